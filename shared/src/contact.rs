@@ -1,0 +1,243 @@
+//! The tip on the belt: Q, b, p and the four solution modes (paper, section II-A).
+//!
+//! In contact z̈_n = b + p f_n. The free normal acceleration b depends on state
+//! and torque; p on the posture, the friction coefficient μ and the direction of slip only.
+
+use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
+
+use crate::arm::Arm;
+use crate::kinematics::Pose;
+use crate::real::Real;
+
+/// Direction of the tip's velocity relative to the belt, ż_r = ż_t − v_belt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Slip {
+    /// ż_r > 0, the paper's case: friction pulls towards −t.
+    Positive,
+    /// ż_r < 0, its mirror image.
+    Negative,
+}
+
+impl Slip {
+    /// The direction of a slip velocity; zero counts as positive.
+    #[inline]
+    pub fn of<T: Real>(slip_velocity: T) -> Self {
+        if slip_velocity < T::zero() {
+            Slip::Negative
+        } else {
+            Slip::Positive
+        }
+    }
+
+    /// +1 or −1.
+    #[inline]
+    pub fn sign<T: Real>(self) -> T {
+        match self {
+            Slip::Positive => T::one(),
+            Slip::Negative => -T::one(),
+        }
+    }
+
+    /// The opposite direction.
+    #[inline]
+    pub fn reversed(self) -> Self {
+        match self {
+            Slip::Positive => Slip::Negative,
+            Slip::Negative => Slip::Positive,
+        }
+    }
+}
+
+/// How the sliding equations can be solved at one state (paper, section II-A).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SolutionMode {
+    /// p > 0, b < 0: the tip slides with f_n = −b/p.
+    Sliding,
+    /// p > 0, b ≥ 0: the tip leaves the belt.
+    Flight,
+    /// p ≤ 0, b ≥ 0: sliding and flight are both solutions.
+    Indeterminate,
+    /// p ≤ 0, b < 0: neither is; only an impact without collision remains.
+    Inconsistent,
+}
+
+impl SolutionMode {
+    /// The mode for given p (1/kg) and b (m/s²).
+    ///
+    /// The paper's section III asks for "b > 0" while sliding; its own equation
+    /// for f_n needs b < 0, which is what its section II says.
+    #[inline]
+    pub fn classify<T: Real>(p: T, b: T) -> Self {
+        match (p > T::zero(), b < T::zero()) {
+            (true, true) => SolutionMode::Sliding,
+            (true, false) => SolutionMode::Flight,
+            (false, false) => SolutionMode::Indeterminate,
+            (false, true) => SolutionMode::Inconsistent,
+        }
+    }
+}
+
+/// Contact-space terms at one state: z̈ = a + Q f.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactTerms<T: Real> {
+    /// Q = J M⁻¹ Jᵀ, 1/kg, symmetric.
+    pub q: Matrix2<T>,
+    /// Tip acceleration without contact force (m/s²); its normal part is b.
+    pub free_acceleration_m_s2: Vector2<T>,
+}
+
+impl<T: Real> ContactTerms<T> {
+    /// Free normal acceleration b, m/s².
+    #[inline]
+    pub fn b(&self) -> T {
+        self.free_acceleration_m_s2.y
+    }
+
+    /// p = Q22 − μ s Q21, 1/kg, with s the slip direction.
+    #[inline]
+    pub fn p(&self, friction: T, slip: Slip) -> T {
+        p_of(&self.q, friction, slip)
+    }
+
+    /// Normal force of sliding, f_n = −b/p, N; meaningful in [`SolutionMode::Sliding`].
+    #[inline]
+    pub fn sliding_normal_force_n(&self, friction: T, slip: Slip) -> T {
+        -self.b() / self.p(friction, slip)
+    }
+
+    /// Contact force (f_t, f_n), N, that gives the tip the acceleration
+    /// `tip_acceleration_m_s2`; `None` where Q is singular (straight arm).
+    #[inline]
+    pub fn force_for_acceleration_n(
+        &self,
+        tip_acceleration_m_s2: &Vector2<T>,
+    ) -> Option<Vector2<T>> {
+        let determinant = self.q.m11 * self.q.m22 - self.q.m12 * self.q.m21;
+        if !(determinant > T::zero()) {
+            return None;
+        }
+        let wanted = tip_acceleration_m_s2 - self.free_acceleration_m_s2;
+        Some(Vector2::new(
+            (self.q.m22 * wanted.x - self.q.m12 * wanted.y) / determinant,
+            (self.q.m11 * wanted.y - self.q.m21 * wanted.x) / determinant,
+        ))
+    }
+}
+
+#[inline]
+fn p_of<T: Real>(q: &Matrix2<T>, friction: T, slip: Slip) -> T {
+    q.m22 - friction * slip.sign::<T>() * q.m21
+}
+
+impl<T: Real> Arm<T> {
+    /// Q = J M⁻¹ Jᵀ, 1/kg.
+    #[inline]
+    pub fn inverse_tip_inertia(&self, pose: &Pose<T>) -> Matrix2<T> {
+        let jacobian = self.jacobian(pose);
+        jacobian * self.inverse_mass_matrix(pose) * jacobian.transpose()
+    }
+
+    /// p of a posture for friction μ and slip direction, 1/kg.
+    #[inline]
+    pub fn p(&self, pose: &Pose<T>, friction: T, slip: Slip) -> T {
+        p_of(&self.inverse_tip_inertia(pose), friction, slip)
+    }
+
+    /// All contact terms at joint angles `theta` (rad), rates `theta_dot`
+    /// (rad/s) and generalised torque `torque_nm` (see
+    /// [`generalised_torque_nm`](crate::dynamics::generalised_torque_nm)).
+    #[inline]
+    pub fn contact_terms(
+        &self,
+        theta: &Vector2<T>,
+        theta_dot: &Vector2<T>,
+        pose: &Pose<T>,
+        torque_nm: &Vector2<T>,
+    ) -> ContactTerms<T> {
+        let jacobian = self.jacobian(pose);
+        let mobility = self.inverse_mass_matrix(pose);
+        let load = torque_nm
+            - self.passive_torque_nm(theta, theta_dot, pose)
+            - self.centrifugal_torque_nm(theta_dot, pose);
+        ContactTerms {
+            q: jacobian * mobility * jacobian.transpose(),
+            free_acceleration_m_s2: jacobian * (mobility * load)
+                + self.centripetal_m_s2(pose, theta_dot),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::ArmParameters;
+    use crate::kinematics::Posture;
+    use proptest::prelude::*;
+
+    fn arm() -> Arm<f64> {
+        Arm::new(ArmParameters::default()).unwrap()
+    }
+
+    fn p_on_belt(tip_t_m: f64, posture: Posture, friction: f64, slip: Slip) -> f64 {
+        let theta = arm().joint_angles_on_belt_rad(tip_t_m, posture).unwrap();
+        arm().p(&Pose::new(&theta), friction, slip)
+    }
+
+    /// Table II of the paper at μ = 0.6: 0.183 elbow up; elbow down it prints
+    /// 0.168, which is the value at μ = 0.5.
+    #[test]
+    fn p_changes_sign_at_the_admissible_edges() {
+        for (edge, margin, posture, friction) in [
+            (0.182_68, 1e-5, Posture::ElbowUp, 0.6),
+            (0.164_71, 1e-5, Posture::ElbowDown, 0.6),
+            (0.168, 1e-3, Posture::ElbowDown, 0.5),
+        ] {
+            assert!(p_on_belt(edge - margin, posture, friction, Slip::Positive) > 0.0);
+            assert!(p_on_belt(edge + margin, posture, friction, Slip::Positive) < 0.0);
+        }
+    }
+
+    #[test]
+    fn the_four_modes_follow_the_signs_of_p_and_b() {
+        assert_eq!(SolutionMode::classify(1.0, -1.0), SolutionMode::Sliding);
+        assert_eq!(SolutionMode::classify(1.0, 1.0), SolutionMode::Flight);
+        assert_eq!(
+            SolutionMode::classify(-1.0, 1.0),
+            SolutionMode::Indeterminate
+        );
+        assert_eq!(
+            SolutionMode::classify(-1.0, -1.0),
+            SolutionMode::Inconsistent
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn p_is_the_same_for_the_mirrored_posture_and_slip(
+            tip in -0.18_f64..0.18, friction in 0.0_f64..1.5, up: bool,
+        ) {
+            let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
+            let here = p_on_belt(tip, posture, friction, Slip::Positive);
+            let there = p_on_belt(-tip, posture.mirrored(), friction, Slip::Negative);
+            prop_assert!((here - there).abs() < 1e-9);
+        }
+
+        #[test]
+        fn the_force_for_an_acceleration_gives_it(
+            tip in -0.17_f64..0.17, w1 in -3.0_f64..3.0, w2 in -3.0_f64..3.0,
+            a_t in -20.0_f64..20.0, a_n in -20.0_f64..20.0,
+        ) {
+            let theta = arm().joint_angles_on_belt_rad(tip, Posture::ElbowDown).unwrap();
+            let terms = arm().contact_terms(
+                &theta, &Vector2::new(w1, w2), &Pose::new(&theta), &Vector2::zeros());
+            let wanted = Vector2::new(a_t, a_n);
+            let force = terms.force_for_acceleration_n(&wanted).unwrap();
+            prop_assert!((terms.free_acceleration_m_s2 + terms.q * force - wanted).norm() < 1e-9);
+        }
+    }
+}

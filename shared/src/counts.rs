@@ -1,0 +1,275 @@
+//! Integers as converters give and take them, and what one count is worth.
+//!
+//! Only integers cross the link. Each quantity has its own type, so that a
+//! force is never scaled as an angle; the plant uses the scalings in `f64`, the
+//! controller in `f32`.
+
+use nalgebra::RealField;
+use serde::{Deserialize, Serialize};
+
+use crate::range::{self, OutOfRange};
+use crate::real::Real;
+
+#[cfg(feature = "zero-copy")]
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+
+macro_rules! counts {
+    ($(#[$documentation:meta])* $name:ident($integer:ty), $type_name:literal) => {
+        $(#[$documentation])*
+        #[repr(C)]
+        #[derive(
+            Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+        )]
+        #[cfg_attr(feature = "zero-copy", derive(ZeroCopySend))]
+        #[cfg_attr(feature = "zero-copy", type_name($type_name))]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        pub struct $name(pub $integer);
+    };
+}
+
+counts!(
+    /// Reading of an absolute single-turn joint encoder, 0 … 2^bits − 1.
+    EncoderCounts(u32), "painleve::EncoderCounts");
+counts!(
+    /// Reading of one axis of the force cell, signed.
+    ForceCounts(i32), "painleve::ForceCounts");
+counts!(
+    /// Command to one torque stage, signed.
+    TorqueCounts(i32), "painleve::TorqueCounts");
+counts!(
+    /// A position along the belt in µm, for display and records.
+    Micrometres(i32), "painleve::Micrometres");
+
+impl Micrometres {
+    /// The nearest whole number of µm; saturates, and NaN gives 0.
+    #[inline]
+    pub fn from_metres<T: Real>(metres: T) -> Self {
+        // Exact for f32 and f64 callers alike: both round the same product.
+        Self(round_to_i32(metres * T::literal(1e6)))
+    }
+
+    /// This position in m.
+    #[inline]
+    pub fn to_metres(self) -> f64 {
+        f64::from(self.0) * 1e-6
+    }
+}
+
+/// Rounds half away from zero; saturates, and NaN gives 0.
+#[inline]
+fn round_to_i32<T: Real>(value: T) -> i32 {
+    let half = T::literal(0.5);
+    let shifted = if value < T::zero() {
+        value - half
+    } else {
+        value + half
+    };
+    // `as` truncates, saturates and maps NaN to zero.
+    truncate(shifted)
+}
+
+#[inline]
+fn truncate<T: Real>(value: T) -> i32 {
+    RealField::clamp(
+        value,
+        T::literal(-2_147_483_648.0),
+        T::literal(2_147_483_520.0),
+    )
+    .to_f64() as i32
+}
+
+/// A joint encoder: resolution and mounting offset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EncoderScale {
+    /// Resolution: 2^bits counts a turn.
+    pub bits: u8,
+    /// Reading at angle zero, counts.
+    pub offset: EncoderCounts,
+}
+
+impl EncoderScale {
+    /// Checks the resolution.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if `bits` is not within 8 … 24: beyond 24 bits a single
+    /// precision angle no longer resolves a count.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        range::check("converters.encoder.bits", f64::from(self.bits), 8.0, 24.0)?;
+        range::check(
+            "converters.encoder.offset_counts",
+            f64::from(self.offset.0),
+            0.0,
+            f64::from(self.modulus() - 1),
+        )
+    }
+
+    /// Counts a turn, 2^bits.
+    #[inline]
+    pub fn modulus(&self) -> u32 {
+        1 << (self.bits & 31)
+    }
+
+    /// One count, rad.
+    #[inline]
+    pub fn rad_per_count<T: Real>(&self) -> T {
+        T::literal(core::f64::consts::TAU / f64::from(self.modulus()))
+    }
+
+    /// Whether an encoder of this resolution can give this reading.
+    #[inline]
+    pub fn contains(&self, reading: EncoderCounts) -> bool {
+        reading.0 < self.modulus()
+    }
+
+    /// Reading nearest to an angle in rad (any number of turns).
+    pub fn reading(&self, angle_rad: f64) -> EncoderCounts {
+        let counts = libm::round(angle_rad / self.rad_per_count::<f64>()) as i64;
+        let modulus = i64::from(self.modulus());
+        let reading = (counts + i64::from(self.offset.0)).rem_euclid(modulus);
+        EncoderCounts(reading as u32)
+    }
+
+    /// Counts from angle zero to a reading, the short way round:
+    /// −2^(bits−1) … 2^(bits−1) − 1.
+    #[inline]
+    pub fn counts_from_zero(&self, reading: EncoderCounts) -> i32 {
+        self.shortest_way(reading.0.wrapping_sub(self.offset.0))
+    }
+
+    /// Counts from one reading to the next, the short way round.
+    #[inline]
+    pub fn difference(&self, from: EncoderCounts, to: EncoderCounts) -> i32 {
+        self.shortest_way(to.0.wrapping_sub(from.0))
+    }
+
+    #[inline]
+    fn shortest_way(&self, counts: u32) -> i32 {
+        let unused = 32 - u32::from(self.bits & 31);
+        // Shifting up and back extends the sign of a number of `bits` bits.
+        ((counts << (unused & 31)) as i32) >> (unused & 31)
+    }
+}
+
+/// A converter that is linear over ±`range`: a force cell or a torque stage.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LinearScale<T: Real> {
+    /// Resolution: 2^bits counts over the whole range.
+    pub bits: u8,
+    /// Full scale to either side, in the quantity's unit (N or N·m).
+    pub range: T,
+}
+
+impl<T: Real> LinearScale<T> {
+    /// Checks resolution and range; `bits_key` and `range_key` name them.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if bits are not within 4 … 24 or the range is not positive.
+    pub fn validate(
+        &self,
+        bits_key: &'static str,
+        range_key: &'static str,
+    ) -> Result<(), OutOfRange> {
+        range::check(bits_key, f64::from(self.bits), 4.0, 24.0)?;
+        range::check(range_key, self.range, 1e-3, 1e6)
+    }
+
+    /// One count in the quantity's unit.
+    #[inline]
+    pub fn per_count(&self) -> T {
+        self.range / T::literal(f64::from(1_u32 << ((self.bits & 31).wrapping_sub(1) & 31)))
+    }
+
+    /// Largest reading, 2^(bits−1) − 1; the smallest is one below its negative.
+    #[inline]
+    pub fn maximum_counts(&self) -> i32 {
+        (1_i32 << ((self.bits & 31).wrapping_sub(1) & 31)).wrapping_sub(1)
+    }
+
+    /// Whether a converter of this resolution can give or take this reading.
+    #[inline]
+    pub fn contains(&self, counts: i32) -> bool {
+        let maximum = self.maximum_counts();
+        (-maximum - 1..=maximum).contains(&counts)
+    }
+
+    /// Nearest reading, and whether it had to be limited; NaN gives 0.
+    #[inline]
+    pub fn counts(&self, value: T) -> (i32, bool) {
+        let wanted = round_to_i32(value / self.per_count());
+        let maximum = self.maximum_counts();
+        let counts = wanted.clamp(-maximum - 1, maximum);
+        (counts, counts != wanted)
+    }
+
+    /// Value of a reading in the quantity's unit.
+    #[inline]
+    pub fn value(&self, counts: i32) -> T {
+        // Exact: a reading has at most 24 bits.
+        T::literal(f64::from(counts)) * self.per_count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_14_bit_encoder_resolves_383_microradians() {
+        let encoder = EncoderScale {
+            bits: 14,
+            offset: EncoderCounts(0),
+        };
+        assert!((encoder.rad_per_count::<f64>() - 0.383e-3).abs() < 1e-6);
+        assert_eq!(encoder.reading(-0.383e-3), EncoderCounts(16383));
+        assert_eq!(encoder.counts_from_zero(EncoderCounts(16383)), -1);
+    }
+
+    #[test]
+    fn a_12_bit_torque_stage_saturates_and_says_so() {
+        let stage = LinearScale {
+            bits: 12,
+            range: 5.0_f32,
+        };
+        assert_eq!(stage.counts(7.0), (2047, true));
+        assert_eq!(stage.counts(-5.0), (-2048, false));
+        assert_eq!(stage.counts(f32::NAN), (0, false));
+        assert!(!stage.contains(2048));
+    }
+
+    proptest! {
+        #[test]
+        fn encoder_readings_round_trip_within_half_a_count(
+            angle in -3.1_f64..3.1, bits in 8_u8..=24, offset in 0_u32..256,
+        ) {
+            let encoder = EncoderScale { bits, offset: EncoderCounts(offset) };
+            let reading = encoder.reading(angle);
+            prop_assert!(encoder.contains(reading));
+            let lsb: f64 = encoder.rad_per_count();
+            let back = f64::from(encoder.counts_from_zero(reading)) * lsb;
+            prop_assert!((back - angle).abs() <= 0.5 * lsb * (1.0 + 1e-9));
+        }
+
+        #[test]
+        fn differences_go_the_short_way_round_the_turn(
+            start in 0_u32..16384, step in -8192_i32..8192,
+        ) {
+            let encoder = EncoderScale { bits: 14, offset: EncoderCounts(77) };
+            let end = (start as i32 + step).rem_euclid(16384) as u32;
+            prop_assert_eq!(encoder.difference(EncoderCounts(start), EncoderCounts(end)), step);
+        }
+
+        #[test]
+        fn linear_readings_round_trip_exactly(bits in 4_u8..=24, fraction in -1.0_f64..1.0) {
+            let single = LinearScale { bits, range: 5.0_f32 };
+            let double = LinearScale { bits, range: 5.0_f64 };
+            let (counts, limited) = double.counts(fraction * 4.999);
+            prop_assert!(double.contains(counts));
+            if !limited {
+                prop_assert!((double.value(counts) - fraction * 4.999).abs() <= 0.5001 * double.per_count());
+            }
+            // What the controller scales and sends back is the same integer.
+            prop_assert_eq!(single.counts(single.value(counts)), (counts, false));
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Where the tip is, and which joint angles put it there.
+//!
+//! z = (z_t, z_n): z_t along the belt, z_n upwards, origin in the first joint.
+//! The belt is at z_n = −H. All lengths in m, angles in rad.
+
+use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
+
+use crate::arm::Arm;
+use crate::real::Real;
+
+/// Which way the elbow bends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Posture {
+    /// θ2 − θ1 > 0.
+    ElbowUp,
+    /// θ2 − θ1 < 0.
+    ElbowDown,
+}
+
+impl Posture {
+    /// The posture of the joint angles `theta` = (θ1, θ2); the straight arm
+    /// counts as elbow down.
+    pub fn of<T: Real>(theta: &Vector2<T>) -> Self {
+        if theta.y > theta.x {
+            Posture::ElbowUp
+        } else {
+            Posture::ElbowDown
+        }
+    }
+
+    /// The mirror image about the vertical.
+    pub fn mirrored(self) -> Self {
+        match self {
+            Posture::ElbowUp => Posture::ElbowDown,
+            Posture::ElbowDown => Posture::ElbowUp,
+        }
+    }
+}
+
+/// Sines and cosines of the joint angles: evaluated once, used everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose<T: Real> {
+    /// sin θ1, sin θ2.
+    pub sine: Vector2<T>,
+    /// cos θ1, cos θ2.
+    pub cosine: Vector2<T>,
+}
+
+impl<T: Real> Pose<T> {
+    /// The pose of joint angles (θ1, θ2) in rad.
+    #[inline]
+    pub fn new(theta: &Vector2<T>) -> Self {
+        let (sine_1, cosine_1) = theta.x.sine_cosine();
+        let (sine_2, cosine_2) = theta.y.sine_cosine();
+        Self {
+            sine: Vector2::new(sine_1, sine_2),
+            cosine: Vector2::new(cosine_1, cosine_2),
+        }
+    }
+
+    /// sin(θ2 − θ1): zero for the straight arm.
+    #[inline]
+    pub fn sine_elbow(&self) -> T {
+        self.sine.y * self.cosine.x - self.cosine.y * self.sine.x
+    }
+
+    /// cos(θ2 − θ1).
+    #[inline]
+    pub fn cosine_elbow(&self) -> T {
+        self.cosine.y * self.cosine.x + self.sine.y * self.sine.x
+    }
+}
+
+impl<T: Real> Arm<T> {
+    /// Tip position z = (z_t, z_n), m.
+    #[inline]
+    pub fn tip_m(&self, pose: &Pose<T>) -> Vector2<T> {
+        let length = self.parameters().link_length_m;
+        Vector2::new(
+            length * (pose.sine.x + pose.sine.y),
+            -length * (pose.cosine.x + pose.cosine.y),
+        )
+    }
+
+    /// Height of the tip above the belt, z_n + H, m; negative inside the belt.
+    #[inline]
+    pub fn gap_m(&self, pose: &Pose<T>) -> T {
+        let parameters = self.parameters();
+        parameters.height_m - parameters.link_length_m * (pose.cosine.x + pose.cosine.y)
+    }
+
+    /// Jacobian J with ż = J θ̇, m; its rows are the paper's j1 and j2.
+    #[inline]
+    pub fn jacobian(&self, pose: &Pose<T>) -> Matrix2<T> {
+        let length = self.parameters().link_length_m;
+        Matrix2::new(
+            length * pose.cosine.x,
+            length * pose.cosine.y,
+            length * pose.sine.x,
+            length * pose.sine.y,
+        )
+    }
+
+    /// Centripetal acceleration s = J̇ θ̇ of the tip, m/s², for joint rates θ̇ (rad/s).
+    #[inline]
+    pub fn centripetal_m_s2(&self, pose: &Pose<T>, theta_dot: &Vector2<T>) -> Vector2<T> {
+        let length = self.parameters().link_length_m;
+        let square_1 = theta_dot.x * theta_dot.x;
+        let square_2 = theta_dot.y * theta_dot.y;
+        Vector2::new(
+            -length * (square_1 * pose.sine.x + square_2 * pose.sine.y),
+            length * (square_1 * pose.cosine.x + square_2 * pose.cosine.y),
+        )
+    }
+
+    /// Joint angles (θ1, θ2) that put the tip at `tip_m` = (z_t, z_n) in the
+    /// given posture; `None` where the arm does not reach, or for NaN.
+    ///
+    /// With equal links the tip direction halves the elbow angle: θ = φ ∓ β,
+    /// tan φ = −z_t/z_n, cos β = |z|/2l.
+    pub fn joint_angles_rad(&self, tip_m: &Vector2<T>, posture: Posture) -> Option<Vector2<T>> {
+        let distance = (tip_m.x * tip_m.x + tip_m.y * tip_m.y).square_root();
+        let cosine_half_elbow = distance / (self.parameters().link_length_m * T::literal(2.0));
+        // Written so that NaN is refused as well.
+        if !(cosine_half_elbow <= T::one()) {
+            return None;
+        }
+        let direction = tip_m.x.arc_tangent_2(-tip_m.y);
+        let half_elbow = cosine_half_elbow.arc_cosine();
+        let (first, second) = (direction - half_elbow, direction + half_elbow);
+        Some(match posture {
+            Posture::ElbowUp => Vector2::new(first, second),
+            Posture::ElbowDown => Vector2::new(second, first),
+        })
+    }
+
+    /// Joint angles with the tip on the belt at `tip_t_m`; `None` out of reach.
+    pub fn joint_angles_on_belt_rad(&self, tip_t_m: T, posture: Posture) -> Option<Vector2<T>> {
+        self.joint_angles_rad(&Vector2::new(tip_t_m, -self.parameters().height_m), posture)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::ArmParameters;
+    use proptest::prelude::*;
+
+    fn arm() -> Arm<f64> {
+        Arm::new(ArmParameters::default()).unwrap()
+    }
+
+    #[test]
+    fn the_papers_start_postures_are_mirror_solutions_of_one_tip_position() {
+        let down = Vector2::new((-11.4_f64).to_radians(), (-35.1_f64).to_radians());
+        let up = Vector2::new(down.y, down.x);
+        assert_eq!(Posture::of(&down), Posture::ElbowDown);
+        assert_eq!(Posture::of(&up), Posture::ElbowUp);
+        for theta in [down, up] {
+            let tip = arm().tip_m(&Pose::new(&theta));
+            assert!((tip.x + 0.1624).abs() < 2e-4, "{tip}");
+            assert!((tip.y + 0.3775).abs() < 2e-4, "{tip}");
+        }
+    }
+
+    #[test]
+    fn out_of_reach_and_nan_have_no_joint_angles() {
+        assert!(
+            arm()
+                .joint_angles_on_belt_rad(0.1842, Posture::ElbowUp)
+                .is_none()
+        );
+        assert!(
+            arm()
+                .joint_angles_on_belt_rad(f64::NAN, Posture::ElbowUp)
+                .is_none()
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn inverse_kinematics_returns_to_the_tip(
+            distance in 0.02_f64..0.4199, direction in -1.5_f64..1.5, up: bool,
+        ) {
+            let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
+            let tip = Vector2::new(distance * direction.sin(), -distance * direction.cos());
+            let theta = arm().joint_angles_rad(&tip, posture).unwrap();
+            prop_assert!((arm().tip_m(&Pose::new(&theta)) - tip).norm() < 1e-12);
+            prop_assert_eq!(Posture::of(&theta), posture);
+        }
+
+        #[test]
+        fn jacobian_and_centripetal_term_are_derivatives_of_the_tip(
+            t1 in -3.0_f64..3.0, t2 in -3.0_f64..3.0, w1 in -5.0_f64..5.0, w2 in -5.0_f64..5.0,
+        ) {
+            let (theta, rate, step) = (Vector2::new(t1, t2), Vector2::new(w1, w2), 1e-4);
+            let tip = |s: f64| arm().tip_m(&Pose::new(&(theta + rate * s)));
+            let velocity = (tip(step) - tip(-step)) / (2.0 * step);
+            let acceleration = (tip(step) - tip(0.0) * 2.0 + tip(-step)) / (step * step);
+            let pose = Pose::new(&theta);
+            prop_assert!((arm().jacobian(&pose) * rate - velocity).norm() < 1e-6);
+            prop_assert!((arm().centripetal_m_s2(&pose, &rate) - acceleration).norm() < 1e-5);
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! What the arm's controller and its simulated plant must agree on.
+//!
+//! - [`arm`]: the arm's parameters, checked once, and the model made from them
+//! - [`kinematics`], [`dynamics`]: tip, Jacobian, inverse kinematics; M, w, c and energy
+//! - [`contact`]: Q, b, p and the four solution modes of the tip on the belt
+//! - [`counts`]: integers as converters give and take them, with their scaling
+//! - [`frame`], [`status`]: what crosses the link at every control tick
+//! - [`wire`]: the same frames as bytes, for links that are not shared memory
+//! - [`real`], [`range`]: scalars with host-independent functions, and range errors
+//!
+//! Equations and symbols are those of Marchese, Coraggio, Hogan and di Bernardo,
+//! *Control of Painlevé Paradox in a Robotic System* (arXiv:1907.04070), "the
+//! paper" throughout. Everything is generic over `f32` (controller) and `f64`
+//! (plant), needs no heap and never panics.
+
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod arm;
+pub mod contact;
+pub mod counts;
+pub mod dynamics;
+pub mod frame;
+pub mod kinematics;
+pub mod range;
+pub mod real;
+pub mod status;
+pub mod wire;
+
+pub use arm::{Arm, ArmParameters};
+pub use contact::{ContactTerms, Slip, SolutionMode};
+pub use frame::{ActuatorFrame, SensorFrame};
+pub use kinematics::{Pose, Posture};
+pub use range::OutOfRange;
+pub use real::Real;

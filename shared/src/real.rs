@@ -1,0 +1,170 @@
+//! The scalar of the mechanics: `f32` or `f64` with elementary functions that
+//! give the same bits on every host.
+//!
+//! Addition, multiplication, division and square root are fixed by IEEE 754.
+//! Sine, cosine and their inverses are not: a C library may round them
+//! differently on every machine. They are therefore never taken from the host.
+//! In `f64` (plant) they come from the `libm` crate. In `f32` (controller) sine
+//! and cosine are a polynomial, because `libm` evaluates them in `f64`, which is
+//! software on a Cortex-M4F: about 2,100 instructions against a few dozen.
+
+use nalgebra::RealField;
+
+/// A real number whose elementary functions do not depend on the host.
+pub trait Real: RealField + Copy {
+    /// The nearest number to an `f64` literal.
+    fn literal(value: f64) -> Self;
+
+    /// This number as `f64`, exact for `f32` and `f64`.
+    fn to_f64(self) -> f64;
+
+    /// Sine and cosine of an angle in rad.
+    fn sine_cosine(self) -> (Self, Self);
+
+    /// Arc cosine in rad; NaN outside -1 … 1.
+    fn arc_cosine(self) -> Self;
+
+    /// Angle of the point (`x`, `self`) in rad, -π … π.
+    fn arc_tangent_2(self, x: Self) -> Self;
+
+    /// Square root, correctly rounded; NaN below zero.
+    fn square_root(self) -> Self;
+}
+
+impl Real for f64 {
+    #[inline]
+    fn literal(value: f64) -> Self {
+        value
+    }
+
+    #[inline]
+    fn to_f64(self) -> f64 {
+        self
+    }
+
+    #[inline]
+    fn sine_cosine(self) -> (Self, Self) {
+        libm::sincos(self)
+    }
+
+    #[inline]
+    fn arc_cosine(self) -> Self {
+        libm::acos(self)
+    }
+
+    #[inline]
+    fn arc_tangent_2(self, x: Self) -> Self {
+        libm::atan2(self, x)
+    }
+
+    #[inline]
+    fn square_root(self) -> Self {
+        libm::sqrt(self)
+    }
+}
+
+impl Real for f32 {
+    #[inline]
+    fn literal(value: f64) -> Self {
+        value as f32
+    }
+
+    #[inline]
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+
+    #[inline]
+    fn sine_cosine(self) -> (Self, Self) {
+        sine_cosine_f32(self)
+    }
+
+    #[inline]
+    fn arc_cosine(self) -> Self {
+        libm::acosf(self)
+    }
+
+    #[inline]
+    fn arc_tangent_2(self, x: Self) -> Self {
+        libm::atan2f(self, x)
+    }
+
+    #[inline]
+    fn square_root(self) -> Self {
+        libm::sqrtf(self)
+    }
+}
+
+/// Largest angle (rad) that the three-part reduction below handles exactly; an
+/// unwrapped joint angle stays far inside it.
+const REDUCTION_LIMIT_RAD: f32 = 8192.0;
+
+/// Sine and cosine in single precision only.
+///
+/// Reduction to ±π/4 by Cody and Waite's three-part π/2 and the minimax
+/// polynomials of Cephes `sinf.c` (Moshier). The absolute error is below 1.2e-7,
+/// two units in the last place of 1, for |angle| up to 8192 rad; beyond that `libm`
+/// takes over.
+fn sine_cosine_f32(angle: f32) -> (f32, f32) {
+    const HALF_PI_HIGH: f32 = 1.570_312_5;
+    const HALF_PI_MIDDLE: f32 = 4.837_513e-4;
+    const HALF_PI_LOW: f32 = 7.549_79e-8;
+
+    if !(-REDUCTION_LIMIT_RAD..=REDUCTION_LIMIT_RAD).contains(&angle) {
+        return libm::sincosf(angle);
+    }
+    let turns = angle * core::f32::consts::FRAC_2_PI;
+    let quadrant = (turns + if turns < 0.0 { -0.5 } else { 0.5 }) as i32;
+    let k = quadrant as f32;
+    let x = ((angle - k * HALF_PI_HIGH) - k * HALF_PI_MIDDLE) - k * HALF_PI_LOW;
+    let z = x * x;
+    let sine = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z * x + x;
+    let cosine =
+        ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z - 0.5 * z + 1.0;
+    match quadrant & 3 {
+        0 => (sine, cosine),
+        1 => (cosine, -sine),
+        2 => (-sine, -cosine),
+        _ => (-cosine, sine),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{f32, format};
+
+    /// The polynomial against double precision, over every angle a joint can
+    /// have and the whole range of the reduction.
+    #[test]
+    fn single_precision_sine_and_cosine_are_within_two_units_of_one() {
+        let mut worst = 0.0_f64;
+        let fine = (-400_000..=400_000).map(|i| i as f32 * 2.5e-5);
+        let coarse = (-819_200..=819_200).map(|i| i as f32 * 0.01);
+        for angle in fine.chain(coarse) {
+            let (sine, cosine) = angle.sine_cosine();
+            let exact = f64::from(angle);
+            worst = worst
+                .max((f64::from(sine) - libm::sin(exact)).abs())
+                .max((f64::from(cosine) - libm::cos(exact)).abs());
+        }
+        assert!(worst < 1.2e-7, "{}", format!("worst error {worst:e}"));
+    }
+
+    #[test]
+    fn small_angles_keep_their_relative_accuracy() {
+        for exponent in -30..0 {
+            let angle = libm::ldexpf(1.3, exponent);
+            let (sine, _) = angle.sine_cosine();
+            let exact = libm::sin(f64::from(angle));
+            assert!((f64::from(sine) - exact).abs() <= 1.2e-7 * exact.abs());
+        }
+    }
+
+    #[test]
+    fn huge_and_non_finite_angles_do_not_misbehave() {
+        assert_eq!(1.0e30_f32.sine_cosine(), libm::sincosf(1.0e30));
+        assert!(f32::NAN.sine_cosine().0.is_nan());
+        assert!(f32::INFINITY.sine_cosine().1.is_nan());
+    }
+}
