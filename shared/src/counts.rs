@@ -11,7 +11,10 @@ use crate::range::{self, OutOfRange};
 use crate::real::Real;
 
 #[cfg(feature = "zero-copy")]
-use iceoryx2_bb_derive_macros::ZeroCopySend;
+use {
+    iceoryx2_bb_derive_macros::ZeroCopySend,
+    iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend,
+};
 
 macro_rules! counts {
     ($(#[$documentation:meta])* $name:ident($integer:ty), $type_name:literal) => {

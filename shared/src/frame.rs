@@ -10,7 +10,10 @@ use crate::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
 use crate::status::{Fault, SupervisorState};
 
 #[cfg(feature = "zero-copy")]
-use iceoryx2_bb_derive_macros::ZeroCopySend;
+use {
+    iceoryx2_bb_derive_macros::ZeroCopySend,
+    iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend,
+};
 
 /// Digital inputs of the controller, one bit each.
 #[repr(C)]

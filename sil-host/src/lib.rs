@@ -1,1 +1,4 @@
-//! x
+//! The host side of the bench: a simulated arm on a moving belt with its
+//! converters, and everything around it.
+
+pub mod plant;

@@ -1,0 +1,276 @@
+//! Belt speed over time.
+
+use painleve_shared::range::{self, OutOfRange};
+use serde::{Deserialize, Serialize};
+
+/// Fastest belt that a scenario may ask for, m/s.
+const MAXIMUM_SPEED_M_S: f64 = 100.0;
+
+/// Speed of the belt, v_belt, as a function of time; positive along +t.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum BeltProfile {
+    /// Always the same speed.
+    Constant {
+        /// Speed, m/s.
+        speed_m_s: f64,
+    },
+    /// One speed before `at_s`, another from then on.
+    Step {
+        /// Speed before the step, m/s.
+        from_m_s: f64,
+        /// Speed from the step on, m/s.
+        to_m_s: f64,
+        /// Time of the step, s.
+        at_s: f64,
+    },
+    /// A change of speed at constant acceleration.
+    Ramp {
+        /// Speed before the ramp, m/s.
+        from_m_s: f64,
+        /// Speed after the ramp, m/s.
+        to_m_s: f64,
+        /// Time at which the ramp starts, s.
+        start_s: f64,
+        /// How long the ramp takes, s.
+        duration_s: f64,
+    },
+    /// A sine around a mean speed.
+    Sine {
+        /// Mean speed, m/s.
+        mean_m_s: f64,
+        /// Amplitude, m/s.
+        amplitude_m_s: f64,
+        /// Frequency, Hz.
+        frequency_hz: f64,
+    },
+}
+
+impl Default for BeltProfile {
+    /// The paper's section III: −0.4 m/s.
+    fn default() -> Self {
+        Self::Constant { speed_m_s: -0.4 }
+    }
+}
+
+impl BeltProfile {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        let speed = |key, value| range::check(key, value, -MAXIMUM_SPEED_M_S, MAXIMUM_SPEED_M_S);
+        match *self {
+            Self::Constant { speed_m_s } => speed("belt.profile.speed_m_s", speed_m_s),
+            Self::Step {
+                from_m_s,
+                to_m_s,
+                at_s,
+            } => {
+                speed("belt.profile.from_m_s", from_m_s)?;
+                speed("belt.profile.to_m_s", to_m_s)?;
+                range::check("belt.profile.at_s", at_s, 0.0, 1e7)
+            }
+            Self::Ramp {
+                from_m_s,
+                to_m_s,
+                start_s,
+                duration_s,
+            } => {
+                speed("belt.profile.from_m_s", from_m_s)?;
+                speed("belt.profile.to_m_s", to_m_s)?;
+                range::check("belt.profile.start_s", start_s, 0.0, 1e7)?;
+                range::check("belt.profile.duration_s", duration_s, 1e-6, 1e7)
+            }
+            Self::Sine {
+                mean_m_s,
+                amplitude_m_s,
+                frequency_hz,
+            } => {
+                speed("belt.profile.mean_m_s", mean_m_s)?;
+                speed("belt.profile.amplitude_m_s", amplitude_m_s)?;
+                range::check("belt.profile.frequency_hz", frequency_hz, 1e-6, 1e3)
+            }
+        }
+    }
+
+    /// Speed at time `t_s`, m/s.
+    pub fn speed_m_s(&self, t_s: f64) -> f64 {
+        match *self {
+            Self::Constant { speed_m_s } => speed_m_s,
+            Self::Step {
+                from_m_s,
+                to_m_s,
+                at_s,
+            } => {
+                if t_s < at_s {
+                    from_m_s
+                } else {
+                    to_m_s
+                }
+            }
+            Self::Ramp {
+                from_m_s,
+                to_m_s,
+                start_s,
+                duration_s,
+            } => {
+                let progress = ((t_s - start_s) / duration_s).clamp(0.0, 1.0);
+                from_m_s + (to_m_s - from_m_s) * progress
+            }
+            Self::Sine {
+                mean_m_s,
+                amplitude_m_s,
+                frequency_hz,
+            } => {
+                let phase = core::f64::consts::TAU * frequency_hz * t_s;
+                mean_m_s + amplitude_m_s * libm::sin(phase)
+            }
+        }
+    }
+
+    /// Acceleration at time `t_s`, m/s²; at a corner that of the time after it.
+    pub fn acceleration_m_s2(&self, t_s: f64) -> f64 {
+        match *self {
+            Self::Constant { .. } | Self::Step { .. } => 0.0,
+            Self::Ramp {
+                from_m_s,
+                to_m_s,
+                start_s,
+                duration_s,
+            } => {
+                if (start_s..start_s + duration_s).contains(&t_s) {
+                    (to_m_s - from_m_s) / duration_s
+                } else {
+                    0.0
+                }
+            }
+            Self::Sine {
+                amplitude_m_s,
+                frequency_hz,
+                ..
+            } => {
+                let rate = core::f64::consts::TAU * frequency_hz;
+                amplitude_m_s * rate * libm::cos(rate * t_s)
+            }
+        }
+    }
+
+    /// Distance the belt moves from `from_s` to `to_s`, m.
+    pub fn displacement_m(&self, from_s: f64, to_s: f64) -> f64 {
+        self.position_m(to_s) - self.position_m(from_s)
+    }
+
+    /// Integral of the speed from time zero, m.
+    fn position_m(&self, t_s: f64) -> f64 {
+        match *self {
+            Self::Constant { speed_m_s } => speed_m_s * t_s,
+            Self::Step {
+                from_m_s,
+                to_m_s,
+                at_s,
+            } => from_m_s * t_s + (to_m_s - from_m_s) * (t_s - at_s).max(0.0),
+            Self::Ramp {
+                from_m_s,
+                to_m_s,
+                start_s,
+                duration_s,
+            } => {
+                let inside = (t_s - start_s).clamp(0.0, duration_s);
+                let after = (t_s - start_s - duration_s).max(0.0);
+                let change = to_m_s - from_m_s;
+                from_m_s * t_s + change * (0.5 * inside * inside / duration_s + after)
+            }
+            Self::Sine {
+                mean_m_s,
+                amplitude_m_s,
+                frequency_hz,
+            } => {
+                let rate = core::f64::consts::TAU * frequency_hz;
+                mean_m_s * t_s + amplitude_m_s * (1.0 - libm::cos(rate * t_s)) / rate
+            }
+        }
+    }
+
+    /// The next time after `t_s` at which speed or acceleration jumps, s;
+    /// infinite if there is none.
+    pub fn next_corner_s(&self, t_s: f64) -> f64 {
+        let corners = match *self {
+            Self::Constant { .. } | Self::Sine { .. } => [f64::INFINITY; 2],
+            Self::Step { at_s, .. } => [at_s, f64::INFINITY],
+            Self::Ramp {
+                start_s,
+                duration_s,
+                ..
+            } => [start_s, start_s + duration_s],
+        };
+        corners
+            .into_iter()
+            .find(|corner| *corner > t_s)
+            .unwrap_or(f64::INFINITY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn profiles() -> impl Strategy<Value = BeltProfile> {
+        let speed = -1.0_f64..1.0;
+        prop_oneof![
+            speed
+                .clone()
+                .prop_map(|speed_m_s| BeltProfile::Constant { speed_m_s }),
+            (speed.clone(), speed.clone(), 0.0..2.0_f64).prop_map(|(from_m_s, to_m_s, at_s)| {
+                BeltProfile::Step {
+                    from_m_s,
+                    to_m_s,
+                    at_s,
+                }
+            }),
+            (speed.clone(), speed.clone(), 0.0..2.0_f64, 0.1..2.0_f64).prop_map(
+                |(from_m_s, to_m_s, start_s, duration_s)| BeltProfile::Ramp {
+                    from_m_s,
+                    to_m_s,
+                    start_s,
+                    duration_s,
+                }
+            ),
+            (speed.clone(), speed, 0.1..5.0_f64).prop_map(
+                |(mean_m_s, amplitude_m_s, frequency_hz)| BeltProfile::Sine {
+                    mean_m_s,
+                    amplitude_m_s,
+                    frequency_hz,
+                }
+            ),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn displacement_and_acceleration_belong_to_the_speed(
+            profile in profiles(), t in 0.001_f64..4.0,
+        ) {
+            let step = 1e-6;
+            prop_assume!(profile.next_corner_s(t - step) > t + step);
+            let speed = profile.displacement_m(t - step, t + step) / (2.0 * step);
+            let acceleration =
+                (profile.speed_m_s(t + step) - profile.speed_m_s(t - step)) / (2.0 * step);
+            prop_assert!((speed - profile.speed_m_s(t)).abs() < 1e-8);
+            prop_assert!((acceleration - profile.acceleration_m_s2(t)).abs() < 1e-5);
+            prop_assert!(profile.validate().is_ok());
+        }
+    }
+
+    #[test]
+    fn bad_numbers_are_named() {
+        let profile = BeltProfile::Constant {
+            speed_m_s: f64::NAN,
+        };
+        assert_eq!(
+            profile.validate().unwrap_err().key,
+            "belt.profile.speed_m_s"
+        );
+    }
+}

@@ -1,0 +1,592 @@
+//! The plant: a two-link rigid arm whose tip meets a moving belt with Coulomb friction.
+//!
+//! A hybrid system. Between events the state follows the smooth equations of its
+//! contact mode ([`motion`]), integrated with adaptive steps ([`dop853`]). Events
+//! are located inside the step ([`event`]): the tip lands, slip dies, the normal
+//! force vanishes, the friction cone is left, p reaches zero. At an event the
+//! tip collides ([`impact`]) and the mode that follows is decided anew
+//! ([`transition`]). In contact the state is projected back onto the belt after
+//! every step, so that the constraint does not drift.
+//!
+//! Torque is held between commands ([`torque`]); the belt's speed is a function
+//! of time ([`belt`]). Nothing allocates after construction, nothing is random,
+//! and elementary functions come from `libm`, so that equal inputs give equal
+//! bits on every host.
+
+pub mod belt;
+pub mod dop853;
+pub mod event;
+pub mod impact;
+pub mod motion;
+pub mod statistics;
+pub mod torque;
+pub mod transition;
+
+use nalgebra::Vector2;
+use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::{Arm, ArmParameters, Pose, Slip};
+use serde::{Deserialize, Serialize};
+
+use belt::BeltProfile;
+use dop853::{Step, Tolerance};
+use impact::ImpactLaw;
+use motion::{ContactMode, Motion, State};
+use torque::TorqueSegment;
+use transition::{Indeterminate, Next};
+
+/// Everything that defines the plant's equations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlantParameters {
+    /// The arm.
+    pub arm: ArmParameters<f64>,
+    /// Friction coefficient μ between tip and belt.
+    pub friction: f64,
+    /// The belt's speed.
+    pub belt: BeltProfile,
+    /// How the tip bounces.
+    pub impact: ImpactLaw,
+    /// Accuracy and conventions.
+    pub solver: SolverSettings,
+}
+
+impl Default for PlantParameters {
+    /// The paper's section III: Table I, μ = 0.6, v_belt = −0.4 m/s.
+    fn default() -> Self {
+        Self {
+            arm: ArmParameters::default(),
+            friction: 0.6,
+            belt: BeltProfile::default(),
+            impact: ImpactLaw::default(),
+            solver: SolverSettings::default(),
+        }
+    }
+}
+
+/// Accuracy of the solution and conventions where the model leaves a choice.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SolverSettings {
+    /// Error of one step relative to the state.
+    pub relative_tolerance: f64,
+    /// Error of one step, rad and rad/s.
+    pub absolute_tolerance: f64,
+    /// Largest step, s.
+    pub maximum_step_s: f64,
+    /// A rebound slower than this ends a series of bounces, m/s.
+    pub chatter_speed_m_s: f64,
+    /// What follows where both sliding and flight are solutions.
+    pub indeterminate: Indeterminate,
+}
+
+impl Default for SolverSettings {
+    fn default() -> Self {
+        Self {
+            relative_tolerance: 1e-9,
+            absolute_tolerance: 1e-10,
+            maximum_step_s: 0.05,
+            // The last bounces lower than 1e-13 m, below rounding of the gap.
+            chatter_speed_m_s: 1e-6,
+            indeterminate: Indeterminate::Flight,
+        }
+    }
+}
+
+impl SolverSettings {
+    fn validate(&self) -> Result<(), OutOfRange> {
+        range::check(
+            "solver.relative_tolerance",
+            self.relative_tolerance,
+            1e-13,
+            1e-3,
+        )?;
+        range::check(
+            "solver.absolute_tolerance",
+            self.absolute_tolerance,
+            1e-14,
+            1e-3,
+        )?;
+        range::check("solver.maximum_step_s", self.maximum_step_s, 1e-5, 1.0)?;
+        range::check(
+            "solver.chatter_speed_m_s",
+            self.chatter_speed_m_s,
+            1e-8,
+            1e-2,
+        )
+    }
+}
+
+/// Why the plant cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// The integrator needs steps below rounding of the time.
+    #[error("the plant's step size vanished at t = {time_s} s in mode {mode:?}")]
+    StepVanished {
+        /// When, s.
+        time_s: f64,
+        /// In which mode.
+        mode: ContactMode,
+    },
+    /// Events follow each other without time passing.
+    #[error("contact events without end at t = {time_s} s")]
+    EventsWithoutEnd {
+        /// When, s.
+        time_s: f64,
+    },
+    /// A collision has no solution.
+    #[error("at t = {time_s} s: {source}")]
+    EndlessImpact {
+        /// When, s.
+        time_s: f64,
+        /// Which.
+        source: impact::EndlessImpact,
+    },
+}
+
+/// A discontinuity of the motion, as told to an [`Observer`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// The tip hit the belt with this normal velocity (m/s, negative).
+    Impact {
+        /// Normal velocity before, m/s.
+        approach_m_s: f64,
+    },
+    /// The tip was thrown off out of sliding although nothing collided.
+    ImpactWithoutCollision,
+    /// The mode changed.
+    ModeChange {
+        /// Mode before.
+        from: ContactMode,
+        /// Mode after.
+        to: ContactMode,
+    },
+}
+
+/// One accepted step of the plant, as told to an [`Observer`].
+#[derive(Clone, Copy, Debug)]
+pub struct PlantStep<'a> {
+    /// The equations of the step.
+    pub motion: &'a Motion<'a>,
+    /// The contact mode during the step.
+    pub mode: ContactMode,
+    /// Start time, s.
+    pub start_s: f64,
+    /// State at the start.
+    pub start: &'a State,
+    /// End time, s.
+    pub end_s: f64,
+    /// State at the end.
+    pub end: &'a State,
+}
+
+/// Watches a plant while it advances.
+pub trait Observer {
+    /// Called after every accepted step.
+    fn step(&mut self, step: &PlantStep<'_>);
+    /// Called at every discontinuity; `state` is the one after it.
+    fn event(&mut self, time_s: f64, event: Event, state: &State);
+}
+
+/// Watches nothing.
+impl Observer for () {
+    fn step(&mut self, _: &PlantStep<'_>) {}
+    fn event(&mut self, _: f64, _: Event, _: &State) {}
+}
+
+/// More events than any motion has within the shortest time that matters.
+const MAXIMUM_EVENTS_AT_ONE_TIME: u32 = 1000;
+
+/// The simulated arm on its belt.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    arm: Arm<f64>,
+    friction: f64,
+    belt: BeltProfile,
+    impact: ImpactLaw,
+    solver: SolverSettings,
+    torque: TorqueSegment,
+    time_s: f64,
+    state: State,
+    mode: ContactMode,
+    /// Where the tip came to stick: time (s) and z_t (m).
+    stick_start: (f64, f64),
+    /// The torque or the belt has changed since the mode was decided.
+    unsettled: bool,
+    step_size_s: f64,
+    step: Box<Step<4>>,
+}
+
+impl Plant {
+    /// A plant at rest or in motion at time zero with zero torque. A tip at belt height
+    /// within a millimetre, or inside the belt, is first put onto the belt.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first parameter that is out of range.
+    pub fn new(parameters: &PlantParameters, initial: State) -> Result<Self, OutOfRange> {
+        let arm = Arm::new(parameters.arm)?;
+        range::check("belt.friction", parameters.friction, 0.0, 10.0)?;
+        parameters.belt.validate()?;
+        parameters.impact.validate()?;
+        parameters.solver.validate()?;
+        let pi = core::f64::consts::PI;
+        range::check("initial.theta1_deg", initial[0].to_degrees(), -180.0, 180.0)?;
+        range::check("initial.theta2_deg", initial[1].to_degrees(), -180.0, 180.0)?;
+        range::check(
+            "initial.theta1_dot_rad_s",
+            initial[2],
+            -100.0 * pi,
+            100.0 * pi,
+        )?;
+        range::check(
+            "initial.theta2_dot_rad_s",
+            initial[3],
+            -100.0 * pi,
+            100.0 * pi,
+        )?;
+
+        let mut plant = Self {
+            arm,
+            friction: parameters.friction,
+            belt: parameters.belt,
+            impact: parameters.impact,
+            solver: parameters.solver,
+            torque: TorqueSegment::constant(Vector2::zeros()),
+            time_s: 0.0,
+            state: initial,
+            mode: ContactMode::Flight,
+            stick_start: (0.0, 0.0),
+            unsettled: false,
+            step_size_s: 1e-3,
+            step: Box::new(Step::empty()),
+        };
+        let motion = plant.motion();
+        if motion.gap_m(&initial) < CONTACT_AT_START_M {
+            let on_belt = motion.lowered_onto_belt(&initial);
+            let velocity = motion.relative_velocity_m_s(0.0, &on_belt);
+            if velocity.y <= plant.solver.chatter_speed_m_s {
+                plant.state = motion.onto_belt(&on_belt);
+                plant.mode = ContactMode::slide(Slip::of(velocity.x));
+                plant.unsettled = true;
+            } else {
+                plant.state = on_belt;
+            }
+        }
+        Ok(plant)
+    }
+
+    /// The arm's model.
+    pub fn arm(&self) -> &Arm<f64> {
+        &self.arm
+    }
+
+    /// Present time, s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Present state.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Present contact mode.
+    pub fn mode(&self) -> ContactMode {
+        self.mode
+    }
+
+    /// Joint torques applied now, (u1, u2), N·m.
+    pub fn torque_nm(&self) -> Vector2<f64> {
+        self.torque.at(self.time_s)
+    }
+
+    /// The equations of the present stretch of motion.
+    pub fn motion(&self) -> Motion<'_> {
+        Motion {
+            arm: &self.arm,
+            belt: &self.belt,
+            friction: self.friction,
+            torque: self.torque,
+        }
+    }
+
+    /// Contact force (f_t, f_n) on the tip now, N; impulses are not part of it.
+    pub fn contact_force_n(&self) -> Vector2<f64> {
+        let motion = self.motion();
+        let terms = motion.terms(self.time_s, &self.state);
+        motion.force_n(self.time_s, self.mode, &terms)
+    }
+
+    /// Commands joint torques `target_nm` from now on, through a stage with
+    /// time constant `lag_s` (0 for none).
+    pub fn command_torque(&mut self, target_nm: Vector2<f64>, lag_s: f64) {
+        let next = self.torque.followed_by(self.time_s, target_nm, lag_s);
+        if next.at(self.time_s) != self.torque.at(self.time_s) {
+            self.unsettled = true;
+        }
+        self.torque = next;
+    }
+
+    /// Decides the contact mode at the present time, so that forces are those
+    /// after the last command.
+    ///
+    /// # Errors
+    /// [`PlantError`] if no mode is possible.
+    pub fn settle(&mut self, observer: &mut impl Observer) -> Result<(), PlantError> {
+        if self.unsettled && self.mode.is_contact() {
+            self.enter_contact(observer)?;
+        }
+        self.unsettled = false;
+        Ok(())
+    }
+
+    /// Integrates to time `until_s`.
+    ///
+    /// # Errors
+    /// [`PlantError`]; the plant stands at the time of the error.
+    pub fn advance(
+        &mut self,
+        until_s: f64,
+        observer: &mut impl Observer,
+    ) -> Result<(), PlantError> {
+        while self.time_s < until_s {
+            let corner = self.belt.next_corner_s(self.time_s).min(until_s);
+            self.settle(observer)?;
+            self.advance_smoothly(corner, observer)?;
+            self.unsettled |= corner < until_s;
+        }
+        self.settle(observer)
+    }
+
+    /// Integrates to a time before which torque and belt are smooth.
+    fn advance_smoothly(
+        &mut self,
+        until_s: f64,
+        observer: &mut impl Observer,
+    ) -> Result<(), PlantError> {
+        let mut events = 0;
+        let mut event_s = self.time_s;
+        while self.time_s < until_s {
+            let remaining = until_s - self.time_s;
+            if remaining <= 4.0 * f64::EPSILON * until_s.abs() {
+                self.time_s = until_s;
+                break;
+            }
+            let Some(event) = self.step_or_event(until_s, observer)? else {
+                continue;
+            };
+            events = if event > event_s + 1e-9 {
+                0
+            } else {
+                events + 1
+            };
+            event_s = event;
+            if events > MAXIMUM_EVENTS_AT_ONE_TIME {
+                return Err(PlantError::EventsWithoutEnd { time_s: event });
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes one good step, or goes to the first event in it and returns its time.
+    fn step_or_event(
+        &mut self,
+        until_s: f64,
+        observer: &mut impl Observer,
+    ) -> Result<Option<f64>, PlantError> {
+        let motion = Motion {
+            arm: &self.arm,
+            belt: &self.belt,
+            friction: self.friction,
+            torque: self.torque,
+        };
+        let tolerance = Tolerance {
+            relative: self.solver.relative_tolerance,
+            absolute: self.solver.absolute_tolerance,
+        };
+        let (mode, start_s, start) = (self.mode, self.time_s, self.state);
+        let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
+        let slope = derivative(start_s, &start);
+        let remaining = until_s - start_s;
+        loop {
+            let wanted = self.step_size_s.min(self.solver.maximum_step_s);
+            let size = wanted.min(remaining);
+            self.step
+                .take(&derivative, start_s, &start, &slope, size, &tolerance);
+            if self.step.error <= 1.0 {
+                // A step cut short says nothing against a longer one.
+                let proposed = self.step.proposed_size();
+                self.step_size_s = if size < wanted {
+                    wanted.max(proposed)
+                } else {
+                    proposed
+                };
+                break;
+            }
+            self.step_size_s = if self.step.error.is_finite() {
+                self.step.proposed_size()
+            } else {
+                0.1 * size
+            };
+            if start_s + self.step_size_s == start_s {
+                return Err(PlantError::StepVanished {
+                    time_s: start_s,
+                    mode,
+                });
+            }
+        }
+        self.step.finish(&derivative);
+
+        let mut event = transition::first_event_s(&motion, mode, &mut self.step);
+        if let Some(event_s) = event.as_mut() {
+            // The polynomial that located the event is less accurate than a
+            // step; the rest of the gap is removed by Newton's method in time,
+            // because putting the tip onto the belt by force would change the energy.
+            for _ in 0..3 {
+                let size = *event_s - start_s;
+                self.step
+                    .take(&derivative, start_s, &start, &slope, size, &tolerance);
+                let correction = transition::landing_correction_s(&motion, mode, &self.step.end);
+                if correction.abs() <= f64::EPSILON * *event_s || *event_s + correction <= start_s {
+                    break;
+                }
+                *event_s += correction;
+            }
+        }
+        let end_s = event.unwrap_or(if self.step.h == remaining {
+            until_s
+        } else {
+            start_s + self.step.h
+        });
+        let end = match mode {
+            ContactMode::Flight => self.step.end,
+            ContactMode::SlidePositive | ContactMode::SlideNegative => {
+                motion.onto_belt(&self.step.end)
+            }
+            ContactMode::Stick => {
+                let (since, anchor) = self.stick_start;
+                let tip = anchor + self.belt.displacement_m(since, end_s);
+                motion.onto_stick(end_s, tip, &self.step.end)
+            }
+        };
+        observer.step(&PlantStep {
+            motion: &motion,
+            mode,
+            start_s,
+            start: &start,
+            end_s,
+            end: &end,
+        });
+        self.time_s = end_s;
+        self.state = end;
+        if event.is_some() {
+            self.handle_event(observer)?;
+        }
+        Ok(event)
+    }
+
+    /// The tip has landed, or sliding or sticking cannot go on.
+    fn handle_event(&mut self, observer: &mut impl Observer) -> Result<(), PlantError> {
+        if self.mode.is_contact() {
+            let motion = self.motion();
+            let slip = motion.relative_velocity_m_s(self.time_s, &self.state).x;
+            if self
+                .mode
+                .slip()
+                .is_some_and(|s| s.sign::<f64>() * slip <= 0.0)
+            {
+                // Slip has just died; what is left of it is the resolution of time.
+                self.state =
+                    motion.onto_stick(self.time_s, motion.tip_t_m(&self.state), &self.state);
+            }
+            return self.enter_contact(observer);
+        }
+        let motion = self.motion();
+        let state = motion.lowered_onto_belt(&self.state);
+        let approach_m_s = motion.relative_velocity_m_s(self.time_s, &state).y;
+        self.state = state;
+        if approach_m_s < 0.0 {
+            self.collide(observer, Event::Impact { approach_m_s })?;
+        }
+        let motion = self.motion();
+        let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
+        if rebound < self.solver.chatter_speed_m_s {
+            self.state = motion.onto_belt(&self.state);
+            self.enter_contact(observer)?;
+        }
+        Ok(())
+    }
+
+    /// The tip is on the belt without normal velocity: decides what follows.
+    fn enter_contact(&mut self, observer: &mut impl Observer) -> Result<(), PlantError> {
+        // Each throw that does not lift the tip ends its slip, which leaves
+        // only sticking and sliding from rest.
+        for _ in 0..4 {
+            let motion = self.motion();
+            let next =
+                transition::decide(&motion, self.time_s, &self.state, self.solver.indeterminate);
+            match next {
+                Next::Mode(mode) => {
+                    if mode == ContactMode::Stick && self.mode != ContactMode::Stick {
+                        let tip_t_m = motion.tip_t_m(&self.state);
+                        self.state = motion.onto_stick(self.time_s, tip_t_m, &self.state);
+                        self.stick_start = (self.time_s, tip_t_m);
+                    }
+                    self.change_mode(mode, observer);
+                    return Ok(());
+                }
+                Next::Thrown => {
+                    self.collide(observer, Event::ImpactWithoutCollision)?;
+                    let motion = self.motion();
+                    let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
+                    if rebound >= self.solver.chatter_speed_m_s {
+                        self.change_mode(ContactMode::Flight, observer);
+                        return Ok(());
+                    }
+                    self.state = motion.onto_belt(&self.state);
+                }
+            }
+        }
+        Err(PlantError::EventsWithoutEnd {
+            time_s: self.time_s,
+        })
+    }
+
+    fn collide(&mut self, observer: &mut impl Observer, event: Event) -> Result<(), PlantError> {
+        let motion = self.motion();
+        let mut velocity = motion.relative_velocity_m_s(self.time_s, &self.state);
+        if event == Event::ImpactWithoutCollision {
+            // Rounding must not decide between a collision and none.
+            velocity.y = 0.0;
+        }
+        let q = self
+            .arm
+            .inverse_tip_inertia(&Pose::new(&motion::theta(&self.state)));
+        let impact =
+            impact::collide(&q, self.friction, &self.impact, velocity).map_err(|source| {
+                PlantError::EndlessImpact {
+                    time_s: self.time_s,
+                    source,
+                }
+            })?;
+        self.state = motion.apply_impulse(&self.state, &impact.impulse_ns);
+        observer.event(self.time_s, event, &self.state);
+        Ok(())
+    }
+
+    fn change_mode(&mut self, mode: ContactMode, observer: &mut impl Observer) {
+        if mode != self.mode {
+            let from = core::mem::replace(&mut self.mode, mode);
+            observer.event(
+                self.time_s,
+                Event::ModeChange { from, to: mode },
+                &self.state,
+            );
+        }
+    }
+}
+
+/// A tip closer to the belt than this at the start is taken to touch it, m: the
+/// paper gives its initial conditions to three digits.
+const CONTACT_AT_START_M: f64 = 1e-4;
+
+#[cfg(test)]
+mod tests;

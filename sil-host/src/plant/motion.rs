@@ -1,0 +1,212 @@
+//! Equations of motion in each contact mode, and the contact force that goes with them.
+
+use nalgebra::{Vector2, Vector4};
+use painleve_shared::dynamics::generalised_torque_nm;
+use painleve_shared::{Arm, ContactTerms, Pose, Slip};
+use serde::{Deserialize, Serialize};
+
+use super::belt::BeltProfile;
+use super::torque::TorqueSegment;
+
+/// State of the arm as one vector: θ1, θ2 (rad), θ̇1, θ̇2 (rad/s).
+pub type State = Vector4<f64>;
+
+/// Joint angles of a state, rad.
+pub fn theta(state: &State) -> Vector2<f64> {
+    Vector2::new(state[0], state[1])
+}
+
+/// Joint rates of a state, rad/s.
+pub fn theta_dot(state: &State) -> Vector2<f64> {
+    Vector2::new(state[2], state[3])
+}
+
+/// What the tip does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContactMode {
+    /// No contact.
+    Flight,
+    /// Sliding with ż_r > 0.
+    SlidePositive,
+    /// Sliding with ż_r < 0.
+    SlideNegative,
+    /// Moving with the belt.
+    Stick,
+}
+
+impl ContactMode {
+    /// Sliding in one direction.
+    pub fn slide(slip: Slip) -> Self {
+        match slip {
+            Slip::Positive => Self::SlidePositive,
+            Slip::Negative => Self::SlideNegative,
+        }
+    }
+
+    /// The direction of sliding.
+    pub fn slip(self) -> Option<Slip> {
+        match self {
+            Self::SlidePositive => Some(Slip::Positive),
+            Self::SlideNegative => Some(Slip::Negative),
+            Self::Flight | Self::Stick => None,
+        }
+    }
+
+    /// Whether the tip touches the belt.
+    pub fn is_contact(self) -> bool {
+        self != Self::Flight
+    }
+
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flight => "flight",
+            Self::SlidePositive => "slide +",
+            Self::SlideNegative => "slide −",
+            Self::Stick => "stick",
+        }
+    }
+}
+
+/// The arm, the belt and the torque of one stretch of motion.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion<'a> {
+    /// The arm.
+    pub arm: &'a Arm<f64>,
+    /// The belt's speed.
+    pub belt: &'a BeltProfile,
+    /// Friction coefficient μ.
+    pub friction: f64,
+    /// Joint torques.
+    pub torque: TorqueSegment,
+}
+
+impl Motion<'_> {
+    /// Contact terms at a state.
+    pub fn terms(&self, t_s: f64, state: &State) -> ContactTerms<f64> {
+        let angles = theta(state);
+        let torque = generalised_torque_nm(&self.torque.at(t_s));
+        self.arm
+            .contact_terms(&angles, &theta_dot(state), &Pose::new(&angles), &torque)
+    }
+
+    /// Contact force (f_t, f_n), N, of a mode with given contact terms. In a
+    /// stick that the straight arm makes singular it is zero.
+    pub fn force_n(&self, t_s: f64, mode: ContactMode, terms: &ContactTerms<f64>) -> Vector2<f64> {
+        match mode {
+            ContactMode::Flight => Vector2::zeros(),
+            ContactMode::SlidePositive | ContactMode::SlideNegative => {
+                let slip = mode.slip().unwrap_or(Slip::Positive);
+                let normal = terms.sliding_normal_force_n(self.friction, slip);
+                Vector2::new(-self.friction * slip.sign::<f64>() * normal, normal)
+            }
+            ContactMode::Stick => {
+                let belt = Vector2::new(self.belt.acceleration_m_s2(t_s), 0.0);
+                terms
+                    .force_for_acceleration_n(&belt)
+                    .unwrap_or_else(Vector2::zeros)
+            }
+        }
+    }
+
+    /// Time derivative of the state in a mode.
+    #[inline]
+    pub fn derivative(&self, mode: ContactMode, t_s: f64, state: &State) -> State {
+        let (angles, rates) = (theta(state), theta_dot(state));
+        let pose = Pose::new(&angles);
+        let mobility = self.arm.inverse_mass_matrix(&pose);
+        let load = generalised_torque_nm(&self.torque.at(t_s))
+            - self.arm.passive_torque_nm(&angles, &rates, &pose)
+            - self.arm.centrifugal_torque_nm(&rates, &pose);
+        let mut acceleration = mobility * load;
+        if mode.is_contact() {
+            let jacobian = self.arm.jacobian(&pose);
+            let terms = ContactTerms {
+                q: jacobian * mobility * jacobian.transpose(),
+                free_acceleration_m_s2: jacobian * acceleration
+                    + self.arm.centripetal_m_s2(&pose, &rates),
+            };
+            let force = self.force_n(t_s, mode, &terms);
+            acceleration += mobility * (jacobian.transpose() * force);
+        }
+        State::new(rates.x, rates.y, acceleration.x, acceleration.y)
+    }
+
+    /// Tip velocity relative to the belt, (v_r, v_n), m/s.
+    pub fn relative_velocity_m_s(&self, t_s: f64, state: &State) -> Vector2<f64> {
+        let velocity = self.arm.jacobian(&Pose::new(&theta(state))) * theta_dot(state);
+        Vector2::new(velocity.x - self.belt.speed_m_s(t_s), velocity.y)
+    }
+
+    /// Height of the tip over the belt, m.
+    pub fn gap_m(&self, state: &State) -> f64 {
+        self.arm.gap_m(&Pose::new(&theta(state)))
+    }
+
+    /// Position of the tip along the belt, m.
+    pub fn tip_t_m(&self, state: &State) -> f64 {
+        self.arm.tip_m(&Pose::new(&theta(state))).x
+    }
+
+    /// Changes the joint rates by a tip impulse (P_t, P_n), N·s.
+    pub fn apply_impulse(&self, state: &State, impulse_ns: &Vector2<f64>) -> State {
+        let pose = Pose::new(&theta(state));
+        let change = self.arm.inverse_mass_matrix(&pose)
+            * (self.arm.jacobian(&pose).transpose() * impulse_ns);
+        state + State::new(0.0, 0.0, change.x, change.y)
+    }
+
+    /// The nearest state, in the metric of kinetic energy, with the tip on the
+    /// belt and no normal velocity. Removes what integration errors left.
+    pub fn onto_belt(&self, state: &State) -> State {
+        let state = self.lowered_onto_belt(state);
+        let pose = Pose::new(&theta(&state));
+        let normal = self.arm.jacobian(&pose).row(1).transpose();
+        let direction = self.arm.inverse_mass_matrix(&pose) * normal;
+        let speed = normal.dot(&theta_dot(&state));
+        let change = direction * (-speed / normal.dot(&direction));
+        state + State::new(0.0, 0.0, change.x, change.y)
+    }
+
+    /// The nearest state with the tip at belt height; velocities stay.
+    pub fn lowered_onto_belt(&self, state: &State) -> State {
+        let mut state = *state;
+        // Newton; two iterations reach rounding from any integration error,
+        // the rest serve initial conditions given by hand.
+        for _ in 0..8 {
+            let pose = Pose::new(&theta(&state));
+            let gap = self.arm.gap_m(&pose);
+            if gap.abs() < 1e-16 {
+                break;
+            }
+            let normal = self.arm.jacobian(&pose).row(1).transpose();
+            let direction = self.arm.inverse_mass_matrix(&pose) * normal;
+            let change = direction * (-gap / normal.dot(&direction));
+            state += State::new(change.x, change.y, 0.0, 0.0);
+        }
+        state
+    }
+
+    /// The state with the tip at (`tip_t_m`, belt height), moving with the belt.
+    pub fn onto_stick(&self, t_s: f64, tip_t_m: f64, state: &State) -> State {
+        let mut state = *state;
+        for _ in 0..4 {
+            let pose = Pose::new(&theta(&state));
+            let error = Vector2::new(tip_t_m - self.arm.tip_m(&pose).x, -self.arm.gap_m(&pose));
+            if error.norm() < 1e-16 {
+                break;
+            }
+            let Some(change) = self.arm.jacobian(&pose).lu().solve(&error) else {
+                break;
+            };
+            state += State::new(change.x, change.y, 0.0, 0.0);
+        }
+        let jacobian = self.arm.jacobian(&Pose::new(&theta(&state)));
+        let belt = Vector2::new(self.belt.speed_m_s(t_s), 0.0);
+        match jacobian.lu().solve(&belt) {
+            Some(rates) => State::new(state[0], state[1], rates.x, rates.y),
+            None => state,
+        }
+    }
+}

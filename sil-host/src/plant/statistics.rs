@@ -1,0 +1,94 @@
+//! What happened in a run, as plain numbers.
+
+use super::motion::{ContactMode, State};
+use super::{Event, Observer, PlantStep};
+
+/// Counts and extremes of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Statistics {
+    /// Times that sliding or sticking ended in flight.
+    pub lift_offs: u64,
+    /// When this first happened, s.
+    pub first_lift_off_s: Option<f64>,
+    /// Collisions with the belt.
+    pub impacts: u64,
+    /// Impacts without collision.
+    pub impacts_without_collision: u64,
+    /// Largest tip position along the belt, m.
+    pub max_tip_t_m: f64,
+    /// Smallest normal force after the settling time, N; zero in flight.
+    pub min_normal_force_n: f64,
+    /// Largest joint torque, N·m.
+    pub peak_torque_nm: f64,
+    /// Time in contact, s.
+    pub contact_s: f64,
+    /// Time watched, s.
+    pub total_s: f64,
+    settling_s: f64,
+}
+
+impl Statistics {
+    /// Nothing has happened yet. The normal force is watched from `settling_s` on.
+    pub fn new(settling_s: f64) -> Self {
+        Self {
+            lift_offs: 0,
+            first_lift_off_s: None,
+            impacts: 0,
+            impacts_without_collision: 0,
+            max_tip_t_m: f64::NEG_INFINITY,
+            min_normal_force_n: f64::INFINITY,
+            peak_torque_nm: 0.0,
+            contact_s: 0.0,
+            total_s: 0.0,
+            settling_s,
+        }
+    }
+
+    /// Part of the time in contact, 0 … 1.
+    pub fn contact_fraction(&self) -> f64 {
+        if self.total_s > 0.0 {
+            self.contact_s / self.total_s
+        } else {
+            0.0
+        }
+    }
+}
+
+impl Observer for Statistics {
+    fn step(&mut self, step: &PlantStep<'_>) {
+        let motion = step.motion;
+        let duration = step.end_s - step.start_s;
+        self.total_s += duration;
+        if step.mode.is_contact() {
+            self.contact_s += duration;
+        }
+        for (t_s, state) in [(step.start_s, step.start), (step.end_s, step.end)] {
+            self.max_tip_t_m = self.max_tip_t_m.max(motion.tip_t_m(state));
+            self.peak_torque_nm = self.peak_torque_nm.max(motion.torque.at(t_s).amax());
+            if t_s >= self.settling_s {
+                let normal = if step.mode.is_contact() {
+                    let terms = motion.terms(t_s, state);
+                    motion.force_n(t_s, step.mode, &terms).y
+                } else {
+                    0.0
+                };
+                self.min_normal_force_n = self.min_normal_force_n.min(normal);
+            }
+        }
+    }
+
+    fn event(&mut self, time_s: f64, event: Event, _: &State) {
+        match event {
+            Event::Impact { .. } => self.impacts += 1,
+            Event::ImpactWithoutCollision => self.impacts_without_collision += 1,
+            Event::ModeChange {
+                to: ContactMode::Flight,
+                ..
+            } => {
+                self.lift_offs += 1;
+                self.first_lift_off_s.get_or_insert(time_s);
+            }
+            Event::ModeChange { .. } => {}
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! Which contact mode follows, and when the present one ends.
+
+use nalgebra::Vector2;
+use painleve_shared::{ContactTerms, Pose, Slip, SolutionMode};
+use serde::{Deserialize, Serialize};
+
+use super::dop853::{DenseStep, Step};
+use super::event::{first_negative, stays_above};
+use super::motion::{ContactMode, Motion, State, theta, theta_dot};
+
+/// What follows where p < 0 and b ≥ 0, so that sliding and flight both solve
+/// the equations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Indeterminate {
+    /// The tip leaves (the paper, after Elkaranshawy et al. 2017).
+    Flight,
+    /// The tip goes on sliding with f_n = −b/p.
+    Slide,
+}
+
+/// What follows from a tip on the belt without normal velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// Motion in this mode.
+    Mode(ContactMode),
+    /// An impact without collision.
+    Thrown,
+}
+
+/// Slip below which the tip is at rest on the belt, m/s: well above rounding,
+/// well below anything a tolerance resolves.
+const REST_SLIP_M_S: f64 = 1e-12;
+
+/// Below this fraction of Q22, p counts as zero: −b/p then exceeds any force.
+const P_GUARD: f64 = 1e-6;
+
+/// Clearance, m, below which a step is searched for contact: more than the
+/// quintic of [`stays_above`] can be wrong in one step.
+const CLEARANCE_M: f64 = 1e-6;
+
+/// Parts of a step that are looked at one by one in a search.
+const SEARCH_PARTS: u32 = 16;
+
+/// Resolution of event times, s.
+const TIME_RESOLUTION_S: f64 = 1e-15;
+
+/// Decides what follows at time `t_s` from a state with the tip on the belt
+/// and no normal velocity.
+pub fn decide(motion: &Motion<'_>, t_s: f64, state: &State, indeterminate: Indeterminate) -> Next {
+    let terms = motion.terms(t_s, state);
+    let slip_speed = motion.relative_velocity_m_s(t_s, state).x;
+    if slip_speed.abs() <= REST_SLIP_M_S {
+        return from_rest(motion, t_s, &terms);
+    }
+    let slip = Slip::of(slip_speed);
+    let p = guarded_p(motion, &terms, slip);
+    Next::Mode(match SolutionMode::classify(p, terms.b()) {
+        SolutionMode::Sliding => ContactMode::slide(slip),
+        SolutionMode::Flight => ContactMode::Flight,
+        SolutionMode::Indeterminate => match indeterminate {
+            Indeterminate::Flight => ContactMode::Flight,
+            Indeterminate::Slide => ContactMode::slide(slip),
+        },
+        SolutionMode::Inconsistent => return Next::Thrown,
+    })
+}
+
+fn guarded_p(motion: &Motion<'_>, terms: &ContactTerms<f64>, slip: Slip) -> f64 {
+    terms.p(motion.friction, slip) - P_GUARD * terms.q.m22
+}
+
+fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Next {
+    if terms.b() >= 0.0 {
+        return Next::Mode(ContactMode::Flight);
+    }
+    if cone_margin(motion, t_s, terms) >= 0.0 {
+        return Next::Mode(ContactMode::Stick);
+    }
+    let starts = |slip: &Slip| {
+        guarded_p(motion, terms, *slip) > 0.0
+            && slip.sign::<f64>() * slip_acceleration(motion, t_s, terms, *slip) > 0.0
+    };
+    match [Slip::Positive, Slip::Negative]
+        .iter()
+        .find(|slip| starts(slip))
+    {
+        Some(slip) => Next::Mode(ContactMode::slide(*slip)),
+        None => Next::Thrown,
+    }
+}
+
+/// How far the force of sticking is inside the friction cone, N; negative outside.
+fn cone_margin(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> f64 {
+    let force = motion.force_n(t_s, ContactMode::Stick, terms);
+    motion.friction * force.y - force.x.abs()
+}
+
+/// Acceleration of the tip along the belt relative to it while sliding, m/s².
+fn slip_acceleration(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>, slip: Slip) -> f64 {
+    let force = motion.force_n(t_s, ContactMode::slide(slip), terms);
+    terms.free_acceleration_m_s2.x + terms.q.row(0).transpose().dot(&force)
+        - motion.belt.acceleration_m_s2(t_s)
+}
+
+/// Time of the first event in a finished step, s; the event has happened there.
+pub fn first_event_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<4>) -> Option<f64> {
+    match mode {
+        ContactMode::Flight => first_landing_s(motion, step),
+        ContactMode::SlidePositive | ContactMode::SlideNegative => {
+            first_end_of_slide_s(motion, mode, step)
+        }
+        ContactMode::Stick => {
+            let margin = |t: f64, x: &State| {
+                let terms = motion.terms(t, x);
+                cone_margin(motion, t, &terms).min(-terms.b())
+            };
+            if margin(step.t + step.h, &step.end) >= 0.0 {
+                return None;
+            }
+            let dense = step.dense(&|t, x: &State| motion.derivative(mode, t, x));
+            first_in_parts(step, &dense, &margin)
+        }
+    }
+}
+
+/// Height over the belt, its rate and its acceleration.
+fn gap_jet(motion: &Motion<'_>, state: &State, slope: &State) -> [f64; 3] {
+    let pose = Pose::new(&theta(state));
+    let rates = theta_dot(state);
+    let normal = motion.arm.jacobian(&pose).row(1).transpose();
+    let acceleration = Vector2::new(slope[2], slope[3]);
+    [
+        motion.arm.gap_m(&pose),
+        normal.dot(&rates),
+        normal.dot(&acceleration) + motion.arm.centripetal_m_s2(&pose, &rates).y,
+    ]
+}
+
+fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
+    let start = gap_jet(motion, &step.start, step.start_slope());
+    let end = gap_jet(motion, &step.end, step.end_slope());
+    if stays_above(CLEARANCE_M, step.h, start, end) {
+        return None;
+    }
+    let (t, h) = (step.t, step.h);
+    let dense = step.dense(&|t, x: &State| motion.derivative(ContactMode::Flight, t, x));
+    let gap = |at: f64| motion.gap_m(&dense.at(at));
+    let speed = |at: f64| {
+        let state = dense.at(at);
+        let normal = motion
+            .arm
+            .jacobian(&Pose::new(&theta(&state)))
+            .row(1)
+            .transpose();
+        normal.dot(&theta_dot(&state))
+    };
+    let mut before = (t, start[0], start[1]);
+    for part in 1..=SEARCH_PARTS {
+        let at = if part == SEARCH_PARTS {
+            t + h
+        } else {
+            t + h * f64::from(part) / f64::from(SEARCH_PARTS)
+        };
+        let mut after = (at, gap(at), speed(at));
+        if after.1 >= 0.0 && before.2 < 0.0 && after.2 > 0.0 {
+            // A dip between two looks.
+            let lowest = first_negative(
+                before.0,
+                after.0,
+                -before.2,
+                -after.2,
+                TIME_RESOLUTION_S,
+                |at| -speed(at),
+            );
+            let depth = gap(lowest);
+            if depth < 0.0 {
+                after = (lowest, depth, 0.0);
+            }
+        }
+        if after.1 < 0.0 {
+            if part == 1 && start[0].abs() < 1e-12 {
+                return Some(first_return_s(t, after.0, start, gap));
+            }
+            if before.1 < 0.0 {
+                return Some(before.0);
+            }
+            return Some(first_negative(
+                before.0,
+                after.0,
+                before.1,
+                after.1,
+                TIME_RESOLUTION_S,
+                gap,
+            ));
+        }
+        before = (at, after.1, after.2);
+    }
+    None
+}
+
+/// How much later than at `state` the tip of a flight meets the belt, s, to first order.
+pub fn landing_correction_s(motion: &Motion<'_>, mode: ContactMode, state: &State) -> f64 {
+    if mode.is_contact() {
+        return 0.0;
+    }
+    let pose = Pose::new(&theta(state));
+    let gap = motion.arm.gap_m(&pose);
+    let speed = motion
+        .arm
+        .jacobian(&pose)
+        .row(1)
+        .transpose()
+        .dot(&theta_dot(state));
+    // A landing at grazing speed has no corrections worth making.
+    if speed < -1e-6 && gap.abs() > 1e-16 {
+        -gap / speed
+    } else {
+        0.0
+    }
+}
+
+/// Landing of a flight that started on the belt at `t`: the root at the start
+/// is divided out, once for a start with normal velocity, twice without.
+fn first_return_s(t: f64, until: f64, start: [f64; 3], gap: impl Fn(f64) -> f64) -> f64 {
+    let [_, speed, acceleration] = start;
+    let single = speed > 1e-12;
+    let at_start = if single { speed } else { 0.5 * acceleration };
+    if at_start <= 0.0 {
+        return t;
+    }
+    let divided = |at: f64| {
+        let since = at - t;
+        gap(at) / if single { since } else { since * since }
+    };
+    first_negative(
+        t,
+        until,
+        at_start,
+        divided(until),
+        TIME_RESOLUTION_S,
+        divided,
+    )
+}
+
+fn first_end_of_slide_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<4>) -> Option<f64> {
+    let slip = mode.slip()?;
+    let sign = slip.sign::<f64>();
+    // In an indeterminate slide p and b are both on the other side.
+    let side = if guarded_p(motion, &motion.terms(step.t, &step.start), slip) > 0.0 {
+        1.0
+    } else {
+        -1.0
+    };
+    let margin = |t: f64, x: &State| {
+        let terms = motion.terms(t, x);
+        let sliding = sign * motion.relative_velocity_m_s(t, x).x + 0.5 * REST_SLIP_M_S;
+        sliding
+            .min(-side * terms.b())
+            .min(side * guarded_p(motion, &terms, slip))
+    };
+    let end_margin = margin(step.t + step.h, &step.end);
+    // Slip can die and start again within a step; a cubic through both ends tells.
+    let slip_at = |t: f64, x: &State| {
+        let terms = motion.terms(t, x);
+        [
+            sign * motion.relative_velocity_m_s(t, x).x,
+            sign * slip_acceleration(motion, t, &terms, slip),
+        ]
+    };
+    if end_margin >= 0.0 {
+        let [v0, a0] = slip_at(step.t, &step.start);
+        let [v1, a1] = slip_at(step.t + step.h, &step.end);
+        let third = step.h / 3.0;
+        if v0.min(v1).min(v0 + a0 * third).min(v1 - a1 * third) >= 0.0 {
+            return None;
+        }
+    }
+    let dense = step.dense(&|t, x: &State| motion.derivative(mode, t, x));
+    first_in_parts(step, &dense, &margin)
+}
+
+/// First time in a step at which a margin is negative, looked for part by part.
+fn first_in_parts(
+    step: &Step<4>,
+    dense: &DenseStep<4>,
+    margin: &impl Fn(f64, &State) -> f64,
+) -> Option<f64> {
+    let mut before = (step.t, margin(step.t, &step.start));
+    if before.1 < 0.0 {
+        return Some(step.t);
+    }
+    for part in 1..=SEARCH_PARTS {
+        let at = if part == SEARCH_PARTS {
+            step.t + step.h
+        } else {
+            step.t + step.h * f64::from(part) / f64::from(SEARCH_PARTS)
+        };
+        let after = (at, margin(at, &dense.at(at)));
+        if after.1 < 0.0 {
+            return Some(first_negative(
+                before.0,
+                after.0,
+                before.1,
+                after.1,
+                TIME_RESOLUTION_S,
+                |at| margin(at, &dense.at(at)),
+            ));
+        }
+        before = after;
+    }
+    None
+}
