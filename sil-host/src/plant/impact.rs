@@ -189,11 +189,7 @@ impl<'a> Process<'a> {
     /// deepens and this phase cannot end it.
     fn until_compressed(&self) -> Option<f64> {
         let rate = self.rates().y;
-        if rate > 0.0 && self.velocity.y <= 0.0 {
-            Some(-self.velocity.y / rate)
-        } else {
-            None
-        }
+        (rate > 0.0).then(|| (-self.velocity.y / rate).max(0.0))
     }
 
     /// Impulse until the work has grown by `work` from `start` in the present phase.
@@ -212,7 +208,7 @@ impl<'a> Process<'a> {
     }
 }
 
-/// Collision at tip velocity `velocity_m_s` = (v_r, v_n ≤ 0) relative to the belt.
+/// Collision at tip velocity `velocity_m_s` = (v_r, v_n < 0) relative to the belt.
 ///
 /// # Errors
 /// [`EndlessImpact`] if compression never ends, which no positive definite Q does.
@@ -222,7 +218,31 @@ pub fn collide(
     law: &ImpactLaw,
     velocity_m_s: Vector2<f64>,
 ) -> Result<Impact, EndlessImpact> {
-    let start = Process::new(q, friction, velocity_m_s);
+    rebound(Process::new(q, friction, velocity_m_s), law)
+}
+
+/// Impact without collision: the tip slides with `slip_m_s` ≠ 0 along the belt, p is zero or
+/// negative, and the contact force grows beyond bounds until slip has died.
+///
+/// # Errors
+/// As [`collide`].
+pub fn throw(
+    q: &Matrix2<f64>,
+    friction: f64,
+    law: &ImpactLaw,
+    slip_m_s: f64,
+) -> Result<Impact, EndlessImpact> {
+    let mut start = Process::new(q, friction, Vector2::new(slip_m_s, 0.0));
+    let until_slip_dies = start.until_slip_dies();
+    if !until_slip_dies.is_finite() {
+        return Err(EndlessImpact);
+    }
+    start.end_slip(until_slip_dies);
+    rebound(start, law)
+}
+
+/// The rest of a collision: compression to its end, then restitution.
+fn rebound(start: Process<'_>, law: &ImpactLaw) -> Result<Impact, EndlessImpact> {
     let compressed = start.run(Process::until_compressed)?;
     let end = match law.law {
         Restitution::Poisson => {
@@ -320,7 +340,7 @@ mod tests {
     fn an_inconsistent_contact_is_thrown_off_without_collision() {
         // p = 2 − 0.6 · 4 < 0 for positive slip.
         let q = Matrix2::new(10.0, 4.0, 4.0, 2.0);
-        let impact = collide(&q, 0.6, &ImpactLaw::default(), Vector2::new(0.4, 0.0)).unwrap();
+        let impact = throw(&q, 0.6, &ImpactLaw::default(), 0.4).unwrap();
         assert!(impact.velocity_m_s.y > 0.0);
         assert!(impact.impulse_ns.y > 0.0);
     }

@@ -216,8 +216,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// A plant at rest or in motion at time zero with zero torque. A tip at belt height
-    /// within a millimetre, or inside the belt, is first put onto the belt.
+    /// A plant at time zero with zero torque. A tip within 0.1 mm over the belt or
+    /// 1 mm inside it is first put onto the belt.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first parameter that is out of range.
@@ -259,7 +259,14 @@ impl Plant {
             step: Box::new(Step::empty()),
         };
         let motion = plant.motion();
-        if motion.gap_m(&initial) < CONTACT_AT_START_M {
+        let gap_m = motion.gap_m(&initial);
+        range::check(
+            "initial tip height over the belt in m",
+            gap_m,
+            -INSIDE_AT_START_M,
+            f64::MAX,
+        )?;
+        if gap_m < CONTACT_AT_START_M {
             let on_belt = motion.lowered_onto_belt(&initial);
             let velocity = motion.relative_velocity_m_s(0.0, &on_belt);
             if velocity.y <= plant.solver.chatter_speed_m_s {
@@ -552,21 +559,18 @@ impl Plant {
 
     fn collide(&mut self, observer: &mut impl Observer, event: Event) -> Result<(), PlantError> {
         let motion = self.motion();
-        let mut velocity = motion.relative_velocity_m_s(self.time_s, &self.state);
-        if event == Event::ImpactWithoutCollision {
-            // Rounding must not decide between a collision and none.
-            velocity.y = 0.0;
-        }
-        let q = self
-            .arm
-            .inverse_tip_inertia(&Pose::new(&motion::theta(&self.state)));
-        let impact =
-            impact::collide(&q, self.friction, &self.impact, velocity).map_err(|source| {
-                PlantError::EndlessImpact {
-                    time_s: self.time_s,
-                    source,
-                }
-            })?;
+        let velocity = motion.relative_velocity_m_s(self.time_s, &self.state);
+        let pose = Pose::new(&motion::theta(&self.state));
+        let q = self.arm.inverse_tip_inertia(&pose);
+        let impact = if event == Event::ImpactWithoutCollision {
+            impact::throw(&q, self.friction, &self.impact, velocity.x)
+        } else {
+            impact::collide(&q, self.friction, &self.impact, velocity)
+        };
+        let impact = impact.map_err(|source| PlantError::EndlessImpact {
+            time_s: self.time_s,
+            source,
+        })?;
         self.state = motion.apply_impulse(&self.state, &impact.impulse_ns);
         observer.event(self.time_s, event, &self.state);
         Ok(())
@@ -587,6 +591,9 @@ impl Plant {
 /// A tip closer to the belt than this at the start is taken to touch it, m: the
 /// paper gives its initial conditions to three digits.
 const CONTACT_AT_START_M: f64 = 1e-4;
+
+/// Deepest start inside the belt that still counts as rounding of a start on it, m.
+const INSIDE_AT_START_M: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests;

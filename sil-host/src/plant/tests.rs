@@ -168,6 +168,12 @@ fn a_reversing_belt_makes_the_tip_stick_and_slide_back() {
     assert!(drift.gap_m < 1e-10);
 }
 
+#[test]
+fn a_start_deep_inside_the_belt_is_refused() {
+    let error = Plant::new(&PlantParameters::default(), at_rest(0.0, 0.0)).unwrap_err();
+    assert_eq!(error.key, "initial tip height over the belt in m");
+}
+
 /// The bars of accuracy: a second of bouncing hardly depends on the tolerance.
 #[test]
 fn a_tighter_tolerance_does_not_move_a_second_of_bouncing() {
@@ -238,4 +244,51 @@ fn the_attractor_is_in_torque_balance() {
         .passive_torque_nm(&angles, &nalgebra::Vector2::zeros(), &pose);
     assert!((load - passive).amax() < 1e-6, "{}", load - passive);
     assert_eq!(Posture::of(&angles), Posture::ElbowDown);
+}
+
+mod any_scenario {
+    use super::*;
+    use proptest::prelude::*;
+
+    prop_compose! {
+        fn belts()(kind in 0..3, a in -1.0_f64..1.0, b in -1.0_f64..1.0, at in 0.0_f64..2.0, f in 0.2_f64..5.0)
+            -> BeltProfile {
+            match kind {
+                0 => BeltProfile::Step { from_m_s: a, to_m_s: b, at_s: at },
+                1 => BeltProfile::Ramp { from_m_s: a, to_m_s: b, start_s: at, duration_s: 0.5 },
+                _ => BeltProfile::Sine { mean_m_s: 0.3 * a, amplitude_m_s: b, frequency_hz: f },
+            }
+        }
+    }
+
+    proptest! {
+        /// Whatever the friction, the belt, the torque and the start: the
+        /// plant goes on, keeps the tip out of the belt and on it in contact.
+        #[test]
+        fn the_plant_always_goes_on(
+            friction in 0.0_f64..1.5, restitution in 0.0_f64..1.0, energetic: bool, belt in belts(),
+            theta1 in -60.0_f64..60.0, theta2 in -60.0_f64..60.0,
+            u1 in -1.0_f64..1.0, u2 in -1.0_f64..1.0,
+        ) {
+            let law = if energetic { Restitution::Energetic } else { Restitution::Poisson };
+            let parameters = PlantParameters {
+                friction,
+                belt,
+                impact: ImpactLaw { law, restitution },
+                ..Default::default()
+            };
+            let initial = at_rest(theta1, theta2);
+            let arm = Arm::new(parameters.arm).unwrap();
+            prop_assume!(arm.gap_m(&Pose::new(&theta(&initial))) > -1e-3);
+            let mut plant = plant(&parameters, initial);
+            plant.command_torque(nalgebra::Vector2::new(u1, u2), 0.0);
+            let mut drift = ConstraintDrift::default();
+            for tenth in 1..=30 {
+                plant.advance(0.1 * f64::from(tenth), &mut drift)
+                    .map_err(|error| TestCaseError::fail(error.to_string()))?;
+                prop_assert!(plant.motion().gap_m(plant.state()) > -1e-10);
+            }
+            prop_assert!(drift.gap_m < 1e-10);
+        }
+    }
 }

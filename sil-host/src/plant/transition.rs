@@ -77,17 +77,14 @@ fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Next {
     if cone_margin(motion, t_s, terms) >= 0.0 {
         return Next::Mode(ContactMode::Stick);
     }
-    let starts = |slip: &Slip| {
-        guarded_p(motion, terms, *slip) > 0.0
-            && slip.sign::<f64>() * slip_acceleration(motion, t_s, terms, *slip) > 0.0
-    };
-    match [Slip::Positive, Slip::Negative]
-        .iter()
-        .find(|slip| starts(slip))
-    {
-        Some(slip) => Next::Mode(ContactMode::slide(*slip)),
-        None => Next::Thrown,
-    }
+    // At the edge of the cone one direction has an acceleration of zero up to
+    // rounding and the other one against itself: take the better of the two.
+    let away = |slip: Slip| slip.sign::<f64>() * slip_acceleration(motion, t_s, terms, slip);
+    [Slip::Positive, Slip::Negative]
+        .into_iter()
+        .filter(|slip| guarded_p(motion, terms, *slip) > 0.0)
+        .max_by(|one, other| away(*one).total_cmp(&away(*other)))
+        .map_or(Next::Thrown, |slip| Next::Mode(ContactMode::slide(slip)))
 }
 
 /// How far the force of sticking is inside the friction cone, N; negative outside.
