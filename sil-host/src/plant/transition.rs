@@ -39,6 +39,12 @@ const P_GUARD: f64 = 1e-6;
 /// quintic of [`stays_above`] can be wrong in one step.
 const CLEARANCE_M: f64 = 1e-6;
 
+/// A tip that leaves the belt faster than this is thrown off, m/s.
+const TAKE_OFF_SPEED_M_S: f64 = 1e-7;
+
+/// Depth that a tip leaving the belt without normal velocity may reach by rounding, m.
+const GRAZING_M: f64 = 1e-14;
+
 /// Parts of a step that are looked at one by one in a search.
 const SEARCH_PARTS: u32 = 16;
 
@@ -142,7 +148,13 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
     }
     let (t, h) = (step.t, step.h);
     let dense = step.dense(&|t, x: &State| motion.derivative(ContactMode::Flight, t, x));
-    let gap = |at: f64| motion.gap_m(&dense.at(at));
+    // A flight that starts on the belt has a root at its start. With a normal
+    // velocity it is divided out; without one the tip may graze the belt by
+    // less than rounding, which must not count as landing.
+    let from_belt = start[0].abs() < 1e-12;
+    let thrown = from_belt && start[1] > TAKE_OFF_SPEED_M_S;
+    let slack = if from_belt && !thrown { GRAZING_M } else { 0.0 };
+    let gap = |at: f64| motion.gap_m(&dense.at(at)) + slack;
     let speed = |at: f64| {
         let state = dense.at(at);
         let normal = motion
@@ -152,7 +164,7 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
             .transpose();
         normal.dot(&theta_dot(&state))
     };
-    let mut before = (t, start[0], start[1]);
+    let mut before = (t, start[0] + slack, start[1]);
     for part in 1..=SEARCH_PARTS {
         let at = if part == SEARCH_PARTS {
             t + h
@@ -176,8 +188,16 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
             }
         }
         if after.1 < 0.0 {
-            if part == 1 && start[0].abs() < 1e-12 {
-                return Some(first_return_s(t, after.0, start, gap));
+            if part == 1 && thrown {
+                let divided = |at: f64| gap(at) / (at - t);
+                return Some(first_negative(
+                    t,
+                    after.0,
+                    start[1],
+                    divided(after.0),
+                    TIME_RESOLUTION_S,
+                    divided,
+                ));
             }
             if before.1 < 0.0 {
                 return Some(before.0);
@@ -215,29 +235,6 @@ pub fn landing_correction_s(motion: &Motion<'_>, mode: ContactMode, state: &Stat
     } else {
         0.0
     }
-}
-
-/// Landing of a flight that started on the belt at `t`: the root at the start
-/// is divided out, once for a start with normal velocity, twice without.
-fn first_return_s(t: f64, until: f64, start: [f64; 3], gap: impl Fn(f64) -> f64) -> f64 {
-    let [_, speed, acceleration] = start;
-    let single = speed > 1e-12;
-    let at_start = if single { speed } else { 0.5 * acceleration };
-    if at_start <= 0.0 {
-        return t;
-    }
-    let divided = |at: f64| {
-        let since = at - t;
-        gap(at) / if single { since } else { since * since }
-    };
-    first_negative(
-        t,
-        until,
-        at_start,
-        divided(until),
-        TIME_RESOLUTION_S,
-        divided,
-    )
 }
 
 fn first_end_of_slide_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<4>) -> Option<f64> {
