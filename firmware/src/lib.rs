@@ -1,2 +1,33 @@
-//! x
+//! The arm's controller: a pure function from configuration, state and a sensor
+//! frame to an actuator frame, called once per control tick.
+//!
+//! It does not know where it runs. The same source is flashed to the
+//! microcontroller, linked into the simulation and run under an emulator, and
+//! gives the same bits everywhere: single precision, no fused multiply-add, sine and
+//! cosine from `painleve-shared`. Nothing here allocates, panics or loops without bound.
+//!
+//! One tick, in order: [`controller`] checks the frame; [`estimator`] turns counts into
+//! angles and rates; [`contact_detector`] decides whether the tip touches;
+//! [`supervisor`] decides what may be done; [`reference`](mod@reference) says where the tip
+//! should be; [`pid`] or [`hybrid`] computes torques; the torques are limited and
+//! turned into counts. [`telemetry`] shows what went on inside.
+
 #![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod configuration;
+pub mod contact_detector;
+pub mod controller;
+pub mod estimator;
+pub mod hybrid;
+pub mod law;
+pub mod pid;
+pub mod reference;
+pub mod supervisor;
+pub mod telemetry;
+
+pub use configuration::Configuration;
+pub use controller::Controller;
+pub use telemetry::Telemetry;

@@ -141,6 +141,35 @@ impl<T: Real> Arm<T> {
     pub fn joint_angles_on_belt_rad(&self, tip_t_m: T, posture: Posture) -> Option<Vector2<T>> {
         self.joint_angles_rad(&Vector2::new(tip_t_m, -self.parameters().height_m), posture)
     }
+
+    /// Joint rates θ̇ (rad/s) that move the tip along the belt with
+    /// `tip_speed_m_s` at `tip_t_m`; zero where the arm is straight or does not reach.
+    ///
+    /// The time derivative of θ = φ ∓ β in [`joint_angles_rad`](Self::joint_angles_rad).
+    pub fn joint_rates_on_belt_rad_s(
+        &self,
+        tip_t_m: T,
+        tip_speed_m_s: T,
+        posture: Posture,
+    ) -> Vector2<T> {
+        let height = self.parameters().height_m;
+        let square = tip_t_m * tip_t_m + height * height;
+        let distance = square.square_root();
+        let reach = self.parameters().link_length_m * T::literal(2.0);
+        // 2l sin β
+        let half_elbow_sine = ((reach - distance) * (reach + distance)).square_root();
+        if !(half_elbow_sine > T::zero()) {
+            return Vector2::zeros();
+        }
+        let direction_rate = tip_speed_m_s * height / square;
+        let half_elbow_rate = -tip_t_m * tip_speed_m_s / (distance * half_elbow_sine);
+        let first = direction_rate - half_elbow_rate;
+        let second = direction_rate + half_elbow_rate;
+        match posture {
+            Posture::ElbowUp => Vector2::new(first, second),
+            Posture::ElbowDown => Vector2::new(second, first),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -190,6 +219,17 @@ mod tests {
             let theta = arm().joint_angles_rad(&tip, posture).unwrap();
             prop_assert!((arm().tip_m(&Pose::new(&theta)) - tip).norm() < 1e-12);
             prop_assert_eq!(Posture::of(&theta), posture);
+        }
+
+        #[test]
+        fn joint_rates_move_the_tip_along_the_belt(
+            tip in -0.18_f64..0.18, speed in -1.0_f64..1.0, up: bool,
+        ) {
+            let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
+            let theta = arm().joint_angles_on_belt_rad(tip, posture).unwrap();
+            let rates = arm().joint_rates_on_belt_rad_s(tip, speed, posture);
+            let velocity = arm().jacobian(&Pose::new(&theta)) * rates;
+            prop_assert!((velocity - Vector2::new(speed, 0.0)).norm() < 1e-9);
         }
 
         #[test]

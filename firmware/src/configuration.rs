@@ -1,0 +1,86 @@
+//! Everything that can be set about the controller, checked before it runs.
+//!
+//! Kept apart from state: a configuration is a value that can be stored, sent
+//! over a link (serde) and compared; the controller is made from it.
+
+use painleve_shared::counts::{EncoderScale, LinearScale};
+use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::{Arm, ArmParameters};
+use serde::{Deserialize, Serialize};
+
+use crate::contact_detector::ContactDetectorSettings;
+use crate::estimator::EstimatorSettings;
+use crate::law::LawSettings;
+use crate::reference::Program;
+use crate::supervisor::SupervisorSettings;
+
+/// The converters' scalings as the controller knows them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Converters {
+    /// Encoders of θ1 and of θ2 − θ1.
+    pub encoders: [EncoderScale; 2],
+    /// Force cell, N.
+    pub force: LinearScale<f32>,
+    /// Torque stages, N·m.
+    pub torque: LinearScale<f32>,
+}
+
+/// Configuration of the controller.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Configuration {
+    /// Control rate, Hz.
+    pub tick_hz: f32,
+    /// The arm as the controller knows it.
+    pub arm: ArmParameters<f32>,
+    /// What a count is worth.
+    pub converters: Converters,
+    /// Largest torque on either joint, N·m.
+    pub torque_limit_nm: f32,
+    /// How rates are estimated from counts.
+    pub estimator: EstimatorSettings,
+    /// When the tip is taken to touch the belt.
+    pub contact: ContactDetectorSettings,
+    /// When the drive is armed, and when it is shut down.
+    pub supervisor: SupervisorSettings,
+    /// The control law.
+    pub law: LawSettings,
+    /// Where the tip shall go.
+    pub reference: Program,
+}
+
+impl Configuration {
+    /// Time between two ticks, s.
+    pub fn tick_s(&self) -> f32 {
+        1.0 / self.tick_hz
+    }
+
+    /// Checks every number and makes the arm's model.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<Arm<f32>, OutOfRange> {
+        range::check("run.tick_hz", self.tick_hz, 10.0, 1e5)?;
+        let arm = Arm::new(self.arm)?;
+        for encoder in &self.converters.encoders {
+            encoder.validate()?;
+        }
+        self.converters
+            .force
+            .validate("converters.force.bits", "converters.force.range_n")?;
+        self.converters
+            .torque
+            .validate("converters.torque.bits", "converters.torque.range_nm")?;
+        range::check(
+            "controller.torque_limit_nm",
+            self.torque_limit_nm,
+            0.0,
+            f64::from(self.converters.torque.range),
+        )?;
+        self.estimator.validate(self.tick_hz)?;
+        self.contact.validate(self.converters.force.range)?;
+        self.supervisor.validate()?;
+        self.law.validate()?;
+        self.reference.validate(arm.reach_on_belt_m())?;
+        Ok(arm)
+    }
+}

@@ -1,0 +1,162 @@
+//! Tests of the tick's bookkeeping: frames, faults, limits, counters.
+
+use super::*;
+use crate::configuration::Converters;
+use crate::hybrid::HybridSettings;
+use crate::law::LawSettings;
+use crate::reference::Program;
+use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
+use painleve_shared::frame::DigitalInputs;
+
+fn configuration() -> Configuration {
+    let encoder = EncoderScale {
+        bits: 14,
+        offset: EncoderCounts(0),
+    };
+    Configuration {
+        tick_hz: 1000.0,
+        arm: Default::default(),
+        converters: Converters {
+            encoders: [encoder; 2],
+            force: LinearScale {
+                bits: 12,
+                range: 20.0,
+            },
+            torque: LinearScale {
+                bits: 12,
+                range: 5.0,
+            },
+        },
+        torque_limit_nm: 5.0,
+        estimator: Default::default(),
+        contact: Default::default(),
+        supervisor: Default::default(),
+        law: LawSettings::Hybrid(HybridSettings::default()),
+        reference: Program::default(),
+    }
+}
+
+/// The arm at rest at x0,d, pressing with 10 N.
+fn frame(tick: u32) -> SensorFrame {
+    let encoder = configuration().converters.encoders[0];
+    SensorFrame {
+        tick,
+        sequence: tick,
+        joints: [
+            encoder.reading((-11.4_f64).to_radians()),
+            encoder.reading((-35.1_f64 + 11.4).to_radians()),
+        ],
+        normal_force: ForceCounts(1024),
+        tangential_force: ForceCounts(-614),
+        inputs: DigitalInputs::ENABLE,
+    }
+}
+
+fn run(controller: &mut Controller, ticks: core::ops::Range<u32>) -> ActuatorFrame {
+    ticks.fold(ActuatorFrame::default(), |_, tick| {
+        controller.tick(&frame(tick))
+    })
+}
+
+fn tracking() -> Controller {
+    let mut controller = Controller::new(&configuration()).unwrap();
+    let answer = run(&mut controller, 0..20);
+    assert_eq!(answer.supervisor_state(), Some(SupervisorState::Tracking));
+    assert_ne!(answer.torques, [TorqueCounts(0); 2]);
+    controller
+}
+
+fn assert_fault(controller: &mut Controller, bad: &SensorFrame, fault: Fault) {
+    let answer = controller.tick(bad);
+    assert_eq!(answer.latched_fault(), Some(fault));
+    assert_eq!(answer.torques, [TorqueCounts(0); 2], "safe within the tick");
+    let next = controller.tick(&frame(bad.tick.wrapping_add(1)));
+    assert_eq!(next.latched_fault(), Some(fault), "latched");
+    assert_eq!(next.torques, [TorqueCounts(0); 2]);
+}
+
+#[test]
+fn answers_echo_the_tick_and_count_frames() {
+    let mut controller = Controller::new(&configuration()).unwrap();
+    let first = controller.tick(&frame(7));
+    let second = controller.tick(&frame(8));
+    assert_eq!((first.tick, second.tick), (7, 8));
+    assert_eq!(second.sequence, first.sequence.wrapping_add(1));
+}
+
+#[test]
+fn counters_wrap_without_a_fault() {
+    let mut controller = Controller::new(&configuration()).unwrap();
+    let mut answer = ActuatorFrame::default();
+    for tick in 0..100_u32 {
+        answer = controller.tick(&frame(tick.wrapping_add(u32::MAX - 50)));
+    }
+    assert_eq!(answer.supervisor_state(), Some(SupervisorState::Tracking));
+    assert_eq!(controller.telemetry().lost_frames, 0);
+}
+
+#[test]
+fn readings_out_of_range_are_faults() {
+    let mut bad = frame(20);
+    bad.joints[1] = EncoderCounts(16_384);
+    assert_fault(&mut tracking(), &bad, Fault::EncoderOutOfRange);
+    let mut bad = frame(20);
+    bad.normal_force = ForceCounts(2048);
+    assert_fault(&mut tracking(), &bad, Fault::ForceOutOfRange);
+    let mut bad = frame(20);
+    bad.joints[0].0 ^= 1 << 12;
+    assert_fault(&mut tracking(), &bad, Fault::EncoderJump);
+}
+
+#[test]
+fn lost_frames_are_counted_and_too_many_are_a_fault() {
+    let mut controller = tracking();
+    let answer = controller.tick(&frame(22));
+    assert_eq!(answer.latched_fault(), None);
+    assert_eq!(controller.telemetry().lost_frames, 2);
+    assert_fault(&mut controller, &frame(30), Fault::FramesLost);
+}
+
+#[test]
+fn a_stale_frame_keeps_the_torque_and_many_are_a_fault() {
+    let mut controller = tracking();
+    let before = controller.tick(&frame(20));
+    for _ in 0..5 {
+        let answer = controller.tick(&frame(20));
+        assert_eq!(answer.torques, before.torques);
+    }
+    assert_eq!(controller.telemetry().stale_frames, 5);
+    assert_fault(&mut controller, &frame(20), Fault::StaleFrame);
+}
+
+#[test]
+fn a_law_that_is_not_finite_is_a_fault() {
+    let mut controller = tracking();
+    controller.apply(&Vector2::new(f32::NAN, 0.0));
+    assert_eq!(controller.supervisor.fault(), Some(Fault::NotFinite));
+    controller.apply(&Vector2::new(0.0, f32::INFINITY));
+    assert_eq!(controller.supervisor.fault(), Some(Fault::NotFinite));
+}
+
+#[test]
+fn torque_is_limited_and_counted() {
+    let mut limited = configuration();
+    limited.torque_limit_nm = 0.5;
+    let mut controller = Controller::new(&limited).unwrap();
+    let answer = run(&mut controller, 0..20);
+    assert!(answer.flags.contains(StatusFlags::SATURATED));
+    let limit = (0.5 / limited.converters.torque.per_count()).round() as i32;
+    assert!(answer.torques.iter().all(|torque| torque.0.abs() <= limit));
+    assert!(controller.telemetry().saturated_ticks > 10);
+}
+
+#[test]
+fn bad_configurations_are_named() {
+    let mut bad = configuration();
+    bad.torque_limit_nm = f32::NAN;
+    let error = Controller::new(&bad).unwrap_err();
+    assert_eq!(error.key, "controller.torque_limit_nm");
+    let mut bad = configuration();
+    bad.arm.height_m = 0.42;
+    assert_eq!(Controller::new(&bad).unwrap_err().key, "arm.height_m");
+}

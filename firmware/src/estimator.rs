@@ -1,0 +1,233 @@
+//! Joint angles and rates from encoder counts.
+//!
+//! A tracking loop (second-order Luenberger observer) on each joint. A count of a
+//! 14-bit encoder within a millisecond is 0.38 rad/s, so that differencing sees
+//! nothing of a lift-off; the loop spreads a count over its time constant instead.
+//! The acceleration that the control law has just asked for is fed in, so that
+//! the loop may be slow without lagging behind the motion that is commanded.
+//!
+//! Both poles lie at z = exp(−ω T): gains 1 − z² and (1 − z)²/T.
+
+use nalgebra::Vector2;
+use painleve_shared::counts::{EncoderCounts, EncoderScale};
+use painleve_shared::range::{self, OutOfRange};
+use serde::{Deserialize, Serialize};
+
+/// Settings of the tracking loops.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EstimatorSettings {
+    /// Bandwidth ω of both loops, rad/s.
+    pub bandwidth_rad_s: f32,
+    /// No joint moves faster than this, rad/s; a reading that says so is a fault.
+    pub rate_limit_rad_s: f32,
+}
+
+impl Default for EstimatorSettings {
+    fn default() -> Self {
+        Self {
+            bandwidth_rad_s: 250.0,
+            rate_limit_rad_s: 100.0,
+        }
+    }
+}
+
+impl EstimatorSettings {
+    /// Checks the settings for a control rate of `tick_hz`.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self, tick_hz: f32) -> Result<(), OutOfRange> {
+        range::check(
+            "controller.estimator.bandwidth_rad_s",
+            self.bandwidth_rad_s,
+            1.0,
+            f64::from(tick_hz) * 3.0,
+        )?;
+        range::check(
+            "controller.estimator.rate_limit_rad_s",
+            self.rate_limit_rad_s,
+            1.0,
+            1e4,
+        )
+    }
+}
+
+/// A reading that no motion of the joint explains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncoderJump;
+
+/// Tracking loop of one joint.
+#[derive(Clone, Copy, Debug)]
+struct TrackingLoop {
+    reading: EncoderCounts,
+    /// Unwrapped, counts from angle zero.
+    counts: i32,
+    angle_rad: f32,
+    rate_rad_s: f32,
+}
+
+/// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates.
+#[derive(Clone, Debug)]
+pub struct Estimator {
+    scales: [EncoderScale; 2],
+    rad_per_count: [f32; 2],
+    jump_counts: [i32; 2],
+    tick_s: f32,
+    angle_gain: f32,
+    rate_gain_per_s: f32,
+    joints: Option<[TrackingLoop; 2]>,
+}
+
+impl Estimator {
+    /// An estimator that has seen nothing yet.
+    pub fn new(settings: &EstimatorSettings, scales: [EncoderScale; 2], tick_hz: f32) -> Self {
+        let tick_s = 1.0 / tick_hz;
+        let pole = libm::expf(-settings.bandwidth_rad_s * tick_s);
+        let rad_per_count = scales.map(|scale| scale.rad_per_count::<f32>());
+        Self {
+            scales,
+            rad_per_count,
+            // One count more than the limit, for the rounding of two readings.
+            jump_counts: rad_per_count
+                .map(|lsb| (settings.rate_limit_rad_s * tick_s / lsb) as i32 + 2),
+            tick_s,
+            angle_gain: 1.0 - pole * pole,
+            rate_gain_per_s: (1.0 - pole) * (1.0 - pole) * tick_hz,
+            joints: None,
+        }
+    }
+
+    /// Takes in the readings of one tick.
+    ///
+    /// `elapsed_ticks` is the time since the readings before (1 unless frames were lost);
+    /// `acceleration_rad_s2` is the expected θ̈ of q' in that time. The first readings
+    /// set the angles with zero rates.
+    ///
+    /// # Errors
+    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the
+    /// estimate stays as it was.
+    pub fn update(
+        &mut self,
+        readings: &[EncoderCounts; 2],
+        elapsed_ticks: u32,
+        acceleration_rad_s2: &Vector2<f32>,
+    ) -> Result<(), EncoderJump> {
+        let [scale_1, scale_2] = self.scales;
+        let [reading_1, reading_2] = *readings;
+        let Some([joint_1, joint_2]) = self.joints else {
+            self.joints = Some([
+                self.start(scale_1, self.rad_per_count[0], reading_1),
+                self.start(scale_2, self.rad_per_count[1], reading_2),
+            ]);
+            return Ok(());
+        };
+        let moved_1 = scale_1.difference(joint_1.reading, reading_1);
+        let moved_2 = scale_2.difference(joint_2.reading, reading_2);
+        let ticks = elapsed_ticks.clamp(1, 1000) as i32;
+        if moved_1.abs() > self.jump_counts[0].saturating_mul(ticks)
+            || moved_2.abs() > self.jump_counts[1].saturating_mul(ticks)
+        {
+            return Err(EncoderJump);
+        }
+        let elapsed_s = ticks as f32 * self.tick_s;
+        let follow = |joint: TrackingLoop, reading, moved: i32, lsb: f32, acceleration: f32| {
+            let counts = joint.counts.wrapping_add(moved);
+            let rate = joint.rate_rad_s + acceleration * elapsed_s;
+            let angle = joint.angle_rad + 0.5 * (joint.rate_rad_s + rate) * elapsed_s;
+            let innovation = counts as f32 * lsb - angle;
+            TrackingLoop {
+                reading,
+                counts,
+                angle_rad: angle + self.angle_gain * innovation,
+                rate_rad_s: rate + self.rate_gain_per_s * innovation,
+            }
+        };
+        let [lsb_1, lsb_2] = self.rad_per_count;
+        self.joints = Some([
+            follow(joint_1, reading_1, moved_1, lsb_1, acceleration_rad_s2.x),
+            follow(joint_2, reading_2, moved_2, lsb_2, acceleration_rad_s2.y),
+        ]);
+        Ok(())
+    }
+
+    fn start(&self, scale: EncoderScale, lsb: f32, reading: EncoderCounts) -> TrackingLoop {
+        let counts = scale.counts_from_zero(reading);
+        TrackingLoop {
+            reading,
+            counts,
+            angle_rad: counts as f32 * lsb,
+            rate_rad_s: 0.0,
+        }
+    }
+
+    /// Absolute joint angles θ = (θ1, θ2), rad; zero before the first readings.
+    pub fn theta_rad(&self) -> Vector2<f32> {
+        self.joints.map_or_else(Vector2::zeros, |[one, two]| {
+            Vector2::new(one.angle_rad, one.angle_rad + two.angle_rad)
+        })
+    }
+
+    /// Absolute joint rates θ̇, rad/s; zero before the second readings.
+    pub fn theta_dot_rad_s(&self) -> Vector2<f32> {
+        self.joints.map_or_else(Vector2::zeros, |[one, two]| {
+            Vector2::new(one.rate_rad_s, one.rate_rad_s + two.rate_rad_s)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCALE: EncoderScale = EncoderScale {
+        bits: 14,
+        offset: EncoderCounts(16_000),
+    };
+
+    fn track(motion: impl Fn(f64) -> (f64, f64), acceleration: f32, ticks: u32) -> Estimator {
+        let mut estimator = Estimator::new(&EstimatorSettings::default(), [SCALE; 2], 1000.0);
+        for tick in 0..ticks {
+            let (one, two) = motion(f64::from(tick) * 1e-3);
+            let readings = [SCALE.reading(one), SCALE.reading(two)];
+            estimator
+                .update(&readings, 1, &Vector2::new(acceleration, 0.0))
+                .unwrap();
+        }
+        estimator
+    }
+
+    #[test]
+    fn a_constant_rate_is_found_from_coarse_counts_through_a_wrap() {
+        // θ1 passes the encoder's wrap; the elbow turns the other way.
+        let estimator = track(|t| (0.1 + 1.7 * t, -0.3 - 0.4 * t), 0.0, 400);
+        let rate = estimator.theta_dot_rad_s();
+        assert!((rate.x - 1.7).abs() < 0.1, "{rate}");
+        assert!((rate.y - 1.3).abs() < 0.2, "{rate}");
+        let theta = estimator.theta_rad();
+        assert!((theta.x - (0.1 + 1.7 * 0.399)).abs() < 6e-4, "{theta}");
+    }
+
+    #[test]
+    fn a_known_acceleration_leaves_no_lag() {
+        let with = track(|t| (5.0 * t * t, 0.0), 10.0, 200).theta_dot_rad_s().x;
+        let without = track(|t| (5.0 * t * t, 0.0), 0.0, 200).theta_dot_rad_s().x;
+        let truth = 10.0 * 0.199;
+        assert!((with - truth).abs() < 0.05, "{with}");
+        assert!((without - truth).abs() > (with - truth).abs());
+    }
+
+    #[test]
+    fn a_jump_is_refused_and_changes_nothing() {
+        let mut estimator = track(|_| (0.2, 0.1), 0.0, 10);
+        let before = estimator.theta_rad();
+        let jumped = [SCALE.reading(0.5), SCALE.reading(0.1)];
+        assert_eq!(
+            estimator.update(&jumped, 1, &Vector2::zeros()),
+            Err(EncoderJump)
+        );
+        assert_eq!(estimator.theta_rad(), before);
+        // Over a longer time the same difference is a motion.
+        assert!(estimator.update(&jumped, 10, &Vector2::zeros()).is_ok());
+    }
+}

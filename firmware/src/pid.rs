@@ -1,0 +1,135 @@
+//! The paper's PID on the joint angles q' = (θ1, θ2 − θ1) (section III-A).
+//!
+//! u_i = K_P,i e_i + K_I,i ∫ e_i dt + K_D,i ė_i with e = q'* − q', where q'* puts
+//! the tip on the belt at z_t* in the posture in which the drive was armed.
+
+use nalgebra::Vector2;
+use painleve_shared::range::{self, OutOfRange};
+use serde::{Deserialize, Serialize};
+
+use crate::law::{LawInput, LawOutput};
+
+/// Gains of the PID, for joint 1 and joint 2.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PidSettings {
+    /// K_P, N·m/rad.
+    pub proportional_nm_rad: [f32; 2],
+    /// K_I, N·m/(rad·s).
+    pub integral_nm_rad_s: [f32; 2],
+    /// K_D, N·m·s/rad.
+    pub derivative_nms_rad: [f32; 2],
+    /// Largest torque of the integral action, N·m.
+    pub integral_limit_nm: f32,
+}
+
+impl Default for PidSettings {
+    /// The paper's gains from x0,d.
+    fn default() -> Self {
+        Self {
+            proportional_nm_rad: [200.0, 0.0],
+            integral_nm_rad_s: [25.0, 0.0],
+            derivative_nms_rad: [2.0, 0.0],
+            integral_limit_nm: 5.0,
+        }
+    }
+}
+
+impl PidSettings {
+    /// Checks the gains.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        let gains = [
+            (
+                "controller.law.pid.proportional_nm_rad",
+                self.proportional_nm_rad,
+            ),
+            (
+                "controller.law.pid.integral_nm_rad_s",
+                self.integral_nm_rad_s,
+            ),
+            (
+                "controller.law.pid.derivative_nms_rad",
+                self.derivative_nms_rad,
+            ),
+        ];
+        for (key, values) in gains {
+            for value in values {
+                range::check(key, value, 0.0, 1e5)?;
+            }
+        }
+        range::check(
+            "controller.law.pid.integral_limit_nm",
+            self.integral_limit_nm,
+            0.0,
+            1e3,
+        )
+    }
+}
+
+/// The PID with its integrals.
+#[derive(Clone, Copy, Debug)]
+pub struct Pid {
+    settings: PidSettings,
+    /// Torque of the integral action, N·m.
+    integral_nm: Vector2<f32>,
+    /// Joint angles of the last reference within reach, rad.
+    wanted_rad: Option<Vector2<f32>>,
+}
+
+impl Pid {
+    /// A PID that has not run yet.
+    pub fn new(settings: PidSettings) -> Self {
+        Self {
+            settings,
+            integral_nm: Vector2::zeros(),
+            wanted_rad: None,
+        }
+    }
+
+    /// Forgets the integrals.
+    pub fn reset(&mut self) {
+        *self = Self::new(self.settings);
+    }
+
+    /// Torques for one tick.
+    pub fn tick(&mut self, input: &LawInput<'_>) -> LawOutput {
+        let theta_wanted = input
+            .arm
+            .joint_angles_on_belt_rad(input.reference.position_m, input.posture)
+            .or(self.wanted_rad)
+            .unwrap_or(input.theta_rad);
+        self.wanted_rad = Some(theta_wanted);
+        let rate_wanted = input.arm.joint_rates_on_belt_rad_s(
+            input.reference.position_m,
+            input.reference.velocity_m_s,
+            input.posture,
+        );
+        let error = elbow_relative(&(theta_wanted - input.theta_rad));
+        let error_rate = elbow_relative(&(rate_wanted - input.theta_dot_rad_s));
+        let [kp_1, kp_2] = self.settings.proportional_nm_rad;
+        let [ki_1, ki_2] = self.settings.integral_nm_rad_s;
+        let [kd_1, kd_2] = self.settings.derivative_nms_rad;
+        // Anti-windup: the integrals stand still while the torque is limited,
+        // and never exceed their own limit.
+        if !input.saturated {
+            let limit = self.settings.integral_limit_nm;
+            let step = Vector2::new(ki_1 * error.x, ki_2 * error.y) * input.tick_s;
+            self.integral_nm = (self.integral_nm + step).map(|torque| torque.clamp(-limit, limit));
+        }
+        LawOutput {
+            torque_nm: Vector2::new(
+                kp_1 * error.x + self.integral_nm.x + kd_1 * error_rate.x,
+                kp_2 * error.y + self.integral_nm.y + kd_2 * error_rate.y,
+            ),
+            acceleration_rad_s2: Vector2::zeros(),
+        }
+    }
+}
+
+/// (θ1, θ2) to q' = (θ1, θ2 − θ1).
+fn elbow_relative(theta: &Vector2<f32>) -> Vector2<f32> {
+    Vector2::new(theta.x, theta.y - theta.x)
+}

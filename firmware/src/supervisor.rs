@@ -1,0 +1,285 @@
+//! What the controller may do: idle → armed → tracking ⇄ lift-off, and fault
+//! from everywhere. A fault is latched until a reset.
+
+use painleve_shared::frame::DigitalInputs;
+use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::status::{Fault, SupervisorState};
+use serde::{Deserialize, Serialize};
+
+/// What to do when contact is lost while tracking.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnLiftOff {
+    /// The law goes on, as in the paper, until the time limit.
+    #[default]
+    Continue,
+    /// The fault [`Fault::LiftOffTooLong`] is latched at once.
+    Fault,
+}
+
+/// Settings of the supervisor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SupervisorSettings {
+    /// Ticks in contact, armed, before the reference starts.
+    pub arming_ticks: u32,
+    /// Ticks after which arming without contact is given up.
+    pub arming_limit_ticks: u32,
+    /// What to do when contact is lost.
+    pub on_lift_off: OnLiftOff,
+    /// Ticks without contact after which the drive is shut down; 0 for never.
+    pub lift_off_limit_ticks: u32,
+    /// Frames that may be lost in a row.
+    pub lost_frames_limit: u32,
+    /// Repeated or old frames in a row that are tolerated.
+    pub stale_frames_limit: u32,
+}
+
+impl Default for SupervisorSettings {
+    fn default() -> Self {
+        Self {
+            arming_ticks: 10,
+            arming_limit_ticks: 1000,
+            on_lift_off: OnLiftOff::Continue,
+            lift_off_limit_ticks: 2000,
+            lost_frames_limit: 5,
+            stale_frames_limit: 5,
+        }
+    }
+}
+
+impl SupervisorSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        let ticks = |key, value: u32, minimum, maximum| {
+            range::check(key, f64::from(value), minimum, maximum)
+        };
+        ticks(
+            "controller.supervisor.arming_ticks",
+            self.arming_ticks,
+            0.0,
+            1e6,
+        )?;
+        ticks(
+            "controller.supervisor.arming_limit_ticks",
+            self.arming_limit_ticks,
+            f64::from(self.arming_ticks) + 1.0,
+            1e8,
+        )?;
+        ticks(
+            "controller.supervisor.lift_off_limit_ticks",
+            self.lift_off_limit_ticks,
+            0.0,
+            1e8,
+        )?;
+        ticks(
+            "controller.supervisor.lost_frames_limit",
+            self.lost_frames_limit,
+            0.0,
+            100.0,
+        )?;
+        ticks(
+            "controller.supervisor.stale_frames_limit",
+            self.stale_frames_limit,
+            0.0,
+            100.0,
+        )
+    }
+}
+
+/// The state machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Supervisor {
+    settings: SupervisorSettings,
+    state: SupervisorState,
+    fault: Option<Fault>,
+    /// Ticks in the present state, or in contact while armed.
+    ticks: u32,
+    contact_ticks: u32,
+    inputs: DigitalInputs,
+}
+
+impl Supervisor {
+    /// An idle supervisor.
+    pub fn new(settings: SupervisorSettings) -> Self {
+        Self {
+            settings,
+            state: SupervisorState::Idle,
+            fault: None,
+            ticks: 0,
+            contact_ticks: 0,
+            inputs: DigitalInputs::default(),
+        }
+    }
+
+    /// Present state.
+    pub fn state(&self) -> SupervisorState {
+        self.state
+    }
+
+    /// The latched fault.
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
+    /// Whether torque may be applied.
+    pub fn drives(&self) -> bool {
+        matches!(
+            self.state,
+            SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff
+        )
+    }
+
+    /// Latches a fault. The first one stays.
+    pub fn latch(&mut self, fault: Fault) {
+        if self.fault.is_none() {
+            self.fault = Some(fault);
+        }
+        self.enter(SupervisorState::Fault);
+    }
+
+    /// One tick: `has_law` says whether there is anything to arm.
+    pub fn tick(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) {
+        let before = core::mem::replace(&mut self.inputs, inputs);
+        let rises = |bit| inputs.contains(bit) && !before.contains(bit);
+        let enabled = inputs.contains(DigitalInputs::ENABLE);
+        self.ticks = self.ticks.saturating_add(1);
+        match self.state {
+            SupervisorState::Fault => {
+                if rises(DigitalInputs::RESET) {
+                    self.fault = None;
+                    self.enter(SupervisorState::Idle);
+                }
+            }
+            SupervisorState::Idle => {
+                // An edge, so that a reset alone does not start the drive again.
+                if rises(DigitalInputs::ENABLE) && has_law {
+                    self.enter(SupervisorState::Armed);
+                }
+            }
+            _ if !enabled => self.enter(SupervisorState::Idle),
+            SupervisorState::Armed => {
+                self.contact_ticks = if contact {
+                    self.contact_ticks.saturating_add(1)
+                } else {
+                    0
+                };
+                if self.contact_ticks > self.settings.arming_ticks {
+                    self.enter(SupervisorState::Tracking);
+                } else if self.ticks > self.settings.arming_limit_ticks {
+                    self.latch(Fault::ContactNotFound);
+                }
+            }
+            SupervisorState::Tracking => {
+                if !contact {
+                    match self.settings.on_lift_off {
+                        OnLiftOff::Continue => self.enter(SupervisorState::LiftOff),
+                        OnLiftOff::Fault => self.latch(Fault::LiftOffTooLong),
+                    }
+                }
+            }
+            SupervisorState::LiftOff => {
+                let limit = self.settings.lift_off_limit_ticks;
+                if contact {
+                    self.enter(SupervisorState::Tracking);
+                } else if limit > 0 && self.ticks > limit {
+                    self.latch(Fault::LiftOffTooLong);
+                }
+            }
+        }
+    }
+
+    fn enter(&mut self, state: SupervisorState) {
+        if self.state != state {
+            self.state = state;
+            self.ticks = 0;
+            self.contact_ticks = 0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use SupervisorState::{Armed, Idle, LiftOff, Tracking};
+
+    const ON: DigitalInputs = DigitalInputs::ENABLE;
+    const OFF: DigitalInputs = DigitalInputs(0);
+
+    fn tracking() -> Supervisor {
+        let mut supervisor = Supervisor::new(SupervisorSettings::default());
+        for _ in 0..12 {
+            supervisor.tick(ON, true, true);
+        }
+        assert_eq!(supervisor.state(), Tracking);
+        supervisor
+    }
+
+    #[test]
+    fn enabling_arms_and_confirmed_contact_starts_tracking() {
+        let mut supervisor = Supervisor::new(SupervisorSettings::default());
+        supervisor.tick(OFF, true, true);
+        assert_eq!(supervisor.state(), Idle);
+        supervisor.tick(ON, true, true);
+        assert_eq!(supervisor.state(), Armed);
+        assert_eq!(tracking().state(), Tracking);
+    }
+
+    #[test]
+    fn without_a_law_nothing_arms() {
+        let mut supervisor = Supervisor::new(SupervisorSettings::default());
+        supervisor.tick(ON, true, false);
+        assert_eq!(supervisor.state(), Idle);
+    }
+
+    #[test]
+    fn arming_without_contact_is_given_up() {
+        let mut supervisor = Supervisor::new(SupervisorSettings::default());
+        for _ in 0..1002 {
+            supervisor.tick(ON, false, true);
+        }
+        assert_eq!(supervisor.fault(), Some(Fault::ContactNotFound));
+        assert!(!supervisor.drives());
+    }
+
+    #[test]
+    fn lift_off_is_left_on_contact_and_faults_after_its_limit() {
+        let mut supervisor = tracking();
+        supervisor.tick(ON, false, true);
+        assert_eq!(supervisor.state(), LiftOff);
+        supervisor.tick(ON, true, true);
+        assert_eq!(supervisor.state(), Tracking);
+        for _ in 0..2002 {
+            supervisor.tick(ON, false, true);
+        }
+        assert_eq!(supervisor.fault(), Some(Fault::LiftOffTooLong));
+    }
+
+    #[test]
+    fn a_fault_is_latched_until_reset_and_needs_a_new_enable() {
+        let mut supervisor = tracking();
+        supervisor.latch(Fault::NotFinite);
+        supervisor.latch(Fault::StaleFrame);
+        for inputs in [ON, OFF, ON] {
+            supervisor.tick(inputs, true, true);
+            assert_eq!(supervisor.fault(), Some(Fault::NotFinite));
+        }
+        supervisor.tick(ON.with(DigitalInputs::RESET), true, true);
+        assert_eq!((supervisor.state(), supervisor.fault()), (Idle, None));
+        supervisor.tick(ON, true, true);
+        assert_eq!(supervisor.state(), Idle);
+        supervisor.tick(OFF, true, true);
+        supervisor.tick(ON, true, true);
+        assert_eq!(supervisor.state(), Armed);
+    }
+
+    #[test]
+    fn disabling_stops_the_drive() {
+        let mut supervisor = tracking();
+        supervisor.tick(OFF, true, true);
+        assert_eq!(supervisor.state(), Idle);
+    }
+}
