@@ -3,4 +3,5 @@
 
 pub mod atomic_file;
 pub mod plant;
+pub mod plot;
 pub mod record;

@@ -242,6 +242,8 @@ impl LogWriter {
             .library(concat!("painleve ", env!("CARGO_PKG_VERSION")))
             // The cores belong to the control loop; one thread keeps up with it.
             .compression_threads(0)
+            // The default level is slower here and compresses these messages no better.
+            .compression_level(1)
             .create(BufWriter::new(file))?;
         writer.write_metadata(&Metadata {
             name: "painleve".to_owned(),
