@@ -1,0 +1,222 @@
+//! Axis ranges that outliers cannot spoil, and labels for them.
+
+use std::ops::Range;
+
+use super::decimate::Extent;
+
+/// Part of the bins that may lie off scale at either end.
+const OUTLIERS: f64 = 0.01;
+/// Everything is shown unless that makes the axis this many times longer.
+const WORTH_CLIPPING: f64 = 2.5;
+/// Free space above and below the curve, as a part of its height.
+const MARGIN: f64 = 0.08;
+
+/// The range of a value axis, and what it leaves out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ValueAxis {
+    /// From bottom to top; never empty, always finite.
+    pub range: Range<f64>,
+    /// Least value, if it is below the range.
+    pub off_scale_min: Option<f64>,
+    /// Greatest value, if it is above the range.
+    pub off_scale_max: Option<f64>,
+}
+
+impl ValueAxis {
+    /// The range for some curves.
+    ///
+    /// All values are shown if that leaves the ordinary ones readable; otherwise the
+    /// axis ends a little beyond the range of all but the most extreme percent.
+    /// `include` is always within, and the range is at least `minimum_span` long, so
+    /// that noise on a constant does not fill the panel.
+    pub fn new(
+        extents: impl Iterator<Item = Extent>,
+        include: Option<f64>,
+        minimum_span: f64,
+    ) -> Self {
+        let mut minima = Vec::new();
+        let mut maxima = Vec::new();
+        let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for extent in extents.filter(|extent| !extent.is_empty()) {
+            least = least.min(extent.min);
+            greatest = greatest.max(extent.max);
+            // An infinity within a bin hides its other values; both ends are finite then.
+            minima.extend(
+                [extent.min, extent.first]
+                    .into_iter()
+                    .find(|v| v.is_finite()),
+            );
+            maxima.extend(
+                [extent.max, extent.last]
+                    .into_iter()
+                    .find(|v| v.is_finite()),
+            );
+        }
+        minima.sort_unstable_by(f64::total_cmp);
+        maxima.sort_unstable_by(f64::total_cmp);
+
+        let (Some(ordinary_min), Some(ordinary_max)) = (
+            quantile(&minima, OUTLIERS),
+            quantile(&maxima, 1.0 - OUTLIERS),
+        ) else {
+            return Self::padded(include.unwrap_or(0.0), include.unwrap_or(0.0), minimum_span);
+        };
+        let with_include = |low: f64, high: f64| {
+            include.map_or((low, high), |value| (low.min(value), high.max(value)))
+        };
+        let ordinary = with_include(
+            ordinary_min.min(ordinary_max),
+            ordinary_max.max(ordinary_min),
+        );
+        let ordinary_span = (ordinary.1 - ordinary.0).max(minimum_span);
+
+        let everything = with_include(least, greatest);
+        let (low, high) = if everything.1 - everything.0 <= WORTH_CLIPPING * ordinary_span {
+            everything
+        } else {
+            // Either end stretches on its own: a spike upwards costs nothing below.
+            let room = 0.25 * ordinary_span;
+            (
+                everything.0.max(ordinary.0 - room),
+                everything.1.min(ordinary.1 + room),
+            )
+        };
+        let mut axis = Self::padded(low, high, minimum_span);
+        axis.off_scale_min = (least < axis.range.start).then_some(least);
+        axis.off_scale_max = (greatest > axis.range.end).then_some(greatest);
+        axis
+    }
+
+    fn padded(low: f64, high: f64, minimum_span: f64) -> Self {
+        // Values beyond this could not be told apart on paper, and their difference
+        // must stay finite.
+        let (low, high) = (low.clamp(-1e300, 1e300), high.clamp(-1e300, 1e300));
+        let relative = 1e-9 * low.abs().max(high.abs());
+        let missing = (minimum_span.max(relative) - (high - low)).max(0.0);
+        let margin = MARGIN * (high - low + missing) + 0.5 * missing;
+        Self {
+            range: low - margin..high + margin,
+            off_scale_min: None,
+            off_scale_max: None,
+        }
+    }
+
+    /// A value moved to the nearer end if it is off scale.
+    pub fn clamp(&self, value: f64) -> f64 {
+        value.clamp(self.range.start, self.range.end)
+    }
+
+    /// What is off scale, for the reader; empty if nothing is.
+    pub fn off_scale_note(&self, unit: &str) -> String {
+        match (self.off_scale_min, self.off_scale_max) {
+            (None, None) => String::new(),
+            (Some(min), None) => format!("off scale: down to {} {unit}", short(min)),
+            (None, Some(max)) => format!("off scale: up to {} {unit}", short(max)),
+            (Some(min), Some(max)) => {
+                format!("off scale: {} … {} {unit}", short(min), short(max))
+            }
+        }
+    }
+}
+
+/// A label with as many decimals as tell values `step` apart.
+pub fn label(value: f64, step: f64) -> String {
+    if !(1e-6..1e7).contains(&step) {
+        return format!("{value:.1e}").replace('-', "−");
+    }
+    // Ticks are at 1, 2 or 5 times a power of ten below the step.
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    let is_zero = text
+        .trim_start_matches('-')
+        .chars()
+        .all(|c| c == '0' || c == '.');
+    match text.strip_prefix('-') {
+        Some(positive) if is_zero => positive.to_owned(),
+        Some(positive) => format!("−{positive}"),
+        None => text,
+    }
+}
+
+/// Three digits, for notes.
+fn short(value: f64) -> String {
+    if value.is_infinite() {
+        return if value > 0.0 { "∞" } else { "−∞" }.to_owned();
+    }
+    if value.abs() >= 1e5 {
+        return format!("{value:.1e}").replace('-', "−");
+    }
+    label(value, value.abs() / 100.0)
+}
+
+/// The value below which a part `p` of the sorted values lies.
+fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    sorted.get((p * last as f64).round() as usize).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn axis(values: &[f64]) -> ValueAxis {
+        ValueAxis::new(
+            values.iter().map(|&value| Extent::of(value)),
+            Some(0.0),
+            1.0,
+        )
+    }
+
+    #[test]
+    fn a_spike_is_cut_and_told_but_a_frequent_value_is_shown() {
+        let mut values = vec![10.0; 1000];
+        values[500] = 480.0;
+        let spiky = axis(&values);
+        assert!(spiky.range.end < 20.0, "{spiky:?}");
+        assert_eq!(spiky.off_scale_max, Some(480.0));
+        assert_eq!(spiky.off_scale_note("N"), "off scale: up to 480 N");
+        values[500] = f64::INFINITY;
+        assert_eq!(axis(&values).off_scale_note("N"), "off scale: up to ∞ N");
+
+        values[..300].fill(480.0);
+        values[500] = 10.0;
+        assert!(axis(&values).range.end > 480.0);
+        // A mild overshoot stays in the picture.
+        values.fill(10.0);
+        values[500] = 16.0;
+        assert_eq!(axis(&values).off_scale_note("N"), "");
+    }
+
+    #[test]
+    fn labels_have_the_decimals_their_steps_need() {
+        assert_eq!(label(0.148, 0.02), "0.15");
+        assert_eq!(label(-0.148, 0.005), "−0.148");
+        assert_eq!(label(-1e-17, 0.5), "0.0");
+        assert_eq!(label(20.0, 10.0), "20");
+        assert_eq!(label(-3e9, 1e9), "−3.0e9");
+        assert_eq!(short(-1234.5), "−1234");
+        assert_eq!(short(12.345), "12.3");
+    }
+
+    proptest! {
+        #[test]
+        fn any_range_is_finite_and_not_empty(
+            values in prop::collection::vec(
+                prop_oneof![
+                    any::<f64>(), -10.0..10.0, Just(f64::INFINITY), Just(f64::NAN), Just(0.148),
+                ],
+                0..50,
+            ),
+        ) {
+            let axis = axis(&values);
+            let span = axis.range.end - axis.range.start;
+            prop_assert!(span.is_finite() && span >= 1.0, "{axis:?}");
+            prop_assert!(axis.range.contains(&0.0));
+            for value in values.into_iter().filter(|value| !value.is_nan()) {
+                prop_assert!((axis.range.start..=axis.range.end).contains(&axis.clamp(value)));
+                let _ = (label(value, span / 5.0), short(value));
+            }
+        }
+    }
+}

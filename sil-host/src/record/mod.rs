@@ -1,0 +1,101 @@
+//! What a run leaves behind, one [`Sample`] a control tick.
+//!
+//! - [`mcap`]: the samples as a log file for Foxglove, PlotJuggler and scripts
+//!
+//! The same samples feed the figure in [`crate::plot`].
+
+use painleve_shared::{ActuatorFrame, SensorFrame};
+use serde::{Deserialize, Serialize};
+
+pub mod mcap;
+
+/// What holds the tip of the real arm at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum ContactMode {
+    /// The tip is off the belt.
+    #[default]
+    Flight = 0,
+    /// It slides with ż_r > 0.
+    SlidePositive = 1,
+    /// It slides with ż_r < 0.
+    SlideNegative = 2,
+    /// It moves with the belt, the force inside the friction cone.
+    Stick = 3,
+}
+
+impl ContactMode {
+    /// All modes, by number.
+    pub const ALL: [Self; 4] = [
+        Self::Flight,
+        Self::SlidePositive,
+        Self::SlideNegative,
+        Self::Stick,
+    ];
+
+    /// The mode's name, as it is serialised.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flight => "flight",
+            Self::SlidePositive => "slide-positive",
+            Self::SlideNegative => "slide-negative",
+            Self::Stick => "stick",
+        }
+    }
+}
+
+/// Both frames of a control tick and the truth behind them.
+///
+/// Plant values are those at the instant the sensors are read, before the answer acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Simulated time, s.
+    pub time_s: f64,
+    /// What the controller was told.
+    pub sensor: SensorFrame,
+    /// What it answered.
+    pub actuator: ActuatorFrame,
+    /// Angles θ1, θ2 from the downward vertical, rad.
+    pub theta_rad: [f64; 2],
+    /// Their rates, rad/s.
+    pub theta_dot_rad_s: [f64; 2],
+    /// Position of the tip along the belt z_t, m.
+    pub tip_t_m: f64,
+    /// Height of the tip over the belt, m.
+    pub gap_m: f64,
+    /// Velocity of the tip relative to the belt ż_r, m/s.
+    pub slip_velocity_m_s: f64,
+    /// Velocity of the belt v_belt, m/s.
+    pub belt_speed_m_s: f64,
+    /// Normal force f_n, N.
+    pub normal_force_n: f64,
+    /// Tangential force f_t, N.
+    pub tangential_force_n: f64,
+    /// Free normal acceleration b, m/s².
+    pub b_m_s2: f64,
+    /// p for the present direction of slip, 1/kg.
+    pub p_per_kg: f64,
+    /// Torques u1, u2 that act on the joints, N·m.
+    pub torque_nm: [f64; 2],
+    /// Reference z_t*, m.
+    pub reference_tip_t_m: f64,
+    /// What holds the tip.
+    pub mode: ContactMode,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contact_modes_are_serialised_by_name_and_numbered_in_order() {
+        for (number, mode) in ContactMode::ALL.into_iter().enumerate() {
+            assert_eq!(mode as usize, number);
+            assert_eq!(
+                serde_json::to_value(mode).unwrap(),
+                serde_json::json!(mode.name())
+            );
+        }
+    }
+}
