@@ -1,7 +1,21 @@
 //! The host side of the bench: a simulated arm on a moving belt with its
 //! converters, and everything around it.
+//!
+//! - [`plant`]: the hybrid rigid-body model
+//! - [`converters`], [`simulation`]: the plant as the controller's wires see it
+//! - [`controller_host`], [`link`], [`realtime`]: whatever runs the controller, and how to reach it
+//! - [`closed_loop`]: sample, exchange, record, advance
+//! - [`scenario`]: everything that defines a run, as a TOML file
+//! - [`record`], [`plot`], [`report`]: what a run leaves behind
 
 pub mod atomic_file;
+pub mod closed_loop;
+pub mod controller_host;
+pub mod converters;
+pub mod link;
 pub mod plant;
 pub mod plot;
+pub mod realtime;
 pub mod record;
+pub mod scenario;
+pub mod simulation;

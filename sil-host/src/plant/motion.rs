@@ -21,21 +21,31 @@ pub fn theta_dot(state: &State) -> Vector2<f64> {
     Vector2::new(state[2], state[3])
 }
 
-/// What the tip does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// What holds the tip.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[repr(u8)]
 pub enum ContactMode {
-    /// No contact.
-    Flight,
-    /// Sliding with ż_r > 0.
-    SlidePositive,
-    /// Sliding with ż_r < 0.
-    SlideNegative,
-    /// Moving with the belt.
-    Stick,
+    /// The tip is off the belt.
+    #[default]
+    Flight = 0,
+    /// It slides with ż_r > 0.
+    SlidePositive = 1,
+    /// It slides with ż_r < 0.
+    SlideNegative = 2,
+    /// It moves with the belt, the force inside the friction cone.
+    Stick = 3,
 }
 
 impl ContactMode {
+    /// All modes, by number.
+    pub const ALL: [Self; 4] = [
+        Self::Flight,
+        Self::SlidePositive,
+        Self::SlideNegative,
+        Self::Stick,
+    ];
+
     /// Sliding in one direction.
     pub fn slide(slip: Slip) -> Self {
         match slip {
@@ -58,12 +68,12 @@ impl ContactMode {
         self != Self::Flight
     }
 
-    /// Name for people.
+    /// The mode's name, as it is serialised.
     pub fn name(self) -> &'static str {
         match self {
             Self::Flight => "flight",
-            Self::SlidePositive => "slide +",
-            Self::SlideNegative => "slide −",
+            Self::SlidePositive => "slide-positive",
+            Self::SlideNegative => "slide-negative",
             Self::Stick => "stick",
         }
     }
@@ -207,6 +217,22 @@ impl Motion<'_> {
         match jacobian.lu().solve(&belt) {
             Some(rates) => State::new(state[0], state[1], rates.x, rates.y),
             None => state,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contact_modes_are_serialised_by_name_and_numbered_in_order() {
+        for (number, mode) in ContactMode::ALL.into_iter().enumerate() {
+            assert_eq!(mode as usize, number);
+            assert_eq!(
+                serde_json::to_value(mode).unwrap(),
+                serde_json::json!(mode.name())
+            );
         }
     }
 }

@@ -17,7 +17,8 @@ use super::PlotError;
 use super::axis::{ValueAxis, label};
 use super::decimate::{Bin, Decimator, Extent};
 use crate::atomic_file;
-use crate::record::{ContactMode, Sample};
+use crate::plant::motion::ContactMode;
+use crate::record::Sample;
 
 /// Signals of the figure, by their place in a bin.
 mod signal {

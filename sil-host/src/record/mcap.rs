@@ -471,7 +471,7 @@ mod tests {
     use painleve_shared::status::{Fault, SupervisorState};
     use serde_json::Value;
 
-    use crate::record::ContactMode;
+    use crate::plant::motion::ContactMode;
 
     fn sample(tick: u32) -> Sample {
         // Quarters, so that reading them back is exact.

@@ -5,45 +5,10 @@
 //! The same samples feed the figure in [`crate::plot`].
 
 use painleve_shared::{ActuatorFrame, SensorFrame};
-use serde::{Deserialize, Serialize};
+
+use crate::plant::motion::ContactMode;
 
 pub mod mcap;
-
-/// What holds the tip of the real arm at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[repr(u8)]
-pub enum ContactMode {
-    /// The tip is off the belt.
-    #[default]
-    Flight = 0,
-    /// It slides with ż_r > 0.
-    SlidePositive = 1,
-    /// It slides with ż_r < 0.
-    SlideNegative = 2,
-    /// It moves with the belt, the force inside the friction cone.
-    Stick = 3,
-}
-
-impl ContactMode {
-    /// All modes, by number.
-    pub const ALL: [Self; 4] = [
-        Self::Flight,
-        Self::SlidePositive,
-        Self::SlideNegative,
-        Self::Stick,
-    ];
-
-    /// The mode's name, as it is serialised.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Flight => "flight",
-            Self::SlidePositive => "slide-positive",
-            Self::SlideNegative => "slide-negative",
-            Self::Stick => "stick",
-        }
-    }
-}
 
 /// Both frames of a control tick and the truth behind them.
 ///
@@ -82,20 +47,4 @@ pub struct Sample {
     pub reference_tip_t_m: f64,
     /// What holds the tip.
     pub mode: ContactMode,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn contact_modes_are_serialised_by_name_and_numbered_in_order() {
-        for (number, mode) in ContactMode::ALL.into_iter().enumerate() {
-            assert_eq!(mode as usize, number);
-            assert_eq!(
-                serde_json::to_value(mode).unwrap(),
-                serde_json::json!(mode.name())
-            );
-        }
-    }
 }

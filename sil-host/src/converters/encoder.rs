@@ -1,0 +1,138 @@
+//! Absolute single-turn joint encoders on θ1 and on the elbow, θ2 − θ1.
+//!
+//! Latency is exact: the plant is stopped at the instant of capture (the part of
+//! the latency below one tick), and whole ticks wait in a ring.
+
+use nalgebra::Vector2;
+use painleve_shared::counts::{EncoderCounts, EncoderScale};
+use painleve_shared::range::{self, OutOfRange};
+use serde::{Deserialize, Serialize};
+
+use super::noise::{Channel, Noise};
+
+/// Longest latency, in whole ticks.
+const MAXIMUM_LATENCY_TICKS: usize = 16;
+
+/// Settings of both joint encoders.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EncoderSettings {
+    /// Resolution: 2^bits counts a turn.
+    pub bits: u8,
+    /// Reading at angle zero.
+    pub offset_counts: [u32; 2],
+    /// Standard deviation of the noise, rad.
+    pub noise_rad: f64,
+    /// Time from capture to the frame that carries it, in control ticks.
+    pub latency_ticks: f64,
+}
+
+impl Default for EncoderSettings {
+    fn default() -> Self {
+        Self {
+            bits: 14,
+            offset_counts: [0, 0],
+            noise_rad: 0.0,
+            latency_ticks: 0.0,
+        }
+    }
+}
+
+impl EncoderSettings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        for offset in self.offset_counts {
+            EncoderScale {
+                bits: self.bits,
+                offset: EncoderCounts(offset),
+            }
+            .validate()?;
+        }
+        range::check("converters.encoder.noise_rad", self.noise_rad, 0.0, 0.1)?;
+        range::check(
+            "converters.encoder.latency_ticks",
+            self.latency_ticks,
+            0.0,
+            MAXIMUM_LATENCY_TICKS as f64 - 1.0,
+        )
+    }
+}
+
+/// Both encoders with their noise and the readings on their way.
+#[derive(Clone, Debug)]
+pub struct Encoders {
+    scales: [EncoderScale; 2],
+    noise: [Noise; 2],
+    whole_ticks: usize,
+    fraction: f64,
+    /// Ring of captured readings.
+    captured: [[EncoderCounts; 2]; MAXIMUM_LATENCY_TICKS],
+    next: usize,
+}
+
+impl Encoders {
+    /// Encoders that have seen the arm at rest at `theta_rad` = (θ1, θ2) for ever.
+    pub fn new(settings: &EncoderSettings, seed: u64, theta_rad: &Vector2<f64>) -> Self {
+        let mut encoders = Self {
+            scales: settings.scales(),
+            noise: [Channel::Encoder1, Channel::Encoder2]
+                .map(|channel| Noise::new(seed, channel, settings.noise_rad)),
+            whole_ticks: settings.latency_ticks as usize,
+            fraction: settings.latency_ticks.fract(),
+            captured: [[EncoderCounts(0); 2]; MAXIMUM_LATENCY_TICKS],
+            next: 0,
+        };
+        for _ in 0..MAXIMUM_LATENCY_TICKS {
+            encoders.capture(theta_rad);
+        }
+        encoders
+    }
+
+    /// How long before a tick the encoders capture for it, in ticks, 0 … 1.
+    pub fn capture_before_tick(&self) -> f64 {
+        self.fraction
+    }
+
+    /// Captures the joint angles (θ1, θ2), rad; called once per tick.
+    pub fn capture(&mut self, theta_rad: &Vector2<f64>) {
+        let joints = [theta_rad.x, theta_rad.y - theta_rad.x];
+        let mut readings = [EncoderCounts(0); 2];
+        for (joint, reading) in readings.iter_mut().enumerate() {
+            let angle = joints[joint] + self.noise[joint].draw();
+            *reading = self.scales[joint].reading(angle);
+        }
+        self.captured[self.next] = readings;
+        self.next = (self.next + 1) % MAXIMUM_LATENCY_TICKS;
+    }
+
+    /// The readings that this tick's frame carries.
+    pub fn readings(&self) -> [EncoderCounts; 2] {
+        let behind = self.whole_ticks + 1;
+        let index = (self.next + MAXIMUM_LATENCY_TICKS - behind) % MAXIMUM_LATENCY_TICKS;
+        self.captured[index]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_are_of_the_elbow_and_late_by_whole_ticks() {
+        let settings = EncoderSettings {
+            latency_ticks: 2.25,
+            ..Default::default()
+        };
+        let mut encoders = Encoders::new(&settings, 1, &Vector2::new(0.0, 0.0));
+        assert_eq!(encoders.capture_before_tick(), 0.25);
+        for tick in 1..=5 {
+            encoders.capture(&Vector2::new(0.1 * f64::from(tick), 0.5));
+        }
+        let scale = encoders.scales[0];
+        let expected = [scale.reading(0.3), scale.reading(0.5 - 0.3)];
+        assert_eq!(encoders.readings(), expected);
+    }
+}

@@ -1,0 +1,72 @@
+//! What stands between the plant's quantities and the controller's integers.
+//!
+//! - [`noise`]: seeded noise, one stream per channel
+//! - [`encoder`]: joint encoders with resolution, offset, noise and latency
+//! - [`force_cell`]: f_n and f_t with resolution, range and noise
+//! - [`torque_stage`]: torque with resolution, saturation, lag and transport delay
+//!
+//! Whatever crosses the link is an exact integer; the controller knows the
+//! scalings ([`ConverterSettings::scales`]), never the noise.
+
+pub mod encoder;
+pub mod force_cell;
+pub mod noise;
+pub mod torque_stage;
+
+use painleve_firmware::configuration::Converters;
+use painleve_shared::counts::{EncoderCounts, EncoderScale, LinearScale};
+use painleve_shared::range::OutOfRange;
+use serde::{Deserialize, Serialize};
+
+use encoder::EncoderSettings;
+use force_cell::ForceCellSettings;
+use torque_stage::TorqueStageSettings;
+
+/// Settings of all converters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConverterSettings {
+    /// Both joint encoders.
+    pub encoder: EncoderSettings,
+    /// Both axes of the force cell.
+    pub force: ForceCellSettings,
+    /// Both torque stages.
+    pub torque: TorqueStageSettings,
+}
+
+impl ConverterSettings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        self.encoder.validate()?;
+        self.force.validate()?;
+        self.torque.validate()
+    }
+
+    /// What the controller is told about the converters.
+    pub fn scales(&self) -> Converters {
+        Converters {
+            encoders: self.encoder.scales(),
+            force: LinearScale {
+                bits: self.force.bits,
+                range: self.force.range_n as f32,
+            },
+            torque: LinearScale {
+                bits: self.torque.bits,
+                range: self.torque.range_nm as f32,
+            },
+        }
+    }
+}
+
+impl EncoderSettings {
+    /// Scalings of both encoders.
+    fn scales(&self) -> [EncoderScale; 2] {
+        self.offset_counts.map(|offset| EncoderScale {
+            bits: self.bits,
+            offset: EncoderCounts(offset),
+        })
+    }
+}

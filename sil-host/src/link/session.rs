@@ -1,0 +1,153 @@
+//! What the plant tells the controller about a run before its first frame.
+
+use iceoryx2::prelude::ZeroCopySend;
+use serde::{Deserialize, Serialize};
+
+use super::LinkError;
+
+/// Most bytes of configuration a session can carry.
+pub const CONFIGURATION_CAPACITY: usize = 2048;
+
+/// How the plant paces its ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Pacing {
+    /// Tick by tick, as fast as both ends go; deterministic.
+    Lockstep,
+    /// By the clock, whether the controller has answered or not.
+    Realtime,
+}
+
+/// A run, as the controller needs to know it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Session {
+    /// Control ticks per simulated second; not 0.
+    pub tick_hz: u32,
+    /// Pacing of the plant.
+    pub pacing: Pacing,
+    /// The controller's configuration, encoded with postcard; opaque to the
+    /// link, at most [`CONFIGURATION_CAPACITY`] bytes.
+    pub configuration: Vec<u8>,
+}
+
+/// What a session message says, once checked.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Announcement {
+    Begin(Session),
+    End,
+}
+
+/// The session message in shared memory.
+///
+/// Plain numbers, as another process wrote them: every bit pattern is a valid
+/// value, and [`SessionMessage::read`] checks what it means.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, ZeroCopySend)]
+#[type_name("painleve::SessionMessage")]
+pub(super) struct SessionMessage {
+    kind: u32,
+    tick_hz: u32,
+    pacing: u32,
+    length: u32,
+    configuration: [u8; CONFIGURATION_CAPACITY],
+}
+
+impl SessionMessage {
+    const BEGIN: u32 = 1;
+    const END: u32 = 2;
+    const LOCKSTEP: u32 = 1;
+    const REALTIME: u32 = 2;
+
+    pub(super) fn begin(session: &Session) -> Result<Self, LinkError> {
+        let length = session.configuration.len();
+        let mut configuration = [0; CONFIGURATION_CAPACITY];
+        configuration
+            .get_mut(..length)
+            .ok_or(LinkError::ConfigurationTooLong { length })?
+            .copy_from_slice(&session.configuration);
+        Ok(Self {
+            kind: Self::BEGIN,
+            tick_hz: session.tick_hz,
+            pacing: match session.pacing {
+                Pacing::Lockstep => Self::LOCKSTEP,
+                Pacing::Realtime => Self::REALTIME,
+            },
+            length: length as u32,
+            configuration,
+        })
+    }
+
+    pub(super) fn end() -> Self {
+        Self {
+            kind: Self::END,
+            tick_hz: 0,
+            pacing: 0,
+            length: 0,
+            configuration: [0; CONFIGURATION_CAPACITY],
+        }
+    }
+
+    /// What the message says; `None` if this version does not understand it.
+    pub(super) fn read(&self) -> Option<Announcement> {
+        match self.kind {
+            Self::BEGIN if self.tick_hz > 0 => Some(Announcement::Begin(Session {
+                tick_hz: self.tick_hz,
+                pacing: match self.pacing {
+                    Self::LOCKSTEP => Pacing::Lockstep,
+                    Self::REALTIME => Pacing::Realtime,
+                    _ => return None,
+                },
+                configuration: self.configuration.get(..self.length as usize)?.to_vec(),
+            })),
+            Self::END => Some(Announcement::End),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn session(length: usize) -> Session {
+        Session {
+            tick_hz: 1000,
+            pacing: Pacing::Realtime,
+            configuration: vec![0xa5; length],
+        }
+    }
+
+    #[test]
+    fn messages_say_what_was_put_in() {
+        for length in [0, 1, CONFIGURATION_CAPACITY] {
+            let message = SessionMessage::begin(&session(length)).unwrap();
+            assert_eq!(message.read(), Some(Announcement::Begin(session(length))));
+        }
+        assert_eq!(SessionMessage::end().read(), Some(Announcement::End));
+    }
+
+    #[test]
+    fn too_long_a_configuration_is_refused() {
+        let length = CONFIGURATION_CAPACITY + 1;
+        assert!(matches!(
+            SessionMessage::begin(&session(length)),
+            Err(LinkError::ConfigurationTooLong { length: l }) if l == length
+        ));
+    }
+
+    #[test]
+    fn nonsense_is_not_understood() {
+        let good = SessionMessage::begin(&session(3)).unwrap();
+        for bad in [
+            SessionMessage { kind: 9, ..good },
+            SessionMessage { pacing: 0, ..good },
+            SessionMessage { tick_hz: 0, ..good },
+            SessionMessage {
+                length: CONFIGURATION_CAPACITY as u32 + 1,
+                ..good
+            },
+        ] {
+            assert_eq!(bad.read(), None);
+        }
+    }
+}

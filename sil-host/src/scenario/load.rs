@@ -1,0 +1,273 @@
+//! Scenarios from names, files and overrides.
+
+use std::fs;
+use std::path::PathBuf;
+
+use painleve_shared::range::OutOfRange;
+use toml::{Table, Value};
+
+use super::{Scenario, built_in};
+use crate::plant::Plant;
+
+/// Why there is no scenario to run.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    /// Neither a built-in name nor a file.
+    #[error("no built-in scenario and no file is called '{name}'; built in are: {known}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The built-in names.
+        known: String,
+    },
+    /// The file cannot be read.
+    #[error("cannot read scenario file {}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file holds nothing.
+    #[error("scenario file {} is empty", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The text is not TOML.
+    #[error("{origin} is not TOML: {message}")]
+    Syntax {
+        /// File or scenario.
+        origin: String,
+        /// What is wrong and where.
+        message: String,
+    },
+    /// A key is unknown or has the wrong type.
+    #[error("{origin}: {key}: {message}")]
+    Key {
+        /// File, scenario or option.
+        origin: String,
+        /// Path of the key.
+        key: String,
+        /// What is wrong and what is allowed.
+        message: String,
+    },
+    /// An override is not of the form key=value.
+    #[error("--set '{text}' is not of the form key=value, as in --set belt.friction=0.4")]
+    Override {
+        /// What was given.
+        text: String,
+    },
+    /// A value is out of range.
+    #[error("{origin}: {source}")]
+    Range {
+        /// File or scenario.
+        origin: String,
+        /// Which and what is allowed.
+        source: OutOfRange,
+    },
+}
+
+impl Scenario {
+    /// The built-in scenario or file called `name`, with overrides `key=value`
+    /// applied in order, checked as a whole.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user.
+    pub fn load(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
+        let (origin, table) = read(name)?;
+        let mut scenario = from_table(&origin, table)?;
+        for text in overrides {
+            scenario = with_override(scenario, text)?;
+        }
+        let range = |source| ScenarioError::Range {
+            origin: origin.clone(),
+            source,
+        };
+        scenario.validate().map_err(range)?;
+        Plant::new(&scenario.plant_parameters(), scenario.initial.state()).map_err(range)?;
+        Ok(scenario)
+    }
+}
+
+fn read(name: &str) -> Result<(String, Table), ScenarioError> {
+    if let Some(text) = built_in::text(name) {
+        let origin = format!("scenario {name}");
+        let table = parse(&origin, text)?;
+        return Ok((origin, table));
+    }
+    let path = PathBuf::from(name);
+    if !path.exists() {
+        return Err(ScenarioError::Unknown {
+            name: name.into(),
+            known: built_in::names().collect::<Vec<_>>().join(", "),
+        });
+    }
+    let text = fs::read_to_string(&path).map_err(|source| ScenarioError::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    let origin = format!("scenario file {}", path.display());
+    let mut table = parse(&origin, &text)?;
+    if table.is_empty() {
+        return Err(ScenarioError::Empty { path });
+    }
+    if let (false, Some(stem)) = (table.contains_key("name"), path.file_stem()) {
+        table.insert("name".into(), Value::String(stem.to_string_lossy().into()));
+    }
+    Ok((origin, table))
+}
+
+fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
+    text.parse().map_err(|error: toml::de::Error| {
+        let line = error
+            .span()
+            .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
+        ScenarioError::Syntax {
+            origin: origin.into(),
+            message: match line {
+                Some(line) => format!("line {line}: {}", error.message()),
+                None => error.message().into(),
+            },
+        }
+    })
+}
+
+fn from_table(origin: &str, table: Table) -> Result<Scenario, ScenarioError> {
+    serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
+        origin: origin.into(),
+        key: error.path().to_string(),
+        message: error.inner().message().replace('\n', " "),
+    })
+}
+
+/// The scenario with one key changed. The key must be one that the scenario has.
+fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioError> {
+    let wrong = || ScenarioError::Override { text: text.into() };
+    let (key, value) = text.split_once('=').ok_or_else(wrong)?;
+    let (key, value) = (key.trim(), value.trim());
+    if key.is_empty() || value.is_empty() {
+        return Err(wrong());
+    }
+    // A bare word is a string, so that names need no quotes inside quotes.
+    let value = format!("value = {value}")
+        .parse::<Table>()
+        .ok()
+        .and_then(|mut table| table.remove("value"))
+        .unwrap_or_else(|| Value::String(value.into()));
+    let origin = format!("--set {key}");
+    let mut root = Value::try_from(&scenario).map_err(|error| ScenarioError::Key {
+        origin: origin.clone(),
+        key: key.into(),
+        message: error.to_string(),
+    })?;
+    let mut place = &mut root;
+    for part in key.split('.') {
+        let next = match place {
+            Value::Table(table) => {
+                let known = table.keys().cloned().collect::<Vec<_>>().join(", ");
+                table
+                    .get_mut(part)
+                    .ok_or(format!("there is no '{part}' here, only: {known}"))
+            }
+            Value::Array(array) => {
+                let count = array.len();
+                part.parse::<usize>()
+                    .ok()
+                    .and_then(|index| array.get_mut(index))
+                    .ok_or(format!("'{part}' is not one of its {count} items, from 0"))
+            }
+            _ => Err(format!("'{part}' is inside a single value")),
+        };
+        place = next.map_err(|message| ScenarioError::Key {
+            origin: "--set".into(),
+            key: key.into(),
+            message,
+        })?;
+    }
+    *place = match (&*place, value) {
+        // A whole number is a number.
+        (Value::Float(_), Value::Integer(integer)) => Value::Float(integer as f64),
+        (_, value) => value,
+    };
+    match root {
+        Value::Table(table) => from_table("--set", table),
+        _ => Err(wrong()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn load(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
+        let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+        Scenario::load("hybrid-elbow-down", &overrides)
+    }
+
+    fn message(overrides: &[&str]) -> String {
+        load(overrides).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn overrides_change_one_key_each() {
+        let scenario = load(&[
+            "belt.friction=0.4",
+            "run.duration_s=2",
+            "impact.law=energetic",
+            "controller.reference.0.minimum-jerk.target_m=0.1",
+            "belt.profile={ kind = \"sine\", mean_m_s = -0.4, amplitude_m_s = 0.1, frequency_hz = 2.0 }",
+        ])
+        .unwrap();
+        assert_eq!(scenario.belt.friction, 0.4);
+        assert_eq!(scenario.run.duration_s, 2.0);
+        assert_eq!(scenario.belt.profile.speed_m_s(0.0), -0.4);
+        assert_eq!(scenario.name, "hybrid-elbow-down");
+    }
+
+    #[test]
+    fn mistakes_are_named_with_what_is_allowed() {
+        for (overrides, parts) in [
+            (&["belt.frction=0.4"][..], &["belt.frction", "friction, profile"][..]),
+            (&["belt.friction=nan"], &["belt.friction = NaN", "0 to 10"]),
+            (&["belt.friction=inf"], &["belt.friction = inf", "0 to 10"]),
+            (&["belt.friction=-1"], &["belt.friction = -1", "0 to 10"]),
+            (&["arm.height_m=0.42"], &["arm.height_m = 0.42", "0.41958"]),
+            (&["belt.friction"], &["belt.friction", "key=value"]),
+            (&["run.tick_hz=0"], &["run.tick_hz = 0", "10 to"]),
+            (&["run.seed=-1"], &["run.seed"]),
+            (&["impact.law=newton"], &["impact.law", "poisson", "energetic"]),
+            (&["initial.theta1_deg=0"], &["initial tip height"]),
+            (
+                &["controller.reference.0.minimum-jerk.target_m=0.3"],
+                &["controller.reference.target_m", "0.184"],
+            ),
+        ] {
+            let message = message(overrides);
+            for part in parts {
+                assert!(message.contains(part), "'{part}' is not in: {message}");
+            }
+            assert!(!message.contains('\n'), "{message}");
+        }
+    }
+
+    #[test]
+    fn files_may_be_partial_but_not_empty_and_not_misspelt() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("slow.toml");
+        let load = |text: &str| {
+            fs::write(&path, text).unwrap();
+            Scenario::load(path.to_str().unwrap(), &[])
+        };
+        let scenario = load("[belt]\nfriction = 0.5\n").unwrap();
+        assert_eq!((scenario.belt.friction, scenario.name.as_str()), (0.5, "slow"));
+        let message = |text| load(text).unwrap_err().to_string();
+        assert!(message("").contains("is empty"));
+        assert!(message("[belt\n").contains("line 1"));
+        assert!(message("[belt]\nspeed = 1\n").contains("speed"));
+        assert!(message("[belt]\nfriction = \"high\"\n").contains("belt.friction"));
+        let missing = Scenario::load("no-such-scenario", &[]).unwrap_err();
+        assert!(missing.to_string().contains("hybrid-elbow-down"));
+        assert!(Scenario::load(folder.path().to_str().unwrap(), &[]).is_err());
+    }
+}
