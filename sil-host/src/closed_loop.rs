@@ -5,8 +5,7 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::status::Fault;
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::controller_host::{Answer, ControllerHost};
-use crate::link::LinkError;
+use crate::controller_host::{Answer, ControllerHost, HostError};
 use crate::plant::PlantError;
 use crate::plant::statistics::Statistics;
 use crate::record::Sample;
@@ -26,24 +25,35 @@ pub enum LoopError {
     Plant(#[from] PlantError),
     /// The controller is gone.
     #[error(transparent)]
-    Link(#[from] LinkError),
+    Host(#[from] HostError),
     /// Somebody who watches the run cannot go on, a record that cannot be written, say.
     #[error("{0}")]
     Watcher(String),
+    /// The process has been asked to end.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 /// Watches a run tick by tick.
 pub trait Watcher {
-    /// Whether [`Watcher::tick`] wants to be called at all.
+    /// Whether [`Watcher::sample`] wants to be called at all.
     fn wants_samples(&self) -> bool {
         true
     }
 
-    /// Takes in one tick.
+    /// Takes in everything about one tick.
     ///
     /// # Errors
-    /// [`LoopError::Watcher`] ends the run.
-    fn tick(&mut self, sample: &Sample) -> Result<(), LoopError>;
+    /// [`LoopError`] ends the run.
+    fn sample(&mut self, sample: &Sample) -> Result<(), LoopError>;
+
+    /// Called at the end of every tick.
+    ///
+    /// # Errors
+    /// [`LoopError`] ends the run.
+    fn tick(&mut self) -> Result<(), LoopError> {
+        Ok(())
+    }
 }
 
 /// Watches nothing.
@@ -52,7 +62,7 @@ impl Watcher for () {
         false
     }
 
-    fn tick(&mut self, _: &Sample) -> Result<(), LoopError> {
+    fn sample(&mut self, _: &Sample) -> Result<(), LoopError> {
         Ok(())
     }
 }
@@ -167,11 +177,11 @@ impl<H: ControllerHost> ClosedLoop<H> {
             None => self.stale_ticks += 1,
         }
         if watcher.wants_samples() {
-            watcher.tick(&self.simulation.describe(&sensor, &self.last_answer))?;
+            watcher.sample(&self.simulation.describe(&sensor, &self.last_answer))?;
         }
         self.simulation
             .advance(frame.as_ref(), &mut self.statistics)?;
-        Ok(())
+        watcher.tick()
     }
 
     /// Ends the run.

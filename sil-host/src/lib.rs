@@ -7,15 +7,20 @@
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`scenario`]: everything that defines a run, as a TOML file
 //! - [`record`], [`plot`], [`report`]: what a run leaves behind
+//! - [`commands`]: the `painleve` command; [`interrupt`], [`lifetime`]: its processes' ends
 
 pub mod atomic_file;
 pub mod closed_loop;
+pub mod commands;
 pub mod controller_host;
 pub mod converters;
+pub mod interrupt;
+pub mod lifetime;
 pub mod link;
 pub mod plant;
 pub mod plot;
 pub mod realtime;
 pub mod record;
+pub mod report;
 pub mod scenario;
 pub mod simulation;

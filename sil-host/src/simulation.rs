@@ -67,8 +67,7 @@ impl Simulation {
     /// [`PlantError`] if the contact mode of the start cannot be decided.
     pub fn sample(&mut self, observer: &mut impl Observer) -> Result<SensorFrame, PlantError> {
         self.plant.settle(observer)?;
-        let (tangential_force, normal_force) =
-            self.force_cell.read(&self.plant.contact_force_n());
+        let (tangential_force, normal_force) = self.force_cell.read(&self.plant.contact_force_n());
         let enabled = self.plant.time_s() >= self.enable_at_s;
         // The counters of the wire wrap.
         let tick = self.tick as u32;
@@ -124,7 +123,8 @@ impl Simulation {
         answer: Option<&ActuatorFrame>,
         observer: &mut impl Observer,
     ) -> Result<(), PlantError> {
-        self.torque_stages.command(answer.map(|frame| frame.torques));
+        self.torque_stages
+            .command(answer.map(|frame| frame.torques));
         let tick = self.tick as f64;
         // From whole numbers, so that nothing accumulates.
         let at = |ticks: f64| (tick + ticks) / self.tick_hz;

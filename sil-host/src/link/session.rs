@@ -9,7 +9,7 @@ use super::LinkError;
 pub const CONFIGURATION_CAPACITY: usize = 2048;
 
 /// How the plant paces its ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Pacing {
     /// Tick by tick, as fast as both ends go; deterministic.

@@ -228,7 +228,10 @@ mod tests {
     #[test]
     fn mistakes_are_named_with_what_is_allowed() {
         for (overrides, parts) in [
-            (&["belt.frction=0.4"][..], &["belt.frction", "friction, profile"][..]),
+            (
+                &["belt.frction=0.4"][..],
+                &["belt.frction", "friction, profile"][..],
+            ),
             (&["belt.friction=nan"], &["belt.friction = NaN", "0 to 10"]),
             (&["belt.friction=inf"], &["belt.friction = inf", "0 to 10"]),
             (&["belt.friction=-1"], &["belt.friction = -1", "0 to 10"]),
@@ -236,7 +239,10 @@ mod tests {
             (&["belt.friction"], &["belt.friction", "key=value"]),
             (&["run.tick_hz=0"], &["run.tick_hz = 0", "10 to"]),
             (&["run.seed=-1"], &["run.seed"]),
-            (&["impact.law=newton"], &["impact.law", "poisson", "energetic"]),
+            (
+                &["impact.law=newton"],
+                &["impact.law", "poisson", "energetic"],
+            ),
             (&["initial.theta1_deg=0"], &["initial tip height"]),
             (
                 &["controller.reference.0.minimum-jerk.target_m=0.3"],
@@ -260,7 +266,10 @@ mod tests {
             Scenario::load(path.to_str().unwrap(), &[])
         };
         let scenario = load("[belt]\nfriction = 0.5\n").unwrap();
-        assert_eq!((scenario.belt.friction, scenario.name.as_str()), (0.5, "slow"));
+        assert_eq!(
+            (scenario.belt.friction, scenario.name.as_str()),
+            (0.5, "slow")
+        );
         let message = |text| load(text).unwrap_err().to_string();
         assert!(message("").contains("is empty"));
         assert!(message("[belt\n").contains("line 1"));

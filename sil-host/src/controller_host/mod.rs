@@ -1,4 +1,11 @@
 //! Whatever runs the controller, as the closed loop sees it.
+//!
+//! - [`InProcess`]: a library call, for studies and tests
+//! - [`lockstep`]: another process over the link, tick by tick
+//! - [`paced`]: another process over the link, by the clock
+
+pub mod lockstep;
+pub mod paced;
 
 use std::time::{Duration, Instant};
 
@@ -17,13 +24,24 @@ pub struct Answer {
     pub round_trip: Duration,
 }
 
+/// Why there are no answers any more.
+#[derive(Debug, thiserror::Error)]
+pub enum HostError {
+    /// The controller is gone.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The clock cannot be waited on.
+    #[error("cannot wait on the monotonic clock: {0}")]
+    Clock(std::io::Error),
+}
+
 /// Something that answers sensor frames.
 pub trait ControllerHost {
     /// Sends one frame and waits for its answer or the end of the tick.
     ///
     /// # Errors
-    /// [`LinkError`] if there is no controller to answer any more.
-    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, LinkError>;
+    /// [`HostError`] if there is no controller to answer any more.
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError>;
 }
 
 /// The controller in this very process.
@@ -44,7 +62,7 @@ impl InProcess {
 }
 
 impl ControllerHost for InProcess {
-    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, LinkError> {
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
         let start = Instant::now();
         let answer = self.controller.tick(frame);
         Ok(Answer {
