@@ -27,7 +27,7 @@ pub fn end_with_parent() -> io::Result<()> {
 pub struct Guarded(Child);
 
 /// Time between asking a child to end and forcing it.
-const GRACE: Duration = Duration::from_secs(1);
+const GRACE: Duration = Duration::from_millis(300);
 
 impl Guarded {
     /// Takes charge of a child.

@@ -1,1 +1,230 @@
-//! x
+//! Starting the `painleve` program from end-to-end tests, and looking at what it leaves.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::Value;
+
+/// The released program; built if it is not there yet or out of date.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let built = Command::new(cargo)
+            .args(["build", "--release", "--package", "painleve-sil-host"])
+            .args(["--message-format", "json"])
+            .current_dir(&workspace)
+            .stderr(Stdio::inherit())
+            .output()
+            .unwrap_or_else(|error| panic!("cannot start cargo: {error}"));
+        assert!(built.status.success(), "the program does not build");
+        String::from_utf8_lossy(&built.stdout)
+            .lines()
+            .filter_map(|line| serde_json::from_str::<Value>(line).ok())
+            .filter_map(|message| message["executable"].as_str().map(PathBuf::from))
+            .find(|path| path.file_stem().is_some_and(|stem| stem == "painleve"))
+            .unwrap_or_else(|| panic!("cargo did not say where the program is"))
+    })
+}
+
+/// A folder to run the program in, and the bus that is used there.
+pub struct Bench {
+    folder: tempfile::TempDir,
+    /// Name of a bus that no other test uses.
+    pub bus: String,
+}
+
+impl Bench {
+    /// An empty folder and a new bus.
+    ///
+    /// # Panics
+    /// If the folder cannot be made.
+    pub fn new(name: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("no folder: {error}"));
+        let bus = format!("test-{name}-{}", std::process::id());
+        Self { folder, bus }
+    }
+
+    /// A path inside the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// All files below the folder, relative to it.
+    pub fn files(&self) -> Vec<String> {
+        let mut found = Vec::new();
+        let mut folders = vec![self.folder.path().to_path_buf()];
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if let Ok(relative) = path.strip_prefix(self.folder.path()) {
+                    found.push(relative.display().to_string());
+                }
+            }
+        }
+        found.sort();
+        found
+    }
+
+    /// The program with arguments, to be run in the folder.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(program());
+        command.args(arguments).current_dir(self.folder.path());
+        command
+    }
+
+    /// Runs the program to its end.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments)
+            .output()
+            .unwrap_or_else(|error| panic!("cannot start painleve: {error}"))
+    }
+
+    /// Runs the program and reads the one JSON object that it must print.
+    ///
+    /// # Panics
+    /// If it fails or prints anything else.
+    pub fn report(&self, arguments: &[&str]) -> Value {
+        let output = self.run(arguments);
+        assert!(output.status.success(), "{output:?}");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(text.trim().lines().count(), 1, "{text}");
+        serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error} in {text}"))
+    }
+
+    /// Starts the program and leaves it running.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start(&self, arguments: &[&str]) -> Running {
+        let child = self
+            .command(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap_or_else(|error| panic!("cannot start painleve: {error}"));
+        Running(Some(child))
+    }
+
+    /// Shared memory and sockets that still bear the bus's name.
+    pub fn leftovers(&self) -> Vec<String> {
+        let entries = std::fs::read_dir("/dev/shm")
+            .into_iter()
+            .flatten()
+            .flatten();
+        entries
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .filter(|name| name.contains(&self.bus))
+            .collect()
+    }
+}
+
+/// A running program; killed when this value goes.
+pub struct Running(Option<Child>);
+
+impl Running {
+    /// Process id.
+    ///
+    /// # Panics
+    /// After [`Running::end`].
+    pub fn id(&self) -> i32 {
+        let id = self.0.as_ref().map(Child::id);
+        id.and_then(|id| i32::try_from(id).ok())
+            .unwrap_or_else(|| panic!("the program has ended"))
+    }
+
+    /// Waits for the end, at most `limit`; the output and how long it took.
+    ///
+    /// # Panics
+    /// If the program is still running then.
+    pub fn end(mut self, limit: Duration) -> (Output, Duration) {
+        let start = Instant::now();
+        while start.elapsed() < limit {
+            let child = self.0.as_mut().unwrap_or_else(|| panic!("ended twice"));
+            if !matches!(child.try_wait(), Ok(None))
+                && let Some(child) = self.0.take()
+            {
+                let took = start.elapsed();
+                let output = child.wait_with_output();
+                return (output.unwrap_or_else(|error| panic!("{error}")), took);
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        panic!("still running after {limit:?}");
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.0 {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// Sends a signal to a process.
+///
+/// # Panics
+/// If there is no such process.
+pub fn signal(id: i32, signal: Signal) {
+    kill(Pid::from_raw(id), signal).unwrap_or_else(|error| panic!("signal to {id}: {error}"));
+}
+
+/// Ids of the child processes of `parent` whose first argument is `subcommand`,
+/// waiting a while for one to appear.
+pub fn child_of(parent: i32, subcommand: &str) -> i32 {
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(5) {
+        for entry in std::fs::read_dir("/proc").into_iter().flatten().flatten() {
+            let Ok(id) = entry.file_name().to_string_lossy().parse::<i32>() else {
+                continue;
+            };
+            let read = |name: &str| std::fs::read_to_string(entry.path().join(name));
+            let (Ok(status), Ok(line)) = (read("status"), read("cmdline")) else {
+                continue;
+            };
+            let is_child = status
+                .lines()
+                .any(|line| line == format!("PPid:\t{parent}"));
+            if is_child && line.split('\0').nth(1) == Some(subcommand) {
+                return id;
+            }
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    panic!("{parent} has no child '{subcommand}'");
+}
+
+/// Whether a process still runs; one that has ended and waits for its parent does not.
+pub fn is_running(id: i32) -> bool {
+    std::fs::read_to_string(format!("/proc/{id}/stat")).is_ok_and(|stat| {
+        !stat
+            .rsplit(')')
+            .next()
+            .is_some_and(|rest| rest.starts_with(" Z"))
+    })
+}
+
+/// Standard error as text.
+pub fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Exit code of a status; −1 after a signal.
+pub fn code(status: ExitStatus) -> i32 {
+    status.code().unwrap_or(-1)
+}

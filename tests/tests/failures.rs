@@ -1,0 +1,200 @@
+//! What goes wrong ends with one message, an exit code, and nothing left behind.
+
+use std::time::Duration;
+
+use nix::sys::signal::Signal;
+use painleve_tests::{Bench, child_of, code, errors, is_running, signal};
+
+/// Peers must notice each other's end within this time.
+const NOTICE: Duration = Duration::from_secs(2);
+
+/// A run that is still going on when the test interferes.
+const LONG: [&str; 4] = ["run", "--set", "run.duration_s=100000", "--json"];
+
+fn assert_refused(bench: &Bench, arguments: &[&str], exit: i32, parts: &[&str]) {
+    let output = bench.run(arguments);
+    let message = errors(&output);
+    assert_eq!(code(output.status), exit, "{arguments:?}: {message}");
+    assert_eq!(
+        message.trim().lines().count(),
+        1,
+        "{arguments:?}: {message}"
+    );
+    assert!(message.starts_with("error: "), "{message}");
+    for part in parts {
+        assert!(message.contains(part), "'{part}' is not in: {message}");
+    }
+    assert!(output.stdout.is_empty(), "{output:?}");
+    let files = bench.files();
+    assert!(
+        files.iter().all(|file| file.ends_with(".toml")),
+        "{files:?}"
+    );
+}
+
+#[test]
+fn bad_scenarios_are_refused_by_name_and_range() {
+    let bench = Bench::new("bad");
+    std::fs::write(bench.path("empty.toml"), "").unwrap();
+    std::fs::write(bench.path("typo.toml"), "[belt]\nfricton = 0.5\n").unwrap();
+    std::fs::write(bench.path("nan.toml"), "[belt]\nfriction = nan\n").unwrap();
+    std::fs::write(bench.path("no.toml"), "this is not TOML").unwrap();
+    for (arguments, parts) in [
+        (
+            &["run", "no-such-scenario"][..],
+            &["no-such-scenario", "hybrid-elbow-up"][..],
+        ),
+        (&["run", "missing.toml"], &["missing.toml"]),
+        (&["run", "empty.toml"], &["empty.toml", "is empty"]),
+        (&["run", "typo.toml"], &["belt", "fricton", "friction"]),
+        (&["run", "nan.toml"], &["belt.friction = NaN", "0 to 10"]),
+        (&["run", "no.toml"], &["no.toml", "line 1"]),
+        (
+            &["--set", "belt.friction=inf"],
+            &["belt.friction = inf", "0 to 10"],
+        ),
+        (
+            &["--set", "arm.height_m=0.42"],
+            &["arm.height_m = 0.42", "0.00"],
+        ),
+        (
+            &["--set", "belt.colour=red"],
+            &["belt.colour", "friction, profile"],
+        ),
+        (&["--set", "run.duration_s=-1"], &["run.duration_s = -1"]),
+        (
+            &["--set", "controller.torque_limit_nm=9"],
+            &["controller.torque_limit_nm = 9", "0 to 5"],
+        ),
+        (
+            &["plant", "--bus", "b", "--set", "run.tick_hz=1"],
+            &["run.tick_hz = 1", "10 to"],
+        ),
+    ] {
+        assert_refused(&bench, arguments, 2, parts);
+    }
+}
+
+#[test]
+fn outputs_that_cannot_be_written_are_refused_before_the_run() {
+    let bench = Bench::new("output");
+    for option in ["--record", "--plot"] {
+        assert_refused(
+            &bench,
+            &["run", option, "/proc/nowhere/run"],
+            4,
+            &["/proc/nowhere"],
+        );
+    }
+}
+
+#[test]
+fn a_missing_peer_is_reported_in_time() {
+    let bench = Bench::new("missing");
+    for arguments in [
+        ["controller", "--bus", &bench.bus],
+        ["plant", "--bus", &bench.bus],
+    ] {
+        let (output, took) = bench.start(&arguments).end(Duration::from_secs(10));
+        assert_eq!(code(output.status), 3, "{output:?}");
+        assert!(errors(&output).contains(&bench.bus), "{output:?}");
+        // Half a second for starting and ending a process on a busy machine.
+        assert!(took < NOTICE + Duration::from_millis(500), "took {took:?}");
+    }
+    assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
+}
+
+#[test]
+fn a_second_plant_on_a_bus_is_refused() {
+    let bench = Bench::new("two");
+    let first = bench.start(&[&LONG[..], &["--bus", &bench.bus]].concat());
+    let plant = child_of(first.id(), "plant");
+    std::thread::sleep(Duration::from_millis(300));
+    let output = bench.run(&["plant", "--bus", &bench.bus, "--no-record", "--no-plot"]);
+    assert_eq!(code(output.status), 3, "{output:?}");
+    assert!(errors(&output).contains(&bench.bus), "{output:?}");
+    assert!(is_running(plant), "the first plant must not suffer");
+}
+
+/// Kills one process of a run and looks at what becomes of the others.
+fn kill_and_watch(name: &str, victim: &str, with: Signal) {
+    let bench = Bench::new(name);
+    let run = bench.start(&[&LONG[..], &["--bus", &bench.bus]].concat());
+    let plant = child_of(run.id(), "plant");
+    let controller = child_of(run.id(), "controller");
+    std::thread::sleep(Duration::from_millis(400));
+    let victim_id = match victim {
+        "plant" => plant,
+        "controller" => controller,
+        _ => run.id(),
+    };
+    signal(victim_id, with);
+    let (output, took) = run.end(Duration::from_secs(10));
+    assert_ne!(code(output.status), 0, "{output:?}");
+    assert!(took < NOTICE + Duration::from_millis(500), "took {took:?}");
+    if victim != "run" {
+        assert!(errors(&output).contains("error: "), "{output:?}");
+    }
+    let start = std::time::Instant::now();
+    while (is_running(plant) || is_running(controller)) && start.elapsed() < NOTICE {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(
+        !is_running(plant) && !is_running(controller),
+        "left running"
+    );
+    let visible = bench.files();
+    let visible = visible.iter().filter(|file| !file.contains(".part"));
+    assert_eq!(visible.count(), 0, "half-written: {:?}", bench.files());
+
+    // Whatever was left does not stop the next run on the same bus.
+    let next = bench.report(&[
+        "run",
+        "--bus",
+        &bench.bus,
+        "--set",
+        "run.duration_s=0.2",
+        "--json",
+        "--no-record",
+        "--no-plot",
+    ]);
+    assert_eq!(next["ticks"], 200);
+    assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
+}
+
+#[test]
+fn a_killed_controller_ends_the_run() {
+    kill_and_watch("kill-controller", "controller", Signal::SIGKILL);
+}
+
+#[test]
+fn a_killed_plant_ends_the_run() {
+    kill_and_watch("kill-plant", "plant", Signal::SIGKILL);
+}
+
+#[test]
+fn a_stopped_controller_ends_the_run() {
+    kill_and_watch("stop-controller", "controller", Signal::SIGSTOP);
+}
+
+#[test]
+fn a_killed_run_takes_its_processes_along() {
+    kill_and_watch("kill-run", "run", Signal::SIGKILL);
+}
+
+#[test]
+fn ctrl_c_ends_a_run_tidily() {
+    let bench = Bench::new("ctrl-c");
+    let run = bench.start(&[&LONG[..], &["--bus", &bench.bus]].concat());
+    let plant = child_of(run.id(), "plant");
+    let controller = child_of(run.id(), "controller");
+    std::thread::sleep(Duration::from_millis(400));
+    for id in [run.id(), plant, controller] {
+        signal(id, Signal::SIGINT);
+    }
+    let (output, _) = run.end(Duration::from_secs(10));
+    assert_eq!(code(output.status), 130, "{output:?}");
+    assert!(bench.files().is_empty(), "{:?}", bench.files());
+    assert!(!is_running(plant) && !is_running(controller));
+    assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
+}

@@ -1,0 +1,254 @@
+//! The main job, end to end: two processes over shared memory, and what they leave.
+
+use painleve_sil_host::closed_loop::ClosedLoop;
+use painleve_sil_host::controller_host::InProcess;
+use painleve_sil_host::scenario::{Scenario, built_in};
+use painleve_sil_host::simulation::Simulation;
+use painleve_tests::Bench;
+use serde_json::Value;
+
+const QUIET: [&str; 2] = ["--no-record", "--no-plot"];
+
+fn number(report: &Value, key: &str) -> f64 {
+    report[key]
+        .as_f64()
+        .unwrap_or_else(|| panic!("{key} is no number in {report}"))
+}
+
+#[test]
+fn the_default_run_slides_to_the_papers_limit_without_lift_off() {
+    let bench = Bench::new("default");
+    let report = bench.report(&["--json"]);
+    assert_eq!(report["scenario"], "hybrid-elbow-down");
+    assert_eq!(
+        (report["tick_hz"].as_u64(), report["ticks"].as_u64()),
+        (Some(1000), Some(6000))
+    );
+    assert_eq!(report["lift_offs"], 0);
+    assert_eq!(report["first_lift_off_s"], Value::Null);
+    assert!(
+        (number(&report, "final_tip_t_m") - 0.148).abs() < 1e-3,
+        "{report}"
+    );
+    assert_eq!(number(&report, "final_reference_m"), 0.148);
+    assert_eq!(bench.files(), ["out/run.mcap", "out/run.svg"]);
+}
+
+#[test]
+fn the_elbow_up_run_slides_to_its_limit_too() {
+    let bench = Bench::new("up");
+    let report = bench.report(&["run", "hybrid-elbow-up", "--json"]);
+    assert_eq!(report["lift_offs"], 0);
+    assert!(
+        (number(&report, "final_tip_t_m") - 0.163).abs() < 1e-3,
+        "{report}"
+    );
+}
+
+#[test]
+fn the_pid_keeps_contact_elbow_down_and_loses_it_elbow_up() {
+    let bench = Bench::new("pid");
+    let down = bench.report(&["run", "pid-elbow-down", "--json", QUIET[0], QUIET[1]]);
+    assert_eq!(down["lift_offs"], 0);
+    assert!(
+        (number(&down, "final_tip_t_m") - 0.0375).abs() < 2e-3,
+        "{down}"
+    );
+    let up = bench.report(&["run", "pid-elbow-up", "--json", QUIET[0], QUIET[1]]);
+    assert!(number(&up, "lift_offs") >= 1.0, "{up}");
+    assert!(up["first_lift_off_s"].is_number());
+}
+
+#[test]
+fn without_control_the_arm_keeps_bouncing_from_x0_a() {
+    let bench = Bench::new("bounce");
+    let report = bench.report(&["run", "open-loop-bounce", "--json", QUIET[0], QUIET[1]]);
+    assert_eq!(report["controller"], "off");
+    assert_eq!(report["impacts_without_collision"], 1);
+    assert_eq!(number(&report, "peak_torque_nm"), 0.0);
+    assert!(number(&report, "impacts") > 50.0);
+    assert!(number(&report, "contact_fraction") < 0.01);
+}
+
+#[test]
+fn the_papers_own_gains_work_with_ideal_converters() {
+    let bench = Bench::new("paper");
+    let report = bench.report(&["run", "paper-gains", "--json", QUIET[0], QUIET[1]]);
+    assert_eq!(report["lift_offs"], 0);
+    assert!(
+        (number(&report, "final_tip_t_m") - 0.148).abs() < 1e-5,
+        "{report}"
+    );
+    assert!(
+        (number(&report, "min_normal_force_n") - 10.0).abs() < 0.1,
+        "{report}"
+    );
+}
+
+/// Names that programs rely on. Add to the report, never rename.
+#[test]
+fn the_report_keeps_its_contract() {
+    let report = Bench::new("contract").report(&["run", "--set", "run.duration_s=0.2", "--json"]);
+    for key in [
+        "scenario",
+        "controller",
+        "host",
+        "ticks",
+        "tick_hz",
+        "sim_s",
+        "wall_s",
+        "realtime_factor",
+        "lift_offs",
+        "first_lift_off_s",
+        "impacts",
+        "impacts_without_collision",
+        "max_tip_t_m",
+        "final_tip_t_m",
+        "final_reference_m",
+        "min_normal_force_n",
+        "peak_torque_nm",
+        "contact_fraction",
+        "saturated_ticks",
+        "stale_ticks",
+        "round_trip_us",
+        "log_hash",
+    ] {
+        assert!(report.get(key).is_some(), "{key} is missing in {report}");
+    }
+    for key in ["p50", "p99", "p999", "max"] {
+        assert!(
+            report["round_trip_us"][key].is_number(),
+            "{key} in {report}"
+        );
+    }
+    assert_eq!(report["host"], "native");
+}
+
+/// One process or two, once or twice: the same frames.
+#[test]
+fn every_scenario_gives_the_same_frames_in_one_process_and_in_two() {
+    let bench = Bench::new("hash");
+    for name in built_in::names() {
+        let scenario = Scenario::load(name, &[]).unwrap();
+        let simulation = Simulation::new(&scenario).unwrap();
+        let host = InProcess::new(&scenario.controller_configuration()).unwrap();
+        let mut closed_loop = ClosedLoop::new(simulation, host);
+        for _ in 0..scenario.run.ticks() {
+            closed_loop.tick(&mut ()).unwrap();
+        }
+        let here = closed_loop.finish().0.log_hash;
+        let arguments = ["run", name, "--json", QUIET[0], QUIET[1]];
+        for _ in 0..2 {
+            assert_eq!(
+                bench.report(&arguments)["log_hash"],
+                here.as_str(),
+                "{name}"
+            );
+        }
+    }
+}
+
+#[test]
+fn another_seed_is_another_run() {
+    let bench = Bench::new("seed");
+    let hash = |seed: &str| {
+        let seed = format!("run.seed={seed}");
+        let arguments = [
+            "run",
+            "--set",
+            "run.duration_s=0.5",
+            "--set",
+            &seed,
+            "--json",
+            QUIET[0],
+            QUIET[1],
+        ];
+        bench.report(&arguments)["log_hash"].clone()
+    };
+    assert_ne!(hash("1"), hash("2"));
+}
+
+#[test]
+fn runs_side_by_side_do_not_meet() {
+    let bench = Bench::new("side");
+    let arguments = [
+        "run",
+        "--set",
+        "run.duration_s=2",
+        "--json",
+        QUIET[0],
+        QUIET[1],
+    ];
+    let alone = bench.report(&arguments)["log_hash"].clone();
+    let running: Vec<_> = (0..3).map(|_| bench.start(&arguments)).collect();
+    for run in running {
+        let (output, _) = run.end(std::time::Duration::from_secs(60));
+        assert!(output.status.success(), "{output:?}");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["log_hash"], alone);
+    }
+}
+
+#[test]
+fn by_the_clock_a_run_takes_its_time() {
+    let bench = Bench::new("clock");
+    let report = bench.report(&[
+        "run",
+        "--pacing",
+        "realtime",
+        "--set",
+        "run.duration_s=0.5",
+        "--json",
+        QUIET[0],
+        QUIET[1],
+    ]);
+    assert_eq!(report["pacing"], "realtime");
+    assert_eq!(report["ticks"], 500);
+    assert!(number(&report, "wall_s") >= 0.499);
+    assert!(report["wake_up_us"]["max"].is_number());
+}
+
+#[test]
+fn the_table_and_the_list_are_for_people() {
+    let bench = Bench::new("people");
+    let output = bench.run(&["run", "--set", "run.duration_s=0.2"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    for part in ["hybrid-elbow-down", "lift-offs", "round trip", "real time"] {
+        assert!(text.contains(part), "'{part}' is not in\n{text}");
+    }
+    assert!(output.stderr.is_empty(), "{output:?}");
+    let list = bench.run(&["scenarios"]);
+    let text = String::from_utf8_lossy(&list.stdout);
+    assert!(built_in::names().all(|name| text.contains(name)), "{text}");
+    // What is printed is a scenario file again.
+    let printed = bench.run(&["scenarios", "paper-gains"]).stdout;
+    std::fs::write(bench.path("printed.toml"), printed).unwrap();
+    let path = bench.path("printed.toml");
+    let again = Scenario::load(path.to_str().unwrap(), &[]).unwrap();
+    assert_eq!(again, Scenario::load("paper-gains", &[]).unwrap());
+}
+
+#[test]
+fn the_record_holds_every_tick_with_its_schema() {
+    let bench = Bench::new("record");
+    let report = bench.report(&[
+        "--json",
+        "--set",
+        "run.duration_s=0.5",
+        "--record",
+        "deep/er/log.mcap",
+    ]);
+    let bytes = std::fs::read(bench.path("deep/er/log.mcap")).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let statistics = summary.stats.unwrap();
+    assert_eq!(
+        statistics.message_count,
+        3 * report["ticks"].as_u64().unwrap()
+    );
+    assert!(
+        summary
+            .channels
+            .values()
+            .all(|channel| channel.schema.is_some())
+    );
+}

@@ -1,0 +1,21 @@
+//! `cargo xtask ci`: formatting, lints and tests, in this order.
+
+use crate::command::{ChoreError, run_cargo};
+use crate::test;
+
+/// Runs what continuous integration runs.
+///
+/// # Errors
+/// The first command that fails.
+pub fn run() -> Result<(), ChoreError> {
+    run_cargo(&["fmt", "--all", "--check"])?;
+    run_cargo(&[
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ])?;
+    test::run()
+}

@@ -1,0 +1,55 @@
+//! Running other programs, with every command line shown.
+
+use std::env;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Why a chore failed.
+#[derive(Debug)]
+pub struct ChoreError(pub String);
+
+impl fmt::Display for ChoreError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// The workspace's folder.
+pub fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .map_or_else(|| PathBuf::from("."), Path::to_path_buf)
+}
+
+/// The cargo that runs this program.
+pub fn cargo() -> String {
+    env::var("CARGO").unwrap_or_else(|_| "cargo".into())
+}
+
+/// Runs a program in the workspace's folder.
+///
+/// # Errors
+/// If it cannot be started or does not succeed.
+pub fn run(program: &str, arguments: &[&str]) -> Result<(), ChoreError> {
+    let line = format!("{program} {}", arguments.join(" "));
+    eprintln!("$ {line}");
+    let status = Command::new(program)
+        .args(arguments)
+        .current_dir(workspace())
+        .status()
+        .map_err(|error| ChoreError(format!("cannot start `{line}`: {error}")))?;
+    if status.success() {
+        Ok(())
+    } else {
+        Err(ChoreError(format!("`{line}` failed ({status})")))
+    }
+}
+
+/// Runs cargo in the workspace's folder.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_cargo(arguments: &[&str]) -> Result<(), ChoreError> {
+    run(&cargo(), arguments)
+}
