@@ -1,5 +1,6 @@
 //! Both ends together: threads for what is said, processes for what dies.
 
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -89,10 +90,11 @@ impl TestBus {
     /// This test binary once more, as one end in a process of its own.
     fn process(&self, role: &str) -> Process {
         let child = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "link::tests::end_in_a_process", "--ignored"])
+            .args(["--exact", "link::tests::end_in_a_process"])
+            .args(["--ignored", "--nocapture"])
             .env(ROLE, role)
             .env(BUS, self.name.as_str())
-            .stdout(Stdio::null())
+            .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
@@ -120,6 +122,8 @@ fn find(folder: &Path, prefix: &str, found: &mut Vec<PathBuf>) {
     }
 }
 
+/// What [`end_in_a_process`] says once its end is open.
+const OPEN: &str = "end is open";
 const ROLE: &str = "PAINLEVE_TEST_ROLE";
 const BUS: &str = "PAINLEVE_TEST_BUS";
 
@@ -127,6 +131,14 @@ const BUS: &str = "PAINLEVE_TEST_BUS";
 struct Process(Child);
 
 impl Process {
+    fn wait_until_open(&mut self) {
+        let said = BufReader::new(self.0.stdout.take().unwrap());
+        assert!(
+            said.lines().any(|line| line.unwrap().ends_with(OPEN)),
+            "the process has failed to open its end"
+        );
+    }
+
     fn kill(&mut self) {
         self.0.kill().unwrap();
         self.0.wait().unwrap();
@@ -149,18 +161,22 @@ fn end_in_a_process() {
     let bus = TestBus::named(std::env::var(BUS).unwrap().parse().unwrap());
     match role.as_str() {
         "controller" => {
-            answer_all(bus.controller(PATIENT).unwrap().0).unwrap();
+            let (controller, _) = bus.controller(PATIENT).unwrap();
+            println!("{OPEN}");
+            answer_all(controller).unwrap();
         }
         "plant" => {
             let mut plant = bus.plant().unwrap();
+            println!("{OPEN}");
             plant.wait_for_controller(PATIENT).unwrap();
             for tick in 0.. {
                 plant.exchange(&sensor(tick)).unwrap();
             }
         }
-        // Holds the bus and says nothing.
+        // A controller that holds the bus and says nothing.
         "mute" => {
             let _end = bus.controller(PATIENT).unwrap();
+            println!("{OPEN}");
             thread::sleep(PATIENT);
         }
         other => panic!("no role {other}"),
@@ -521,11 +537,7 @@ fn what_two_killed_processes_leave_is_removed_by_the_next() {
     let bus = TestBus::new();
     let mut plant = bus.process("plant");
     let mut mute = bus.process("mute");
-    // The bus is in use once both are there.
-    while !matches!(
-        bus.controller(SHORT),
-        Err(LinkError::ControllerInUse { .. })
-    ) {}
+    mute.wait_until_open();
     plant.kill();
     mute.kill();
 
