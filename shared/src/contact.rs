@@ -3,6 +3,8 @@
 //! In contact z̈_n = b + p f_n. The free normal acceleration b depends on state
 //! and torque; p on the posture, the friction coefficient μ and the direction of slip only.
 
+use core::cmp::Ordering;
+
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -118,7 +120,8 @@ impl<T: Real> ContactTerms<T> {
         tip_acceleration_m_s2: &Vector2<T>,
     ) -> Option<Vector2<T>> {
         let determinant = self.q.m11 * self.q.m22 - self.q.m12 * self.q.m21;
-        if !(determinant > T::zero()) {
+        // Not `<=`: NaN is refused as well.
+        if determinant.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
             return None;
         }
         let wanted = tip_acceleration_m_s2 - self.free_acceleration_m_s2;

@@ -3,6 +3,8 @@
 //! z = (z_t, z_n): z_t along the belt, z_n upwards, origin in the first joint.
 //! The belt is at z_n = −H. All lengths in m, angles in rad.
 
+use core::cmp::Ordering;
+
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -124,8 +126,7 @@ impl<T: Real> Arm<T> {
     pub fn joint_angles_rad(&self, tip_m: &Vector2<T>, posture: Posture) -> Option<Vector2<T>> {
         let distance = (tip_m.x * tip_m.x + tip_m.y * tip_m.y).square_root();
         let cosine_half_elbow = distance / (self.parameters().link_length_m * T::literal(2.0));
-        // Written so that NaN is refused as well.
-        if !(cosine_half_elbow <= T::one()) {
+        if cosine_half_elbow > T::one() || cosine_half_elbow.to_f64().is_nan() {
             return None;
         }
         let direction = tip_m.x.arc_tangent_2(-tip_m.y);
@@ -158,7 +159,7 @@ impl<T: Real> Arm<T> {
         let reach = self.parameters().link_length_m * T::literal(2.0);
         // 2l sin β
         let half_elbow_sine = ((reach - distance) * (reach + distance)).square_root();
-        if !(half_elbow_sine > T::zero()) {
+        if half_elbow_sine.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
             return Vector2::zeros();
         }
         let direction_rate = tip_speed_m_s * height / square;

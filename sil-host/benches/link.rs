@@ -1,5 +1,6 @@
-//! What the link alone costs: one sensor frame there, one actuator frame back,
-//! between two processes.
+//! What the link alone costs, one sensor frame there and one actuator frame back
+//! between two processes, and beside it what a lockstep tick costs in all: the same
+//! exchange with the plant at one end and the controller at the other.
 //!
 //! Besides criterion's time per round trip it prints round trips per second and
 //! their percentiles; the maximum is the scheduler's more than the link's.
@@ -10,9 +11,13 @@ use std::time::{Duration, Instant};
 use criterion::Criterion;
 use hdrhistogram::Histogram;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_sil_host::closed_loop::ClosedLoop;
+use painleve_sil_host::controller_host::lockstep::Lockstep;
 use painleve_sil_host::link::{
     BusName, ControllerEnd, LinkError, Pacing, PlantEnd, Received, Session,
 };
+use painleve_sil_host::scenario::{Scenario, built_in};
+use painleve_sil_host::simulation::Simulation;
 
 /// Set for the second process: the bus on which it answers.
 const BUS: &str = "PAINLEVE_BENCH_BUS";
@@ -42,7 +47,8 @@ fn bench() -> Outcome<()> {
     // `cargo test` runs benches once, without `--bench`.
     if std::env::args().any(|argument| argument == "--bench") {
         let round_trips = RoundTrips::measure(|| ping_pong.round_trip())?;
-        println!("link, bare ping-pong: {round_trips}\n");
+        println!("bare ping-pong of the frames: {round_trips}");
+        println!("lockstep run, plant included: {}\n", lockstep()?);
     }
     let mut criterion = Criterion::default().configure_from_args();
     let mut failure = None;
@@ -60,10 +66,33 @@ fn bench() -> Outcome<()> {
     }
 }
 
+/// The default scenario against the program's own controller process.
+fn lockstep() -> Outcome<RoundTrips> {
+    let scenario = Scenario::load(built_in::DEFAULT, &["run.duration_s=1000".into()])?;
+    let bus = BusName::unique();
+    let session = Session {
+        tick_hz: scenario.run.tick_hz,
+        pacing: Pacing::Lockstep,
+        configuration: postcard::to_stdvec(&scenario.controller_configuration())?,
+    };
+    let mut plant = PlantEnd::create(&bus, &session)?;
+    let mut controller = AnsweringProcess(
+        Command::new(env!("CARGO_BIN_EXE_painleve"))
+            .args(["controller", "--wait-s", "5", "--bus", bus.as_str()])
+            .spawn()?,
+    );
+    plant.wait_for_controller(Duration::from_secs(5))?;
+    let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario)?, Lockstep(plant));
+    let ticks = RoundTrips::measure(|| closed_loop.tick(&mut ()))?;
+    closed_loop.finish().1.0.end()?;
+    controller.0.wait()?;
+    Ok(ticks)
+}
+
 /// The bare exchange of frames with a second process that only echoes them.
 struct PingPong {
     plant: PlantEnd,
-    echo: EchoProcess,
+    echo: AnsweringProcess,
     tick: u32,
 }
 
@@ -76,7 +105,7 @@ impl PingPong {
             configuration: Vec::new(),
         };
         let mut plant = PlantEnd::create(&bus, &session)?;
-        let echo = EchoProcess::start(&bus)?;
+        let echo = AnsweringProcess::start(&bus)?;
         plant.wait_for_controller(Duration::from_secs(5))?;
         Ok(Self {
             plant,
@@ -102,10 +131,10 @@ impl PingPong {
     }
 }
 
-/// The echoing process; killed if the bench fails.
-struct EchoProcess(Child);
+/// The process that answers; killed if the bench fails.
+struct AnsweringProcess(Child);
 
-impl EchoProcess {
+impl AnsweringProcess {
     fn start(bus: &BusName) -> Outcome<Self> {
         let echo = Command::new(std::env::current_exe()?)
             .env(BUS, bus.as_str())
@@ -114,7 +143,7 @@ impl EchoProcess {
     }
 }
 
-impl Drop for EchoProcess {
+impl Drop for AnsweringProcess {
     fn drop(&mut self) {
         // Both fail only if it has already ended.
         let _ = self.0.kill();
@@ -142,7 +171,9 @@ struct RoundTrips {
 }
 
 impl RoundTrips {
-    fn measure(mut round_trip: impl FnMut() -> Result<(), LinkError>) -> Outcome<Self> {
+    fn measure<E: std::error::Error + 'static>(
+        mut round_trip: impl FnMut() -> Result<(), E>,
+    ) -> Outcome<Self> {
         let mut latency_ns = Histogram::new(3)?;
         for _ in 0..ROUND_TRIPS / 10 {
             round_trip()?;

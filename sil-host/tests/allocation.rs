@@ -1,15 +1,19 @@
-//! Proof that the plant's step, the converters and the controller's tick never
-//! touch the heap: a counting allocator watches a bouncing run and a controlled one.
+//! Proof that the plant's step, the converters, the controller's tick and the
+//! exchange of frames never touch the heap: a counting allocator watches them.
 
 // A global allocator is `unsafe` by nature; this one only counts.
 #![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::hint::black_box;
+use std::time::Duration;
 
 use painleve_firmware::Controller;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_sil_host::closed_loop::ClosedLoop;
 use painleve_sil_host::controller_host::InProcess;
+use painleve_sil_host::link::{BusName, ControllerEnd, Pacing, PlantEnd, Received, Session};
 use painleve_sil_host::scenario::{Scenario, built_in};
 use painleve_sil_host::simulation::Simulation;
 
@@ -47,7 +51,7 @@ fn allocations_of<R>(work: impl FnOnce() -> R) -> u64 {
 
 #[test]
 fn the_counter_counts() {
-    assert_eq!(allocations_of(|| Box::new(1)), 1);
+    assert_eq!(allocations_of(|| black_box(Box::new(1))), 1);
 }
 
 #[test]
@@ -87,4 +91,58 @@ fn a_tick_of_the_closed_loop_does_not_allocate() {
             .is_ok()
     });
     assert_eq!(ticks, 0);
+}
+
+const WARM_UP: u32 = 10;
+const EXCHANGES: u32 = 10_000;
+const PATIENT: Duration = Duration::from_secs(20);
+
+#[test]
+fn frames_cross_the_link_without_allocation_on_either_end() {
+    let bus = BusName::unique();
+    let session = Session {
+        tick_hz: 1000,
+        pacing: Pacing::Lockstep,
+        configuration: vec![7; 100],
+    };
+    let mut plant = PlantEnd::create(&bus, &session).unwrap();
+    plant.set_silence_limit(PATIENT);
+
+    let controller = std::thread::spawn(move || {
+        let (mut controller, _) = ControllerEnd::open(&bus, PATIENT).unwrap();
+        controller.set_silence_limit(PATIENT);
+        let mut before = 0;
+        let mut after = 0;
+        while let Received::Frame(frame) = controller.receive().unwrap() {
+            if frame.tick == WARM_UP {
+                before = ALLOCATIONS.get();
+            }
+            let answer = ActuatorFrame {
+                tick: frame.tick,
+                ..ActuatorFrame::default()
+            };
+            controller.send(&answer).unwrap();
+            after = ALLOCATIONS.get();
+        }
+        after - before
+    });
+
+    plant.wait_for_controller(PATIENT).unwrap();
+    let mut before = 0;
+    for tick in 0..WARM_UP + EXCHANGES {
+        if tick == WARM_UP {
+            before = ALLOCATIONS.get();
+        }
+        let frame = SensorFrame {
+            tick,
+            ..SensorFrame::default()
+        };
+        plant.exchange(&frame).unwrap();
+        // As in real time: without an answer waiting.
+        plant.try_receive().unwrap();
+    }
+    let plant_allocations = ALLOCATIONS.get() - before;
+    plant.end().unwrap();
+    assert_eq!(plant_allocations, 0);
+    assert_eq!(controller.join().unwrap(), 0);
 }

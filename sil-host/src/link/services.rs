@@ -80,7 +80,7 @@ impl Presence {
 
     /// Removes what killed processes have left behind.
     pub(super) fn clear_dead(&self) {
-        self.node.blocking_cleanup_dead_nodes(CLEAN_UP_TIMEOUT);
+        Node::<ipc::Service>::blocking_cleanup_dead_nodes(self.node.config(), CLEAN_UP_TIMEOUT);
     }
 
     /// A [`LinkError::Transport`] on this bus.
@@ -91,10 +91,15 @@ impl Presence {
     /// Whether the process of this node lives. When that cannot be told, yes:
     /// the silence limit remains.
     pub(super) fn is_alive(&self, node: UniqueNodeId) -> bool {
-        !matches!(
-            Node::<ipc::Service>::state_of(self.node.config(), node),
-            Ok(None | Some(NodeState::Dead(_)))
-        )
+        let mut state = None;
+        let listed = Node::<ipc::Service>::list(self.node.config(), |other| {
+            if *other.node_id() != node {
+                return CallbackProgression::Continue;
+            }
+            state = Some(other);
+            CallbackProgression::Stop
+        });
+        listed.is_err() || !matches!(state, None | Some(NodeState::Dead(_)))
     }
 
     fn builder<T: Payload>(&self, kind: &str) -> Result<Builder<T, (), ipc::Service>, LinkError> {
@@ -225,8 +230,7 @@ fn open<T: Payload>(presence: &Presence, kind: &str) -> Result<Service<T>, Unava
             | PublishSubscribeOpenError::IsMarkedForDestruction
             | PublishSubscribeOpenError::HangsInCreation
             | PublishSubscribeOpenError::ExceedsMaxNumberOfNodes => Unavailable::NotYet,
-            PublishSubscribeOpenError::IncompatibleTypes
-            | PublishSubscribeOpenError::VersionMismatch => {
+            PublishSubscribeOpenError::IncompatibleTypes => {
                 Unavailable::Never(LinkError::Incompatible {
                     bus: presence.bus.clone(),
                 })
