@@ -28,10 +28,10 @@ fn fastest(speed_m_s: f64, theta1_deg: f64, theta2_deg: f64) -> f64 {
         ..Default::default()
     };
     let initial = State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0);
-    let mut plant = Plant::new(&parameters, initial).unwrap();
-    plant.advance(250.0, &mut ()).unwrap();
+    let mut plant = Plant::new(&parameters, initial).expect("the paper's arm is valid");
+    plant.advance(250.0, &mut ()).expect("goes on");
     let mut fastest = Fastest(f64::NEG_INFINITY);
-    plant.advance(300.0, &mut fastest).unwrap();
+    plant.advance(300.0, &mut fastest).expect("goes on");
     fastest.0
 }
 

@@ -72,7 +72,8 @@ impl Observer for Statistics {
                 } else {
                     0.0
                 };
-                self.min_normal_force_n = self.min_normal_force_n.min(normal);
+                // At the instant of a lift-off rounding may leave a negative zero.
+                self.min_normal_force_n = self.min_normal_force_n.min(normal.max(0.0));
             }
         }
     }
