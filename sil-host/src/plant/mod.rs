@@ -192,6 +192,10 @@ impl Observer for () {
     fn event(&mut self, _: f64, _: Event, _: &State) {}
 }
 
+/// Corrections of an event's time that the first-order change of the state
+/// carries without loss, s.
+const FIRST_ORDER_S: f64 = 1e-8;
+
 /// More events than any motion has within the shortest time that matters.
 const MAXIMUM_EVENTS_AT_ONE_TIME: u32 = 1000;
 
@@ -212,6 +216,9 @@ pub struct Plant {
     /// The torque or the belt has changed since the mode was decided.
     unsettled: bool,
     step_size_s: f64,
+    /// Derivative at the present state, where the last step left it; not after
+    /// anything that changes the state or the equations.
+    end_slope: Option<State>,
     step: Box<Step<4>>,
 }
 
@@ -256,6 +263,7 @@ impl Plant {
             stick_start: (0.0, 0.0),
             unsettled: false,
             step_size_s: 1e-3,
+            end_slope: None,
             step: Box::new(Step::empty()),
         };
         let motion = plant.motion();
@@ -329,6 +337,7 @@ impl Plant {
         if next.at(self.time_s) != self.torque.at(self.time_s) {
             self.unsettled = true;
         }
+        self.end_slope = None;
         self.torque = next;
     }
 
@@ -411,7 +420,10 @@ impl Plant {
         };
         let (mode, start_s, start) = (self.mode, self.time_s, self.state);
         let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
-        let slope = derivative(start_s, &start);
+        let slope = self
+            .end_slope
+            .take()
+            .unwrap_or_else(|| derivative(start_s, &start));
         let remaining = until_s - start_s;
         loop {
             let wanted = self.step_size_s.min(self.solver.maximum_step_s);
@@ -445,17 +457,26 @@ impl Plant {
         let mut event = transition::first_event_s(&motion, mode, &mut self.step);
         if let Some(event_s) = event.as_mut() {
             // The polynomial that located the event is less accurate than a
-            // step; the rest of the gap is removed by Newton's method in time,
-            // because putting the tip onto the belt by force would change the energy.
+            // step. What a step leaves of the gap is removed by Newton's method in
+            // time, because putting the tip onto the belt by force would change
+            // the energy.
             for _ in 0..3 {
                 let size = *event_s - start_s;
                 self.step
                     .take(&derivative, start_s, &start, &slope, size, &tolerance);
                 let correction = transition::landing_correction_s(&motion, mode, &self.step.end);
-                if correction.abs() <= f64::EPSILON * *event_s || *event_s + correction <= start_s {
+                if *event_s + correction <= start_s {
                     break;
                 }
+                let exact = correction.abs() < FIRST_ORDER_S;
+                if exact {
+                    let end_slope = derivative(*event_s, &self.step.end);
+                    self.step.end += end_slope * correction;
+                }
                 *event_s += correction;
+                if exact {
+                    break;
+                }
             }
         }
         let end_s = event.unwrap_or(if self.step.h == remaining {
@@ -484,6 +505,9 @@ impl Plant {
         });
         self.time_s = end_s;
         self.state = end;
+        if event.is_none() && mode == ContactMode::Flight {
+            self.end_slope = Some(*self.step.end_slope());
+        }
         if event.is_some() {
             self.handle_event(observer)?;
         }

@@ -154,16 +154,16 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
     let from_belt = start[0].abs() < 1e-12;
     let thrown = from_belt && start[1] > TAKE_OFF_SPEED_M_S;
     let slack = if from_belt && !thrown { GRAZING_M } else { 0.0 };
-    let gap = |at: f64| motion.gap_m(&dense.at(at)) + slack;
-    let speed = |at: f64| {
+    let gap_and_speed = |at: f64| {
         let state = dense.at(at);
-        let normal = motion
-            .arm
-            .jacobian(&Pose::new(&theta(&state)))
-            .row(1)
-            .transpose();
-        normal.dot(&theta_dot(&state))
+        let pose = Pose::new(&theta(&state));
+        let normal = motion.arm.jacobian(&pose).row(1).transpose();
+        (
+            motion.arm.gap_m(&pose) + slack,
+            normal.dot(&theta_dot(&state)),
+        )
     };
+    let gap = |at: f64| motion.gap_m(&dense.at(at)) + slack;
     let mut before = (t, start[0] + slack, start[1]);
     for part in 1..=SEARCH_PARTS {
         let at = if part == SEARCH_PARTS {
@@ -171,7 +171,8 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
         } else {
             t + h * f64::from(part) / f64::from(SEARCH_PARTS)
         };
-        let mut after = (at, gap(at), speed(at));
+        let (gap_at, speed_at) = gap_and_speed(at);
+        let mut after = (at, gap_at, speed_at);
         if after.1 >= 0.0 && before.2 < 0.0 && after.2 > 0.0 {
             // A dip between two looks.
             let lowest = first_negative(
@@ -180,7 +181,7 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
                 -before.2,
                 -after.2,
                 TIME_RESOLUTION_S,
-                |at| -speed(at),
+                |at| -gap_and_speed(at).1,
             );
             let depth = gap(lowest);
             if depth < 0.0 {
