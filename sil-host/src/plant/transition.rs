@@ -46,7 +46,7 @@ const TAKE_OFF_SPEED_M_S: f64 = 1e-7;
 const GRAZING_M: f64 = 1e-14;
 
 /// Parts of a step that are looked at one by one in a search.
-const SEARCH_PARTS: u32 = 16;
+const SEARCH_PARTS: u32 = 8;
 
 /// Resolution of event times, s.
 const TIME_RESOLUTION_S: f64 = 1e-15;
