@@ -18,6 +18,26 @@ pub trait Real: RealField + Copy {
     /// This number as `f64`, exact for `f32` and `f64`.
     fn to_f64(self) -> f64;
 
+    /// The nearest number to an integer; exact in `f32` up to 24 bits. Never by way
+    /// of `f64`, which is software on a Cortex-M4F.
+    fn from_integer(value: i32) -> Self;
+
+    /// The integer part; saturates, and NaN gives 0.
+    fn truncate_to_i32(self) -> i32;
+
+    /// The nearest number within `minimum ..= maximum`; NaN stays NaN. Unlike the standard
+    /// library's `clamp` it cannot panic.
+    #[inline]
+    fn limited(self, minimum: Self, maximum: Self) -> Self {
+        if self < minimum {
+            minimum
+        } else if self > maximum {
+            maximum
+        } else {
+            self
+        }
+    }
+
     /// Sine and cosine of an angle in rad.
     fn sine_cosine(self) -> (Self, Self);
 
@@ -40,6 +60,16 @@ impl Real for f64 {
     #[inline]
     fn to_f64(self) -> f64 {
         self
+    }
+
+    #[inline]
+    fn from_integer(value: i32) -> Self {
+        f64::from(value)
+    }
+
+    #[inline]
+    fn truncate_to_i32(self) -> i32 {
+        self as i32
     }
 
     #[inline]
@@ -72,6 +102,16 @@ impl Real for f32 {
     #[inline]
     fn to_f64(self) -> f64 {
         f64::from(self)
+    }
+
+    #[inline]
+    fn from_integer(value: i32) -> Self {
+        value as f32
+    }
+
+    #[inline]
+    fn truncate_to_i32(self) -> i32 {
+        self as i32
     }
 
     #[inline]
