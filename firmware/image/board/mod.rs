@@ -1,0 +1,83 @@
+//! What the tasks need of a board. Nothing else differs between boards.
+
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use stm32f4xx_hal::pac;
+
+pub mod qemu;
+
+/// Why a board does not start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+pub enum StartFault {
+    /// The crystal oscillator or the phase-locked loop did not settle in time.
+    Clock,
+    /// The link to the host cannot be opened.
+    Link,
+}
+
+/// A board, taken apart into what each task owns.
+pub struct Parts<B: Board> {
+    /// For the control task.
+    pub drive: B::Drive,
+    /// For the link task.
+    pub port: B::Port,
+}
+
+/// A microcontroller board with the arm, or a stand-in for it, on its pins.
+pub trait Board {
+    /// What the control task uses.
+    type Drive: Drive;
+    /// What the link task uses.
+    type Port: Port;
+
+    /// Name, for the banner.
+    const NAME: &'static str;
+
+    /// Starts clocks, pins and peripherals in bounded time.
+    fn start(
+        device: pac::Peripherals,
+        core: cortex_m::Peripherals,
+    ) -> Result<Parts<Self>, StartFault>
+    where
+        Self: Sized;
+
+    /// Takes the torque off, whatever state the program is in.
+    fn take_torque_off();
+
+    /// Takes the torque off and stays there.
+    fn halt() -> !;
+
+    /// Called again and again while nothing else is to be done.
+    fn idle();
+}
+
+/// The side of the control task: all of it within a few dozen instructions.
+pub trait Drive {
+    /// Starts the interrupt of [`CONTROL_TIMER`](crate::app) at this rate, Hz.
+    fn start_timer(&mut self, tick_hz: f32);
+
+    /// Takes note of the timer's interrupt; returns whether the next one is
+    /// already due.
+    fn begin_tick(&mut self) -> bool;
+
+    /// What the sensors read. `from_host` is the newest frame from the link, for
+    /// a plant that is simulated on the other side of it.
+    fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame>;
+
+    /// Puts out the torques.
+    fn actuate(&mut self, answer: &ActuatorFrame);
+
+    /// A running count for [`Response::Actuator`](painleve_shared::message::Response).
+    fn stopwatch(&self) -> u32;
+}
+
+/// The side of the link task: bytes to and from the host.
+pub trait Port {
+    /// Whether more bytes have to wait until the host has read its answer.
+    const HALF_DUPLEX: bool;
+
+    /// Moves received bytes into `buffer`; returns how many, 0 when there are none.
+    fn receive(&mut self, buffer: &mut [u8]) -> usize;
+
+    /// Sends bytes, all of them or, if the host does not take them, none.
+    fn send(&mut self, bytes: &[u8]) -> bool;
+}

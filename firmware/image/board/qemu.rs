@@ -1,0 +1,123 @@
+//! QEMU's `netduinoplus2`: a STM32F405, the chip that is flashed.
+//!
+//! `mps2-an386` would have a timer with more digits and a serial port that is
+//! kept in virtual time, but another memory map and other timers; here the control timer,
+//! its interrupt and the map are those of the flash target. QEMU models no clock
+//! tree, no converters and no watchdog for it: the arm's frames come through the link.
+//!
+//! The link is semihosting on two pipes in QEMU's working folder. The virtual
+//! clock stands still during a semihosting call, so that a run under `-icount` is
+//! deterministic to the instruction, however long the host takes.
+
+use defmt_semihosting as _;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use semihosting::fs::File;
+use semihosting::io::{Read, Write};
+use stm32f4xx_hal::pac;
+
+use super::{Board, Drive, Parts, Port, StartFault};
+
+/// QEMU's timers count nanoseconds of virtual time, whatever the clock tree says.
+const TIMER_HZ: f32 = 1e9;
+
+/// See the module's page.
+pub struct Qemu;
+
+impl Board for Qemu {
+    type Drive = Timers;
+    type Port = Pipes;
+
+    const NAME: &'static str = "netduinoplus2 under QEMU";
+
+    fn start(
+        device: pac::Peripherals,
+        _: cortex_m::Peripherals,
+    ) -> Result<Parts<Self>, StartFault> {
+        // The stopwatch.
+        device.TIM5.arr().write(|w| w.arr().set(u32::MAX));
+        device.TIM5.cr1().write(|w| w.cen().set_bit());
+        Ok(Parts {
+            drive: Timers {
+                control: device.TIM2,
+                stopwatch: device.TIM5,
+            },
+            port: Pipes {
+                requests: File::open(c"requests").map_err(|_| StartFault::Link)?,
+                responses: File::create(c"responses").map_err(|_| StartFault::Link)?,
+            },
+        })
+    }
+
+    /// The host sees the image end, and takes the torque off in its simulation.
+    fn take_torque_off() {}
+
+    fn halt() -> ! {
+        semihosting::process::exit(1)
+    }
+
+    fn idle() {
+        // No wait for interrupt: with one timer running, QEMU's virtual clock
+        // would jump past its deadline.
+        cortex_m::asm::nop();
+    }
+}
+
+/// The control timer and the stopwatch.
+pub struct Timers {
+    control: pac::TIM2,
+    stopwatch: pac::TIM5,
+}
+
+impl Drive for Timers {
+    fn start_timer(&mut self, tick_hz: f32) {
+        let timer = &self.control;
+        timer.cr1().write(|w| w.cen().clear_bit());
+        timer.psc().write(|w| w.psc().set(0));
+        timer
+            .arr()
+            .write(|w| w.arr().set((TIMER_HZ / tick_hz) as u32));
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.sr().modify(|_, w| w.uif().clear_bit());
+        timer.dier().write(|w| w.uie().set_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+    }
+
+    fn begin_tick(&mut self) -> bool {
+        self.control.sr().modify(|_, w| w.uif().clear_bit());
+        false
+    }
+
+    fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame> {
+        from_host
+    }
+
+    /// The answer on the link is the output.
+    fn actuate(&mut self, _: &ActuatorFrame) {}
+
+    fn stopwatch(&self) -> u32 {
+        self.stopwatch.cnt().read().bits()
+    }
+}
+
+/// A pipe each way.
+pub struct Pipes {
+    requests: File,
+    responses: File,
+}
+
+impl Port for Pipes {
+    const HALF_DUPLEX: bool = true;
+
+    /// Blocks, with all of virtual time, until the host asks for something. A host that is gone
+    /// ends the image.
+    fn receive(&mut self, buffer: &mut [u8]) -> usize {
+        match self.requests.read(buffer) {
+            Ok(length) if length > 0 => length,
+            _ => Qemu::halt(),
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> bool {
+        self.responses.write_all(bytes).is_ok()
+    }
+}
