@@ -1,0 +1,6 @@
+//! x
+use crate::command::ChoreError;
+/// x
+pub fn run() -> Result<(), ChoreError> {
+    Ok(())
+}
