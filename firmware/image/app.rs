@@ -185,29 +185,28 @@ mod tasks {
                 let Some(message) = inbox.push(*byte) else {
                     continue;
                 };
-                let response = match wire::decode::<Request<Configuration>>(message) {
-                    Ok(Request::Sensor(frame)) => {
+                let response = match decode(message) {
+                    Some(Request::Sensor(frame)) => {
                         from_host.lock(|newest| *newest = Some(frame));
                         awaits_control = true;
                         continue;
                     }
-                    Ok(Request::Configure(configuration)) => {
-                        match Controller::new(&configuration) {
-                            Ok(new) => {
-                                from_host.lock(|newest| *newest = None);
-                                controller.lock(|controller| *controller = Some(new));
-                                health.lock(|health| *health = Health::default());
-                                drive.lock(|drive| drive.start_timer(configuration.tick_hz));
-                                Response::Ready
-                            }
-                            Err(_) => Response::Refused,
+                    Some(Request::Configure(configuration)) => {
+                        from_host.lock(|newest| *newest = None);
+                        // Holds up `control`, which has nothing to control yet.
+                        if controller.lock(|controller| configure(controller, &configuration)) {
+                            health.lock(|health| *health = Health::default());
+                            drive.lock(|drive| drive.start(&configuration));
+                            Response::Ready
+                        } else {
+                            Response::Refused
                         }
                     }
-                    Ok(Request::Health) => Response::Health(Health {
+                    Some(Request::Health) => Response::Health(Health {
                         stack_bytes: stack::high_water_bytes(),
                         ..health.lock(|health| *health)
                     }),
-                    Err(_) => {
+                    None => {
                         health.lock(|health| {
                             health.corrupt_messages = health.corrupt_messages.wrapping_add(1);
                         });
@@ -221,6 +220,25 @@ mod tasks {
                 return;
             }
         }
+    }
+
+    /// Makes a new controller in place of the old one, which stays if the
+    /// configuration is out of range. Out of line for the sake of the stack.
+    #[inline(never)]
+    fn configure(controller: &mut Option<Controller>, configuration: &Configuration) -> bool {
+        match Controller::new(configuration) {
+            Ok(new) => {
+                *controller = Some(new);
+                true
+            }
+            Err(_) => false,
+        }
+    }
+
+    /// Decodes a message. Out of line for the sake of the stack.
+    #[inline(never)]
+    fn decode(message: &mut [u8]) -> Option<Request<Configuration>> {
+        wire::decode(message).ok()
     }
 
     /// A response that the host does not take is lost; the host asks again or gives up.

@@ -1,5 +1,6 @@
 //! What the tasks need of a board. Nothing else differs between boards.
 
+use painleve_firmware::Configuration;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use stm32f4xx_hal::pac;
 
@@ -52,8 +53,8 @@ pub trait Board {
 
 /// The side of the control task: all of it within a few dozen instructions.
 pub trait Drive {
-    /// Starts the interrupt of [`CONTROL_TIMER`](crate::app) at this rate, Hz.
-    fn start_timer(&mut self, tick_hz: f32);
+    /// Starts the control timer's interrupt at the configuration's rate.
+    fn start(&mut self, configuration: &Configuration);
 
     /// Takes note of the timer's interrupt; returns whether the next one is
     /// already due.

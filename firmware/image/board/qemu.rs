@@ -10,6 +10,7 @@
 //! deterministic to the instruction, however long the host takes.
 
 use defmt_semihosting as _;
+use painleve_firmware::Configuration;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
@@ -69,13 +70,13 @@ pub struct Timers {
 }
 
 impl Drive for Timers {
-    fn start_timer(&mut self, tick_hz: f32) {
+    fn start(&mut self, configuration: &Configuration) {
         let timer = &self.control;
         timer.cr1().write(|w| w.cen().clear_bit());
         timer.psc().write(|w| w.psc().set(0));
         timer
             .arr()
-            .write(|w| w.arr().set((TIMER_HZ / tick_hz) as u32));
+            .write(|w| w.arr().set((TIMER_HZ / configuration.tick_hz) as u32));
         timer.egr().write(|w| w.ug().set_bit());
         timer.sr().modify(|_, w| w.uif().clear_bit());
         timer.dier().write(|w| w.uie().set_bit());
