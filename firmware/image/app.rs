@@ -1,6 +1,7 @@
 //! The image's tasks, from the highest priority down:
 //!
 //! - `control`, the timer's interrupt at the control rate: sample → tick → actuate
+//! - `serial`, the serial port's interrupt: bytes from and to the host
 //! - `link`: requests from the host, responses to it
 //! - `idle`: the log
 //!
@@ -25,7 +26,7 @@ mod tasks {
     use stm32f4xx_hal::pac::Interrupt;
 
     use crate::Hardware;
-    use crate::board::{Board, Drive, Parts, Port};
+    use crate::board::{Board, Bytes, Drive, Parts, Port};
     use crate::inbox::Inbox;
     use crate::stack;
 
@@ -58,6 +59,7 @@ mod tasks {
 
     #[local]
     struct Local {
+        bytes: <Hardware as Board>::Bytes,
         port: <Hardware as Board>::Port,
         inbox: Inbox,
         answers_in: Producer<'static, Response>,
@@ -74,7 +76,7 @@ mod tasks {
     fn init(cx: init::Context) -> (Shared, Local) {
         stack::paint();
         let parts = Hardware::start(cx.device, cx.core);
-        let Parts { drive, port } = match parts {
+        let Parts { drive, bytes, port } = match parts {
             Ok(parts) => parts,
             Err(fault) => {
                 defmt::error!("{=str} does not start: {}", Hardware::NAME, fault);
@@ -92,6 +94,7 @@ mod tasks {
                 health: Health::default(),
             },
             Local {
+                bytes,
                 port,
                 inbox: Inbox::new(),
                 answers_in,
@@ -119,8 +122,7 @@ mod tasks {
             ..
         } = cx.shared;
         (controller, drive, from_host, health).lock(|controller, drive, from_host, health| {
-            let overrun = drive.begin_tick();
-            health.overruns = health.overruns.wrapping_add(u32::from(overrun));
+            drive.begin_tick();
             let (Some(controller), Some(frame)) = (controller, drive.sample(from_host.take()))
             else {
                 return;
@@ -131,6 +133,8 @@ mod tasks {
             drive.actuate(&answer);
 
             health.ticks = health.ticks.wrapping_add(1);
+            let overrun = drive.next_tick_is_due();
+            health.overruns = health.overruns.wrapping_add(u32::from(overrun));
             let response = Response::Actuator {
                 frame: answer,
                 elapsed,
@@ -152,6 +156,12 @@ mod tasks {
                 *before = event;
             }
         });
+    }
+
+    #[task(binds = USART1, priority = 2, local = [bytes])]
+    fn serial(cx: serial::Context) {
+        cx.local.bytes.serve();
+        rtic::pend(LINK);
     }
 
     #[task(binds = SPI3, priority = 1,
@@ -191,12 +201,15 @@ mod tasks {
                         awaits_control = true;
                         continue;
                     }
-                    Some(Request::Configure(configuration)) => {
+                    Some(Request::Configure {
+                        configuration,
+                        plant,
+                    }) => {
                         from_host.lock(|newest| *newest = None);
                         // Holds up `control`, which has nothing to control yet.
                         if controller.lock(|controller| configure(controller, &configuration)) {
                             health.lock(|health| *health = Health::default());
-                            drive.lock(|drive| drive.start(&configuration));
+                            drive.lock(|drive| drive.start(&configuration, plant));
                             Response::Ready
                         } else {
                             Response::Refused

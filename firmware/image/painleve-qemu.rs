@@ -9,11 +9,14 @@ mod board;
 #[cfg(target_os = "none")]
 mod inbox;
 #[cfg(target_os = "none")]
+#[path = "board/qemu.rs"]
+mod qemu;
+#[cfg(target_os = "none")]
 mod stack;
 
 /// The board of this image.
 #[cfg(target_os = "none")]
-use board::qemu::Qemu as Hardware;
+use qemu::Qemu as Hardware;
 
 /// A PC, where `--all-features` comes by, has nothing to run.
 #[cfg(not(target_os = "none"))]

@@ -14,12 +14,26 @@ pub const MAXIMUM_LENGTH: usize = 512;
 /// What the host asks of the board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Request<C> {
-    /// Start afresh with this configuration; [`Response::Ready`] or [`Response::Refused`].
-    Configure(C),
-    /// Control one tick; [`Response::Actuator`].
+    /// Start afresh; [`Response::Ready`] or [`Response::Refused`].
+    Configure {
+        /// Configuration of the controller.
+        configuration: C,
+        /// Where its sensor frames come from.
+        plant: Plant,
+    },
+    /// Control one tick of a simulated plant; [`Response::Actuator`].
     Sensor(SensorFrame),
     /// Tell what was counted since the configuration; [`Response::Health`].
     Health,
+}
+
+/// Where a controller's sensor frames come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Plant {
+    /// From the host, in [`Request::Sensor`].
+    Simulated,
+    /// From the board's own sensors, at every tick of its timer.
+    Real,
 }
 
 /// What the board answers.

@@ -2,12 +2,14 @@
 
 use painleve_firmware::Configuration;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::message::Plant;
 use stm32f4xx_hal::pac;
 
-pub mod qemu;
+pub mod timer;
 
 /// Why a board does not start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+#[allow(dead_code, reason = "no board has all of them")]
 pub enum StartFault {
     /// The crystal oscillator or the phase-locked loop did not settle in time.
     Clock,
@@ -19,6 +21,8 @@ pub enum StartFault {
 pub struct Parts<B: Board> {
     /// For the control task.
     pub drive: B::Drive,
+    /// For the serial port's interrupt.
+    pub bytes: B::Bytes,
     /// For the link task.
     pub port: B::Port,
 }
@@ -27,6 +31,8 @@ pub struct Parts<B: Board> {
 pub trait Board {
     /// What the control task uses.
     type Drive: Drive;
+    /// What the serial port's interrupt uses.
+    type Bytes: Bytes;
     /// What the link task uses.
     type Port: Port;
 
@@ -51,14 +57,16 @@ pub trait Board {
     fn idle();
 }
 
-/// The side of the control task: all of it within a few dozen instructions.
+/// The side of the control task; all of it in bounded time.
 pub trait Drive {
     /// Starts the control timer's interrupt at the configuration's rate.
-    fn start(&mut self, configuration: &Configuration);
+    fn start(&mut self, configuration: &Configuration, plant: Plant);
 
-    /// Takes note of the timer's interrupt; returns whether the next one is
-    /// already due.
-    fn begin_tick(&mut self) -> bool;
+    /// Takes note of the timer's interrupt.
+    fn begin_tick(&mut self);
+
+    /// Whether the timer's interrupt has come again since [`Drive::begin_tick`].
+    fn next_tick_is_due(&self) -> bool;
 
     /// What the sensors read. `from_host` is the newest frame from the link, for
     /// a plant that is simulated on the other side of it.
@@ -69,6 +77,12 @@ pub trait Drive {
 
     /// A running count for [`Response::Actuator`](painleve_shared::message::Response).
     fn stopwatch(&self) -> u32;
+}
+
+/// The side of the serial port's interrupt.
+pub trait Bytes {
+    /// Moves bytes between the port and its buffers.
+    fn serve(&mut self);
 }
 
 /// The side of the link task: bytes to and from the host.

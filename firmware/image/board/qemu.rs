@@ -12,11 +12,12 @@
 use defmt_semihosting as _;
 use painleve_firmware::Configuration;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::message::Plant;
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use stm32f4xx_hal::pac;
 
-use super::{Board, Drive, Parts, Port, StartFault};
+use crate::board::{Board, Bytes, Drive, Parts, Port, StartFault, timer};
 
 /// QEMU's timers count nanoseconds of virtual time, whatever the clock tree says.
 const TIMER_HZ: f32 = 1e9;
@@ -26,6 +27,7 @@ pub struct Qemu;
 
 impl Board for Qemu {
     type Drive = Timers;
+    type Bytes = NoBytes;
     type Port = Pipes;
 
     const NAME: &'static str = "netduinoplus2 under QEMU";
@@ -42,6 +44,7 @@ impl Board for Qemu {
                 control: device.TIM2,
                 stopwatch: device.TIM5,
             },
+            bytes: NoBytes,
             port: Pipes {
                 requests: File::open(c"requests").map_err(|_| StartFault::Link)?,
                 responses: File::create(c"responses").map_err(|_| StartFault::Link)?,
@@ -73,24 +76,19 @@ pub struct Timers {
 }
 
 impl Drive for Timers {
-    fn start(&mut self, configuration: &Configuration) {
-        let timer = &self.control;
-        timer.cr1().write(|w| w.cen().clear_bit());
-        timer.psc().write(|w| w.psc().set(0));
-        timer
-            .arr()
-            .write(|w| w.arr().set((TIMER_HZ / configuration.tick_hz) as u32));
-        timer.egr().write(|w| w.ug().set_bit());
-        timer.sr().modify(|_, w| w.uif().clear_bit());
-        timer.dier().write(|w| w.uie().set_bit());
-        timer.cr1().write(|w| w.cen().set_bit());
+    fn start(&mut self, configuration: &Configuration, _: Plant) {
+        timer::start(&self.control, TIMER_HZ / configuration.tick_hz);
     }
 
-    fn begin_tick(&mut self) -> bool {
-        self.control.sr().modify(|_, w| w.uif().clear_bit());
-        false
+    fn begin_tick(&mut self) {
+        timer::acknowledge(&self.control);
     }
 
+    fn next_tick_is_due(&self) -> bool {
+        timer::is_due(&self.control)
+    }
+
+    /// There is no other plant than a simulated one.
     fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame> {
         from_host
     }
@@ -101,6 +99,13 @@ impl Drive for Timers {
     fn stopwatch(&self) -> u32 {
         self.stopwatch.cnt().read().bits()
     }
+}
+
+/// Semihosting has no interrupt.
+pub struct NoBytes;
+
+impl Bytes for NoBytes {
+    fn serve(&mut self) {}
 }
 
 /// A pipe each way.

@@ -19,7 +19,7 @@ use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
 use painleve_firmware::Configuration;
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::message::{Health, MAXIMUM_LENGTH, Request, Response};
+use painleve_shared::message::{Health, MAXIMUM_LENGTH, Plant, Request, Response};
 use painleve_shared::wire;
 
 use super::{BoardError, TimedAnswer, log};
@@ -121,7 +121,10 @@ impl Emulator {
         if let (Some(table), Some(output)) = (table, emulator.process.child().stdout.take()) {
             table.print_from(output);
         }
-        match emulator.request(&Request::Configure(configuration.clone()))? {
+        match emulator.request(&Request::Configure {
+            configuration: configuration.clone(),
+            plant: Plant::Simulated,
+        })? {
             Response::Ready => Ok(emulator),
             Response::Refused => Err(BoardError::Refused),
             other => Err(BoardError::OutOfTurn(other)),
