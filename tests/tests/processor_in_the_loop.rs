@@ -1,8 +1,9 @@
 //! The controller's image on the emulated microcontroller against the same
 //! controller on this machine: equal to the last bit, in every run.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+use nix::sys::signal::Signal;
 use painleve_firmware::{Configuration, Controller};
 use painleve_shared::frame::SensorFrame;
 use painleve_sil_host::board::Emulator;
@@ -10,7 +11,7 @@ use painleve_sil_host::closed_loop::ClosedLoop;
 use painleve_sil_host::controller_host::{Answer, ControllerHost, HostError};
 use painleve_sil_host::scenario::{Scenario, built_in};
 use painleve_sil_host::simulation::Simulation;
-use painleve_tests::{Bench, image};
+use painleve_tests::{Bench, child_of, image, is_running, signal};
 
 /// Gives every frame to both controllers and compares what they answer.
 struct Both {
@@ -105,4 +106,37 @@ fn a_missing_image_is_an_error_that_says_how_to_build_one() {
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains("cargo xtask build-fw"), "{text}");
+}
+
+#[test]
+fn killing_emulator_bridge_or_plant_ends_the_others() {
+    for victim in ["emulator", "bridge", "plant"] {
+        let bench = Bench::new(&format!("kill-{victim}"));
+        let image = image().to_string_lossy();
+        let long = [
+            "run", "--host", "qemu", "--elf", &image, "--bus", &bench.bus,
+        ];
+        let duration = ["--set", "run.duration_s=1000"];
+        let running = bench.start(&[&long[..], &duration, &QUIET].concat());
+        let bridge = child_of(running.id(), "bridge");
+        let plant = child_of(running.id(), "plant");
+        let emulator = child_of(bridge, "-machine");
+        let id = match victim {
+            "emulator" => emulator,
+            "bridge" => bridge,
+            _ => plant,
+        };
+        signal(id, Signal::SIGKILL);
+        let (output, _) = running.end(Duration::from_secs(2));
+        assert!(!output.status.success());
+        assert!(!output.stderr.is_empty(), "{victim}: no message");
+        let start = Instant::now();
+        for id in [emulator, bridge, plant] {
+            while is_running(id) {
+                assert!(start.elapsed() < Duration::from_secs(2), "{victim}: {id}");
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        }
+        assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
+    }
 }

@@ -54,6 +54,21 @@ pub fn default_image() -> PathBuf {
         .unwrap_or_else(|| IMAGE.into())
 }
 
+/// Checks that image and emulator are there, before anything is started.
+///
+/// # Errors
+/// [`BoardError::ImageMissing`], [`BoardError::EmulatorMissing`].
+pub fn check(image: &Path) -> Result<(), BoardError> {
+    if !image.is_file() {
+        return Err(BoardError::ImageMissing(image.into()));
+    }
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    if !std::env::split_paths(&path).any(|folder| folder.join(PROGRAM).is_file()) {
+        return Err(BoardError::EmulatorMissing);
+    }
+    Ok(())
+}
+
 /// An image running under QEMU, configured.
 ///
 /// QEMU ends with this value, and with the thread that made it.
@@ -76,9 +91,7 @@ impl Emulator {
         configuration: &Configuration,
         with_log: bool,
     ) -> Result<Self, BoardError> {
-        if !image.exists() {
-            return Err(BoardError::ImageMissing(image.into()));
-        }
+        check(image)?;
         // QEMU runs in a folder of its own.
         let image = image.canonicalize()?;
         let table = with_log.then(|| log::Table::of_image(&image)).transpose()?;
@@ -106,12 +119,7 @@ impl Emulator {
             } else {
                 Stdio::null()
             });
-        let child = kill_with_parent(&mut command)
-            .spawn()
-            .map_err(|error| match error.kind() {
-                io::ErrorKind::NotFound => BoardError::EmulatorMissing,
-                _ => error.into(),
-            })?;
+        let child = kill_with_parent(&mut command).spawn()?;
         let mut emulator = Self {
             process: Guarded::new(child),
             requests,

@@ -58,6 +58,11 @@ pub struct ImageArguments {
 }
 
 impl ImageArguments {
+    /// The image to run.
+    pub fn path(&self) -> PathBuf {
+        self.elf.clone().unwrap_or_else(emulator::default_image)
+    }
+
     /// The same as command-line arguments, for a child process.
     pub fn to_arguments(&self) -> Vec<std::ffi::OsString> {
         let mut arguments = Vec::new();
@@ -89,9 +94,8 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
                 arguments.bus
             ))
         })?;
-    let image = arguments.image.elf.clone();
-    let image = image.unwrap_or_else(emulator::default_image);
-    let mut emulator = Emulator::start(&image, &configuration, arguments.image.log)?;
+    let image = &arguments.image;
+    let mut emulator = Emulator::start(&image.path(), &configuration, image.log)?;
     let mut times = TickTimes::default();
     while let Received::Frame(frame) = end.receive()? {
         let answer = emulator.exchange(&frame)?;
@@ -101,7 +105,7 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
             return Err(CommandError::Interrupted);
         }
     }
-    if let Some(path) = &arguments.image.timing {
+    if let Some(path) = &image.timing {
         let report = times.report("qemu", "instructions", &emulator.health()?);
         write(path, &report)?;
     }

@@ -10,6 +10,7 @@ use clap::{Args, ValueEnum};
 use super::CommandError;
 use super::bridge::ImageArguments;
 use super::output::OutputArguments;
+use crate::board::emulator;
 use crate::interrupt::Interrupt;
 use crate::lifetime::Guarded;
 use crate::link::{BusName, Pacing};
@@ -101,6 +102,9 @@ const CONTROLLER_END: Duration = Duration::from_millis(1700);
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     // Before anything is started, so that there is one message about it.
     arguments.scenario.load()?;
+    if arguments.host == Host::Qemu {
+        emulator::check(&arguments.image.path())?;
+    }
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
     let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
 
@@ -137,8 +141,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         if let Some(status) = controller.ended()?
             && !status.success()
         {
-            // The plant notices by itself and says so; if it does not, this does.
+            // The plant notices by itself and says so; if it does not, this does. Why a
+            // board stopped, only its bridge knows.
             if let Some(plant_status) = wait(&mut plant, CONTROLLER_END)? {
+                if arguments.host != Host::Native {
+                    eprintln!("error{}", said(&mut controller));
+                }
                 break plant_status;
             }
             return Err(CommandError::Process(format!(
