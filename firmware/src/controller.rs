@@ -5,7 +5,7 @@ use painleve_shared::counts::{Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
 use painleve_shared::status::{Fault, SupervisorState};
-use painleve_shared::{Arm, Pose, Posture};
+use painleve_shared::{Arm, Pose, Posture, Real};
 
 use crate::configuration::Configuration;
 use crate::contact_detector::ContactDetector;
@@ -232,7 +232,7 @@ impl Controller {
         }
         let limit = self.configuration.torque_limit_nm;
         let scale = self.configuration.converters.torque;
-        let limited = wanted_nm.map(|torque| torque.clamp(-limit, limit));
+        let limited = wanted_nm.map(|torque| torque.limited(-limit, limit));
         let (counts_1, over_1) = scale.counts(limited.x);
         let (counts_2, over_2) = scale.counts(limited.y);
         let saturated = over_1 || over_2 || limited != *wanted_nm;

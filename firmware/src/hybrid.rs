@@ -12,9 +12,9 @@
 //! wherever p > 0, and μ is needed nowhere. This is the default.
 
 use nalgebra::Vector2;
-use painleve_shared::Slip;
 use painleve_shared::dynamics::joint_torque_nm;
 use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::{Real, Slip};
 use serde::{Deserialize, Serialize};
 
 use crate::law::{LawInput, LawOutput};
@@ -182,7 +182,7 @@ impl Hybrid {
                 * (settings.normal_force_n - input.force_n.y)
                 * input.tick_s;
             let limit = settings.force_integral_limit_n;
-            self.force_integral_n = (self.force_integral_n + step).clamp(-limit, limit);
+            self.force_integral_n = (self.force_integral_n + step).limited(-limit, limit);
         }
         let normal_force = settings.normal_force_n + self.force_integral_n;
 

@@ -4,6 +4,7 @@
 //! the tip on the belt at z_t* in the posture in which the drive was armed.
 
 use nalgebra::Vector2;
+use painleve_shared::Real;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 
@@ -117,7 +118,8 @@ impl Pid {
         if !input.saturated {
             let limit = self.settings.integral_limit_nm;
             let step = Vector2::new(ki_1 * error.x, ki_2 * error.y) * input.tick_s;
-            self.integral_nm = (self.integral_nm + step).map(|torque| torque.clamp(-limit, limit));
+            self.integral_nm =
+                (self.integral_nm + step).map(|torque| torque.limited(-limit, limit));
         }
         LawOutput {
             torque_nm: Vector2::new(

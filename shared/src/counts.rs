@@ -4,7 +4,6 @@
 //! force is never scaled as an angle; the plant uses the scalings in `f64`, the
 //! controller in `f32`.
 
-use nalgebra::RealField;
 use serde::{Deserialize, Serialize};
 
 use crate::range::{self, OutOfRange};
@@ -67,18 +66,7 @@ fn round_to_i32<T: Real>(value: T) -> i32 {
     } else {
         value + half
     };
-    // `as` truncates, saturates and maps NaN to zero.
-    truncate(shifted)
-}
-
-#[inline]
-fn truncate<T: Real>(value: T) -> i32 {
-    RealField::clamp(
-        value,
-        T::literal(-2_147_483_648.0),
-        T::literal(2_147_483_520.0),
-    )
-    .to_f64() as i32
+    shifted.truncate_to_i32()
 }
 
 /// A joint encoder: resolution and mounting offset.
@@ -179,7 +167,7 @@ impl<T: Real> LinearScale<T> {
     /// One count in the quantity's unit.
     #[inline]
     pub fn per_count(&self) -> T {
-        self.range / T::literal(f64::from(1_u32 << ((self.bits & 31).wrapping_sub(1) & 31)))
+        self.range / T::from_integer(1 << ((self.bits & 31).wrapping_sub(1) & 31))
     }
 
     /// Largest reading, 2^(bits−1) − 1; the smallest is one below its negative.
@@ -208,7 +196,7 @@ impl<T: Real> LinearScale<T> {
     #[inline]
     pub fn value(&self, counts: i32) -> T {
         // Exact: a reading has at most 24 bits.
-        T::literal(f64::from(counts)) * self.per_count()
+        T::from_integer(counts) * self.per_count()
     }
 }
 

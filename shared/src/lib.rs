@@ -5,7 +5,8 @@
 //! - [`contact`]: Q, b, p and the four solution modes of the tip on the belt
 //! - [`counts`]: integers as converters give and take them, with their scaling
 //! - [`frame`], [`status`]: what crosses the link at every control tick
-//! - [`wire`]: the same frames as bytes, for links that are not shared memory
+//! - [`wire`], [`message`]: the same frames as bytes, for links that are not shared memory,
+//!   and what is said with them
 //! - [`real`], [`range`]: scalars with host-independent functions, and range errors
 //!
 //! Equations and symbols are those of Marchese, Coraggio, Hogan and di Bernardo,
@@ -24,6 +25,7 @@ pub mod counts;
 pub mod dynamics;
 pub mod frame;
 pub mod kinematics;
+pub mod message;
 pub mod range;
 pub mod real;
 pub mod status;

@@ -8,7 +8,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
 use serde::{Deserialize, Serialize};
 
-/// Small table: 16 entries of 4 bytes, so that the flash stays small.
+/// The smallest table there is: 256 entries of 4 bytes.
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Why bytes are not a message.

@@ -4,12 +4,14 @@
 //! - [`plant`]: the hybrid rigid-body model
 //! - [`converters`], [`simulation`]: the plant as the controller's wires see it
 //! - [`controller_host`], [`link`], [`realtime`]: whatever runs the controller, and how to reach it
+//! - [`board`]: the controller's image on an emulated microcontroller
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`scenario`]: everything that defines a run, as a TOML file
 //! - [`record`], [`plot`], [`report`]: what a run leaves behind
 //! - [`commands`]: the `painleve` command; [`interrupt`], [`lifetime`]: its processes' ends
 
 pub mod atomic_file;
+pub mod board;
 pub mod closed_loop;
 pub mod commands;
 pub mod controller_host;

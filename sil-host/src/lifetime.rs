@@ -1,7 +1,8 @@
 //! Child processes that never outlive whoever started them.
 
 use std::io;
-use std::process::{Child, ExitStatus};
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
 use nix::sys::prctl::set_pdeathsig;
@@ -21,6 +22,15 @@ pub fn end_with_parent() -> io::Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Makes the kernel kill a command's process when the thread that started it ends. For a
+/// program that is not ours and ignores requests to end.
+#[allow(unsafe_code)]
+pub fn kill_with_parent(command: &mut Command) -> &mut Command {
+    // SAFETY: the closure runs between fork and exec, where only async-signal-safe
+    // calls are allowed; it makes one system call and does not allocate.
+    unsafe { command.pre_exec(|| Ok(set_pdeathsig(Signal::SIGKILL)?)) }
 }
 
 /// A child that is ended, by force if need be, when this value goes.
@@ -48,6 +58,13 @@ impl Guarded {
         self.0.try_wait()
     }
 
+    /// Forces the child to end.
+    pub fn kill(&mut self) {
+        // Errors mean that it has just ended.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+
     /// Asks the child to end, waits a while, then forces it.
     pub fn stop(&mut self) {
         if let Ok(Some(_)) = self.0.try_wait() {
@@ -64,8 +81,7 @@ impl Guarded {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        self.kill();
     }
 }
 

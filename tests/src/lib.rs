@@ -35,6 +35,34 @@ pub fn program() -> &'static Path {
     })
 }
 
+/// The controller's image for the emulated board; built if it is out of date.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    IMAGE.get_or_init(|| {
+        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let built = Command::new(cargo)
+            .args([
+                "run",
+                "--quiet",
+                "--package",
+                "painleve-xtask",
+                "--",
+                "build-fw",
+            ])
+            .current_dir(&workspace)
+            .status();
+        assert!(
+            built.is_ok_and(|status| status.success()),
+            "`cargo xtask build-fw` fails: run `cargo xtask setup` first"
+        );
+        workspace.join("target/thumbv7em-none-eabihf/release/painleve-qemu")
+    })
+}
+
 /// A folder to run the program in, and the bus that is used there.
 pub struct Bench {
     folder: tempfile::TempDir,

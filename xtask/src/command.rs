@@ -32,10 +32,23 @@ pub fn cargo() -> String {
 /// # Errors
 /// If it cannot be started or does not succeed.
 pub fn run(program: &str, arguments: &[&str]) -> Result<(), ChoreError> {
+    run_with(program, arguments, &[])
+}
+
+/// Runs a program in the workspace's folder with more environment variables.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(
+    program: &str,
+    arguments: &[&str],
+    environment: &[(&str, &str)],
+) -> Result<(), ChoreError> {
     let line = format!("{program} {}", arguments.join(" "));
     eprintln!("$ {line}");
     let status = Command::new(program)
         .args(arguments)
+        .envs(environment.iter().copied())
         .current_dir(workspace())
         .status()
         .map_err(|error| ChoreError(format!("cannot start `{line}`: {error}")))?;

@@ -1,7 +1,11 @@
 //! The workspace's chores, as `cargo xtask …`: one local command equals CI.
 
+mod build_fw;
 mod ci;
 mod command;
+mod flash;
+mod setup;
+mod size;
 mod test;
 
 use std::process::ExitCode;
@@ -20,6 +24,14 @@ struct Cli {
 enum Chore {
     /// Install what the tests need and run every test.
     Test,
+    /// Install the microcontroller's Rust target and QEMU.
+    Setup,
+    /// Build the controller's images for the microcontroller.
+    BuildFw,
+    /// Flash, RAM and stack of the images, with their limits.
+    Size,
+    /// Build the image for the STM32F405 and flash it with probe-rs.
+    Flash,
     /// What continuous integration does: formatting, clippy, every test.
     Ci,
 }
@@ -27,6 +39,10 @@ enum Chore {
 fn main() -> ExitCode {
     let result = match Cli::parse().chore {
         Chore::Test => test::run(),
+        Chore::Setup => setup::run(),
+        Chore::BuildFw => build_fw::run(),
+        Chore::Size => size::run(),
+        Chore::Flash => flash::run(),
         Chore::Ci => ci::run(),
     };
     match result {

@@ -1,5 +1,6 @@
 //! The `painleve` command: its subcommands, their options, their errors.
 
+mod bridge;
 mod controller;
 mod output;
 mod plant;
@@ -10,6 +11,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::board::BoardError;
 use crate::closed_loop::LoopError;
 use crate::link::LinkError;
 use crate::scenario::ScenarioError;
@@ -34,6 +36,8 @@ enum Command {
     Plant(plant::PlantArguments),
     /// Run the controller for the plant on the bus.
     Controller(controller::ControllerArguments),
+    /// Run the controller's image on a board for the plant on the bus.
+    Bridge(bridge::BridgeArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
 }
@@ -50,6 +54,9 @@ pub enum CommandError {
     /// The peer is missing, gone or wrong.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// The board that runs the controller is missing, gone or wrong.
+    #[error(transparent)]
+    Board(#[from] BoardError),
     /// A file cannot be written.
     #[error("{0}")]
     Output(String),
@@ -74,7 +81,7 @@ impl CommandError {
         match self {
             Self::Scenario(_) => 2,
             Self::Loop(LoopError::Plant(_)) => 1,
-            Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Process(_) => 3,
+            Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => 3,
             Self::Loop(LoopError::Watcher(_)) | Self::Output(_) => 4,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => 130,
             Self::Told { code } => *code,
@@ -104,6 +111,7 @@ pub fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Plant(arguments) => plant::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
+        Command::Bridge(arguments) => bridge::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
     };
     match result {

@@ -5,10 +5,12 @@ use std::io::Read;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::CommandError;
+use super::bridge::ImageArguments;
 use super::output::OutputArguments;
+use crate::board::emulator;
 use crate::interrupt::Interrupt;
 use crate::lifetime::Guarded;
 use crate::link::{BusName, Pacing};
@@ -56,6 +58,16 @@ impl ScenarioArguments {
     }
 }
 
+/// What runs the controller.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Host {
+    /// The firmware's controller in a process of its own.
+    #[default]
+    Native,
+    /// The image of the flash target under QEMU.
+    Qemu,
+}
+
 /// Options of `painleve run`.
 #[derive(Clone, Debug, Args)]
 pub struct RunArguments {
@@ -64,6 +76,11 @@ pub struct RunArguments {
     /// Bus on which plant and controller meet; unique by default.
     #[arg(long)]
     bus: Option<BusName>,
+    /// What runs the controller.
+    #[arg(long, value_enum, default_value_t)]
+    host: Host,
+    #[command(flatten)]
+    image: ImageArguments,
     #[command(flatten)]
     output: OutputArguments,
     /// Print one JSON object on stdout instead of the table.
@@ -85,6 +102,9 @@ const CONTROLLER_END: Duration = Duration::from_millis(1700);
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     // Before anything is started, so that there is one message about it.
     arguments.scenario.load()?;
+    if arguments.host == Host::Qemu {
+        emulator::check(&arguments.image.path())?;
+    }
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
     let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
 
@@ -92,9 +112,24 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     plant_arguments.extend(arguments.scenario.to_arguments());
     plant_arguments.extend(arguments.output.to_arguments());
     plant_arguments.push("--json".into());
+    let host = arguments.host.to_possible_value();
+    let host = host.as_ref().map_or("native", |host| host.get_name());
+    plant_arguments.extend(["--host-name".into(), host.into()]);
     let mut plant = start(plant_arguments, &bus, Stdio::inherit())?;
-    // Its complaints matter only while the plant has none.
-    let mut controller = start(vec!["controller".into()], &bus, Stdio::piped())?;
+    let mut controller_arguments: Vec<OsString> = match arguments.host {
+        Host::Native => vec!["controller".into()],
+        Host::Qemu => vec!["bridge".into(), "qemu".into()],
+    };
+    if arguments.host != Host::Native {
+        controller_arguments.extend(arguments.image.to_arguments());
+    }
+    // Its complaints matter only while the plant has none, a log at once.
+    let stderr = if arguments.image.log {
+        Stdio::inherit()
+    } else {
+        Stdio::piped()
+    };
+    let mut controller = start(controller_arguments, &bus, stderr)?;
 
     let plant_status = loop {
         if interrupt.is_requested() {
@@ -106,8 +141,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         if let Some(status) = controller.ended()?
             && !status.success()
         {
-            // The plant notices by itself and says so; if it does not, this does.
+            // The plant notices by itself and says so; if it does not, this does. Why a
+            // board stopped, only its bridge knows.
             if let Some(plant_status) = wait(&mut plant, CONTROLLER_END)? {
+                if arguments.host != Host::Native {
+                    eprintln!("error{}", said(&mut controller));
+                }
                 break plant_status;
             }
             return Err(CommandError::Process(format!(

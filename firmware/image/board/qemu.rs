@@ -1,0 +1,132 @@
+//! QEMU's `netduinoplus2`: a STM32F405, the chip that is flashed.
+//!
+//! `mps2-an386` would have a timer with more digits and a serial port that is
+//! kept in virtual time, but another memory map and other timers; here the control timer,
+//! its interrupt and the map are those of the flash target. QEMU models no clock
+//! tree, no converters and no watchdog for it: the arm's frames come through the link.
+//!
+//! The link is semihosting on two pipes in QEMU's working folder. The virtual
+//! clock stands still during a semihosting call, so that a run under `-icount` is
+//! deterministic to the instruction, however long the host takes.
+
+use defmt_semihosting as _;
+use painleve_firmware::Configuration;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::message::Plant;
+use semihosting::fs::File;
+use semihosting::io::{Read, Write};
+use stm32f4xx_hal::pac;
+
+use crate::board::{Board, Bytes, Drive, Parts, Port, StartFault, timer};
+
+/// QEMU's timers count nanoseconds of virtual time, whatever the clock tree says.
+const TIMER_HZ: f32 = 1e9;
+
+/// See the module's page.
+pub struct Qemu;
+
+impl Board for Qemu {
+    type Drive = Timers;
+    type Bytes = NoBytes;
+    type Port = Pipes;
+
+    const NAME: &'static str = "netduinoplus2 under QEMU";
+
+    fn start(
+        device: pac::Peripherals,
+        _: cortex_m::Peripherals,
+    ) -> Result<Parts<Self>, StartFault> {
+        // The stopwatch.
+        device.TIM5.arr().write(|w| w.arr().set(u32::MAX));
+        device.TIM5.cr1().write(|w| w.cen().set_bit());
+        Ok(Parts {
+            drive: Timers {
+                control: device.TIM2,
+                stopwatch: device.TIM5,
+            },
+            bytes: NoBytes,
+            port: Pipes {
+                requests: File::open(c"requests").map_err(|_| StartFault::Link)?,
+                responses: File::create(c"responses").map_err(|_| StartFault::Link)?,
+            },
+        })
+    }
+
+    /// The host sees the image end, and takes the torque off in its simulation.
+    fn take_torque_off() {}
+
+    fn halt() -> ! {
+        semihosting::process::exit(1)
+    }
+
+    #[allow(unsafe_code)]
+    fn idle() {
+        // No wait for interrupt: with one timer running, QEMU's virtual clock
+        // would jump past its deadline. A straight piece of code is one block to
+        // QEMU and many times faster than a loop.
+        // SAFETY: does nothing.
+        unsafe { core::arch::asm!(".rept 200", "nop", ".endr", options(nomem, nostack)) }
+    }
+}
+
+/// The control timer and the stopwatch.
+pub struct Timers {
+    control: pac::TIM2,
+    stopwatch: pac::TIM5,
+}
+
+impl Drive for Timers {
+    fn start(&mut self, configuration: &Configuration, _: Plant) {
+        timer::start(&self.control, TIMER_HZ / configuration.tick_hz);
+    }
+
+    fn begin_tick(&mut self) {
+        timer::acknowledge(&self.control);
+    }
+
+    fn next_tick_is_due(&self) -> bool {
+        timer::is_due(&self.control)
+    }
+
+    /// There is no other plant than a simulated one.
+    fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame> {
+        from_host
+    }
+
+    /// The answer on the link is the output.
+    fn actuate(&mut self, _: &ActuatorFrame) {}
+
+    fn stopwatch(&self) -> u32 {
+        self.stopwatch.cnt().read().bits()
+    }
+}
+
+/// Semihosting has no interrupt.
+pub struct NoBytes;
+
+impl Bytes for NoBytes {
+    fn serve(&mut self) {}
+}
+
+/// A pipe each way.
+pub struct Pipes {
+    requests: File,
+    responses: File,
+}
+
+impl Port for Pipes {
+    const HALF_DUPLEX: bool = true;
+
+    /// Blocks, with all of virtual time, until the host asks for something. A host that is gone
+    /// ends the image.
+    fn receive(&mut self, buffer: &mut [u8]) -> usize {
+        match self.requests.read(buffer) {
+            Ok(length) if length > 0 => length,
+            _ => Qemu::halt(),
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> bool {
+        self.responses.write_all(bytes).is_ok()
+    }
+}

@@ -1,0 +1,24 @@
+//! TIM2, the control timer: the same registers on the chip and under QEMU.
+
+use stm32f4xx_hal::pac::TIM2;
+
+/// Starts the timer's interrupt every `counts` of its clock.
+pub fn start(timer: &TIM2, counts: f32) {
+    timer.cr1().write(|w| w.cen().clear_bit());
+    timer.psc().write(|w| w.psc().set(0));
+    timer.arr().write(|w| w.arr().set(counts as u32 - 1));
+    timer.egr().write(|w| w.ug().set_bit());
+    acknowledge(timer);
+    timer.dier().write(|w| w.uie().set_bit());
+    timer.cr1().write(|w| w.cen().set_bit());
+}
+
+/// Clears the interrupt.
+pub fn acknowledge(timer: &TIM2) {
+    timer.sr().modify(|_, w| w.uif().clear_bit());
+}
+
+/// Whether the interrupt has come again since it was cleared.
+pub fn is_due(timer: &TIM2) -> bool {
+    timer.sr().read().uif().bit_is_set()
+}

@@ -1,0 +1,103 @@
+//! USART1 with a buffer each way, at 921,600 baud, 8N1.
+//!
+//! Its interrupt moves single bytes, 11 µs apart; the link task takes and gives them in bulk and
+//! may be late by a whole buffer: 5.5 ms.
+
+use heapless::spsc::{Consumer, Producer, Queue};
+use stm32f4xx_hal::nb;
+use stm32f4xx_hal::pac::{Interrupt, USART1};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::serial::{Rx, RxISR, RxListen, Serial, Tx, TxISR, TxListen};
+
+use crate::board::{Bytes, Port};
+
+/// Speed of the line, bit/s.
+pub const BAUD: u32 = 921_600;
+
+/// Bytes that may wait, each way.
+const CAPACITY: usize = 512;
+
+/// The interrupt's side.
+pub struct UartBytes {
+    receiver: Rx<USART1>,
+    transmitter: Tx<USART1>,
+    received: Producer<'static, u8>,
+    to_send: Consumer<'static, u8>,
+}
+
+/// The link task's side.
+pub struct UartPort {
+    received: Consumer<'static, u8>,
+    to_send: Producer<'static, u8>,
+}
+
+/// Takes charge of the serial port; `None` the second time.
+pub fn split(serial: Serial<USART1>) -> Option<(UartBytes, UartPort)> {
+    let in_queue = cortex_m::singleton!(RECEIVED: Queue<u8, CAPACITY> = Queue::new())?;
+    let out_queue = cortex_m::singleton!(TO_SEND: Queue<u8, CAPACITY> = Queue::new())?;
+    let (received_in, received_out) = in_queue.split();
+    let (to_send_in, to_send_out) = out_queue.split();
+    let (transmitter, mut receiver) = serial.split();
+    receiver.listen();
+    Some((
+        UartBytes {
+            receiver,
+            transmitter,
+            received: received_in,
+            to_send: to_send_out,
+        },
+        UartPort {
+            received: received_out,
+            to_send: to_send_in,
+        },
+    ))
+}
+
+impl Bytes for UartBytes {
+    fn serve(&mut self) {
+        while self.receiver.is_rx_not_empty() {
+            // A byte that is broken or finds no room spoils its message, which
+            // the checksum notices.
+            if let Ok(byte) = self.receiver.read() {
+                let _ = self.received.enqueue(byte);
+            }
+        }
+        if self.transmitter.is_tx_empty() {
+            match self.to_send.dequeue() {
+                Some(byte) => {
+                    self.transmitter.listen();
+                    let _: nb::Result<(), _> = self.transmitter.write(byte);
+                }
+                None => self.transmitter.unlisten(),
+            }
+        }
+    }
+}
+
+impl Port for UartPort {
+    const HALF_DUPLEX: bool = false;
+
+    fn receive(&mut self, buffer: &mut [u8]) -> usize {
+        let mut length = 0;
+        for place in buffer {
+            let Some(byte) = self.received.dequeue() else {
+                break;
+            };
+            *place = byte;
+            length += 1;
+        }
+        length
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> bool {
+        if self.to_send.capacity() - self.to_send.len() < bytes.len() {
+            return false;
+        }
+        for byte in bytes {
+            let _ = self.to_send.enqueue(*byte);
+        }
+        // The interrupt takes the first byte and asks for itself from then on.
+        rtic::pend(Interrupt::USART1);
+        true
+    }
+}

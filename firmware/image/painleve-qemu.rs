@@ -1,0 +1,23 @@
+//! The image for QEMU's `netduinoplus2`.
+
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod app;
+#[cfg(target_os = "none")]
+mod board;
+#[cfg(target_os = "none")]
+mod inbox;
+#[cfg(target_os = "none")]
+#[path = "board/qemu.rs"]
+mod qemu;
+#[cfg(target_os = "none")]
+mod stack;
+
+/// The board of this image.
+#[cfg(target_os = "none")]
+use qemu::Qemu as Hardware;
+
+/// A PC, where `--all-features` comes by, has nothing to run.
+#[cfg(not(target_os = "none"))]
+fn main() {}

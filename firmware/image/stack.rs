@@ -1,0 +1,44 @@
+//! Most stack ever used: the free part is painted at the start and looked at later.
+
+#![allow(unsafe_code)] // reads and writes the stack below the program's own
+
+use core::ptr::addr_of_mut;
+
+/// What untouched stack holds.
+const PAINT: u32 = 0xdead_57ac;
+
+/// Room left unpainted below the stack pointer of whoever paints, bytes.
+const MARGIN_BYTES: usize = 128;
+
+unsafe extern "C" {
+    /// End of static memory, lowest address of the stack (cortex-m-rt).
+    static mut __sheap: u32;
+    /// One past the highest address of the stack.
+    static mut _stack_start: u32;
+}
+
+/// Paints all of the stack that is not in use. Call it first.
+pub fn paint() {
+    let mut word = addr_of_mut!(__sheap);
+    let top = (cortex_m::register::msp::read() as usize - MARGIN_BYTES) as *mut u32;
+    while word < top {
+        // SAFETY: between static memory and the margin below the stack pointer
+        // lies memory that nothing uses; both ends are aligned to words.
+        unsafe {
+            word.write_volatile(PAINT);
+            word = word.add(1);
+        }
+    }
+}
+
+/// Most stack used since [`paint`], bytes.
+pub fn high_water_bytes() -> u32 {
+    let mut word = addr_of_mut!(__sheap);
+    let top = addr_of_mut!(_stack_start);
+    // SAFETY: reads words of RAM from the end of static memory up to the start of the
+    // stack; a value that changes meanwhile does no harm.
+    while word < top && unsafe { word.read_volatile() } == PAINT {
+        word = word.wrapping_add(1);
+    }
+    (top as usize - word as usize) as u32
+}

@@ -1,0 +1,48 @@
+//! What an image says with defmt, as text.
+
+use std::io::Read;
+use std::path::Path;
+
+use defmt_decoder::DecodeError;
+
+use super::BoardError;
+
+/// The table of an image's messages: they cross as numbers, the text is in the image.
+pub struct Table(defmt_decoder::Table);
+
+impl Table {
+    /// Reads the table from an image.
+    ///
+    /// # Errors
+    /// [`BoardError::Image`] if it has none.
+    pub fn of_image(image: &Path) -> Result<Self, BoardError> {
+        let error = |reason: String| BoardError::Image {
+            path: image.into(),
+            reason,
+        };
+        let bytes = std::fs::read(image).map_err(|cause| error(cause.to_string()))?;
+        defmt_decoder::Table::parse(&bytes)
+            .map_err(|cause| error(cause.to_string()))?
+            .map(Self)
+            .ok_or_else(|| error("it has no defmt table".into()))
+    }
+
+    /// Prints everything from `output` on stderr until it ends, in a thread of its own.
+    pub fn print_from(self, mut output: impl Read + Send + 'static) {
+        std::thread::spawn(move || {
+            let mut decoder = self.0.new_stream_decoder();
+            let mut bytes = [0; 1024];
+            while let Ok(length @ 1..) = output.read(&mut bytes) {
+                decoder.received(&bytes[..length]);
+                loop {
+                    match decoder.decode() {
+                        Ok(frame) => eprintln!("board: {}", frame.display(false)),
+                        // The stream finds its place again at the next frame.
+                        Err(DecodeError::Malformed) => {}
+                        Err(DecodeError::UnexpectedEof) => break,
+                    }
+                }
+            }
+        });
+    }
+}

@@ -1,0 +1,142 @@
+//! The controller's image on the emulated microcontroller against the same
+//! controller on this machine: equal to the last bit, in every run.
+
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+use painleve_firmware::{Configuration, Controller};
+use painleve_shared::frame::SensorFrame;
+use painleve_sil_host::board::Emulator;
+use painleve_sil_host::closed_loop::ClosedLoop;
+use painleve_sil_host::controller_host::{Answer, ControllerHost, HostError};
+use painleve_sil_host::scenario::{Scenario, built_in};
+use painleve_sil_host::simulation::Simulation;
+use painleve_tests::{Bench, child_of, image, is_running, signal};
+
+/// Gives every frame to both controllers and compares what they answer.
+struct Both {
+    native: Controller,
+    emulated: Emulator,
+    scenario: String,
+}
+
+impl Both {
+    fn new(scenario: &Scenario) -> Self {
+        let configuration: Configuration = scenario.controller_configuration();
+        Self {
+            native: Controller::new(&configuration).unwrap(),
+            emulated: Emulator::start(image(), &configuration, false).unwrap(),
+            scenario: scenario.name.clone(),
+        }
+    }
+}
+
+impl ControllerHost for Both {
+    fn exchange(&mut self, sensor: &SensorFrame) -> Result<Answer, HostError> {
+        let start = Instant::now();
+        let before = self.native.clone();
+        let native = self.native.tick(sensor);
+        let emulated = self.emulated.exchange(sensor).unwrap().frame;
+        assert!(
+            native == emulated,
+            "{}: the image differs first at tick {}\n\
+             sensor frame {sensor:?}\n\
+             native   answer {native:?}\n\
+             emulated answer {emulated:?}\n\
+             native   state {:?}, latched {:?}\n\
+             emulated state {:?}, latched {:?}\n\
+             native controller before {before:#?}",
+            self.scenario,
+            sensor.tick,
+            native.supervisor_state(),
+            native.latched_fault(),
+            emulated.supervisor_state(),
+            emulated.latched_fault(),
+        );
+        Ok(Answer {
+            frame: Some(native),
+            round_trip: start.elapsed(),
+        })
+    }
+}
+
+#[test]
+fn the_image_answers_every_built_in_scenario_with_the_same_counts() {
+    for name in built_in::names() {
+        let scenario = Scenario::load(name, &[]).unwrap();
+        let simulation = Simulation::new(&scenario).unwrap();
+        let mut closed_loop = ClosedLoop::new(simulation, Both::new(&scenario));
+        for _ in 0..scenario.run.ticks() {
+            closed_loop.tick(&mut ()).unwrap();
+        }
+        let (_, mut both) = closed_loop.finish();
+        let health = both.emulated.health().unwrap();
+        assert_eq!(u64::from(health.ticks), scenario.run.ticks(), "{name}");
+        assert_eq!((health.corrupt_messages, health.overruns), (0, 0), "{name}");
+    }
+}
+
+const SHORT: [&str; 2] = ["--set", "run.duration_s=1.0"];
+const QUIET: [&str; 3] = ["--json", "--no-record", "--no-plot"];
+
+#[test]
+fn runs_as_processes_agree_and_repeat_themselves_to_the_instruction() {
+    let bench = Bench::new("pil");
+    let image = image().to_string_lossy();
+    let native = bench.report(&[&["run"], &SHORT[..], &QUIET[..]].concat());
+    let mut timings = Vec::new();
+    for _ in 0..3 {
+        let qemu = [
+            "run", "--host", "qemu", "--elf", &image, "--timing", "t.json",
+        ];
+        let report = bench.report(&[&qemu[..], &SHORT[..], &QUIET[..]].concat());
+        assert_eq!(report["host"], "qemu");
+        assert_eq!(report["log_hash"], native["log_hash"]);
+        timings.push(std::fs::read_to_string(bench.path("t.json")).unwrap());
+    }
+    assert_eq!(timings[0], timings[1]);
+    assert_eq!(timings[0], timings[2]);
+}
+
+#[test]
+fn a_missing_image_is_an_error_that_says_how_to_build_one() {
+    let bench = Bench::new("no-image");
+    let qemu = ["run", "--host", "qemu", "--elf", "/nowhere/image"];
+    let output = bench.run(&[&qemu[..], &QUIET[..]].concat());
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(text.contains("cargo xtask build-fw"), "{text}");
+}
+
+#[test]
+fn killing_emulator_bridge_or_plant_ends_the_others() {
+    for victim in ["emulator", "bridge", "plant"] {
+        let bench = Bench::new(&format!("kill-{victim}"));
+        let image = image().to_string_lossy();
+        let long = [
+            "run", "--host", "qemu", "--elf", &image, "--bus", &bench.bus,
+        ];
+        let duration = ["--set", "run.duration_s=1000"];
+        let running = bench.start(&[&long[..], &duration, &QUIET].concat());
+        let bridge = child_of(running.id(), "bridge");
+        let plant = child_of(running.id(), "plant");
+        let emulator = child_of(bridge, "-machine");
+        let id = match victim {
+            "emulator" => emulator,
+            "bridge" => bridge,
+            _ => plant,
+        };
+        signal(id, Signal::SIGKILL);
+        let (output, _) = running.end(Duration::from_secs(2));
+        assert!(!output.status.success());
+        assert!(!output.stderr.is_empty(), "{victim}: no message");
+        let start = Instant::now();
+        for id in [emulator, bridge, plant] {
+            while is_running(id) {
+                assert!(start.elapsed() < Duration::from_secs(2), "{victim}: {id}");
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        }
+        assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
+    }
+}

@@ -1,0 +1,111 @@
+//! `cargo xtask build-fw`: the controller's images for the microcontroller.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::command::{ChoreError, cargo, run_with, workspace};
+
+/// The microcontroller's target.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// Debian's own compiler, from the packages `rustc-web` and `rust-web-src`.
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+
+/// How the target's core library is had.
+enum Toolchain {
+    /// Installed with this toolchain.
+    Installed,
+    /// Built from Debian's sources by Debian's compiler.
+    Debian,
+}
+
+/// Builds every image.
+///
+/// # Errors
+/// If the target is not installed, or the build fails.
+pub fn run() -> Result<(), ChoreError> {
+    let build = [
+        "build",
+        "--release",
+        "--package",
+        "painleve-firmware",
+        "--features",
+        "image",
+        "--bins",
+        "--target",
+        TARGET,
+    ];
+    match toolchain()? {
+        Toolchain::Installed => run_with(&cargo(), &build, &[]),
+        Toolchain::Debian => {
+            // A target folder of its own: objects of two compilers do not mix.
+            let folder = workspace().join("target/debian");
+            let folder = folder.to_string_lossy();
+            let build = [&build[..], &["-Zbuild-std=core", "--target-dir", &folder]].concat();
+            let environment = [("RUSTC", DEBIAN_RUSTC), ("RUSTC_BOOTSTRAP", "1")];
+            run_with("/usr/bin/cargo", &build, &environment)?;
+            for name in ["painleve-qemu", "painleve-f405"] {
+                let built = workspace().join(format!("target/debian/{TARGET}/release/{name}"));
+                copy(&built, &image(name))?;
+            }
+            Ok(())
+        }
+    }
+}
+
+/// Where an image is once built.
+pub fn image(name: &str) -> PathBuf {
+    workspace().join(format!("target/{TARGET}/release/{name}"))
+}
+
+/// Whether `rustc` has the target's core library.
+pub fn target_is_installed() -> bool {
+    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
+    let Ok(output) = Command::new(rustc)
+        .args(["--print", "target-libdir", "--target", TARGET])
+        .current_dir(workspace())
+        .output()
+    else {
+        return false;
+    };
+    let folder = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+    std::fs::read_dir(folder).is_ok_and(|files| {
+        files
+            .flatten()
+            .any(|file| file.file_name().to_string_lossy().starts_with("libcore-"))
+    })
+}
+
+/// Whether Debian's compiler and the sources of its core library are there.
+pub fn debian_can_build() -> bool {
+    let sysroot = Command::new(DEBIAN_RUSTC)
+        .args(["--print", "sysroot"])
+        .output();
+    sysroot.is_ok_and(|output| {
+        let sysroot = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        Path::new(&sysroot)
+            .join("lib/rustlib/src/rust/library/core")
+            .exists()
+    })
+}
+
+fn toolchain() -> Result<Toolchain, ChoreError> {
+    if target_is_installed() {
+        Ok(Toolchain::Installed)
+    } else if debian_can_build() {
+        Ok(Toolchain::Debian)
+    } else {
+        Err(ChoreError(format!(
+            "the Rust target {TARGET} is not installed: run `cargo xtask setup`"
+        )))
+    }
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), ChoreError> {
+    let error =
+        |cause: std::io::Error| ChoreError(format!("cannot write {}: {cause}", to.display()));
+    if let Some(folder) = to.parent() {
+        std::fs::create_dir_all(folder).map_err(error)?;
+    }
+    std::fs::copy(from, to).map(|_| ()).map_err(error)
+}
