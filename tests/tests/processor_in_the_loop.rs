@@ -24,8 +24,8 @@ impl Both {
     fn new(scenario: &Scenario) -> Self {
         let configuration: Configuration = scenario.controller_configuration();
         Self {
-            native: Controller::new(&configuration).unwrap(),
-            emulated: Emulator::start(image(), &configuration, false).unwrap(),
+            native: Controller::new(&configuration).expect("built in"),
+            emulated: Emulator::start(image(), &configuration, false).expect("QEMU starts"),
             scenario: scenario.name.clone(),
         }
     }
@@ -36,7 +36,11 @@ impl ControllerHost for Both {
         let start = Instant::now();
         let before = self.native.clone();
         let native = self.native.tick(sensor);
-        let emulated = self.emulated.exchange(sensor).unwrap().frame;
+        let emulated = self
+            .emulated
+            .exchange(sensor)
+            .expect("the image answers")
+            .frame;
         assert!(
             native == emulated,
             "{}: the image differs first at tick {}\n\

@@ -131,7 +131,7 @@ pub enum LinkError {
     /// iceoryx2 or the operating system refused.
     #[error(
         "bus `{bus}`: could not {action} ({cause}); \
-         check that /dev/shm and /tmp/iceoryx2 are writable and not full"
+         check that /dev/shm and /tmp are writable and not full"
     )]
     Transport {
         /// The bus.

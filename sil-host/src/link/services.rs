@@ -6,8 +6,8 @@ use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::prelude::{
-    CallbackProgression, Config, LogLevel, Node, NodeBuilder, NodeState, ServiceName,
-    SignalHandlingMode, ZeroCopySend, ipc, set_log_level_from_env_or,
+    CallbackProgression, Config, FileName, LogLevel, Node, NodeBuilder, NodeState, Path,
+    SemanticString, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level_from_env_or,
 };
 use iceoryx2::service::builder::publish_subscribe::{
     Builder, PublishSubscribeCreateError, PublishSubscribeOpenError,
@@ -38,9 +38,18 @@ pub(super) trait Payload: ZeroCopySend + std::fmt::Debug + Copy + 'static {}
 impl<T: ZeroCopySend + std::fmt::Debug + Copy + 'static> Payload for T {}
 
 /// The settings of iceoryx2: its defaults, whatever configuration file a user
-/// has, so that two painleve processes always meet.
+/// has, so that two painleve processes always meet; with files of one's own for
+/// every user of a machine, because nobody may open another one's.
 pub(super) fn default_config() -> Config {
-    Config::default()
+    let user = nix::unistd::getuid();
+    let mut config = Config::default();
+    if let Ok(prefix) = FileName::new(format!("painleve_{user}_").as_bytes()) {
+        config.global.prefix = prefix;
+    }
+    if let Ok(folder) = Path::new(format!("/tmp/painleve_{user}").as_bytes()) {
+        config.global.set_root_path(&folder);
+    }
+    config
 }
 
 /// Why services could not be had right now.

@@ -34,7 +34,8 @@ impl Files {
     fn left(&self) -> Vec<PathBuf> {
         let mut left = Vec::new();
         find(Path::new("/dev/shm"), &self.prefix, &mut left);
-        find(Path::new("/tmp/iceoryx2"), &self.prefix, &mut left);
+        let folder = services::default_config().global.root_path().to_string();
+        find(Path::new(&folder), &self.prefix, &mut left);
         left
     }
 }
