@@ -26,6 +26,7 @@ pub struct Simulation {
     torque_stages: TorqueStages,
     tick_hz: f64,
     tick: u64,
+    first_tick: u32,
     enable_at_s: f64,
 }
 
@@ -45,6 +46,7 @@ impl Simulation {
             torque_stages: TorqueStages::new(&converters.torque),
             tick_hz: f64::from(scenario.run.tick_hz),
             tick: 0,
+            first_tick: scenario.run.first_tick,
             enable_at_s: scenario.controller.enable_at_s,
             plant,
         })
@@ -70,7 +72,7 @@ impl Simulation {
         let (tangential_force, normal_force) = self.force_cell.read(&self.plant.contact_force_n());
         let enabled = self.plant.time_s() >= self.enable_at_s;
         // The counters of the wire wrap.
-        let tick = self.tick as u32;
+        let tick = self.first_tick.wrapping_add(self.tick as u32);
         Ok(SensorFrame {
             tick,
             sequence: tick,

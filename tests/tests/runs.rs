@@ -169,6 +169,31 @@ fn another_seed_is_another_run() {
 }
 
 #[test]
+fn counters_that_wrap_change_nothing() {
+    let bench = Bench::new("wrap");
+    let run = |first_tick: &str| {
+        let first_tick = format!("run.first_tick={first_tick}");
+        let mut report = bench.report(&[
+            "run",
+            "--set",
+            "run.duration_s=1",
+            "--set",
+            &first_tick,
+            "--json",
+            QUIET[0],
+            QUIET[1],
+        ]);
+        for varying in ["wall_s", "realtime_factor", "round_trip_us", "log_hash"] {
+            report[varying] = Value::Null;
+        }
+        report
+    };
+    let wrapped = run("4294966900");
+    assert_eq!(wrapped["fault"], Value::Null);
+    assert_eq!(wrapped, run("0"));
+}
+
+#[test]
 fn runs_side_by_side_do_not_meet() {
     let bench = Bench::new("side");
     let arguments = [

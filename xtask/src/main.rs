@@ -6,6 +6,7 @@ mod command;
 mod flash;
 mod setup;
 mod size;
+mod soak;
 mod test;
 
 use std::process::ExitCode;
@@ -32,6 +33,8 @@ enum Chore {
     Size,
     /// Build the image for the STM32F405 and flash it with probe-rs.
     Flash,
+    /// A simulated day of lockstep operation with counters that wrap; not part of CI.
+    Soak(soak::SoakArguments),
     /// What continuous integration does: formatting, clippy, every test.
     Ci,
 }
@@ -43,6 +46,7 @@ fn main() -> ExitCode {
         Chore::BuildFw => build_fw::run(),
         Chore::Size => size::run(),
         Chore::Flash => flash::run(),
+        Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Ci => ci::run(),
     };
     match result {

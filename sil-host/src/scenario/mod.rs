@@ -62,6 +62,8 @@ pub struct RunSettings {
     pub tick_hz: u32,
     /// Seed of all noise.
     pub seed: u64,
+    /// Tick and sequence number of the first frame: near 2³² the counters wrap early.
+    pub first_tick: u32,
 }
 
 impl Default for RunSettings {
@@ -70,6 +72,7 @@ impl Default for RunSettings {
             duration_s: 6.0,
             tick_hz: 1000,
             seed: 1,
+            first_tick: 0,
         }
     }
 }
