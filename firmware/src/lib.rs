@@ -9,7 +9,7 @@
 //! One tick, in order: [`controller`] checks the frame; [`estimator`] turns counts into
 //! angles and rates; [`contact_detector`] decides whether the tip touches;
 //! [`supervisor`] decides what may be done; [`reference`](mod@reference) says where the tip
-//! should be; [`pid`] or [`hybrid`] computes torques; the torques are limited and
+//! should be; [`law`] computes torques; the torques are limited and
 //! turned into counts. [`telemetry`] shows what went on inside.
 
 #![no_std]
@@ -21,9 +21,7 @@ pub mod configuration;
 pub mod contact_detector;
 pub mod controller;
 pub mod estimator;
-pub mod hybrid;
 pub mod law;
-pub mod pid;
 pub mod reference;
 pub mod supervisor;
 pub mod telemetry;

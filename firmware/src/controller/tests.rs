@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::configuration::Converters;
-use crate::hybrid::HybridSettings;
 use crate::law::LawSettings;
+use crate::law::hybrid::HybridSettings;
 use crate::reference::Program;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
 use painleve_shared::frame::DigitalInputs;

@@ -165,12 +165,7 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
     };
     let gap = |at: f64| motion.gap_m(&dense.at(at)) + slack;
     let mut before = (t, start[0] + slack, start[1]);
-    for part in 1..=SEARCH_PARTS {
-        let at = if part == SEARCH_PARTS {
-            t + h
-        } else {
-            t + h * f64::from(part) / f64::from(SEARCH_PARTS)
-        };
+    for at in looks(t, h) {
         let (gap_at, speed_at) = gap_and_speed(at);
         let mut after = (at, gap_at, speed_at);
         if after.1 >= 0.0 && before.2 < 0.0 && after.2 > 0.0 {
@@ -189,7 +184,7 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
             }
         }
         if after.1 < 0.0 {
-            if part == 1 && thrown {
+            if before.0 == t && thrown {
                 let divided = |at: f64| gap(at) / (at - t);
                 return Some(first_negative(
                     t,
@@ -215,6 +210,11 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
         before = (at, after.1, after.2);
     }
     None
+}
+
+/// Times at which a step from `t` over `h` is looked at; the last is its end.
+fn looks(t: f64, h: f64) -> impl Iterator<Item = f64> {
+    (1..=SEARCH_PARTS).map(move |part| t + h * (f64::from(part) / f64::from(SEARCH_PARTS)))
 }
 
 /// How much later than at `state` the tip of a flight meets the belt, s, to first order.
@@ -285,12 +285,7 @@ fn first_in_parts(
     if before.1 < 0.0 {
         return Some(step.t);
     }
-    for part in 1..=SEARCH_PARTS {
-        let at = if part == SEARCH_PARTS {
-            step.t + step.h
-        } else {
-            step.t + step.h * f64::from(part) / f64::from(SEARCH_PARTS)
-        };
+    for at in looks(step.t, step.h) {
         let after = (at, margin(at, &dense.at(at)));
         if after.1 < 0.0 {
             return Some(first_negative(

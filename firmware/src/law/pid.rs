@@ -8,7 +8,7 @@ use painleve_shared::Real;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 
-use crate::law::{LawInput, LawOutput};
+use super::signals::{LawInput, LawOutput};
 
 /// Gains of the PID, for joint 1 and joint 2.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,47 +1,20 @@
-//! The control laws' common ground: what they are given and what they answer.
+//! The control laws, and the choice between them.
+//!
+//! - [`signals`]: what a law is given and what it answers
+//! - [`pid`]: the paper's PID on the joints
+//! - [`hybrid`]: the paper's hybrid force/motion law
+
+pub mod hybrid;
+pub mod pid;
+pub mod signals;
 
 use nalgebra::Vector2;
 use painleve_shared::range::OutOfRange;
-use painleve_shared::{Arm, Pose, Posture};
 use serde::{Deserialize, Serialize};
 
-use crate::hybrid::{Hybrid, HybridSettings};
-use crate::pid::{Pid, PidSettings};
-use crate::reference::TipReference;
-
-/// What a law knows at one tick.
-#[derive(Clone, Copy, Debug)]
-pub struct LawInput<'a> {
-    /// The arm's model.
-    pub arm: &'a Arm<f32>,
-    /// Estimated joint angles θ, rad.
-    pub theta_rad: Vector2<f32>,
-    /// Estimated joint rates θ̇, rad/s.
-    pub theta_dot_rad_s: Vector2<f32>,
-    /// Sines and cosines of θ.
-    pub pose: Pose<f32>,
-    /// Posture in which the drive was armed.
-    pub posture: Posture,
-    /// Measured contact force (f_t, f_n), N.
-    pub force_n: Vector2<f32>,
-    /// Whether the tip touches the belt.
-    pub contact: bool,
-    /// Whether the torque of the tick before was limited.
-    pub saturated: bool,
-    /// Where the tip shall be.
-    pub reference: TipReference,
-    /// Time between two ticks, s.
-    pub tick_s: f32,
-}
-
-/// A law's answer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LawOutput {
-    /// Wanted joint torques (u1, u2), N·m, before limits.
-    pub torque_nm: Vector2<f32>,
-    /// Joint acceleration θ̈ that the law expects of them, rad/s².
-    pub acceleration_rad_s2: Vector2<f32>,
-}
+use hybrid::{Hybrid, HybridSettings};
+use pid::{Pid, PidSettings};
+use signals::{LawInput, LawOutput};
 
 /// Choice and settings of the control law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -17,7 +17,7 @@ use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Real, Slip};
 use serde::{Deserialize, Serialize};
 
-use crate::law::{LawInput, LawOutput};
+use super::signals::{LawInput, LawOutput};
 
 /// Where the friction f_t that the law compensates comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
