@@ -10,7 +10,7 @@
 //! angles and rates; [`contact_detector`] decides whether the tip touches;
 //! [`supervisor`] decides what may be done; [`reference`](mod@reference) says where the tip
 //! should be; [`pid`] or [`hybrid`] computes torques; the torques are limited and
-//! turned into counts. [`telemetry`] shows what went on inside.
+//! turned into counts. [`deadline_monitor`] watches over what is around the tick; [`telemetry`] shows what went on inside.
 
 #![no_std]
 
@@ -20,6 +20,7 @@ extern crate std;
 pub mod configuration;
 pub mod contact_detector;
 pub mod controller;
+pub mod deadline_monitor;
 pub mod estimator;
 pub mod hybrid;
 pub mod law;
