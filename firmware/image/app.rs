@@ -18,11 +18,13 @@ use crate::board::Board;
 #[app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod tasks {
     use heapless::spsc::{Consumer, Producer, Queue};
+    use painleve_firmware::deadline_monitor::{DeadlineMonitor, Lapse};
     use painleve_firmware::{Configuration, Controller};
     use painleve_shared::frame::SensorFrame;
-    use painleve_shared::message::{Health, MAXIMUM_LENGTH, Request, Response};
+    use painleve_shared::message::{Health, MAXIMUM_LENGTH, Plant, Request, Response};
     use painleve_shared::status::{Fault, SupervisorState};
     use painleve_shared::wire;
+    use rtic::Mutex;
     use stm32f4xx_hal::pac::Interrupt;
 
     use crate::Hardware;
@@ -41,10 +43,48 @@ mod tasks {
 
     /// What the log hears of the control task.
     #[derive(Clone, Copy, PartialEq)]
-    pub struct Event {
-        tick: u32,
+    pub struct Change {
         state: SupervisorState,
         fault: Option<Fault>,
+    }
+
+    /// What is counted since the configuration.
+    pub struct Watch {
+        plant: Plant,
+        monitor: DeadlineMonitor,
+        /// What the link has against going on.
+        broken_link: Option<Fault>,
+        ticks: u32,
+        /// Ticks a second.
+        tick_hz: u32,
+        worst_elapsed: u32,
+        dropped_responses: u32,
+    }
+
+    impl Watch {
+        const fn new(plant: Plant, monitor: DeadlineMonitor, tick_hz: u32) -> Self {
+            Self {
+                plant,
+                monitor,
+                broken_link: None,
+                ticks: 0,
+                tick_hz,
+                worst_elapsed: 0,
+                dropped_responses: 0,
+            }
+        }
+
+        /// The counters; the stack is not looked at in here, it takes too long.
+        fn health(&self) -> Health {
+            Health {
+                stack_bytes: 0,
+                ticks: self.ticks,
+                corrupt_messages: self.monitor.total(Lapse::CorruptMessage),
+                dropped_responses: self.dropped_responses,
+                missing_frames: self.monitor.total(Lapse::MissingFrame),
+                overruns: self.monitor.total(Lapse::Overrun),
+            }
+        }
     }
 
     #[shared]
@@ -54,7 +94,7 @@ mod tasks {
         drive: <Hardware as Board>::Drive,
         /// Newest sensor frame from the host.
         from_host: Option<SensorFrame>,
-        health: Health,
+        watch: Watch,
     }
 
     #[local]
@@ -64,14 +104,14 @@ mod tasks {
         inbox: Inbox,
         answers_in: Producer<'static, Response>,
         answers_out: Consumer<'static, Response>,
-        events_in: Producer<'static, Event>,
-        events_out: Consumer<'static, Event>,
-        reported: Event,
+        events_in: Producer<'static, Change>,
+        events_out: Consumer<'static, Change>,
+        reported: Change,
     }
 
     #[init(local = [
         answers: Queue<Response, ANSWERS> = Queue::new(),
-        events: Queue<Event, EVENTS> = Queue::new(),
+        events: Queue<Change, EVENTS> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         stack::paint();
@@ -91,7 +131,7 @@ mod tasks {
                 controller: None,
                 drive,
                 from_host: None,
-                health: Health::default(),
+                watch: Watch::new(Plant::Lockstep, DeadlineMonitor::default(), 0),
             },
             Local {
                 bytes,
@@ -101,8 +141,7 @@ mod tasks {
                 answers_out,
                 events_in,
                 events_out,
-                reported: Event {
-                    tick: 0,
+                reported: Change {
                     state: SupervisorState::Idle,
                     fault: None,
                 },
@@ -111,49 +150,57 @@ mod tasks {
     }
 
     #[task(binds = TIM2, priority = 3,
-           shared = [controller, drive, from_host, health],
+           shared = [controller, drive, from_host, watch],
            local = [answers_in, events_in, reported])]
     fn control(cx: control::Context) {
         let control::SharedResources {
             controller,
             drive,
             from_host,
-            health,
+            watch,
             ..
         } = cx.shared;
-        (controller, drive, from_host, health).lock(|controller, drive, from_host, health| {
+        (controller, drive, from_host, watch).lock(|controller, drive, from_host, watch| {
             drive.begin_tick();
-            let (Some(controller), Some(frame)) = (controller, drive.sample(from_host.take()))
-            else {
+            let Some(controller) = controller else {
+                return;
+            };
+            let frame = drive.sample(from_host.take());
+            let missing = frame.is_none() && watch.plant == Plant::Realtime;
+            let missing = watch.monitor.note(Lapse::MissingFrame, missing);
+            if let Some(fault) = missing.or(watch.broken_link.take()) {
+                drive.actuate(&controller.stop(fault));
+            }
+            let Some(frame) = frame else {
                 return;
             };
             let start = drive.stopwatch();
             let answer = controller.tick(&frame);
             let elapsed = drive.stopwatch().wrapping_sub(start);
             drive.actuate(&answer);
-
-            health.ticks = health.ticks.wrapping_add(1);
-            let overrun = drive.next_tick_is_due();
-            health.overruns = health.overruns.wrapping_add(u32::from(overrun));
             let response = Response::Actuator {
                 frame: answer,
                 elapsed,
             };
             if cx.local.answers_in.enqueue(response).is_err() {
-                health.dropped_responses = health.dropped_responses.wrapping_add(1);
+                watch.dropped_responses = watch.dropped_responses.wrapping_add(1);
             }
             rtic::pend(LINK);
+
+            watch.ticks = watch.ticks.wrapping_add(1);
+            watch.worst_elapsed = watch.worst_elapsed.max(elapsed);
             let telemetry = controller.telemetry();
-            let event = Event {
-                tick: telemetry.tick,
+            let change = Change {
                 state: telemetry.state,
                 fault: telemetry.fault,
             };
-            let before = cx.local.reported;
-            if (event.state, event.fault) != (before.state, before.fault)
-                && cx.local.events_in.enqueue(event).is_ok()
-            {
-                *before = event;
+            // What the queue has no room for is not said.
+            if change != *cx.local.reported && cx.local.events_in.enqueue(change).is_ok() {
+                *cx.local.reported = change;
+            }
+            let overrun = drive.next_tick_is_due();
+            if let Some(fault) = watch.monitor.note(Lapse::Overrun, overrun) {
+                drive.actuate(&controller.stop(fault));
             }
         });
     }
@@ -165,7 +212,7 @@ mod tasks {
     }
 
     #[task(binds = SPI3, priority = 1,
-           shared = [controller, drive, from_host, health],
+           shared = [controller, drive, from_host, watch],
            local = [port, inbox, answers_out, received: [u8; MAXIMUM_LENGTH] = [0; MAXIMUM_LENGTH]])]
     fn link(cx: link::Context) {
         let link::LocalResources {
@@ -179,7 +226,7 @@ mod tasks {
             mut controller,
             mut drive,
             mut from_host,
-            mut health,
+            mut watch,
             ..
         } = cx.shared;
         while let Some(answer) = answers_out.dequeue() {
@@ -195,34 +242,35 @@ mod tasks {
                 let Some(message) = inbox.push(*byte) else {
                     continue;
                 };
-                let response = match decode(message) {
-                    Some(Request::Sensor(frame)) => {
+                let response = match wire::decode(message) {
+                    Ok(Request::Sensor(frame)) => {
+                        note_message(&mut watch, false);
                         from_host.lock(|newest| *newest = Some(frame));
                         awaits_control = true;
                         continue;
                     }
-                    Some(Request::Configure {
+                    Ok(Request::Configure {
                         configuration,
                         plant,
                     }) => {
                         from_host.lock(|newest| *newest = None);
                         // Holds up `control`, which has nothing to control yet.
                         if controller.lock(|controller| configure(controller, &configuration)) {
-                            health.lock(|health| *health = Health::default());
+                            let tick_hz = configuration.tick_hz as u32;
+                            let monitor = DeadlineMonitor::default();
+                            watch.lock(|watch| *watch = Watch::new(plant, monitor, tick_hz));
                             drive.lock(|drive| drive.start(&configuration, plant));
                             Response::Ready
                         } else {
                             Response::Refused
                         }
                     }
-                    Some(Request::Health) => Response::Health(Health {
+                    Ok(Request::Health) => Response::Health(Health {
                         stack_bytes: stack::high_water_bytes(),
-                        ..health.lock(|health| *health)
+                        ..watch.lock(|watch| watch.health())
                     }),
-                    None => {
-                        health.lock(|health| {
-                            health.corrupt_messages = health.corrupt_messages.wrapping_add(1);
-                        });
+                    Err(_) => {
+                        note_message(&mut watch, true);
                         continue;
                     }
                 };
@@ -233,6 +281,14 @@ mod tasks {
                 return;
             }
         }
+    }
+
+    /// Counts good and broken messages; `control` acts on too many of these.
+    fn note_message(watch: &mut impl Mutex<T = Watch>, broken: bool) {
+        watch.lock(|watch| {
+            let fault = watch.monitor.note(Lapse::CorruptMessage, broken);
+            watch.broken_link = fault.or(watch.broken_link);
+        });
     }
 
     /// Makes a new controller in place of the old one, which stays if the
@@ -248,12 +304,6 @@ mod tasks {
         }
     }
 
-    /// Decodes a message. Out of line for the sake of the stack.
-    #[inline(never)]
-    fn decode(message: &mut [u8]) -> Option<Request<Configuration>> {
-        wire::decode(message).ok()
-    }
-
     /// A response that the host does not take is lost; the host asks again or gives up.
     fn send(port: &mut <Hardware as Board>::Port, response: &Response) {
         let mut buffer = [0; 96];
@@ -262,19 +312,30 @@ mod tasks {
         }
     }
 
-    #[idle(local = [events_out])]
-    fn idle(cx: idle::Context) -> ! {
+    #[idle(shared = [watch], local = [events_out])]
+    fn idle(mut cx: idle::Context) -> ! {
         defmt::info!(
             "painleve {=str} on {=str}",
             env!("CARGO_PKG_VERSION"),
             Hardware::NAME
         );
+        let mut second = 0;
         loop {
-            while let Some(event) = cx.local.events_out.dequeue() {
-                match event.fault {
-                    None => defmt::info!("tick {=u32}: {}", event.tick, event.state),
-                    Some(fault) => defmt::error!("tick {=u32}: {}", event.tick, fault),
+            while let Some(change) = cx.local.events_out.dequeue() {
+                match change.fault {
+                    None => defmt::info!("{}", change.state),
+                    Some(fault) => defmt::error!("{}", fault),
                 }
+            }
+            let (ticks, tick_hz, worst) = cx
+                .shared
+                .watch
+                .lock(|watch| (watch.ticks, watch.tick_hz, watch.worst_elapsed));
+            if let Some(now) = ticks.checked_div(tick_hz)
+                && now != second
+            {
+                second = now;
+                defmt::info!("{=u32} ticks, the longest took {=u32}", ticks, worst);
             }
             Hardware::idle();
         }

@@ -104,6 +104,14 @@ impl Controller {
         self.answer
     }
 
+    /// Latches a fault that was found outside a frame, and takes the torque off. The
+    /// answer is the last one without torque.
+    pub fn stop(&mut self, fault: Fault) -> ActuatorFrame {
+        self.supervisor.latch(fault);
+        self.shut_down(self.answer.tick);
+        self.answer
+    }
+
     fn arrival(&mut self, frame: &SensorFrame) -> Arrival {
         let limits = self.configuration.supervisor;
         let Some(last) = self.last_sequence else {

@@ -9,8 +9,9 @@
 //! One tick, in order: [`controller`] checks the frame; [`estimator`] turns counts into
 //! angles and rates; [`contact_detector`] decides whether the tip touches;
 //! [`supervisor`] decides what may be done; [`reference`](mod@reference) says where the tip
-//! should be; [`law`] computes torques; the torques are limited and
-//! turned into counts. [`telemetry`] shows what went on inside.
+//! should be; [`law`] computes torques; the torques are limited and turned into
+//! counts. [`deadline_monitor`] watches over what is around the tick; [`telemetry`]
+//! shows what went on inside.
 
 #![no_std]
 
@@ -20,6 +21,7 @@ extern crate std;
 pub mod configuration;
 pub mod contact_detector;
 pub mod controller;
+pub mod deadline_monitor;
 pub mod estimator;
 pub mod law;
 pub mod reference;

@@ -30,8 +30,10 @@ pub enum Request<C> {
 /// Where a controller's sensor frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Plant {
-    /// From the host, in [`Request::Sensor`].
-    Simulated,
+    /// From the host, in [`Request::Sensor`], who waits for every answer.
+    Lockstep,
+    /// From the host by the clock: a tick of the board's timer without a frame is a lapse.
+    Realtime,
     /// From the board's own sensors, at every tick of its timer.
     Real,
 }
@@ -68,6 +70,8 @@ pub struct Health {
     pub corrupt_messages: u32,
     /// Answers that nobody took in time.
     pub dropped_responses: u32,
+    /// Ticks without a sensor frame from a host that goes by the clock.
+    pub missing_frames: u32,
     /// Ticks that ended after the next one should have begun.
     pub overruns: u32,
 }

@@ -66,11 +66,17 @@ pub enum Fault {
     ContactNotFound = 7,
     /// Contact was lost for longer than allowed.
     LiftOffTooLong = 8,
+    /// Ticks were not done when the next one was due.
+    Overrun = 9,
+    /// Too many ticks in a row had no sensor frame.
+    FrameMissing = 10,
+    /// Too many messages in a row were broken.
+    CorruptMessages = 11,
 }
 
 impl Fault {
     /// All faults, by number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 11] = [
         Self::EncoderOutOfRange,
         Self::EncoderJump,
         Self::ForceOutOfRange,
@@ -79,6 +85,9 @@ impl Fault {
         Self::NotFinite,
         Self::ContactNotFound,
         Self::LiftOffTooLong,
+        Self::Overrun,
+        Self::FrameMissing,
+        Self::CorruptMessages,
     ];
 
     /// The fault with this number; 0 means none.
@@ -97,6 +106,9 @@ impl Fault {
             Self::NotFinite => "control law gave a number that is not finite",
             Self::ContactNotFound => "contact not confirmed in time after enabling",
             Self::LiftOffTooLong => "contact lost for longer than allowed",
+            Self::Overrun => "control ticks not done when the next was due",
+            Self::FrameMissing => "too many ticks in a row without a sensor frame",
+            Self::CorruptMessages => "too many broken messages in a row",
         }
     }
 }

@@ -1,12 +1,13 @@
 //! The controller's image on the emulated microcontroller against the same
-//! controller on this machine: equal to the last bit, in every run.
+//! controller on this machine: equal to the last bit, in every run, and within the
+//! budget of instructions and stack in `budget.json`.
 
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
 use painleve_firmware::{Configuration, Controller};
 use painleve_shared::frame::SensorFrame;
-use painleve_sil_host::board::Emulator;
+use painleve_sil_host::board::{Emulator, TickTimes};
 use painleve_sil_host::closed_loop::ClosedLoop;
 use painleve_sil_host::controller_host::{Answer, ControllerHost, HostError};
 use painleve_sil_host::scenario::{Scenario, built_in};
@@ -17,6 +18,7 @@ use painleve_tests::{Bench, child_of, image, is_running, signal};
 struct Both {
     native: Controller,
     emulated: Emulator,
+    times: TickTimes,
     scenario: String,
 }
 
@@ -26,6 +28,7 @@ impl Both {
         Self {
             native: Controller::new(&configuration).expect("built in"),
             emulated: Emulator::start(image(), &configuration, false).expect("QEMU starts"),
+            times: TickTimes::default(),
             scenario: scenario.name.clone(),
         }
     }
@@ -36,11 +39,9 @@ impl ControllerHost for Both {
         let start = Instant::now();
         let before = self.native.clone();
         let native = self.native.tick(sensor);
-        let emulated = self
-            .emulated
-            .exchange(sensor)
-            .expect("the image answers")
-            .frame;
+        let answer = self.emulated.exchange(sensor).expect("the image answers");
+        self.times.push(&answer);
+        let emulated = answer.frame;
         assert!(
             native == emulated,
             "{}: the image differs first at tick {}\n\
@@ -64,8 +65,13 @@ impl ControllerHost for Both {
     }
 }
 
+fn budget() -> serde_json::Value {
+    serde_json::from_str(include_str!("../budget.json")).expect("valid JSON")
+}
+
 #[test]
-fn the_image_answers_every_built_in_scenario_with_the_same_counts() {
+fn the_image_answers_every_built_in_scenario_with_the_same_counts_within_budget() {
+    let budget = budget();
     for name in built_in::names() {
         let scenario = Scenario::load(name, &[]).unwrap();
         let simulation = Simulation::new(&scenario).unwrap();
@@ -77,6 +83,19 @@ fn the_image_answers_every_built_in_scenario_with_the_same_counts() {
         let health = both.emulated.health().unwrap();
         assert_eq!(u64::from(health.ticks), scenario.run.ticks(), "{name}");
         assert_eq!((health.corrupt_messages, health.overruns), (0, 0), "{name}");
+        let report = both.times.report("qemu", "instructions", &health);
+        let most = budget["worst_tick_instructions"][name].as_u64();
+        let most = most.unwrap_or_else(|| panic!("budget.json says nothing of {name}"));
+        assert!(
+            u64::from(report.max) <= most,
+            "{name}: more than the {most} instructions of budget.json: {:?}",
+            report.worst,
+        );
+        assert!(
+            u64::from(report.stack_bytes) <= budget["stack_bytes"].as_u64().unwrap(),
+            "{name}: {} bytes of stack are more than budget.json allows",
+            report.stack_bytes,
+        );
     }
 }
 

@@ -141,7 +141,7 @@ impl Board for F405 {
                     c.pc0.into_pull_down_input().erase(),
                     c.pc1.into_pull_down_input().erase(),
                 ],
-                plant: Plant::Simulated,
+                plant: Plant::Lockstep,
                 sequence: 0,
             },
             bytes,
@@ -256,7 +256,7 @@ impl Drive for F405Drive {
 
     fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame> {
         match self.plant {
-            Plant::Simulated => from_host,
+            Plant::Lockstep | Plant::Realtime => from_host,
             Plant::Real => Some(self.read_sensors()),
         }
     }

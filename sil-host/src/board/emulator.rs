@@ -131,7 +131,7 @@ impl Emulator {
         }
         match emulator.request(&Request::Configure {
             configuration: configuration.clone(),
-            plant: Plant::Simulated,
+            plant: Plant::Lockstep,
         })? {
             Response::Ready => Ok(emulator),
             Response::Refused => Err(BoardError::Refused),
