@@ -150,13 +150,14 @@ fn killing_emulator_bridge_or_plant_ends_the_others() {
             _ => plant,
         };
         signal(id, Signal::SIGKILL);
-        let (output, _) = running.end(Duration::from_secs(2));
+        // They take well under 2 s; the rest is for a busy machine.
+        let (output, _) = running.end(Duration::from_secs(6));
         assert!(!output.status.success());
         assert!(!output.stderr.is_empty(), "{victim}: no message");
         let start = Instant::now();
         for id in [emulator, bridge, plant] {
             while is_running(id) {
-                assert!(start.elapsed() < Duration::from_secs(2), "{victim}: {id}");
+                assert!(start.elapsed() < Duration::from_secs(6), "{victim}: {id}");
                 std::thread::sleep(Duration::from_millis(10));
             }
         }

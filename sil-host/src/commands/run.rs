@@ -95,6 +95,10 @@ const START_WAIT_S: &str = "10";
 /// How often the children are looked at.
 const WATCH: Duration = Duration::from_millis(10);
 
+/// How long the plant may take to notice and tell that the controller is gone.
+/// With stopping it by force, all are gone within 2 s.
+const PLANT_NOTICE: Duration = Duration::from_millis(1000);
+
 /// How long the controller may take to end after the plant has.
 const CONTROLLER_END: Duration = Duration::from_millis(1700);
 
@@ -143,7 +147,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         {
             // The plant notices by itself and says so; if it does not, this does. Why a
             // board stopped, only its bridge knows.
-            if let Some(plant_status) = wait(&mut plant, CONTROLLER_END)? {
+            if let Some(plant_status) = wait(&mut plant, PLANT_NOTICE)? {
                 if arguments.host != Host::Native {
                     eprintln!("error{}", said(&mut controller));
                 }

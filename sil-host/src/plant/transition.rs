@@ -48,6 +48,9 @@ const GRAZING_M: f64 = 1e-14;
 /// Parts of a step that are looked at one by one in a search.
 const SEARCH_PARTS: u32 = 8;
 
+/// b and p change little within a step this short, s; longer ones are searched.
+const SHORT_STEP_S: f64 = 5e-3;
+
 /// Resolution of event times, s.
 const TIME_RESOLUTION_S: f64 = 1e-15;
 
@@ -267,7 +270,8 @@ fn first_end_of_slide_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<
         let [v0, a0] = slip_at(step.t, &step.start);
         let [v1, a1] = slip_at(step.t + step.h, &step.end);
         let third = step.h / 3.0;
-        if v0.min(v1).min(v0 + a0 * third).min(v1 - a1 * third) >= 0.0 {
+        let slides_on = v0.min(v1).min(v0 + a0 * third).min(v1 - a1 * third) >= 0.0;
+        if slides_on && step.h <= SHORT_STEP_S {
             return None;
         }
     }
