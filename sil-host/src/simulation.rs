@@ -8,6 +8,7 @@ use nalgebra::Vector2;
 use painleve_shared::ActuatorFrame;
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::range::OutOfRange;
+use painleve_shared::status::SupervisorState;
 
 use crate::converters::encoder::Encoders;
 use crate::converters::force_cell::ForceCell;
@@ -110,7 +111,7 @@ impl Simulation {
             b_m_s2: terms.b(),
             p_per_kg: terms.p(motion.friction, painleve_shared::Slip::of(slip)),
             torque_nm: self.plant.torque_nm().into(),
-            reference_tip_t_m: actuator.reference_tip.to_metres(),
+            reference_tip_t_m: reference_m(actuator),
             mode,
         }
     }
@@ -154,5 +155,15 @@ impl Simulation {
 
     fn angles(&self) -> Vector2<f64> {
         theta(self.plant.state())
+    }
+}
+
+/// The reference that the controller follows, m; NaN while it follows none.
+fn reference_m(actuator: &ActuatorFrame) -> f64 {
+    match actuator.supervisor_state() {
+        Some(SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff) => {
+            actuator.reference_tip.to_metres()
+        }
+        _ => f64::NAN,
     }
 }

@@ -55,7 +55,9 @@ pub enum BoardError {
     #[error("the emulated board has not answered for {0:.1?}: its image hangs")]
     Silent(Duration),
     /// What has come is no message.
-    #[error("the board's answer cannot be read: {0}")]
+    #[error(
+        "the board's answer cannot be read: {0}; its image may be older than this program, see `cargo xtask build-fw`"
+    )]
     Wire(#[from] WireError),
     /// The configuration is out of range for the image.
     #[error(

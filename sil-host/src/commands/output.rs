@@ -87,7 +87,7 @@ impl Output {
             crate::atomic_file::AtomicFile::create(&arguments.plot)
                 .map_err(|error| output(&error))?;
             let subtitle = format!(
-                "{} controller · {} Hz · μ = {} · seed {}",
+                "law: {} · {} Hz · μ = {} · seed {}",
                 scenario.controller.law.name(),
                 scenario.run.tick_hz,
                 scenario.belt.friction,

@@ -43,7 +43,7 @@ pub struct Sample {
     pub p_per_kg: f64,
     /// Torques u1, u2 that act on the joints, N·m.
     pub torque_nm: [f64; 2],
-    /// Reference z_t*, m.
+    /// Reference z_t*, m; NaN while the controller follows none.
     pub reference_tip_t_m: f64,
     /// What holds the tip.
     pub mode: ContactMode,
