@@ -154,13 +154,14 @@ impl<T: Real> LinearScale<T> {
     /// Checks resolution and range; `bits_key` and `range_key` name them.
     ///
     /// # Errors
-    /// [`OutOfRange`] if bits are not within 4 … 24 or the range is not positive.
+    /// [`OutOfRange`] if bits are not within 4 … 22 or the range is not positive: beyond 22 bits
+    /// single precision no longer tells a value's nearest count.
     pub fn validate(
         &self,
         bits_key: &'static str,
         range_key: &'static str,
     ) -> Result<(), OutOfRange> {
-        range::check(bits_key, f64::from(self.bits), 4.0, 24.0)?;
+        range::check(bits_key, f64::from(self.bits), 4.0, 22.0)?;
         range::check(range_key, self.range, 1e-3, 1e6)
     }
 
@@ -195,7 +196,7 @@ impl<T: Real> LinearScale<T> {
     /// Value of a reading in the quantity's unit.
     #[inline]
     pub fn value(&self, counts: i32) -> T {
-        // Exact: a reading has at most 24 bits.
+        // Exact: a reading has at most 22 bits.
         T::from_integer(counts) * self.per_count()
     }
 }
@@ -251,7 +252,7 @@ mod tests {
         }
 
         #[test]
-        fn linear_readings_round_trip_exactly(bits in 4_u8..=24, fraction in -1.0_f64..1.0) {
+        fn linear_readings_round_trip_exactly(bits in 4_u8..=22, fraction in -1.0_f64..1.0) {
             let single = LinearScale { bits, range: 5.0_f32 };
             let double = LinearScale { bits, range: 5.0_f64 };
             let (counts, limited) = double.counts(fraction * 4.999);
