@@ -161,6 +161,10 @@ fn killing_emulator_bridge_or_plant_ends_the_others() {
                 std::thread::sleep(Duration::from_millis(10));
             }
         }
+        // Whatever the killed one left does not stop the next run, which clears it.
+        let next = ["run", "--bus", &bench.bus];
+        let report = bench.report(&[&next[..], &SHORT, &QUIET].concat());
+        assert_eq!(report["ticks"], 1000);
         assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
     }
 }
