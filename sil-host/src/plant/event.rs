@@ -1,23 +1,21 @@
 //! Where inside a step something happens: the tip lands, slip dies, contact ends.
 
-/// Finds the earliest point of [`lower`, `upper`] at which `margin` is
+/// Resolution of event times, s.
+const RESOLUTION_S: f64 = 1e-15;
+
+/// Finds a time between `before` and `after` at which `margin` turns
 /// negative, up to rounding, by the ITP method (Oliveira and Takahashi 2020).
-/// `margin(lower)` must not be negative and `margin(upper)` must be; the returned time is on the negative
-/// side, so that the event has happened there.
-pub fn first_negative(
-    mut lower: f64,
-    mut upper: f64,
-    mut at_lower: f64,
-    mut at_upper: f64,
-    resolution: f64,
-    margin: impl Fn(f64) -> f64,
-) -> f64 {
-    let slack = libm::log2(((upper - lower) / resolution).max(1.0)).ceil() as i32 + 1;
+/// Both are a time (s) with the margin there: not negative before, negative after. The
+/// returned time is on the negative side, so that the event has happened there.
+pub fn first_negative(before: (f64, f64), after: (f64, f64), margin: impl Fn(f64) -> f64) -> f64 {
+    let (mut lower, mut at_lower) = before;
+    let (mut upper, mut at_upper) = after;
+    let slack = libm::log2(((upper - lower) / RESOLUTION_S).max(1.0)).ceil() as i32 + 1;
     let truncation = 0.2 / (upper - lower);
     // The pace below ends after `slack` halvings; the bound is for rounding.
     for iteration in 0..2 * slack {
         let width = upper - lower;
-        if width <= resolution {
+        if width <= RESOLUTION_S {
             break;
         }
         let middle = 0.5 * (lower + upper);
@@ -25,7 +23,7 @@ pub fn first_negative(
         let falsi = (lower * at_upper - upper * at_lower) / (at_upper - at_lower);
         let towards_middle = (middle - falsi).signum();
         let push = (truncation * width * width).min((middle - falsi).abs());
-        let radius = 0.5 * (libm::ldexp(resolution, (slack - iteration).clamp(0, 60)) - width);
+        let radius = 0.5 * (libm::ldexp(RESOLUTION_S, (slack - iteration).clamp(0, 60)) - width);
         let pushed = falsi + towards_middle * push;
         let point = if (pushed - middle).abs() <= radius.max(0.0) {
             pushed
@@ -72,8 +70,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn locate(lower: f64, upper: f64, margin: impl Fn(f64) -> f64) -> f64 {
-        let (at_lower, at_upper) = (margin(lower), margin(upper));
-        first_negative(lower, upper, at_lower, at_upper, 1e-15, margin)
+        let ends = [lower, upper].map(|t| (t, margin(t)));
+        first_negative(ends[0], ends[1], margin)
     }
 
     proptest! {

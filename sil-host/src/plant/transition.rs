@@ -51,9 +51,6 @@ const SEARCH_PARTS: u32 = 8;
 /// b and p change little within a step this short, s; longer ones are searched.
 const SHORT_STEP_S: f64 = 5e-3;
 
-/// Resolution of event times, s.
-const TIME_RESOLUTION_S: f64 = 1e-15;
-
 /// Decides what follows at time `t_s` from a state with the tip on the belt
 /// and no normal velocity.
 pub fn decide(motion: &Motion<'_>, t_s: f64, state: &State, indeterminate: Indeterminate) -> Next {
@@ -173,14 +170,9 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
         let mut after = (at, gap_at, speed_at);
         if after.1 >= 0.0 && before.2 < 0.0 && after.2 > 0.0 {
             // A dip between two looks.
-            let lowest = first_negative(
-                before.0,
-                after.0,
-                -before.2,
-                -after.2,
-                TIME_RESOLUTION_S,
-                |at| -gap_and_speed(at).1,
-            );
+            let lowest = first_negative((before.0, -before.2), (after.0, -after.2), |at| {
+                -gap_and_speed(at).1
+            });
             let depth = gap(lowest);
             if depth < 0.0 {
                 after = (lowest, depth, 0.0);
@@ -190,11 +182,8 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
             if before.0 == t && thrown {
                 let divided = |at: f64| gap(at) / (at - t);
                 return Some(first_negative(
-                    t,
-                    after.0,
-                    start[1],
-                    divided(after.0),
-                    TIME_RESOLUTION_S,
+                    (t, start[1]),
+                    (after.0, divided(after.0)),
                     divided,
                 ));
             }
@@ -202,11 +191,8 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
                 return Some(before.0);
             }
             return Some(first_negative(
-                before.0,
-                after.0,
-                before.1,
-                after.1,
-                TIME_RESOLUTION_S,
+                (before.0, before.1),
+                (after.0, after.1),
                 gap,
             ));
         }
@@ -292,14 +278,9 @@ fn first_in_parts(
     for at in looks(step.t, step.h) {
         let after = (at, margin(at, &dense.at(at)));
         if after.1 < 0.0 {
-            return Some(first_negative(
-                before.0,
-                after.0,
-                before.1,
-                after.1,
-                TIME_RESOLUTION_S,
-                |at| margin(at, &dense.at(at)),
-            ));
+            return Some(first_negative(before, after, |at| {
+                margin(at, &dense.at(at))
+            }));
         }
         before = after;
     }
