@@ -5,16 +5,26 @@ use painleve_shared::counts::{Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
 use painleve_shared::status::{Fault, SupervisorState};
-use painleve_shared::{Arm, Pose, Posture, Real};
+use painleve_shared::{Arm, Posture, Real, Slip};
 
+use crate::belt_observer::BeltObserver;
 use crate::configuration::Configuration;
-use crate::contact_detector::ContactDetector;
+use crate::contact_guard::{HalfPlane, nearest_torque_nm};
+use crate::contact_observer::{ContactObserver, GapReading};
+use crate::edge_governor::EdgeGovernor;
 use crate::estimator::{EncoderJump, Estimator};
+use crate::friction_estimator::FrictionEstimator;
 use crate::law::Law;
-use crate::law::signals::LawInput;
+use crate::law::signals::{LawInput, LawOutput};
+use crate::length_calibration::LengthCalibration;
+use crate::model::Model;
+use crate::recovery::Recovery;
 use crate::reference::{QueueFull, ReferenceGenerator, Segment, TipReference};
 use crate::supervisor::Supervisor;
 use crate::telemetry::Telemetry;
+
+/// Friction above the estimate that a throw may be explained by.
+const THROWN_BY_FRICTION: f32 = 0.4;
 
 /// What the sequence number of a frame says.
 enum Arrival {
@@ -31,13 +41,21 @@ pub struct Controller {
     arm: Arm<f32>,
     tick_s: f32,
     estimator: Estimator,
-    detector: ContactDetector,
+    contact: ContactObserver,
+    friction: FrictionEstimator,
+    belt: BeltObserver,
+    calibration: LengthCalibration,
     supervisor: Supervisor,
     reference: ReferenceGenerator,
+    governor: EdgeGovernor,
     law: Law,
+    recovery: Recovery,
+    /// Posture in which the drive was armed or the tip landed.
     posture: Posture,
-    /// θ̈ of q' that the law expects until the next tick, rad/s².
+    /// θ̈ of q' expected until the next tick, rad/s².
     expected_acceleration: Vector2<f32>,
+    /// Torque that rounding to counts still owes, N·m.
+    rounding_nm: Vector2<f32>,
     last_sequence: Option<u32>,
     stale_in_a_row: u32,
     answer: ActuatorFrame,
@@ -59,16 +77,31 @@ impl Controller {
                 configuration.converters.encoders,
                 configuration.tick_hz,
             ),
-            detector: ContactDetector::new(configuration.contact),
+            contact: ContactObserver::new(&configuration.contact),
+            friction: FrictionEstimator::new(
+                &configuration.friction,
+                configuration.contact.force_noise_n,
+                configuration.tick_s(),
+            ),
+            belt: BeltObserver::new(&configuration.belt),
+            calibration: LengthCalibration::new(
+                &configuration.calibration,
+                configuration.arm.link_length_m,
+                configuration.arm.height_m,
+                configuration.tick_s(),
+            ),
             supervisor: Supervisor::new(configuration.supervisor),
             reference: ReferenceGenerator::new(
                 &configuration.reference,
                 0.0,
                 configuration.tick_hz,
             ),
+            governor: EdgeGovernor::new(&configuration.governor, arm.reach_on_belt_m()),
             law: Law::new(&configuration.law),
+            recovery: Recovery::new(&configuration.recovery),
             posture: Posture::ElbowDown,
             expected_acceleration: Vector2::zeros(),
+            rounding_nm: Vector2::zeros(),
             last_sequence: None,
             stale_in_a_row: 0,
             answer: ActuatorFrame::default(),
@@ -147,71 +180,184 @@ impl Controller {
             scale.value(frame.tangential_force.0),
             scale.value(frame.normal_force.0),
         );
-        let contact = self.detector.update(force_n.y);
+        let model = Model::new(
+            &self.arm,
+            self.estimator.theta_rad(),
+            self.estimator.theta_dot_rad_s(),
+        );
+        let touched = self.contact.contact();
+        let contact = self.observe(&model, &force_n);
         let state_before = self.supervisor.state();
         self.supervisor
             .tick(frame.inputs, contact, self.law.is_on());
-
-        let theta_rad = self.estimator.theta_rad();
-        let theta_dot_rad_s = self.estimator.theta_dot_rad_s();
-        let pose = Pose::new(&theta_rad);
-        let tip_t_m = self.arm.tip_m(&pose).x;
-        let mut input = LawInput {
-            arm: &self.arm,
-            theta_rad,
-            theta_dot_rad_s,
-            pose,
-            posture: self.posture,
-            force_n,
-            contact,
-            saturated: self.telemetry.saturated,
-            reference: TipReference {
-                position_m: tip_t_m,
-                ..Default::default()
-            },
-            tick_s: self.tick_s,
-        };
         let state = self.supervisor.state();
-        if state == SupervisorState::Armed && state_before != state {
-            self.posture = Posture::of(&theta_rad);
-            input.posture = self.posture;
+        let armed = state == SupervisorState::Armed && state_before != state;
+        let recovering = self.supervisor.recovers() && self.contact.flight();
+
+        let tip_t_m = model.tip_m.x;
+        if armed {
+            self.posture = Posture::of(&model.theta_rad);
+        } else if let Some(posture) = self.recovery.posture() {
+            self.posture = posture;
+        }
+        if armed || (contact && !touched && state == SupervisorState::Armed) {
             self.reference = ReferenceGenerator::new(
                 &self.configuration.reference,
                 tip_t_m,
                 self.configuration.tick_hz,
             );
-            input.saturated = false;
-            self.law.reset(&input);
         }
-        input.reference = match state {
+        self.governor
+            .search(&self.arm, self.posture, tip_t_m, &self.friction.estimate());
+        let wanted = match state {
             SupervisorState::Armed => self.reference.start(),
+            // A reference does not run away from a tip that is being brought back.
+            SupervisorState::LiftOff if recovering => self.reference.present(),
             SupervisorState::Tracking | SupervisorState::LiftOff => self.reference.next_tick(),
-            SupervisorState::Idle | SupervisorState::Fault => input.reference,
+            SupervisorState::Idle | SupervisorState::Fault => TipReference {
+                position_m: tip_t_m,
+                ..Default::default()
+            },
         };
+        let starts = armed || (contact && !touched);
+        if starts {
+            self.governor.restart(tip_t_m);
+        }
+        let mut input = LawInput {
+            arm: &self.arm,
+            model: &model,
+            posture: self.posture,
+            force_n,
+            friction: self.friction.estimate(),
+            contact,
+            saturated: (self.telemetry.saturated || self.telemetry.guarded) && !starts,
+            reference: wanted,
+            tick_s: self.tick_s,
+        };
+        if state == SupervisorState::Armed
+            || state == SupervisorState::Tracking
+            || state == SupervisorState::LiftOff
+        {
+            input.reference = self.governor.govern(&wanted, self.tick_s);
+        }
 
         self.telemetry = Telemetry {
             tick: frame.tick,
-            theta_rad: theta_rad.into(),
-            theta_dot_rad_s: theta_dot_rad_s.into(),
+            theta_rad: model.theta_rad.into(),
+            theta_dot_rad_s: model.theta_dot_rad_s.into(),
             tip_t_m,
             reference_m: input.reference.position_m,
             normal_force_n: force_n.y,
             tangential_force_n: force_n.x,
             contact,
+            contact_confidence: self.contact.confidence(),
+            friction: input.friction.coefficient,
+            friction_deviation: input.friction.deviation,
+            slip: input.friction.slip,
+            sticks: input.friction.sticks,
+            edges_m: self.governor.edges_m().into(),
+            at_edge: self.governor.is_at_edge(),
+            recovering,
+            guarded: false,
             ..self.telemetry
         };
         if self.supervisor.drives() {
-            let output = self.law.tick(&input);
-            let acceleration = output.acceleration_rad_s2;
-            self.expected_acceleration =
-                Vector2::new(acceleration.x, acceleration.y - acceleration.x);
-            self.apply(&output.torque_nm);
+            let output = if recovering {
+                self.recovery
+                    .tick(&self.arm, &model, self.governor.edges_m(), self.tick_s)
+            } else {
+                self.recovery.end();
+                if starts {
+                    self.law.reset(&input);
+                }
+                self.law.tick(&input)
+            };
+            self.drive(&output, &model, contact);
         }
         if self.supervisor.drives() {
             self.report(frame.tick);
         } else {
             self.shut_down(frame.tick);
         }
+    }
+
+    /// Takes in what a tick's readings say about contact, friction, belt and links; returns
+    /// whether the tip touches.
+    fn observe(&mut self, model: &Model, force_n: &Vector2<f32>) -> bool {
+        let residual = self.estimator.residual_rad();
+        let innovation = self.estimator.innovation_rad();
+        let jacobian = &model.jacobian;
+        let count = self.estimator.count_rad();
+        // Half a count of either encoder; the second one turns θ2 alone.
+        let gap_error_m = 0.5 * (model.tip_m.x.abs() * count.x + jacobian.m22.abs() * count.y);
+        let jump_error_m =
+            0.5 * ((jacobian.m11 + jacobian.m12).abs() * count.x + jacobian.m12.abs() * count.y);
+        let gap = GapReading {
+            gap_m: model.gap_m + jacobian.m21 * residual.x + jacobian.m22 * residual.y,
+            gap_error_m,
+            jump_m: jacobian.m11 * innovation.x + jacobian.m12 * innovation.y,
+            jump_error_m,
+        };
+        let touched = self.contact.contact();
+        let contact = self.contact.update(force_n.y, &gap);
+        if contact {
+            if !touched && let Some(slip) = self.belt.slip(model.tip_velocity_m_s.x) {
+                self.friction.expect_slip(slip);
+            }
+            self.friction.update(force_n);
+            if self.contact.confidence() >= 1.0 {
+                let length = self.calibration.update(gap.gap_m);
+                self.arm = self.arm.with_link_length(length);
+            }
+        } else if touched {
+            self.thrown(model);
+        }
+        let friction = self.friction.estimate();
+        self.belt.update(
+            model.tip_velocity_m_s.x,
+            contact.then_some(&friction),
+            self.tick_s,
+        );
+        contact
+    }
+
+    /// The tip has just left the belt. Where a little more friction than estimated explains
+    /// that, it is taken to be the reason.
+    fn thrown(&mut self, model: &Model) {
+        let friction = self.friction.estimate();
+        let coupling = friction.slip.sign::<f32>() * model.q.m12;
+        let critical = model.q.m22 / coupling;
+        if coupling > 0.0 && critical < friction.coefficient + THROWN_BY_FRICTION {
+            self.friction.thrown(critical);
+        }
+    }
+
+    /// Turns a law's answer into counts: kept on the belt, limited, checked.
+    fn drive(&mut self, output: &LawOutput, model: &Model, contact: bool) {
+        let mut torque_nm = output.torque_nm;
+        let guard = self.configuration.guard;
+        if guard.enabled && contact {
+            let friction = self.friction.estimate();
+            let p = model.p_per_kg(friction.coefficient, friction.slip);
+            if p > 0.0 {
+                let (offset, normal) = model.free_normal_acceleration();
+                let plane = HalfPlane {
+                    normal,
+                    bound: -p * guard.minimum_force_n - offset,
+                };
+                let limit = self.configuration.torque_limit_nm;
+                let (guarded_nm, acted) = nearest_torque_nm(&torque_nm, &plane, limit);
+                if acted {
+                    torque_nm = guarded_nm;
+                    self.telemetry.guarded = true;
+                    self.telemetry.guarded_ticks = self.telemetry.guarded_ticks.wrapping_add(1);
+                }
+            }
+        }
+        self.apply(&torque_nm);
+        let given_nm = Vector2::from(self.telemetry.torque_nm);
+        let acceleration = model.acceleration_rad_s2(&given_nm, &output.contact_force_n);
+        self.expected_acceleration = Vector2::new(acceleration.x, acceleration.y - acceleration.x);
     }
 
     /// Checks the readings and takes them in.
@@ -242,8 +388,14 @@ impl Controller {
         let limit = self.configuration.torque_limit_nm;
         let scale = self.configuration.converters.torque;
         let limited = wanted_nm.map(|torque| torque.limited(-limit, limit));
-        let (counts_1, over_1) = scale.counts(limited.x);
-        let (counts_2, over_2) = scale.counts(limited.y);
+        // What rounding took away is given with the next tick: near the edge, where p is
+        // small, half a count of constant torque would be a newton of force.
+        let owed = limited + self.rounding_nm;
+        let (counts_1, over_1) = scale.counts(owed.x);
+        let (counts_2, over_2) = scale.counts(owed.y);
+        let given = Vector2::new(scale.value(counts_1), scale.value(counts_2));
+        let half = 0.5 * scale.per_count();
+        self.rounding_nm = (owed - given).map(|rest| rest.limited(-half, half));
         let saturated = over_1 || over_2 || limited != *wanted_nm;
         self.answer.torques = [TorqueCounts(counts_1), TorqueCounts(counts_2)];
         self.telemetry.torque_nm = limited.into();
@@ -258,7 +410,11 @@ impl Controller {
         self.answer.torques = [TorqueCounts(0); 2];
         self.telemetry.torque_nm = [0.0; 2];
         self.telemetry.saturated = false;
+        self.telemetry.guarded = false;
+        self.telemetry.recovering = false;
+        self.telemetry.at_edge = false;
         self.expected_acceleration = Vector2::zeros();
+        self.rounding_nm = Vector2::zeros();
         self.report(tick);
     }
 
@@ -271,6 +427,14 @@ impl Controller {
         flags.set_if(StatusFlags::CONTACT, telemetry.contact);
         flags.set_if(StatusFlags::SATURATED, telemetry.saturated);
         flags.set_if(StatusFlags::REFERENCE_DONE, self.reference.is_done());
+        flags.set_if(StatusFlags::GUARDED, telemetry.guarded);
+        flags.set_if(StatusFlags::AT_EDGE, telemetry.at_edge);
+        flags.set_if(StatusFlags::RECOVERING, telemetry.recovering);
+        flags.set_if(
+            StatusFlags::SLIP_NEGATIVE,
+            telemetry.contact && telemetry.slip == Slip::Negative,
+        );
+        flags.set_if(StatusFlags::STICKS, telemetry.contact && telemetry.sticks);
         self.answer.reference_tip = Micrometres::from_metres(telemetry.reference_m);
         self.answer.estimated_tip = Micrometres::from_metres(telemetry.tip_t_m);
         self.answer.state = telemetry.state as u8;

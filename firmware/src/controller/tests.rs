@@ -30,8 +30,14 @@ fn configuration() -> Configuration {
         torque_limit_nm: 5.0,
         estimator: Default::default(),
         contact: Default::default(),
+        friction: Default::default(),
+        belt: Default::default(),
+        calibration: Default::default(),
         supervisor: Default::default(),
         law: LawSettings::Hybrid(HybridSettings::default()),
+        guard: Default::default(),
+        governor: Default::default(),
+        recovery: Default::default(),
         reference: Program::default(),
     }
 }
