@@ -7,6 +7,7 @@
 //! - [`board`]: the controller's image on an emulated microcontroller
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`scenario`]: everything that defines a run, as a TOML file
+//! - [`study`]: the paper's studies, many runs at a time
 //! - [`record`], [`plot`], [`report`]: what a run leaves behind
 //! - [`commands`]: the `painleve` command; [`interrupt`], [`lifetime`]: its processes' ends
 
@@ -26,3 +27,4 @@ pub mod record;
 pub mod report;
 pub mod scenario;
 pub mod simulation;
+pub mod study;

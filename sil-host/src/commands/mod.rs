@@ -6,6 +6,7 @@ mod output;
 mod plant;
 mod run;
 mod scenarios;
+mod study;
 
 use std::process::ExitCode;
 
@@ -15,6 +16,7 @@ use crate::board::BoardError;
 use crate::closed_loop::LoopError;
 use crate::link::LinkError;
 use crate::scenario::ScenarioError;
+use crate::study::StudyError;
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
 ///
@@ -40,6 +42,8 @@ enum Command {
     Bridge(bridge::BridgeArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
+    /// Compute one of the paper's studies as numbers, data files and figures.
+    Study(study::StudyArguments),
 }
 
 /// Why a command failed. Every message is one sentence for the user.
@@ -60,6 +64,9 @@ pub enum CommandError {
     /// A file cannot be written.
     #[error("{0}")]
     Output(String),
+    /// A study has no outcome.
+    #[error(transparent)]
+    Study(#[from] StudyError),
     /// A process of the run cannot be started or has died.
     #[error("{0}")]
     Process(String),
@@ -80,6 +87,11 @@ impl CommandError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Scenario(_) => 2,
+            Self::Study(error) => match error {
+                StudyError::Scenario(_) | StudyError::Option(_) | StudyError::Range(_) => 2,
+                StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
+                StudyError::Plot(_) => 4,
+            },
             Self::Loop(LoopError::Plant(_)) => 1,
             Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => 3,
             Self::Loop(LoopError::Watcher(_)) | Self::Output(_) => 4,
@@ -113,6 +125,7 @@ pub fn main() -> ExitCode {
         Command::Controller(arguments) => controller::run(&arguments),
         Command::Bridge(arguments) => bridge::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
