@@ -10,8 +10,6 @@ mod board;
 #[path = "board/f405.rs"]
 mod f405;
 #[cfg(target_os = "none")]
-mod inbox;
-#[cfg(target_os = "none")]
 #[path = "board/sensors.rs"]
 mod sensors;
 #[cfg(target_os = "none")]
@@ -19,6 +17,8 @@ mod stack;
 #[cfg(target_os = "none")]
 #[path = "board/uart.rs"]
 mod uart;
+#[cfg(target_os = "none")]
+mod watch;
 
 /// The board of this image.
 #[cfg(target_os = "none")]

@@ -9,6 +9,7 @@ use painleve_shared::{Arm, ArmParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::contact_detector::ContactDetectorSettings;
+use crate::deadline_monitor::DeadlineLimits;
 use crate::estimator::EstimatorSettings;
 use crate::law::LawSettings;
 use crate::reference::Program;
@@ -42,6 +43,8 @@ pub struct Configuration {
     pub contact: ContactDetectorSettings,
     /// When the drive is armed, and when it is shut down.
     pub supervisor: SupervisorSettings,
+    /// How many lapses in a row are survived.
+    pub deadlines: DeadlineLimits,
     /// The control law.
     pub law: LawSettings,
     /// Where the tip shall go.
@@ -79,6 +82,7 @@ impl Configuration {
         self.estimator.validate(self.tick_hz)?;
         self.contact.validate(self.converters.force.range)?;
         self.supervisor.validate()?;
+        self.deadlines.validate()?;
         self.law.validate()?;
         self.reference.validate(arm.reach_on_belt_m())?;
         Ok(arm)

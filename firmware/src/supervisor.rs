@@ -29,10 +29,6 @@ pub struct SupervisorSettings {
     pub on_lift_off: OnLiftOff,
     /// Ticks without contact after which the drive is shut down; 0 for never.
     pub lift_off_limit_ticks: u32,
-    /// Frames that may be lost in a row.
-    pub lost_frames_limit: u32,
-    /// Repeated or old frames in a row that are tolerated.
-    pub stale_frames_limit: u32,
 }
 
 impl Default for SupervisorSettings {
@@ -42,8 +38,6 @@ impl Default for SupervisorSettings {
             arming_limit_ticks: 1000,
             on_lift_off: OnLiftOff::Continue,
             lift_off_limit_ticks: 2000,
-            lost_frames_limit: 5,
-            stale_frames_limit: 5,
         }
     }
 }
@@ -74,18 +68,6 @@ impl SupervisorSettings {
             self.lift_off_limit_ticks,
             0.0,
             1e8,
-        )?;
-        ticks(
-            "controller.supervisor.lost_frames_limit",
-            self.lost_frames_limit,
-            0.0,
-            100.0,
-        )?;
-        ticks(
-            "controller.supervisor.stale_frames_limit",
-            self.stale_frames_limit,
-            0.0,
-            100.0,
         )
     }
 }
@@ -139,6 +121,11 @@ impl Supervisor {
             self.fault = Some(fault);
         }
         self.enter(SupervisorState::Fault);
+    }
+
+    /// Stops the drive without looking at anything else.
+    pub fn disable(&mut self) {
+        self.enter(SupervisorState::Idle);
     }
 
     /// One tick: `has_law` says whether there is anything to arm.

@@ -30,10 +30,6 @@ pub struct Telemetry {
     pub contact: bool,
     /// Whether the torque was limited.
     pub saturated: bool,
-    /// Frames lost since the start.
-    pub lost_frames: u32,
-    /// Repeated or old frames since the start.
-    pub stale_frames: u32,
     /// Ticks with limited torque since the start.
     pub saturated_ticks: u32,
 }

@@ -9,6 +9,7 @@ mod load;
 
 use painleve_firmware::Configuration;
 use painleve_firmware::contact_detector::ContactDetectorSettings;
+use painleve_firmware::deadline_monitor::DeadlineLimits;
 use painleve_firmware::estimator::EstimatorSettings;
 use painleve_firmware::law::LawSettings;
 use painleve_firmware::law::hybrid::HybridSettings;
@@ -158,6 +159,8 @@ pub struct ControllerSettings {
     pub contact: ContactDetectorSettings,
     /// When the drive is armed, and when it is shut down.
     pub supervisor: SupervisorSettings,
+    /// How many lapses in a row are survived.
+    pub deadlines: DeadlineLimits,
     /// The control law.
     pub law: LawSettings,
     /// Where the tip shall go.
@@ -177,6 +180,7 @@ impl Default for ControllerSettings {
             estimator: EstimatorSettings::default(),
             contact: ContactDetectorSettings::default(),
             supervisor: SupervisorSettings::default(),
+            deadlines: DeadlineLimits::default(),
             law: LawSettings::Hybrid(HybridSettings::default()),
             reference: Program {
                 segments: [segment].into_iter().collect(),
@@ -226,6 +230,7 @@ impl Scenario {
             estimator: settings.estimator,
             contact: settings.contact,
             supervisor: settings.supervisor,
+            deadlines: settings.deadlines,
             law: settings.law,
             reference: settings.reference.clone(),
         }
