@@ -29,6 +29,7 @@ mod tasks {
 
     use crate::Hardware;
     use crate::board::{Board, Bytes, Drive, Parts, Port};
+    use crate::configure;
     use crate::stack;
     use crate::watch::{Change, Watch};
 
@@ -165,12 +166,14 @@ mod tasks {
 
     #[task(binds = SPI3, priority = 1,
            shared = [controller, drive, from_host, watch],
-           local = [port, inbox, answers_out, received: [u8; MAXIMUM_LENGTH] = [0; MAXIMUM_LENGTH]])]
+           local = [port, inbox, answers_out, decoded: Option<Configuration> = None,
+                    received: [u8; MAXIMUM_LENGTH] = [0; MAXIMUM_LENGTH]])]
     fn link(cx: link::Context) {
         let link::LocalResources {
             port,
             inbox,
             answers_out,
+            decoded,
             received,
             ..
         } = cx.local;
@@ -194,12 +197,12 @@ mod tasks {
                 let Some(message) = inbox.push(*byte) else {
                     continue;
                 };
-                let decoded = wire::decode(message);
-                let stopped = controller.lock(|it| note_message(it.as_mut(), &decoded));
+                let request = wire::decode(message);
+                let stopped = controller.lock(|it| note_message(it.as_mut(), &request));
                 if let Some(stopped) = stopped {
                     drive.lock(|drive| drive.actuate(&stopped));
                 }
-                let response = match decoded {
+                let response = match request {
                     Ok(Request::Sensor(frame)) => {
                         from_host.lock(|newest| *newest = Some(frame));
                         awaits_control = true;
@@ -213,18 +216,21 @@ mod tasks {
                         drive.lock(|drive| drive.actuate(&ActuatorFrame::default()));
                         controller.lock(|controller| *controller = None);
                         from_host.lock(|newest| *newest = None);
-                        match decode_configuration(configuration) {
+                        configure::decode(decoded, configuration);
+                        match decoded {
                             Some(configuration) => {
                                 let tick_hz = configuration.tick_hz as u32;
                                 watch.lock(|watch| *watch = Watch::new(plant, tick_hz));
-                                if controller.lock(|it| configure(it, &configuration)) {
-                                    drive.lock(|drive| drive.start(&configuration, plant));
-                                    Response::Ready {
-                                        stopwatch_hz: drive.lock(|drive| drive.stopwatch_hz()),
-                                    }
-                                } else {
-                                    Response::Refused
-                                }
+                                let stopwatch_hz =
+                                    (&mut controller, &mut drive).lock(|controller, drive| {
+                                        configure::make(controller, configuration);
+                                        controller.as_ref()?;
+                                        drive.start(configuration, plant);
+                                        Some(drive.stopwatch_hz())
+                                    });
+                                stopwatch_hz.map_or(Response::Refused, |stopwatch_hz| {
+                                    Response::Ready { stopwatch_hz }
+                                })
                             }
                             None => Response::Refused,
                         }
@@ -249,10 +255,10 @@ mod tasks {
     /// too many of these.
     fn note_message<M>(
         controller: Option<&mut Controller>,
-        decoded: &Result<M, WireError>,
+        request: &Result<M, WireError>,
     ) -> Option<ActuatorFrame> {
         let controller = controller?;
-        let broken = |kinds: &[WireError]| decoded.as_ref().is_err_and(|it| kinds.contains(it));
+        let broken = |kinds: &[WireError]| request.as_ref().is_err_and(|it| kinds.contains(it));
         let checksum = broken(&[WireError::Checksum]);
         let garbage = broken(&[WireError::Garbage, WireError::Content]);
         let stopped = controller.note(Lapse::FailedChecksum, u32::from(checksum));
@@ -261,21 +267,8 @@ mod tasks {
             .or(stopped)
     }
 
-    // Out of line, one after the other, for the sake of the stack.
-
-    #[inline(never)]
-    fn decode_configuration(bytes: &[u8]) -> Option<Configuration> {
-        postcard::from_bytes(bytes).ok()
-    }
-
-    /// Makes a controller, unless the configuration is out of range.
-    #[inline(never)]
-    fn configure(controller: &mut Option<Controller>, configuration: &Configuration) -> bool {
-        *controller = Controller::new(configuration).ok();
-        controller.is_some()
-    }
-
     /// A response that the host does not take is lost; the host asks again or gives up.
+    #[inline(never)]
     fn send(port: &mut <Hardware as Board>::Port, response: &Response) {
         let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
         if let Ok(bytes) = wire::encode(response, &mut buffer) {

@@ -7,6 +7,8 @@ mod app;
 #[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
+mod configure;
+#[cfg(target_os = "none")]
 #[path = "board/f405.rs"]
 mod f405;
 #[cfg(target_os = "none")]

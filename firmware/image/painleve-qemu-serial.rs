@@ -7,6 +7,8 @@ mod app;
 #[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
+mod configure;
+#[cfg(target_os = "none")]
 #[path = "board/qemu.rs"]
 mod qemu;
 #[cfg(target_os = "none")]

@@ -17,6 +17,9 @@ use crate::reference::{QueueFull, ReferenceGenerator, Segment, TipReference};
 use crate::supervisor::Supervisor;
 use crate::telemetry::Telemetry;
 
+/// Ticks without readings are not counted further: a fault is latched long before.
+const UNREAD_TICKS_LIMIT: u32 = 1 << 16;
+
 /// What a frame is good for.
 enum Arrival {
     /// Readings so many ticks after the ones before (1 when none were lost).
@@ -149,8 +152,6 @@ impl Controller {
     fn arrival(&mut self, frame: &SensorFrame) -> Arrival {
         let last = self.last_sequence.unwrap_or(frame.sequence.wrapping_sub(1));
         let ahead = frame.sequence.wrapping_sub(last);
-        // More than half the range ahead is behind.
-        let stale = ahead == 0 || ahead > u32::MAX / 2;
         let converters = &self.configuration.converters;
         let mut joints = converters.encoders.iter().zip(frame.joints);
         let forces = [frame.normal_force, frame.tangential_force];
@@ -158,20 +159,44 @@ impl Controller {
         let forces = forces
             .iter()
             .all(|force| converters.force.contains(force.0));
-        let lost = if stale { 0 } else { ahead - 1 };
+        if ahead != 1 || !encoders || !forces {
+            return self.irregular_arrival(frame.sequence, ahead, encoders, forces);
+        }
+        self.last_sequence = Some(frame.sequence);
+        for lapse in Lapse::OF_FRAMES {
+            self.note(lapse, 0);
+        }
+        Arrival::After(1 + core::mem::take(&mut self.unread_ticks))
+    }
+
+    /// A frame that is not the next one, or has readings (`encoders`, `forces`) out of range.
+    #[cold]
+    #[inline(never)]
+    fn irregular_arrival(
+        &mut self,
+        sequence: u32,
+        ahead: u32,
+        encoders: bool,
+        forces: bool,
+    ) -> Arrival {
+        // More than half the range ahead is behind.
+        let stale = ahead == 0 || ahead > u32::MAX / 2;
         self.note(Lapse::StaleFrame, u32::from(stale));
-        self.note(Lapse::LostFrame, lost);
-        self.note(Lapse::EncoderOutOfRange, u32::from(!encoders));
-        self.note(Lapse::ForceOutOfRange, u32::from(!forces));
         if stale {
             return Arrival::Stale;
         }
-        self.last_sequence = Some(frame.sequence);
+        self.last_sequence = Some(sequence);
+        self.note(Lapse::LostFrame, ahead - 1);
+        self.note(Lapse::EncoderOutOfRange, u32::from(!encoders));
+        self.note(Lapse::ForceOutOfRange, u32::from(!forces));
+        let ticks = ahead.saturating_add(self.unread_ticks);
         if encoders && forces {
-            return Arrival::After(ahead.saturating_add(core::mem::take(&mut self.unread_ticks)));
+            self.unread_ticks = 0;
+            Arrival::After(ticks)
+        } else {
+            self.unread_ticks = ticks.min(UNREAD_TICKS_LIMIT);
+            Arrival::OutOfRange
         }
-        self.unread_ticks = self.unread_ticks.saturating_add(ahead);
-        Arrival::OutOfRange
     }
 
     fn answer(&mut self, frame: &SensorFrame, elapsed_ticks: u32) {

@@ -34,6 +34,14 @@ impl Lapse {
     /// Number of kinds.
     const COUNT: usize = Self::FailedChecksum as usize + 1;
 
+    /// Those that a frame can be about that has come.
+    pub const OF_FRAMES: [Self; 4] = [
+        Self::StaleFrame,
+        Self::LostFrame,
+        Self::EncoderOutOfRange,
+        Self::ForceOutOfRange,
+    ];
+
     /// The fault that too many in a row are.
     pub fn fault(self) -> Fault {
         match self {
