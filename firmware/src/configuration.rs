@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::belt_observer::BeltSettings;
 use crate::contact_guard::GuardSettings;
 use crate::contact_observer::ContactSettings;
+use crate::deadline_monitor::DeadlineLimits;
 use crate::edge_governor::GovernorSettings;
 use crate::estimator::EstimatorSettings;
 use crate::friction_estimator::FrictionSettings;
@@ -54,6 +55,8 @@ pub struct Configuration {
     pub calibration: CalibrationSettings,
     /// When the drive is armed, and when it is shut down.
     pub supervisor: SupervisorSettings,
+    /// How many lapses in a row are survived.
+    pub deadlines: DeadlineLimits,
     /// The control law.
     pub law: LawSettings,
     /// How the tip is kept pressed on the belt.
@@ -100,6 +103,7 @@ impl Configuration {
         self.friction.validate()?;
         self.belt.validate()?;
         self.calibration.validate()?;
+        self.deadlines.validate()?;
         self.law.validate()?;
         self.guard.validate()?;
         self.governor.validate()?;

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{Micrometres, TorqueCounts};
-use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::{Arm, Posture, Real, Slip};
@@ -11,6 +11,7 @@ use crate::belt_observer::BeltObserver;
 use crate::configuration::Configuration;
 use crate::contact_guard::{HalfPlane, nearest_torque_nm};
 use crate::contact_observer::{ContactObserver, GapReading};
+use crate::deadline_monitor::{DeadlineMonitor, Lapse};
 use crate::edge_governor::EdgeGovernor;
 use crate::estimator::{EncoderJump, Estimator};
 use crate::friction_estimator::FrictionEstimator;
@@ -26,12 +27,17 @@ use crate::telemetry::Telemetry;
 /// Friction above the estimate that a throw may be explained by.
 const THROWN_BY_FRICTION: f32 = 0.4;
 
-/// What the sequence number of a frame says.
+/// Ticks without readings are not counted further: a fault is latched long before.
+const UNREAD_TICKS_LIMIT: u32 = 1 << 16;
+
+/// What a frame is good for.
 enum Arrival {
-    /// So many ticks after the frame before (1 when none was lost).
+    /// Readings so many ticks after the ones before (1 when none were lost).
     After(u32),
     /// A repeated or old frame.
     Stale,
+    /// A new frame with a reading that cannot be.
+    OutOfRange,
 }
 
 /// The controller: configuration and state of one arm.
@@ -46,6 +52,7 @@ pub struct Controller {
     belt: BeltObserver,
     calibration: LengthCalibration,
     supervisor: Supervisor,
+    monitor: DeadlineMonitor,
     reference: ReferenceGenerator,
     governor: EdgeGovernor,
     law: Law,
@@ -57,7 +64,8 @@ pub struct Controller {
     /// Torque that rounding to counts still owes, N·m.
     rounding_nm: Vector2<f32>,
     last_sequence: Option<u32>,
-    stale_in_a_row: u32,
+    /// Ticks since the last readings that were taken in, before the present frame's.
+    unread_ticks: u32,
     answer: ActuatorFrame,
     telemetry: Telemetry,
 }
@@ -91,6 +99,7 @@ impl Controller {
                 configuration.tick_s(),
             ),
             supervisor: Supervisor::new(configuration.supervisor),
+            monitor: DeadlineMonitor::new(configuration.deadlines),
             reference: ReferenceGenerator::new(
                 &configuration.reference,
                 0.0,
@@ -103,7 +112,7 @@ impl Controller {
             expected_acceleration: Vector2::zeros(),
             rounding_nm: Vector2::zeros(),
             last_sequence: None,
-            stale_in_a_row: 0,
+            unread_ticks: 0,
             answer: ActuatorFrame::default(),
             telemetry: Telemetry::default(),
             configuration: configuration.clone(),
@@ -127,53 +136,109 @@ impl Controller {
     pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
         let sequence = self.answer.sequence.wrapping_add(1);
         match self.arrival(frame) {
-            // An old frame holds nothing new: the last torque stays, for a while.
-            Arrival::Stale if self.supervisor.fault().is_none() => {}
-            Arrival::Stale => self.shut_down(frame.tick),
             Arrival::After(ticks) => self.answer(frame, ticks),
+            // There is nothing new to go by: the last torque stays, for a while.
+            Arrival::Stale if self.supervisor.drives() => {}
+            Arrival::OutOfRange
+                if self.supervisor.drives() && frame.inputs.contains(DigitalInputs::ENABLE) => {}
+            Arrival::OutOfRange if self.supervisor.drives() => {
+                self.supervisor.disable();
+                self.shut_down(frame.tick);
+            }
+            Arrival::Stale | Arrival::OutOfRange => self.shut_down(frame.tick),
         }
         self.answer.tick = frame.tick;
         self.answer.sequence = sequence;
         self.answer
     }
 
-    /// Latches a fault that was found outside a frame, and takes the torque off. The
-    /// answer is the last one without torque.
-    pub fn stop(&mut self, fault: Fault) -> ActuatorFrame {
-        self.supervisor.latch(fault);
+    /// Takes note of how many times something went wrong around this tick, 0 for a
+    /// good one. If that is now too often in a row, the fault is latched, and the last answer
+    /// without its torque is returned, to be put out at once.
+    #[inline]
+    pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
+        // A good one, which nearly all are, costs next to nothing.
+        if times == 0 {
+            self.monitor.note_good(lapse);
+            None
+        } else {
+            self.note_bad(lapse, times)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn note_bad(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
+        if !self.monitor.note_bad(lapse, times) || self.supervisor.fault().is_some() {
+            return None;
+        }
+        self.supervisor.latch(lapse.fault());
         self.shut_down(self.answer.tick);
-        self.answer
+        Some(self.answer)
+    }
+
+    /// How often each kind of lapse has happened.
+    pub fn monitor(&self) -> &DeadlineMonitor {
+        &self.monitor
     }
 
     fn arrival(&mut self, frame: &SensorFrame) -> Arrival {
-        let limits = self.configuration.supervisor;
-        let Some(last) = self.last_sequence else {
-            self.last_sequence = Some(frame.sequence);
-            return Arrival::After(1);
-        };
+        let last = self.last_sequence.unwrap_or(frame.sequence.wrapping_sub(1));
         let ahead = frame.sequence.wrapping_sub(last);
+        let converters = &self.configuration.converters;
+        let mut joints = converters.encoders.iter().zip(frame.joints);
+        let forces = [frame.normal_force, frame.tangential_force];
+        let encoders = joints.all(|(scale, reading)| scale.contains(reading));
+        let forces = forces
+            .iter()
+            .all(|force| converters.force.contains(force.0));
+        if ahead != 1 || !encoders || !forces {
+            return self.irregular_arrival(frame.sequence, ahead, encoders, forces);
+        }
+        self.last_sequence = Some(frame.sequence);
+        for lapse in Lapse::OF_FRAMES {
+            self.note(lapse, 0);
+        }
+        Arrival::After(1 + core::mem::take(&mut self.unread_ticks))
+    }
+
+    /// A frame that is not the next one, or has readings (`encoders`, `forces`) out of range.
+    #[cold]
+    #[inline(never)]
+    fn irregular_arrival(
+        &mut self,
+        sequence: u32,
+        ahead: u32,
+        encoders: bool,
+        forces: bool,
+    ) -> Arrival {
         // More than half the range ahead is behind.
-        if ahead == 0 || ahead > u32::MAX / 2 {
-            self.telemetry.stale_frames = self.telemetry.stale_frames.wrapping_add(1);
-            self.stale_in_a_row = self.stale_in_a_row.saturating_add(1);
-            if self.stale_in_a_row > limits.stale_frames_limit {
-                self.supervisor.latch(Fault::StaleFrame);
-            }
+        let stale = ahead == 0 || ahead > u32::MAX / 2;
+        self.note(Lapse::StaleFrame, u32::from(stale));
+        if stale {
             return Arrival::Stale;
         }
-        self.stale_in_a_row = 0;
-        self.last_sequence = Some(frame.sequence);
-        let lost = ahead - 1;
-        self.telemetry.lost_frames = self.telemetry.lost_frames.wrapping_add(lost);
-        if lost > limits.lost_frames_limit {
-            self.supervisor.latch(Fault::FramesLost);
+        self.last_sequence = Some(sequence);
+        self.note(Lapse::LostFrame, ahead - 1);
+        self.note(Lapse::EncoderOutOfRange, u32::from(!encoders));
+        self.note(Lapse::ForceOutOfRange, u32::from(!forces));
+        let ticks = ahead.saturating_add(self.unread_ticks);
+        if encoders && forces {
+            self.unread_ticks = 0;
+            Arrival::After(ticks)
+        } else {
+            self.unread_ticks = ticks.min(UNREAD_TICKS_LIMIT);
+            Arrival::OutOfRange
         }
-        Arrival::After(ahead)
     }
 
     fn answer(&mut self, frame: &SensorFrame, elapsed_ticks: u32) {
-        if let Err(fault) = self.measure(frame, elapsed_ticks) {
-            self.supervisor.latch(fault);
+        let expected = &self.expected_acceleration;
+        if let Err(EncoderJump) = self
+            .estimator
+            .update(&frame.joints, elapsed_ticks, expected)
+        {
+            self.supervisor.latch(Fault::EncoderJump);
         }
         let scale = self.configuration.converters.force;
         let force_n = Vector2::new(
@@ -358,24 +423,6 @@ impl Controller {
         let given_nm = Vector2::from(self.telemetry.torque_nm);
         let acceleration = model.acceleration_rad_s2(&given_nm, &output.contact_force_n);
         self.expected_acceleration = Vector2::new(acceleration.x, acceleration.y - acceleration.x);
-    }
-
-    /// Checks the readings and takes them in.
-    fn measure(&mut self, frame: &SensorFrame, elapsed_ticks: u32) -> Result<(), Fault> {
-        let converters = &self.configuration.converters;
-        for (scale, reading) in converters.encoders.iter().zip(frame.joints) {
-            if !scale.contains(reading) {
-                return Err(Fault::EncoderOutOfRange);
-            }
-        }
-        for force in [frame.normal_force, frame.tangential_force] {
-            if !converters.force.contains(force.0) {
-                return Err(Fault::ForceOutOfRange);
-            }
-        }
-        self.estimator
-            .update(&frame.joints, elapsed_ticks, &self.expected_acceleration)
-            .map_err(|EncoderJump| Fault::EncoderJump)
     }
 
     /// Limits the wanted torques and turns them into counts.

@@ -35,10 +35,6 @@ pub struct SupervisorSettings {
     pub recoveries_limit: u32,
     /// … a row being ended by so many ticks in contact.
     pub recovered_ticks: u32,
-    /// Frames that may be lost in a row.
-    pub lost_frames_limit: u32,
-    /// Repeated or old frames in a row that are tolerated.
-    pub stale_frames_limit: u32,
 }
 
 impl Default for SupervisorSettings {
@@ -50,8 +46,6 @@ impl Default for SupervisorSettings {
             lift_off_limit_ticks: 2000,
             recoveries_limit: 10,
             recovered_ticks: 1000,
-            lost_frames_limit: 5,
-            stale_frames_limit: 5,
         }
     }
 }
@@ -94,18 +88,6 @@ impl SupervisorSettings {
             self.recovered_ticks,
             1.0,
             1e8,
-        )?;
-        ticks(
-            "controller.supervisor.lost_frames_limit",
-            self.lost_frames_limit,
-            0.0,
-            100.0,
-        )?;
-        ticks(
-            "controller.supervisor.stale_frames_limit",
-            self.stale_frames_limit,
-            0.0,
-            100.0,
         )
     }
 }
@@ -167,6 +149,11 @@ impl Supervisor {
             self.fault = Some(fault);
         }
         self.enter(SupervisorState::Fault);
+    }
+
+    /// Stops the drive without looking at anything else.
+    pub fn disable(&mut self) {
+        self.enter(SupervisorState::Idle);
     }
 
     /// One tick: `has_law` says whether there is anything to arm.

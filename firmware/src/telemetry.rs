@@ -49,10 +49,6 @@ pub struct Telemetry {
     pub guarded: bool,
     /// Whether the torque was limited.
     pub saturated: bool,
-    /// Frames lost since the start.
-    pub lost_frames: u32,
-    /// Repeated or old frames since the start.
-    pub stale_frames: u32,
     /// Ticks on which the contact guard acted since the start.
     pub guarded_ticks: u32,
     /// Ticks with limited torque since the start.

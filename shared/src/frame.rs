@@ -28,6 +28,9 @@ impl DigitalInputs {
     pub const ENABLE: Self = Self(1);
     /// A rising edge clears a latched fault.
     pub const RESET: Self = Self(1 << 1);
+    /// Makes the tick last until the next one is due. Only the emulated board has this
+    /// input, for tests of the deadline monitor.
+    pub const OVERLOAD: Self = Self(1 << 31);
 
     /// Whether all bits of `inputs` are high.
     #[inline]

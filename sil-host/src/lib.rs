@@ -4,9 +4,11 @@
 //! - [`plant`]: the hybrid rigid-body model
 //! - [`converters`], [`simulation`]: the plant as the controller's wires see it
 //! - [`controller_host`], [`link`], [`realtime`]: whatever runs the controller, and how to reach it
-//! - [`board`]: the controller's image on an emulated microcontroller
+//! - [`board`]: the controller's image on a microcontroller, emulated or on a serial line
+//! - [`timing`]: what its ticks cost
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`scenario`]: everything that defines a run, as a TOML file
+//! - [`study`]: the paper's studies, many runs at a time
 //! - [`record`], [`plot`], [`report`]: what a run leaves behind
 //! - [`commands`]: the `painleve` command; [`interrupt`], [`lifetime`]: its processes' ends
 
@@ -26,3 +28,5 @@ pub mod record;
 pub mod report;
 pub mod scenario;
 pub mod simulation;
+pub mod study;
+pub mod timing;

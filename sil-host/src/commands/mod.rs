@@ -6,6 +6,8 @@ mod output;
 mod plant;
 mod run;
 mod scenarios;
+mod study;
+mod timing;
 
 use std::process::ExitCode;
 
@@ -15,6 +17,7 @@ use crate::board::BoardError;
 use crate::closed_loop::LoopError;
 use crate::link::LinkError;
 use crate::scenario::ScenarioError;
+use crate::study::StudyError;
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
 ///
@@ -38,8 +41,12 @@ enum Command {
     Controller(controller::ControllerArguments),
     /// Run the controller's image on a board for the plant on the bus.
     Bridge(bridge::BridgeArguments),
+    /// What control ticks cost: instructions, cycles, or lateness, with the worst of all.
+    Timing(timing::TimingArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
+    /// Compute one of the paper's studies as numbers, data files and figures.
+    Study(study::StudyArguments),
 }
 
 /// Why a command failed. Every message is one sentence for the user.
@@ -60,6 +67,9 @@ pub enum CommandError {
     /// A file cannot be written.
     #[error("{0}")]
     Output(String),
+    /// A study has no outcome.
+    #[error(transparent)]
+    Study(#[from] StudyError),
     /// A process of the run cannot be started or has died.
     #[error("{0}")]
     Process(String),
@@ -80,6 +90,11 @@ impl CommandError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Scenario(_) => 2,
+            Self::Study(error) => match error {
+                StudyError::Scenario(_) | StudyError::Option(_) | StudyError::Range(_) => 2,
+                StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
+                StudyError::Plot(_) => 4,
+            },
             Self::Loop(LoopError::Plant(_)) => 1,
             Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => 3,
             Self::Loop(LoopError::Watcher(_)) | Self::Output(_) => 4,
@@ -112,7 +127,9 @@ pub fn main() -> ExitCode {
         Command::Plant(arguments) => plant::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
         Command::Bridge(arguments) => bridge::run(&arguments),
+        Command::Timing(arguments) => timing::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -3,19 +3,19 @@
 //! Panels are stacked on one time axis as in the paper's simulation figures. Where
 //! the tip is off the belt, every panel is shaded, so that cause and effect line up.
 
-use std::io;
 use std::ops::Range;
 use std::path::PathBuf;
 
-use plotters::coord::Shift;
-use plotters::coord::ranged1d::Ranged;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::HPos;
 
 use super::PlotError;
 use super::axis::{ValueAxis, label};
 use super::decimate::{Bin, Decimator, Extent};
+use super::style::{
+    self, Area, BLACK_INK, BLUE_INK, Drawn, GREEN, GREY, GRID, HEADING, LEGEND, NOTE, ORANGE, SKY,
+    SUBTITLE, TICK, TITLE, VERMILLION, text, text_width, ticks, without_straight_ons,
+};
 use crate::atomic_file;
 use crate::plant::motion::ContactMode;
 use crate::record::Sample;
@@ -51,16 +51,6 @@ struct Panel {
     /// Shortest value axis, so that noise on a constant stays small.
     minimum_span: f64,
 }
-
-// The palette of Okabe and Ito, told apart by colour-blind readers and in grey.
-const BLACK_INK: RGBColor = RGBColor(0x1A, 0x1A, 0x1A);
-const BLUE_INK: RGBColor = RGBColor(0x00, 0x72, 0xB2);
-const SKY: RGBColor = RGBColor(0x56, 0xB4, 0xE9);
-const GREEN: RGBColor = RGBColor(0x00, 0x9E, 0x73);
-const ORANGE: RGBColor = RGBColor(0xE6, 0x9F, 0x00);
-const VERMILLION: RGBColor = RGBColor(0xD5, 0x5E, 0x00);
-const GREY: RGBColor = RGBColor(0x70, 0x70, 0x70);
-const GRID: RGBColor = RGBColor(0xE4, 0xE4, 0xE4);
 
 const TIP_PANEL: Panel = Panel {
     title: "Tip position zₜ",
@@ -153,8 +143,6 @@ const LANES: [(ContactMode, &str, RGBColor); 4] = [
     (ContactMode::Flight, "flight", VERMILLION),
 ];
 
-// Drawn at twice the size it is shown, because coordinates are whole pixels.
-const DRAWN_PER_SHOWN: i32 = 2;
 const WIDTH: i32 = 2000;
 const LEFT: i32 = 170;
 const RIGHT: i32 = 50;
@@ -170,35 +158,8 @@ const HEIGHT: i32 = TITLE_HEIGHT
     + LANES.len() as i32 * LANE_HEIGHT
     + TIME_AXIS_HEIGHT;
 
-const FONT: &str = "Helvetica, Arial, Liberation Sans, DejaVu Sans, sans-serif";
-struct Look {
-    size: i32,
-    weight: FontStyle,
-    colour: RGBColor,
-}
-
-impl Look {
-    const fn new(size: i32, weight: FontStyle, colour: RGBColor) -> Self {
-        Self {
-            size,
-            weight,
-            colour,
-        }
-    }
-}
-
-const TITLE: Look = Look::new(46, FontStyle::Bold, BLACK_INK);
-const SUBTITLE: Look = Look::new(31, FontStyle::Normal, GREY);
-const HEADING: Look = Look::new(33, FontStyle::Bold, BLACK_INK);
-const LEGEND: Look = Look::new(31, FontStyle::Normal, BLACK_INK);
-const NOTE: Look = Look::new(29, FontStyle::Normal, GREY);
-const TICK: Look = Look::new(29, FontStyle::Normal, BLACK_INK);
-
 const TIME_TICKS: usize = 10;
 const VALUE_TICKS: usize = 5;
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), DrawingAreaErrorKind<io::Error>>;
 
 /// The figure of one run; memory does not grow with the length of the run.
 #[derive(Clone, Debug)]
@@ -240,21 +201,7 @@ impl RunPlot {
     /// # Errors
     /// [`PlotError::Draw`] if the drawing library refuses, which it has no reason to.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let mut svg = String::new();
-        {
-            let backend = SVGBackend::with_string(&mut svg, (WIDTH as u32, HEIGHT as u32));
-            let root = backend.into_drawing_area();
-            self.draw(&root)
-                .and_then(|()| root.present())
-                .map_err(|error| PlotError::Draw(error.to_string()))?;
-        }
-        let drawn = format!(r#"width="{WIDTH}" height="{HEIGHT}""#);
-        let shown = format!(
-            r#"width="{}" height="{}" stroke-linejoin="round""#,
-            WIDTH / DRAWN_PER_SHOWN,
-            HEIGHT / DRAWN_PER_SHOWN
-        );
-        Ok(svg.replacen(&drawn, &shown, 1))
+        style::svg((WIDTH, HEIGHT), |root| self.draw(root))
     }
 
     /// Writes the figure to an SVG file, whole or not at all.
@@ -266,7 +213,6 @@ impl RunPlot {
     }
 
     fn draw(&self, root: &Area<'_>) -> Drawn {
-        root.fill(&WHITE)?;
         text(root, &self.title, &TITLE, (LEFT, 44), HPos::Left)?;
         text(root, &self.subtitle, &SUBTITLE, (LEFT, 90), HPos::Left)?;
 
@@ -561,55 +507,6 @@ fn time_range<const SIGNALS: usize>(bins: &[Bin<SIGNALS>]) -> Range<f64> {
     }
 }
 
-/// Round values within a range, about `count` of them, and their distance.
-fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
-    // A tick at the very end shall not be lost to rounding.
-    let slack = 1e-6 * (range.end - range.start);
-    let ticks = RangedCoordf64::from(range.start - slack..range.end + slack).key_points(count);
-    let step = match ticks.as_slice() {
-        [first, second, ..] => second - first,
-        _ => range.end - range.start,
-    };
-    (ticks, step)
-}
-
-/// Leaves out points on the way straight up, down or ahead to the next one.
-fn without_straight_ons(points: impl Iterator<Item = (i32, i32)>) -> Vec<(i32, i32)> {
-    let mut kept: Vec<(i32, i32)> = Vec::new();
-    for next in points {
-        match *kept.as_slice() {
-            [.., last] if last == next => continue,
-            [.., before, last] => {
-                let upright = before.0 == last.0 && last.0 == next.0;
-                let level = before.1 == last.1 && last.1 == next.1;
-                let onwards = (last.0 - before.0) * (next.0 - last.0) >= 0
-                    && (last.1 - before.1) * (next.1 - last.1) >= 0;
-                if (upright || level) && onwards {
-                    kept.pop();
-                }
-            }
-            _ => {}
-        }
-        kept.push(next);
-    }
-    kept
-}
-
-/// Width of a text in some usual font; the true one is known to the viewer only.
-fn text_width(text: &str, look: &Look) -> i32 {
-    text.chars().count() as i32 * look.size * 45 / 100
-}
-
-fn text(root: &Area<'_>, text: &str, look: &Look, at: (i32, i32), side: HPos) -> Drawn {
-    if text.is_empty() {
-        return Ok(());
-    }
-    let style = TextStyle::from((FONT, look.size, look.weight))
-        .color(&look.colour)
-        .pos(Pos::new(side, VPos::Center));
-    root.draw_text(text, &style, at)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -725,24 +622,6 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).unwrap(), plot.svg().unwrap());
         let error = plot.write(path.join("run.svg")).unwrap_err().to_string();
         assert!(error.contains("run.svg/run.svg"), "{error}");
-    }
-
-    #[test]
-    fn points_on_a_straight_way_are_left_out_but_turns_are_kept() {
-        let points = [
-            (0, 0),
-            (0, 5),
-            (0, 9),
-            (0, 2),
-            (0, 2),
-            (3, 2),
-            (8, 2),
-            (9, 3),
-        ];
-        assert_eq!(
-            without_straight_ons(points.into_iter()),
-            [(0, 0), (0, 9), (0, 2), (8, 2), (9, 3)]
-        );
     }
 
     proptest! {

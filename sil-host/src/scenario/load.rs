@@ -75,26 +75,46 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
-        let (origin, table) = read(name)?;
-        let mut scenario = from_table(&origin, table)?;
+        let scenario = Self::load_unplaced(name, overrides)?;
+        let plant = Plant::new(&scenario.plant_parameters(), scenario.initial.state());
+        plant.map_err(|source| ScenarioError::Range {
+            origin: origin(name),
+            source,
+        })?;
+        Ok(scenario)
+    }
+
+    /// The same for studies that place the arm themselves: the start is not checked
+    /// against the belt.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user.
+    pub fn load_unplaced(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
+        let mut scenario = from_table(&origin(name), read(name)?)?;
         for text in overrides {
             scenario = with_override(scenario, text)?;
         }
         let range = |source| ScenarioError::Range {
-            origin: origin.clone(),
+            origin: origin(name),
             source,
         };
         scenario.validate().map_err(range)?;
-        Plant::new(&scenario.plant_parameters(), scenario.initial.state()).map_err(range)?;
         Ok(scenario)
     }
 }
 
-fn read(name: &str) -> Result<(String, Table), ScenarioError> {
+/// What a scenario's name stands for, in messages.
+fn origin(name: &str) -> String {
+    match built_in::text(name) {
+        Some(_) => format!("scenario {name}"),
+        None => format!("scenario file {name}"),
+    }
+}
+
+fn read(name: &str) -> Result<Table, ScenarioError> {
+    let origin = origin(name);
     if let Some(text) = built_in::text(name) {
-        let origin = format!("scenario {name}");
-        let table = parse(&origin, text)?;
-        return Ok((origin, table));
+        return parse(&origin, text);
     }
     let path = PathBuf::from(name);
     if !path.exists() {
@@ -107,7 +127,6 @@ fn read(name: &str) -> Result<(String, Table), ScenarioError> {
         path: path.clone(),
         source,
     })?;
-    let origin = format!("scenario file {}", path.display());
     let mut table = parse(&origin, &text)?;
     if table.is_empty() {
         return Err(ScenarioError::Empty { path });
@@ -115,7 +134,7 @@ fn read(name: &str) -> Result<(String, Table), ScenarioError> {
     if let (false, Some(stem)) = (table.contains_key("name"), path.file_stem()) {
         table.insert("name".into(), Value::String(stem.to_string_lossy().into()));
     }
-    Ok((origin, table))
+    Ok(table)
 }
 
 fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {

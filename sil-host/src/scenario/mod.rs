@@ -11,6 +11,7 @@ use painleve_firmware::Configuration;
 use painleve_firmware::belt_observer;
 use painleve_firmware::contact_guard::GuardSettings;
 use painleve_firmware::contact_observer::ContactSettings;
+use painleve_firmware::deadline_monitor::DeadlineLimits;
 use painleve_firmware::edge_governor::GovernorSettings;
 use painleve_firmware::estimator::EstimatorSettings;
 use painleve_firmware::friction_estimator::FrictionSettings;
@@ -170,6 +171,8 @@ pub struct ControllerSettings {
     pub calibration: CalibrationSettings,
     /// When the drive is armed, and when it is shut down.
     pub supervisor: SupervisorSettings,
+    /// How many lapses in a row are survived.
+    pub deadlines: DeadlineLimits,
     /// The control law.
     pub law: LawSettings,
     /// How the tip is kept pressed on the belt.
@@ -198,6 +201,7 @@ impl Default for ControllerSettings {
             belt: belt_observer::BeltSettings::default(),
             calibration: CalibrationSettings::default(),
             supervisor: SupervisorSettings::default(),
+            deadlines: DeadlineLimits::default(),
             law: LawSettings::Hybrid(HybridSettings::default()),
             guard: GuardSettings::default(),
             governor: GovernorSettings::default(),
@@ -253,6 +257,7 @@ impl Scenario {
             friction: settings.friction,
             belt: settings.belt,
             calibration: settings.calibration,
+            deadlines: settings.deadlines,
             law: settings.law,
             guard: settings.guard,
             governor: settings.governor,

@@ -1,0 +1,28 @@
+//! `painleve study`: the paper's studies from the command line.
+
+mod admissible;
+mod options;
+
+use clap::{Args, Subcommand};
+
+use super::CommandError;
+
+/// Options of `painleve study`.
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    #[command(subcommand)]
+    study: StudyCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum StudyCommand {
+    /// Table II: the tip positions at which p > 0, and the critical friction.
+    Admissible(admissible::AdmissibleArguments),
+}
+
+/// Computes a study and writes what it came to.
+pub fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
+    match &arguments.study {
+        StudyCommand::Admissible(arguments) => admissible::run(arguments),
+    }
+}

@@ -1,0 +1,147 @@
+//! What all figures share: colours, fonts, ticks, and SVG at twice the size shown.
+
+use std::io;
+use std::ops::Range;
+
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::Ranged;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::PlotError;
+
+// The palette of Okabe and Ito, told apart by colour-blind readers and in grey.
+pub(crate) const BLACK_INK: RGBColor = RGBColor(0x1A, 0x1A, 0x1A);
+pub(crate) const BLUE_INK: RGBColor = RGBColor(0x00, 0x72, 0xB2);
+pub(crate) const SKY: RGBColor = RGBColor(0x56, 0xB4, 0xE9);
+pub(crate) const GREEN: RGBColor = RGBColor(0x00, 0x9E, 0x73);
+pub(crate) const ORANGE: RGBColor = RGBColor(0xE6, 0x9F, 0x00);
+pub(crate) const VERMILLION: RGBColor = RGBColor(0xD5, 0x5E, 0x00);
+pub(crate) const GREY: RGBColor = RGBColor(0x70, 0x70, 0x70);
+pub(super) const GRID: RGBColor = RGBColor(0xE4, 0xE4, 0xE4);
+
+// Drawn at twice the size it is shown, because coordinates are whole pixels.
+pub(super) const DRAWN_PER_SHOWN: i32 = 2;
+pub(super) const FONT: &str = "Helvetica, Arial, Liberation Sans, DejaVu Sans, sans-serif";
+pub(super) struct Look {
+    pub(super) size: i32,
+    weight: FontStyle,
+    colour: RGBColor,
+}
+
+impl Look {
+    const fn new(size: i32, weight: FontStyle, colour: RGBColor) -> Self {
+        Self {
+            size,
+            weight,
+            colour,
+        }
+    }
+}
+
+pub(super) const TITLE: Look = Look::new(46, FontStyle::Bold, BLACK_INK);
+pub(super) const SUBTITLE: Look = Look::new(31, FontStyle::Normal, GREY);
+pub(super) const HEADING: Look = Look::new(33, FontStyle::Bold, BLACK_INK);
+pub(super) const LEGEND: Look = Look::new(31, FontStyle::Normal, BLACK_INK);
+pub(super) const NOTE: Look = Look::new(29, FontStyle::Normal, GREY);
+pub(super) const TICK: Look = Look::new(29, FontStyle::Normal, BLACK_INK);
+
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type Drawn = Result<(), DrawingAreaErrorKind<io::Error>>;
+
+/// Draws a figure of `size` (width, height) in drawn units.
+pub(super) fn svg(
+    size: (i32, i32),
+    draw: impl FnOnce(&Area<'_>) -> Drawn,
+) -> Result<String, PlotError> {
+    let (width, height) = size;
+    let mut svg = String::new();
+    {
+        let backend = SVGBackend::with_string(&mut svg, (width as u32, height as u32));
+        let root = backend.into_drawing_area();
+        root.fill(&WHITE)
+            .and_then(|()| draw(&root))
+            .and_then(|()| root.present())
+            .map_err(|error| PlotError::Draw(error.to_string()))?;
+    }
+    let drawn = format!(r#"width="{width}" height="{height}""#);
+    let shown = format!(
+        r#"width="{}" height="{}" stroke-linejoin="round""#,
+        width / DRAWN_PER_SHOWN,
+        height / DRAWN_PER_SHOWN
+    );
+    Ok(svg.replacen(&drawn, &shown, 1))
+}
+
+/// Round values within a range, about `count` of them, and their distance.
+pub(super) fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
+    // A tick at the very end shall not be lost to rounding.
+    let slack = 1e-6 * (range.end - range.start);
+    let ticks = RangedCoordf64::from(range.start - slack..range.end + slack).key_points(count);
+    let step = match ticks.as_slice() {
+        [first, second, ..] => second - first,
+        _ => range.end - range.start,
+    };
+    (ticks, step)
+}
+
+/// Leaves out points on the way straight up, down or ahead to the next one.
+pub(super) fn without_straight_ons(points: impl Iterator<Item = (i32, i32)>) -> Vec<(i32, i32)> {
+    let mut kept: Vec<(i32, i32)> = Vec::new();
+    for next in points {
+        match *kept.as_slice() {
+            [.., last] if last == next => continue,
+            [.., before, last] => {
+                let upright = before.0 == last.0 && last.0 == next.0;
+                let level = before.1 == last.1 && last.1 == next.1;
+                let onwards = (last.0 - before.0) * (next.0 - last.0) >= 0
+                    && (last.1 - before.1) * (next.1 - last.1) >= 0;
+                if (upright || level) && onwards {
+                    kept.pop();
+                }
+            }
+            _ => {}
+        }
+        kept.push(next);
+    }
+    kept
+}
+
+/// Width of a text in some usual font; the true one is known to the viewer only.
+pub(super) fn text_width(text: &str, look: &Look) -> i32 {
+    text.chars().count() as i32 * look.size * 45 / 100
+}
+
+pub(super) fn text(root: &Area<'_>, text: &str, look: &Look, at: (i32, i32), side: HPos) -> Drawn {
+    if text.is_empty() {
+        return Ok(());
+    }
+    let style = TextStyle::from((FONT, look.size, look.weight))
+        .color(&look.colour)
+        .pos(Pos::new(side, VPos::Center));
+    root.draw_text(text, &style, at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_on_a_straight_way_are_left_out_but_turns_are_kept() {
+        let points = [
+            (0, 0),
+            (0, 5),
+            (0, 9),
+            (0, 2),
+            (0, 2),
+            (3, 2),
+            (8, 2),
+            (9, 3),
+        ];
+        assert_eq!(
+            without_straight_ons(points.into_iter()),
+            [(0, 0), (0, 9), (0, 2), (8, 2), (9, 3)]
+        );
+    }
+}

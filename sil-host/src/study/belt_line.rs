@@ -1,0 +1,232 @@
+//! Postures with the tip on the belt, as an analytic curve.
+//!
+//! Along z_t itself the joint angles have square roots where the arm is straight. With
+//! z_t = R sin τ, R the reach, they have none: cos β = |z|/2l and sin β = R cos τ/2l give
+//! half the elbow's angle, and p is an analytic function of τ from −π/2 to π/2.
+
+use nalgebra::{Matrix2, Vector2};
+use painleve_shared::{Arm, Pose, Posture, Slip};
+
+/// Points at which a quantity is looked at first. It has a handful of extrema at most,
+/// so that each is between its own points.
+const POINTS: usize = 4096;
+
+/// The tip on the belt of an arm in one posture.
+#[derive(Clone, Copy, Debug)]
+pub struct BeltLine<'a> {
+    arm: &'a Arm<f64>,
+    posture: Posture,
+}
+
+impl<'a> BeltLine<'a> {
+    /// All places on the belt in a posture.
+    pub fn new(arm: &'a Arm<f64>, posture: Posture) -> Self {
+        Self { arm, posture }
+    }
+
+    /// z_t at τ, m.
+    pub fn tip_t_m(&self, tau: f64) -> f64 {
+        self.arm.reach_on_belt_m() * libm::sin(tau)
+    }
+
+    /// τ at z_t (m); `None` out of reach.
+    pub fn tau(&self, tip_t_m: f64) -> Option<f64> {
+        let sine = tip_t_m / self.arm.reach_on_belt_m();
+        (sine.abs() <= 1.0).then(|| libm::asin(sine))
+    }
+
+    /// Joint angles (θ1, θ2) at τ, rad.
+    pub fn theta_rad(&self, tau: f64) -> Vector2<f64> {
+        let parameters = self.arm.parameters();
+        let tip = self.tip_t_m(tau);
+        let direction = libm::atan2(tip, parameters.height_m);
+        let distance = libm::hypot(tip, parameters.height_m);
+        let half_elbow = libm::atan2(self.arm.reach_on_belt_m() * libm::cos(tau), distance);
+        let (first, second) = (direction - half_elbow, direction + half_elbow);
+        match self.posture {
+            Posture::ElbowUp => Vector2::new(first, second),
+            Posture::ElbowDown => Vector2::new(second, first),
+        }
+    }
+
+    /// Q at τ, 1/kg.
+    pub fn inverse_tip_inertia(&self, tau: f64) -> Matrix2<f64> {
+        self.arm
+            .inverse_tip_inertia(&Pose::new(&self.theta_rad(tau)))
+    }
+
+    /// p at τ, 1/kg.
+    pub fn p(&self, tau: f64, friction: f64, slip: Slip) -> f64 {
+        self.arm.p(&Pose::new(&self.theta_rad(tau)), friction, slip)
+    }
+
+    /// Friction coefficient at which p is zero at τ; infinite where no friction does that.
+    pub fn friction_of_zero_p(&self, tau: f64, slip: Slip) -> f64 {
+        let q = self.inverse_tip_inertia(tau);
+        let pull = slip.sign::<f64>() * q.m21;
+        if pull > 0.0 {
+            q.m22 / pull
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
+/// Stretches of τ on which `value` is positive, in order, to rounding.
+pub fn positive_stretches(value: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+    let mut points = samples(&value);
+    // Between two points of one sign the value may still cross zero twice.
+    let mut extrema: Vec<(f64, f64)> = points
+        .windows(3)
+        .filter_map(|three| {
+            let [left, middle, right] = three else {
+                return None;
+            };
+            let sign = middle.1.signum();
+            let towards_zero =
+                sign * middle.1 <= sign * left.1 && sign * middle.1 <= sign * right.1;
+            towards_zero.then(|| {
+                let tau = minimum(left.0, right.0, |tau| sign * value(tau));
+                (tau, value(tau))
+            })
+        })
+        .collect();
+    points.append(&mut extrema);
+    points.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
+
+    let mut stretches = Vec::new();
+    let mut start = points
+        .first()
+        .filter(|point| point.1 > 0.0)
+        .map(|point| point.0);
+    for pair in points.windows(2) {
+        let [before, after] = pair else { continue };
+        if (before.1 > 0.0) == (after.1 > 0.0) {
+            continue;
+        }
+        let root = bisected(before.0, after.0, |tau| {
+            (value(tau) > 0.0) == (before.1 > 0.0)
+        });
+        match start.take() {
+            Some(start) => stretches.push((start, root)),
+            None => start = Some(root),
+        }
+    }
+    if let (Some(start), Some(end)) = (start, points.last()) {
+        stretches.push((start, end.0));
+    }
+    stretches
+}
+
+/// The τ at which `value` is least, and the value there.
+pub fn least(value: impl Fn(f64) -> f64) -> (f64, f64) {
+    let points = samples(&value);
+    let lowest = (0..points.len())
+        .min_by(|&one, &other| points[one].1.total_cmp(&points[other].1))
+        .unwrap_or(0);
+    let left = points[lowest.saturating_sub(1)].0;
+    let right = points[(lowest + 1).min(points.len() - 1)].0;
+    let tau = minimum(left, right, &value);
+    let refined = (tau, value(tau));
+    if refined.1 < points[lowest].1 {
+        refined
+    } else {
+        points[lowest]
+    }
+}
+
+fn samples(value: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+    (0..=POINTS)
+        .map(|index| {
+            let tau = core::f64::consts::PI * (index as f64 / POINTS as f64 - 0.5);
+            (tau, value(tau))
+        })
+        .collect()
+}
+
+/// Where a property that holds at `holds` and not at `fails` ends, to rounding.
+fn bisected(mut holds: f64, mut fails: f64, property: impl Fn(f64) -> bool) -> f64 {
+    loop {
+        let middle = 0.5 * (holds + fails);
+        if middle == holds || middle == fails {
+            return holds;
+        }
+        if property(middle) {
+            holds = middle;
+        } else {
+            fails = middle;
+        }
+    }
+}
+
+/// Golden-section search for the minimum of a function with one between two points.
+fn minimum(left: f64, right: f64, value: impl Fn(f64) -> f64) -> f64 {
+    let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut left, mut right) = (left, right);
+    let (mut one, mut two) = (
+        right - ratio * (right - left),
+        left + ratio * (right - left),
+    );
+    let (mut at_one, mut at_two) = (value(one), value(two));
+    // Near a minimum values differ by less than rounding within the root of rounding.
+    while right - left > 1e-9 {
+        if at_one <= at_two {
+            (right, two, at_two) = (two, one, at_one);
+            one = right - ratio * (right - left);
+            at_one = value(one);
+        } else {
+            (left, one, at_one) = (one, two, at_two);
+            two = left + ratio * (right - left);
+            at_two = value(two);
+        }
+    }
+    0.5 * (left + right)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_shared::ArmParameters;
+
+    #[test]
+    fn the_curve_is_the_inverse_kinematics_without_their_roots() {
+        let arm = Arm::new(ArmParameters::default()).unwrap();
+        for posture in [Posture::ElbowUp, Posture::ElbowDown] {
+            let line = BeltLine::new(&arm, posture);
+            for tip in [-0.184, -0.1, 0.0, 0.05, 0.17, 0.1841] {
+                let theta = line.theta_rad(line.tau(tip).unwrap());
+                let expected = arm.joint_angles_on_belt_rad(tip, posture).unwrap();
+                assert!((theta - expected).norm() < 1e-9, "{theta} {expected}");
+                assert!((arm.tip_m(&Pose::new(&theta)).x - tip).abs() < 1e-15);
+            }
+            assert_eq!(line.tau(0.185), None);
+        }
+    }
+
+    #[test]
+    fn roots_are_found_to_rounding_also_where_they_are_closer_than_the_grid() {
+        let stretches = positive_stretches(|t| (t - 0.3) * (t - 0.3) - 1e-10);
+        let expected = [
+            (-core::f64::consts::FRAC_PI_2, 0.3 - 1e-5),
+            (0.3 + 1e-5, core::f64::consts::FRAC_PI_2),
+        ];
+        assert_eq!(stretches.len(), 2);
+        for (stretch, expected) in stretches.iter().zip(expected) {
+            assert!((stretch.0 - expected.0).abs() < 1e-12, "{stretch:?}");
+            assert!((stretch.1 - expected.1).abs() < 1e-12, "{stretch:?}");
+        }
+        let [(start, _)] = positive_stretches(|t| t - 0.25)[..] else {
+            panic!("one stretch");
+        };
+        assert!((start - 0.25).abs() < 1e-16);
+        assert!(positive_stretches(|_| -1.0).is_empty());
+        assert_eq!(positive_stretches(|_| 1.0).len(), 1);
+    }
+
+    #[test]
+    fn the_least_value_is_found_inside_and_at_the_ends() {
+        let (tau, value) = least(|t| 2.0 + (t - 0.1234).powi(2));
+        assert!((tau - 0.1234).abs() < 1e-7 && value == 2.0, "{tau} {value}");
+        assert_eq!(least(|t| t).0, -core::f64::consts::FRAC_PI_2);
+    }
+}

@@ -1,0 +1,230 @@
+//! The values of a parameter that a study goes through: `FROM:TO:STEP` or `a,b,c`.
+
+use std::str::FromStr;
+
+/// More values than anyone means.
+const MOST_VALUES: f64 = 1e7;
+
+/// Decimals beyond which a double cannot tell numbers near one apart.
+const MOST_DECIMALS: usize = 15;
+
+/// Finite values in the order in which they were asked for; at least one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    values: Vec<f64>,
+}
+
+/// Why a text is no [`Grid`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// There is nothing in it.
+    #[error("'{text}' holds no values; give FROM:TO:STEP or a list as in 0.4,0.6")]
+    Empty {
+        /// What was given.
+        text: String,
+    },
+    /// One of its parts is no finite number.
+    #[error("'{part}' in '{text}' is not a finite number; give FROM:TO:STEP or a list a,b,c")]
+    NotFinite {
+        /// What was given.
+        text: String,
+        /// The part.
+        part: String,
+    },
+    /// A range has two parts, or more than three.
+    #[error("'{text}' has {parts} parts; a range has three, FROM:TO:STEP, as in -1:-0.1:0.005")]
+    Parts {
+        /// What was given.
+        text: String,
+        /// How many parts.
+        parts: usize,
+    },
+    /// The range never ends.
+    #[error("'{text}' has step 0; give one that leads from FROM to TO")]
+    ZeroStep {
+        /// What was given.
+        text: String,
+    },
+    /// The range is empty.
+    #[error("'{text}' is empty: step {step} leads away from {to}; start at {from} with step {}", -step)]
+    WrongWay {
+        /// What was given.
+        text: String,
+        /// First value.
+        from: f64,
+        /// Last value.
+        to: f64,
+        /// The step.
+        step: f64,
+    },
+    /// Far too many values.
+    #[error("'{text}' has {count:e} values; at most {MOST_VALUES:e} are allowed")]
+    TooMany {
+        /// What was given.
+        text: String,
+        /// How many.
+        count: f64,
+    },
+}
+
+impl Grid {
+    /// The values, in order.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// One value.
+    pub fn of(value: f64) -> Self {
+        Self {
+            values: vec![value],
+        }
+    }
+
+    fn range(text: &str, from: f64, to: f64, step: f64) -> Result<Self, GridError> {
+        let text = || text.to_owned();
+        if step == 0.0 {
+            return Err(GridError::ZeroStep { text: text() });
+        }
+        let steps = (to - from) / step;
+        if steps < 0.0 {
+            return Err(GridError::WrongWay {
+                text: text(),
+                from,
+                to,
+                step,
+            });
+        }
+        if steps >= MOST_VALUES {
+            return Err(GridError::TooMany {
+                text: text(),
+                count: steps + 1.0,
+            });
+        }
+        // The multiples of a decimal step are decimals again: 3 · 0.1 is 0.3.
+        let decimals = decimals(from).max(decimals(step));
+        // The last value is within reach of rounding, or it is not one.
+        let slack = 0.5 * f64::EPSILON * from.abs().max(to.abs());
+        let values = (0..=steps.round() as u64)
+            .map(|index| rounded(from + index as f64 * step, decimals))
+            .filter(|value| (value - to) * step.signum() <= slack)
+            .collect();
+        Ok(Self { values })
+    }
+}
+
+impl FromStr for Grid {
+    type Err = GridError;
+
+    fn from_str(text: &str) -> Result<Self, GridError> {
+        if text.trim().is_empty() {
+            return Err(GridError::Empty { text: text.into() });
+        }
+        let separator = if text.contains(':') { ':' } else { ',' };
+        let values = text
+            .split(separator)
+            .map(|part| match part.trim().parse::<f64>() {
+                Ok(value) if value.is_finite() => Ok(value + 0.0),
+                _ => Err(GridError::NotFinite {
+                    text: text.into(),
+                    part: part.into(),
+                }),
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        match (separator, values.as_slice()) {
+            (':', &[from, to, step]) => Self::range(text, from, to, step),
+            (':', parts) => Err(GridError::Parts {
+                text: text.into(),
+                parts: parts.len(),
+            }),
+            _ => Ok(Self { values }),
+        }
+    }
+}
+
+/// Decimals of the shortest text that is read as this value.
+fn decimals(value: f64) -> usize {
+    let text = value.to_string();
+    text.split_once('.')
+        .map_or(0, |(_, decimals)| decimals.len())
+}
+
+/// The nearest number of so many decimals; never a negative zero.
+fn rounded(value: f64, decimals: usize) -> f64 {
+    if decimals > MOST_DECIMALS {
+        return value;
+    }
+    format!("{value:.decimals$}").parse().unwrap_or(value) + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn values(text: &str) -> Vec<f64> {
+        text.parse::<Grid>().unwrap().values
+    }
+
+    #[test]
+    fn ranges_hold_decimals_and_both_ends() {
+        assert_eq!(values("0.1:0.5:0.1"), [0.1, 0.2, 0.3, 0.4, 0.5]);
+        assert_eq!(values("-0.1:0.1:0.1"), [-0.1, 0.0, 0.1]);
+        assert_eq!(values("1:0.25:-0.25"), [1.0, 0.75, 0.5, 0.25]);
+        assert_eq!(values("0:1:0.4"), [0.0, 0.4, 0.8]);
+        assert_eq!(values("2:2:1"), [2.0]);
+        assert_eq!(values("0:3e-3:1e-3"), [0.0, 0.001, 0.002, 0.003]);
+        let speeds = values("-1:-0.1:0.005");
+        assert_eq!((speeds.len(), speeds[180]), (181, -0.1));
+        assert_eq!(speeds[85].to_string(), "-0.575");
+        // A negative zero would print as -0.
+        assert!(values("-0.1:0.1:0.1")[1].is_sign_positive());
+    }
+
+    #[test]
+    fn lists_keep_their_order() {
+        assert_eq!(values("0.6"), [0.6]);
+        assert_eq!(values(" 3, -1 ,2"), [3.0, -1.0, 2.0]);
+    }
+
+    #[test]
+    fn mistakes_are_told_with_what_is_allowed() {
+        for (text, part) in [
+            ("", "holds no values"),
+            ("  ", "holds no values"),
+            ("0.1,,0.3", "'' in '0.1,,0.3' is not a finite number"),
+            ("0.4,high", "'high' in '0.4,high' is not a finite number"),
+            ("nan", "not a finite number"),
+            ("0:inf:1", "'inf' in '0:inf:1'"),
+            ("0:1", "has 2 parts"),
+            ("0:1:2:3", "has 4 parts"),
+            ("0:1:0", "step 0"),
+            ("0:1:-0", "step 0"),
+            ("0:1:-0.1", "leads away from 1; start at 0 with step 0.1"),
+            ("-0.1:-1:0.005", "step 0.005 leads away from -1"),
+            ("0:1:1e-9", "at most 1e7"),
+        ] {
+            let message = text.parse::<Grid>().unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_range_counts_as_in_whole_numbers(
+            from in -1000_i64..1000, count in 1_i64..300, step in 1_i64..50, digits in 0_u32..5, down: bool,
+        ) {
+            let step = if down { -step } else { step };
+            let scale = 10_f64.powi(digits as i32);
+            let decimal = |whole: i64| whole as f64 / scale;
+            let to = from + (count - 1) * step;
+            let text = format!("{}:{}:{}", decimal(from), decimal(to), decimal(step));
+            let expected: Vec<f64> = (0..count).map(|i| decimal(from + i * step)).collect();
+            prop_assert_eq!(values(&text), expected);
+        }
+
+        #[test]
+        fn no_text_panics(text in "[-0-9.:,ea inf]{0,20}") {
+            let _ = text.parse::<Grid>();
+        }
+    }
+}
