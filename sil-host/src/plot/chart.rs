@@ -121,11 +121,13 @@ pub enum Mark {
         /// a place that is not there leaves the cell clear.
         cells: Vec<u8>,
     },
-    /// A word in the panel.
+    /// Words in the panel.
     Label {
-        /// Where its middle is.
+        /// Where their middle is, or their left end.
         at: (f64, f64),
-        /// The word.
+        /// Whether `at` is the middle.
+        centred: bool,
+        /// The words.
         text: String,
     },
 }
@@ -417,9 +419,14 @@ impl<'a> Placed<'a> {
                 palette,
                 cells,
             } => self.draw_cells(root, (x, y), *columns, palette, cells),
-            Mark::Label { at, text: word } => {
+            Mark::Label {
+                at,
+                centred,
+                text: words,
+            } => {
                 let at = (self.x(at.0), self.y(at.1));
-                text(root, word, &LEGEND, at, HPos::Center)
+                let side = if *centred { HPos::Center } else { HPos::Left };
+                text(root, words, &LEGEND, at, side)
             }
         }
     }
