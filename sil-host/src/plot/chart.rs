@@ -10,8 +10,8 @@ use super::PlotError;
 use super::axis::{ValueAxis, label};
 use super::decimate::Extent;
 use super::style::{
-    self, Area, Drawn, GREY, GRID, HEADING, LEGEND, NOTE, SUBTITLE, TICK, TITLE, text, text_width,
-    ticks, without_straight_ons,
+    self, Area, Drawn, GREY, GRID, HEADING, LEGEND, NOTE, SUBTITLE, TICK, TITLE, over_white, text,
+    text_width, ticks, without_straight_ons,
 };
 
 const WIDTH: i32 = 2000;
@@ -121,11 +121,13 @@ pub enum Mark {
         /// a place that is not there leaves the cell clear.
         cells: Vec<u8>,
     },
-    /// A word in the panel.
+    /// Words in the panel.
     Label {
-        /// Where its middle is.
+        /// Where their middle is, or their left end.
         at: (f64, f64),
-        /// The word.
+        /// Whether `at` is the middle.
+        centred: bool,
+        /// The words.
         text: String,
     },
 }
@@ -368,7 +370,8 @@ impl<'a> Placed<'a> {
                 ..
             } => {
                 let style = colour.stroke_width(*width);
-                for part in points.split(|(x, y)| x.is_nan() || y.is_nan()) {
+                let parts = points.split(|(x, y)| x.is_nan() || y.is_nan());
+                for part in parts.filter(|part| !part.is_empty()) {
                     let pixels = part.iter().map(|&(x, y)| (self.x(x), self.y(y)));
                     let pixels = without_straight_ons(pixels);
                     if *dashed {
@@ -417,9 +420,14 @@ impl<'a> Placed<'a> {
                 palette,
                 cells,
             } => self.draw_cells(root, (x, y), *columns, palette, cells),
-            Mark::Label { at, text: word } => {
+            Mark::Label {
+                at,
+                centred,
+                text: words,
+            } => {
                 let at = (self.x(at.0), self.y(at.1));
-                text(root, word, &LEGEND, at, HPos::Center)
+                let side = if *centred { HPos::Center } else { HPos::Left };
+                text(root, words, &LEGEND, at, side)
             }
         }
     }
@@ -437,7 +445,9 @@ impl<'a> Placed<'a> {
             range.start + (range.end - range.start) * index as f64 / count as f64
         };
         for (row, line) in cells.chunks(columns.max(1)).enumerate() {
-            let (low, high) = (self.y(at(y, row, rows)), self.y(at(y, row + 1, rows)));
+            let low = self.y(at(y, row, rows));
+            // One unit into the next row, which covers it, so that no seam shows.
+            let high = (self.y(at(y, row + 1, rows)) - 1).max(self.top);
             // Neighbours of one colour are one rectangle.
             let mut start = 0;
             for run in line.chunk_by(|one, next| one == next) {
@@ -482,10 +492,4 @@ fn line<const N: usize>(
     width: u32,
 ) -> Drawn {
     root.draw(&PathElement::new(points, colour.stroke_width(width)))
-}
-
-/// The colour that a clear one has on white.
-fn over_white(colour: RGBColor, opacity: f64) -> RGBColor {
-    let mix = |part: u8| (255.0 + (f64::from(part) - 255.0) * opacity.clamp(0.0, 1.0)) as u8;
-    RGBColor(mix(colour.0), mix(colour.1), mix(colour.2))
 }

@@ -74,6 +74,12 @@ pub(super) fn svg(
     Ok(svg.replacen(&drawn, &shown, 1))
 }
 
+/// The colour that a clear one has on white.
+pub(crate) fn over_white(colour: RGBColor, opacity: f64) -> RGBColor {
+    let mix = |part: u8| (255.0 + (f64::from(part) - 255.0) * opacity.clamp(0.0, 1.0)) as u8;
+    RGBColor(mix(colour.0), mix(colour.1), mix(colour.2))
+}
+
 /// Round values within a range, about `count` of them, and their distance.
 pub(super) fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
     // A tick at the very end shall not be lost to rounding.

@@ -90,16 +90,27 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load_unplaced(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
-        let mut scenario = from_table(&origin(name), read(name)?)?;
+        from_table(&origin(name), read(name)?)?.with_overrides(&origin(name), overrides)
+    }
+
+    /// This scenario with overrides `key=value` applied in order, its numbers checked.
+    /// `origin` says in messages what they were applied to.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user.
+    pub fn with_overrides(
+        mut self,
+        origin: &str,
+        overrides: &[String],
+    ) -> Result<Self, ScenarioError> {
         for text in overrides {
-            scenario = with_override(scenario, text)?;
+            self = with_override(self, text)?;
         }
-        let range = |source| ScenarioError::Range {
-            origin: origin(name),
+        self.validate().map_err(|source| ScenarioError::Range {
+            origin: origin.into(),
             source,
-        };
-        scenario.validate().map_err(range)?;
-        Ok(scenario)
+        })?;
+        Ok(self)
     }
 }
 

@@ -145,7 +145,7 @@ fn samples(value: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
 }
 
 /// Where a property that holds at `holds` and not at `fails` ends, to rounding.
-fn bisected(mut holds: f64, mut fails: f64, property: impl Fn(f64) -> bool) -> f64 {
+pub fn bisected(mut holds: f64, mut fails: f64, property: impl Fn(f64) -> bool) -> f64 {
     loop {
         let middle = 0.5 * (holds + fails);
         if middle == holds || middle == fails {

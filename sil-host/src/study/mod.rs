@@ -4,15 +4,22 @@
 //! - [`outcome`]: what a study came to, as JSON, CSV, table and figure
 //! - [`paper`]: the values to set beside
 //! - [`admissible`]: Table II, where on the belt p > 0; [`belt_line`]: the postures it looks at
+//! - [`regions`]: Fig. 3, the solution modes over (θ1, θ̇1)
+//! - [`sliding_range`]: Z_t,sliding, how far a controller slides
+//! - [`case`], [`trial`]: closed loops to study, and running them in this process
 //!
 //! A study is a list of rows that know nothing of each other ([`Study`]), so that they
 //! can be computed in any order, on any number of threads, or in shards.
 
 pub mod admissible;
 pub mod belt_line;
+pub mod case;
 pub mod grid;
 pub mod outcome;
 pub mod paper;
+pub mod regions;
+pub mod sliding_range;
+pub mod trial;
 
 use painleve_shared::range::OutOfRange;
 use rayon::prelude::*;

@@ -48,3 +48,11 @@ pub fn table<T: Into<comfy_table::Row>>(header: T) -> Table {
         .set_header(header);
     table
 }
+
+/// The name under which a value is serialised.
+pub fn name(value: &impl Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(name)) => name,
+        other => format!("{other:?}"),
+    }
+}

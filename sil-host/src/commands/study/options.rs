@@ -4,19 +4,23 @@ use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use painleve_shared::Posture;
 
 use crate::atomic_file::{self, AtomicFile};
 use crate::commands::CommandError;
-use crate::scenario::{Scenario, built_in};
+use crate::scenario::Scenario;
 use crate::study::{self, Outcome, Study, StudyError, outcome};
 
-/// The scenario that a study varies.
+/// The built-in scenario without a controller.
+const OPEN_LOOP: &str = "open-loop-bounce";
+
+/// The scenario that an open-loop study varies.
 #[derive(Clone, Debug, Args)]
 pub struct BaseOptions {
     /// Built-in scenario or TOML file whose plant and controller are studied.
-    #[arg(long, value_name = "SCENARIO", default_value = built_in::DEFAULT)]
+    #[arg(long, value_name = "SCENARIO", default_value = OPEN_LOOP)]
     scenario: String,
     #[command(flatten)]
     overrides: Overrides,
@@ -160,4 +164,39 @@ fn progress_bar(rows: usize) -> ProgressBar {
     }
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     bar
+}
+
+/// A posture on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PostureOption {
+    /// θ2 > θ1.
+    ElbowUp,
+    /// θ2 < θ1.
+    ElbowDown,
+}
+
+impl From<PostureOption> for Posture {
+    fn from(option: PostureOption) -> Self {
+        match option {
+            PostureOption::ElbowUp => Self::ElbowUp,
+            PostureOption::ElbowDown => Self::ElbowDown,
+        }
+    }
+}
+
+/// A length on the command line.
+pub fn metres(text: &str) -> Result<f64, String> {
+    positive(text, 1e-6, 1.0, "metres")
+}
+
+/// A duration on the command line.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    positive(text, 1e-3, 1e6, "seconds")
+}
+
+fn positive(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("give {unit} from {least} to {most}")),
+    }
 }
