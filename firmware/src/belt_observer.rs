@@ -5,6 +5,7 @@
 //! observer keeps these bounds; they widen with the acceleration that the belt may have. Once
 //! the tip has slid both ways, or stuck, they meet.
 
+use painleve_shared::Real;
 use painleve_shared::Slip;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
@@ -91,18 +92,18 @@ impl BeltObserver {
         }
         let widening = self.settings.acceleration_m_s2 * tick_s;
         let limit = self.settings.fastest_m_s;
-        self.slowest_m_s = (self.slowest_m_s - widening).max(-limit);
-        self.fastest_m_s = (self.fastest_m_s + widening).min(limit);
+        self.slowest_m_s = (self.slowest_m_s - widening).at_least(-limit);
+        self.fastest_m_s = (self.fastest_m_s + widening).at_most(limit);
         let Some(friction) = friction else {
             return;
         };
         if friction.sticks || friction.slip == Slip::Positive {
-            self.fastest_m_s = self.fastest_m_s.min(tip_velocity_m_s);
-            self.slowest_m_s = self.slowest_m_s.min(self.fastest_m_s);
+            self.fastest_m_s = self.fastest_m_s.at_most(tip_velocity_m_s);
+            self.slowest_m_s = self.slowest_m_s.at_most(self.fastest_m_s);
         }
         if friction.sticks || friction.slip == Slip::Negative {
-            self.slowest_m_s = self.slowest_m_s.max(tip_velocity_m_s);
-            self.fastest_m_s = self.fastest_m_s.max(self.slowest_m_s);
+            self.slowest_m_s = self.slowest_m_s.at_least(tip_velocity_m_s);
+            self.fastest_m_s = self.fastest_m_s.at_least(self.slowest_m_s);
         }
     }
 

@@ -132,7 +132,7 @@ impl FrictionEstimator {
     pub fn update(&mut self, force_n: &Vector2<f32>) {
         let first_variance = self.settings.first_deviation * self.settings.first_deviation;
         let drift = self.settings.drift_per_sqrt_s;
-        self.variance = (self.variance + drift * drift * self.tick_s).min(first_variance);
+        self.variance = (self.variance + drift * drift * self.tick_s).at_most(first_variance);
         self.sticks = false;
         if force_n.y < self.settings.observable_n {
             return;
@@ -159,7 +159,7 @@ impl FrictionEstimator {
         }
         self.sticking_s = 0.0;
         let gain = self.variance / (self.variance + ratio_variance);
-        self.coefficient = (self.coefficient + gain * innovation).max(0.0);
+        self.coefficient = (self.coefficient + gain * innovation).at_least(0.0);
         self.variance *= 1.0 - gain;
     }
 

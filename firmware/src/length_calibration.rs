@@ -4,6 +4,7 @@
 //! therefore gives l, better the longer the tip slides. An arm 5 % longer than its
 //! data sheet says would otherwise miss its references by a centimetre and its edges by more.
 
+use painleve_shared::Real;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 
@@ -69,7 +70,7 @@ impl LengthCalibration {
             length_m: nominal_m,
             mean: 0.0,
             readings: 0.0,
-            most_readings: (settings.averaging_s / tick_s).max(1.0),
+            most_readings: (settings.averaging_s / tick_s).at_least(1.0),
         }
     }
 
@@ -80,7 +81,7 @@ impl LengthCalibration {
             return self.length_m;
         }
         let sum = (self.height_m - measured_gap_m) / self.length_m;
-        self.readings = (self.readings + 1.0).min(self.most_readings);
+        self.readings = (self.readings + 1.0).at_most(self.most_readings);
         self.mean += (sum - self.mean) / self.readings;
         let length = self.height_m / self.mean;
         // Also refuses what is not finite.

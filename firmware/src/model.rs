@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 use painleve_shared::dynamics::{generalised_torque_nm, joint_torque_nm};
-use painleve_shared::{Arm, Pose, Slip};
+use painleve_shared::{Arm, Pose, Real, Slip};
 
 /// |sin(θ2 − θ1)| below which J⁻¹ is bounded: the arm is nearly straight and
 /// no torque moves the tip along the belt any more.
@@ -46,9 +46,9 @@ impl Model {
         let mobility = arm.inverse_mass_matrix(&pose);
         let sine_elbow = pose.sine_elbow();
         let bounded = if sine_elbow < 0.0 {
-            sine_elbow.min(-STRAIGHT_ARM_SINE)
+            sine_elbow.at_most(-STRAIGHT_ARM_SINE)
         } else {
-            sine_elbow.max(STRAIGHT_ARM_SINE)
+            sine_elbow.at_least(STRAIGHT_ARM_SINE)
         };
         let length = arm.parameters().link_length_m;
         Self {

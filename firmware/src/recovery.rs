@@ -135,10 +135,12 @@ impl Recovery {
     ) -> LawOutput {
         let settings = &self.settings;
         let (lower, upper) = edges_m;
-        let retreat = settings.retreat_m.min(0.5 * (upper - lower).max(0.0));
+        let retreat = settings
+            .retreat_m
+            .at_most(0.5 * (upper - lower).at_least(0.0));
         let mut flight = self.flight.unwrap_or(Flight {
             landing_m: model.tip_m.x,
-            height_m: model.gap_m.max(0.0),
+            height_m: model.gap_m.at_least(0.0),
             lands: false,
             posture: Posture::of(&model.theta_rad),
             path_rad: None,
@@ -148,14 +150,14 @@ impl Recovery {
         let admissible = model.tip_m.x > lower && model.tip_m.x < upper;
         flight.lands = away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible);
         // The higher the tip, the faster down; the last stretch at landing speed.
-        let down = settings.landing_speed_m_s + DESCENT_PER_S * flight.height_m.max(0.0);
+        let down = settings.landing_speed_m_s + DESCENT_PER_S * flight.height_m.at_least(0.0);
         let vertical_speed = if !flight.lands {
             let rise = (settings.clearance_m - flight.height_m) / tick_s;
             rise.limited(-down, RAISING_M_S)
         } else {
             -down
         };
-        flight.height_m = (flight.height_m + vertical_speed * tick_s).max(-DEEPEST_M);
+        flight.height_m = (flight.height_m + vertical_speed * tick_s).at_least(-DEEPEST_M);
         let height_m = flight.height_m - arm.parameters().height_m;
         let path_rad = arm
             .joint_angles_rad(&Vector2::new(flight.landing_m, height_m), flight.posture)
@@ -169,8 +171,8 @@ impl Recovery {
         let wanted = (path_rad - model.theta_rad) * (bandwidth * bandwidth)
             + (path_rate_rad_s - model.theta_dot_rad_s) * (2.0 * bandwidth);
         let size = wanted.norm_squared().square_root();
-        let scale =
-            (settings.acceleration_rad_s2 / size.max(settings.acceleration_rad_s2)).min(1.0);
+        let scale = (settings.acceleration_rad_s2 / size.at_least(settings.acceleration_rad_s2))
+            .at_most(1.0);
         LawOutput {
             torque_nm: model.inverse_dynamics_nm(&(wanted * scale), &Vector2::zeros()),
             contact_force_n: Vector2::zeros(),

@@ -28,6 +28,7 @@ pub mod kinematics;
 pub mod message;
 pub mod range;
 pub mod real;
+mod square_root;
 pub mod status;
 pub mod wire;
 

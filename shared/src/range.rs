@@ -48,25 +48,30 @@ impl core::error::Error for OutOfRange {}
 ///
 /// # Errors
 /// [`OutOfRange`] naming `key` otherwise.
+#[inline]
 pub fn check<T: Real>(
     key: &'static str,
     value: T,
     minimum: f64,
     maximum: f64,
 ) -> Result<(), OutOfRange> {
-    let value = value.to_f64();
-    // In the value's precision: 0.1 is allowed where 0.1 is the bound.
-    let minimum = T::literal(minimum).to_f64();
-    let maximum = T::literal(maximum).to_f64();
-    if value.is_finite() && (minimum..=maximum).contains(&value) {
+    // In the value's precision: 0.1 is allowed where 0.1 is the bound, and a microcontroller
+    // without double precision compares singles.
+    if value >= T::literal(minimum) && value <= T::literal(maximum) && value.is_finite() {
         Ok(())
     } else {
-        Err(OutOfRange {
-            key,
-            value,
-            minimum,
-            maximum,
-        })
+        Err(refused(key, value.to_f64(), minimum, maximum))
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn refused(key: &'static str, value: f64, minimum: f64, maximum: f64) -> OutOfRange {
+    OutOfRange {
+        key,
+        value,
+        minimum,
+        maximum,
     }
 }
 

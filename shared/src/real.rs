@@ -10,6 +10,8 @@
 
 use nalgebra::RealField;
 
+use crate::square_root::square_root;
+
 /// A real number whose elementary functions do not depend on the host.
 pub trait Real: RealField + Copy {
     /// The nearest number to an `f64` literal.
@@ -36,6 +38,19 @@ pub trait Real: RealField + Copy {
         } else {
             self
         }
+    }
+
+    /// The lesser of this number and `maximum`; NaN stays NaN. A comparison: the standard
+    /// library's `min` is a function call on a Cortex-M4F.
+    #[inline]
+    fn at_most(self, maximum: Self) -> Self {
+        if self > maximum { maximum } else { self }
+    }
+
+    /// The greater of this number and `minimum`; NaN stays NaN.
+    #[inline]
+    fn at_least(self, minimum: Self) -> Self {
+        if self < minimum { minimum } else { self }
     }
 
     /// Sine and cosine of an angle in rad.
@@ -131,7 +146,7 @@ impl Real for f32 {
 
     #[inline]
     fn square_root(self) -> Self {
-        libm::sqrtf(self)
+        square_root(self)
     }
 }
 

@@ -273,8 +273,8 @@ impl Hybrid {
                 let p = input.model.p_per_kg(friction.coefficient, friction.slip);
                 let share = OBSERVER_SHARE * p / input.model.q.m22;
                 let weight = (input.tick_s / (time_constant_s + input.tick_s))
-                    .min(share)
-                    .max(0.0);
+                    .at_most(share)
+                    .at_least(0.0);
                 let expected = -friction.coefficient * friction.slip.sign::<f32>() * normal_force_n;
                 let rest = input.force_n.x - expected;
                 self.filtered_friction_n += weight * (rest - self.filtered_friction_n);
