@@ -266,11 +266,8 @@ impl Controller {
             self.posture = posture;
         }
         if armed || (contact && !touched && state == SupervisorState::Armed) {
-            self.reference = ReferenceGenerator::new(
-                &self.configuration.reference,
-                tip_t_m,
-                self.configuration.tick_hz,
-            );
+            let program = &self.configuration.reference;
+            self.reference.restart(program, tip_t_m);
         }
         self.governor
             .search(&self.arm, self.posture, tip_t_m, &self.friction.estimate());

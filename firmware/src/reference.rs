@@ -130,16 +130,24 @@ pub struct ReferenceGenerator {
 impl ReferenceGenerator {
     /// A generator that stands at `start_m` and then follows `program`.
     pub fn new(program: &Program, start_m: f32, tick_hz: f32) -> Self {
-        let mut queue = Deque::new();
-        for segment in &program.segments {
-            // Cannot fail: the queue has the program's capacity.
-            let _ = queue.push_back(*segment);
-        }
-        Self {
+        let mut generator = Self {
             tick_hz,
-            queue,
+            queue: Deque::new(),
             start_m,
             elapsed_ticks: 0,
+        };
+        generator.restart(program, start_m);
+        generator
+    }
+
+    /// Stands at `start_m` and then follows `program`. Takes as long as the program has segments.
+    pub fn restart(&mut self, program: &Program, start_m: f32) {
+        self.start_m = start_m;
+        self.elapsed_ticks = 0;
+        self.queue.clear();
+        for segment in &program.segments {
+            // Cannot fail: the queue has the program's capacity.
+            let _ = self.queue.push_back(*segment);
         }
     }
 

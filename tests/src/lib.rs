@@ -71,7 +71,7 @@ fn built_image(name: &str) -> PathBuf {
         "`cargo xtask build-fw` fails: run `cargo xtask setup` first"
     );
     workspace
-        .join("target/thumbv7em-none-eabihf/release")
+        .join("target/thumbv7em-none-eabihf/firmware")
         .join(name)
 }
 

@@ -23,8 +23,9 @@ fn run(bench: &Bench, line: &Line, more: &[&str]) -> (Value, Value) {
         "run", "--host", "serial", "--port", &port, "--timing", "t.json",
     ];
     let report = bench.report(&[&serial[..], more, &QUIET].concat());
-    let timing = std::fs::read_to_string(bench.path("t.json")).unwrap();
-    (report, serde_json::from_str(&timing).unwrap())
+    let timing = std::fs::read_to_string(bench.path("t.json"));
+    let timing = timing.expect("the run writes it");
+    (report, serde_json::from_str(&timing).expect("JSON"))
 }
 
 fn count(report: &Value, path: &str) -> u64 {
@@ -120,7 +121,8 @@ impl Pressing {
             "controller.estimator.bandwidth_rad_s=100",
             "controller.deadlines.missing_frames=100",
         ];
-        let scenario = Scenario::load("hybrid-elbow-down", &overrides.map(String::from)).unwrap();
+        let scenario = Scenario::load("hybrid-elbow-down", &overrides.map(String::from));
+        let scenario = scenario.expect("valid overrides");
         let configuration = scenario.controller_configuration();
         let encoders = configuration.converters.encoders;
         let frame = SensorFrame {
@@ -132,8 +134,9 @@ impl Pressing {
             tangential_force: ForceCounts(-614),
             ..Default::default()
         };
+        let board = Serial::open(&line.host_port, &configuration, Plant::Realtime);
         Self {
-            board: Serial::open(&line.host_port, &configuration, Plant::Realtime).unwrap(),
+            board: board.expect("a board on the line"),
             frame,
         }
     }
@@ -142,7 +145,8 @@ impl Pressing {
         self.frame.tick += 1;
         self.frame.sequence += 1;
         self.frame.inputs = inputs;
-        self.board.exchange(&self.frame).unwrap().frame
+        let answer = self.board.exchange(&self.frame);
+        answer.expect("the board answers").frame
     }
 }
 

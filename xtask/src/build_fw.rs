@@ -8,6 +8,9 @@ use crate::command::{ChoreError, cargo, run_with, workspace};
 /// The microcontroller's target.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
+/// The profile of the images.
+const PROFILE: &str = "firmware";
+
 /// Debian's own compiler, from the packages `rustc-web` and `rust-web-src`.
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
@@ -26,7 +29,8 @@ enum Toolchain {
 pub fn run() -> Result<(), ChoreError> {
     let build = [
         "build",
-        "--release",
+        "--profile",
+        PROFILE,
         "--package",
         "painleve-firmware",
         "--features",
@@ -45,7 +49,7 @@ pub fn run() -> Result<(), ChoreError> {
             let environment = [("RUSTC", DEBIAN_RUSTC), ("RUSTC_BOOTSTRAP", "1")];
             run_with("/usr/bin/cargo", &build, &environment)?;
             for name in ["painleve-qemu", "painleve-qemu-serial", "painleve-f405"] {
-                let built = workspace().join(format!("target/debian/{TARGET}/release/{name}"));
+                let built = workspace().join(format!("target/debian/{TARGET}/{PROFILE}/{name}"));
                 copy(&built, &image(name))?;
             }
             Ok(())
@@ -55,7 +59,7 @@ pub fn run() -> Result<(), ChoreError> {
 
 /// Where an image is once built.
 pub fn image(name: &str) -> PathBuf {
-    workspace().join(format!("target/{TARGET}/release/{name}"))
+    workspace().join(format!("target/{TARGET}/{PROFILE}/{name}"))
 }
 
 /// Whether `rustc` has the target's core library.

@@ -50,7 +50,7 @@ fn transfer<BUS: SpiBus, SELECT: OutputPin>(
 /// 14 bits of angle below an error flag and even parity.
 fn angle_counts(word: u16) -> u32 {
     let error = word & 0x4000 != 0;
-    if error || word.count_ones() % 2 != 0 {
+    if error || !word.count_ones().is_multiple_of(2) {
         BROKEN
     } else {
         u32::from(word & 0x3fff)

@@ -30,7 +30,7 @@ use crate::timing::Unit;
 const PROGRAM: &str = "qemu-system-arm";
 
 /// Where the workspace builds the image, below its target folder.
-const IMAGE: &str = "thumbv7em-none-eabihf/release/painleve-qemu";
+const IMAGE: &str = "thumbv7em-none-eabihf/firmware/painleve-qemu";
 
 /// Time between two looks at whether the emulator is alive.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
