@@ -3,7 +3,8 @@
 mod admissible;
 mod bifurcation;
 mod cells;
-mod options;
+mod closed_loop_bifurcation;
+pub mod options;
 mod poincare;
 mod regions;
 mod sliding_range;
@@ -29,6 +30,8 @@ enum StudyCommand {
     Bifurcation(bifurcation::BifurcationArguments),
     /// Fig. 5: θ1 at each upward zero of θ̇1, and whether the motion is periodic or chaotic.
     Poincare(poincare::PoincareArguments),
+    /// Fig. 12: over the belt's speed with the controller in the loop.
+    ClosedLoopBifurcation(closed_loop_bifurcation::ClosedLoopBifurcationArguments),
     /// How far each controller slides before it leaves the belt.
     SlidingRange(sliding_range::SlidingRangeArguments),
 }
@@ -40,6 +43,7 @@ pub fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
         StudyCommand::Regions(arguments) => regions::run(arguments),
         StudyCommand::Bifurcation(arguments) => bifurcation::run(arguments),
         StudyCommand::Poincare(arguments) => poincare::run(arguments),
+        StudyCommand::ClosedLoopBifurcation(arguments) => closed_loop_bifurcation::run(arguments),
         StudyCommand::SlidingRange(arguments) => sliding_range::run(arguments),
     }
 }
