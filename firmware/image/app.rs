@@ -18,19 +18,20 @@ use crate::board::Board;
 #[app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod tasks {
     use heapless::spsc::{Consumer, Producer, Queue};
-    use painleve_firmware::deadline_monitor::{DeadlineMonitor, Lapse};
+    use painleve_firmware::deadline_monitor::Lapse;
     use painleve_firmware::{Configuration, Controller};
-    use painleve_shared::frame::SensorFrame;
-    use painleve_shared::message::{Health, MAXIMUM_LENGTH, Plant, Request, Response};
-    use painleve_shared::status::{Fault, SupervisorState};
-    use painleve_shared::wire;
-    use rtic::Mutex;
+    use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+    use painleve_shared::message::{
+        Health, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, Plant, Request, Response,
+    };
+    use painleve_shared::wire::{self, Inbox, WireError};
     use stm32f4xx_hal::pac::Interrupt;
 
     use crate::Hardware;
     use crate::board::{Board, Bytes, Drive, Parts, Port};
-    use crate::inbox::Inbox;
+    use crate::configure;
     use crate::stack;
+    use crate::watch::{Change, Watch};
 
     /// An interrupt that no peripheral in use raises: it runs `link`.
     const LINK: Interrupt = Interrupt::SPI3;
@@ -40,52 +41,6 @@ mod tasks {
 
     /// Changes that may wait for the log.
     const EVENTS: usize = 8;
-
-    /// What the log hears of the control task.
-    #[derive(Clone, Copy, PartialEq)]
-    pub struct Change {
-        state: SupervisorState,
-        fault: Option<Fault>,
-    }
-
-    /// What is counted since the configuration.
-    pub struct Watch {
-        plant: Plant,
-        monitor: DeadlineMonitor,
-        /// What the link has against going on.
-        broken_link: Option<Fault>,
-        ticks: u32,
-        /// Ticks a second.
-        tick_hz: u32,
-        worst_elapsed: u32,
-        dropped_responses: u32,
-    }
-
-    impl Watch {
-        const fn new(plant: Plant, monitor: DeadlineMonitor, tick_hz: u32) -> Self {
-            Self {
-                plant,
-                monitor,
-                broken_link: None,
-                ticks: 0,
-                tick_hz,
-                worst_elapsed: 0,
-                dropped_responses: 0,
-            }
-        }
-
-        /// The counters; the stack is not looked at in here, it takes too long.
-        fn health(&self) -> Health {
-            Health {
-                stack_bytes: 0,
-                ticks: self.ticks,
-                corrupt_messages: self.monitor.total(Lapse::CorruptMessage),
-                dropped_responses: self.dropped_responses,
-                missing_frames: self.monitor.total(Lapse::MissingFrame),
-                overruns: self.monitor.total(Lapse::Overrun),
-            }
-        }
-    }
 
     #[shared]
     struct Shared {
@@ -131,7 +86,7 @@ mod tasks {
                 controller: None,
                 drive,
                 from_host: None,
-                watch: Watch::new(Plant::Lockstep, DeadlineMonitor::default(), 0),
+                watch: Watch::new(Plant::Lockstep, 0),
             },
             Local {
                 bytes,
@@ -141,10 +96,7 @@ mod tasks {
                 answers_out,
                 events_in,
                 events_out,
-                reported: Change {
-                    state: SupervisorState::Idle,
-                    fault: None,
-                },
+                reported: Change::NONE,
             },
         )
     }
@@ -167,40 +119,41 @@ mod tasks {
             };
             let frame = drive.sample(from_host.take());
             let missing = frame.is_none() && watch.plant == Plant::Realtime;
-            let missing = watch.monitor.note(Lapse::MissingFrame, missing);
-            if let Some(fault) = missing.or(watch.broken_link.take()) {
-                drive.actuate(&controller.stop(fault));
-            }
-            let Some(frame) = frame else {
-                return;
-            };
-            let start = drive.stopwatch();
-            let answer = controller.tick(&frame);
-            let elapsed = drive.stopwatch().wrapping_sub(start);
-            drive.actuate(&answer);
-            let response = Response::Actuator {
-                frame: answer,
-                elapsed,
+            let stopped = controller.note(Lapse::MissingFrame, u32::from(missing));
+            let response = match (frame, stopped) {
+                (None, None) => return,
+                (None, Some(stopped)) => {
+                    drive.actuate(&stopped);
+                    Response::Actuator {
+                        frame: stopped,
+                        elapsed: 0,
+                    }
+                }
+                (Some(frame), _) => {
+                    let start = drive.stopwatch();
+                    let mut answer = controller.tick(&frame);
+                    let elapsed = drive.stopwatch().wrapping_sub(start);
+                    drive.actuate(&answer);
+                    watch.tick(elapsed);
+                    let overrun = u32::from(drive.next_tick_is_due());
+                    if let Some(stopped) = controller.note(Lapse::Overrun, overrun) {
+                        drive.actuate(&stopped);
+                        answer = stopped;
+                    }
+                    Response::Actuator {
+                        frame: answer,
+                        elapsed,
+                    }
+                }
             };
             if cx.local.answers_in.enqueue(response).is_err() {
                 watch.dropped_responses = watch.dropped_responses.wrapping_add(1);
             }
             rtic::pend(LINK);
-
-            watch.ticks = watch.ticks.wrapping_add(1);
-            watch.worst_elapsed = watch.worst_elapsed.max(elapsed);
-            let telemetry = controller.telemetry();
-            let change = Change {
-                state: telemetry.state,
-                fault: telemetry.fault,
-            };
+            let change = Change::of(controller);
             // What the queue has no room for is not said.
             if change != *cx.local.reported && cx.local.events_in.enqueue(change).is_ok() {
                 *cx.local.reported = change;
-            }
-            let overrun = drive.next_tick_is_due();
-            if let Some(fault) = watch.monitor.note(Lapse::Overrun, overrun) {
-                drive.actuate(&controller.stop(fault));
             }
         });
     }
@@ -213,12 +166,14 @@ mod tasks {
 
     #[task(binds = SPI3, priority = 1,
            shared = [controller, drive, from_host, watch],
-           local = [port, inbox, answers_out, received: [u8; MAXIMUM_LENGTH] = [0; MAXIMUM_LENGTH]])]
+           local = [port, inbox, answers_out, decoded: Option<Configuration> = None,
+                    received: [u8; MAXIMUM_LENGTH] = [0; MAXIMUM_LENGTH]])]
     fn link(cx: link::Context) {
         let link::LocalResources {
             port,
             inbox,
             answers_out,
+            decoded,
             received,
             ..
         } = cx.local;
@@ -242,37 +197,50 @@ mod tasks {
                 let Some(message) = inbox.push(*byte) else {
                     continue;
                 };
-                let response = match wire::decode(message) {
+                let request = wire::decode(message);
+                let stopped = controller.lock(|it| note_message(it.as_mut(), &request));
+                if let Some(stopped) = stopped {
+                    drive.lock(|drive| drive.actuate(&stopped));
+                }
+                let response = match request {
                     Ok(Request::Sensor(frame)) => {
-                        note_message(&mut watch, false);
                         from_host.lock(|newest| *newest = Some(frame));
                         awaits_control = true;
                         continue;
                     }
                     Ok(Request::Configure {
-                        configuration,
                         plant,
+                        configuration,
                     }) => {
+                        // Without a controller `control` does nothing: the torque goes off before.
+                        drive.lock(|drive| drive.actuate(&ActuatorFrame::default()));
+                        controller.lock(|controller| *controller = None);
                         from_host.lock(|newest| *newest = None);
-                        // Holds up `control`, which has nothing to control yet.
-                        if controller.lock(|controller| configure(controller, &configuration)) {
-                            let tick_hz = configuration.tick_hz as u32;
-                            let monitor = DeadlineMonitor::default();
-                            watch.lock(|watch| *watch = Watch::new(plant, monitor, tick_hz));
-                            drive.lock(|drive| drive.start(&configuration, plant));
-                            Response::Ready
-                        } else {
-                            Response::Refused
+                        configure::decode(decoded, configuration);
+                        match decoded {
+                            Some(configuration) => {
+                                let tick_hz = configuration.tick_hz as u32;
+                                watch.lock(|watch| *watch = Watch::new(plant, tick_hz));
+                                let stopwatch_hz =
+                                    (&mut controller, &mut drive).lock(|controller, drive| {
+                                        configure::make(controller, configuration);
+                                        controller.as_ref()?;
+                                        drive.start(configuration, plant);
+                                        Some(drive.stopwatch_hz())
+                                    });
+                                stopwatch_hz.map_or(Response::Refused, |stopwatch_hz| {
+                                    Response::Ready { stopwatch_hz }
+                                })
+                            }
+                            None => Response::Refused,
                         }
                     }
                     Ok(Request::Health) => Response::Health(Health {
                         stack_bytes: stack::high_water_bytes(),
-                        ..watch.lock(|watch| watch.health())
+                        ..(&mut controller, &mut watch)
+                            .lock(|controller, watch| watch.health(controller.as_ref()))
                     }),
-                    Err(_) => {
-                        note_message(&mut watch, true);
-                        continue;
-                    }
+                    Err(_) => continue,
                 };
                 send(port, &response);
             }
@@ -283,30 +251,26 @@ mod tasks {
         }
     }
 
-    /// Counts good and broken messages; `control` acts on too many of these.
-    fn note_message(watch: &mut impl Mutex<T = Watch>, broken: bool) {
-        watch.lock(|watch| {
-            let fault = watch.monitor.note(Lapse::CorruptMessage, broken);
-            watch.broken_link = fault.or(watch.broken_link);
-        });
-    }
-
-    /// Makes a new controller in place of the old one, which stays if the
-    /// configuration is out of range. Out of line for the sake of the stack.
-    #[inline(never)]
-    fn configure(controller: &mut Option<Controller>, configuration: &Configuration) -> bool {
-        match Controller::new(configuration) {
-            Ok(new) => {
-                *controller = Some(new);
-                true
-            }
-            Err(_) => false,
-        }
+    /// Counts broken messages, good ones start over; the answer without torque if there are
+    /// too many of these.
+    fn note_message<M>(
+        controller: Option<&mut Controller>,
+        request: &Result<M, WireError>,
+    ) -> Option<ActuatorFrame> {
+        let controller = controller?;
+        let broken = |kinds: &[WireError]| request.as_ref().is_err_and(|it| kinds.contains(it));
+        let checksum = broken(&[WireError::Checksum]);
+        let garbage = broken(&[WireError::Garbage, WireError::Content]);
+        let stopped = controller.note(Lapse::FailedChecksum, u32::from(checksum));
+        controller
+            .note(Lapse::Garbage, u32::from(garbage))
+            .or(stopped)
     }
 
     /// A response that the host does not take is lost; the host asks again or gives up.
+    #[inline(never)]
     fn send(port: &mut <Hardware as Board>::Port, response: &Response) {
-        let mut buffer = [0; 96];
+        let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
         if let Ok(bytes) = wire::encode(response, &mut buffer) {
             let _ = port.send(bytes);
         }

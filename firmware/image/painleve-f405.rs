@@ -7,10 +7,10 @@ mod app;
 #[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
+mod configure;
+#[cfg(target_os = "none")]
 #[path = "board/f405.rs"]
 mod f405;
-#[cfg(target_os = "none")]
-mod inbox;
 #[cfg(target_os = "none")]
 #[path = "board/sensors.rs"]
 mod sensors;
@@ -19,6 +19,8 @@ mod stack;
 #[cfg(target_os = "none")]
 #[path = "board/uart.rs"]
 mod uart;
+#[cfg(target_os = "none")]
+mod watch;
 
 /// The board of this image.
 #[cfg(target_os = "none")]

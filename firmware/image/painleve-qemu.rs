@@ -7,12 +7,14 @@ mod app;
 #[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
-mod inbox;
+mod configure;
 #[cfg(target_os = "none")]
 #[path = "board/qemu.rs"]
 mod qemu;
 #[cfg(target_os = "none")]
 mod stack;
+#[cfg(target_os = "none")]
+mod watch;
 
 /// The board of this image.
 #[cfg(target_os = "none")]

@@ -8,9 +8,16 @@ use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Arm, ArmParameters};
 use serde::{Deserialize, Serialize};
 
-use crate::contact_detector::ContactDetectorSettings;
+use crate::belt_observer::BeltSettings;
+use crate::contact_guard::GuardSettings;
+use crate::contact_observer::ContactSettings;
+use crate::deadline_monitor::DeadlineLimits;
+use crate::edge_governor::GovernorSettings;
 use crate::estimator::EstimatorSettings;
+use crate::friction_estimator::FrictionSettings;
 use crate::law::LawSettings;
+use crate::length_calibration::CalibrationSettings;
+use crate::recovery::RecoverySettings;
 use crate::reference::Program;
 use crate::supervisor::SupervisorSettings;
 
@@ -39,11 +46,25 @@ pub struct Configuration {
     /// How rates are estimated from counts.
     pub estimator: EstimatorSettings,
     /// When the tip is taken to touch the belt.
-    pub contact: ContactDetectorSettings,
+    pub contact: ContactSettings,
+    /// How friction is estimated.
+    pub friction: FrictionSettings,
+    /// What is known about the belt.
+    pub belt: BeltSettings,
+    /// How the links' length is calibrated.
+    pub calibration: CalibrationSettings,
     /// When the drive is armed, and when it is shut down.
     pub supervisor: SupervisorSettings,
+    /// How many lapses in a row are survived.
+    pub deadlines: DeadlineLimits,
     /// The control law.
     pub law: LawSettings,
+    /// How the tip is kept pressed on the belt.
+    pub guard: GuardSettings,
+    /// How the reference is kept off the paradox.
+    pub governor: GovernorSettings,
+    /// How a tip that left the belt is brought back.
+    pub recovery: RecoverySettings,
     /// Where the tip shall go.
     pub reference: Program,
 }
@@ -79,8 +100,21 @@ impl Configuration {
         self.estimator.validate(self.tick_hz)?;
         self.contact.validate(self.converters.force.range)?;
         self.supervisor.validate()?;
+        self.friction.validate()?;
+        self.belt.validate()?;
+        self.calibration.validate()?;
+        self.deadlines.validate()?;
         self.law.validate()?;
-        self.reference.validate(arm.reach_on_belt_m())?;
+        self.guard.validate()?;
+        self.governor.validate()?;
+        self.recovery.validate()?;
+        // A governed reference may be out of reach: it is held at the edge.
+        let reach_m = if self.governor.enabled {
+            2.0 * self.arm.link_length_m
+        } else {
+            arm.reach_on_belt_m()
+        };
+        self.reference.validate(reach_m)?;
         Ok(arm)
     }
 }

@@ -1,41 +1,133 @@
-//! What may go wrong around a tick, each kind with its own counter and limit.
+//! What may go wrong with a tick and its sensor frame, each kind with its own counter and limit.
 //!
-//! A single late tick or broken message is counted and survived; more than a
-//! limit in a row is a fault, which the controller latches until it is reset.
-//! Stale, lost and out-of-range frames are the controller's own matter: they arrive.
+//! A single late tick, broken message or impossible reading is counted and
+//! survived; more than a limit in a row is a fault, which the controller latches
+//! until it is reset.
 
+use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::status::Fault;
+use serde::{Deserialize, Serialize};
 
-/// A failure around one tick.
+/// One kind of failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(usize)]
 pub enum Lapse {
     /// The tick was not done when the next one was due.
     Overrun,
-    /// There was no sensor frame for the tick.
+    /// There was no sensor frame when the tick was due: it is late, or lost.
     MissingFrame,
-    /// A message failed its checksum or could not be understood.
-    CorruptMessage,
+    /// A frame with the sequence number of an earlier one.
+    StaleFrame,
+    /// A sequence number that never came.
+    LostFrame,
+    /// An encoder reading that its resolution does not allow.
+    EncoderOutOfRange,
+    /// A force reading that its resolution does not allow.
+    ForceOutOfRange,
+    /// Bytes that are no message.
+    Garbage,
+    /// A message whose checksum is wrong.
+    FailedChecksum,
+}
+
+impl Lapse {
+    /// Number of kinds.
+    const COUNT: usize = Self::FailedChecksum as usize + 1;
+
+    /// Those that a frame can be about that has come.
+    pub const OF_FRAMES: [Self; 4] = [
+        Self::StaleFrame,
+        Self::LostFrame,
+        Self::EncoderOutOfRange,
+        Self::ForceOutOfRange,
+    ];
+
+    /// The fault that too many in a row are.
+    pub fn fault(self) -> Fault {
+        match self {
+            Self::Overrun => Fault::Overrun,
+            Self::MissingFrame => Fault::FrameMissing,
+            Self::StaleFrame => Fault::StaleFrame,
+            Self::LostFrame => Fault::FramesLost,
+            Self::EncoderOutOfRange => Fault::EncoderOutOfRange,
+            Self::ForceOutOfRange => Fault::ForceOutOfRange,
+            Self::Garbage | Self::FailedChecksum => Fault::CorruptMessages,
+        }
+    }
 }
 
 /// How many lapses in a row are survived.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct DeadlineLimits {
     /// Of [`Lapse::Overrun`].
     pub overruns: u32,
     /// Of [`Lapse::MissingFrame`].
     pub missing_frames: u32,
-    /// Of [`Lapse::CorruptMessage`].
-    pub corrupt_messages: u32,
+    /// Of [`Lapse::StaleFrame`].
+    pub stale_frames: u32,
+    /// Of [`Lapse::LostFrame`].
+    pub lost_frames: u32,
+    /// Of [`Lapse::EncoderOutOfRange`] and of [`Lapse::ForceOutOfRange`], each.
+    pub out_of_range_counts: u32,
+    /// Of [`Lapse::Garbage`].
+    pub garbage: u32,
+    /// Of [`Lapse::FailedChecksum`].
+    pub failed_checksums: u32,
 }
 
 impl Default for DeadlineLimits {
     /// A tick that overruns once may have met a rare branch; twice is a
-    /// processor that is too slow. At 1 kHz the arm moves 10 mm in 20 ms at most.
+    /// processor that is too slow. At 1 kHz the arm moves 10 mm in 20 ms at most. A sensor
+    /// whose answer is disturbed is right again at the next tick, or broken.
     fn default() -> Self {
         Self {
             overruns: 1,
             missing_frames: 10,
-            corrupt_messages: 10,
+            stale_frames: 5,
+            lost_frames: 5,
+            out_of_range_counts: 2,
+            garbage: 10,
+            failed_checksums: 10,
+        }
+    }
+}
+
+impl DeadlineLimits {
+    /// Checks the limits.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        for (key, limit) in [
+            ("controller.deadlines.overruns", self.overruns),
+            ("controller.deadlines.missing_frames", self.missing_frames),
+            ("controller.deadlines.stale_frames", self.stale_frames),
+            ("controller.deadlines.lost_frames", self.lost_frames),
+            (
+                "controller.deadlines.out_of_range_counts",
+                self.out_of_range_counts,
+            ),
+            ("controller.deadlines.garbage", self.garbage),
+            (
+                "controller.deadlines.failed_checksums",
+                self.failed_checksums,
+            ),
+        ] {
+            range::check(key, f64::from(limit), 0.0, 100.0)?;
+        }
+        Ok(())
+    }
+
+    fn of(&self, lapse: Lapse) -> u32 {
+        match lapse {
+            Lapse::Overrun => self.overruns,
+            Lapse::MissingFrame => self.missing_frames,
+            Lapse::StaleFrame => self.stale_frames,
+            Lapse::LostFrame => self.lost_frames,
+            Lapse::EncoderOutOfRange | Lapse::ForceOutOfRange => self.out_of_range_counts,
+            Lapse::Garbage => self.garbage,
+            Lapse::FailedChecksum => self.failed_checksums,
         }
     }
 }
@@ -51,9 +143,7 @@ struct Count {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DeadlineMonitor {
     limits: DeadlineLimits,
-    overruns: Count,
-    missing_frames: Count,
-    corrupt_messages: Count,
+    counts: [Count; Lapse::COUNT],
 }
 
 impl DeadlineMonitor {
@@ -65,38 +155,24 @@ impl DeadlineMonitor {
         }
     }
 
-    /// Takes note of whether `lapse` happened this time; returns the fault when it has
-    /// happened too often in a row.
-    pub fn note(&mut self, lapse: Lapse, happened: bool) -> Option<Fault> {
-        let (count, limit, fault) = match lapse {
-            Lapse::Overrun => (&mut self.overruns, self.limits.overruns, Fault::Overrun),
-            Lapse::MissingFrame => (
-                &mut self.missing_frames,
-                self.limits.missing_frames,
-                Fault::FrameMissing,
-            ),
-            Lapse::CorruptMessage => (
-                &mut self.corrupt_messages,
-                self.limits.corrupt_messages,
-                Fault::CorruptMessages,
-            ),
-        };
-        if !happened {
-            count.in_a_row = 0;
-            return None;
-        }
-        count.total = count.total.wrapping_add(1);
-        count.in_a_row = count.in_a_row.saturating_add(1);
-        (count.in_a_row > limit).then_some(fault)
+    /// Takes note that `lapse` did not happen this time.
+    #[inline]
+    pub fn note_good(&mut self, lapse: Lapse) {
+        self.counts[lapse as usize].in_a_row = 0;
+    }
+
+    /// Takes note of how many times `lapse` happened; says whether that is now too often in a row.
+    #[must_use]
+    pub fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
+        let count = &mut self.counts[lapse as usize];
+        count.total = count.total.wrapping_add(times);
+        count.in_a_row = count.in_a_row.saturating_add(times);
+        count.in_a_row > self.limits.of(lapse)
     }
 
     /// How often `lapse` has happened; wraps.
     pub fn total(&self, lapse: Lapse) -> u32 {
-        match lapse {
-            Lapse::Overrun => self.overruns.total,
-            Lapse::MissingFrame => self.missing_frames.total,
-            Lapse::CorruptMessage => self.corrupt_messages.total,
-        }
+        self.counts[lapse as usize].total
     }
 }
 
@@ -104,26 +180,52 @@ impl DeadlineMonitor {
 mod tests {
     use super::*;
 
+    const ALL: [Lapse; Lapse::COUNT] = [
+        Lapse::Overrun,
+        Lapse::MissingFrame,
+        Lapse::StaleFrame,
+        Lapse::LostFrame,
+        Lapse::EncoderOutOfRange,
+        Lapse::ForceOutOfRange,
+        Lapse::Garbage,
+        Lapse::FailedChecksum,
+    ];
+
     #[test]
-    fn each_kind_has_its_own_limit_and_a_good_tick_starts_over() {
-        let mut monitor = DeadlineMonitor::default();
-        assert_eq!(monitor.note(Lapse::Overrun, true), None);
-        for _ in 0..10 {
-            assert_eq!(monitor.note(Lapse::MissingFrame, true), None);
+    fn each_kind_has_its_own_counter_and_limit_and_a_good_one_starts_over() {
+        for lapse in ALL {
+            let limits = DeadlineLimits::default();
+            let limit = limits.of(lapse);
+            let mut monitor = DeadlineMonitor::new(limits);
+            for _ in 0..limit {
+                assert!(!monitor.note_bad(lapse, 1), "{lapse:?}");
+            }
+            monitor.note_good(lapse);
+            assert!(!monitor.note_bad(lapse, limit));
+            for other in ALL.into_iter().filter(|other| *other != lapse) {
+                assert!(!monitor.note_bad(other, 1));
+                assert_eq!(monitor.total(other), 1);
+            }
+            assert!(monitor.note_bad(lapse, 1), "{lapse:?}");
+            assert_eq!(monitor.total(lapse), 2 * limit + 1);
         }
-        assert_eq!(monitor.note(Lapse::MissingFrame, false), None);
-        assert_eq!(monitor.note(Lapse::MissingFrame, true), None);
-        assert_eq!(monitor.note(Lapse::Overrun, true), Some(Fault::Overrun));
-        assert_eq!(monitor.total(Lapse::MissingFrame), 11);
-        assert_eq!(monitor.total(Lapse::Overrun), 2);
-        assert_eq!(monitor.total(Lapse::CorruptMessage), 0);
     }
 
     #[test]
     fn totals_wrap_without_a_fault() {
         let mut monitor = DeadlineMonitor::default();
-        monitor.missing_frames.total = u32::MAX;
-        assert_eq!(monitor.note(Lapse::MissingFrame, true), None);
+        monitor.counts[Lapse::MissingFrame as usize].total = u32::MAX;
+        assert!(!monitor.note_bad(Lapse::MissingFrame, 1));
         assert_eq!(monitor.total(Lapse::MissingFrame), 0);
+    }
+
+    #[test]
+    fn limits_are_checked_and_named() {
+        let limits = DeadlineLimits {
+            garbage: 101,
+            ..Default::default()
+        };
+        let error = limits.validate().unwrap_err();
+        assert_eq!(error.key, "controller.deadlines.garbage");
     }
 }

@@ -9,6 +9,7 @@
 //! Both poles lie at z = exp(−ω T): gains 1 − z² and (1 − z)²/T.
 
 use nalgebra::Vector2;
+use painleve_shared::Real;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
@@ -26,7 +27,7 @@ pub struct EstimatorSettings {
 impl Default for EstimatorSettings {
     fn default() -> Self {
         Self {
-            bandwidth_rad_s: 250.0,
+            bandwidth_rad_s: 400.0,
             rate_limit_rad_s: 100.0,
         }
     }
@@ -65,6 +66,8 @@ struct TrackingLoop {
     counts: i32,
     angle_rad: f32,
     rate_rad_s: f32,
+    /// Measured less expected angle at the last tick, rad.
+    innovation_rad: f32,
 }
 
 /// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates.
@@ -73,6 +76,7 @@ pub struct Estimator {
     scales: [EncoderScale; 2],
     rad_per_count: [f32; 2],
     jump_counts: [i32; 2],
+    rate_limit_rad_s: f32,
     tick_s: f32,
     angle_gain: f32,
     rate_gain_per_s: f32,
@@ -91,6 +95,7 @@ impl Estimator {
             // One count more than the limit, for the rounding of two readings.
             jump_counts: rad_per_count
                 .map(|lsb| (settings.rate_limit_rad_s * tick_s / lsb) as i32 + 2),
+            rate_limit_rad_s: settings.rate_limit_rad_s,
             tick_s,
             angle_gain: 1.0 - pole * pole,
             rate_gain_per_s: (1.0 - pole) * (1.0 - pole) * tick_hz,
@@ -140,7 +145,9 @@ impl Estimator {
                 reading,
                 counts,
                 angle_rad: angle + self.angle_gain * innovation,
-                rate_rad_s: rate + self.rate_gain_per_s * innovation,
+                rate_rad_s: (rate + self.rate_gain_per_s * innovation)
+                    .limited(-self.rate_limit_rad_s, self.rate_limit_rad_s),
+                innovation_rad: innovation,
             }
         };
         let [lsb_1, lsb_2] = self.rad_per_count;
@@ -158,6 +165,7 @@ impl Estimator {
             counts,
             angle_rad: counts as f32 * lsb,
             rate_rad_s: 0.0,
+            innovation_rad: 0.0,
         }
     }
 
@@ -166,6 +174,24 @@ impl Estimator {
         self.joints.map_or_else(Vector2::zeros, |[one, two]| {
             Vector2::new(one.angle_rad, one.angle_rad + two.angle_rad)
         })
+    }
+
+    /// Measured less expected absolute joint angles at the last tick, rad.
+    pub fn innovation_rad(&self) -> Vector2<f32> {
+        self.joints.map_or_else(Vector2::zeros, |[one, two]| {
+            Vector2::new(one.innovation_rad, one.innovation_rad + two.innovation_rad)
+        })
+    }
+
+    /// Measured less estimated absolute joint angles, rad: what the last tick left of the
+    /// innovation.
+    pub fn residual_rad(&self) -> Vector2<f32> {
+        self.innovation_rad() * (1.0 - self.angle_gain)
+    }
+
+    /// One count of each encoder, rad.
+    pub fn count_rad(&self) -> Vector2<f32> {
+        self.rad_per_count.into()
     }
 
     /// Absolute joint rates θ̇, rad/s; zero before the second readings.

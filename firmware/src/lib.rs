@@ -18,12 +18,19 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod belt_observer;
 pub mod configuration;
-pub mod contact_detector;
+pub mod contact_guard;
+pub mod contact_observer;
 pub mod controller;
 pub mod deadline_monitor;
+pub mod edge_governor;
 pub mod estimator;
+pub mod friction_estimator;
 pub mod law;
+pub mod length_calibration;
+pub mod model;
+pub mod recovery;
 pub mod reference;
 pub mod supervisor;
 pub mod telemetry;

@@ -159,6 +159,17 @@ impl ReferenceGenerator {
         }
     }
 
+    /// Where the reference has got to, at rest: what to hold while time stands still.
+    pub fn present(&self) -> TipReference {
+        let position_m = self.queue.front().map_or(self.start_m, |segment| {
+            at(segment, self.start_m, self.elapsed_ticks, self.tick_hz).position_m
+        });
+        TipReference {
+            position_m,
+            ..Default::default()
+        }
+    }
+
     /// Whether the last segment has ended.
     pub fn is_done(&self) -> bool {
         self.queue.is_empty()

@@ -10,8 +10,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnLiftOff {
-    /// The law goes on, as in the paper, until the time limit.
+    /// The tip is brought back onto the belt, a limited number of times.
     #[default]
+    Recover,
+    /// The law goes on, as in the paper, until the time limit.
     Continue,
     /// The fault [`Fault::LiftOffTooLong`] is latched at once.
     Fault,
@@ -29,10 +31,10 @@ pub struct SupervisorSettings {
     pub on_lift_off: OnLiftOff,
     /// Ticks without contact after which the drive is shut down; 0 for never.
     pub lift_off_limit_ticks: u32,
-    /// Frames that may be lost in a row.
-    pub lost_frames_limit: u32,
-    /// Repeated or old frames in a row that are tolerated.
-    pub stale_frames_limit: u32,
+    /// Lift-offs in a row from which the tip is brought back …
+    pub recoveries_limit: u32,
+    /// … a row being ended by so many ticks in contact.
+    pub recovered_ticks: u32,
 }
 
 impl Default for SupervisorSettings {
@@ -40,10 +42,10 @@ impl Default for SupervisorSettings {
         Self {
             arming_ticks: 10,
             arming_limit_ticks: 1000,
-            on_lift_off: OnLiftOff::Continue,
+            on_lift_off: OnLiftOff::Recover,
             lift_off_limit_ticks: 2000,
-            lost_frames_limit: 5,
-            stale_frames_limit: 5,
+            recoveries_limit: 10,
+            recovered_ticks: 1000,
         }
     }
 }
@@ -76,16 +78,16 @@ impl SupervisorSettings {
             1e8,
         )?;
         ticks(
-            "controller.supervisor.lost_frames_limit",
-            self.lost_frames_limit,
+            "controller.supervisor.recoveries_limit",
+            self.recoveries_limit,
             0.0,
-            100.0,
+            1e6,
         )?;
         ticks(
-            "controller.supervisor.stale_frames_limit",
-            self.stale_frames_limit,
-            0.0,
-            100.0,
+            "controller.supervisor.recovered_ticks",
+            self.recovered_ticks,
+            1.0,
+            1e8,
         )
     }
 }
@@ -99,6 +101,8 @@ pub struct Supervisor {
     /// Ticks in the present state, or in contact while armed.
     ticks: u32,
     contact_ticks: u32,
+    /// Lift-offs in a row.
+    lift_offs: u32,
     inputs: DigitalInputs,
 }
 
@@ -111,6 +115,7 @@ impl Supervisor {
             fault: None,
             ticks: 0,
             contact_ticks: 0,
+            lift_offs: 0,
             inputs: DigitalInputs::default(),
         }
     }
@@ -133,12 +138,22 @@ impl Supervisor {
         )
     }
 
+    /// Whether a tip in the air is brought back onto the belt.
+    pub fn recovers(&self) -> bool {
+        self.settings.on_lift_off == OnLiftOff::Recover && self.drives()
+    }
+
     /// Latches a fault. The first one stays.
     pub fn latch(&mut self, fault: Fault) {
         if self.fault.is_none() {
             self.fault = Some(fault);
         }
         self.enter(SupervisorState::Fault);
+    }
+
+    /// Stops the drive without looking at anything else.
+    pub fn disable(&mut self) {
+        self.enter(SupervisorState::Idle);
     }
 
     /// One tick: `has_law` says whether there is anything to arm.
@@ -157,6 +172,7 @@ impl Supervisor {
             SupervisorState::Idle => {
                 // An edge, so that a reset alone does not start the drive again.
                 if rises(DigitalInputs::ENABLE) && has_law {
+                    self.lift_offs = 0;
                     self.enter(SupervisorState::Armed);
                 }
             }
@@ -174,9 +190,19 @@ impl Supervisor {
                 }
             }
             SupervisorState::Tracking => {
+                if self.ticks > self.settings.recovered_ticks {
+                    self.lift_offs = 0;
+                }
                 if !contact {
+                    self.lift_offs = self.lift_offs.saturating_add(1);
+                    let limit = self.settings.recoveries_limit;
                     match self.settings.on_lift_off {
-                        OnLiftOff::Continue => self.enter(SupervisorState::LiftOff),
+                        OnLiftOff::Recover if self.lift_offs > limit => {
+                            self.latch(Fault::RecoveryFailed);
+                        }
+                        OnLiftOff::Recover | OnLiftOff::Continue => {
+                            self.enter(SupervisorState::LiftOff);
+                        }
                         OnLiftOff::Fault => self.latch(Fault::LiftOffTooLong),
                     }
                 }

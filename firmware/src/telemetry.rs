@@ -1,5 +1,6 @@
 //! What went on inside the controller at its last tick, in SI units.
 
+use painleve_shared::Slip;
 use painleve_shared::status::{Fault, SupervisorState};
 
 /// A snapshot for logs and displays; nothing is controlled by it.
@@ -28,12 +29,28 @@ pub struct Telemetry {
     pub torque_nm: [f32; 2],
     /// Whether the tip is taken to touch.
     pub contact: bool,
+    /// How sure that is, 0 … 1.
+    pub contact_confidence: f32,
+    /// Estimated friction coefficient.
+    pub friction: f32,
+    /// Its standard deviation.
+    pub friction_deviation: f32,
+    /// Direction of slip.
+    pub slip: Slip,
+    /// Whether the tip seems to move with the belt.
+    pub sticks: bool,
+    /// Edges of the admissible stretch of the belt, m.
+    pub edges_m: [f32; 2],
+    /// Whether an edge holds the reference back.
+    pub at_edge: bool,
+    /// Whether the tip is being brought back onto the belt.
+    pub recovering: bool,
+    /// Whether the contact guard changed the torque.
+    pub guarded: bool,
     /// Whether the torque was limited.
     pub saturated: bool,
-    /// Frames lost since the start.
-    pub lost_frames: u32,
-    /// Repeated or old frames since the start.
-    pub stale_frames: u32,
+    /// Ticks on which the contact guard acted since the start.
+    pub guarded_ticks: u32,
     /// Ticks with limited torque since the start.
     pub saturated_ticks: u32,
 }

@@ -127,6 +127,24 @@ impl<T: Real> Arm<T> {
         &self.parameters
     }
 
+    /// The same arm with links of another length (m), equally heavy. The length is not checked.
+    #[must_use]
+    pub fn with_link_length(&self, link_length_m: T) -> Self {
+        let ratio = link_length_m / self.parameters.link_length_m;
+        let square = ratio * ratio;
+        Self {
+            parameters: ArmParameters {
+                link_length_m,
+                ..self.parameters
+            },
+            inertia_1: self.inertia_1 * square,
+            inertia_coupling: self.inertia_coupling * square,
+            inertia_2: self.inertia_2 * square,
+            gravity_1: self.gravity_1 * ratio,
+            gravity_2: self.gravity_2 * ratio,
+        }
+    }
+
     /// Largest |z_t| (m) at which the tip can touch the belt: √(4l² − H²).
     pub fn reach_on_belt_m(&self) -> T {
         let reach = self.parameters.link_length_m * T::literal(2.0);
@@ -152,6 +170,30 @@ mod tests {
             ..Default::default()
         };
         assert_eq!(Arm::new(parameters).unwrap_err().key, "arm.height_m");
+    }
+
+    #[test]
+    fn an_arm_with_other_links_is_the_one_made_with_them() {
+        let parameters = ArmParameters::<f64>::default();
+        let link_length_m = 0.2;
+        let made = Arm::new(ArmParameters {
+            link_length_m,
+            ..parameters
+        })
+        .unwrap();
+        let changed = Arm::new(parameters)
+            .unwrap()
+            .with_link_length(link_length_m);
+        assert_eq!(made.parameters(), changed.parameters());
+        for (made, changed) in [
+            (made.inertia_1, changed.inertia_1),
+            (made.inertia_coupling, changed.inertia_coupling),
+            (made.inertia_2, changed.inertia_2),
+            (made.gravity_1, changed.gravity_1),
+            (made.gravity_2, changed.gravity_2),
+        ] {
+            assert!((made - changed).abs() < 1e-15);
+        }
     }
 
     #[test]

@@ -9,15 +9,16 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
-use crate::kinematics::Pose;
+use crate::kinematics::{Pose, Posture};
 use crate::real::Real;
 
 /// Direction of the tip's velocity relative to the belt, ż_r = ż_t − v_belt.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Slip {
     /// ż_r > 0, the paper's case: friction pulls towards −t.
+    #[default]
     Positive,
     /// ż_r < 0, its mirror image.
     Negative,
@@ -151,6 +152,40 @@ impl<T: Real> Arm<T> {
         p_of(&self.inverse_tip_inertia(pose), friction, slip)
     }
 
+    /// Q12/Q22 with the tip on the belt at `tip_t_m`: how strongly friction drives the tip into
+    /// the belt or off it, since p = Q22 (1 − μ s Q12/Q22). `None` out of reach or for a straight arm.
+    ///
+    /// On the belt the tip's direction φ and the elbow δ = θ2 − θ1 follow from z_t without
+    /// trigonometry (sin φ = z_t/d, cos δ = d²/2l² − 1, d² = z_t² + H²), and J M⁻¹ Jᵀ of two equal
+    /// rods becomes, up to one positive factor,
+    ///
+    /// ```text
+    /// Q12 = ⅔ cos δ sin 2φ + sin δ cos 2φ
+    /// Q22 = 5/3 − cos²δ − ⅔ cos δ cos 2φ + sin δ sin 2φ
+    /// ```
+    pub fn coupling_on_belt(&self, tip_t_m: T, posture: Posture) -> Option<T> {
+        let (length, height) = (self.parameters().link_length_m, self.parameters().height_m);
+        let square = tip_t_m * tip_t_m + height * height;
+        let scale = T::one() / square;
+        let sine_2phi = T::literal(2.0) * tip_t_m * height * scale;
+        let cosine_2phi = (height * height - tip_t_m * tip_t_m) * scale;
+        let cosine_elbow = square / (T::literal(2.0) * length * length) - T::one();
+        let sine_square = T::one() - cosine_elbow * cosine_elbow;
+        // Not `<=`: NaN is refused as well.
+        if sine_square.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
+            return None;
+        }
+        let sine_elbow = match posture {
+            Posture::ElbowUp => sine_square.square_root(),
+            Posture::ElbowDown => -sine_square.square_root(),
+        };
+        let two_thirds = T::literal(2.0 / 3.0) * cosine_elbow;
+        let tangential = two_thirds * sine_2phi + sine_elbow * cosine_2phi;
+        let normal = T::literal(5.0 / 3.0) - cosine_elbow * cosine_elbow - two_thirds * cosine_2phi
+            + sine_elbow * sine_2phi;
+        Some(tangential / normal)
+    }
+
     /// All contact terms at joint angles `theta` (rad), rates `theta_dot`
     /// (rad/s) and generalised torque `torque_nm` (see
     /// [`generalised_torque_nm`](crate::dynamics::generalised_torque_nm)).
@@ -179,7 +214,6 @@ impl<T: Real> Arm<T> {
 mod tests {
     use super::*;
     use crate::arm::ArmParameters;
-    use crate::kinematics::Posture;
     use proptest::prelude::*;
 
     fn arm() -> Arm<f64> {
@@ -228,6 +262,15 @@ mod tests {
             let here = p_on_belt(tip, posture, friction, Slip::Positive);
             let there = p_on_belt(-tip, posture.mirrored(), friction, Slip::Negative);
             prop_assert!((here - there).abs() < 1e-9);
+        }
+
+        #[test]
+        fn the_coupling_on_the_belt_is_that_of_the_matrix_q(tip in -0.184_f64..0.184, up: bool) {
+            let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
+            let theta = arm().joint_angles_on_belt_rad(tip, posture).unwrap();
+            let q = arm().inverse_tip_inertia(&Pose::new(&theta));
+            let coupling = arm().coupling_on_belt(tip, posture).unwrap();
+            prop_assert!((coupling - q.m12 / q.m22).abs() < 1e-9);
         }
 
         #[test]

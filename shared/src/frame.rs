@@ -28,6 +28,9 @@ impl DigitalInputs {
     pub const ENABLE: Self = Self(1);
     /// A rising edge clears a latched fault.
     pub const RESET: Self = Self(1 << 1);
+    /// Makes the tick last until the next one is due. Only the emulated board has this
+    /// input, for tests of the deadline monitor.
+    pub const OVERLOAD: Self = Self(1 << 31);
 
     /// Whether all bits of `inputs` are high.
     #[inline]
@@ -58,6 +61,16 @@ impl StatusFlags {
     pub const SATURATED: Self = Self(1 << 1);
     /// The last segment of the reference has ended.
     pub const REFERENCE_DONE: Self = Self(1 << 2);
+    /// The contact guard changed the torque to keep the tip pressed on the belt.
+    pub const GUARDED: Self = Self(1 << 3);
+    /// The reference is beyond the edge of the admissible stretch, and held there.
+    pub const AT_EDGE: Self = Self(1 << 4);
+    /// The tip is being brought back onto the belt.
+    pub const RECOVERING: Self = Self(1 << 5);
+    /// In contact: the tip seems to slide with ż_r < 0 (clear: ż_r > 0).
+    pub const SLIP_NEGATIVE: Self = Self(1 << 6);
+    /// In contact: the tip seems to move with the belt.
+    pub const STICKS: Self = Self(1 << 7);
 
     /// Whether all bits of `flags` are set.
     #[inline]

@@ -1,25 +1,27 @@
 //! What a board and its host say to each other over bytes, encoded by
 //! [`wire`](crate::wire): one request, one response.
 //!
-//! The configuration comes first, so that one image serves every scenario. Its
-//! type belongs to the controller, hence the parameter.
+//! The configuration comes first, so that one image serves every scenario.
 
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{ActuatorFrame, SensorFrame};
 
 /// Longest encoded message, in bytes: a configuration with a full reference.
-pub const MAXIMUM_LENGTH: usize = 512;
+pub const MAXIMUM_LENGTH: usize = 768;
+
+/// Longest encoded response, in bytes.
+pub const MAXIMUM_RESPONSE_LENGTH: usize = 80;
 
 /// What the host asks of the board.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Request<C> {
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Request<'a> {
     /// Start afresh; [`Response::Ready`] or [`Response::Refused`].
     Configure {
-        /// Configuration of the controller.
-        configuration: C,
         /// Where its sensor frames come from.
         plant: Plant,
+        /// Configuration of the controller, whose type is the controller's, by postcard.
+        configuration: &'a [u8],
     },
     /// Control one tick of a simulated plant; [`Response::Actuator`].
     Sensor(SensorFrame),
@@ -32,7 +34,7 @@ pub enum Request<C> {
 pub enum Plant {
     /// From the host, in [`Request::Sensor`], who waits for every answer.
     Lockstep,
-    /// From the host by the clock: a tick of the board's timer without a frame is a lapse.
+    /// From the host in time: a tick of the board's timer without a frame is a lapse.
     Realtime,
     /// From the board's own sensors, at every tick of its timer.
     Real,
@@ -43,15 +45,19 @@ pub enum Plant {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Response {
     /// The configuration is accepted and the control timer runs.
-    Ready,
+    Ready {
+        /// How fast the stopwatch of the answers counts, Hz: the processor's clock on
+        /// hardware, 10⁹ of virtual time under an emulator.
+        stopwatch_hz: u32,
+    },
     /// The configuration has a number that is out of range.
     Refused,
     /// The answer to a sensor frame.
     Actuator {
         /// The frame.
         frame: ActuatorFrame,
-        /// What the tick took, in counts of the board's stopwatch: processor
-        /// cycles on hardware, nanoseconds of virtual time under an emulator.
+        /// What the tick took, in counts of the board's stopwatch; 0 for an answer
+        /// that nobody asked for, because a fault has taken the torque off.
         elapsed: u32,
     },
     /// Counters.
@@ -66,12 +72,78 @@ pub struct Health {
     pub stack_bytes: u32,
     /// Ticks controlled.
     pub ticks: u32,
-    /// Messages that were no message: framing, checksum or content was wrong.
-    pub corrupt_messages: u32,
     /// Answers that nobody took in time.
     pub dropped_responses: u32,
-    /// Ticks without a sensor frame from a host that goes by the clock.
-    pub missing_frames: u32,
     /// Ticks that ended after the next one should have begun.
     pub overruns: u32,
+    /// Ticks without a sensor frame from a host that goes by the clock.
+    pub missing_frames: u32,
+    /// Frames with the sequence number of an earlier one.
+    pub stale_frames: u32,
+    /// Sequence numbers that never came.
+    pub lost_frames: u32,
+    /// Frames with a reading that its converter cannot give.
+    pub out_of_range_counts: u32,
+    /// Runs of bytes that were no message.
+    pub garbage: u32,
+    /// Messages whose checksum was wrong.
+    pub failed_checksums: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
+    use crate::frame::{DigitalInputs, StatusFlags};
+    use crate::wire;
+
+    #[test]
+    fn the_longest_responses_fit_their_buffer() {
+        let frame = ActuatorFrame {
+            tick: u32::MAX,
+            sequence: u32::MAX,
+            torques: [TorqueCounts(i32::MIN); 2],
+            reference_tip: Micrometres(i32::MIN),
+            estimated_tip: Micrometres(i32::MIN),
+            state: u8::MAX,
+            fault: u8::MAX,
+            flags: StatusFlags(u16::MAX),
+        };
+        let elapsed = u32::MAX;
+        let health = Health {
+            stack_bytes: u32::MAX,
+            ticks: u32::MAX,
+            dropped_responses: u32::MAX,
+            overruns: u32::MAX,
+            missing_frames: u32::MAX,
+            stale_frames: u32::MAX,
+            lost_frames: u32::MAX,
+            out_of_range_counts: u32::MAX,
+            garbage: u32::MAX,
+            failed_checksums: u32::MAX,
+        };
+        let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
+        for response in [
+            Response::Actuator { frame, elapsed },
+            Response::Health(health),
+        ] {
+            assert!(wire::encode(&response, &mut buffer).is_ok(), "{response:?}");
+        }
+    }
+
+    /// At 921,600 baud and ten bits a byte, 92 bytes pass in a millisecond.
+    #[test]
+    fn a_tick_at_1_khz_leaves_room_on_the_line_for_the_longest_frames() {
+        let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
+        let sensor = SensorFrame {
+            tick: u32::MAX,
+            sequence: u32::MAX,
+            joints: [EncoderCounts(u32::MAX); 2],
+            normal_force: ForceCounts(i32::MIN),
+            tangential_force: ForceCounts(i32::MIN),
+            inputs: DigitalInputs(u32::MAX),
+        };
+        let request = wire::encode(&Request::Sensor(sensor), &mut buffer);
+        assert!(request.is_ok_and(|bytes| bytes.len() <= 46));
+    }
 }

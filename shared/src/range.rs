@@ -20,8 +20,25 @@ impl core::fmt::Display for OutOfRange {
         write!(
             f,
             "{} = {} is outside the allowed range {} to {}",
-            self.key, self.value, self.minimum, self.maximum
+            self.key,
+            Shortest(self.value),
+            Shortest(self.minimum),
+            Shortest(self.maximum)
         )
+    }
+}
+
+/// A number as it was written: one that is exact in `f32` with the digits of an `f32`.
+struct Shortest(f64);
+
+impl core::fmt::Display for Shortest {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let single = self.0 as f32;
+        if f64::from(single) == self.0 {
+            single.fmt(f)
+        } else {
+            self.0.fmt(f)
+        }
     }
 }
 
@@ -38,6 +55,9 @@ pub fn check<T: Real>(
     maximum: f64,
 ) -> Result<(), OutOfRange> {
     let value = value.to_f64();
+    // In the value's precision: 0.1 is allowed where 0.1 is the bound.
+    let minimum = T::literal(minimum).to_f64();
+    let maximum = T::literal(maximum).to_f64();
     if value.is_finite() && (minimum..=maximum).contains(&value) {
         Ok(())
     } else {
@@ -61,6 +81,16 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "arm.link_mass_kg = NaN is outside the allowed range 0.001 to 100"
+        );
+    }
+
+    #[test]
+    fn single_precision_bounds_are_met_and_shown_as_written() {
+        assert!(check("x", 0.1_f32, 0.1, 1.0).is_ok());
+        let error = check("x", 0.5_f32, 0.1, 0.42).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "x = 0.5 is outside the allowed range 0.1 to 0.42"
         );
     }
 

@@ -72,11 +72,13 @@ pub enum Fault {
     FrameMissing = 10,
     /// Too many messages in a row were broken.
     CorruptMessages = 11,
+    /// The tip left the belt again and again.
+    RecoveryFailed = 12,
 }
 
 impl Fault {
     /// All faults, by number.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::EncoderOutOfRange,
         Self::EncoderJump,
         Self::ForceOutOfRange,
@@ -88,6 +90,7 @@ impl Fault {
         Self::Overrun,
         Self::FrameMissing,
         Self::CorruptMessages,
+        Self::RecoveryFailed,
     ];
 
     /// The fault with this number; 0 means none.
@@ -109,6 +112,7 @@ impl Fault {
             Self::Overrun => "control ticks not done when the next was due",
             Self::FrameMissing => "too many ticks in a row without a sensor frame",
             Self::CorruptMessages => "too many broken messages in a row",
+            Self::RecoveryFailed => "tip left the belt again and again",
         }
     }
 }

@@ -8,8 +8,13 @@ use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
 use serde::{Deserialize, Serialize};
 
+use crate::message::MAXIMUM_LENGTH;
+
 /// The smallest table there is: 256 entries of 4 bytes.
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// Bytes of the checksum behind a message.
+const CHECKSUM_LENGTH: usize = 4;
 
 /// Why bytes are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,15 +22,21 @@ static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 pub enum WireError {
     /// The buffer is too small for the message.
     BufferTooSmall,
-    /// Framing, checksum or content is wrong.
-    Corrupt,
+    /// The bytes are not framed as a message: noise, or one that is cut or too long.
+    Garbage,
+    /// A frame whose checksum is wrong.
+    Checksum,
+    /// A frame that arrived as it was sent, but holds nothing that is known here.
+    Content,
 }
 
 impl core::fmt::Display for WireError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             WireError::BufferTooSmall => "the buffer is too small for the message",
-            WireError::Corrupt => "framing, checksum or content of the message is wrong",
+            WireError::Garbage => "the bytes are not framed as a message",
+            WireError::Checksum => "the checksum of the message is wrong",
+            WireError::Content => "the message is of an unknown kind",
         })
     }
 }
@@ -51,11 +62,66 @@ pub fn encode<'a, M: Serialize>(message: &M, buffer: &'a mut [u8]) -> Result<&'a
 /// `bytes` as scratch.
 ///
 /// # Errors
-/// [`WireError::Corrupt`] for anything that `encode` did not make.
-pub fn decode<M: for<'de> Deserialize<'de>>(bytes: &mut [u8]) -> Result<M, WireError> {
-    let length = cobs::decode_in_place(bytes).map_err(|_| WireError::Corrupt)?;
-    let content = bytes.get(..length).ok_or(WireError::Corrupt)?;
-    postcard::from_bytes_crc32(content, digest()).map_err(|_| WireError::Corrupt)
+/// [`WireError::Garbage`], [`WireError::Checksum`] or [`WireError::Content`] for
+/// anything that `encode` did not make.
+pub fn decode<'a, M: Deserialize<'a>>(bytes: &'a mut [u8]) -> Result<M, WireError> {
+    let length = cobs::decode_in_place(bytes).map_err(|_| WireError::Garbage)?;
+    let framed = bytes.get(..length).ok_or(WireError::Garbage)?;
+    let (content, checksum) = framed
+        .split_last_chunk::<CHECKSUM_LENGTH>()
+        .ok_or(WireError::Garbage)?;
+    if CRC.checksum(content) != u32::from_le_bytes(*checksum) {
+        return Err(WireError::Checksum);
+    }
+    postcard::from_bytes(content).map_err(|_| WireError::Content)
+}
+
+/// Collects bytes up to the zero that ends a message; finds its place again after garbage.
+#[derive(Clone, Debug)]
+pub struct Inbox {
+    bytes: [u8; MAXIMUM_LENGTH],
+    length: usize,
+    /// The message is longer than any: its rest is skipped.
+    overlong: bool,
+}
+
+impl Default for Inbox {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Inbox {
+    /// An empty inbox.
+    pub const fn new() -> Self {
+        Self {
+            bytes: [0; MAXIMUM_LENGTH],
+            length: 0,
+            overlong: false,
+        }
+    }
+
+    /// Takes in one byte; returns a message, without its closing zero, when it is complete. An
+    /// overlong one comes out empty, which decodes as [`WireError::Garbage`].
+    pub fn push(&mut self, byte: u8) -> Option<&mut [u8]> {
+        if byte != 0 {
+            match self.bytes.get_mut(self.length) {
+                Some(place) => {
+                    *place = byte;
+                    self.length += 1;
+                }
+                None => self.overlong = true,
+            }
+            return None;
+        }
+        let length = core::mem::take(&mut self.length);
+        let overlong = core::mem::take(&mut self.overlong);
+        // A zero after a zero is no message, but how a sender makes sure of a fresh start.
+        if length == 0 {
+            return None;
+        }
+        self.bytes.get_mut(..if overlong { 0 } else { length })
+    }
 }
 
 #[cfg(test)]
@@ -98,7 +164,11 @@ mod tests {
             bytes.pop();
             let at = at % bytes.len();
             bytes[at] ^= 1 << bit;
-            prop_assert_eq!(decode::<SensorFrame>(&mut bytes), Err(WireError::Corrupt));
+            let decoded = decode::<SensorFrame>(&mut bytes);
+            prop_assert!(
+                matches!(decoded, Err(WireError::Garbage | WireError::Checksum)),
+                "{:?}", decoded
+            );
         }
     }
 
@@ -112,5 +182,44 @@ mod tests {
             );
         }
         assert!(decode::<SensorFrame>(&mut []).is_err());
+    }
+
+    #[test]
+    fn what_arrives_whole_and_is_unknown_is_told_from_what_is_damaged() {
+        let mut buffer = [0; 16];
+        let length = encode(&(1_u8, 2_u8), &mut buffer).unwrap().len();
+        let bytes = &mut buffer[..length - 1];
+        assert_eq!(
+            decode::<(u32, u32, u32)>(&mut bytes.to_vec()),
+            Err(WireError::Content)
+        );
+        bytes[2] ^= 1;
+        assert_eq!(decode::<(u8, u8)>(bytes), Err(WireError::Checksum));
+    }
+
+    #[test]
+    fn messages_are_found_again_after_garbage() {
+        let frame = SensorFrame {
+            tick: 7,
+            ..Default::default()
+        };
+        let good = encoded(&frame);
+        let mut stream = std::vec![9, 9, 9];
+        stream.extend(&good);
+        stream.extend([1; 2 * MAXIMUM_LENGTH]);
+        stream.push(0);
+        stream.extend(&good);
+        let mut inbox = Inbox::new();
+        let mut results = Vec::new();
+        for byte in stream {
+            if let Some(message) = inbox.push(byte) {
+                results.push(decode::<SensorFrame>(message));
+            }
+        }
+        // The first good message is spoilt by the garbage before it.
+        assert!(matches!(
+            results[..],
+            [Err(_), Err(WireError::Garbage), Ok(found)] if found == frame
+        ));
     }
 }

@@ -4,7 +4,8 @@
 //! - [`plant`]: the hybrid rigid-body model
 //! - [`converters`], [`simulation`]: the plant as the controller's wires see it
 //! - [`controller_host`], [`link`], [`realtime`]: whatever runs the controller, and how to reach it
-//! - [`board`]: the controller's image on an emulated microcontroller
+//! - [`board`]: the controller's image on a microcontroller, emulated or on a serial line
+//! - [`timing`]: what its ticks cost
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`scenario`]: everything that defines a run, as a TOML file
 //! - [`study`]: the paper's studies, many runs at a time
@@ -30,3 +31,4 @@ pub mod report;
 pub mod scenario;
 pub mod simulation;
 pub mod study;
+pub mod timing;

@@ -1,4 +1,8 @@
 //! Starting the `painleve` program from end-to-end tests, and looking at what it leaves.
+//!
+//! - [`line`]: a serial line that can be disturbed, with the image at its end
+
+pub mod line;
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
@@ -35,32 +39,40 @@ pub fn program() -> &'static Path {
     })
 }
 
-/// The controller's image for the emulated board; built if it is out of date.
+/// The controller's image for the emulated board in lockstep; built if it is out of date.
 ///
 /// # Panics
 /// If it cannot be built.
 pub fn image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    IMAGE.get_or_init(|| {
-        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
-        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let built = Command::new(cargo)
-            .args([
-                "run",
-                "--quiet",
-                "--package",
-                "painleve-xtask",
-                "--",
-                "build-fw",
-            ])
-            .current_dir(&workspace)
-            .status();
-        assert!(
-            built.is_ok_and(|status| status.success()),
-            "`cargo xtask build-fw` fails: run `cargo xtask setup` first"
-        );
-        workspace.join("target/thumbv7em-none-eabihf/release/painleve-qemu")
-    })
+    IMAGE.get_or_init(|| built_image("painleve-qemu"))
+}
+
+/// The same with the flash target's serial port as its link.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn serial_image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    IMAGE.get_or_init(|| built_image("painleve-qemu-serial"))
+}
+
+fn built_image(name: &str) -> PathBuf {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let xtask = ["run", "--quiet", "--package", "painleve-xtask", "--"];
+    let built = Command::new(cargo)
+        .args(xtask)
+        .arg("build-fw")
+        .current_dir(&workspace)
+        .status();
+    assert!(
+        built.is_ok_and(|status| status.success()),
+        "`cargo xtask build-fw` fails: run `cargo xtask setup` first"
+    );
+    workspace
+        .join("target/thumbv7em-none-eabihf/release")
+        .join(name)
 }
 
 /// A folder to run the program in, and the bus that is used there.

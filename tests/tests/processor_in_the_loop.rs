@@ -6,12 +6,16 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
 use painleve_firmware::{Configuration, Controller};
-use painleve_shared::frame::SensorFrame;
-use painleve_sil_host::board::{Emulator, TickTimes};
+use painleve_shared::counts::TorqueCounts;
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
+use painleve_shared::message::Health;
+use painleve_shared::status::{Fault, SupervisorState};
+use painleve_sil_host::board::{Board, Emulator};
 use painleve_sil_host::closed_loop::ClosedLoop;
 use painleve_sil_host::controller_host::{Answer, ControllerHost, HostError};
 use painleve_sil_host::scenario::{Scenario, built_in};
 use painleve_sil_host::simulation::Simulation;
+use painleve_sil_host::timing::{TickTimes, TimingReport};
 use painleve_tests::{Bench, child_of, image, is_running, signal};
 
 /// Gives every frame to both controllers and compares what they answer.
@@ -40,7 +44,7 @@ impl ControllerHost for Both {
         let before = self.native.clone();
         let native = self.native.tick(sensor);
         let answer = self.emulated.exchange(sensor).expect("the image answers");
-        self.times.push(&answer);
+        self.times.push(&answer.frame, answer.cost);
         let emulated = answer.frame;
         assert!(
             native == emulated,
@@ -80,10 +84,17 @@ fn the_image_answers_every_built_in_scenario_with_the_same_counts_within_budget(
             closed_loop.tick(&mut ()).unwrap();
         }
         let (_, mut both) = closed_loop.finish();
-        let health = both.emulated.health().unwrap();
-        assert_eq!(u64::from(health.ticks), scenario.run.ticks(), "{name}");
-        assert_eq!((health.corrupt_messages, health.overruns), (0, 0), "{name}");
-        let report = both.times.report("qemu", "instructions", &health);
+        let tick_hz = scenario.run.tick_hz;
+        let report = TimingReport::of_board(name, tick_hz, &both.times, &mut both.emulated);
+        let report = report.unwrap();
+        let stack_bytes = report.stack_bytes.unwrap();
+        let health = report.board.unwrap();
+        let nothing_else = Health {
+            stack_bytes,
+            ticks: scenario.run.ticks() as u32,
+            ..Default::default()
+        };
+        assert_eq!(health, nothing_else, "{name}");
         let most = budget["worst_tick_instructions"][name].as_u64();
         let most = most.unwrap_or_else(|| panic!("budget.json says nothing of {name}"));
         assert!(
@@ -92,11 +103,54 @@ fn the_image_answers_every_built_in_scenario_with_the_same_counts_within_budget(
             report.worst,
         );
         assert!(
-            u64::from(report.stack_bytes) <= budget["stack_bytes"].as_u64().unwrap(),
-            "{name}: {} bytes of stack are more than budget.json allows",
-            report.stack_bytes,
+            u64::from(stack_bytes) <= budget["stack_bytes"].as_u64().unwrap(),
+            "{name}: {stack_bytes} bytes of stack are more than budget.json allows",
         );
     }
+}
+
+/// Two ticks that last until the next is due, in the middle of a run.
+#[test]
+fn overload_latches_a_fault_without_torque_in_the_same_tick_until_it_is_armed_again() {
+    let scenario = Scenario::default();
+    let configuration = scenario.controller_configuration();
+    let mut simulation = Simulation::new(&scenario).unwrap();
+    let mut board = Emulator::start(image(), &configuration, false).unwrap();
+    let mut tick = |inputs: DigitalInputs| -> ActuatorFrame {
+        let mut frame = simulation.sample(&mut ()).unwrap();
+        frame.inputs = inputs;
+        let answer = board.exchange(&frame).unwrap().frame;
+        simulation.advance(Some(&answer), &mut ()).unwrap();
+        answer
+    };
+    let on = DigitalInputs::ENABLE;
+    let overload = on.with(DigitalInputs::OVERLOAD);
+    let no_torque = [TorqueCounts(0); 2];
+    for _ in 0..50 {
+        assert_eq!(tick(on).latched_fault(), None);
+    }
+    // One is survived, and a good one starts over.
+    for inputs in [overload, on, overload] {
+        let answer = tick(inputs);
+        assert_eq!(answer.supervisor_state(), Some(SupervisorState::Tracking));
+        assert_ne!(answer.torques, no_torque);
+    }
+    let stopped = tick(overload);
+    assert_eq!(stopped.latched_fault(), Some(Fault::Overrun));
+    assert_eq!(stopped.torques, no_torque);
+    for inputs in [on, DigitalInputs::default(), on] {
+        let answer = tick(inputs);
+        assert_eq!(answer.latched_fault(), Some(Fault::Overrun));
+        assert_eq!(answer.torques, no_torque);
+    }
+    let reset = tick(on.with(DigitalInputs::RESET));
+    assert_eq!(reset.supervisor_state(), Some(SupervisorState::Idle));
+    assert_eq!(tick(on).torques, no_torque, "a reset alone arms nothing");
+    tick(DigitalInputs::default());
+    let armed = tick(on);
+    assert_eq!(armed.supervisor_state(), Some(SupervisorState::Armed));
+    assert_ne!(armed.torques, no_torque);
+    assert_eq!(board.health().unwrap().overruns, 3);
 }
 
 const SHORT: [&str; 2] = ["--set", "run.duration_s=1.0"];

@@ -44,7 +44,7 @@ pub fn run() -> Result<(), ChoreError> {
             let build = [&build[..], &["-Zbuild-std=core", "--target-dir", &folder]].concat();
             let environment = [("RUSTC", DEBIAN_RUSTC), ("RUSTC_BOOTSTRAP", "1")];
             run_with("/usr/bin/cargo", &build, &environment)?;
-            for name in ["painleve-qemu", "painleve-f405"] {
+            for name in ["painleve-qemu", "painleve-qemu-serial", "painleve-f405"] {
                 let built = workspace().join(format!("target/debian/{TARGET}/release/{name}"));
                 copy(&built, &image(name))?;
             }

@@ -129,6 +129,7 @@ impl Board for F405 {
         Ok(Parts {
             drive: F405Drive {
                 timer_hz: rcc.clocks.timclk1().raw(),
+                core_hz: rcc.clocks.sysclk().raw(),
                 timer: device.TIM2,
                 watchdog,
                 torque_1,
@@ -190,6 +191,7 @@ fn start_crystal(rcc: &pac::RCC) -> Result<(), StartFault> {
 pub struct F405Drive {
     timer: pac::TIM2,
     timer_hz: u32,
+    core_hz: u32,
     watchdog: IndependentWatchdog,
     torque_1: C1,
     torque_2: C2,
@@ -241,6 +243,7 @@ impl Drive for F405Drive {
     fn start(&mut self, configuration: &Configuration, plant: Plant) {
         self.torque_bits = configuration.converters.torque.bits;
         self.plant = plant;
+        timer::set_back(&self.timer);
         timer::start(&self.timer, self.timer_hz as f32 / configuration.tick_hz);
         self.watchdog.start(TICK_LIMIT_MS.millis());
     }
@@ -279,5 +282,9 @@ impl Drive for F405Drive {
 
     fn stopwatch(&self) -> u32 {
         DWT::cycle_count()
+    }
+
+    fn stopwatch_hz(&self) -> u32 {
+        self.core_hz
     }
 }

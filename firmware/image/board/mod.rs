@@ -77,6 +77,9 @@ pub trait Drive {
 
     /// A running count for [`Response::Actuator`](painleve_shared::message::Response).
     fn stopwatch(&self) -> u32;
+
+    /// How fast [`Drive::stopwatch`] counts, Hz.
+    fn stopwatch_hz(&self) -> u32;
 }
 
 /// The side of the serial port's interrupt.

@@ -11,7 +11,7 @@
 
 use defmt_semihosting as _;
 use painleve_firmware::Configuration;
-use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::Plant;
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
@@ -36,14 +36,8 @@ impl Board for Qemu {
         device: pac::Peripherals,
         _: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
-        // The stopwatch.
-        device.TIM5.arr().write(|w| w.arr().set(u32::MAX));
-        device.TIM5.cr1().write(|w| w.cen().set_bit());
         Ok(Parts {
-            drive: Timers {
-                control: device.TIM2,
-                stopwatch: device.TIM5,
-            },
+            drive: Timers::start(device.TIM2, device.TIM5),
             bytes: NoBytes,
             port: Pipes {
                 requests: File::open(c"requests").map_err(|_| StartFault::Link)?,
@@ -75,6 +69,15 @@ pub struct Timers {
     stopwatch: pac::TIM5,
 }
 
+impl Timers {
+    /// Lets the stopwatch run.
+    pub fn start(control: pac::TIM2, stopwatch: pac::TIM5) -> Self {
+        stopwatch.arr().write(|w| w.arr().set(u32::MAX));
+        stopwatch.cr1().write(|w| w.cen().set_bit());
+        Self { control, stopwatch }
+    }
+}
+
 impl Drive for Timers {
     fn start(&mut self, configuration: &Configuration, _: Plant) {
         timer::start(&self.control, TIMER_HZ / configuration.tick_hz);
@@ -90,6 +93,10 @@ impl Drive for Timers {
 
     /// There is no other plant than a simulated one.
     fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame> {
+        let overload = |frame: SensorFrame| frame.inputs.contains(DigitalInputs::OVERLOAD);
+        if from_host.is_some_and(overload) {
+            while !self.next_tick_is_due() {}
+        }
         from_host
     }
 
@@ -98,6 +105,10 @@ impl Drive for Timers {
 
     fn stopwatch(&self) -> u32 {
         self.stopwatch.cnt().read().bits()
+    }
+
+    fn stopwatch_hz(&self) -> u32 {
+        TIMER_HZ as u32
     }
 }
 

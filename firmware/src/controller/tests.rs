@@ -30,8 +30,15 @@ fn configuration() -> Configuration {
         torque_limit_nm: 5.0,
         estimator: Default::default(),
         contact: Default::default(),
+        friction: Default::default(),
+        belt: Default::default(),
+        calibration: Default::default(),
         supervisor: Default::default(),
+        deadlines: Default::default(),
         law: LawSettings::Hybrid(HybridSettings::default()),
+        guard: Default::default(),
+        governor: Default::default(),
+        recovery: Default::default(),
         reference: Program::default(),
     }
 }
@@ -92,20 +99,91 @@ fn counters_wrap_without_a_fault() {
         answer = controller.tick(&frame(tick.wrapping_add(u32::MAX - 50)));
     }
     assert_eq!(answer.supervisor_state(), Some(SupervisorState::Tracking));
-    assert_eq!(controller.telemetry().lost_frames, 0);
+    assert_eq!(controller.monitor().total(Lapse::LostFrame), 0);
+}
+
+/// A frame with one reading that its converter cannot give.
+fn impossible(tick: u32, lapse: Lapse) -> SensorFrame {
+    let mut bad = frame(tick);
+    match lapse {
+        Lapse::EncoderOutOfRange => bad.joints[1] = EncoderCounts(16_384),
+        _ => bad.normal_force = ForceCounts(2048),
+    }
+    bad
 }
 
 #[test]
-fn readings_out_of_range_are_faults() {
-    let mut bad = frame(20);
-    bad.joints[1] = EncoderCounts(16_384);
-    assert_fault(&mut tracking(), &bad, Fault::EncoderOutOfRange);
-    let mut bad = frame(20);
-    bad.normal_force = ForceCounts(2048);
-    assert_fault(&mut tracking(), &bad, Fault::ForceOutOfRange);
+fn impossible_readings_keep_the_torque_and_too_many_in_a_row_are_a_fault() {
+    for lapse in [Lapse::EncoderOutOfRange, Lapse::ForceOutOfRange] {
+        let mut controller = tracking();
+        let before = controller.tick(&frame(20));
+        for tick in [21, 22] {
+            let answer = controller.tick(&impossible(tick, lapse));
+            assert_eq!(answer.torques, before.torques);
+            assert_eq!(answer.latched_fault(), None);
+        }
+        // The estimator bridges what it has not seen, and the count starts over.
+        assert_eq!(controller.tick(&frame(23)).latched_fault(), None);
+        for tick in [24, 25] {
+            controller.tick(&impossible(tick, lapse));
+        }
+        assert_eq!(controller.monitor().total(lapse), 4);
+        assert_eq!(controller.monitor().total(Lapse::LostFrame), 0);
+        assert_fault(&mut controller, &impossible(26, lapse), lapse.fault());
+    }
+}
+
+#[test]
+fn the_drive_can_be_disabled_by_a_frame_whose_readings_are_impossible() {
+    let mut controller = tracking();
+    let mut bad = impossible(20, Lapse::ForceOutOfRange);
+    bad.inputs = DigitalInputs::default();
+    let answer = controller.tick(&bad);
+    assert_eq!(answer.torques, [TorqueCounts(0); 2]);
+    assert_eq!(answer.supervisor_state(), Some(SupervisorState::Idle));
+    // ENABLE has to rise again in a frame that can be believed.
+    let answer = controller.tick(&frame(21));
+    assert_eq!(answer.supervisor_state(), Some(SupervisorState::Idle));
+}
+
+#[test]
+fn a_joint_that_jumps_is_a_fault_at_once() {
     let mut bad = frame(20);
     bad.joints[0].0 ^= 1 << 12;
     assert_fault(&mut tracking(), &bad, Fault::EncoderJump);
+}
+
+#[test]
+fn a_lapse_around_the_tick_latches_past_its_limit_until_armed_again() {
+    for lapse in [Lapse::Overrun, Lapse::MissingFrame, Lapse::FailedChecksum] {
+        let mut controller = tracking();
+        let stopped = (0..20).find_map(|_| controller.note(lapse, 1));
+        let stopped = stopped.expect("every kind has a limit");
+        assert_eq!(stopped.latched_fault(), Some(lapse.fault()));
+        assert_eq!(stopped.torques, [TorqueCounts(0); 2], "safe at once");
+        // Told once; the fault stays whatever comes.
+        assert_eq!(controller.note(lapse, 1), None);
+        controller.note(lapse, 0);
+        let answer = run(&mut controller, 20..30);
+        assert_eq!(answer.latched_fault(), Some(lapse.fault()));
+        assert_eq!(answer.torques, [TorqueCounts(0); 2]);
+        let mut tick = 30;
+        let mut with = |inputs| {
+            tick += 1;
+            let inputs = SensorFrame {
+                inputs,
+                ..frame(tick)
+            };
+            controller.tick(&inputs)
+        };
+        with(DigitalInputs::ENABLE.with(DigitalInputs::RESET));
+        let answer = with(DigitalInputs::ENABLE);
+        assert_eq!(answer.supervisor_state(), Some(SupervisorState::Idle));
+        with(DigitalInputs::default());
+        let answer = with(DigitalInputs::ENABLE);
+        assert_eq!(answer.supervisor_state(), Some(SupervisorState::Armed));
+        assert_ne!(answer.torques, [TorqueCounts(0); 2]);
+    }
 }
 
 #[test]
@@ -113,7 +191,7 @@ fn lost_frames_are_counted_and_too_many_are_a_fault() {
     let mut controller = tracking();
     let answer = controller.tick(&frame(22));
     assert_eq!(answer.latched_fault(), None);
-    assert_eq!(controller.telemetry().lost_frames, 2);
+    assert_eq!(controller.monitor().total(Lapse::LostFrame), 2);
     assert_fault(&mut controller, &frame(30), Fault::FramesLost);
 }
 
@@ -125,7 +203,7 @@ fn a_stale_frame_keeps_the_torque_and_many_are_a_fault() {
         let answer = controller.tick(&frame(20));
         assert_eq!(answer.torques, before.torques);
     }
-    assert_eq!(controller.telemetry().stale_frames, 5);
+    assert_eq!(controller.monitor().total(Lapse::StaleFrame), 5);
     assert_fault(&mut controller, &frame(20), Fault::StaleFrame);
 }
 

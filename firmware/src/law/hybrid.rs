@@ -9,10 +9,12 @@
 //! The paper's f_t is continuous. Sampled, the friction of the last sample fed forward
 //! makes a loop with gain −μ Q12/p per sample, which diverges where |μ Q12| > p.
 //! A first-order low-pass on the measured f_t moves the pole to −Q22/(p τ): stable
-//! wherever p > 0, and μ is needed nowhere. This is the default.
+//! wherever p > 0, and μ is needed nowhere. Towards the edge, p → 0, even that pole
+//! outruns the sampling. The default therefore feeds the estimated friction forward,
+//! −μ̂ s α_f, which closes no loop at all, and low-passes only what is left of the measured
+//! f_t, with a gain that falls with p (see [`FrictionFeedForward::Observed`]).
 
 use nalgebra::Vector2;
-use painleve_shared::dynamics::joint_torque_nm;
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Real, Slip};
 use serde::{Deserialize, Serialize};
@@ -28,6 +30,13 @@ pub enum FrictionFeedForward {
     /// The reading through a first-order low-pass.
     Filtered {
         /// Time constant τ, s.
+        time_constant_s: f32,
+    },
+    /// The estimated friction −μ̂ s α_f, corrected by the reading through a low-pass:
+    /// d̂ += k (f_t + μ̂ s α_f − d̂) with k = min(T/τ, ¼ p̂/Q22), so that the pole of the
+    /// loop through the contact, 1 − k Q22/p, stays near ¾ however close the edge is.
+    Observed {
+        /// Time constant τ far from the edge, s.
         time_constant_s: f32,
     },
     /// Coulomb friction −μ sign(ż_r) α_f with a known belt.
@@ -49,6 +58,12 @@ pub struct HybridSettings {
     pub position_gain_per_s2: f32,
     /// K'_D, 1/s.
     pub velocity_gain_per_s: f32,
+    /// Gain of ∫ (z_t* − z_t) dt, 1/s³; not in the paper.
+    pub position_integral_gain_per_s3: f32,
+    /// Largest acceleration by that integral, m/s².
+    pub position_integral_limit_m_s2: f32,
+    /// Time constant with which f_n* is approached after landing, s; 0 for at once, as in the paper.
+    pub force_time_constant_s: f32,
     /// K'_I, 1/s.
     pub force_integral_gain_per_s: f32,
     /// Largest correction by the force integral, N.
@@ -62,11 +77,14 @@ impl Default for HybridSettings {
     fn default() -> Self {
         Self {
             normal_force_n: 10.0,
-            position_gain_per_s2: 400.0,
-            velocity_gain_per_s: 40.0,
+            position_gain_per_s2: 3000.0,
+            velocity_gain_per_s: 100.0,
+            position_integral_gain_per_s3: 40_000.0,
+            position_integral_limit_m_s2: 20.0,
+            force_time_constant_s: 0.02,
             force_integral_gain_per_s: 5.0,
             force_integral_limit_n: 5.0,
-            friction: FrictionFeedForward::Filtered {
+            friction: FrictionFeedForward::Observed {
                 time_constant_s: 0.03,
             },
         }
@@ -96,6 +114,21 @@ impl HybridSettings {
             1e4,
         )?;
         key(
+            "controller.law.hybrid.position_integral_gain_per_s3",
+            self.position_integral_gain_per_s3,
+            1e9,
+        )?;
+        key(
+            "controller.law.hybrid.position_integral_limit_m_s2",
+            self.position_integral_limit_m_s2,
+            1e6,
+        )?;
+        key(
+            "controller.law.hybrid.force_time_constant_s",
+            self.force_time_constant_s,
+            10.0,
+        )?;
+        key(
             "controller.law.hybrid.force_integral_gain_per_s",
             self.force_integral_gain_per_s,
             1e4,
@@ -109,6 +142,11 @@ impl HybridSettings {
             FrictionFeedForward::Measured => Ok(()),
             FrictionFeedForward::Filtered { time_constant_s } => key(
                 "controller.law.hybrid.friction.filtered.time_constant_s",
+                time_constant_s,
+                10.0,
+            ),
+            FrictionFeedForward::Observed { time_constant_s } => key(
+                "controller.law.hybrid.friction.observed.time_constant_s",
                 time_constant_s,
                 10.0,
             ),
@@ -132,17 +170,20 @@ impl HybridSettings {
     }
 }
 
-/// |sin(θ2 − θ1)| below which J⁻¹ is bounded: the arm is nearly straight and
-/// no torque moves the tip along the belt any more.
-const STRAIGHT_ARM_SINE: f32 = 0.02;
+/// Part of the sampling that the loop through the contact may use: its pole is 1 − ¼ p̂/p.
+const OBSERVER_SHARE: f32 = 0.25;
 
 /// The hybrid law with its state.
 #[derive(Clone, Copy, Debug)]
 pub struct Hybrid {
     settings: HybridSettings,
+    /// Wanted normal force on its way to f_n*, N.
+    wanted_force_n: f32,
     /// K'_I ∫ (f_n* − f_n) dt, N.
     force_integral_n: f32,
-    /// Low-passed f_t, N.
+    /// Gain times ∫ (z_t* − z_t) dt, m/s².
+    position_integral_m_s2: f32,
+    /// Low-passed f_t, or what the estimated friction leaves of it, N.
     filtered_friction_n: f32,
 }
 
@@ -151,83 +192,101 @@ impl Hybrid {
     pub fn new(settings: HybridSettings) -> Self {
         Self {
             settings,
+            wanted_force_n: settings.normal_force_n,
             force_integral_n: 0.0,
+            position_integral_m_s2: 0.0,
             filtered_friction_n: 0.0,
         }
     }
 
-    /// Forgets the integral and starts the low-pass at the present friction.
+    /// Forgets the integrals and starts from the present contact force.
     pub fn reset(&mut self, input: &LawInput<'_>) {
         *self = Self::new(self.settings);
-        self.filtered_friction_n = input.force_n.x;
+        if self.settings.force_time_constant_s > 0.0 {
+            self.wanted_force_n = input.force_n.y.limited(0.0, self.settings.normal_force_n);
+        }
+        if !matches!(self.settings.friction, FrictionFeedForward::Observed { .. }) {
+            self.filtered_friction_n = input.force_n.x;
+        }
     }
 
     /// Torques for one tick.
     pub fn tick(&mut self, input: &LawInput<'_>) -> LawOutput {
+        let tangential_acceleration = self.tangential_acceleration_m_s2(input);
+        let normal_force = self.normal_force_n(input);
+        let friction_force = self.friction_force_n(input, normal_force);
+        let acceleration = input
+            .model
+            .joint_acceleration_rad_s2(&Vector2::new(tangential_acceleration, 0.0));
+        let force = Vector2::new(friction_force, normal_force);
+        LawOutput {
+            torque_nm: input.model.inverse_dynamics_nm(&acceleration, &force),
+            contact_force_n: force,
+        }
+    }
+
+    /// α_v, m/s².
+    fn tangential_acceleration_m_s2(&mut self, input: &LawInput<'_>) -> f32 {
         let settings = &self.settings;
-        let arm = input.arm;
-        let jacobian = arm.jacobian(&input.pose);
-        let tip_velocity =
-            jacobian.m11 * input.theta_dot_rad_s.x + jacobian.m12 * input.theta_dot_rad_s.y;
-        let tip_position = arm.tip_m(&input.pose).x;
+        let error = input.reference.position_m - input.model.tip_m.x;
+        let error_rate = input.reference.velocity_m_s - input.model.tip_velocity_m_s.x;
+        if input.contact && !input.saturated {
+            let limit = settings.position_integral_limit_m_s2;
+            let step = settings.position_integral_gain_per_s3 * error * input.tick_s;
+            self.position_integral_m_s2 =
+                (self.position_integral_m_s2 + step).limited(-limit, limit);
+        }
+        input.reference.acceleration_m_s2
+            + settings.position_gain_per_s2 * error
+            + settings.velocity_gain_per_s * error_rate
+            + self.position_integral_m_s2
+    }
 
-        let tangential_acceleration = input.reference.acceleration_m_s2
-            + settings.position_gain_per_s2 * (input.reference.position_m - tip_position)
-            + settings.velocity_gain_per_s * (input.reference.velocity_m_s - tip_velocity);
-
+    /// α_f, N.
+    fn normal_force_n(&mut self, input: &LawInput<'_>) -> f32 {
+        let settings = &self.settings;
+        let approach = input.tick_s / (settings.force_time_constant_s + input.tick_s);
+        self.wanted_force_n += approach * (settings.normal_force_n - self.wanted_force_n);
         // Anti-windup: no integration in the air, where there is no force to
         // control, nor while the torque is limited.
         if input.contact && !input.saturated {
             let step = settings.force_integral_gain_per_s
-                * (settings.normal_force_n - input.force_n.y)
+                * (self.wanted_force_n - input.force_n.y)
                 * input.tick_s;
             let limit = settings.force_integral_limit_n;
             self.force_integral_n = (self.force_integral_n + step).limited(-limit, limit);
         }
-        let normal_force = settings.normal_force_n + self.force_integral_n;
+        self.wanted_force_n + self.force_integral_n
+    }
 
-        let friction_force = match settings.friction {
+    /// f_t that is fed forward, N.
+    fn friction_force_n(&mut self, input: &LawInput<'_>, normal_force_n: f32) -> f32 {
+        match self.settings.friction {
             FrictionFeedForward::Measured => input.force_n.x,
             FrictionFeedForward::Filtered { time_constant_s } => {
                 let weight = input.tick_s / (time_constant_s + input.tick_s);
                 self.filtered_friction_n += weight * (input.force_n.x - self.filtered_friction_n);
                 self.filtered_friction_n
             }
+            FrictionFeedForward::Observed { time_constant_s } => {
+                let friction = &input.friction;
+                let p = input.model.p_per_kg(friction.coefficient, friction.slip);
+                let share = OBSERVER_SHARE * p / input.model.q.m22;
+                let weight = (input.tick_s / (time_constant_s + input.tick_s))
+                    .min(share)
+                    .max(0.0);
+                let expected = -friction.coefficient * friction.slip.sign::<f32>() * normal_force_n;
+                let rest = input.force_n.x - expected;
+                self.filtered_friction_n += weight * (rest - self.filtered_friction_n);
+                expected + self.filtered_friction_n
+            }
             FrictionFeedForward::Model {
                 friction,
                 belt_speed_m_s,
             } => {
-                let slip = Slip::of(tip_velocity - belt_speed_m_s);
-                -friction * slip.sign::<f32>() * normal_force
+                let slip = Slip::of(input.model.tip_velocity_m_s.x - belt_speed_m_s);
+                -friction * slip.sign::<f32>() * normal_force_n
             }
-        };
-
-        let centripetal = arm.centripetal_m_s2(&input.pose, &input.theta_dot_rad_s);
-        let tip_acceleration =
-            Vector2::new(tangential_acceleration - centripetal.x, -centripetal.y);
-        let length = arm.parameters().link_length_m;
-        let sine_elbow = input.pose.sine_elbow();
-        let bounded = if sine_elbow < 0.0 {
-            sine_elbow.min(-STRAIGHT_ARM_SINE)
-        } else {
-            sine_elbow.max(STRAIGHT_ARM_SINE)
-        };
-        // J⁻¹ a, with det J = l² sin(θ2 − θ1).
-        let scale = 1.0 / (length * length * bounded);
-        let acceleration = Vector2::new(
-            (jacobian.m22 * tip_acceleration.x - jacobian.m12 * tip_acceleration.y) * scale,
-            (jacobian.m11 * tip_acceleration.y - jacobian.m21 * tip_acceleration.x) * scale,
-        );
-
-        let load = Vector2::new(-friction_force, -normal_force);
-        let generalised =
-            arm.passive_torque_nm(&input.theta_rad, &input.theta_dot_rad_s, &input.pose)
-                + arm.centrifugal_torque_nm(&input.theta_dot_rad_s, &input.pose)
-                + arm.mass_matrix(&input.pose) * acceleration
-                + jacobian.transpose() * load;
-        LawOutput {
-            torque_nm: joint_torque_nm(&generalised),
-            acceleration_rad_s2: acceleration,
         }
     }
 }
@@ -235,6 +294,8 @@ impl Hybrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::friction_estimator::FrictionEstimate;
+    use crate::model::Model;
     use crate::reference::TipReference;
     use painleve_shared::dynamics::generalised_torque_nm;
     use painleve_shared::{Arm, ArmParameters, Pose, Posture};
@@ -252,14 +313,19 @@ mod tests {
             let theta_rad = arm.joint_angles_on_belt_rad(tip, posture).unwrap();
             let theta_dot_rad_s = arm.joint_rates_on_belt_rad_s(tip, speed, posture);
             let pose = Pose::new(&theta_rad);
+            let model = Model::new(&arm, theta_rad, theta_dot_rad_s);
             let settings = HybridSettings {
                 force_integral_gain_per_s: 0.0,
+                position_integral_gain_per_s3: 0.0,
                 friction: FrictionFeedForward::Model { friction, belt_speed_m_s: -1.0 },
                 ..Default::default()
             };
             let reference = TipReference { position_m: tip + 0.001, velocity_m_s: speed, acceleration_m_s2: 0.7 };
             let output = Hybrid::new(settings).tick(&LawInput {
-                arm: &arm, theta_rad, theta_dot_rad_s, pose, posture,
+                arm: &arm, model: &model, posture,
+                friction: FrictionEstimate {
+                    coefficient: friction, deviation: 0.0, slip: Slip::Positive, sticks: false,
+                },
                 force_n: Vector2::zeros(), contact: true, saturated: false,
                 reference, tick_s: 1e-3,
             });
@@ -269,7 +335,7 @@ mod tests {
             let force = Vector2::new(-friction * normal, normal);
             let acceleration = terms.free_acceleration_m_s2 + terms.q * force;
             prop_assert!((normal - 10.0).abs() < 0.02, "f_n = {}", normal);
-            prop_assert!((acceleration.x - (0.7 + 400.0 * 0.001)).abs() < 0.05, "{}", acceleration);
+            prop_assert!((acceleration.x - (0.7 + 3000.0 * 0.001)).abs() < 0.05, "{}", acceleration);
         }
     }
 }

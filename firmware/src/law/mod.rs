@@ -92,7 +92,7 @@ impl Law {
         match self {
             Self::Off => LawOutput {
                 torque_nm: Vector2::zeros(),
-                acceleration_rad_s2: Vector2::zeros(),
+                contact_force_n: Vector2::zeros(),
             },
             Self::Pid(law) => law.tick(input),
             Self::Hybrid(law) => law.tick(input),

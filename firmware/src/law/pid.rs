@@ -101,15 +101,15 @@ impl Pid {
             .arm
             .joint_angles_on_belt_rad(input.reference.position_m, input.posture)
             .or(self.wanted_rad)
-            .unwrap_or(input.theta_rad);
+            .unwrap_or(input.model.theta_rad);
         self.wanted_rad = Some(theta_wanted);
         let rate_wanted = input.arm.joint_rates_on_belt_rad_s(
             input.reference.position_m,
             input.reference.velocity_m_s,
             input.posture,
         );
-        let error = elbow_relative(&(theta_wanted - input.theta_rad));
-        let error_rate = elbow_relative(&(rate_wanted - input.theta_dot_rad_s));
+        let error = elbow_relative(&(theta_wanted - input.model.theta_rad));
+        let error_rate = elbow_relative(&(rate_wanted - input.model.theta_dot_rad_s));
         let [kp_1, kp_2] = self.settings.proportional_nm_rad;
         let [ki_1, ki_2] = self.settings.integral_nm_rad_s;
         let [kd_1, kd_2] = self.settings.derivative_nms_rad;
@@ -126,7 +126,7 @@ impl Pid {
                 kp_1 * error.x + self.integral_nm.x + kd_1 * error_rate.x,
                 kp_2 * error.y + self.integral_nm.y + kd_2 * error_rate.y,
             ),
-            acceleration_rad_s2: Vector2::zeros(),
+            contact_force_n: input.force_n,
         }
     }
 }

@@ -1,8 +1,10 @@
 //! The control laws' common ground: what they are given and what they answer.
 
 use nalgebra::Vector2;
-use painleve_shared::{Arm, Pose, Posture};
+use painleve_shared::{Arm, Posture};
 
+use crate::friction_estimator::FrictionEstimate;
+use crate::model::Model;
 use crate::reference::TipReference;
 
 /// What a law knows at one tick.
@@ -10,16 +12,14 @@ use crate::reference::TipReference;
 pub struct LawInput<'a> {
     /// The arm's model.
     pub arm: &'a Arm<f32>,
-    /// Estimated joint angles θ, rad.
-    pub theta_rad: Vector2<f32>,
-    /// Estimated joint rates θ̇, rad/s.
-    pub theta_dot_rad_s: Vector2<f32>,
-    /// Sines and cosines of θ.
-    pub pose: Pose<f32>,
+    /// The same at the estimated state.
+    pub model: &'a Model,
     /// Posture in which the drive was armed.
     pub posture: Posture,
     /// Measured contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
+    /// What is known about friction.
+    pub friction: FrictionEstimate,
     /// Whether the tip touches the belt.
     pub contact: bool,
     /// Whether the torque of the tick before was limited.
@@ -35,6 +35,6 @@ pub struct LawInput<'a> {
 pub struct LawOutput {
     /// Wanted joint torques (u1, u2), N·m, before limits.
     pub torque_nm: Vector2<f32>,
-    /// Joint acceleration θ̈ that the law expects of them, rad/s².
-    pub acceleration_rad_s2: Vector2<f32>,
+    /// Contact force (f_t, f_n) that the law expects with them, N.
+    pub contact_force_n: Vector2<f32>,
 }

@@ -22,18 +22,15 @@ use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{Health, MAXIMUM_LENGTH, Plant, Request, Response};
 use painleve_shared::wire;
 
-use super::{BoardError, TimedAnswer, log};
+use super::{Board, BoardError, SILENCE_LIMIT, TimedAnswer, log};
 use crate::lifetime::{Guarded, kill_with_parent};
+use crate::timing::Unit;
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
 
 /// Where the workspace builds the image, below its target folder.
 const IMAGE: &str = "thumbv7em-none-eabihf/release/painleve-qemu";
-
-/// A board silent for longer than this hangs; shorter than the link's own limit, so that
-/// the message that is seen is about the board.
-const SILENCE_LIMIT: Duration = Duration::from_millis(1300);
 
 /// Time between two looks at whether the emulator is alive.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
@@ -130,42 +127,17 @@ impl Emulator {
             table.print_from(output);
         }
         match emulator.request(&Request::Configure {
-            configuration: configuration.clone(),
             plant: Plant::Lockstep,
+            configuration: &super::encode(configuration)?,
         })? {
-            Response::Ready => Ok(emulator),
+            Response::Ready { .. } => Ok(emulator),
             Response::Refused => Err(BoardError::Refused),
             other => Err(BoardError::OutOfTurn(other)),
         }
         // The folder goes here: both sides have their pipes open.
     }
 
-    /// Lets the image control one tick.
-    ///
-    /// # Errors
-    /// [`BoardError`] if the image has stopped, hangs or answers wrongly.
-    pub fn exchange(&mut self, frame: &SensorFrame) -> Result<TimedAnswer, BoardError> {
-        match self.request(&Request::Sensor(*frame))? {
-            Response::Actuator { frame, elapsed } => Ok(TimedAnswer {
-                frame,
-                instructions: elapsed >> self.shift,
-            }),
-            other => Err(BoardError::OutOfTurn(other)),
-        }
-    }
-
-    /// What the image has counted.
-    ///
-    /// # Errors
-    /// As [`Emulator::exchange`].
-    pub fn health(&mut self) -> Result<Health, BoardError> {
-        match self.request(&Request::Health)? {
-            Response::Health(health) => Ok(health),
-            other => Err(BoardError::OutOfTurn(other)),
-        }
-    }
-
-    fn request(&mut self, request: &Request<Configuration>) -> Result<Response, BoardError> {
+    fn request(&mut self, request: &Request<'_>) -> Result<Response, BoardError> {
         let mut buffer = [0; MAXIMUM_LENGTH];
         let bytes = wire::encode(request, &mut buffer)?;
         // One write, shorter than a pipe's buffer: it arrives whole and never blocks.
@@ -176,7 +148,7 @@ impl Emulator {
             let read = self.responses.read(&mut buffer[length..])?;
             length += read;
             if read == 0 || length == buffer.len() {
-                return Err(wire::WireError::Corrupt.into());
+                return Err(wire::WireError::Garbage.into());
             }
         }
         Ok(wire::decode(&mut buffer[..length - 1])?)
@@ -198,6 +170,31 @@ impl Emulator {
             if start.elapsed() > SILENCE_LIMIT {
                 return Err(BoardError::Silent(start.elapsed()));
             }
+        }
+    }
+}
+
+impl Board for Emulator {
+    const HOST: &'static str = "qemu";
+
+    fn unit(&self) -> Unit {
+        Unit::Instructions
+    }
+
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<TimedAnswer, BoardError> {
+        match self.request(&Request::Sensor(*frame))? {
+            Response::Actuator { frame, elapsed } => Ok(TimedAnswer {
+                frame,
+                cost: elapsed >> self.shift,
+            }),
+            other => Err(BoardError::OutOfTurn(other)),
+        }
+    }
+
+    fn health(&mut self) -> Result<Health, BoardError> {
+        match self.request(&Request::Health)? {
+            Response::Health(health) => Ok(health),
+            other => Err(BoardError::OutOfTurn(other)),
         }
     }
 }

@@ -6,38 +6,57 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use painleve_firmware::Configuration;
+use painleve_shared::message::Plant;
 
 use super::CommandError;
 use crate::atomic_file::AtomicFile;
 use crate::board::emulator::{self, Emulator};
-use crate::board::{TickTimes, TimingReport};
+use crate::board::{Board, BoardError, LineHealth, Serial};
 use crate::interrupt::Interrupt;
 use crate::lifetime;
-use crate::link::{BusName, ControllerEnd, Received};
+use crate::link::{BusName, ControllerEnd, Pacing, Received};
+use crate::timing::{TickTimes, TimingReport};
 
 /// Options of `painleve bridge`.
 #[derive(Debug, Args)]
 pub struct BridgeArguments {
     #[command(subcommand)]
-    board: Board,
+    target: Target,
 }
 
 #[derive(Debug, Subcommand)]
-enum Board {
+enum Target {
     /// The image under QEMU: deterministic, with instruction counts.
-    Qemu(QemuArguments),
+    Qemu {
+        #[command(flatten)]
+        bus: BusArguments,
+        #[command(flatten)]
+        image: ImageArguments,
+    },
+    /// A flashed board behind a serial port.
+    Serial {
+        #[command(flatten)]
+        bus: BusArguments,
+        /// The port, as in /dev/ttyUSB0.
+        #[arg(long, value_name = "PATH")]
+        port: PathBuf,
+        /// Write what every tick cost as JSON.
+        #[arg(long, value_name = "PATH")]
+        timing: Option<PathBuf>,
+    },
 }
 
 #[derive(Debug, Args)]
-struct QemuArguments {
+struct BusArguments {
     /// Bus on which the plant is.
     #[arg(long)]
     bus: BusName,
-    #[command(flatten)]
-    image: ImageArguments,
     /// How long to wait for the plant, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
     wait_s: f64,
+    /// What the plant runs, for the report.
+    #[arg(long, hide = true, default_value = "")]
+    scenario_name: String,
     /// End when the process that started this one does.
     #[arg(long, hide = true)]
     end_with_parent: bool,
@@ -54,7 +73,7 @@ pub struct ImageArguments {
     pub log: bool,
     /// Write what every tick cost as JSON.
     #[arg(long, value_name = "PATH")]
-    timing: Option<PathBuf>,
+    pub timing: Option<PathBuf>,
 }
 
 impl ImageArguments {
@@ -80,34 +99,66 @@ impl ImageArguments {
 
 /// Carries frames between the bus and the board until the plant's session ends.
 pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
-    let Board::Qemu(arguments) = &arguments.board;
-    if arguments.end_with_parent {
+    match &arguments.target {
+        Target::Qemu { bus, image } => carry(bus, image.timing.as_deref(), |configuration, _| {
+            Emulator::start(&image.path(), configuration, image.log)
+        }),
+        Target::Serial { bus, port, timing } => {
+            carry(bus, timing.as_deref(), |configuration, pacing| {
+                Serial::open(port, configuration, plant(pacing))
+            })
+        }
+    }
+}
+
+/// A board that is to keep time counts the ticks without a frame.
+fn plant(pacing: Pacing) -> Plant {
+    match pacing {
+        Pacing::Lockstep => Plant::Lockstep,
+        Pacing::Realtime => Plant::Realtime,
+    }
+}
+
+fn carry<B: Board>(
+    bus: &BusArguments,
+    timing: Option<&Path>,
+    start: impl FnOnce(&Configuration, Pacing) -> Result<B, BoardError>,
+) -> Result<(), CommandError> {
+    if bus.end_with_parent {
         lifetime::end_with_parent()?;
     }
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
-    let wait = Duration::from_secs_f64(arguments.wait_s);
-    let (mut end, session) = ControllerEnd::open(&arguments.bus, wait)?;
+    let wait = Duration::from_secs_f64(bus.wait_s);
+    let (mut end, session) = ControllerEnd::open(&bus.bus, wait)?;
     let configuration: Configuration =
         postcard::from_bytes(&session.configuration).map_err(|error| {
             CommandError::Process(format!(
                 "the plant on bus {} sent a configuration that cannot be read: {error}",
-                arguments.bus
+                bus.bus
             ))
         })?;
-    let image = &arguments.image;
-    let mut emulator = Emulator::start(&image.path(), &configuration, image.log)?;
+    let mut board = start(&configuration, session.pacing)?;
     let mut times = TickTimes::default();
     while let Received::Frame(frame) = end.receive()? {
-        let answer = emulator.exchange(&frame)?;
+        let answer = board.exchange(&frame)?;
         end.send(&answer.frame)?;
-        times.push(&answer);
+        times.push(&answer.frame, answer.cost);
         if interrupt.is_requested() {
             return Err(CommandError::Interrupted);
         }
     }
-    if let Some(path) = &image.timing {
-        let report = times.report("qemu", "instructions", &emulator.health()?);
+    if let Some(path) = timing {
+        let scenario = &bus.scenario_name;
+        let report = TimingReport::of_board(scenario, session.tick_hz, &times, &mut board)?;
         write(path, &report)?;
+    }
+    if let Some(line) = board.line()
+        && line != LineHealth::default()
+    {
+        eprintln!(
+            "line: {} requests repeated, {} runs of garbage and {} wrong checksums from the board",
+            line.repeated_requests, line.garbage, line.failed_checksums
+        );
     }
     Ok(())
 }

@@ -8,6 +8,7 @@ mod plant;
 mod run;
 mod scenarios;
 mod study;
+mod timing;
 
 use std::process::ExitCode;
 
@@ -41,6 +42,8 @@ enum Command {
     Controller(controller::ControllerArguments),
     /// Run the controller's image on a board for the plant on the bus.
     Bridge(bridge::BridgeArguments),
+    /// What control ticks cost: instructions, cycles, or lateness, with the worst of all.
+    Timing(timing::TimingArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
     /// Compute one of the paper's studies as numbers, data files and figures.
@@ -127,6 +130,7 @@ pub fn main() -> ExitCode {
         Command::Plant(arguments) => plant::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
         Command::Bridge(arguments) => bridge::run(&arguments),
+        Command::Timing(arguments) => timing::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Figures(arguments) => figures::run(&arguments),

@@ -38,6 +38,9 @@ pub struct PlantArguments {
     /// What to call the controller's host in the report.
     #[arg(long, hide = true, default_value = "native")]
     host_name: String,
+    /// By the clock, but the clock is a board's: wait for its answers.
+    #[arg(long, hide = true)]
+    board_keeps_time: bool,
     /// End when the process that started this one does.
     #[arg(long, hide = true)]
     end_with_parent: bool,
@@ -62,12 +65,7 @@ pub fn run(arguments: &PlantArguments) -> Result<(), CommandError> {
 
     let name = &arguments.host_name;
     let report = match pacing {
-        Pacing::Lockstep => {
-            let (result, host, wall) = drive(&scenario, simulation, Lockstep(end), &mut output)?;
-            host.0.end()?;
-            RunReport::new(&scenario, name, "lockstep", &result, wall)
-        }
-        Pacing::Realtime => {
+        Pacing::Realtime if !arguments.board_keeps_time => {
             eprintln!("plant: {}", request_realtime());
             let paced = Paced::start(end, scenario.run.tick_hz)?;
             let (result, host, wall) = drive(&scenario, simulation, paced, &mut output)?;
@@ -76,8 +74,13 @@ pub fn run(arguments: &PlantArguments) -> Result<(), CommandError> {
             RunReport {
                 wake_up_us: Some(Percentiles::of_ns(&lateness_ns)),
                 missed_deadlines: Some(missed),
-                ..RunReport::new(&scenario, name, "realtime", &result, wall)
+                ..RunReport::new(&scenario, name, pacing.name(), &result, wall)
             }
+        }
+        Pacing::Lockstep | Pacing::Realtime => {
+            let (result, host, wall) = drive(&scenario, simulation, Lockstep(end), &mut output)?;
+            host.0.end()?;
+            RunReport::new(&scenario, name, pacing.name(), &result, wall)
         }
     };
     output.finish()?;

@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::io::Read;
+use std::path::PathBuf;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
@@ -10,7 +11,7 @@ use clap::{Args, ValueEnum};
 use super::CommandError;
 use super::bridge::ImageArguments;
 use super::output::OutputArguments;
-use crate::board::emulator;
+use crate::board::{emulator, serial};
 use crate::interrupt::Interrupt;
 use crate::lifetime::Guarded;
 use crate::link::{BusName, Pacing};
@@ -49,11 +50,7 @@ impl ScenarioArguments {
         for text in &self.overrides {
             arguments.extend(["--set".into(), text.into()]);
         }
-        let pacing = match self.pacing {
-            Pacing::Lockstep => "lockstep",
-            Pacing::Realtime => "realtime",
-        };
-        arguments.extend(["--pacing".into(), pacing.into()]);
+        arguments.extend(["--pacing".into(), self.pacing.name().into()]);
         arguments
     }
 }
@@ -66,6 +63,8 @@ pub enum Host {
     Native,
     /// The image of the flash target under QEMU.
     Qemu,
+    /// A flashed board behind the serial port --port.
+    Serial,
 }
 
 /// Options of `painleve run`.
@@ -79,6 +78,9 @@ pub struct RunArguments {
     /// What runs the controller.
     #[arg(long, value_enum, default_value_t)]
     host: Host,
+    /// Serial port of the board, as in /dev/ttyUSB0.
+    #[arg(long, value_name = "PATH", required_if_eq("host", "serial"))]
+    port: Option<PathBuf>,
     #[command(flatten)]
     image: ImageArguments,
     #[command(flatten)]
@@ -109,6 +111,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     if arguments.host == Host::Qemu {
         emulator::check(&arguments.image.path())?;
     }
+    if let (Host::Serial, Some(port)) = (arguments.host, &arguments.port) {
+        serial::check(port)?;
+    }
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
     let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
 
@@ -119,21 +124,17 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let host = arguments.host.to_possible_value();
     let host = host.as_ref().map_or("native", |host| host.get_name());
     plant_arguments.extend(["--host-name".into(), host.into()]);
-    let mut plant = start(plant_arguments, &bus, Stdio::inherit())?;
-    let mut controller_arguments: Vec<OsString> = match arguments.host {
-        Host::Native => vec!["controller".into()],
-        Host::Qemu => vec!["bridge".into(), "qemu".into()],
-    };
-    if arguments.host != Host::Native {
-        controller_arguments.extend(arguments.image.to_arguments());
+    if arguments.host == Host::Serial {
+        plant_arguments.push("--board-keeps-time".into());
     }
+    let mut plant = start(plant_arguments, &bus, Stdio::inherit())?;
     // Its complaints matter only while the plant has none, a log at once.
     let stderr = if arguments.image.log {
         Stdio::inherit()
     } else {
         Stdio::piped()
     };
-    let mut controller = start(controller_arguments, &bus, stderr)?;
+    let mut controller = start(controller_arguments(arguments), &bus, stderr)?;
 
     let plant_status = loop {
         if interrupt.is_requested() {
@@ -184,6 +185,26 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         CommandError::Process(format!("the plant process gave no report: {error}"))
     })?;
     print(&report, arguments.json)
+}
+
+fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
+    let image = &arguments.image;
+    let mut line: Vec<OsString> = match arguments.host {
+        Host::Native => return vec!["controller".into()],
+        Host::Qemu => vec!["bridge".into(), "qemu".into()],
+        Host::Serial => vec!["bridge".into(), "serial".into()],
+    };
+    line.extend(["--scenario-name".into(), arguments.scenario.name().into()]);
+    if arguments.host == Host::Serial {
+        for (option, path) in [("--port", &arguments.port), ("--timing", &image.timing)] {
+            if let Some(path) = path {
+                line.extend([option.into(), path.into()]);
+            }
+        }
+    } else {
+        line.extend(image.to_arguments());
+    }
+    line
 }
 
 fn start(arguments: Vec<OsString>, bus: &BusName, stderr: Stdio) -> Result<Guarded, CommandError> {

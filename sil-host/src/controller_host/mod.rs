@@ -1,6 +1,7 @@
 //! Whatever runs the controller, as the closed loop sees it.
 //!
 //! - [`InProcess`]: a library call, for studies and tests
+//! - [`OnBoard`]: the image on a board, without a link
 //! - [`lockstep`]: another process over the link, tick by tick
 //! - [`paced`]: another process over the link, by the clock
 
@@ -13,7 +14,9 @@ use painleve_firmware::{Configuration, Controller};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::range::OutOfRange;
 
+use crate::board::{Board, BoardError};
 use crate::link::LinkError;
+use crate::timing::TickTimes;
 
 /// The answer to one sensor frame.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +33,9 @@ pub enum HostError {
     /// The controller is gone.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// The board does not answer.
+    #[error(transparent)]
+    Board(#[from] BoardError),
     /// The clock cannot be waited on.
     #[error("cannot wait on the monotonic clock: {0}")]
     Clock(std::io::Error),
@@ -68,6 +74,37 @@ impl ControllerHost for InProcess {
         Ok(Answer {
             frame: Some(answer),
             round_trip: start.elapsed(),
+        })
+    }
+}
+
+/// The controller on a board that belongs to this process.
+pub struct OnBoard<B> {
+    /// The board.
+    pub board: B,
+    /// What its ticks have cost.
+    pub times: TickTimes,
+}
+
+impl<B> OnBoard<B> {
+    /// A board that has its configuration.
+    pub fn new(board: B) -> Self {
+        Self {
+            board,
+            times: TickTimes::default(),
+        }
+    }
+}
+
+impl<B: Board> ControllerHost for OnBoard<B> {
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
+        let start = Instant::now();
+        let answer = self.board.exchange(frame)?;
+        let round_trip = start.elapsed();
+        self.times.push(&answer.frame, answer.cost);
+        Ok(Answer {
+            frame: Some(answer.frame),
+            round_trip,
         })
     }
 }

@@ -18,6 +18,16 @@ pub enum Pacing {
     Realtime,
 }
 
+impl Pacing {
+    /// The name, as on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lockstep => "lockstep",
+            Self::Realtime => "realtime",
+        }
+    }
+}
+
 /// A run, as the controller needs to know it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Session {

@@ -2,6 +2,7 @@
 //!
 //! - [`run`]: one run over time, stacked panels on one time axis
 //! - [`chart`]: the figures of studies: curves, points and regions over one axis
+//! - [`timing`]: what ticks cost
 //! - [`decimate`]: runs of any length in bounded memory, extremes kept
 //! - [`axis`]: ranges that outliers cannot spoil, and their labels
 
@@ -10,6 +11,7 @@ pub mod chart;
 pub mod decimate;
 pub mod run;
 pub(crate) mod style;
+pub mod timing;
 
 pub use chart::Chart;
 pub use run::RunPlot;

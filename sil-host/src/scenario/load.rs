@@ -275,8 +275,8 @@ mod tests {
             ),
             (&["initial.theta1_deg=0"], &["initial tip height"]),
             (
-                &["controller.reference.0.minimum-jerk.target_m=0.3"],
-                &["controller.reference.target_m", "0.184"],
+                &["controller.reference.0.minimum-jerk.target_m=0.5"],
+                &["controller.reference.target_m", "0.42"],
             ),
         ] {
             let message = message(overrides);

@@ -8,10 +8,17 @@ pub mod built_in;
 mod load;
 
 use painleve_firmware::Configuration;
-use painleve_firmware::contact_detector::ContactDetectorSettings;
+use painleve_firmware::belt_observer;
+use painleve_firmware::contact_guard::GuardSettings;
+use painleve_firmware::contact_observer::ContactSettings;
+use painleve_firmware::deadline_monitor::DeadlineLimits;
+use painleve_firmware::edge_governor::GovernorSettings;
 use painleve_firmware::estimator::EstimatorSettings;
+use painleve_firmware::friction_estimator::FrictionSettings;
 use painleve_firmware::law::LawSettings;
 use painleve_firmware::law::hybrid::HybridSettings;
+use painleve_firmware::length_calibration::CalibrationSettings;
+use painleve_firmware::recovery::RecoverySettings;
 use painleve_firmware::reference::{Program, Segment};
 use painleve_firmware::supervisor::SupervisorSettings;
 use painleve_shared::ArmParameters;
@@ -155,11 +162,25 @@ pub struct ControllerSettings {
     /// How rates are estimated.
     pub estimator: EstimatorSettings,
     /// When the tip is taken to touch.
-    pub contact: ContactDetectorSettings,
+    pub contact: ContactSettings,
+    /// How friction is estimated.
+    pub friction: FrictionSettings,
+    /// What the controller knows about the belt.
+    pub belt: belt_observer::BeltSettings,
+    /// How the links' length is calibrated.
+    pub calibration: CalibrationSettings,
     /// When the drive is armed, and when it is shut down.
     pub supervisor: SupervisorSettings,
+    /// How many lapses in a row are survived.
+    pub deadlines: DeadlineLimits,
     /// The control law.
     pub law: LawSettings,
+    /// How the tip is kept pressed on the belt.
+    pub guard: GuardSettings,
+    /// How the reference is kept off the paradox.
+    pub governor: GovernorSettings,
+    /// How a tip that left the belt is brought back.
+    pub recovery: RecoverySettings,
     /// Where the tip shall go.
     pub reference: Program,
 }
@@ -175,9 +196,16 @@ impl Default for ControllerSettings {
             torque_limit_nm: 5.0,
             arm: None,
             estimator: EstimatorSettings::default(),
-            contact: ContactDetectorSettings::default(),
+            contact: ContactSettings::default(),
+            friction: FrictionSettings::default(),
+            belt: belt_observer::BeltSettings::default(),
+            calibration: CalibrationSettings::default(),
             supervisor: SupervisorSettings::default(),
+            deadlines: DeadlineLimits::default(),
             law: LawSettings::Hybrid(HybridSettings::default()),
+            guard: GuardSettings::default(),
+            governor: GovernorSettings::default(),
+            recovery: RecoverySettings::default(),
             reference: Program {
                 segments: [segment].into_iter().collect(),
             },
@@ -226,7 +254,14 @@ impl Scenario {
             estimator: settings.estimator,
             contact: settings.contact,
             supervisor: settings.supervisor,
+            friction: settings.friction,
+            belt: settings.belt,
+            calibration: settings.calibration,
+            deadlines: settings.deadlines,
             law: settings.law,
+            guard: settings.guard,
+            governor: settings.governor,
+            recovery: settings.recovery,
             reference: settings.reference.clone(),
         }
     }

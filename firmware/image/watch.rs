@@ -1,0 +1,83 @@
+//! What is counted between two configurations, for the host and for the log.
+
+use painleve_firmware::Controller;
+use painleve_firmware::deadline_monitor::Lapse;
+use painleve_shared::message::{Health, Plant};
+use painleve_shared::status::{Fault, SupervisorState};
+
+/// What the log hears of the control task.
+#[derive(Clone, Copy, PartialEq)]
+pub struct Change {
+    /// The supervisor's state.
+    pub state: SupervisorState,
+    /// The latched fault.
+    pub fault: Option<Fault>,
+}
+
+impl Change {
+    /// Nothing has happened yet.
+    pub const NONE: Self = Self {
+        state: SupervisorState::Idle,
+        fault: None,
+    };
+
+    /// How things are now.
+    pub fn of(controller: &Controller) -> Self {
+        let telemetry = controller.telemetry();
+        Self {
+            state: telemetry.state,
+            fault: telemetry.fault,
+        }
+    }
+}
+
+/// What is counted besides the controller's lapses.
+pub struct Watch {
+    /// Where sensor frames come from.
+    pub plant: Plant,
+    /// Ticks controlled.
+    pub ticks: u32,
+    /// Ticks a second.
+    pub tick_hz: u32,
+    /// Longest tick, in counts of the stopwatch.
+    pub worst_elapsed: u32,
+    /// Answers for which the link had no room.
+    pub dropped_responses: u32,
+}
+
+impl Watch {
+    /// Nothing counted.
+    pub const fn new(plant: Plant, tick_hz: u32) -> Self {
+        Self {
+            plant,
+            ticks: 0,
+            tick_hz,
+            worst_elapsed: 0,
+            dropped_responses: 0,
+        }
+    }
+
+    /// Takes note of a tick.
+    pub fn tick(&mut self, elapsed: u32) {
+        self.ticks = self.ticks.wrapping_add(1);
+        self.worst_elapsed = self.worst_elapsed.max(elapsed);
+    }
+
+    /// Every counter, except the stack: looking at that takes too long to hold up the control task.
+    pub fn health(&self, controller: Option<&Controller>) -> Health {
+        let total = |lapse| controller.map_or(0, |controller| controller.monitor().total(lapse));
+        Health {
+            stack_bytes: 0,
+            ticks: self.ticks,
+            dropped_responses: self.dropped_responses,
+            overruns: total(Lapse::Overrun),
+            missing_frames: total(Lapse::MissingFrame),
+            stale_frames: total(Lapse::StaleFrame),
+            lost_frames: total(Lapse::LostFrame),
+            out_of_range_counts: total(Lapse::EncoderOutOfRange)
+                .wrapping_add(total(Lapse::ForceOutOfRange)),
+            garbage: total(Lapse::Garbage),
+            failed_checksums: total(Lapse::FailedChecksum),
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! The torque closest to the wanted one that keeps the tip pressed on the belt.
+//!
+//! While sliding, f_n = −b/p, and b = b₀ + n·u is affine in the joint torques u. f_n ≥ f_min
+//! is therefore one half-plane, n·u ≤ −p f_min − b₀, and the torque limits are a
+//! box around it: the nearest point has a closed form.
+
+use nalgebra::Vector2;
+use painleve_shared::Real;
+use painleve_shared::range::{self, OutOfRange};
+use serde::{Deserialize, Serialize};
+
+/// Settings of the contact guard.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GuardSettings {
+    /// Whether there is a guard.
+    pub enabled: bool,
+    /// Least predicted normal force f_min, N.
+    pub minimum_force_n: f32,
+}
+
+impl Default for GuardSettings {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            minimum_force_n: 1.0,
+        }
+    }
+}
+
+impl GuardSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        range::check(
+            "controller.guard.minimum_force_n",
+            self.minimum_force_n,
+            0.0,
+            1e3,
+        )
+    }
+}
+
+/// The half-plane n·u ≤ c of the joint torques that keep the tip on the belt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfPlane {
+    /// n, 1/(kg·m).
+    pub normal: Vector2<f32>,
+    /// c, m/s².
+    pub bound: f32,
+}
+
+/// The torque (N·m) within ±`limit_nm` nearest to `wanted_nm` in the half-plane, and whether the
+/// half-plane moved it. Where box and half-plane do not meet, the corner of the box deepest
+/// on the half-plane's side.
+pub fn nearest_torque_nm(
+    wanted_nm: &Vector2<f32>,
+    plane: &HalfPlane,
+    limit_nm: f32,
+) -> (Vector2<f32>, bool) {
+    let limited = wanted_nm.map(|torque| torque.limited(-limit_nm, limit_nm));
+    let normal = &plane.normal;
+    let square = normal.norm_squared();
+    if normal.dot(&limited) <= plane.bound || square <= 0.0 {
+        return (limited, false);
+    }
+    // On the line, as near as can be to the wanted torque.
+    let step = (plane.bound - normal.dot(wanted_nm)) / square;
+    let foot = wanted_nm + normal * step;
+    // Where the foot is outside the box, the nearest point of the line inside it
+    // has one torque at its limit and the other from the line.
+    let first = foot.x.limited(-limit_nm, limit_nm);
+    let second = along(plane.bound - normal.x * first, normal.y, foot.y);
+    if second.abs() <= limit_nm {
+        return (Vector2::new(first, second), true);
+    }
+    let second = second.limited(-limit_nm, limit_nm);
+    let first = along(plane.bound - normal.y * second, normal.x, first);
+    if first.abs() <= limit_nm {
+        (Vector2::new(first, second), true)
+    } else {
+        (normal.map(|component| -limit_nm.copysign(component)), true)
+    }
+}
+
+/// `rest / slope`, or `otherwise` where the slope is too small to solve for.
+fn along(rest: f32, slope: f32, otherwise: f32) -> f32 {
+    let value = rest / slope;
+    if value.is_finite() { value } else { otherwise }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const LIMIT_NM: f32 = 5.0;
+
+    fn inside(torque: &Vector2<f32>, plane: &HalfPlane) -> bool {
+        let slack = 1e-3 * (1.0 + plane.bound.abs() + plane.normal.norm() * LIMIT_NM);
+        plane.normal.dot(torque) <= plane.bound + slack
+    }
+
+    #[test]
+    fn a_torque_that_keeps_the_tip_pressed_is_left_alone() {
+        let plane = HalfPlane {
+            normal: Vector2::new(3.0, -1.0),
+            bound: 1.0,
+        };
+        let wanted = Vector2::new(0.1, 0.2);
+        assert_eq!(
+            nearest_torque_nm(&wanted, &plane, LIMIT_NM),
+            (wanted, false)
+        );
+    }
+
+    proptest! {
+        /// Against a search over the whole box.
+        #[test]
+        fn no_torque_within_limits_is_nearer(
+            w1 in -8.0_f32..8.0, w2 in -8.0_f32..8.0, n1 in -50.0_f32..50.0, n2 in -50.0_f32..50.0,
+            bound in -200.0_f32..200.0,
+        ) {
+            let wanted = Vector2::new(w1, w2);
+            let plane = HalfPlane { normal: Vector2::new(n1, n2), bound };
+            let (found, _) = nearest_torque_nm(&wanted, &plane, LIMIT_NM);
+            prop_assert!(found.amax() <= LIMIT_NM);
+            let grid = (0..=80).flat_map(|i| (0..=80).map(move |j| {
+                Vector2::new(i as f32, j as f32) * (2.0 * LIMIT_NM / 80.0) - Vector2::repeat(LIMIT_NM)
+            }));
+            let admissible = grid.clone().filter(|torque| n1 * torque.x + n2 * torque.y <= bound);
+            let mut any = false;
+            for other in admissible {
+                any = true;
+                prop_assert!((found - wanted).norm() <= (other - wanted).norm() + 1e-3);
+            }
+            if any {
+                prop_assert!(inside(&found, &plane), "{} {:?}", found, plane);
+            }
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! Does the tip touch the belt? The log-odds of contact against flight, from what every
+//! tick adds to them.
+//!
+//! - **Force cell**: a reading f of noise σ is told apart between a contact of at least
+//!   f_c and none: (f_c/σ²) (f − f_c/2). A noisy reading near zero does not chatter, and a
+//!   clear one decides within two or three ticks.
+//! - **Encoders**: the height of the tip over the belt is known to within half a count of either
+//!   encoder, h = ½ (|z_t| Δθ₁ + l |sin θ₂| Δθ₂₁). A gap above h is no contact. An impact without
+//!   collision also stops the slip (the impulse goes on until slip dies): the tip's velocity
+//!   along the belt jumps by the belt's speed, which the tracking loops see at
+//!   once. The gap that follows confirms it.
+//!
+//! Either alone is enough; together the force cell, when it is there, decides first.
+
+use painleve_shared::Real;
+use painleve_shared::range::{self, OutOfRange};
+use serde::{Deserialize, Serialize};
+
+/// Log-odds beyond which contact or flight is taken for certain.
+const CERTAIN: f32 = 8.0;
+/// Log-odds at which the decision changes.
+const DECISION: f32 = 4.0;
+/// Most that the force cell may add in one tick.
+const FORCE_LIMIT: f32 = 6.0;
+/// Most that a gap may add, and take away.
+const GAP_FOR: f32 = 2.0;
+const GAP_AGAINST: f32 = 6.0;
+/// Slope of the log-odds over the gap in units of its uncertainty.
+const GAP_SLOPE: f32 = 16.0;
+/// Jump of the tip along the belt, in units of its uncertainty, that an impact explains better.
+const JUMP_RATIO: f32 = 2.5;
+
+/// Which readings decide.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Evidence {
+    /// The force cell.
+    #[default]
+    ForceCell,
+    /// The encoders: for an arm without a force cell.
+    Encoders,
+}
+
+/// Settings of the contact observer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ContactSettings {
+    /// Which readings decide.
+    pub evidence: Evidence,
+    /// Smallest normal force of a contact, f_c, N.
+    pub contact_n: f32,
+    /// Standard deviation of one reading of the force cell, σ, N.
+    pub force_noise_n: f32,
+    /// Uncertainty of the gap beyond the encoders' resolution, m.
+    pub gap_uncertainty_m: f32,
+}
+
+impl Default for ContactSettings {
+    fn default() -> Self {
+        Self {
+            evidence: Evidence::ForceCell,
+            contact_n: 0.3,
+            force_noise_n: 0.1,
+            gap_uncertainty_m: 15e-6,
+        }
+    }
+}
+
+impl ContactSettings {
+    /// Checks the settings against the force cell's range (N).
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self, force_range_n: f32) -> Result<(), OutOfRange> {
+        let key = |key, value, minimum, maximum| range::check(key, value, minimum, maximum);
+        let full = f64::from(force_range_n);
+        key("controller.contact.contact_n", self.contact_n, 1e-3, full)?;
+        key(
+            "controller.contact.force_noise_n",
+            self.force_noise_n,
+            1e-4,
+            full,
+        )?;
+        key(
+            "controller.contact.gap_uncertainty_m",
+            self.gap_uncertainty_m,
+            0.0,
+            0.01,
+        )
+    }
+}
+
+/// What the encoders say about the tip at one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GapReading {
+    /// Measured height of the tip over the belt, m.
+    pub gap_m: f32,
+    /// Largest error of the gap from the encoders' resolution, m.
+    pub gap_error_m: f32,
+    /// How far the tip moved along the belt beyond what the tracking loops expected, m.
+    pub jump_m: f32,
+    /// Largest error of that, m.
+    pub jump_error_m: f32,
+}
+
+/// The log-odds with the decision that follows from them.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactObserver {
+    settings: ContactSettings,
+    /// f_c/σ², 1/N.
+    slope_per_n: f32,
+    log_odds: f32,
+    contact: bool,
+}
+
+impl ContactObserver {
+    /// An observer that takes the tip to be in the air.
+    pub fn new(settings: &ContactSettings) -> Self {
+        Self {
+            settings: *settings,
+            slope_per_n: settings.contact_n / (settings.force_noise_n * settings.force_noise_n),
+            log_odds: -DECISION,
+            contact: false,
+        }
+    }
+
+    /// Takes in one tick's readings: normal force (N) and gap. Returns whether the tip touches.
+    pub fn update(&mut self, normal_force_n: f32, gap: &GapReading) -> bool {
+        let change = match self.settings.evidence {
+            Evidence::ForceCell => {
+                let above = normal_force_n - 0.5 * self.settings.contact_n;
+                (self.slope_per_n * above).limited(-FORCE_LIMIT, FORCE_LIMIT)
+            }
+            Evidence::Encoders => {
+                let uncertainty = gap.gap_error_m + self.settings.gap_uncertainty_m;
+                let mut change =
+                    (GAP_SLOPE * (1.0 - gap.gap_m / uncertainty)).limited(-GAP_AGAINST, GAP_FOR);
+                // A jump alone leaves it open; the gap that follows decides.
+                if gap.jump_m.abs() > JUMP_RATIO * gap.jump_error_m && self.log_odds > 0.0 {
+                    change = change.min(0.0) - self.log_odds;
+                }
+                change
+            }
+        };
+        self.log_odds = (self.log_odds + change).limited(-CERTAIN, CERTAIN);
+        if self.contact {
+            self.contact = self.log_odds > -DECISION;
+        } else {
+            self.contact = self.log_odds > DECISION;
+        }
+        self.contact
+    }
+
+    /// Whether the tip is taken to touch.
+    pub fn contact(&self) -> bool {
+        self.contact
+    }
+
+    /// Whether the tip is in the air beyond doubt; at the start there is doubt.
+    pub fn flight(&self) -> bool {
+        !self.contact && self.log_odds < -DECISION
+    }
+
+    /// How sure that is: 0 at the point of changing the decision, 1 for certain.
+    pub fn confidence(&self) -> f32 {
+        let toward = if self.contact {
+            self.log_odds
+        } else {
+            -self.log_odds
+        };
+        ((toward + DECISION) / (CERTAIN + DECISION)).limited(0.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn observer(evidence: Evidence) -> ContactObserver {
+        ContactObserver::new(&ContactSettings {
+            evidence,
+            ..Default::default()
+        })
+    }
+
+    fn gap(gap_m: f32) -> GapReading {
+        GapReading {
+            gap_m,
+            gap_error_m: 50e-6,
+            jump_m: 0.0,
+            jump_error_m: 60e-6,
+        }
+    }
+
+    /// Ticks until the decision is `contact`.
+    fn ticks_until(contact: bool, mut update: impl FnMut() -> bool) -> u32 {
+        (1..100).find(|_| update() == contact).unwrap()
+    }
+
+    #[test]
+    fn the_force_cell_decides_within_a_few_ticks_and_does_not_chatter() {
+        let mut observer = observer(Evidence::ForceCell);
+        let nothing = GapReading::default();
+        assert!(!observer.flight(), "at the start there is doubt");
+        assert_eq!(ticks_until(true, || observer.update(0.5, &nothing)), 2);
+        for force in [0.2, 0.05, 0.3, 0.1, 0.25, 0.15] {
+            assert!(observer.update(force, &nothing), "{force}");
+        }
+        for _ in 0..3 {
+            observer.update(10.0, &nothing);
+        }
+        assert_eq!(observer.confidence(), 1.0);
+        assert!(ticks_until(false, || observer.update(0.0, &nothing)) <= 3);
+        assert!(!observer.update(0.1, &nothing));
+    }
+
+    #[test]
+    fn a_gap_that_the_encoders_resolve_is_no_contact() {
+        let mut observer = observer(Evidence::Encoders);
+        for tick in 0..1000 {
+            // Quantisation alone.
+            observer.update(0.0, &gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
+        }
+        assert!(observer.contact());
+        assert!(ticks_until(false, || observer.update(10.0, &gap(100e-6))) <= 3);
+        assert!(ticks_until(true, || observer.update(0.0, &gap(0.0))) <= 8);
+    }
+
+    #[test]
+    fn a_jump_alone_is_no_flight_but_makes_a_small_gap_one() {
+        let jump = GapReading {
+            jump_m: 300e-6,
+            ..gap(20e-6)
+        };
+        let mut observer = observer(Evidence::Encoders);
+        for _ in 0..20 {
+            observer.update(0.0, &gap(0.0));
+        }
+        assert!(observer.update(0.0, &jump));
+        assert!(observer.update(0.0, &gap(20e-6)));
+        observer.update(0.0, &jump);
+        assert!(!observer.update(0.0, &gap(90e-6)));
+    }
+}

@@ -1,0 +1,273 @@
+//! Friction coefficient and direction of slip from the force cell.
+//!
+//! While the tip slides, −s f_t/f_n is μ exactly, whatever the controller does:
+//! the ratio is not part of any loop. A scalar Kalman filter averages it, with the
+//! variance of a ratio of noisy forces, σ² (1 + μ²)/f_n², and μ as a random walk.
+//!
+//! A reading is left out where it says nothing about μ: in the air, at a small normal force,
+//! and in stick, where friction is anything up to μ f_n. Stick shows as a ratio well below
+//! the estimate; if that lasts, μ has changed and the filter starts to learn again.
+
+use nalgebra::Vector2;
+use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::{Real, Slip};
+use serde::{Deserialize, Serialize};
+
+/// Deviations below the estimate at which the tip may stick.
+const STICK_DEVIATIONS: f32 = 5.0;
+/// Part of the estimate below it at which the tip may stick.
+const STICK_FRACTION: f32 = 0.1;
+
+/// Settings of the friction estimator.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FrictionSettings {
+    /// First guess of μ.
+    pub first_guess: f32,
+    /// Standard deviation of the first guess.
+    pub first_deviation: f32,
+    /// How far μ walks, 1/√s.
+    pub drift_per_sqrt_s: f32,
+    /// Normal force below which friction is not observed, N.
+    pub observable_n: f32,
+    /// How long a ratio below the estimate is taken for stick, s.
+    pub stick_limit_s: f32,
+}
+
+impl Default for FrictionSettings {
+    fn default() -> Self {
+        Self {
+            first_guess: 0.6,
+            first_deviation: 0.2,
+            drift_per_sqrt_s: 0.0005,
+            observable_n: 1.0,
+            stick_limit_s: 0.2,
+        }
+    }
+}
+
+impl FrictionSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        let key = |key, value, minimum, maximum| range::check(key, value, minimum, maximum);
+        key(
+            "controller.friction.first_guess",
+            self.first_guess,
+            0.0,
+            2.0,
+        )?;
+        key(
+            "controller.friction.first_deviation",
+            self.first_deviation,
+            1e-3,
+            2.0,
+        )?;
+        key(
+            "controller.friction.drift_per_sqrt_s",
+            self.drift_per_sqrt_s,
+            1e-4,
+            1.0,
+        )?;
+        key(
+            "controller.friction.observable_n",
+            self.observable_n,
+            0.01,
+            1e3,
+        )?;
+        key(
+            "controller.friction.stick_limit_s",
+            self.stick_limit_s,
+            0.0,
+            100.0,
+        )
+    }
+}
+
+/// What is known about friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionEstimate {
+    /// Friction coefficient μ̂.
+    pub coefficient: f32,
+    /// Its standard deviation.
+    pub deviation: f32,
+    /// Direction of slip, from the sign of the friction force.
+    pub slip: Slip,
+    /// Whether the tip seems to move with the belt.
+    pub sticks: bool,
+}
+
+/// The filter with its state.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionEstimator {
+    settings: FrictionSettings,
+    force_variance_n2: f32,
+    tick_s: f32,
+    coefficient: f32,
+    variance: f32,
+    slip: Slip,
+    sticks: bool,
+    sticking_s: f32,
+}
+
+impl FrictionEstimator {
+    /// An estimator that has seen nothing; `force_noise_n` is the standard deviation of one
+    /// reading of the force cell, N.
+    pub fn new(settings: &FrictionSettings, force_noise_n: f32, tick_s: f32) -> Self {
+        Self {
+            settings: *settings,
+            force_variance_n2: force_noise_n * force_noise_n,
+            tick_s,
+            coefficient: settings.first_guess,
+            variance: settings.first_deviation * settings.first_deviation,
+            slip: Slip::Positive,
+            sticks: false,
+            sticking_s: 0.0,
+        }
+    }
+
+    /// Takes in one reading (f_t, f_n), N, of a tip in contact.
+    pub fn update(&mut self, force_n: &Vector2<f32>) {
+        let first_variance = self.settings.first_deviation * self.settings.first_deviation;
+        let drift = self.settings.drift_per_sqrt_s;
+        self.variance = (self.variance + drift * drift * self.tick_s).min(first_variance);
+        self.sticks = false;
+        if force_n.y < self.settings.observable_n {
+            return;
+        }
+        // Below the noise the sign says nothing.
+        if force_n.x * force_n.x > 9.0 * self.force_variance_n2 {
+            self.slip = Slip::of(-force_n.x);
+        }
+        let ratio = -self.slip.sign::<f32>() * force_n.x / force_n.y;
+        let ratio_variance = self.force_variance_n2 * (1.0 + self.coefficient * self.coefficient)
+            / (force_n.y * force_n.y);
+        let innovation = ratio - self.coefficient;
+        let gate = STICK_DEVIATIONS * (self.variance + ratio_variance).square_root()
+            + STICK_FRACTION * self.coefficient;
+        if innovation < -gate {
+            self.sticking_s += self.tick_s;
+            if self.sticking_s < self.settings.stick_limit_s {
+                self.sticks = true;
+                return;
+            }
+            self.variance = first_variance;
+        } else if innovation > gate {
+            self.variance = first_variance;
+        }
+        self.sticking_s = 0.0;
+        let gain = self.variance / (self.variance + ratio_variance);
+        self.coefficient = (self.coefficient + gain * innovation).max(0.0);
+        self.variance *= 1.0 - gain;
+    }
+
+    /// Takes in the direction in which a tip that lands will slip.
+    pub fn expect_slip(&mut self, slip: Slip) {
+        self.slip = slip;
+    }
+
+    /// Takes in that the tip was thrown off where sliding has no solution from μ = `critical` on.
+    pub fn thrown(&mut self, critical: f32) {
+        if self.coefficient < critical {
+            self.coefficient = critical;
+        }
+        self.variance = self.settings.first_deviation * self.settings.first_deviation;
+    }
+
+    /// Present knowledge.
+    pub fn estimate(&self) -> FrictionEstimate {
+        FrictionEstimate {
+            coefficient: self.coefficient,
+            deviation: self.variance.square_root(),
+            slip: self.slip,
+            sticks: self.sticks,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const NOISE_N: f32 = 0.1;
+
+    /// Uniform noise of the right deviation from a fixed stream.
+    fn noise(step: u32) -> f32 {
+        let bits = step
+            .wrapping_mul(2_654_435_761)
+            .rotate_left(13)
+            .wrapping_mul(2_246_822_519);
+        ((bits >> 8) as f32 / (1 << 24) as f32 - 0.5) * 12.0_f32.sqrt() * NOISE_N
+    }
+
+    fn slide(estimator: &mut FrictionEstimator, friction: f32, slip: Slip, ticks: u32) {
+        for tick in 0..ticks {
+            let force = Vector2::new(-friction * slip.sign::<f32>() * 10.0, 10.0);
+            estimator.update(&(force + Vector2::new(noise(2 * tick), noise(2 * tick + 1))));
+        }
+    }
+
+    fn estimator(first_guess: f32) -> FrictionEstimator {
+        let settings = FrictionSettings {
+            first_guess,
+            ..Default::default()
+        };
+        FrictionEstimator::new(&settings, NOISE_N, 1e-3)
+    }
+
+    proptest! {
+        #[test]
+        fn friction_and_slip_are_found_from_a_wrong_guess(
+            friction in 0.1_f32..1.2, wrong in 0.7_f32..1.3, positive: bool,
+        ) {
+            let slip = if positive { Slip::Positive } else { Slip::Negative };
+            let mut estimator = estimator(friction * wrong);
+            slide(&mut estimator, friction, slip, 100);
+            let found = estimator.estimate();
+            prop_assert_eq!(found.slip, slip);
+            prop_assert!((found.coefficient - friction).abs() < 0.01, "{:?}", found);
+            prop_assert!((found.coefficient - friction).abs() < 5.0 * found.deviation);
+        }
+    }
+
+    #[test]
+    fn nothing_is_learnt_in_the_air() {
+        let mut estimator = estimator(0.4);
+        for tick in 0..1000 {
+            estimator.update(&Vector2::new(noise(tick), 0.1));
+        }
+        let found = estimator.estimate();
+        assert_eq!(found.coefficient, 0.4);
+        assert!((found.deviation - FrictionSettings::default().first_deviation).abs() < 1e-3);
+    }
+
+    #[test]
+    fn stick_is_not_taken_for_less_friction_but_a_slippery_belt_is() {
+        let mut estimator = estimator(0.6);
+        slide(&mut estimator, 0.6, Slip::Positive, 200);
+        slide(&mut estimator, 0.1, Slip::Positive, 150);
+        assert!(estimator.estimate().sticks);
+        assert!((estimator.estimate().coefficient - 0.6).abs() < 0.01);
+        slide(&mut estimator, 0.1, Slip::Positive, 150);
+        assert!(!estimator.estimate().sticks);
+        assert!((estimator.estimate().coefficient - 0.1).abs() < 0.02);
+    }
+
+    #[test]
+    fn more_friction_is_learnt_at_once() {
+        let mut estimator = estimator(0.3);
+        slide(&mut estimator, 0.3, Slip::Positive, 2000);
+        slide(&mut estimator, 0.7, Slip::Positive, 5);
+        assert!((estimator.estimate().coefficient - 0.7).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_throw_shows_that_friction_is_at_least_critical() {
+        let mut estimator = estimator(0.5);
+        estimator.thrown(0.58);
+        assert_eq!(estimator.estimate().coefficient, 0.58);
+    }
+}

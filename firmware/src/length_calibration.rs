@@ -1,0 +1,136 @@
+//! The links' length from the belt.
+//!
+//! With the tip on the belt cos θ₁ + cos θ₂ = H/l in every posture. The mean of the measured sum
+//! therefore gives l, better the longer the tip slides. An arm 5 % longer than its
+//! data sheet says would otherwise miss its references by a centimetre and its edges by more.
+
+use painleve_shared::range::{self, OutOfRange};
+use serde::{Deserialize, Serialize};
+
+/// Settings of the calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CalibrationSettings {
+    /// Whether the length is calibrated.
+    pub enabled: bool,
+    /// Largest part by which the length may differ from the nominal one.
+    pub tolerance: f32,
+    /// Time over which the mean is taken at most, s.
+    pub averaging_s: f32,
+}
+
+impl Default for CalibrationSettings {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            tolerance: 0.08,
+            averaging_s: 2.0,
+        }
+    }
+}
+
+impl CalibrationSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        range::check("controller.calibration.tolerance", self.tolerance, 0.0, 0.5)?;
+        range::check(
+            "controller.calibration.averaging_s",
+            self.averaging_s,
+            1e-3,
+            1e4,
+        )
+    }
+}
+
+/// The calibration with its mean.
+#[derive(Clone, Copy, Debug)]
+pub struct LengthCalibration {
+    settings: CalibrationSettings,
+    height_m: f32,
+    nominal_m: f32,
+    length_m: f32,
+    /// Mean of cos θ₁ + cos θ₂.
+    mean: f32,
+    /// Readings in the mean.
+    readings: f32,
+    most_readings: f32,
+}
+
+impl LengthCalibration {
+    /// A calibration that has seen nothing: nominal link length and height above the belt in m.
+    pub fn new(settings: &CalibrationSettings, nominal_m: f32, height_m: f32, tick_s: f32) -> Self {
+        Self {
+            settings: *settings,
+            height_m,
+            nominal_m,
+            length_m: nominal_m,
+            mean: 0.0,
+            readings: 0.0,
+            most_readings: (settings.averaging_s / tick_s).max(1.0),
+        }
+    }
+
+    /// Takes in the gap (m) that one tick's readings give for the present length while the tip is
+    /// on the belt; returns the length, m.
+    pub fn update(&mut self, measured_gap_m: f32) -> f32 {
+        if !self.settings.enabled {
+            return self.length_m;
+        }
+        let sum = (self.height_m - measured_gap_m) / self.length_m;
+        self.readings = (self.readings + 1.0).min(self.most_readings);
+        self.mean += (sum - self.mean) / self.readings;
+        let length = self.height_m / self.mean;
+        // Also refuses what is not finite.
+        if (length - self.nominal_m).abs() <= self.settings.tolerance * self.nominal_m {
+            self.length_m = length;
+        }
+        self.length_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEIGHT_M: f32 = 0.3775;
+
+    fn calibration() -> LengthCalibration {
+        LengthCalibration::new(&CalibrationSettings::default(), 0.21, HEIGHT_M, 1e-3)
+    }
+
+    /// The gap that readings give for the length in use, while the tip is on the belt.
+    fn gap_m(true_length_m: f32, used_length_m: f32) -> f32 {
+        HEIGHT_M - used_length_m * HEIGHT_M / true_length_m
+    }
+
+    #[test]
+    fn a_length_within_tolerance_is_found() {
+        let mut calibration = calibration();
+        let mut length_m = 0.21;
+        for _ in 0..10 {
+            length_m = calibration.update(gap_m(0.2205, length_m));
+        }
+        assert!((length_m - 0.2205).abs() < 1e-6, "{length_m}");
+    }
+
+    #[test]
+    fn errors_of_the_readings_are_averaged() {
+        let mut calibration = calibration();
+        let mut length_m = 0.21;
+        for tick in 0..1000 {
+            let error_m = if tick % 2 == 0 { 50e-6 } else { -50e-6 };
+            length_m = calibration.update(gap_m(0.205, length_m) + error_m);
+        }
+        assert!((length_m - 0.205).abs() < 1e-6, "{length_m}");
+    }
+
+    #[test]
+    fn a_length_beyond_tolerance_or_not_finite_is_refused() {
+        for gap in [gap_m(0.25, 0.21), f32::NAN, f32::INFINITY, HEIGHT_M] {
+            assert_eq!(calibration().update(gap), 0.21);
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! The arm's model at the estimated state, evaluated once a tick and used by
+//! everybody: law, contact guard, recovery.
+
+use nalgebra::{Matrix2, Vector2};
+use painleve_shared::dynamics::{generalised_torque_nm, joint_torque_nm};
+use painleve_shared::{Arm, Pose, Slip};
+
+/// |sin(θ2 − θ1)| below which J⁻¹ is bounded: the arm is nearly straight and
+/// no torque moves the tip along the belt any more.
+const STRAIGHT_ARM_SINE: f32 = 0.05;
+
+/// Terms of the equations of motion at one state.
+#[derive(Clone, Copy, Debug)]
+pub struct Model {
+    /// Joint angles θ, rad.
+    pub theta_rad: Vector2<f32>,
+    /// Joint rates θ̇, rad/s.
+    pub theta_dot_rad_s: Vector2<f32>,
+    /// Tip (z_t, z_n), m.
+    pub tip_m: Vector2<f32>,
+    /// Height of the tip above the belt, m.
+    pub gap_m: f32,
+    /// Velocity of the tip, m/s.
+    pub tip_velocity_m_s: Vector2<f32>,
+    /// J, m.
+    pub jacobian: Matrix2<f32>,
+    /// M, kg·m².
+    mass: Matrix2<f32>,
+    /// M⁻¹, 1/(kg·m²).
+    mobility: Matrix2<f32>,
+    /// w + c, N·m.
+    bias_nm: Vector2<f32>,
+    /// Centripetal acceleration s of the tip, m/s².
+    centripetal_m_s2: Vector2<f32>,
+    /// 1 / det J with the determinant bounded away from zero, 1/m².
+    inverse_determinant_per_m2: f32,
+    /// Q = J M⁻¹ Jᵀ, 1/kg.
+    pub q: Matrix2<f32>,
+}
+
+impl Model {
+    /// The arm's terms at joint angles θ (rad) and rates θ̇ (rad/s).
+    pub fn new(arm: &Arm<f32>, theta_rad: Vector2<f32>, theta_dot_rad_s: Vector2<f32>) -> Self {
+        let pose = Pose::new(&theta_rad);
+        let jacobian = arm.jacobian(&pose);
+        let mobility = arm.inverse_mass_matrix(&pose);
+        let sine_elbow = pose.sine_elbow();
+        let bounded = if sine_elbow < 0.0 {
+            sine_elbow.min(-STRAIGHT_ARM_SINE)
+        } else {
+            sine_elbow.max(STRAIGHT_ARM_SINE)
+        };
+        let length = arm.parameters().link_length_m;
+        Self {
+            theta_rad,
+            theta_dot_rad_s,
+            tip_m: arm.tip_m(&pose),
+            gap_m: arm.gap_m(&pose),
+            tip_velocity_m_s: jacobian * theta_dot_rad_s,
+            jacobian,
+            mass: arm.mass_matrix(&pose),
+            mobility,
+            bias_nm: arm.passive_torque_nm(&theta_rad, &theta_dot_rad_s, &pose)
+                + arm.centrifugal_torque_nm(&theta_dot_rad_s, &pose),
+            centripetal_m_s2: arm.centripetal_m_s2(&pose, &theta_dot_rad_s),
+            // det J = l² sin(θ2 − θ1).
+            inverse_determinant_per_m2: 1.0 / (length * length * bounded),
+            q: jacobian * mobility * jacobian.transpose(),
+        }
+    }
+
+    /// Joint acceleration θ̈ = J⁻¹ (z̈ − s) of a tip acceleration z̈ (m/s²), rad/s².
+    pub fn joint_acceleration_rad_s2(&self, tip_acceleration_m_s2: &Vector2<f32>) -> Vector2<f32> {
+        let wanted = tip_acceleration_m_s2 - self.centripetal_m_s2;
+        let j = &self.jacobian;
+        Vector2::new(
+            (j.m22 * wanted.x - j.m12 * wanted.y) * self.inverse_determinant_per_m2,
+            (j.m11 * wanted.y - j.m21 * wanted.x) * self.inverse_determinant_per_m2,
+        )
+    }
+
+    /// Joint torques (u1, u2), N·m, for a joint acceleration θ̈ (rad/s²) under a contact
+    /// force (f_t, f_n), N: inverse dynamics u = w + c + M θ̈ − Jᵀ f.
+    pub fn inverse_dynamics_nm(
+        &self,
+        acceleration_rad_s2: &Vector2<f32>,
+        force_n: &Vector2<f32>,
+    ) -> Vector2<f32> {
+        let generalised =
+            self.bias_nm + self.mass * acceleration_rad_s2 - self.jacobian.transpose() * force_n;
+        joint_torque_nm(&generalised)
+    }
+
+    /// Joint acceleration θ̈ (rad/s²) under joint torques (u1, u2), N·m, and a contact force
+    /// (f_t, f_n), N: M⁻¹ (u − w − c + Jᵀ f).
+    pub fn acceleration_rad_s2(
+        &self,
+        torque_nm: &Vector2<f32>,
+        force_n: &Vector2<f32>,
+    ) -> Vector2<f32> {
+        let load =
+            generalised_torque_nm(torque_nm) - self.bias_nm + self.jacobian.transpose() * force_n;
+        self.mobility * load
+    }
+
+    /// Free normal acceleration as a function of the joint torques,
+    /// b = b₀ + n · (u1, u2): b₀ in m/s² and n in 1/(kg·m).
+    pub fn free_normal_acceleration(&self) -> (f32, Vector2<f32>) {
+        let normal = Vector2::new(self.jacobian.m21, self.jacobian.m22);
+        // M⁻¹ is symmetric.
+        let row = self.mobility * normal;
+        let offset = self.centripetal_m_s2.y - row.dot(&self.bias_nm);
+        (offset, Vector2::new(row.x, row.y - row.x))
+    }
+
+    /// p = Q22 − μ s Q12, 1/kg.
+    pub fn p_per_kg(&self, friction: f32, slip: Slip) -> f32 {
+        self.q.m22 - friction * slip.sign::<f32>() * self.q.m12
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_shared::{ArmParameters, Posture};
+    use proptest::prelude::*;
+
+    prop_compose! {
+        fn model()(tip in -0.16_f32..0.16, w1 in -3.0_f32..3.0, w2 in -3.0_f32..3.0, up: bool)
+            -> (Arm<f32>, Model) {
+            let arm = Arm::new(ArmParameters::default()).unwrap();
+            let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
+            let theta = arm.joint_angles_on_belt_rad(tip, posture).unwrap();
+            (arm, Model::new(&arm, theta, Vector2::new(w1, w2)))
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn forward_dynamics_undo_inverse_dynamics(
+            (_, model) in model(), a1 in -50.0_f32..50.0, a2 in -50.0_f32..50.0, f_n in 0.0_f32..10.0,
+        ) {
+            let acceleration = Vector2::new(a1, a2);
+            let force = Vector2::new(-0.6 * f_n, f_n);
+            let torque = model.inverse_dynamics_nm(&acceleration, &force);
+            let found = model.acceleration_rad_s2(&torque, &force);
+            prop_assert!((found - acceleration).norm() < 0.02, "{} {}", found, acceleration);
+        }
+
+        #[test]
+        fn joint_accelerations_give_the_tip_acceleration(
+            (_, model) in model(), a_t in -20.0_f32..20.0, a_n in -20.0_f32..20.0,
+        ) {
+            let wanted = Vector2::new(a_t, a_n);
+            let joints = model.joint_acceleration_rad_s2(&wanted);
+            let found = model.jacobian * joints + model.centripetal_m_s2;
+            prop_assert!((found - wanted).norm() < 1e-3, "{} {}", found, wanted);
+        }
+
+        #[test]
+        fn the_free_normal_acceleration_is_affine_in_the_torques(
+            (arm, model) in model(), u1 in -5.0_f32..5.0, u2 in -5.0_f32..5.0,
+        ) {
+            let torque = Vector2::new(u1, u2);
+            let (offset, slope) = model.free_normal_acceleration();
+            let b = arm
+                .contact_terms(
+                    &model.theta_rad, &model.theta_dot_rad_s, &Pose::new(&model.theta_rad),
+                    &generalised_torque_nm(&torque),
+                )
+                .b();
+            prop_assert!((offset + slope.dot(&torque) - b).abs() < 1e-3 * (1.0 + b.abs()));
+        }
+    }
+}

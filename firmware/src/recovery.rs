@@ -1,0 +1,218 @@
+//! Brings a tip that left the belt back onto it, softly and where it can slide.
+//!
+//! In the air the joints are double integrators (computed torque) that follow a tip path: above the
+//! belt to the admissible stretch, then down, the slower the lower, until it touches; the
+//! law takes over from there. The path is followed in joint angles because a thrown arm may
+//! swing through the straight posture, where tip accelerations cannot be had. A tip at
+//! rest lands with the belt's full slip, in the direction in which the stretch is admissible.
+
+use nalgebra::Vector2;
+use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::{Arm, Posture, Real};
+use serde::{Deserialize, Serialize};
+
+use crate::law::signals::LawOutput;
+use crate::model::Model;
+
+/// Distance from the landing place within which the tip is lowered, m.
+const OVER_LANDING_PLACE_M: f32 = 2e-3;
+/// Speed with which the tip is raised to its clearance, m/s.
+const RAISING_M_S: f32 = 0.1;
+/// Rate at which the height above the belt shrinks on the way down, 1/s.
+const DESCENT_PER_S: f32 = 15.0;
+/// How far below the belt the tip is sent until it is felt to touch, m.
+const DEEPEST_M: f32 = 5e-3;
+
+/// Settings of the recovery.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RecoverySettings {
+    /// Bandwidth of the motion in the air, rad/s.
+    pub bandwidth_rad_s: f32,
+    /// Largest acceleration of the joints in the air, rad/s².
+    pub acceleration_rad_s2: f32,
+    /// Height at which the tip is moved along the belt, m.
+    pub clearance_m: f32,
+    /// Speed at which it is lowered, m/s.
+    pub landing_speed_m_s: f32,
+    /// Distance from the edge of the admissible stretch at which it may land, m.
+    pub retreat_m: f32,
+}
+
+impl Default for RecoverySettings {
+    fn default() -> Self {
+        Self {
+            bandwidth_rad_s: 60.0,
+            acceleration_rad_s2: 500.0,
+            clearance_m: 1e-3,
+            landing_speed_m_s: 0.02,
+            retreat_m: 5e-3,
+        }
+    }
+}
+
+impl RecoverySettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        let key = |key, value, minimum, maximum| range::check(key, value, minimum, maximum);
+        key(
+            "controller.recovery.bandwidth_rad_s",
+            self.bandwidth_rad_s,
+            1.0,
+            1e3,
+        )?;
+        key(
+            "controller.recovery.acceleration_rad_s2",
+            self.acceleration_rad_s2,
+            1.0,
+            1e5,
+        )?;
+        key(
+            "controller.recovery.clearance_m",
+            self.clearance_m,
+            0.0,
+            0.05,
+        )?;
+        key(
+            "controller.recovery.landing_speed_m_s",
+            self.landing_speed_m_s,
+            1e-3,
+            1.0,
+        )?;
+        key("controller.recovery.retreat_m", self.retreat_m, 0.0, 0.05)
+    }
+}
+
+/// The recovery with its state.
+#[derive(Clone, Copy, Debug)]
+pub struct Recovery {
+    settings: RecoverySettings,
+    /// Where to land, m, and the height to have (m), once the tip is in the air.
+    flight: Option<Flight>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Flight {
+    landing_m: f32,
+    height_m: f32,
+    /// Whether the tip has been over its landing place. It then goes down there, even
+    /// if the first touch drags it along.
+    lands: bool,
+    posture: Posture,
+    /// Joint angles of the path at the tick before, rad.
+    path_rad: Option<Vector2<f32>>,
+}
+
+impl Recovery {
+    /// A recovery that has nothing to do.
+    pub fn new(settings: &RecoverySettings) -> Self {
+        Self {
+            settings: *settings,
+            flight: None,
+        }
+    }
+
+    /// The tip touches: there is nothing to recover any more.
+    pub fn end(&mut self) {
+        self.flight = None;
+    }
+
+    /// Posture in which the tip is to land; `None` while there is nothing to recover.
+    pub fn posture(&self) -> Option<Posture> {
+        self.flight.map(|flight| flight.posture)
+    }
+
+    /// Torques for one tick of `tick_s` in the air, with the admissible stretch `edges_m`.
+    pub fn tick(
+        &mut self,
+        arm: &Arm<f32>,
+        model: &Model,
+        edges_m: (f32, f32),
+        tick_s: f32,
+    ) -> LawOutput {
+        let settings = &self.settings;
+        let (lower, upper) = edges_m;
+        let retreat = settings.retreat_m.min(0.5 * (upper - lower).max(0.0));
+        let mut flight = self.flight.unwrap_or(Flight {
+            landing_m: model.tip_m.x,
+            height_m: model.gap_m.max(0.0),
+            lands: false,
+            posture: Posture::of(&model.theta_rad),
+            path_rad: None,
+        });
+        flight.landing_m = flight.landing_m.limited(lower + retreat, upper - retreat);
+        let away = flight.landing_m - model.tip_m.x;
+        let admissible = model.tip_m.x > lower && model.tip_m.x < upper;
+        flight.lands = away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible);
+        // The higher the tip, the faster down; the last stretch at landing speed.
+        let down = settings.landing_speed_m_s + DESCENT_PER_S * flight.height_m.max(0.0);
+        let vertical_speed = if !flight.lands {
+            let rise = (settings.clearance_m - flight.height_m) / tick_s;
+            rise.limited(-down, RAISING_M_S)
+        } else {
+            -down
+        };
+        flight.height_m = (flight.height_m + vertical_speed * tick_s).max(-DEEPEST_M);
+        let height_m = flight.height_m - arm.parameters().height_m;
+        let path_rad = arm
+            .joint_angles_rad(&Vector2::new(flight.landing_m, height_m), flight.posture)
+            .or(flight.path_rad)
+            .unwrap_or(model.theta_rad);
+        let path_rate_rad_s = (path_rad - flight.path_rad.unwrap_or(path_rad)) / tick_s;
+        flight.path_rad = Some(path_rad);
+        self.flight = Some(flight);
+
+        let bandwidth = settings.bandwidth_rad_s;
+        let wanted = (path_rad - model.theta_rad) * (bandwidth * bandwidth)
+            + (path_rate_rad_s - model.theta_dot_rad_s) * (2.0 * bandwidth);
+        let size = wanted.norm_squared().square_root();
+        let scale =
+            (settings.acceleration_rad_s2 / size.max(settings.acceleration_rad_s2)).min(1.0);
+        LawOutput {
+            torque_nm: model.inverse_dynamics_nm(&(wanted * scale), &Vector2::zeros()),
+            contact_force_n: Vector2::zeros(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_shared::ArmParameters;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// A free arm, integrated in small steps, comes down within the stretch, slowly.
+        #[test]
+        fn a_thrown_tip_lands_softly_where_it_may(
+            tip in 0.05_f32..0.17, height in 0.005_f32..0.01, w1 in -0.3_f32..0.3, w2 in -0.3_f32..0.3,
+            up: bool,
+        ) {
+            let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+            let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
+            let at = Vector2::new(tip, height - arm.parameters().height_m);
+            let mut theta = arm.joint_angles_rad(&at, posture).unwrap();
+            let mut theta_dot = Vector2::new(w1, w2);
+            let mut recovery = Recovery::new(&RecoverySettings::default());
+            let edges = (-0.18, 0.16);
+            let landing = (0..1000).find_map(|_| {
+                let model = Model::new(&arm, theta, theta_dot);
+                let torque = recovery.tick(&arm, &model, edges, 1e-3).torque_nm;
+                for _ in 0..10 {
+                    let model = Model::new(&arm, theta, theta_dot);
+                    theta_dot += model.acceleration_rad_s2(&torque, &Vector2::zeros()) * 1e-4;
+                    theta += theta_dot * 1e-4;
+                }
+                let model = Model::new(&arm, theta, theta_dot);
+                let down = model.gap_m < 0.0 && recovery.flight.is_some_and(|flight| flight.lands);
+                down.then_some(model)
+            });
+            let model = landing.unwrap();
+            prop_assert!(model.tip_m.x < 0.16 && model.tip_m.x > -0.18, "{}", model.tip_m);
+            prop_assert!(model.tip_velocity_m_s.y.abs() < 0.06, "{}", model.tip_velocity_m_s);
+        }
+    }
+}

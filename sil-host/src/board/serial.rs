@@ -1,0 +1,239 @@
+//! A board behind a serial port, 921,600 baud, 8N1: hardware in the loop.
+//!
+//! The board's timer sets the pace: it answers a frame at its next tick. Bytes that are no message
+//! are counted and skipped, here and on the board. A request whose answer does not come is
+//! sent again; a frame that the board has seen before changes nothing there.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::os::fd::AsFd;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use nix::errno::Errno;
+use nix::fcntl::OFlag;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::termios::{
+    BaudRate, FlushArg, SetArg, cfmakeraw, cfsetspeed, tcflush, tcgetattr, tcsetattr,
+};
+use painleve_firmware::Configuration;
+use painleve_shared::frame::SensorFrame;
+use painleve_shared::message::{Health, MAXIMUM_LENGTH, Plant, Request, Response};
+use painleve_shared::wire::{self, Inbox, WireError};
+
+use super::{Board, BoardError, LineHealth, SILENCE_LIMIT, TimedAnswer};
+use crate::timing::Unit;
+
+/// Time in which a board answers anything but a frame.
+const PATIENCE: Duration = Duration::from_millis(200);
+
+/// Time in which it answers a frame when nobody minds the wait.
+const LOCKSTEP_PATIENCE: Duration = Duration::from_millis(50);
+
+/// The same by the clock, in ticks: a frame can be repeated twice before the board's
+/// patience of [10 ticks](painleve_firmware::deadline_monitor::DeadlineLimits) is over.
+const REALTIME_PATIENCE_TICKS: u32 = 3;
+
+/// Checks that the port can be used, before anything is started.
+///
+/// # Errors
+/// [`BoardError::Port`].
+pub fn check(path: &Path) -> Result<(), BoardError> {
+    open(path).map(|_| ())
+}
+
+/// A flashed board, configured.
+pub struct Serial {
+    port: File,
+    inbox: Inbox,
+    /// Bytes that have come and are not yet looked at.
+    pending: Vec<u8>,
+    line: LineHealth,
+    frame_patience: Duration,
+    stopwatch_hz: u32,
+}
+
+impl Serial {
+    /// Opens the port and gives the board its configuration. With [`Plant::Realtime`] the
+    /// board counts its ticks without a frame, and stops after too many.
+    ///
+    /// # Errors
+    /// [`BoardError::Port`] if it cannot be opened, [`BoardError::Silent`] if no board
+    /// answers, [`BoardError::Refused`].
+    pub fn open(
+        path: &Path,
+        configuration: &Configuration,
+        plant: Plant,
+    ) -> Result<Self, BoardError> {
+        let port = open(path)?;
+        let period = Duration::from_secs_f32(1.0 / configuration.tick_hz);
+        let mut serial = Self {
+            port,
+            inbox: Inbox::new(),
+            pending: Vec::new(),
+            line: LineHealth::default(),
+            frame_patience: match plant {
+                Plant::Lockstep => LOCKSTEP_PATIENCE.max(REALTIME_PATIENCE_TICKS * period),
+                Plant::Realtime | Plant::Real => REALTIME_PATIENCE_TICKS * period,
+            },
+            stopwatch_hz: 0,
+        };
+        // Ends whatever the board may have received half.
+        serial.port.write_all(&[0])?;
+        let configuration = super::encode(configuration)?;
+        let request = Request::Configure {
+            plant,
+            configuration: &configuration,
+        };
+        let is_wanted =
+            |response: &Response| matches!(response, Response::Ready { .. } | Response::Refused);
+        match serial.ask(&request, PATIENCE, is_wanted)? {
+            Response::Ready { stopwatch_hz } => serial.stopwatch_hz = stopwatch_hz,
+            _ => return Err(BoardError::Refused),
+        }
+        Ok(serial)
+    }
+
+    /// Waits for whatever the board says by itself; `None` after `limit`.
+    ///
+    /// # Errors
+    /// [`BoardError::System`] if the port fails.
+    pub fn listen(&mut self, limit: Duration) -> Result<Option<Response>, BoardError> {
+        self.receive(limit, |_| true)
+    }
+
+    /// Sends a request, again and again, ever more patient, until it is answered.
+    fn ask(
+        &mut self,
+        request: &Request<'_>,
+        mut patience: Duration,
+        is_wanted: impl Fn(&Response) -> bool,
+    ) -> Result<Response, BoardError> {
+        let mut buffer = [0; MAXIMUM_LENGTH];
+        let bytes = wire::encode(request, &mut buffer)?;
+        let start = Instant::now();
+        loop {
+            self.port.write_all(bytes)?;
+            let left = SILENCE_LIMIT.saturating_sub(start.elapsed());
+            if let Some(response) = self.receive(patience.min(left), &is_wanted)? {
+                return Ok(response);
+            }
+            if start.elapsed() >= SILENCE_LIMIT {
+                return Err(BoardError::Silent(start.elapsed()));
+            }
+            self.line.repeated_requests += 1;
+            patience *= 2;
+        }
+    }
+
+    /// Waits for the response that `is_wanted`; others are skipped.
+    fn receive(
+        &mut self,
+        limit: Duration,
+        is_wanted: impl Fn(&Response) -> bool,
+    ) -> Result<Option<Response>, BoardError> {
+        let start = Instant::now();
+        loop {
+            if let Some(response) = self.take(&is_wanted) {
+                return Ok(Some(response));
+            }
+            let left = limit.saturating_sub(start.elapsed());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            // Rounded up, so that the last fraction of a millisecond is not spent polling.
+            let left = PollTimeout::try_from(left + Duration::from_millis(1));
+            let mut ports = [PollFd::new(self.port.as_fd(), PollFlags::POLLIN)];
+            match poll(&mut ports, left.unwrap_or(PollTimeout::MAX)) {
+                Ok(0) | Err(Errno::EINTR) => continue,
+                Ok(_) => {}
+                Err(error) => return Err(io::Error::from(error).into()),
+            }
+            let mut bytes = [0; 256];
+            let length = self.port.read(&mut bytes)?;
+            if length == 0 {
+                return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
+            }
+            self.pending.extend_from_slice(&bytes[..length]);
+        }
+    }
+
+    /// The first response that `is_wanted` among the bytes that have come.
+    fn take(&mut self, is_wanted: impl Fn(&Response) -> bool) -> Option<Response> {
+        let mut looked_at = 0;
+        let mut found = None;
+        for byte in &self.pending {
+            looked_at += 1;
+            let Some(message) = self.inbox.push(*byte) else {
+                continue;
+            };
+            match wire::decode::<Response>(message) {
+                Ok(response) if is_wanted(&response) => {
+                    found = Some(response);
+                    break;
+                }
+                Ok(_) => {}
+                Err(WireError::Checksum) => self.line.failed_checksums += 1,
+                Err(_) => self.line.garbage += 1,
+            }
+        }
+        self.pending.drain(..looked_at);
+        found
+    }
+}
+
+impl Board for Serial {
+    const HOST: &'static str = "serial";
+
+    fn unit(&self) -> Unit {
+        Unit::Cycles {
+            hz: self.stopwatch_hz,
+        }
+    }
+
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<TimedAnswer, BoardError> {
+        let tick = frame.tick;
+        let answers = |response: &Response| matches!(response, Response::Actuator { frame, .. } if frame.tick == tick);
+        match self.ask(&Request::Sensor(*frame), self.frame_patience, answers)? {
+            Response::Actuator { frame, elapsed } => Ok(TimedAnswer {
+                frame,
+                cost: elapsed,
+            }),
+            other => Err(BoardError::OutOfTurn(other)),
+        }
+    }
+
+    fn health(&mut self) -> Result<Health, BoardError> {
+        let answers = |response: &Response| matches!(response, Response::Health(_));
+        match self.ask(&Request::Health, PATIENCE, answers)? {
+            Response::Health(health) => Ok(health),
+            other => Err(BoardError::OutOfTurn(other)),
+        }
+    }
+
+    fn line(&self) -> Option<LineHealth> {
+        Some(self.line)
+    }
+}
+
+fn open(path: &Path) -> Result<File, BoardError> {
+    open_raw(path).map_err(|source| BoardError::Port {
+        path: path.into(),
+        source,
+    })
+}
+
+fn open_raw(path: &Path) -> io::Result<File> {
+    use std::os::unix::fs::OpenOptionsExt;
+    let port = OpenOptions::new()
+        .read(true)
+        .write(true)
+        .custom_flags(OFlag::O_NOCTTY.bits())
+        .open(path)?;
+    let mut settings = tcgetattr(&port)?;
+    cfmakeraw(&mut settings);
+    cfsetspeed(&mut settings, BaudRate::B921600)?;
+    tcsetattr(&port, SetArg::TCSANOW, &settings)?;
+    tcflush(&port, FlushArg::TCIOFLUSH)?;
+    Ok(port)
+}

@@ -1,0 +1,251 @@
+//! A serial line of 921,600 baud between two pseudo-terminals: bytes take their time, and may be
+//! disturbed on the way. At its far end QEMU can run the image with the flash target's driver.
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::os::fd::{AsFd, OwnedFd};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::pty::openpty;
+use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use nix::unistd::ttyname;
+use painleve_sil_host::lifetime::{Guarded, kill_with_parent};
+
+use crate::serial_image;
+
+/// Start bit, eight bits, stop bit at 921,600 baud.
+const BYTE: Duration = Duration::from_nanos(10_851);
+
+/// Bytes that are carried at once, a third of a millisecond.
+const CHUNK: usize = 32;
+
+/// Messages that pass untouched at first, with the configuration among them.
+const QUIET_MESSAGES: u64 = 20;
+
+/// How a line disturbs what it carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Noise {
+    /// Not at all.
+    None,
+    /// In each direction, of every twelve messages one has a flipped bit, one is followed by garbage
+    /// and one runs together with garbage.
+    Steady,
+}
+
+/// The two directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Requests.
+    ToBoard = 0,
+    /// Responses.
+    ToHost = 1,
+}
+
+/// A line; gone with this value.
+pub struct Line {
+    /// The port at the host's end.
+    pub host_port: PathBuf,
+    /// The port at the board's end.
+    pub board_port: PathBuf,
+    disturbances: [Arc<AtomicU64>; 2],
+    is_over: Arc<AtomicBool>,
+    carriers: Vec<JoinHandle<()>>,
+    /// Kept open, so that either end may come and go.
+    _ends: [OwnedFd; 2],
+}
+
+impl Line {
+    /// Lays a line.
+    ///
+    /// # Panics
+    /// If the system has no pseudo-terminals.
+    pub fn new(noise: Noise) -> Self {
+        let (host, host_end, host_port) = terminal();
+        let (board, board_end, board_port) = terminal();
+        let is_over = Arc::new(AtomicBool::new(false));
+        let disturbances = [Arc::default(), Arc::default()];
+        let copy = |file: &File| file.try_clone().unwrap_or_else(|error| panic!("{error}"));
+        let ways = [
+            (copy(&host), copy(&board), Direction::ToBoard),
+            (board, host, Direction::ToHost),
+        ];
+        let carriers = ways.map(|(from, to, direction)| {
+            let is_over = Arc::clone(&is_over);
+            let disturber = Disturber {
+                noise,
+                message: Vec::new(),
+                messages: 0,
+                random: 1 + direction as u32,
+                count: Arc::clone(&disturbances[direction as usize]),
+            };
+            std::thread::spawn(move || carry(from, to, disturber, &is_over))
+        });
+        Self {
+            host_port,
+            board_port,
+            disturbances,
+            is_over,
+            carriers: carriers.into(),
+            _ends: [host_end, board_end],
+        }
+    }
+
+    /// How many messages have been spoilt or made up so far.
+    pub fn disturbances(&self, direction: Direction) -> u64 {
+        self.disturbances[direction as usize].load(Ordering::SeqCst)
+    }
+
+    /// Starts the image at the line's end, in QEMU and by the host's clock: the line knows
+    /// no virtual time.
+    ///
+    /// # Panics
+    /// If QEMU cannot be started.
+    pub fn start_board(&self) -> SerialBoard {
+        let mut command = Command::new("qemu-system-arm");
+        command
+            .args(["-machine", "netduinoplus2", "-display", "none"])
+            .args(["-monitor", "none", "-nodefaults"])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .arg("-chardev")
+            .arg(format!("serial,id=line,path={}", self.board_port.display()))
+            .args(["-serial", "chardev:line", "-kernel"])
+            .arg(serial_image())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null());
+        let child = kill_with_parent(&mut command).spawn();
+        SerialBoard(Guarded::new(
+            child.unwrap_or_else(|error| panic!("cannot start QEMU: {error}")),
+        ))
+    }
+}
+
+/// An emulated board on a line; unplugged when this value goes.
+pub struct SerialBoard(Guarded);
+
+impl Drop for SerialBoard {
+    fn drop(&mut self) {
+        self.0.kill();
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::SeqCst);
+        for carrier in self.carriers.drain(..) {
+            let _ = carrier.join();
+        }
+    }
+}
+
+/// A pseudo-terminal that passes every byte as it is: our end, the other end, its name.
+fn terminal() -> (File, OwnedFd, PathBuf) {
+    let pair = openpty(None, None).unwrap_or_else(|error| panic!("no pseudo-terminal: {error}"));
+    let raw = tcgetattr(&pair.slave).and_then(|mut settings| {
+        cfmakeraw(&mut settings);
+        tcsetattr(&pair.slave, SetArg::TCSANOW, &settings)
+    });
+    raw.unwrap_or_else(|error| panic!("a pseudo-terminal cannot be set: {error}"));
+    let name = ttyname(&pair.slave);
+    let name = name.unwrap_or_else(|error| panic!("a pseudo-terminal has no name: {error}"));
+    (File::from(pair.master), pair.slave, name)
+}
+
+fn carry(mut from: File, mut to: File, mut disturber: Disturber, is_over: &AtomicBool) {
+    let mut free_at = Instant::now();
+    let mut bytes = [0; CHUNK];
+    while !is_over.load(Ordering::SeqCst) {
+        let mut ends = [PollFd::new(from.as_fd(), PollFlags::POLLIN)];
+        if !matches!(poll(&mut ends, PollTimeout::from(20_u8)), Ok(1..)) {
+            continue;
+        }
+        let Ok(length) = from.read(&mut bytes) else {
+            return;
+        };
+        for piece in disturber.pass(&bytes[..length]).chunks(CHUNK) {
+            free_at = free_at.max(Instant::now()) + BYTE * piece.len() as u32;
+            std::thread::sleep(free_at.saturating_duration_since(Instant::now()));
+            if to.write_all(piece).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// Decides what is disturbed, the same in every run. Holds a message until it is complete.
+struct Disturber {
+    noise: Noise,
+    message: Vec<u8>,
+    /// Messages seen.
+    messages: u64,
+    random: u32,
+    count: Arc<AtomicU64>,
+}
+
+impl Disturber {
+    fn pass(&mut self, bytes: &[u8]) -> Vec<u8> {
+        if self.noise == Noise::None {
+            return bytes.to_vec();
+        }
+        let mut passed = Vec::new();
+        for byte in bytes {
+            self.message.push(*byte);
+            if *byte == 0 {
+                self.disturb();
+                passed.append(&mut self.message);
+            }
+        }
+        passed
+    }
+
+    fn disturb(&mut self) {
+        self.messages += 1;
+        if self.messages < QUIET_MESSAGES {
+            return;
+        }
+        match self.messages % 12 {
+            0 => self.flip(),
+            4 => {
+                self.garbage();
+                self.message.push(0);
+            }
+            // It runs together with the next message.
+            8 => self.garbage(),
+            _ => return,
+        }
+        self.count.fetch_add(1, Ordering::SeqCst);
+    }
+
+    /// Flips a bit in the middle of the message, which makes or removes no end.
+    fn flip(&mut self) {
+        let at = self.message.len() / 2;
+        if let Some(byte) = self.message.get_mut(at) {
+            *byte ^= if *byte == 1 { 2 } else { 1 };
+        }
+    }
+
+    /// Up to 60 bytes, none of them an end; sometimes more than the longest message has.
+    fn garbage(&mut self) {
+        let length = match self.next() % 16 {
+            0 => 900,
+            some => 4 * some,
+        };
+        for _ in 0..length {
+            let byte = (self.next() % 255) as u8 + 1;
+            self.message.push(byte);
+        }
+    }
+
+    /// Marsaglia's xorshift.
+    fn next(&mut self) -> u32 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 17;
+        self.random ^= self.random << 5;
+        self.random
+    }
+}

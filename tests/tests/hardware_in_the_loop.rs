@@ -1,0 +1,219 @@
+//! The host of a board behind a serial port, against the flash target's own serial driver in QEMU:
+//! what it answers, what a disturbed line does to it, and when it takes the torque off by itself.
+
+use std::time::{Duration, Instant};
+
+use painleve_shared::counts::{ForceCounts, TorqueCounts};
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
+use painleve_shared::message::{Plant, Response};
+use painleve_shared::status::{Fault, SupervisorState};
+use painleve_sil_host::board::{Board, Serial};
+use painleve_sil_host::scenario::Scenario;
+use painleve_tests::Bench;
+use painleve_tests::line::{Direction, Line, Noise};
+use serde_json::Value;
+
+const QUIET: [&str; 3] = ["--json", "--no-record", "--no-plot"];
+const SHORT: [&str; 2] = ["--set", "run.duration_s=0.4"];
+
+/// Runs on the board at the end of `line`; the run's report and the board's.
+fn run(bench: &Bench, line: &Line, more: &[&str]) -> (Value, Value) {
+    let port = line.host_port.to_string_lossy();
+    let serial = [
+        "run", "--host", "serial", "--port", &port, "--timing", "t.json",
+    ];
+    let report = bench.report(&[&serial[..], more, &QUIET].concat());
+    let timing = std::fs::read_to_string(bench.path("t.json")).unwrap();
+    (report, serde_json::from_str(&timing).unwrap())
+}
+
+fn count(report: &Value, path: &str) -> u64 {
+    let value = report.pointer(path).and_then(Value::as_u64);
+    value.unwrap_or_else(|| panic!("{path} is no count in {report}"))
+}
+
+/// Everything about a run that does not depend on how often frames had to be repeated.
+fn course(report: &Value) -> Vec<&Value> {
+    [
+        "ticks",
+        "fault",
+        "stale_ticks",
+        "lift_offs",
+        "final_tip_t_m",
+        "min_normal_force_n",
+        "peak_torque_nm",
+        "saturated_ticks",
+    ]
+    .map(|key| &report[key])
+    .into()
+}
+
+#[test]
+fn a_run_over_the_line_is_the_native_run() {
+    let bench = Bench::new("serial");
+    let line = Line::new(Noise::None);
+    let _board = line.start_board();
+    let native = bench.report(&[&["run"], &SHORT[..], &QUIET].concat());
+    let (report, timing) = run(&bench, &line, &SHORT);
+    assert_eq!(report["host"], "serial");
+    assert_eq!(course(&report), course(&native));
+    assert_eq!(timing["unit"]["cycles"]["hz"], 1_000_000_000);
+    assert_eq!(count(&timing, "/board/failed_checksums"), 0);
+    assert_eq!(count(&timing, "/line/failed_checksums"), 0);
+    // A repeated frame, on a machine that is very busy, is answered with another sequence number.
+    if count(&timing, "/line/repeated_requests") == 0 {
+        assert_eq!(report["log_hash"], native["log_hash"]);
+    }
+}
+
+#[test]
+fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
+    let bench = Bench::new("noise");
+    let line = Line::new(Noise::Steady);
+    let _board = line.start_board();
+    let native = bench.report(&[&["run"], &SHORT[..], &QUIET].concat());
+    let (report, timing) = run(&bench, &line, &SHORT);
+    // No torque is different from what it is without noise.
+    assert_eq!(course(&report), course(&native));
+    for (end, direction) in [("board", Direction::ToBoard), ("line", Direction::ToHost)] {
+        let garbage = count(&timing, &format!("/{end}/garbage"));
+        let checksums = count(&timing, &format!("/{end}/failed_checksums"));
+        assert!(
+            garbage > 0 && checksums > 0,
+            "{end}: {garbage}, {checksums}"
+        );
+        // What comes after the last look at the counters is not in them.
+        let all = line.disturbances(direction);
+        let counted = garbage + checksums;
+        assert!(
+            counted <= all && counted + 3 >= all,
+            "{end}: {counted} of {all}"
+        );
+    }
+    assert!(count(&timing, "/line/repeated_requests") >= 40);
+}
+
+#[test]
+fn by_the_clock_the_board_keeps_the_time() {
+    let bench = Bench::new("board-clock");
+    let line = Line::new(Noise::None);
+    let _board = line.start_board();
+    // Slow enough for a busy machine.
+    let clock = ["open-loop-bounce", "--pacing", "realtime"];
+    let slow = ["--set", "run.tick_hz=100", "--set", "run.duration_s=0.5"];
+    let (report, _) = run(&bench, &line, &[&clock[..], &slow].concat());
+    assert_eq!(report["pacing"], "realtime");
+    assert_eq!(report["ticks"], 50);
+    assert!(report["wall_s"].as_f64().unwrap() >= 0.47, "{report}");
+}
+
+/// The arm at rest, pressing with 10 N, at 50 Hz: ticks that a busy machine keeps.
+struct Pressing {
+    board: Serial,
+    frame: SensorFrame,
+}
+
+impl Pressing {
+    fn start(line: &Line) -> Self {
+        let overrides = [
+            "run.tick_hz=50",
+            "controller.estimator.bandwidth_rad_s=100",
+            "controller.deadlines.missing_frames=100",
+        ];
+        let scenario = Scenario::load("hybrid-elbow-down", &overrides.map(String::from)).unwrap();
+        let configuration = scenario.controller_configuration();
+        let encoders = configuration.converters.encoders;
+        let frame = SensorFrame {
+            joints: [
+                encoders[0].reading((-11.4_f64).to_radians()),
+                encoders[1].reading((-35.1_f64 + 11.4).to_radians()),
+            ],
+            normal_force: ForceCounts(1024),
+            tangential_force: ForceCounts(-614),
+            ..Default::default()
+        };
+        Self {
+            board: Serial::open(&line.host_port, &configuration, Plant::Realtime).unwrap(),
+            frame,
+        }
+    }
+
+    fn tick(&mut self, inputs: DigitalInputs) -> ActuatorFrame {
+        self.frame.tick += 1;
+        self.frame.sequence += 1;
+        self.frame.inputs = inputs;
+        self.board.exchange(&self.frame).unwrap().frame
+    }
+}
+
+const ON: DigitalInputs = DigitalInputs::ENABLE;
+const NO_TORQUE: [TorqueCounts; 2] = [TorqueCounts(0); 2];
+
+#[test]
+fn silence_latches_a_fault_without_torque_until_it_is_armed_again() {
+    let line = Line::new(Noise::None);
+    let _board = line.start_board();
+    let mut arm = Pressing::start(&line);
+    let answers: Vec<_> = (0..15).map(|_| arm.tick(ON)).collect();
+    let last = answers[14];
+    assert_eq!(last.supervisor_state(), Some(SupervisorState::Tracking));
+    assert_ne!(last.torques, NO_TORQUE);
+
+    // The host says nothing more. The board tells by itself, once, that it has stopped.
+    let start = Instant::now();
+    let told = loop {
+        let response = arm.board.listen(Duration::from_secs(1)).unwrap();
+        if let Some(Response::Actuator { frame, .. }) = response {
+            break frame;
+        }
+        assert!(start.elapsed() < Duration::from_secs(20), "not a word");
+    };
+    assert_eq!(told.latched_fault(), Some(Fault::FrameMissing));
+    assert_eq!(told.torques, NO_TORQUE);
+    assert_eq!(
+        told.tick, last.tick,
+        "the answer to the last frame, withdrawn"
+    );
+    assert!(arm.board.health().unwrap().missing_frames > 100);
+
+    // Frames that come again change nothing, and neither does a reset alone.
+    for inputs in [ON, ON, ON.with(DigitalInputs::RESET), ON] {
+        let answer = arm.tick(inputs);
+        assert_eq!(answer.torques, NO_TORQUE);
+        assert_ne!(answer.supervisor_state(), Some(SupervisorState::Armed));
+    }
+    arm.tick(DigitalInputs::default());
+    let armed = arm.tick(ON);
+    assert_eq!(armed.supervisor_state(), Some(SupervisorState::Armed));
+    assert_eq!(armed.latched_fault(), None);
+    assert_ne!(armed.torques, NO_TORQUE);
+}
+
+#[test]
+fn a_board_that_is_gone_ends_the_run_with_a_message() {
+    let bench = Bench::new("unplugged");
+    let line = Line::new(Noise::None);
+    let board = line.start_board();
+    let port = line.host_port.to_string_lossy();
+    let serial = ["run", "--host", "serial", "--port", &port];
+    let long = ["--set", "run.duration_s=1000"];
+    let running = bench.start(&[&serial[..], &long, &QUIET].concat());
+    std::thread::sleep(Duration::from_millis(800));
+    drop(board);
+    // It takes well under 2 s; the rest is for a busy machine.
+    let (output, _) = running.end(Duration::from_secs(6));
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(text.contains("the board has not answered"), "{text}");
+    assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
+}
+
+#[test]
+fn a_port_that_cannot_be_used_is_named() {
+    let bench = Bench::new("no-port");
+    let serial = ["run", "--host", "serial", "--port", "/nowhere/tty"];
+    let output = bench.run(&[&serial[..], &QUIET].concat());
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(text.contains("/nowhere/tty"), "{text}");
+}
