@@ -276,8 +276,8 @@ fn mistakes_are_told_in_one_line_and_overwrite_nothing() {
             &["give seconds from"],
         ),
         (
-            &["closed-loop-bifurcation", "--target-m", "0.2"],
-            &["target_m = 0.2"],
+            &["closed-loop-bifurcation", "--target-m", "0.5"],
+            &["target_m = 0.5"],
         ),
         (
             &["sliding-range", "--posture", "elbow-left"],

@@ -458,11 +458,11 @@ mod tests {
     #[test]
     fn what_is_out_of_range_is_told_before_anything_runs() {
         let far = ClosedLoopBifurcation {
-            target_m: Some(0.2),
+            target_m: Some(0.5),
             ..study(Controller::Hybrid)
         };
         let error = far.check().unwrap_err().to_string();
-        assert!(error.contains("target_m = 0.2"), "{error}");
+        assert!(error.contains("target_m = 0.5"), "{error}");
         let fast = ClosedLoopBifurcation {
             v_belt_m_s: vec![1e9],
             ..study(Controller::Hybrid)
