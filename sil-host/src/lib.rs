@@ -9,6 +9,7 @@
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`scenario`]: everything that defines a run, as a TOML file
 //! - [`study`]: the paper's studies, many runs at a time
+//! - [`figures`]: the page that sets them beside the paper
 //! - [`record`], [`plot`], [`report`]: what a run leaves behind
 //! - [`commands`]: the `painleve` command; [`interrupt`], [`lifetime`]: its processes' ends
 
@@ -18,6 +19,7 @@ pub mod closed_loop;
 pub mod commands;
 pub mod controller_host;
 pub mod converters;
+pub mod figures;
 pub mod interrupt;
 pub mod lifetime;
 pub mod link;

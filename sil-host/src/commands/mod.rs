@@ -2,6 +2,7 @@
 
 mod bridge;
 mod controller;
+mod figures;
 mod output;
 mod plant;
 mod run;
@@ -47,6 +48,8 @@ enum Command {
     Scenarios(scenarios::ScenariosArguments),
     /// Compute one of the paper's studies as numbers, data files and figures.
     Study(study::StudyArguments),
+    /// Make all of the paper's studies, with one page that sets them beside the paper.
+    Figures(figures::FiguresArguments),
 }
 
 /// Why a command failed. Every message is one sentence for the user.
@@ -130,6 +133,7 @@ pub fn main() -> ExitCode {
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
+        Command::Figures(arguments) => figures::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

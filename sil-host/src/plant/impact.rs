@@ -17,9 +17,11 @@
 //! Brogliato 1999) is the same process started at v_n = 0 with p < 0.
 
 use nalgebra::{Matrix2, Vector2};
-use painleve_shared::Slip;
 use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::{Pose, Slip};
 use serde::{Deserialize, Serialize};
+
+use super::motion::{Motion, State, theta};
 
 /// How much of the compression comes back.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -239,6 +241,35 @@ pub fn throw(
     }
     start.end_slip(until_slip_dies);
     rebound(start, law)
+}
+
+/// How an impact comes about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImpactKind {
+    /// The tip arrives with a normal velocity.
+    Collision,
+    /// It has none, and is thrown off a contact that has become inconsistent.
+    WithoutCollision,
+}
+
+/// The state after an impact of the tip at belt height.
+///
+/// # Errors
+/// As [`collide`].
+pub fn state_after(
+    motion: &Motion<'_>,
+    law: &ImpactLaw,
+    time_s: f64,
+    state: &State,
+    kind: ImpactKind,
+) -> Result<State, EndlessImpact> {
+    let velocity = motion.relative_velocity_m_s(time_s, state);
+    let q = motion.arm.inverse_tip_inertia(&Pose::new(&theta(state)));
+    let impact = match kind {
+        ImpactKind::Collision => collide(&q, motion.friction, law, velocity),
+        ImpactKind::WithoutCollision => throw(&q, motion.friction, law, velocity.x),
+    }?;
+    Ok(motion.apply_impulse(state, &impact.impulse_ns))
 }
 
 /// The rest of a collision: compression to its end, then restitution.

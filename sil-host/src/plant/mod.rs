@@ -24,12 +24,12 @@ pub mod transition;
 
 use nalgebra::Vector2;
 use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::{Arm, ArmParameters, Pose, Slip};
+use painleve_shared::{Arm, ArmParameters, Slip};
 use serde::{Deserialize, Serialize};
 
 use belt::BeltProfile;
 use dop853::{Step, Tolerance};
-use impact::ImpactLaw;
+use impact::{ImpactKind, ImpactLaw};
 use motion::{ContactMode, Motion, State};
 use torque::TorqueSegment;
 use transition::{Indeterminate, Next};
@@ -190,6 +190,19 @@ pub trait Observer {
 impl Observer for () {
     fn step(&mut self, _: &PlantStep<'_>) {}
     fn event(&mut self, _: f64, _: Event, _: &State) {}
+}
+
+/// Two watch at once, the first one first.
+impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
+    fn step(&mut self, step: &PlantStep<'_>) {
+        self.0.step(step);
+        self.1.step(step);
+    }
+
+    fn event(&mut self, time_s: f64, event: Event, state: &State) {
+        self.0.event(time_s, event, state);
+        self.1.event(time_s, event, state);
+    }
 }
 
 /// Corrections of an event's time that the first-order change of the state
@@ -583,19 +596,16 @@ impl Plant {
 
     fn collide(&mut self, observer: &mut impl Observer, event: Event) -> Result<(), PlantError> {
         let motion = self.motion();
-        let velocity = motion.relative_velocity_m_s(self.time_s, &self.state);
-        let pose = Pose::new(&motion::theta(&self.state));
-        let q = self.arm.inverse_tip_inertia(&pose);
-        let impact = if event == Event::ImpactWithoutCollision {
-            impact::throw(&q, self.friction, &self.impact, velocity.x)
+        let kind = if event == Event::ImpactWithoutCollision {
+            ImpactKind::WithoutCollision
         } else {
-            impact::collide(&q, self.friction, &self.impact, velocity)
+            ImpactKind::Collision
         };
-        let impact = impact.map_err(|source| PlantError::EndlessImpact {
-            time_s: self.time_s,
-            source,
-        })?;
-        self.state = motion.apply_impulse(&self.state, &impact.impulse_ns);
+        self.state = impact::state_after(&motion, &self.impact, self.time_s, &self.state, kind)
+            .map_err(|source| PlantError::EndlessImpact {
+                time_s: self.time_s,
+                source,
+            })?;
         observer.event(self.time_s, event, &self.state);
         Ok(())
     }

@@ -12,11 +12,13 @@ use super::torque::TorqueSegment;
 pub type State = Vector4<f64>;
 
 /// Joint angles of a state, rad.
+#[inline]
 pub fn theta(state: &State) -> Vector2<f64> {
     Vector2::new(state[0], state[1])
 }
 
 /// Joint rates of a state, rad/s.
+#[inline]
 pub fn theta_dot(state: &State) -> Vector2<f64> {
     Vector2::new(state[2], state[3])
 }

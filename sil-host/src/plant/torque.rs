@@ -35,6 +35,7 @@ impl TorqueSegment {
     }
 
     /// Joint torques at time `t_s`, N·m.
+    #[inline]
     pub fn at(&self, t_s: f64) -> Vector2<f64> {
         if self.lag_s == 0.0 || self.start_nm == self.target_nm {
             return self.target_nm;

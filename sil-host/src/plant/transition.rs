@@ -106,6 +106,30 @@ fn slip_acceleration(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>, s
         - motion.belt.acceleration_m_s2(t_s)
 }
 
+/// Functions of the state of which one is zero where a mode ends: m for a flight's gap,
+/// m/s, m/s² and 1/kg for slip, b and p of a slide, N and m/s² for cone and b of a stick.
+/// What a mode lacks is infinite.
+pub fn event_functions(
+    motion: &Motion<'_>,
+    mode: ContactMode,
+    t_s: f64,
+    state: &State,
+) -> [f64; 3] {
+    let Some(slip) = mode.slip() else {
+        if mode == ContactMode::Flight {
+            return [motion.gap_m(state), f64::INFINITY, f64::INFINITY];
+        }
+        let terms = motion.terms(t_s, state);
+        return [cone_margin(motion, t_s, &terms), -terms.b(), f64::INFINITY];
+    };
+    let terms = motion.terms(t_s, state);
+    [
+        slip.sign::<f64>() * motion.relative_velocity_m_s(t_s, state).x,
+        -terms.b(),
+        guarded_p(motion, &terms, slip),
+    ]
+}
+
 /// Time of the first event in a finished step, s; the event has happened there.
 pub fn first_event_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<4>) -> Option<f64> {
     match mode {
@@ -115,8 +139,8 @@ pub fn first_event_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<4>)
         }
         ContactMode::Stick => {
             let margin = |t: f64, x: &State| {
-                let terms = motion.terms(t, x);
-                cone_margin(motion, t, &terms).min(-terms.b())
+                let [cone, pressed, _] = event_functions(motion, mode, t, x);
+                cone.min(pressed)
             };
             if margin(step.t + step.h, &step.end) >= 0.0 {
                 return None;
@@ -237,11 +261,10 @@ fn first_end_of_slide_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<
         -1.0
     };
     let margin = |t: f64, x: &State| {
-        let terms = motion.terms(t, x);
-        let sliding = sign * motion.relative_velocity_m_s(t, x).x + 0.5 * REST_SLIP_M_S;
-        sliding
-            .min(-side * terms.b())
-            .min(side * guarded_p(motion, &terms, slip))
+        let [sliding, pressed, p] = event_functions(motion, mode, t, x);
+        (sliding + 0.5 * REST_SLIP_M_S)
+            .min(side * pressed)
+            .min(side * p)
     };
     let end_margin = margin(step.t + step.h, &step.end);
     // Slip can die and start again within a step; a cubic through both ends tells.

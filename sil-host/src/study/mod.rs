@@ -6,18 +6,34 @@
 //! - [`admissible`]: Table II, where on the belt p > 0; [`belt_line`]: the postures it looks at
 //! - [`regions`]: Fig. 3, the solution modes over (θ1, θ̇1)
 //! - [`sliding_range`]: Z_t,sliding, how far a controller slides
+//! - [`closed_loop_bifurcation`]: Fig. 12, the belt's speed with the controller in the loop
 //! - [`case`], [`trial`]: closed loops to study, and running them in this process
+//! - [`bifurcation`]: where over μ × v_belt the arm keeps bouncing, drawn by [`figure_4`]
+//! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: what one does
+//! - [`poincare`]: how it bounces, drawn by [`figure_5`]
+//! - [`chaos`]: periodic or chaotic, by the largest Lyapunov exponent
 //!
 //! A study is a list of rows that know nothing of each other ([`Study`]), so that they
 //! can be computed in any order, on any number of threads, or in shards.
 
 pub mod admissible;
+pub mod attractor;
 pub mod belt_line;
+pub mod bifurcation;
 pub mod case;
+pub mod cells;
+pub mod chaos;
+pub mod closed_loop_bifurcation;
+mod figure_4;
+mod figure_5;
 pub mod grid;
+pub mod initial;
 pub mod outcome;
 pub mod paper;
+mod places;
+pub mod poincare;
 pub mod regions;
+pub mod settled;
 pub mod sliding_range;
 pub mod trial;
 

@@ -38,11 +38,31 @@ pub fn sliding_m(
         && scenario.belt.friction == FRICTION
         && scenario.belt.profile == BeltProfile::default();
     let value = match (controller, posture) {
-        (Controller::Pid, Posture::ElbowDown) => Some(0.0375),
-        (Controller::Pid, Posture::ElbowUp) => None,
         (Controller::Scenario(_), _) => return None,
-        (_, Posture::ElbowDown) => Some(0.148),
-        (_, Posture::ElbowUp) => Some(0.163),
+        (Controller::Pid, Posture::ElbowUp) => None,
+        _ => Some(target_m(controller, posture)),
     };
     of_paper.then_some(value)
+}
+
+/// The farthest target that the paper shows for a law in a posture, m; for the PID elbow
+/// up, which never slides, the same as elbow down.
+pub fn target_m(controller: &Controller, posture: Posture) -> f64 {
+    match (controller, posture) {
+        (Controller::Pid, _) => 0.0375,
+        (_, Posture::ElbowDown) => 0.148,
+        (_, Posture::ElbowUp) => 0.163,
+    }
+}
+
+/// What the paper's Fig. 12 says of a law and an initial condition.
+pub fn closed_loop_bounces(controller: &Controller, initial: &str) -> Option<&'static str> {
+    match controller {
+        Controller::Hybrid | Controller::HybridPaper | Controller::HybridPaperModel
+            if initial == "d" =>
+        {
+            Some("never bounces")
+        }
+        _ => None,
+    }
 }

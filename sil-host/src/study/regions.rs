@@ -322,6 +322,13 @@ fn zeros_of_b(arm: &Arm<f64>, reach: f64, theta2: Theta2) -> Vec<Vec<[f64; 2]>> 
     curves
 }
 
+impl Regions {
+    /// Rest angle of the spring between the links, degrees.
+    pub fn spring_rest_deg(&self) -> f64 {
+        self.arm.parameters().spring_rest_rad.to_degrees()
+    }
+}
+
 impl Map {
     fn title(&self) -> String {
         let side = match self.theta2 {

@@ -1,7 +1,11 @@
 //! `painleve study`: the paper's studies from the command line.
 
 mod admissible;
-mod options;
+mod bifurcation;
+mod cells;
+mod closed_loop_bifurcation;
+pub mod options;
+mod poincare;
 mod regions;
 mod sliding_range;
 
@@ -22,6 +26,12 @@ enum StudyCommand {
     Admissible(admissible::AdmissibleArguments),
     /// Fig. 3: the solution modes over θ1 and its rate, with the tip on the belt.
     Regions(regions::RegionsArguments),
+    /// Fig. 4: where in friction and belt speed the arm keeps bouncing.
+    Bifurcation(bifurcation::BifurcationArguments),
+    /// Fig. 5: θ1 at each upward zero of θ̇1, and whether the motion is periodic or chaotic.
+    Poincare(poincare::PoincareArguments),
+    /// Fig. 12: over the belt's speed with the controller in the loop.
+    ClosedLoopBifurcation(closed_loop_bifurcation::ClosedLoopBifurcationArguments),
     /// How far each controller slides before it leaves the belt.
     SlidingRange(sliding_range::SlidingRangeArguments),
 }
@@ -31,6 +41,9 @@ pub fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     match &arguments.study {
         StudyCommand::Admissible(arguments) => admissible::run(arguments),
         StudyCommand::Regions(arguments) => regions::run(arguments),
+        StudyCommand::Bifurcation(arguments) => bifurcation::run(arguments),
+        StudyCommand::Poincare(arguments) => poincare::run(arguments),
+        StudyCommand::ClosedLoopBifurcation(arguments) => closed_loop_bifurcation::run(arguments),
         StudyCommand::SlidingRange(arguments) => sliding_range::run(arguments),
     }
 }

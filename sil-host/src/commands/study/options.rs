@@ -85,20 +85,25 @@ pub struct OutcomeOptions {
     /// Write the figure.
     #[arg(long, value_name = "PATH")]
     svg: Option<PathBuf>,
+    #[command(flatten)]
+    pub threads: Threads,
+}
+
+/// How many threads compute.
+#[derive(Clone, Debug, Args)]
+pub struct Threads {
     /// Threads that compute; all cores by default. The outcome does not depend on it.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
 }
 
-impl OutcomeOptions {
+impl Threads {
     /// Computes a study with a progress bar.
     ///
     /// # Errors
-    /// [`CommandError`] if an output cannot be written, which is found out first, or the
-    /// study has no outcome.
-    pub fn compute<S: Study>(&self, study: &S) -> Result<Vec<S::Row>, CommandError> {
-        self.check()?;
-        let bar = progress_bar(study.len());
+    /// [`CommandError`] if the study has no outcome.
+    pub fn compute<S: Study>(&self, name: &str, study: &S) -> Result<Vec<S::Row>, CommandError> {
+        let bar = progress_bar(name, study.len());
         let rows = self.in_pool(|| study::rows(study, || bar.inc(1)))?;
         bar.finish_and_clear();
         Ok(rows?)
@@ -115,6 +120,18 @@ impl OutcomeOptions {
             .build()
             .map_err(|error| CommandError::Process(format!("cannot start threads: {error}")))?;
         Ok(pool.install(work))
+    }
+}
+
+impl OutcomeOptions {
+    /// Computes a study with a progress bar.
+    ///
+    /// # Errors
+    /// [`CommandError`] if an output cannot be written, which is found out first, or the
+    /// study has no outcome.
+    pub fn compute<S: Study>(&self, study: &S) -> Result<Vec<S::Row>, CommandError> {
+        self.check()?;
+        self.threads.compute("", study)
     }
 
     /// Finds out whether the files can be written.
@@ -151,17 +168,19 @@ impl OutcomeOptions {
     }
 }
 
-fn output(error: impl std::fmt::Display) -> CommandError {
+/// An output that cannot be written.
+pub fn output(error: impl std::fmt::Display) -> CommandError {
     CommandError::Output(error.to_string())
 }
 
 /// A bar on stderr, where it is a terminal; nothing elsewhere.
-fn progress_bar(rows: usize) -> ProgressBar {
+fn progress_bar(name: &str, rows: usize) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(rows as u64), ProgressDrawTarget::stderr());
-    let template = "{bar:40} {percent:>3} %  {pos}/{len} rows  {eta} left";
+    let template = "{prefix} {bar:40} {percent:>3} %  {pos}/{len} rows  {eta} left";
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
+    bar.set_prefix(name.to_owned());
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     bar
 }

@@ -79,6 +79,6 @@ pub fn run(arguments: &RegionsArguments) -> Result<(), CommandError> {
         theta2: arguments.theta2.clone(),
         slips: slips.collect(),
     };
-    let outcome = arguments.outcome.in_pool(|| regions(&settings))??;
+    let outcome = arguments.outcome.threads.in_pool(|| regions(&settings))??;
     arguments.outcome.write(&outcome)
 }

@@ -55,16 +55,40 @@ pub struct SlidingRangeArguments {
     )]
     reference: Vec<Reference>,
     /// How near the tip must come to its target, m.
-    #[arg(long, value_name = "METRES", default_value_t = Criterion::default().within_m, value_parser = metres)]
+    #[arg(
+        long,
+        value_name = "METRES",
+        default_value_t = Criterion::default().within_m,
+        value_parser = metres,
+        allow_negative_numbers = true
+    )]
     within_m: f64,
     /// How long after the end of the reference it may take for that, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = Criterion::default().patience_s, value_parser = seconds)]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = Criterion::default().patience_s,
+        value_parser = seconds,
+        allow_negative_numbers = true
+    )]
     patience_s: f64,
     /// Distance of the targets that are tried first, m.
-    #[arg(long, value_name = "METRES", default_value_t = Criterion::default().scan_step_m, value_parser = metres)]
+    #[arg(
+        long,
+        value_name = "METRES",
+        default_value_t = Criterion::default().scan_step_m,
+        value_parser = metres,
+        allow_negative_numbers = true
+    )]
     scan_step_m: f64,
     /// Accuracy of the result, m.
-    #[arg(long, value_name = "METRES", default_value_t = Criterion::default().resolution_m, value_parser = metres)]
+    #[arg(
+        long,
+        value_name = "METRES",
+        default_value_t = Criterion::default().resolution_m,
+        value_parser = metres,
+        allow_negative_numbers = true
+    )]
     resolution_m: f64,
     #[command(flatten)]
     overrides: Overrides,

@@ -1,0 +1,43 @@
+//! `painleve study bifurcation`: Fig. 4.
+
+use clap::Args;
+
+use super::cells::CellOptions;
+use super::options::OutcomeOptions;
+use crate::commands::CommandError;
+use crate::study::Grid;
+use crate::study::bifurcation::{Bifurcation, Diagram};
+
+/// Options of `painleve study bifurcation`.
+#[derive(Debug, Args)]
+pub struct BifurcationArguments {
+    /// Friction coefficients μ, FROM:TO:STEP or a list; with one, a section is drawn.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "0.1:1:0.1",
+        allow_hyphen_values = true
+    )]
+    mu: Grid,
+    /// Belt speeds, m/s.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "-1:-0.1:0.005",
+        allow_hyphen_values = true
+    )]
+    v_belt: Grid,
+    #[command(flatten)]
+    cells: CellOptions,
+    #[command(flatten)]
+    outcome: OutcomeOptions,
+}
+
+/// Computes the diagram and writes it.
+pub fn run(arguments: &BifurcationArguments) -> Result<(), CommandError> {
+    let study = Bifurcation {
+        cells: arguments.cells.cells(&arguments.mu, &arguments.v_belt)?,
+    };
+    let rows = arguments.outcome.compute(&study)?;
+    arguments.outcome.write(&Diagram::new(&study, rows))
+}
