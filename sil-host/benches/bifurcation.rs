@@ -16,8 +16,9 @@ fn study(v_belt: &str) -> Bifurcation {
         let grid: Grid = text.parse().expect("a grid");
         grid.values().to_vec()
     };
-    let mut cells = Cells {
+    let cells = Cells {
         plant: PlantParameters::default(),
+        relative_tolerance: RELATIVE_TOLERANCE,
         mu: values("0.1:1:0.1"),
         v_belt_m_s: values(v_belt),
         initial: vec![Initial::A],
@@ -25,7 +26,6 @@ fn study(v_belt: &str) -> Bifurcation {
         transient_s: 5.0,
         record_s: 1.0,
     };
-    cells.set_tolerance(RELATIVE_TOLERANCE);
     Bifurcation { cells }
 }
 

@@ -10,8 +10,9 @@ use painleve_sil_host::study::poincare::Poincare;
 use painleve_sil_host::study::{Study, outcome, rows};
 
 fn cells(mu: &[f64], v_belt_m_s: &[f64], initial: &[Initial]) -> Cells {
-    let mut cells = Cells {
+    let cells = Cells {
         plant: PlantParameters::default(),
+        relative_tolerance: RELATIVE_TOLERANCE,
         mu: mu.to_vec(),
         v_belt_m_s: v_belt_m_s.to_vec(),
         initial: initial.to_vec(),
@@ -19,7 +20,6 @@ fn cells(mu: &[f64], v_belt_m_s: &[f64], initial: &[Initial]) -> Cells {
         transient_s: 250.0,
         record_s: 50.0,
     };
-    cells.set_tolerance(RELATIVE_TOLERANCE);
     cells.check().expect("the paper's settings are valid");
     cells
 }

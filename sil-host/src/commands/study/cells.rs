@@ -44,8 +44,9 @@ impl CellOptions {
             ("solver.relative_tolerance", "--relative-tolerance"),
             ("solver.absolute_tolerance", "--relative-tolerance"),
         ])?;
-        let mut cells = Cells {
+        let cells = Cells {
             plant: scenario.plant_parameters(),
+            relative_tolerance: self.relative_tolerance,
             mu: mu.values().to_vec(),
             v_belt_m_s: v_belt.values().to_vec(),
             initial: self.initial.list().to_vec(),
@@ -53,7 +54,6 @@ impl CellOptions {
             transient_s: self.transient_s,
             record_s: self.record_s,
         };
-        cells.set_tolerance(self.relative_tolerance);
         cells.check()?;
         Ok(cells)
     }
