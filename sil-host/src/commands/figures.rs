@@ -18,7 +18,7 @@ use crate::scenario::{Scenario, ScenarioError};
 use crate::simulation::Simulation;
 use crate::study::admissible::admissible;
 use crate::study::case::{Controller, Converters, Reference};
-use crate::study::cells::Cells;
+use crate::study::cells::{Cells, RELATIVE_TOLERANCE};
 use crate::study::initial::Initial;
 use crate::study::regions::{Settings, Theta2, regions};
 use crate::study::sliding_range::{Criterion, SlidingRange, SlidingRanges};
@@ -167,6 +167,7 @@ impl Makes<'_> {
         let [transient_s, record_s] = self.fineness.open_loop_s;
         Ok(Cells {
             plant: PlantParameters::default(),
+            relative_tolerance: RELATIVE_TOLERANCE,
             mu: grid(mu)?.values().to_vec(),
             v_belt_m_s: grid(v_belt)?.values().to_vec(),
             initial: initial.to_vec(),

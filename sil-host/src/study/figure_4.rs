@@ -4,6 +4,7 @@ use plotters::style::RGBColor;
 
 use super::bifurcation::{Diagram, Row};
 use super::cells::Cells;
+use super::initial::Initial;
 use super::places::Places;
 use crate::plot::chart::{Chart, Mark, Panel};
 use crate::plot::style::{BLACK_INK, BLUE_INK, GREEN, GREY, SKY, VERMILLION};
@@ -59,20 +60,30 @@ fn look(group: &str) -> (String, RGBColor, bool) {
     }
 }
 
-/// A value of each cell of a section against belt speed; the greatest of several.
+/// A value of each cell of a section against belt speed; where several random states start
+/// at the same speed, a dot for each.
 fn curve(diagram: &Diagram, group: &str, value: impl Fn(&Row) -> f64) -> Mark {
     let (name, colour, dashed) = look(group);
-    let points = diagram.rising_speeds().into_iter().map(|place| {
-        let rows = diagram.at(0, place, group).map(&value);
-        let speed = diagram.settings().v_belt_m_s[place];
-        (speed, rows.fold(f64::NEG_INFINITY, f64::max))
-    });
+    let points = diagram
+        .rising_speeds()
+        .into_iter()
+        .flat_map(|place| diagram.at(0, place, group))
+        .map(|row| (row.v_belt_m_s, value(row)))
+        .collect();
+    if group == Initial::Random(1).group() {
+        return Mark::Dots {
+            name,
+            colour,
+            size: 8,
+            points,
+        };
+    }
     Mark::Line {
         name,
         colour,
         width: 4,
         dashed,
-        points: points.collect(),
+        points,
     }
 }
 
@@ -115,7 +126,7 @@ fn apexes(diagram: &Diagram, groups: &[&str]) -> Panel {
 
 /// What the panel above has named already.
 fn without_name(mut mark: Mark) -> Mark {
-    if let Mark::Line { name, .. } = &mut mark {
+    if let Mark::Line { name, .. } | Mark::Dots { name, .. } = &mut mark {
         name.clear();
     }
     mark

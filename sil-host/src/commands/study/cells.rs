@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::options::BaseOptions;
-use crate::study::cells::Cells;
+use crate::study::cells::{Cells, RELATIVE_TOLERANCE};
 use crate::study::initial::Initials;
 use crate::study::{Grid, StudyError};
 
@@ -23,7 +23,7 @@ pub struct CellOptions {
     #[arg(long, value_name = "SECONDS", default_value_t = 50.0)]
     record_s: f64,
     /// Error of one step of the plant relative to its state; the absolute one is a tenth of it.
-    #[arg(long, value_name = "ERROR", default_value_t = 1e-11)]
+    #[arg(long, value_name = "ERROR", default_value_t = RELATIVE_TOLERANCE)]
     relative_tolerance: f64,
     #[command(flatten)]
     base: BaseOptions,
@@ -44,11 +44,9 @@ impl CellOptions {
             ("solver.relative_tolerance", "--relative-tolerance"),
             ("solver.absolute_tolerance", "--relative-tolerance"),
         ])?;
-        let mut plant = scenario.plant_parameters();
-        plant.solver.relative_tolerance = self.relative_tolerance;
-        plant.solver.absolute_tolerance = 0.1 * self.relative_tolerance;
         let cells = Cells {
-            plant,
+            plant: scenario.plant_parameters(),
+            relative_tolerance: self.relative_tolerance,
             mu: mu.values().to_vec(),
             v_belt_m_s: v_belt.values().to_vec(),
             initial: self.initial.list().to_vec(),
