@@ -10,7 +10,8 @@ use super::study::options::{Threads, output};
 use crate::atomic_file::{self, AtomicFile};
 use crate::closed_loop::{ClosedLoop, LoopError, LoopResult, Watcher};
 use crate::controller_host::InProcess;
-use crate::figures::{Page, Section, sections};
+use crate::figures::sections::{closed_loop, open_loop};
+use crate::figures::{Page, Section};
 use crate::plant::PlantParameters;
 use crate::plot::{PlotError, RunPlot};
 use crate::record::Sample;
@@ -147,7 +148,7 @@ impl Makes<'_> {
 
     fn admissible(&self) -> Result<Section, CommandError> {
         let outcome = admissible(&PlantParameters::default().arm, paper::FRICTION)?;
-        self.save(drawn(sections::admissible(&outcome))?, &outcome)
+        self.save(drawn(open_loop::admissible(&outcome))?, &outcome)
     }
 
     fn regions(&self) -> Result<Section, CommandError> {
@@ -160,7 +161,7 @@ impl Makes<'_> {
             slips: vec![Slip::Positive, Slip::Negative],
         };
         let outcome = self.threads.in_pool(|| regions(&settings))??;
-        self.save(drawn(sections::regions(&outcome))?, &outcome)
+        self.save(drawn(open_loop::regions(&outcome))?, &outcome)
     }
 
     fn cells(&self, mu: &str, v_belt: &str, initial: &[Initial]) -> Result<Cells, CommandError> {
@@ -183,7 +184,7 @@ impl Makes<'_> {
         let study = bifurcation::Bifurcation { cells };
         let rows = self.threads.compute("Fig. 4: section", &study)?;
         let outcome = bifurcation::Diagram::new(&study, rows);
-        self.save(drawn(sections::bifurcation_section(&outcome))?, &outcome)
+        self.save(drawn(open_loop::bifurcation_section(&outcome))?, &outcome)
     }
 
     fn bifurcation_map(&self) -> Result<Section, CommandError> {
@@ -192,7 +193,7 @@ impl Makes<'_> {
         let study = bifurcation::Bifurcation { cells };
         let rows = self.threads.compute("Friction and belt speed", &study)?;
         let outcome = bifurcation::Diagram::new(&study, rows);
-        self.save(drawn(sections::bifurcation_map(&outcome))?, &outcome)
+        self.save(drawn(open_loop::bifurcation_map(&outcome))?, &outcome)
     }
 
     fn poincare(&self) -> Result<Section, CommandError> {
@@ -200,7 +201,7 @@ impl Makes<'_> {
         let study = poincare::Poincare { cells };
         let rows = self.threads.compute("Fig. 5: Poincaré", &study)?;
         let outcome = poincare::Diagram::new(&study, rows);
-        self.save(drawn(sections::poincare(&outcome))?, &outcome)
+        self.save(drawn(open_loop::poincare(&outcome))?, &outcome)
     }
 
     fn sliding_range(&self) -> Result<Section, CommandError> {
@@ -226,7 +227,7 @@ impl Makes<'_> {
         let mut rows = self.threads.compute("Sliding range", &study)?;
         rows.extend(self.threads.compute("Sliding range, ramps", &ramps)?);
         let outcome = SlidingRanges { rows };
-        self.save(drawn(sections::sliding_range(&outcome))?, &outcome)
+        self.save(drawn(closed_loop::sliding_range(&outcome))?, &outcome)
     }
 
     fn closed_loop(&self) -> Result<Section, CommandError> {
@@ -260,7 +261,7 @@ impl Makes<'_> {
         let mut rows = self.threads.compute("Fig. 12: ideal", &ideal)?;
         rows.extend(self.threads.compute("Fig. 12: hardware", &hardware)?);
         let outcome = closed_loop_bifurcation::Diagram::new(rows);
-        self.save(drawn(sections::closed_loop(&outcome))?, &outcome)
+        self.save(drawn(closed_loop::diagram(&outcome))?, &outcome)
     }
 
     fn run(&self, name: &str) -> Result<Section, CommandError> {
@@ -274,7 +275,7 @@ impl Makes<'_> {
         let mut drawing = Drawing(RunPlot::new(name, subtitle));
         let result = simulate(&scenario, &mut drawing)?;
         let svg = drawn(drawing.0.svg())?;
-        let section = sections::run(&scenario, &result, svg);
+        let section = closed_loop::run(&scenario, &result, svg);
         let path = self.folder.join(format!("{}.svg", section.name));
         atomic_file::write(path, section.svg.as_bytes()).map_err(output)?;
         Ok(section)
@@ -299,11 +300,11 @@ fn simulate(scenario: &Scenario, watcher: &mut impl Watcher) -> Result<LoopResul
     };
     let simulation = Simulation::new(scenario).map_err(range)?;
     let host = InProcess::new(&scenario.controller_configuration()).map_err(range)?;
-    let mut closed_loop = ClosedLoop::new(simulation, host);
+    let mut running = ClosedLoop::new(simulation, host);
     for _ in 0..scenario.run.ticks() {
-        closed_loop.tick(watcher)?;
+        running.tick(watcher)?;
     }
-    Ok(closed_loop.finish().0)
+    Ok(running.finish().0)
 }
 
 fn drawn<T>(figure: Result<T, PlotError>) -> Result<T, CommandError> {

@@ -7,20 +7,17 @@
 //! beyond the first failure are not part of the range: they are told apart, as
 //! [`Row::reached_beyond_m`].
 
-use comfy_table::Table;
+mod outcome;
+
 use painleve_shared::{Arm, Posture, Slip};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::belt_line::{BeltLine, positive_stretches};
 use super::case::{self, Controller, Converters, Reference};
-use super::outcome::{self, Outcome};
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
 use crate::plant::statistics::Statistics;
-use crate::plot::PlotError;
-use crate::plot::chart::{Chart, Mark, Panel};
-use crate::plot::style::{BLACK_INK, BLUE_INK, GREEN, ORANGE, VERMILLION};
 use crate::scenario::Scenario;
 
 /// When a reference counts as reached, and how finely the range is searched.
@@ -309,194 +306,5 @@ pub struct SlidingRanges {
     pub rows: Vec<Row>,
 }
 
-impl Outcome for SlidingRanges {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
-    }
-
-    fn table(&self) -> Table {
-        let mut table = outcome::table([
-            "controller",
-            "converters",
-            "posture",
-            "μ",
-            "reference",
-            "slides to zₜ (m)",
-            "ends by",
-            "the paper (m)",
-            "p = 0 (m)",
-        ]);
-        for row in &self.rows {
-            let slides = row
-                .z_sliding_m
-                .map_or("–".into(), |metres| format!("{metres:.4}"));
-            let beyond = row
-                .reached_beyond_m
-                .map_or(String::new(), |metres| format!(" (also {metres:.3})"));
-            table.add_row([
-                row.controller.to_string(),
-                outcome::name(&row.converters),
-                outcome::name(&row.posture),
-                row.mu.to_string(),
-                row.reference.to_string(),
-                slides + &beyond,
-                row.ends_by.name().into(),
-                row.paper_m.map_or("–".into(), |metres| metres.to_string()),
-                format!("{:.4}", row.limit_m),
-            ]);
-        }
-        table
-    }
-
-    fn svg(&self) -> Result<String, PlotError> {
-        let far = self
-            .rows
-            .iter()
-            .fold(0.19, |far: f64, row| far.max(row.limit_m + 0.005));
-        let mut marks = Vec::new();
-        let mut named = Vec::new();
-        for (index, row) in self.rows.iter().enumerate() {
-            let top = (self.rows.len() - index) as f64;
-            marks.push(Mark::Label {
-                at: (-0.98 * far, top - 0.3),
-                centred: false,
-                text: row.title(),
-            });
-            let colour = match row.controller {
-                Controller::Pid => ORANGE,
-                Controller::HybridPaper | Controller::HybridPaperModel => BLUE_INK,
-                Controller::Hybrid | Controller::Scenario(_) => GREEN,
-            };
-            let name = match row.controller {
-                Controller::Pid => "PID",
-                Controller::HybridPaper | Controller::HybridPaperModel => "paper's hybrid law",
-                Controller::Hybrid | Controller::Scenario(_) => "hybrid law here",
-            };
-            let mut line = |name: &'static str, colour, width, points| {
-                let name = if named.contains(&name) { "" } else { name };
-                named.push(name);
-                marks.push(Mark::Line {
-                    name: name.into(),
-                    colour,
-                    width,
-                    dashed: false,
-                    points,
-                });
-            };
-            let at = top - 0.75;
-            if let Some(reached) = row.z_sliding_m {
-                line(name, colour, 18, vec![(row.start_m, at), (reached, at)]);
-            }
-            let tick = |x: f64| vec![(x, at - 0.2), (x, at + 0.2)];
-            if let Some(paper) = row.paper_m {
-                line("the paper", VERMILLION, 8, tick(paper));
-            }
-            line("p = 0", BLACK_INK, 4, tick(row.limit_m));
-        }
-        let rows = self.rows.len();
-        Chart {
-            title: "Sliding range".into(),
-            subtitle: "farthest reference reached without lift-off".into(),
-            x_title: "Tip position zₜ (m)".into(),
-            x: Some(-far..far),
-            panels: vec![Panel {
-                title: "From the start to Zₜ,sliding".into(),
-                y: Some(0.0..rows.max(1) as f64),
-                y_ticks: 0,
-                height: 76 * rows.max(1) as i32,
-                marks,
-                ..Panel::default()
-            }],
-        }
-        .svg()
-    }
-}
-
-impl Row {
-    fn title(&self) -> String {
-        let row = format!(
-            "{}, {}, {}, μ = {}, {}",
-            self.controller,
-            outcome::name(&self.converters),
-            outcome::name(&self.posture),
-            self.mu,
-            self.reference,
-        );
-        match self.z_sliding_m {
-            Some(reached) => format!("{row}: {reached:.4} m"),
-            None => format!("{row}: none"),
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn study(controller: Controller, posture: Posture) -> SlidingRange {
-        SlidingRange {
-            controllers: vec![controller],
-            converters: vec![Converters::Hardware],
-            postures: vec![posture],
-            mu: vec![0.6],
-            references: vec![Reference::MinimumJerk(3.0)],
-            overrides: Vec::new(),
-            criterion: Criterion {
-                scan_step_m: 0.05,
-                resolution_m: 2e-3,
-                ..Criterion::default()
-            },
-        }
-    }
-
-    #[test]
-    fn the_hybrid_law_goes_farther_than_in_the_paper_and_the_pid_lifts_off_elbow_up() {
-        let far = study(Controller::Hybrid, Posture::ElbowDown)
-            .row(0)
-            .unwrap();
-        assert!(far.z_sliding_m.unwrap() > 0.16, "{far:?}");
-        assert!((far.limit_m - 0.164_705).abs() < 1e-6);
-        assert!((far.z_sliding_m.unwrap() - far.tip_t_m.unwrap()).abs() < 1e-3);
-        assert_eq!(far.paper_m, Some(0.148));
-        let up = study(Controller::Pid, Posture::ElbowUp).row(0).unwrap();
-        assert_eq!((up.z_sliding_m, up.ends_by), (None, Ending::LiftOff));
-        assert_eq!(up.paper_m, None);
-    }
-
-    #[test]
-    fn the_range_ends_where_the_next_target_fails() {
-        let mut study = study(Controller::Pid, Posture::ElbowDown);
-        // The jump of speed at the start of a fast ramp throws the tip off.
-        study.references = vec![Reference::Ramp(2.0)];
-        let row = study.row(0).unwrap();
-        assert_eq!(row.ends_by, Ending::LiftOff);
-        let case = study.case(0).unwrap();
-        let end = row.z_sliding_m.unwrap();
-        assert!(matches!(case.run(end).unwrap(), Trialled::Reached { .. }));
-        let beyond = end + study.criterion.resolution_m;
-        let failed = case.run(beyond).unwrap();
-        assert!(matches!(failed, Trialled::Failed(Ending::LiftOff)));
-    }
-
-    #[test]
-    fn a_tolerance_that_nothing_meets_is_told_as_not_reached() {
-        let mut study = study(Controller::Hybrid, Posture::ElbowDown);
-        study.criterion.within_m = 1e-9;
-        study.criterion.patience_s = 2.5;
-        study.criterion.scan_step_m = 1.0;
-        let row = study.row(0).unwrap();
-        assert_eq!((row.z_sliding_m, row.ends_by), (None, Ending::NotReached));
-    }
-
-    #[test]
-    fn a_controller_that_does_not_reach_the_belt_is_told_before_anything_runs() {
-        let mut study = study(Controller::Scenario("nothing".into()), Posture::ElbowUp);
-        assert!(study.check().unwrap_err().to_string().contains("nothing"));
-        study.controllers = vec![Controller::Hybrid];
-        study.mu = vec![-1.0];
-        let error = study.check().unwrap_err().to_string();
-        assert!(error.contains("belt.friction = -1"), "{error}");
-    }
-}
+mod tests;

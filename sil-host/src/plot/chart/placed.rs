@@ -1,4 +1,4 @@
-//! The figures of studies: stacked panels of curves, points and regions over one axis.
+//! Panels with their places and scales, drawn.
 
 use std::ops::Range;
 
@@ -6,245 +6,36 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::PlotError;
-use super::axis::{ValueAxis, label};
-use super::decimate::Extent;
-use super::style::{
-    self, Area, Drawn, GREY, GRID, HEADING, LEGEND, NOTE, SUBTITLE, TICK, TITLE, over_white, text,
-    text_width, ticks, without_straight_ons,
+use super::{Entry, LEFT, Mark, Panel, RIGHT, ROW, Symbol, WIDTH, X_TICKS};
+use crate::plot::axis::{ValueAxis, label};
+use crate::plot::decimate::Extent;
+use crate::plot::style::{
+    Area, Drawn, GREY, GRID, HEADING, LEGEND, NOTE, TICK, text, text_width, ticks,
+    without_straight_ons,
 };
 
-const WIDTH: i32 = 2000;
-const LEFT: i32 = 170;
-const RIGHT: i32 = 50;
-const TITLE_HEIGHT: i32 = 124;
-const ROW: i32 = 50;
-const GAP: i32 = 24;
-const AXIS_HEIGHT: i32 = 110;
+/// Length of a line in a legend.
 const LEGEND_LINE: i32 = 66;
-const X_TICKS: usize = 12;
 
-/// A figure.
-#[derive(Clone, Debug, Default)]
-pub struct Chart {
-    /// What the figure shows.
-    pub title: String,
-    /// Parameters that hold for all of it; about 110 characters.
-    pub subtitle: String,
-    /// Name and unit of the axis that all panels share.
-    pub x_title: String,
-    /// Its ends; those of all points if absent.
-    pub x: Option<Range<f64>>,
-    /// From top to bottom.
-    pub panels: Vec<Panel>,
-}
-
-/// One of a figure's panels.
-#[derive(Clone, Debug)]
-pub struct Panel {
-    /// Name and unit of the value axis.
-    pub title: String,
-    /// How to read the panel.
-    pub note: String,
-    /// Ends of the value axis; those of all points if absent.
-    pub y: Option<Range<f64>>,
-    /// About how many values are labelled; none for a strip without values.
-    pub y_ticks: usize,
-    /// Height in drawn units; a whole figure is 2000 wide.
-    pub height: i32,
-    /// What is in it, from the bottom to the top.
-    pub marks: Vec<Mark>,
-}
-
-impl Default for Panel {
-    fn default() -> Self {
-        Self {
-            title: String::new(),
-            note: String::new(),
-            y: None,
-            y_ticks: 6,
-            height: 600,
-            marks: Vec::new(),
-        }
-    }
-}
-
-/// Something in a panel; what has a name is in the legend.
-#[derive(Clone, Debug)]
-pub enum Mark {
-    /// Points joined by straight lines; a NaN interrupts them.
-    Line {
-        /// For the legend.
-        name: String,
-        /// Colour.
-        colour: RGBColor,
-        /// Width in drawn units.
-        width: u32,
-        /// Dashed instead of solid.
-        dashed: bool,
-        /// From the first to the last.
-        points: Vec<(f64, f64)>,
-    },
-    /// Points each for itself.
-    Dots {
-        /// For the legend.
-        name: String,
-        /// Colour.
-        colour: RGBColor,
-        /// Side of the square in drawn units.
-        size: i32,
-        /// In any order.
-        points: Vec<(f64, f64)>,
-    },
-    /// A stretch of the axis, shaded over the panel's height.
-    Span {
-        /// For the legend.
-        name: String,
-        /// Colour.
-        colour: RGBColor,
-        /// 0 for clear to 1 for solid.
-        opacity: f64,
-        /// From where to where.
-        x: Range<f64>,
-    },
-    /// A map of equal cells.
-    Cells {
-        /// Ends of the map along the shared axis.
-        x: Range<f64>,
-        /// Ends of the map along the value axis.
-        y: Range<f64>,
-        /// Cells from left to right.
-        columns: usize,
-        /// Names and colours.
-        palette: Vec<(String, RGBColor)>,
-        /// Place in the palette of each cell, row by row from the bottom, left to right;
-        /// a place that is not there leaves the cell clear.
-        cells: Vec<u8>,
-    },
-    /// Words in the panel.
-    Label {
-        /// Where their middle is, or their left end.
-        at: (f64, f64),
-        /// Whether `at` is the middle.
-        centred: bool,
-        /// The words.
-        text: String,
-    },
-}
-
-impl Mark {
-    /// A solid line.
-    pub fn line(name: &str, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
-        Self::Line {
-            name: name.into(),
-            colour,
-            width: 3,
-            dashed: false,
-            points,
-        }
-    }
-
-    /// A dashed line.
-    pub fn dashed(name: &str, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
-        Self::Line {
-            name: name.into(),
-            colour,
-            width: 3,
-            dashed: true,
-            points,
-        }
-    }
-
-    fn points(&self) -> &[(f64, f64)] {
-        match self {
-            Self::Line { points, .. } | Self::Dots { points, .. } => points,
-            _ => &[],
-        }
-    }
-
-    /// Names and colours for the legend, and whether they are lines.
-    fn legend(&self) -> Vec<(&str, RGBColor, bool)> {
-        match self {
-            Self::Line { name, colour, .. } => vec![(name.as_str(), *colour, true)],
-            Self::Dots { name, colour, .. } => vec![(name.as_str(), *colour, false)],
-            Self::Span {
-                name,
-                colour,
-                opacity,
-                ..
-            } => vec![(name.as_str(), over_white(*colour, *opacity), false)],
-            Self::Cells { palette, .. } => palette
-                .iter()
-                .map(|(name, colour)| (name.as_str(), *colour, false))
-                .collect(),
-            Self::Label { .. } => Vec::new(),
-        }
-    }
-}
-
-impl Chart {
-    /// The figure as SVG text.
-    ///
-    /// # Errors
-    /// [`PlotError::Draw`] if the drawing library refuses, which it has no reason to.
-    pub fn svg(&self) -> Result<String, PlotError> {
-        let x = self.x_range();
-        let laid_out: Vec<Placed<'_>> = self
-            .panels
-            .iter()
-            .scan(TITLE_HEIGHT, |top, panel| {
-                let placed = Placed::new(panel, *top, x.clone());
-                *top = placed.bottom + GAP;
-                Some(placed)
-            })
-            .collect();
-        let bottom = laid_out.last().map_or(TITLE_HEIGHT, |placed| placed.bottom);
-        style::svg((WIDTH, bottom + AXIS_HEIGHT), |root| {
-            text(root, &self.title, &TITLE, (LEFT, 44), HPos::Left)?;
-            text(root, &self.subtitle, &SUBTITLE, (LEFT, 90), HPos::Left)?;
-            for placed in &laid_out {
-                placed.draw(root)?;
-            }
-            let (values, step) = ticks(&x, X_TICKS);
-            for value in values {
-                let at = (x_pixel(&x, value), bottom + 26);
-                text(root, &label(value, step), &TICK, at, HPos::Center)?;
-            }
-            let middle = ((LEFT + WIDTH - RIGHT) / 2, bottom + 68);
-            text(root, &self.x_title, &HEADING, middle, HPos::Center)
-        })
-    }
-
-    fn x_range(&self) -> Range<f64> {
-        self.x.clone().unwrap_or_else(|| {
-            let points = self.panels.iter().flat_map(|panel| &panel.marks);
-            let values = points.flat_map(|mark| mark.points().iter().map(|point| point.0));
-            let (low, high) = values
-                .filter(|value| value.is_finite())
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                    (low.min(value), high.max(value))
-                });
-            if low < high { low..high } else { 0.0..1.0 }
-        })
-    }
-}
+/// Dashes and the gaps between them.
+const DASH: (u32, u32) = (14, 10);
 
 /// A panel with its place in the figure and its scales.
-struct Placed<'a> {
+pub(super) struct Placed<'a> {
     panel: &'a Panel,
     legend_below_heading: bool,
     heading_top: i32,
     top: i32,
-    bottom: i32,
+    pub(super) bottom: i32,
     x: Range<f64>,
     axis: ValueAxis,
 }
 
 impl<'a> Placed<'a> {
-    fn new(panel: &'a Panel, heading_top: i32, x: Range<f64>) -> Self {
+    pub(super) fn new(panel: &'a Panel, heading_top: i32, x: Range<f64>) -> Self {
         let legend: i32 = legend(panel)
             .iter()
-            .map(|(name, ..)| legend_width(name))
+            .map(|entry| legend_width(entry.name))
             .sum();
         let words = text_width(&panel.title, &HEADING) + text_width(&panel.note, &NOTE) + 60;
         let legend_below_heading = words + legend > WIDTH - LEFT - RIGHT;
@@ -282,7 +73,7 @@ impl<'a> Placed<'a> {
         self.bottom - (part * f64::from(self.panel.height)).round() as i32
     }
 
-    fn draw(&self, root: &Area<'_>) -> Drawn {
+    pub(super) fn draw(&self, root: &Area<'_>) -> Drawn {
         let middle = self.heading_top + ROW / 2;
         let note = match self.axis.off_scale_note("") {
             off_scale if off_scale.is_empty() => self.panel.note.clone(),
@@ -344,16 +135,19 @@ impl<'a> Placed<'a> {
         let row = i32::from(self.legend_below_heading);
         let middle = self.heading_top + row * ROW + ROW / 2;
         let mut x = WIDTH - RIGHT;
-        for (name, colour, is_line) in legend(self.panel).into_iter().rev() {
-            x -= text_width(name, &LEGEND);
-            text(root, name, &LEGEND, (x, middle), HPos::Left)?;
+        for entry in legend(self.panel).into_iter().rev() {
+            x -= text_width(entry.name, &LEGEND);
+            text(root, entry.name, &LEGEND, (x, middle), HPos::Left)?;
             x -= LEGEND_LINE + 14;
-            if is_line {
-                line(root, [(x, middle), (x + LEGEND_LINE, middle)], colour, 4)?;
-            } else {
-                let swatch = [(x + 30, middle - 14), (x + LEGEND_LINE, middle + 14)];
-                root.draw(&Rectangle::new(swatch, colour.filled()))?;
-                root.draw(&Rectangle::new(swatch, GREY.stroke_width(1)))?;
+            let across = [(x, middle), (x + LEGEND_LINE, middle)];
+            match entry.symbol {
+                Symbol::Line => line(root, across, entry.colour, 4)?,
+                Symbol::Dashes => dashes(root, across, entry.colour, 4)?,
+                Symbol::Area => {
+                    let area = [(x + 30, middle - 14), (x + LEGEND_LINE, middle + 14)];
+                    root.draw(&Rectangle::new(area, entry.colour.filled()))?;
+                    root.draw(&Rectangle::new(area, GREY.stroke_width(1)))?;
+                }
             }
             x -= 40;
         }
@@ -369,14 +163,14 @@ impl<'a> Placed<'a> {
                 points,
                 ..
             } => {
-                let style = colour.stroke_width(*width);
                 let parts = points.split(|(x, y)| x.is_nan() || y.is_nan());
                 for part in parts.filter(|part| !part.is_empty()) {
                     let pixels = part.iter().map(|&(x, y)| (self.x(x), self.y(y)));
                     let pixels = without_straight_ons(pixels);
                     if *dashed {
-                        root.draw(&DashedPathElement::new(pixels, 14, 10, style))?;
+                        dashes(root, pixels, *colour, *width)?;
                     } else {
+                        let style = colour.stroke_width(*width);
                         root.draw(&PathElement::new(pixels, style))?;
                     }
                 }
@@ -470,17 +264,17 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// Names and colours of what is in a panel, and whether they are lines.
-fn legend(panel: &Panel) -> Vec<(&str, RGBColor, bool)> {
+/// Entries of what is in a panel and has a name.
+fn legend(panel: &Panel) -> Vec<Entry<'_>> {
     let entries = panel.marks.iter().flat_map(Mark::legend);
-    entries.filter(|(name, ..)| !name.is_empty()).collect()
+    entries.filter(|entry| !entry.name.is_empty()).collect()
 }
 
 fn legend_width(name: &str) -> i32 {
     text_width(name, &LEGEND) + LEGEND_LINE + 54
 }
 
-fn x_pixel(range: &Range<f64>, value: f64) -> i32 {
+pub(super) fn x_pixel(range: &Range<f64>, value: f64) -> i32 {
     let part = (value - range.start) / (range.end - range.start);
     LEFT + (part.clamp(0.0, 1.0) * f64::from(WIDTH - RIGHT - LEFT)).round() as i32
 }
@@ -492,4 +286,15 @@ fn line<const N: usize>(
     width: u32,
 ) -> Drawn {
     root.draw(&PathElement::new(points, colour.stroke_width(width)))
+}
+
+fn dashes(
+    root: &Area<'_>,
+    points: impl IntoIterator<Item = (i32, i32), IntoIter: Clone>,
+    colour: RGBColor,
+    width: u32,
+) -> Drawn {
+    let (dash, gap) = DASH;
+    let style = colour.stroke_width(width);
+    root.draw(&DashedPathElement::new(points, dash, gap, style))
 }

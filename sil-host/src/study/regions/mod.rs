@@ -1,0 +1,205 @@
+//! Fig. 3: the four solution modes over (θ1, θ̇1) with the tip on the belt and no torque.
+//!
+//! With the tip on the belt θ1 leaves two θ2, one to either side of the vertical; θ̇2 is
+//! that of a tip without normal velocity. p depends on θ1 alone, so that its zeros are upright
+//! lines; b is a quadratic in θ̇1 at every θ1, so that its zeros are roots of quadratics. Both
+//! are found to rounding, whatever the grid.
+
+mod lines;
+mod outcome;
+
+use painleve_shared::{Arm, ArmParameters, Slip, SolutionMode, range};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Grid, StudyError};
+use lines::{Column, zeros_of_b, zeros_of_p};
+
+/// Which of the two θ2 that a θ1 leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Theta2 {
+    /// θ2 > 0.
+    Positive,
+    /// θ2 < 0.
+    Negative,
+}
+
+impl Theta2 {
+    fn sign(self) -> f64 {
+        match self {
+            Self::Positive => 1.0,
+            Self::Negative => -1.0,
+        }
+    }
+}
+
+/// What to map.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The arm.
+    pub arm: ArmParameters<f64>,
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Middles of the cells, degrees; those out of reach of the belt are left out.
+    pub theta1_deg: Grid,
+    /// Middles of the cells, rad/s.
+    pub theta1_dot_rad_s: Grid,
+    /// Sides of the vertical on which the upper arm's end may be.
+    pub theta2: Vec<Theta2>,
+    /// Slip directions.
+    pub slips: Vec<Slip>,
+}
+
+/// All maps at one friction coefficient.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Regions {
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Largest |θ1| with the tip on the belt, degrees.
+    pub reach_deg: f64,
+    /// One per side and slip direction.
+    pub maps: Vec<Map>,
+    #[serde(skip)]
+    arm: Arm<f64>,
+}
+
+/// One map.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Map {
+    /// Side of the vertical.
+    pub theta2: Theta2,
+    /// Slip direction.
+    pub slip: Slip,
+    /// θ1 at which p = 0, degrees, ascending.
+    pub p_zero_theta1_deg: Vec<f64>,
+    /// Curves of (θ1 in degrees, θ̇1 in rad/s) along which b = 0.
+    pub b_zero: Vec<Vec<[f64; 2]>>,
+    /// Part of the cells that is sliding.
+    pub sliding: f64,
+    /// Part that is flight.
+    pub flight: f64,
+    /// Part that is indeterminate.
+    pub indeterminate: f64,
+    /// Part that is inconsistent.
+    pub inconsistent: f64,
+    #[serde(skip)]
+    cells: Vec<Cell>,
+    #[serde(skip)]
+    grid: (Vec<f64>, Vec<f64>),
+}
+
+/// One cell, as a line of the CSV file.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Cell {
+    mu: f64,
+    theta2: Theta2,
+    slip: Slip,
+    theta1_deg: f64,
+    theta1_dot_rad_s: f64,
+    theta2_deg: f64,
+    theta2_dot_rad_s: f64,
+    b_m_s2: f64,
+    p_per_kg: f64,
+    mode: SolutionMode,
+}
+
+/// Maps the modes.
+///
+/// # Errors
+/// [`StudyError::Range`] if the arm or the friction coefficient is out of range,
+/// [`StudyError::Option`] if no θ1 of the grid reaches the belt.
+pub fn regions(settings: &Settings) -> Result<Regions, StudyError> {
+    range::check("--mu", settings.mu, 0.0, 10.0)?;
+    let arm = Arm::new(settings.arm)?;
+    let cosine = settings.arm.height_m / settings.arm.link_length_m - 1.0;
+    let reach = libm::acos(cosine.clamp(-1.0, 1.0));
+    let inside = |theta1: &&f64| theta1.to_radians().abs() < reach;
+    let theta1: Vec<f64> = settings
+        .theta1_deg
+        .values()
+        .iter()
+        .filter(inside)
+        .copied()
+        .collect();
+    if theta1.is_empty() {
+        return Err(StudyError::Option(format!(
+            "no θ1 of the grid puts the tip on the belt; |θ1| must be below {:.2} degrees",
+            reach.to_degrees()
+        )));
+    }
+    let kinds: Vec<(Theta2, Slip)> = settings
+        .theta2
+        .iter()
+        .flat_map(|&theta2| settings.slips.iter().map(move |&slip| (theta2, slip)))
+        .collect();
+    let maps = kinds
+        .into_par_iter()
+        .map(|(theta2, slip)| map(&arm, settings, &theta1, reach, theta2, slip))
+        .collect();
+    Ok(Regions {
+        mu: settings.mu,
+        reach_deg: reach.to_degrees(),
+        maps,
+        arm,
+    })
+}
+
+fn map(
+    arm: &Arm<f64>,
+    settings: &Settings,
+    theta1_deg: &[f64],
+    reach: f64,
+    theta2: Theta2,
+    slip: Slip,
+) -> Map {
+    let rates = settings.theta1_dot_rad_s.values();
+    let mu = settings.mu;
+    let mut cells = Vec::with_capacity(theta1_deg.len() * rates.len());
+    for &rate in rates {
+        for &degrees in theta1_deg {
+            let Some(column) = Column::new(arm, degrees.to_radians(), theta2) else {
+                continue;
+            };
+            let (b, p) = (column.b(rate), column.p(mu, slip));
+            cells.push(Cell {
+                mu,
+                theta2,
+                slip,
+                theta1_deg: degrees,
+                theta1_dot_rad_s: rate,
+                theta2_deg: column.theta.y.to_degrees(),
+                theta2_dot_rad_s: column.ratio * rate,
+                b_m_s2: b,
+                p_per_kg: p,
+                mode: SolutionMode::classify(p, b),
+            });
+        }
+    }
+    let part = |mode| {
+        let count = cells.iter().filter(|cell| cell.mode == mode).count();
+        count as f64 / cells.len().max(1) as f64
+    };
+    Map {
+        theta2,
+        slip,
+        p_zero_theta1_deg: zeros_of_p(arm, mu, theta2, slip),
+        b_zero: zeros_of_b(arm, reach, theta2),
+        sliding: part(SolutionMode::Sliding),
+        flight: part(SolutionMode::Flight),
+        indeterminate: part(SolutionMode::Indeterminate),
+        inconsistent: part(SolutionMode::Inconsistent),
+        cells,
+        grid: (theta1_deg.to_vec(), rates.to_vec()),
+    }
+}
+
+impl Regions {
+    /// Rest angle of the spring between the links, degrees.
+    pub fn spring_rest_deg(&self) -> f64 {
+        self.arm.parameters().spring_rest_rad.to_degrees()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,68 @@
+//! Sliding ranges whose ends are known or sharp.
+
+use super::*;
+
+fn study(controller: Controller, posture: Posture) -> SlidingRange {
+    SlidingRange {
+        controllers: vec![controller],
+        converters: vec![Converters::Hardware],
+        postures: vec![posture],
+        mu: vec![0.6],
+        references: vec![Reference::MinimumJerk(3.0)],
+        overrides: Vec::new(),
+        criterion: Criterion {
+            scan_step_m: 0.05,
+            resolution_m: 2e-3,
+            ..Criterion::default()
+        },
+    }
+}
+
+#[test]
+fn the_hybrid_law_goes_farther_than_in_the_paper_and_the_pid_lifts_off_elbow_up() {
+    let far = study(Controller::Hybrid, Posture::ElbowDown)
+        .row(0)
+        .unwrap();
+    assert!(far.z_sliding_m.unwrap() > 0.16, "{far:?}");
+    assert!((far.limit_m - 0.164_705).abs() < 1e-6);
+    assert!((far.z_sliding_m.unwrap() - far.tip_t_m.unwrap()).abs() < 1e-3);
+    assert_eq!(far.paper_m, Some(0.148));
+    let up = study(Controller::Pid, Posture::ElbowUp).row(0).unwrap();
+    assert_eq!((up.z_sliding_m, up.ends_by), (None, Ending::LiftOff));
+    assert_eq!(up.paper_m, None);
+}
+
+#[test]
+fn the_range_ends_where_the_next_target_fails() {
+    let mut study = study(Controller::Pid, Posture::ElbowDown);
+    // The jump of speed at the start of a fast ramp throws the tip off.
+    study.references = vec![Reference::Ramp(2.0)];
+    let row = study.row(0).unwrap();
+    assert_eq!(row.ends_by, Ending::LiftOff);
+    let case = study.case(0).unwrap();
+    let end = row.z_sliding_m.unwrap();
+    assert!(matches!(case.run(end).unwrap(), Trialled::Reached { .. }));
+    let beyond = end + study.criterion.resolution_m;
+    let failed = case.run(beyond).unwrap();
+    assert!(matches!(failed, Trialled::Failed(Ending::LiftOff)));
+}
+
+#[test]
+fn a_tolerance_that_nothing_meets_is_told_as_not_reached() {
+    let mut study = study(Controller::Hybrid, Posture::ElbowDown);
+    study.criterion.within_m = 1e-9;
+    study.criterion.patience_s = 2.5;
+    study.criterion.scan_step_m = 1.0;
+    let row = study.row(0).unwrap();
+    assert_eq!((row.z_sliding_m, row.ends_by), (None, Ending::NotReached));
+}
+
+#[test]
+fn a_controller_that_does_not_reach_the_belt_is_told_before_anything_runs() {
+    let mut study = study(Controller::Scenario("nothing".into()), Posture::ElbowUp);
+    assert!(study.check().unwrap_err().to_string().contains("nothing"));
+    study.controllers = vec![Controller::Hybrid];
+    study.mu = vec![-1.0];
+    let error = study.check().unwrap_err().to_string();
+    assert!(error.contains("belt.friction = -1"), "{error}");
+}
