@@ -285,7 +285,7 @@ impl Plant {
             "initial tip height over the belt in m",
             gap_m,
             -INSIDE_AT_START_M,
-            f64::MAX,
+            parameters.arm.height_m + 2.0 * parameters.arm.link_length_m,
         )?;
         if gap_m < CONTACT_AT_START_M {
             let on_belt = motion.lowered_onto_belt(&initial);

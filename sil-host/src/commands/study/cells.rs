@@ -17,14 +17,25 @@ pub struct CellOptions {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// How long each cell runs before it is watched, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 250.0)]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 250.0,
+        allow_negative_numbers = true
+    )]
     transient_s: f64,
     /// How long it is watched, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 50.0)]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 50.0,
+        allow_negative_numbers = true
+    )]
     record_s: f64,
-    /// Error of one step of the plant relative to its state; the absolute one is a tenth of it.
-    #[arg(long, value_name = "ERROR", default_value_t = RELATIVE_TOLERANCE)]
-    relative_tolerance: f64,
+    /// Error of one step of the plant relative to its state, the absolute one a tenth of it
+    /// [default: 1e-11].
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
+    relative_tolerance: Option<f64>,
     #[command(flatten)]
     base: BaseOptions,
 }
@@ -46,7 +57,7 @@ impl CellOptions {
         ])?;
         let cells = Cells {
             plant: scenario.plant_parameters(),
-            relative_tolerance: self.relative_tolerance,
+            relative_tolerance: self.relative_tolerance.unwrap_or(RELATIVE_TOLERANCE),
             mu: mu.values().to_vec(),
             v_belt_m_s: v_belt.values().to_vec(),
             initial: self.initial.list().to_vec(),

@@ -17,6 +17,8 @@ pub mod tangent;
 pub mod verdict;
 
 #[cfg(test)]
+mod bouncing_ball;
+#[cfg(test)]
 mod known_answers;
 
 pub use tangent::Tangent;
