@@ -94,7 +94,7 @@ impl BeltObserver {
         let limit = self.settings.fastest_m_s;
         self.slowest_m_s = (self.slowest_m_s - widening).at_least(-limit);
         self.fastest_m_s = (self.fastest_m_s + widening).at_most(limit);
-        let Some(friction) = friction else {
+        let Some(friction) = friction.filter(|friction| friction.slip_seen) else {
             return;
         };
         if friction.sticks || friction.slip == Slip::Positive {
@@ -133,6 +133,7 @@ mod tests {
             coefficient: 0.6,
             deviation: 0.01,
             slip,
+            slip_seen: true,
             sticks,
         }
     }

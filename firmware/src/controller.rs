@@ -251,7 +251,12 @@ impl Controller {
             self.estimator.theta_dot_rad_s(),
         );
         let touched = self.contact.contact();
-        let contact = self.observe(&model, &force_n);
+        // At the end of its range the force cell shows less than there is.
+        let range = scale.maximum_counts();
+        let in_range = [frame.tangential_force, frame.normal_force]
+            .iter()
+            .all(|force| force.0.abs() < range);
+        let contact = self.observe(&model, &force_n, in_range);
         let state_before = self.supervisor.state();
         self.supervisor
             .tick(frame.inputs, contact, self.law.is_on());
@@ -269,8 +274,18 @@ impl Controller {
             let program = &self.configuration.reference;
             self.reference.restart(program, tip_t_m);
         }
-        self.governor
-            .search(&self.arm, self.posture, tip_t_m, &self.friction.estimate());
+        let landing_p_ratio = if recovering {
+            self.configuration.recovery.minimum_p_ratio
+        } else {
+            0.0
+        };
+        self.governor.search(
+            &self.arm,
+            self.posture,
+            tip_t_m,
+            &self.friction.estimate(),
+            landing_p_ratio,
+        );
         let wanted = match state {
             SupervisorState::Armed => self.reference.start(),
             // A reference does not run away from a tip that is being brought back.
@@ -294,6 +309,7 @@ impl Controller {
             contact,
             saturated: (self.telemetry.saturated || self.telemetry.guarded) && !starts,
             reference: wanted,
+            torque_limit_nm: self.configuration.torque_limit_nm,
             tick_s: self.tick_s,
         };
         if state == SupervisorState::Armed
@@ -345,7 +361,7 @@ impl Controller {
 
     /// Takes in what a tick's readings say about contact, friction, belt and links; returns
     /// whether the tip touches.
-    fn observe(&mut self, model: &Model, force_n: &Vector2<f32>) -> bool {
+    fn observe(&mut self, model: &Model, force_n: &Vector2<f32>, in_range: bool) -> bool {
         let residual = self.estimator.residual_rad();
         let innovation = self.estimator.innovation_rad();
         let jacobian = &model.jacobian;
@@ -366,7 +382,9 @@ impl Controller {
             if !touched && let Some(slip) = self.belt.slip(model.tip_velocity_m_s.x) {
                 self.friction.expect_slip(slip);
             }
-            self.friction.update(force_n);
+            if in_range {
+                self.friction.update(force_n);
+            }
             if self.contact.confidence() >= 1.0 {
                 let length = self.calibration.update(gap.gap_m);
                 self.arm = self.arm.with_link_length(length);

@@ -10,7 +10,7 @@
 //! tick is bounded and the edges follow the friction estimate, within a tenth of a second at 1 kHz.
 
 use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::{Arm, Posture, Real};
+use painleve_shared::{Arm, Posture, Real, Slip};
 use serde::{Deserialize, Serialize};
 
 use crate::friction_estimator::FrictionEstimate;
@@ -101,8 +101,10 @@ impl GovernorSettings {
 struct Admissibility<'a> {
     arm: &'a Arm<f32>,
     posture: Posture,
-    /// μ̂ plus margin, with the sign of slip.
-    signed_friction: f32,
+    /// μ̂ plus margin.
+    friction: f32,
+    /// Direction of slip; `None` while it has not been seen.
+    slip: Option<Slip>,
     minimum_p_ratio: f32,
 }
 
@@ -110,7 +112,14 @@ impl Admissibility<'_> {
     fn at(&self, tip_t_m: f32) -> bool {
         self.arm
             .coupling_on_belt(tip_t_m, self.posture)
-            .is_some_and(|coupling| 1.0 - self.signed_friction * coupling >= self.minimum_p_ratio)
+            .is_some_and(|coupling| {
+                let against = match self.slip {
+                    Some(slip) => slip.sign::<f32>() * coupling,
+                    // It must do for either.
+                    None => coupling.abs(),
+                };
+                1.0 - self.friction * against >= self.minimum_p_ratio
+            })
     }
 }
 
@@ -203,6 +212,8 @@ pub struct EdgeGovernor {
     lower_m: f32,
     upper_m: f32,
     search: Option<Search>,
+    /// What the present search asks for beyond the setting.
+    asked_p_ratio: f32,
     /// The reference that was followed last: position (m) and velocity (m/s).
     position_m: f32,
     velocity_m_s: f32,
@@ -220,6 +231,7 @@ impl EdgeGovernor {
             lower_m: -USABLE_REACH * reach_m,
             upper_m: USABLE_REACH * reach_m,
             search: None,
+            asked_p_ratio: 0.0,
             position_m: 0.0,
             velocity_m_s: 0.0,
             follows: false,
@@ -244,20 +256,27 @@ impl EdgeGovernor {
         self.at_edge
     }
 
-    /// Goes on searching for the edges around a tip at `tip_t_m`.
+    /// Goes on searching for the edges around a tip at `tip_t_m`, with p at least
+    /// `minimum_p_ratio` of Q22 or the setting, whichever is more.
     pub fn search(
         &mut self,
         arm: &Arm<f32>,
         posture: Posture,
         tip_t_m: f32,
         friction: &FrictionEstimate,
+        minimum_p_ratio: f32,
     ) {
+        if minimum_p_ratio != self.asked_p_ratio {
+            self.asked_p_ratio = minimum_p_ratio;
+            self.search = None;
+        }
         let margin = self.settings.friction_deviations * friction.deviation;
         let admissibility = Admissibility {
             arm,
             posture,
-            signed_friction: friction.slip.sign::<f32>() * (friction.coefficient + margin),
-            minimum_p_ratio: self.settings.minimum_p_ratio,
+            friction: friction.coefficient + margin,
+            slip: friction.slip_seen.then_some(friction.slip),
+            minimum_p_ratio: self.settings.minimum_p_ratio.at_least(minimum_p_ratio),
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
@@ -336,7 +355,7 @@ impl EdgeGovernor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_shared::{ArmParameters, Slip};
+    use painleve_shared::ArmParameters;
     use proptest::prelude::*;
 
     const TICK_S: f32 = 1e-3;
@@ -350,6 +369,7 @@ mod tests {
             coefficient,
             deviation: 0.0,
             slip,
+            slip_seen: true,
             sticks: false,
         }
     }
@@ -362,7 +382,7 @@ mod tests {
         };
         let mut governor = EdgeGovernor::new(&settings, arm().reach_on_belt_m());
         for _ in 0..300 {
-            governor.search(&arm(), posture, tip_t_m, friction);
+            governor.search(&arm(), posture, tip_t_m, friction, 0.0);
         }
         governor
     }

@@ -5,8 +5,10 @@
 //! variance of a ratio of noisy forces, σ² (1 + μ²)/f_n², and μ as a random walk.
 //!
 //! A reading is left out where it says nothing about μ: in the air, at a small normal force,
-//! and in stick, where friction is anything up to μ f_n. Stick shows as a ratio well below
-//! the estimate; if that lasts, μ has changed and the filter starts to learn again.
+//! and in stick, where friction is anything up to μ f_n either way. Stick shows as a ratio
+//! well below the estimate; if that lasts, μ has changed and the filter starts to learn again.
+//! The direction of slip is reversed only by a friction force near the other side of
+//! the cone: in stick its sign says nothing.
 
 use nalgebra::Vector2;
 use painleve_shared::range::{self, OutOfRange};
@@ -17,6 +19,9 @@ use serde::{Deserialize, Serialize};
 const STICK_DEVIATIONS: f32 = 5.0;
 /// Part of the estimate below it at which the tip may stick.
 const STICK_FRACTION: f32 = 0.1;
+
+/// Part of the estimated friction that shows a slip the other way.
+const REVERSAL_FRACTION: f32 = 0.8;
 
 /// Settings of the friction estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,7 +46,7 @@ impl Default for FrictionSettings {
             first_deviation: 0.2,
             drift_per_sqrt_s: 0.0005,
             observable_n: 1.0,
-            stick_limit_s: 0.2,
+            stick_limit_s: 0.5,
         }
     }
 }
@@ -95,6 +100,8 @@ pub struct FrictionEstimate {
     pub deviation: f32,
     /// Direction of slip, from the sign of the friction force.
     pub slip: Slip,
+    /// Whether a slip has been seen at all; before, `slip` is a guess.
+    pub slip_seen: bool,
     /// Whether the tip seems to move with the belt.
     pub sticks: bool,
 }
@@ -108,6 +115,7 @@ pub struct FrictionEstimator {
     coefficient: f32,
     variance: f32,
     slip: Slip,
+    slip_seen: bool,
     sticks: bool,
     sticking_s: f32,
 }
@@ -123,6 +131,7 @@ impl FrictionEstimator {
             coefficient: settings.first_guess,
             variance: settings.first_deviation * settings.first_deviation,
             slip: Slip::Positive,
+            slip_seen: false,
             sticks: false,
             sticking_s: 0.0,
         }
@@ -134,12 +143,9 @@ impl FrictionEstimator {
         let drift = self.settings.drift_per_sqrt_s;
         self.variance = (self.variance + drift * drift * self.tick_s).at_most(first_variance);
         self.sticks = false;
+        self.observe_slip(force_n);
         if force_n.y < self.settings.observable_n {
             return;
-        }
-        // Below the noise the sign says nothing.
-        if force_n.x * force_n.x > 9.0 * self.force_variance_n2 {
-            self.slip = Slip::of(-force_n.x);
         }
         let ratio = -self.slip.sign::<f32>() * force_n.x / force_n.y;
         let ratio_variance = self.force_variance_n2 * (1.0 + self.coefficient * self.coefficient)
@@ -163,9 +169,22 @@ impl FrictionEstimator {
         self.variance *= 1.0 - gain;
     }
 
+    fn observe_slip(&mut self, force_n: &Vector2<f32>) {
+        let slip = Slip::of(-force_n.x);
+        // Below the noise the sign says nothing.
+        let clear = force_n.x * force_n.x > 9.0 * self.force_variance_n2;
+        let cone_n = REVERSAL_FRACTION * self.coefficient * force_n.y;
+        let slides = slip == self.slip || force_n.x.abs() >= cone_n;
+        if clear && (slides || !self.slip_seen) {
+            self.slip = slip;
+            self.slip_seen = true;
+        }
+    }
+
     /// Takes in the direction in which a tip that lands will slip.
     pub fn expect_slip(&mut self, slip: Slip) {
         self.slip = slip;
+        self.slip_seen = true;
     }
 
     /// Takes in that the tip was thrown off where sliding has no solution from μ = `critical` on.
@@ -182,6 +201,7 @@ impl FrictionEstimator {
             coefficient: self.coefficient,
             deviation: self.variance.square_root(),
             slip: self.slip,
+            slip_seen: self.slip_seen,
             sticks: self.sticks,
         }
     }
@@ -248,12 +268,24 @@ mod tests {
     fn stick_is_not_taken_for_less_friction_but_a_slippery_belt_is() {
         let mut estimator = estimator(0.6);
         slide(&mut estimator, 0.6, Slip::Positive, 200);
-        slide(&mut estimator, 0.1, Slip::Positive, 150);
+        slide(&mut estimator, 0.1, Slip::Positive, 400);
         assert!(estimator.estimate().sticks);
         assert!((estimator.estimate().coefficient - 0.6).abs() < 0.01);
-        slide(&mut estimator, 0.1, Slip::Positive, 150);
+        slide(&mut estimator, 0.1, Slip::Positive, 200);
         assert!(!estimator.estimate().sticks);
         assert!((estimator.estimate().coefficient - 0.1).abs() < 0.02);
+    }
+
+    #[test]
+    fn only_friction_near_the_other_side_of_the_cone_reverses_the_slip() {
+        let mut estimator = estimator(0.6);
+        slide(&mut estimator, 0.6, Slip::Positive, 200);
+        slide(&mut estimator, 0.4, Slip::Negative, 100);
+        let found = estimator.estimate();
+        assert!(found.slip == Slip::Positive && found.sticks);
+        slide(&mut estimator, 0.6, Slip::Negative, 2);
+        let found = estimator.estimate();
+        assert!(found.slip == Slip::Negative && !found.sticks);
     }
 
     #[test]

@@ -91,6 +91,11 @@ impl Model {
         joint_torque_nm(&generalised)
     }
 
+    /// Joint torques (u1, u2), N·m, that hold a contact force (f_t, f_n), N: −Jᵀ f.
+    pub fn torque_against_nm(&self, force_n: &Vector2<f32>) -> Vector2<f32> {
+        joint_torque_nm(&-(self.jacobian.transpose() * force_n))
+    }
+
     /// Joint acceleration θ̈ (rad/s²) under joint torques (u1, u2), N·m, and a contact force
     /// (f_t, f_n), N: M⁻¹ (u − w − c + Jᵀ f).
     pub fn acceleration_rad_s2(

@@ -35,8 +35,8 @@ pub struct RecoverySettings {
     pub clearance_m: f32,
     /// Speed at which it is lowered, m/s.
     pub landing_speed_m_s: f32,
-    /// Distance from the edge of the admissible stretch at which it may land, m.
-    pub retreat_m: f32,
+    /// Least p as a part of Q22 where it may land: nearer to the edge impacts throw the tip off.
+    pub minimum_p_ratio: f32,
 }
 
 impl Default for RecoverySettings {
@@ -46,7 +46,7 @@ impl Default for RecoverySettings {
             acceleration_rad_s2: 500.0,
             clearance_m: 1e-3,
             landing_speed_m_s: 0.02,
-            retreat_m: 5e-3,
+            minimum_p_ratio: 0.2,
         }
     }
 }
@@ -82,7 +82,12 @@ impl RecoverySettings {
             1e-3,
             1.0,
         )?;
-        key("controller.recovery.retreat_m", self.retreat_m, 0.0, 0.05)
+        key(
+            "controller.recovery.minimum_p_ratio",
+            self.minimum_p_ratio,
+            0.0,
+            0.9,
+        )
     }
 }
 
@@ -135,9 +140,6 @@ impl Recovery {
     ) -> LawOutput {
         let settings = &self.settings;
         let (lower, upper) = edges_m;
-        let retreat = settings
-            .retreat_m
-            .at_most(0.5 * (upper - lower).at_least(0.0));
         let mut flight = self.flight.unwrap_or(Flight {
             landing_m: model.tip_m.x,
             height_m: model.gap_m.at_least(0.0),
@@ -145,7 +147,7 @@ impl Recovery {
             posture: Posture::of(&model.theta_rad),
             path_rad: None,
         });
-        flight.landing_m = flight.landing_m.limited(lower + retreat, upper - retreat);
+        flight.landing_m = flight.landing_m.limited(lower, upper);
         let away = flight.landing_m - model.tip_m.x;
         let admissible = model.tip_m.x > lower && model.tip_m.x < upper;
         flight.lands = away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible);

@@ -64,6 +64,8 @@ pub struct HybridSettings {
     pub position_integral_limit_m_s2: f32,
     /// Time constant with which f_n* is approached after landing, s; 0 for at once, as in the paper.
     pub force_time_constant_s: f32,
+    /// Whether the tip is pressed less where the torque limits do not allow f_n*; not in the paper.
+    pub presses_less: bool,
     /// K'_I, 1/s.
     pub force_integral_gain_per_s: f32,
     /// Largest correction by the force integral, N.
@@ -82,6 +84,7 @@ impl Default for HybridSettings {
             position_integral_gain_per_s3: 40_000.0,
             position_integral_limit_m_s2: 20.0,
             force_time_constant_s: 0.02,
+            presses_less: true,
             force_integral_gain_per_s: 5.0,
             force_integral_limit_n: 5.0,
             friction: FrictionFeedForward::Observed {
@@ -173,6 +176,29 @@ impl HybridSettings {
 /// Part of the sampling that the loop through the contact may use: its pole is 1 − ¼ p̂/p.
 const OBSERVER_SHARE: f32 = 0.25;
 
+/// Part of the torque limit up to which the tip is pressed on the belt; the rest is for motion.
+const TORQUE_USED: f32 = 0.95;
+/// Least part of the wanted contact force.
+const LEAST_PRESSING: f32 = 0.1;
+
+/// The part of `pressing_nm` that leaves both joints within ±`limit_nm` together with `motion_nm`.
+fn affordable(motion_nm: &Vector2<f32>, pressing_nm: &Vector2<f32>, limit_nm: f32) -> f32 {
+    let of_joint = |motion: f32, pressing: f32| {
+        if (motion + pressing).abs() <= limit_nm {
+            1.0
+        } else {
+            // Not finite where nothing is pressed; the motion alone is then too much.
+            (limit_nm.copysign(pressing) - motion) / pressing
+        }
+    };
+    of_joint(motion_nm.x, pressing_nm.x)
+        .at_most(of_joint(motion_nm.y, pressing_nm.y))
+        .limited(LEAST_PRESSING, 1.0)
+}
+
+/// Wanted acceleration from which on a sticking tip is to break away, m/s².
+const BREAKING_AWAY_M_S2: f32 = 1.0;
+
 /// The hybrid law with its state.
 #[derive(Clone, Copy, Debug)]
 pub struct Hybrid {
@@ -185,6 +211,10 @@ pub struct Hybrid {
     position_integral_m_s2: f32,
     /// Low-passed f_t, or what the estimated friction leaves of it, N.
     filtered_friction_n: f32,
+    /// Slip whose friction was fed forward last.
+    slip: Option<Slip>,
+    /// Part of the wanted contact force for which there is torque.
+    pressing: f32,
 }
 
 impl Hybrid {
@@ -196,6 +226,8 @@ impl Hybrid {
             force_integral_n: 0.0,
             position_integral_m_s2: 0.0,
             filtered_friction_n: 0.0,
+            slip: None,
+            pressing: 1.0,
         }
     }
 
@@ -205,23 +237,34 @@ impl Hybrid {
         if self.settings.force_time_constant_s > 0.0 {
             self.wanted_force_n = input.force_n.y.limited(0.0, self.settings.normal_force_n);
         }
-        if !matches!(self.settings.friction, FrictionFeedForward::Observed { .. }) {
-            self.filtered_friction_n = input.force_n.x;
-        }
+        self.filtered_friction_n = input.force_n.x;
     }
 
     /// Torques for one tick.
     pub fn tick(&mut self, input: &LawInput<'_>) -> LawOutput {
         let tangential_acceleration = self.tangential_acceleration_m_s2(input);
         let normal_force = self.normal_force_n(input);
-        let friction_force = self.friction_force_n(input, normal_force);
+        let friction_force = self.friction_force_n(input, normal_force, tangential_acceleration);
         let acceleration = input
             .model
             .joint_acceleration_rad_s2(&Vector2::new(tangential_acceleration, 0.0));
-        let force = Vector2::new(friction_force, normal_force);
+        let wanted = Vector2::new(friction_force, normal_force);
+        let motion_nm = input
+            .model
+            .inverse_dynamics_nm(&acceleration, &Vector2::zeros());
+        let pressing_nm = input.model.torque_against_nm(&wanted);
+        self.pressing = if self.settings.presses_less {
+            affordable(
+                &motion_nm,
+                &pressing_nm,
+                TORQUE_USED * input.torque_limit_nm,
+            )
+        } else {
+            1.0
+        };
         LawOutput {
-            torque_nm: input.model.inverse_dynamics_nm(&acceleration, &force),
-            contact_force_n: force,
+            torque_nm: motion_nm + pressing_nm * self.pressing,
+            contact_force_n: wanted * self.pressing,
         }
     }
 
@@ -249,7 +292,7 @@ impl Hybrid {
         self.wanted_force_n += approach * (settings.normal_force_n - self.wanted_force_n);
         // Anti-windup: no integration in the air, where there is no force to
         // control, nor while the torque is limited.
-        if input.contact && !input.saturated {
+        if input.contact && !input.saturated && self.pressing >= 1.0 {
             let step = settings.force_integral_gain_per_s
                 * (self.wanted_force_n - input.force_n.y)
                 * input.tick_s;
@@ -259,8 +302,13 @@ impl Hybrid {
         self.wanted_force_n + self.force_integral_n
     }
 
-    /// f_t that is fed forward, N.
-    fn friction_force_n(&mut self, input: &LawInput<'_>, normal_force_n: f32) -> f32 {
+    /// f_t that is fed forward, N, with α_f (N) and α_v (m/s²).
+    fn friction_force_n(
+        &mut self,
+        input: &LawInput<'_>,
+        normal_force_n: f32,
+        tangential_acceleration_m_s2: f32,
+    ) -> f32 {
         match self.settings.friction {
             FrictionFeedForward::Measured => input.force_n.x,
             FrictionFeedForward::Filtered { time_constant_s } => {
@@ -270,12 +318,28 @@ impl Hybrid {
             }
             FrictionFeedForward::Observed { time_constant_s } => {
                 let friction = &input.friction;
+                // In stick the friction force follows what is fed forward. Feeding forward the
+                // friction of the slip that is wanted brings it to the edge of its cone,
+                // from where the tip breaks away without a jerk.
+                let wants_slip = tangential_acceleration_m_s2.abs() > BREAKING_AWAY_M_S2;
+                let slip = if friction.sticks && wants_slip {
+                    Slip::of(tangential_acceleration_m_s2)
+                } else {
+                    friction.slip
+                };
+                let slip = friction.slip_seen.then_some(slip);
+                if slip != self.slip {
+                    self.slip = slip;
+                    self.filtered_friction_n = 0.0;
+                }
+                let expected = slip.map_or(0.0, |slip| {
+                    -friction.coefficient * slip.sign::<f32>() * normal_force_n
+                });
                 let p = input.model.p_per_kg(friction.coefficient, friction.slip);
                 let share = OBSERVER_SHARE * p / input.model.q.m22;
                 let weight = (input.tick_s / (time_constant_s + input.tick_s))
                     .at_most(share)
                     .at_least(0.0);
-                let expected = -friction.coefficient * friction.slip.sign::<f32>() * normal_force_n;
                 let rest = input.force_n.x - expected;
                 self.filtered_friction_n += weight * (rest - self.filtered_friction_n);
                 expected + self.filtered_friction_n
@@ -324,10 +388,10 @@ mod tests {
             let output = Hybrid::new(settings).tick(&LawInput {
                 arm: &arm, model: &model, posture,
                 friction: FrictionEstimate {
-                    coefficient: friction, deviation: 0.0, slip: Slip::Positive, sticks: false,
+                    coefficient: friction, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
                 },
                 force_n: Vector2::zeros(), contact: true, saturated: false,
-                reference, tick_s: 1e-3,
+                reference, torque_limit_nm: 50.0, tick_s: 1e-3,
             });
             let terms = arm.contact_terms(
                 &theta_rad, &theta_dot_rad_s, &pose, &generalised_torque_nm(&output.torque_nm));

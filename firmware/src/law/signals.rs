@@ -26,6 +26,8 @@ pub struct LawInput<'a> {
     pub saturated: bool,
     /// Where the tip shall be.
     pub reference: TipReference,
+    /// Largest torque on either joint, N·m.
+    pub torque_limit_nm: f32,
     /// Time between two ticks, s.
     pub tick_s: f32,
 }
