@@ -221,6 +221,7 @@ impl Makes<'_> {
         let ramps = SlidingRange {
             controllers: vec![Controller::Pid, Controller::Hybrid],
             converters: vec![Converters::Ideal],
+            postures: vec![Posture::ElbowDown],
             references: vec![Reference::Ramp(2.0), Reference::Ramp(3.0)],
             ..study.clone()
         };

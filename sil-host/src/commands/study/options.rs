@@ -176,11 +176,13 @@ pub fn output(error: impl std::fmt::Display) -> CommandError {
 /// A bar on stderr, where it is a terminal; nothing elsewhere.
 fn progress_bar(name: &str, rows: usize) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(rows as u64), ProgressDrawTarget::stderr());
-    let template = "{prefix} {bar:40} {percent:>3} %  {pos}/{len} rows  {eta} left";
+    let template = "{prefix}{bar:40} {percent:>3} %  {pos}/{len} rows  {eta} left";
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
-    bar.set_prefix(name.to_owned());
+    if !name.is_empty() {
+        bar.set_prefix(format!("{name}  "));
+    }
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     bar
 }
