@@ -341,8 +341,12 @@ impl Controller {
         };
         if self.supervisor.drives() {
             let output = if recovering {
-                self.recovery
-                    .tick(&self.arm, &model, self.governor.edges_m(), self.tick_s)
+                self.recovery.tick(
+                    &self.arm,
+                    &model,
+                    self.governor.fresh_edges_m(),
+                    self.tick_s,
+                )
             } else {
                 self.recovery.end();
                 if starts {
@@ -419,7 +423,7 @@ impl Controller {
         if guard.enabled && contact {
             let friction = self.friction.estimate();
             let p = model.p_per_kg(friction.coefficient, friction.slip);
-            if p > 0.0 {
+            if p > 0.0 && friction.slip_seen {
                 let (offset, normal) = model.free_normal_acceleration();
                 let plane = HalfPlane {
                     normal,
@@ -452,7 +456,7 @@ impl Controller {
         let limited = wanted_nm.map(|torque| torque.limited(-limit, limit));
         // What rounding took away is given with the next tick: near the edge, where p is
         // small, half a count of constant torque would be a newton of force.
-        let owed = limited + self.rounding_nm;
+        let owed = (limited + self.rounding_nm).map(|torque| torque.limited(-limit, limit));
         let (counts_1, over_1) = scale.counts(owed.x);
         let (counts_2, over_2) = scale.counts(owed.y);
         let given = Vector2::new(scale.value(counts_1), scale.value(counts_2));

@@ -6,8 +6,9 @@
 //! could not stop before an edge is followed with bounded deceleration to the edge
 //! and held there.
 //!
-//! The edges are searched for outwards from the tip, one point a tick, so that the time of a
-//! tick is bounded and the edges follow the friction estimate, within a tenth of a second at 1 kHz.
+//! The edges are searched for outwards from the tip, a point or two a tick, so that the time
+//! of a tick is bounded and the edges follow the friction estimate, within a tenth of a
+//! second at 1 kHz.
 
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Arm, Posture, Real, Slip};
@@ -16,6 +17,8 @@ use serde::{Deserialize, Serialize};
 use crate::friction_estimator::FrictionEstimate;
 use crate::reference::TipReference;
 
+/// Points looked at in one tick while the edges are not known.
+const POINTS_IN_A_HURRY: u32 = 2;
 /// Points from one end of the reach to the other in the search outwards.
 const STEPS_OVER_REACH: f32 = 64.0;
 /// Halvings of the last step: 6 mm / 2⁹ is 11 µm.
@@ -214,6 +217,8 @@ pub struct EdgeGovernor {
     search: Option<Search>,
     /// What the present search asks for beyond the setting.
     asked_p_ratio: f32,
+    /// Whether both edges have been found since it was asked.
+    is_fresh: bool,
     /// The reference that was followed last: position (m) and velocity (m/s).
     position_m: f32,
     velocity_m_s: f32,
@@ -232,6 +237,7 @@ impl EdgeGovernor {
             upper_m: USABLE_REACH * reach_m,
             search: None,
             asked_p_ratio: 0.0,
+            is_fresh: false,
             position_m: 0.0,
             velocity_m_s: 0.0,
             follows: false,
@@ -249,6 +255,11 @@ impl EdgeGovernor {
     /// Edges of the admissible stretch, m.
     pub fn edges_m(&self) -> (f32, f32) {
         (self.lower_m, self.upper_m)
+    }
+
+    /// The same once both have been found for what the search was last asked for.
+    pub fn fresh_edges_m(&self) -> Option<(f32, f32)> {
+        self.is_fresh.then_some((self.lower_m, self.upper_m))
     }
 
     /// Whether an edge holds the reference back.
@@ -269,6 +280,7 @@ impl EdgeGovernor {
         if minimum_p_ratio != self.asked_p_ratio {
             self.asked_p_ratio = minimum_p_ratio;
             self.search = None;
+            self.is_fresh = false;
         }
         let margin = self.settings.friction_deviations * friction.deviation;
         let admissibility = Admissibility {
@@ -281,20 +293,24 @@ impl EdgeGovernor {
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
         let mut search = self.search.unwrap_or(Search::start(tip_t_m));
-        let point = search.point(step, reach);
-        search = search.next(point, admissibility.at(point), step, reach);
-        if search.stage == Stage::Found {
-            let edge = search.inside_m - search.direction * self.settings.distance_m;
-            if search.direction > 0.0 {
-                self.upper_m = edge;
-                search = Search {
-                    direction: -1.0,
-                    ..Search::start(tip_t_m)
-                };
-            } else {
-                // A stretch shorter than both distances is a point.
-                self.lower_m = edge.at_most(self.upper_m);
-                search = Search::start(tip_t_m);
+        let points = if self.is_fresh { 1 } else { POINTS_IN_A_HURRY };
+        for _ in 0..points {
+            let point = search.point(step, reach);
+            search = search.next(point, admissibility.at(point), step, reach);
+            if search.stage == Stage::Found {
+                let edge = search.inside_m - search.direction * self.settings.distance_m;
+                if search.direction > 0.0 {
+                    self.upper_m = edge;
+                    search = Search {
+                        direction: -1.0,
+                        ..Search::start(tip_t_m)
+                    };
+                } else {
+                    // A stretch shorter than both distances is a point.
+                    self.lower_m = edge.at_most(self.upper_m);
+                    self.is_fresh = true;
+                    search = Search::start(tip_t_m);
+                }
             }
         }
         self.search = Some(search);

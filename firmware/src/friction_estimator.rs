@@ -23,6 +23,10 @@ const STICK_FRACTION: f32 = 0.1;
 /// Part of the estimated friction that shows a slip the other way.
 const REVERSAL_FRACTION: f32 = 0.8;
 
+/// Ticks in a row that it takes: in stick the friction force follows what is fed forward, so
+/// that believing it at once would confirm itself, to and fro.
+const REVERSAL_TICKS: u8 = 3;
+
 /// Settings of the friction estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -116,6 +120,8 @@ pub struct FrictionEstimator {
     variance: f32,
     slip: Slip,
     slip_seen: bool,
+    /// Ticks in a row that speak for a slip the other way.
+    contrary_ticks: u8,
     sticks: bool,
     sticking_s: f32,
 }
@@ -132,6 +138,7 @@ impl FrictionEstimator {
             variance: settings.first_deviation * settings.first_deviation,
             slip: Slip::Positive,
             slip_seen: false,
+            contrary_ticks: 0,
             sticks: false,
             sticking_s: 0.0,
         }
@@ -174,10 +181,12 @@ impl FrictionEstimator {
         // Below the noise the sign says nothing.
         let clear = force_n.x * force_n.x > 9.0 * self.force_variance_n2;
         let cone_n = REVERSAL_FRACTION * self.coefficient * force_n.y;
-        let slides = slip == self.slip || force_n.x.abs() >= cone_n;
-        if clear && (slides || !self.slip_seen) {
+        let contrary = clear && slip != self.slip && force_n.x.abs() >= cone_n;
+        self.contrary_ticks = if contrary { self.contrary_ticks + 1 } else { 0 };
+        if self.contrary_ticks >= REVERSAL_TICKS || (clear && !self.slip_seen) {
             self.slip = slip;
             self.slip_seen = true;
+            self.contrary_ticks = 0;
         }
     }
 
@@ -283,7 +292,7 @@ mod tests {
         slide(&mut estimator, 0.4, Slip::Negative, 100);
         let found = estimator.estimate();
         assert!(found.slip == Slip::Positive && found.sticks);
-        slide(&mut estimator, 0.6, Slip::Negative, 2);
+        slide(&mut estimator, 0.6, Slip::Negative, 4);
         let found = estimator.estimate();
         assert!(found.slip == Slip::Negative && !found.sticks);
     }

@@ -219,13 +219,29 @@ fn a_law_that_is_not_finite_is_a_fault() {
 #[test]
 fn torque_is_limited_and_counted() {
     let mut limited = configuration();
-    limited.torque_limit_nm = 0.5;
+    // Less than it takes to hold the arm, so that pressing less does not help.
+    limited.torque_limit_nm = 0.05;
     let mut controller = Controller::new(&limited).unwrap();
     let answer = run(&mut controller, 0..20);
     assert!(answer.flags.contains(StatusFlags::SATURATED));
-    let limit = (0.5 / limited.converters.torque.per_count()).round() as i32;
+    let limit = (0.05 / limited.converters.torque.per_count()).round() as i32;
     assert!(answer.torques.iter().all(|torque| torque.0.abs() <= limit));
     assert!(controller.telemetry().saturated_ticks > 10);
+}
+
+#[test]
+fn the_tip_is_pressed_less_where_torque_is_short() {
+    let mut limited = configuration();
+    limited.torque_limit_nm = 1.5;
+    let mut controller = Controller::new(&limited).unwrap();
+    let answer = run(&mut controller, 0..200);
+    assert_ne!(answer.torques, [TorqueCounts(0); 2]);
+    assert_eq!(controller.telemetry().saturated_ticks, 0);
+    let largest = controller.telemetry().torque_nm.map(f32::abs);
+    assert!(
+        largest[0].max(largest[1]) <= 0.95 * 1.5 + 1e-3,
+        "{largest:?}"
+    );
 }
 
 #[test]

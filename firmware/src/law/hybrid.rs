@@ -235,7 +235,7 @@ impl Hybrid {
     pub fn reset(&mut self, input: &LawInput<'_>) {
         *self = Self::new(self.settings);
         if self.settings.force_time_constant_s > 0.0 {
-            self.wanted_force_n = input.force_n.y.limited(0.0, self.settings.normal_force_n);
+            self.wanted_force_n = input.force_n.y.at_least(0.0);
         }
         self.filtered_friction_n = input.force_n.x;
     }
