@@ -1,0 +1,203 @@
+//! What the controller does that the paper's does not, in the closed loop with hardware-like
+//! converters: to the edge and not over it, with friction guessed wrongly, on reversed and
+//! standing belts, and out of the bounce.
+
+use painleve_shared::ArmParameters;
+use painleve_shared::frame::StatusFlags;
+use painleve_sil_host::closed_loop::{ClosedLoop, LoopError, LoopResult, Watcher};
+use painleve_sil_host::controller_host::InProcess;
+use painleve_sil_host::record::Sample;
+use painleve_sil_host::scenario::Scenario;
+use painleve_sil_host::simulation::Simulation;
+
+/// 0.5 % of the force cell's range.
+const NOISE: &str = "converters.force.noise_n=0.1";
+
+/// What a test asks about the course of a run.
+#[derive(Default)]
+struct Course {
+    /// Largest distance from the reference after 0.2 s, m.
+    tip_error_m: f64,
+    /// The same in the last second, m.
+    rest_error_m: f64,
+    /// Largest deviation from 10 N after 0.2 s, N.
+    force_error_n: f64,
+    /// Last time in the air, s.
+    last_flight_s: f64,
+    at_edge: bool,
+    duration_s: f64,
+}
+
+impl Watcher for Course {
+    fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
+        let error_m = (sample.tip_t_m - sample.reference_tip_t_m).abs();
+        if sample.time_s > 0.2 {
+            self.tip_error_m = self.tip_error_m.max(error_m);
+            self.force_error_n = self.force_error_n.max((sample.normal_force_n - 10.0).abs());
+        }
+        if sample.time_s > self.duration_s - 1.0 {
+            self.rest_error_m = self.rest_error_m.max(error_m);
+        }
+        if !sample.mode.is_contact() {
+            self.last_flight_s = sample.time_s;
+        }
+        self.at_edge = sample.actuator.flags.contains(StatusFlags::AT_EDGE);
+        Ok(())
+    }
+}
+
+fn run(scenario: &str, overrides: &[&str]) -> (LoopResult, Course) {
+    run_scenario(&load(scenario, overrides))
+}
+
+fn load(scenario: &str, overrides: &[&str]) -> Scenario {
+    let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+    Scenario::load(scenario, &overrides).unwrap()
+}
+
+fn run_scenario(scenario: &Scenario) -> (LoopResult, Course) {
+    let host = InProcess::new(&scenario.controller_configuration()).unwrap();
+    let mut closed_loop = ClosedLoop::new(Simulation::new(scenario).unwrap(), host);
+    let mut course = Course {
+        duration_s: scenario.run.duration_s,
+        ..Course::default()
+    };
+    for _ in 0..scenario.run.ticks() {
+        closed_loop.tick(&mut course).unwrap();
+    }
+    (closed_loop.finish().0, course)
+}
+
+fn minimum_jerk(target_m: f64) -> String {
+    format!(
+        "controller.reference=[{{ minimum-jerk = {{ target_m = {target_m}, duration_s = 3.0 }} }}]"
+    )
+}
+
+fn ramp(target_m: f64) -> String {
+    format!("controller.reference=[{{ ramp = {{ target_m = {target_m}, duration_s = 2.0 }} }}]")
+}
+
+/// Where p = 0 for both postures at three frictions, m. At μ = 0.4 elbow up there is no such
+/// place within the arm's reach, 0.1841 m.
+const EDGES: [(&str, f64, f64); 6] = [
+    ("hybrid-elbow-down", 0.4, 0.172_68),
+    ("hybrid-elbow-down", 0.6, 0.164_70),
+    ("hybrid-elbow-down", 0.8, 0.160_96),
+    ("hybrid-elbow-up", 0.4, 0.184_10),
+    ("hybrid-elbow-up", 0.6, 0.182_69),
+    ("hybrid-elbow-up", 0.8, 0.174_92),
+];
+
+#[test]
+fn a_reference_beyond_the_edge_ends_at_the_edge_without_lift_off() {
+    for (scenario, friction, edge_m) in EDGES {
+        let friction = format!("belt.friction={friction}");
+        for reference in [minimum_jerk(edge_m + 0.02), ramp(edge_m + 0.02)] {
+            let (result, course) = run(scenario, &[NOISE, &friction, &reference]);
+            let what = format!("{scenario} {friction} {reference}");
+            assert_eq!(result.statistics.lift_offs, 0, "{what}");
+            assert!(course.at_edge, "{what}");
+            let short_m = edge_m - result.final_tip_t_m;
+            assert!(
+                (0.0..2.5e-3).contains(&short_m),
+                "{what}: {short_m} m short"
+            );
+            assert!(
+                course.rest_error_m < 0.5e-3,
+                "{what}: {}",
+                course.rest_error_m
+            );
+        }
+    }
+}
+
+#[test]
+fn a_first_guess_of_friction_that_is_wrong_does_not_matter() {
+    for guess in [0.42, 0.78] {
+        let guess = format!("controller.friction.first_guess={guess}");
+        for scenario in ["hybrid-elbow-down", "hybrid-elbow-up"] {
+            let (result, course) = run(scenario, &[NOISE, &guess]);
+            assert_eq!(result.statistics.lift_offs, 0);
+            assert!(course.force_error_n < 1.0, "{}", course.force_error_n);
+            assert!(course.tip_error_m < 3e-3, "{}", course.tip_error_m);
+            assert!(course.rest_error_m < 0.5e-3, "{}", course.rest_error_m);
+        }
+    }
+}
+
+#[test]
+fn a_bouncing_arm_is_caught() {
+    for seed in 0..20 {
+        let enable_s = 5.0 + 0.037 * f64::from(seed);
+        let overrides = [
+            "initial.theta1_deg=32.0".to_string(),
+            "initial.theta2_deg=18.27".to_string(),
+            format!("controller.enable_at_s={enable_s}"),
+            format!("run.duration_s={}", enable_s + 2.0),
+            format!("run.seed={seed}"),
+            "controller.reference=[]".to_string(),
+        ];
+        let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+        let (result, course) = run("hybrid-elbow-down", &[&overrides[..], &[NOISE]].concat());
+        let captured_s = course.last_flight_s - enable_s;
+        assert!(captured_s < 0.5, "seed {seed}: {captured_s} s");
+        assert!(
+            course.rest_error_m < 1e-3,
+            "seed {seed}: {}",
+            course.rest_error_m
+        );
+        assert_eq!(result.fault, None, "seed {seed}");
+    }
+}
+
+#[test]
+fn belts_may_stand_reverse_and_stick() {
+    for profile in [
+        "belt.profile.speed_m_s=0.0",
+        "belt.profile.speed_m_s=0.1",
+        "belt.profile.speed_m_s=0.5",
+        "belt.profile={ kind = \"ramp\", from_m_s = -0.4, to_m_s = 0.4, start_s = 4.0, duration_s = 0.5 }",
+    ] {
+        let reference = minimum_jerk(0.1);
+        let (result, course) = run(
+            "hybrid-elbow-down",
+            &[profile, &reference, "run.duration_s=7.0"],
+        );
+        assert_eq!(result.statistics.lift_offs, 0, "{profile}");
+        assert_eq!(result.fault, None, "{profile}");
+        assert!(
+            course.rest_error_m < 1e-3,
+            "{profile}: {}",
+            course.rest_error_m
+        );
+    }
+}
+
+#[test]
+fn links_longer_than_the_data_sheet_says_do_not_move_the_tip() {
+    let reference = minimum_jerk(0.1);
+    let mut scenario = load(
+        "hybrid-elbow-down",
+        &[
+            "arm.link_length_m=0.216",
+            "initial.theta1_deg=-8.0",
+            "initial.theta2_deg=-41.0",
+            &reference,
+        ],
+    );
+    scenario.controller.arm = Some(ArmParameters::default());
+    let (with, _) = run_scenario(&scenario);
+    assert!(
+        (with.final_tip_t_m - 0.1).abs() < 1e-3,
+        "{}",
+        with.final_tip_t_m
+    );
+    scenario.controller.calibration.enabled = false;
+    let (without, _) = run_scenario(&scenario);
+    assert!(
+        (without.final_tip_t_m - 0.1).abs() > 1e-3,
+        "{}",
+        without.final_tip_t_m
+    );
+}
