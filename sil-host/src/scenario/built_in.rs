@@ -1,7 +1,7 @@
 //! The scenarios that come with the program.
 
 /// Name and text of every built-in scenario; the first is the default.
-const SCENARIOS: [(&str, &str); 6] = [
+const SCENARIOS: [(&str, &str); 8] = [
     (
         "hybrid-elbow-down",
         include_str!("built_in/hybrid-elbow-down.toml"),
@@ -20,6 +20,8 @@ const SCENARIOS: [(&str, &str); 6] = [
         include_str!("built_in/open-loop-bounce.toml"),
     ),
     ("paper-gains", include_str!("built_in/paper-gains.toml")),
+    ("edge", include_str!("built_in/edge.toml")),
+    ("capture", include_str!("built_in/capture.toml")),
 ];
 
 /// Name of the scenario that runs when none is asked for.
