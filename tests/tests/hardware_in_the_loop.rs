@@ -101,7 +101,14 @@ fn by_the_clock_the_board_keeps_the_time() {
     let _board = line.start_board();
     // Slow enough for a busy machine.
     let clock = ["open-loop-bounce", "--pacing", "realtime"];
-    let slow = ["--set", "run.tick_hz=100", "--set", "run.duration_s=0.5"];
+    let slow = [
+        "--set",
+        "run.tick_hz=100",
+        "--set",
+        "run.duration_s=0.5",
+        "--set",
+        "controller.estimator.bandwidth_rad_s=100",
+    ];
     let (report, _) = run(&bench, &line, &[&clock[..], &slow].concat());
     assert_eq!(report["pacing"], "realtime");
     assert_eq!(report["ticks"], 50);
