@@ -42,6 +42,10 @@ pub fn check(path: &Path) -> Result<(), BoardError> {
     open(path).map(|_| ())
 }
 
+/// How much longer every further answer is waited for. In lockstep five repetitions fit into
+/// the time that a board may be silent, which is as many as it takes in a row.
+const PATIENCE_GROWTH: f32 = 1.5;
+
 /// A flashed board, configured.
 pub struct Serial {
     port: File,
@@ -122,7 +126,7 @@ impl Serial {
                 return Err(BoardError::Silent(start.elapsed()));
             }
             self.line.repeated_requests += 1;
-            patience *= 2;
+            patience = patience.mul_f32(PATIENCE_GROWTH);
         }
     }
 
