@@ -15,7 +15,10 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::pty::openpty;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
+use painleve_shared::message::Plant;
+use painleve_sil_host::board::Serial;
 use painleve_sil_host::lifetime::{Guarded, kill_with_parent};
+use painleve_sil_host::scenario::Scenario;
 
 use crate::serial_image;
 
@@ -101,11 +104,10 @@ impl Line {
         self.disturbances[direction as usize].load(Ordering::SeqCst)
     }
 
-    /// Starts the image at the line's end, in QEMU and by the host's clock: the line knows
-    /// no virtual time.
+    /// Starts the image at the line's end, in QEMU, and waits until it answers.
     ///
     /// # Panics
-    /// If QEMU cannot be started.
+    /// If QEMU cannot be started, or its image says nothing.
     pub fn start_board(&self) -> SerialBoard {
         let mut command = Command::new("qemu-system-arm");
         command
@@ -114,14 +116,21 @@ impl Line {
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-chardev")
             .arg(format!("serial,id=line,path={}", self.board_port.display()))
+            // 64 ns an instruction, however busy the machine is: no tick takes longer for it.
+            // While it waits, the board goes by the host's clock.
+            .args(["-icount", "shift=6,sleep=on"])
             .args(["-serial", "chardev:line", "-kernel"])
             .arg(serial_image())
             .stdin(Stdio::null())
             .stdout(Stdio::null());
         let child = kill_with_parent(&mut command).spawn();
-        SerialBoard(Guarded::new(
+        let board = SerialBoard(Guarded::new(
             child.unwrap_or_else(|error| panic!("cannot start QEMU: {error}")),
-        ))
+        ));
+        let configuration = Scenario::default().controller_configuration();
+        let answers = || Serial::open(&self.host_port, &configuration, Plant::Lockstep).is_ok();
+        assert!((0..20).any(|_| answers()), "the board says nothing");
+        board
     }
 }
 

@@ -176,6 +176,41 @@ fn runs_as_processes_agree_and_repeat_themselves_to_the_instruction() {
 }
 
 #[test]
+fn timing_is_one_report_for_every_host() {
+    let bench = Bench::new("timing");
+    let image = image().to_string_lossy();
+    let short = ["--set", "run.duration_s=0.1", "--svg", "t.svg", "--json"];
+    let both = ["pid-elbow-up", "paper-gains"];
+    for (host, unit) in [
+        (&["--elf", &image][..], "instructions"),
+        (&["--host", "native"], "nanoseconds"),
+    ] {
+        let reports = bench.report(&[&["timing"], &both[..], host, &short].concat());
+        let reports = reports.as_array().unwrap();
+        assert_eq!(reports.len(), 2);
+        for (report, (name, ticks)) in reports.iter().zip(both.iter().zip([100, 1000])) {
+            assert_eq!(report["scenario"], *name);
+            assert_eq!(report["ticks"], ticks);
+            assert_eq!(report["unit"], unit);
+            let cost = |key: &str| report[key].as_u64().unwrap();
+            let order = ["min", "median", "p999", "max"].map(cost);
+            assert!(order.is_sorted(), "{report}");
+            assert_eq!(report["worst"]["cost"], order[3]);
+            let ticks_of = |pair: &serde_json::Value| pair[1].as_u64().unwrap();
+            let counted: u64 = report["histogram"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(ticks_of)
+                .sum();
+            assert_eq!(counted, ticks);
+        }
+        let figure = std::fs::read_to_string(bench.path("t.svg")).unwrap();
+        assert!(figure.contains("paper-gains, 10000 Hz"), "{host:?}");
+    }
+}
+
+#[test]
 fn a_missing_image_is_an_error_that_says_how_to_build_one() {
     let bench = Bench::new("no-image");
     let qemu = ["run", "--host", "qemu", "--elf", "/nowhere/image"];

@@ -35,7 +35,7 @@ pub struct TimedAnswer {
 
 /// A board silent for longer than this hangs; shorter than the link's own limit, so that
 /// the message that is seen is about the board.
-const SILENCE_LIMIT: Duration = Duration::from_millis(1300);
+const SILENCE_LIMIT: Duration = Duration::from_millis(1000);
 
 /// A board that has its configuration and answers sensor frames.
 pub trait Board {

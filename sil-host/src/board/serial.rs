@@ -42,6 +42,10 @@ pub fn check(path: &Path) -> Result<(), BoardError> {
     open(path).map(|_| ())
 }
 
+/// How much longer every further answer is waited for. In lockstep five repetitions fit into
+/// the time that a board may be silent, which is as many as it takes in a row.
+const PATIENCE_GROWTH: f32 = 1.5;
+
 /// A flashed board, configured.
 pub struct Serial {
     port: File,
@@ -50,6 +54,7 @@ pub struct Serial {
     pending: Vec<u8>,
     line: LineHealth,
     frame_patience: Duration,
+    silence_limit: Duration,
     stopwatch_hz: u32,
 }
 
@@ -76,6 +81,7 @@ impl Serial {
                 Plant::Lockstep => LOCKSTEP_PATIENCE.max(REALTIME_PATIENCE_TICKS * period),
                 Plant::Realtime | Plant::Real => REALTIME_PATIENCE_TICKS * period,
             },
+            silence_limit: SILENCE_LIMIT,
             stopwatch_hz: 0,
         };
         // Ends whatever the board may have received half.
@@ -92,6 +98,12 @@ impl Serial {
             _ => return Err(BoardError::Refused),
         }
         Ok(serial)
+    }
+
+    /// Sets how long the board may be silent before that is an error; a second at first, so that
+    /// the plant hears of it in time.
+    pub fn set_silence_limit(&mut self, limit: Duration) {
+        self.silence_limit = limit;
     }
 
     /// Waits for whatever the board says by itself; `None` after `limit`.
@@ -114,15 +126,15 @@ impl Serial {
         let start = Instant::now();
         loop {
             self.port.write_all(bytes)?;
-            let left = SILENCE_LIMIT.saturating_sub(start.elapsed());
+            let left = self.silence_limit.saturating_sub(start.elapsed());
             if let Some(response) = self.receive(patience.min(left), &is_wanted)? {
                 return Ok(response);
             }
-            if start.elapsed() >= SILENCE_LIMIT {
+            if start.elapsed() >= self.silence_limit {
                 return Err(BoardError::Silent(start.elapsed()));
             }
             self.line.repeated_requests += 1;
-            patience *= 2;
+            patience = patience.mul_f32(PATIENCE_GROWTH);
         }
     }
 

@@ -52,6 +52,9 @@ enum Command {
     Figures(figures::FiguresArguments),
 }
 
+/// Exit code of a process whose peer is missing or has died.
+const PEER_FAILED: u8 = 3;
+
 /// Why a command failed. Every message is one sentence for the user.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
@@ -99,7 +102,9 @@ impl CommandError {
                 StudyError::Plot(_) => 4,
             },
             Self::Loop(LoopError::Plant(_)) => 1,
-            Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => 3,
+            Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => {
+                PEER_FAILED
+            }
             Self::Loop(LoopError::Watcher(_)) | Self::Output(_) => 4,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => 130,
             Self::Told { code } => *code,

@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use super::CommandError;
 use super::bridge::ImageArguments;
 use super::output::OutputArguments;
+use super::{CommandError, PEER_FAILED};
 use crate::board::{emulator, serial};
 use crate::interrupt::Interrupt;
 use crate::lifetime::Guarded;
@@ -104,6 +104,9 @@ const PLANT_NOTICE: Duration = Duration::from_millis(1000);
 /// How long the controller may take to end after the plant has.
 const CONTROLLER_END: Duration = Duration::from_millis(1700);
 
+/// How long a bridge may take to end after the plant has missed it.
+const BRIDGE_END: Duration = Duration::from_millis(300);
+
 /// Runs a scenario as two processes and reports.
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     // Before anything is started, so that there is one message about it.
@@ -146,12 +149,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         if let Some(status) = controller.ended()?
             && !status.success()
         {
-            // The plant notices by itself and says so; if it does not, this does. Why a
-            // board stopped, only its bridge knows.
+            // The plant notices by itself and says so; if it does not, this does.
             if let Some(plant_status) = wait(&mut plant, PLANT_NOTICE)? {
-                if arguments.host != Host::Native {
-                    eprintln!("error{}", said(&mut controller));
-                }
                 break plant_status;
             }
             return Err(CommandError::Process(format!(
@@ -162,6 +161,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         std::thread::sleep(WATCH);
     };
     if !plant_status.success() {
+        // A plant that blames the controller does not know why a board stopped; its bridge does.
+        if plant_status.code() == Some(i32::from(PEER_FAILED))
+            && arguments.host != Host::Native
+            && wait(&mut controller, BRIDGE_END)?.is_some_and(|status| !status.success())
+        {
+            eprintln!("error{}", said(&mut controller));
+        }
         return Err(failure(plant_status));
     }
     let controller_status = wait(&mut controller, CONTROLLER_END)?;
