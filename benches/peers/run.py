@@ -22,7 +22,7 @@ ENVIRONMENT = TARGET / "peers"
 PAINLEVE = TARGET / "release" / "painleve"
 
 # Simulated seconds: a few CPU seconds each.
-PAINLEVE_S, SCIPY_S, MUJOCO_S, SICONOS_S = 20_000, 100, 150, 50
+PAINLEVE_S, SCIPY_S, MUJOCO_S, SICONOS_S = 20_000, 60, 100, 30
 
 PARADOX = {
     "painleve": "decided by the signs of p and b: impact without collision, Routh's process in closed form",
