@@ -31,12 +31,18 @@ class Report:
         self.max_theta1_dot_rad_s = -math.inf
         self.apex_m = 0.0
         self.touches = 0
+        self.last_touch_s = 0.0
         self.start_cpu_s = time.process_time()
 
     def see(self, theta1_dot_rad_s, gap_m):
         """A state of the motion, the gap between tip and belt with it."""
         self.max_theta1_dot_rad_s = max(self.max_theta1_dot_rad_s, theta1_dot_rad_s)
         self.apex_m = max(self.apex_m, gap_m)
+
+    def touch(self, time_s):
+        """The tip has come to the belt."""
+        self.touches += 1
+        self.last_touch_s = time_s
 
     def write(self, simulated_s, settings):
         """Prints the outcome."""
@@ -46,6 +52,7 @@ class Report:
                     "simulated_s": simulated_s,
                     "cpu_s": time.process_time() - self.start_cpu_s,
                     "touches_per_s": self.touches / simulated_s,
+                    "last_touch_s": self.last_touch_s,
                     "apex_m": self.apex_m,
                     "max_theta1_dot_rad_s": self.max_theta1_dot_rad_s,
                     "settings": settings,

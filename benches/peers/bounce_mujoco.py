@@ -58,7 +58,8 @@ def main(simulated_s):
         data.qvel[0] = arm.V_BELT_M_S
         report.see(data.qvel[1], data.geom_xpos[tip][2] + arm.HEIGHT_M)
         is_touching = data.ncon > 0
-        report.touches += is_touching and not was_touching
+        if is_touching and not was_touching:
+            report.touch(data.time)
         was_touching = is_touching
     report.write(
         simulated_s,

@@ -145,7 +145,7 @@ def main(simulated_s):
     while time_s < simulated_s:
         if mode == "throw":
             x, mode = impact(x, True), "flight"
-            report.touches += 1
+            report.touch(time_s)
         slip = None if mode == "flight" else mode
         solution = solve_ivp(
             motion(slip), (time_s, simulated_s), x, method="DOP853", rtol=RTOL, atol=ATOL, events=events_of(slip)
@@ -164,7 +164,7 @@ def main(simulated_s):
             mode = contact_mode(x)
             continue
         x = impact(x, False)
-        report.touches += 1
+        report.touch(time_s)
         mode = "flight" if tip_velocity(x)[1] > SLOWEST_M_S else contact_mode(x)
     report.write(simulated_s, f"SciPy {scipy.__version__}, DOP853, rtol {RTOL:g}, atol {ATOL:g}")
 

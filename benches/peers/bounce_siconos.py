@@ -43,11 +43,12 @@ def main(simulated_s):
             gap, impulse = interaction.y(0)[0], interaction.lambda_(1)[0]
             report.see(system.velocity()[0], gap)
             is_touching = impulse > 0
-            report.touches += is_touching and not was_touching
+            if is_touching and not was_touching:
+                report.touch(steps * STEP_S)
             was_touching = is_touching
             simulation.nextStep()
             steps += 1
-        report.write(steps * STEP_S, f"Siconos {kernel.__version__ if hasattr(kernel, '__version__') else ''}, Moreau-Jean, steps of {STEP_S * 1e3:g} ms")
+        report.write(steps * STEP_S, f"Debian's python3-siconos, Moreau-Jean, Newton's law with e = {arm.RESTITUTION}, steps of {STEP_S * 1e3:g} ms")
 
 
 main(float(sys.argv[1]))

@@ -113,7 +113,8 @@ def main():
             continue
         speed = result["simulated_s"] / result["cpu_s"]
         ours = ours or speed
-        notes.append(f"{name}: {result['simulated_s']:g} s simulated; {result['settings']}.")
+        last = f"; last touch at {result['last_touch_s']:.1f} s" if "last_touch_s" in result else ""
+        notes.append(f"{name}: {result['simulated_s']:g} s simulated{last}; {result['settings']}.")
         print(
             f"| {name} | {speed:,.{0 if speed > 100 else 1}f} | {ours / speed:,.0f} × | {result['touches_per_s']:.1f} "
             f"| {result['apex_m'] * 1e3:.1f} mm | {result['max_theta1_dot_rad_s']:.2f} rad/s | {PARADOX[name]} |",
