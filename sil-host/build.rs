@@ -1,4 +1,7 @@
 //! Tells the program from which revision it is built, so that a sweep can refuse to mix two.
+//!
+//! Told again whenever a source changes, but not when a commit changes nothing: a program built
+//! before its commit stays `…-changed`, and is not built again for every commit.
 
 use std::process::Command;
 
@@ -12,10 +15,6 @@ fn main() {
     let sources = ["src", "../shared/src", "../firmware/src", "../Cargo.lock"];
     for source in sources {
         println!("cargo:rerun-if-changed={source}");
-    }
-    // Every commit and checkout adds a line to it.
-    if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]) {
-        println!("cargo:rerun-if-changed={log}");
     }
     let status = ["status", "--porcelain", "--untracked-files=no", "--"];
     let revision = match git(&["rev-parse", "--short=12", "HEAD"]) {
