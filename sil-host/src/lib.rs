@@ -10,6 +10,7 @@
 //! - [`scenario`]: everything that defines a run, as a TOML file
 //! - [`study`]: the paper's studies, many runs at a time
 //! - [`figures`]: the page that sets them beside the paper
+//! - [`sweep`]: studies in shards, on many machines
 //! - [`record`], [`plot`], [`report`]: what a run leaves behind
 //! - [`commands`]: the `painleve` command; [`interrupt`], [`lifetime`]: its processes' ends
 
@@ -31,4 +32,5 @@ pub mod report;
 pub mod scenario;
 pub mod simulation;
 pub mod study;
+pub mod sweep;
 pub mod timing;

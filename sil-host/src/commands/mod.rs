@@ -8,6 +8,7 @@ mod plant;
 mod run;
 mod scenarios;
 mod study;
+mod sweep;
 mod timing;
 
 use std::process::ExitCode;
@@ -19,6 +20,7 @@ use crate::closed_loop::LoopError;
 use crate::link::LinkError;
 use crate::scenario::ScenarioError;
 use crate::study::StudyError;
+use crate::sweep::SweepError;
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
 ///
@@ -48,6 +50,8 @@ enum Command {
     Scenarios(scenarios::ScenariosArguments),
     /// Compute one of the paper's studies as numbers, data files and figures.
     Study(study::StudyArguments),
+    /// Compute a study in shards, on many machines.
+    Sweep(sweep::SweepArguments),
     /// Make all of the paper's studies, with one page that sets them beside the paper.
     Figures(figures::FiguresArguments),
 }
@@ -76,6 +80,9 @@ pub enum CommandError {
     /// A study has no outcome.
     #[error(transparent)]
     Study(#[from] StudyError),
+    /// There is no sweep, or not all of one.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
     /// A process of the run cannot be started or has died.
     #[error("{0}")]
     Process(String),
@@ -91,16 +98,19 @@ pub enum CommandError {
 }
 
 impl CommandError {
-    /// 1: the plant failed; 2: bad input; 3: a peer is missing or has died;
+    /// 1: the plant failed, or a sweep is incomplete; 2: bad input; 3: a peer is missing or has died;
     /// 4: an output cannot be written; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
             Self::Scenario(_) => 2,
-            Self::Study(error) => match error {
+            Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Scenario(_) | StudyError::Option(_) | StudyError::Range(_) => 2,
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
                 StudyError::Plot(_) => 4,
             },
+            Self::Sweep(SweepError::Incomplete(_)) => 1,
+            Self::Sweep(SweepError::Output(_)) => 4,
+            Self::Sweep(_) => 2,
             Self::Loop(LoopError::Plant(_)) => 1,
             Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => {
                 PEER_FAILED
@@ -138,6 +148,7 @@ pub fn main() -> ExitCode {
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Figures(arguments) => figures::run(&arguments),
     };
     match result {

@@ -4,6 +4,8 @@
 //! while it is watched; the paper's measure, the largest θ̇1, is above zero there
 //! and zero up to rounding elsewhere.
 
+use std::collections::BTreeMap;
+
 use comfy_table::Table;
 use serde::Serialize;
 
@@ -11,6 +13,7 @@ use super::attractor::Attractor;
 use super::cells::Cells;
 use super::initial::Initial;
 use super::outcome::{self, Outcome};
+use super::tabular::Tabular;
 use super::{Study, StudyError, figure_4, paper};
 use crate::plot::PlotError;
 
@@ -85,6 +88,18 @@ impl Study for Bifurcation {
             start_theta1_dot_rad_s: cell.start[2],
             start_theta2_dot_rad_s: cell.start[3],
         })
+    }
+}
+
+impl Tabular for Bifurcation {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(self.cells.seeds())
     }
 }
 

@@ -2,6 +2,7 @@
 //! following which kind of reference. Every case is a scenario.
 
 use core::fmt;
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use nalgebra::Vector2;
@@ -267,6 +268,32 @@ pub fn scenario(
     }
     scenario.initial = start(&scenario.arm, posture)?;
     Ok(scenario)
+}
+
+/// The seed of each controller's converters, as `noise of hybrid`.
+///
+/// # Errors
+/// [`StudyError`] naming the controller if there is no such scenario or a key is wrong.
+pub fn noise_seeds(
+    controllers: &[Controller],
+    overrides: &[String],
+) -> Result<BTreeMap<String, u64>, StudyError> {
+    let seed = |controller| {
+        let scenario = scenario(controller, Posture::ElbowDown, Converters::Own, overrides)?;
+        Ok((format!("noise of {controller}"), scenario.run.seed))
+    };
+    controllers.iter().map(seed).collect()
+}
+
+/// The scenarios that are not known by the names of [`Controller::ALL`].
+pub fn own_scenarios(controllers: &[Controller]) -> Vec<&str> {
+    let own = controllers
+        .iter()
+        .filter_map(|controller| match controller {
+            Controller::Scenario(name) => Some(name.as_str()),
+            _ => None,
+        });
+    own.collect()
 }
 
 #[cfg(test)]

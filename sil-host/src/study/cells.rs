@@ -1,6 +1,7 @@
 //! The cells of a diagram over friction, belt speed and initial condition, by number.
 
 use core::fmt;
+use std::collections::BTreeMap;
 
 use painleve_shared::range::{self, OutOfRange};
 
@@ -69,6 +70,11 @@ impl Cells {
     /// How many there are.
     pub fn len(&self) -> usize {
         self.mu.len() * self.v_belt_m_s.len() * self.initial.len()
+    }
+
+    /// The seed, by what it is for.
+    pub fn seeds(&self) -> BTreeMap<String, u64> {
+        BTreeMap::from([("initial".to_owned(), self.seed)])
     }
 
     /// Whether there are none.

@@ -11,6 +11,7 @@
 //! - [`bifurcation`]: where over μ × v_belt the arm keeps bouncing, drawn by [`figure_4`]
 //! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: what one does
 //! - [`poincare`]: how it bounces, drawn by [`figure_5`]
+//! - [`tabular`]: rows as lines of a table, one at a time
 //! - [`chaos`]: periodic or chaotic, by the largest Lyapunov exponent
 //!
 //! A study is a list of rows that know nothing of each other ([`Study`]), so that they
@@ -35,6 +36,7 @@ pub mod poincare;
 pub mod regions;
 pub mod settled;
 pub mod sliding_range;
+pub mod tabular;
 pub mod trial;
 
 use painleve_shared::range::OutOfRange;

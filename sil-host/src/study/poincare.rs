@@ -1,6 +1,8 @@
 //! Fig. 5: how the arm bounces. θ1 at each upward zero of θ̇1, and whether that goes on
 //! periodically or chaotically, by the criterion of [`verdict`](super::chaos::verdict).
 
+use std::collections::BTreeMap;
+
 use comfy_table::Table;
 use serde::Serialize;
 
@@ -9,6 +11,7 @@ use super::cells::Cells;
 use super::chaos::section::Returns;
 use super::chaos::{Regime, Verdict};
 use super::outcome::{self, Outcome};
+use super::tabular::Tabular;
 use super::{Study, StudyError, figure_5};
 use crate::plot::PlotError;
 
@@ -71,6 +74,31 @@ impl Study for Poincare {
             standard_error_per_s: verdict.standard_error_per_s,
             theta1_rad: returns.returns().iter().map(|one| one.state[0]).collect(),
         })
+    }
+}
+
+impl Tabular for Poincare {
+    type Line = Line;
+
+    fn lines(row: &Row) -> Vec<Line> {
+        let line = |theta1_rad| Line {
+            mu: row.mu,
+            v_belt_m_s: row.v_belt_m_s,
+            initial: row.initial.clone(),
+            regime: row.regime,
+            period: row.period,
+            exponent_per_s: row.exponent_per_s,
+            standard_error_per_s: row.standard_error_per_s,
+            theta1_rad,
+        };
+        if row.theta1_rad.is_empty() {
+            return vec![line(None)];
+        }
+        row.theta1_rad.iter().copied().map(Some).map(line).collect()
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(self.cells.seeds())
     }
 }
 
@@ -173,27 +201,7 @@ impl Outcome for Diagram {
     type Line = Line;
 
     fn lines(&self) -> Vec<Line> {
-        let points = |row: &Row| -> Vec<Option<f64>> {
-            if row.theta1_rad.is_empty() {
-                vec![None]
-            } else {
-                row.theta1_rad.iter().copied().map(Some).collect()
-            }
-        };
-        let line = |row: &Row, theta1_rad| Line {
-            mu: row.mu,
-            v_belt_m_s: row.v_belt_m_s,
-            initial: row.initial.clone(),
-            regime: row.regime,
-            period: row.period,
-            exponent_per_s: row.exponent_per_s,
-            standard_error_per_s: row.standard_error_per_s,
-            theta1_rad,
-        };
-        self.rows
-            .iter()
-            .flat_map(|row| points(row).into_iter().map(move |theta1| line(row, theta1)))
-            .collect()
+        self.rows.iter().flat_map(Poincare::lines).collect()
     }
 
     fn table(&self) -> Table {

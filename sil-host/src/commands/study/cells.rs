@@ -41,6 +41,11 @@ pub struct CellOptions {
 }
 
 impl CellOptions {
+    /// Name of the scenario that they start from.
+    pub fn scenario(&self) -> &str {
+        self.base.name()
+    }
+
     /// The cells over grids of friction and belt speed, checked.
     ///
     /// # Errors

@@ -4,10 +4,10 @@ use clap::Args;
 
 use super::options::{OutcomeOptions, Overrides, seconds};
 use crate::commands::CommandError;
-use crate::study::Grid;
-use crate::study::case::{Controller, Converters, Reference};
+use crate::study::case::{self, Controller, Converters, Reference};
 use crate::study::closed_loop_bifurcation::{ClosedLoopBifurcation, Diagram};
 use crate::study::initial::Initials;
+use crate::study::{Grid, StudyError};
 
 /// Options of `painleve study closed-loop-bifurcation`.
 #[derive(Debug, Args)]
@@ -82,29 +82,45 @@ pub struct ClosedLoopBifurcationArguments {
     outcome: OutcomeOptions,
 }
 
+impl ClosedLoopBifurcationArguments {
+    /// The study that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the option or key that is wrong.
+    pub fn study(&self) -> Result<ClosedLoopBifurcation, StudyError> {
+        self.overrides.refuse(&[
+            ("belt.friction", "--mu"),
+            ("belt.profile", "--v-belt"),
+            ("initial", "--initial"),
+            ("controller.reference", "--reference and --target-m"),
+            ("run.duration_s", "--transient-s and --record-s"),
+        ])?;
+        let study = ClosedLoopBifurcation {
+            controllers: self.controller.clone(),
+            converters: self.converters.clone(),
+            mu: self.mu.values().to_vec(),
+            v_belt_m_s: self.v_belt.values().to_vec(),
+            initial: self.initial.list().to_vec(),
+            seed: self.seed,
+            reference: self.reference,
+            target_m: self.target_m,
+            transient_s: self.transient_s,
+            record_s: self.record_s,
+            overrides: self.overrides.overrides.clone(),
+        };
+        study.check()?;
+        Ok(study)
+    }
+
+    /// The scenarios of its own that it starts from.
+    pub fn scenarios(&self) -> Vec<&str> {
+        case::own_scenarios(&self.controller)
+    }
+}
+
 /// Computes the diagram and writes it.
 pub fn run(arguments: &ClosedLoopBifurcationArguments) -> Result<(), CommandError> {
-    arguments.overrides.refuse(&[
-        ("belt.friction", "--mu"),
-        ("belt.profile", "--v-belt"),
-        ("initial", "--initial"),
-        ("controller.reference", "--reference and --target-m"),
-        ("run.duration_s", "--transient-s and --record-s"),
-    ])?;
-    let study = ClosedLoopBifurcation {
-        controllers: arguments.controller.clone(),
-        converters: arguments.converters.clone(),
-        mu: arguments.mu.values().to_vec(),
-        v_belt_m_s: arguments.v_belt.values().to_vec(),
-        initial: arguments.initial.list().to_vec(),
-        seed: arguments.seed,
-        reference: arguments.reference,
-        target_m: arguments.target_m,
-        transient_s: arguments.transient_s,
-        record_s: arguments.record_s,
-        overrides: arguments.overrides.overrides.clone(),
-    };
-    study.check()?;
+    let study = arguments.study()?;
     let rows = arguments.outcome.compute(&study)?;
     arguments.outcome.write(&Diagram::new(rows))
 }

@@ -1,7 +1,9 @@
-//! `painleve study`: the paper's studies from the command line.
+//! `painleve study`: the paper's studies from the command line. [`campaign`] reads their options
+//! from a campaign file.
 
 mod admissible;
 mod bifurcation;
+pub mod campaign;
 mod cells;
 mod closed_loop_bifurcation;
 pub mod options;

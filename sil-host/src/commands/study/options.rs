@@ -27,6 +27,11 @@ pub struct BaseOptions {
 }
 
 impl BaseOptions {
+    /// Name of the scenario.
+    pub fn name(&self) -> &str {
+        &self.scenario
+    }
+
     /// The scenario, its numbers checked but not where the arm starts. `taken` are keys
     /// that the study's own options set, with the option of each.
     ///

@@ -5,8 +5,8 @@ use clap::Args;
 use super::cells::CellOptions;
 use super::options::OutcomeOptions;
 use crate::commands::CommandError;
-use crate::study::Grid;
 use crate::study::poincare::{Diagram, Poincare};
+use crate::study::{Grid, StudyError};
 
 /// Options of `painleve study poincare`.
 #[derive(Debug, Args)]
@@ -33,11 +33,25 @@ pub struct PoincareArguments {
     outcome: OutcomeOptions,
 }
 
+impl PoincareArguments {
+    /// The study that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the option or key that is wrong.
+    pub fn study(&self) -> Result<Poincare, StudyError> {
+        let cells = self.cells.cells(&self.mu, &self.v_belt)?;
+        Ok(Poincare { cells })
+    }
+
+    /// The scenario that it starts from.
+    pub fn scenarios(&self) -> Vec<&str> {
+        vec![self.cells.scenario()]
+    }
+}
+
 /// Computes the diagram and writes it.
 pub fn run(arguments: &PoincareArguments) -> Result<(), CommandError> {
-    let study = Poincare {
-        cells: arguments.cells.cells(&arguments.mu, &arguments.v_belt)?,
-    };
+    let study = arguments.study()?;
     let rows = arguments.outcome.compute(&study)?;
     arguments.outcome.write(&Diagram::new(&study, rows))
 }

@@ -4,9 +4,9 @@ use clap::Args;
 
 use super::options::{OutcomeOptions, Overrides, PostureOption, metres, seconds};
 use crate::commands::CommandError;
-use crate::study::Grid;
-use crate::study::case::{Controller, Converters, Reference};
+use crate::study::case::{self, Controller, Converters, Reference};
 use crate::study::sliding_range::{Criterion, SlidingRange, SlidingRanges};
+use crate::study::{Grid, StudyError};
 
 /// Options of `painleve study sliding-range`.
 #[derive(Debug, Args)]
@@ -96,34 +96,46 @@ pub struct SlidingRangeArguments {
     outcome: OutcomeOptions,
 }
 
+impl SlidingRangeArguments {
+    /// The study that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the option or key that is wrong.
+    pub fn study(&self) -> Result<SlidingRange, StudyError> {
+        self.overrides.refuse(&[
+            ("belt.friction", "--mu"),
+            ("initial", "--posture"),
+            ("controller.reference", "--reference"),
+            ("run.duration_s", "--patience-s"),
+        ])?;
+        let study = SlidingRange {
+            controllers: self.controller.clone(),
+            converters: self.converters.clone(),
+            postures: self.posture.iter().map(|&posture| posture.into()).collect(),
+            mu: self.mu.values().to_vec(),
+            references: self.reference.clone(),
+            overrides: self.overrides.overrides.clone(),
+            criterion: Criterion {
+                within_m: self.within_m,
+                patience_s: self.patience_s,
+                scan_step_m: self.scan_step_m,
+                resolution_m: self.resolution_m,
+                ..Criterion::default()
+            },
+        };
+        study.check()?;
+        Ok(study)
+    }
+
+    /// The scenarios of its own that it starts from.
+    pub fn scenarios(&self) -> Vec<&str> {
+        case::own_scenarios(&self.controller)
+    }
+}
+
 /// Searches the ranges and writes them.
 pub fn run(arguments: &SlidingRangeArguments) -> Result<(), CommandError> {
-    arguments.overrides.refuse(&[
-        ("belt.friction", "--mu"),
-        ("initial", "--posture"),
-        ("controller.reference", "--reference"),
-        ("run.duration_s", "--patience-s"),
-    ])?;
-    let study = SlidingRange {
-        controllers: arguments.controller.clone(),
-        converters: arguments.converters.clone(),
-        postures: arguments
-            .posture
-            .iter()
-            .map(|&posture| posture.into())
-            .collect(),
-        mu: arguments.mu.values().to_vec(),
-        references: arguments.reference.clone(),
-        overrides: arguments.overrides.overrides.clone(),
-        criterion: Criterion {
-            within_m: arguments.within_m,
-            patience_s: arguments.patience_s,
-            scan_step_m: arguments.scan_step_m,
-            resolution_m: arguments.resolution_m,
-            ..Criterion::default()
-        },
-    };
-    study.check()?;
+    let study = arguments.study()?;
     let rows = arguments.outcome.compute(&study)?;
     arguments.outcome.write(&SlidingRanges { rows })
 }

@@ -7,12 +7,15 @@
 
 mod diagram;
 
+use std::collections::BTreeMap;
+
 use painleve_shared::{Arm, Posture};
 use serde::Serialize;
 
 use super::attractor::Attractor;
 use super::case::{self, Controller, Converters, Reference};
 use super::initial::Initial;
+use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
 use crate::plant::motion::{State, theta};
@@ -203,6 +206,20 @@ impl Study for ClosedLoopBifurcation {
             target_m: cell.target_m,
             tip_t_m: trial.tip_t_m(),
         })
+    }
+}
+
+impl Tabular for ClosedLoopBifurcation {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        let mut seeds = case::noise_seeds(&self.controllers, &self.overrides)?;
+        seeds.insert("initial".into(), self.seed);
+        Ok(seeds)
     }
 }
 

@@ -9,12 +9,15 @@
 
 mod outcome;
 
+use std::collections::BTreeMap;
+
 use painleve_shared::{Arm, Posture, Slip};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::belt_line::{BeltLine, positive_stretches};
 use super::case::{self, Controller, Converters, Reference};
+use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
 use crate::plant::statistics::Statistics;
@@ -179,6 +182,18 @@ impl Study for SlidingRange {
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {
         self.case(index)?.row()
+    }
+}
+
+impl Tabular for SlidingRange {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        case::noise_seeds(&self.controllers, &self.overrides)
     }
 }
 

@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""The open-loop bounce (x0,a, mu = 0.6, v_belt = -0.4 m/s) by painleve and by its peers, in one run.
+
+    cargo build --release && python3 benches/peers/run.py
+
+Prints a Markdown table of simulated seconds per CPU second. SciPy and MuJoCo go into a virtual
+environment of their own below target/; Siconos comes from Debian (apt-get install
+python3-siconos). A peer that cannot be installed or does not run is said to be missing.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+TARGET = HERE.parent.parent / "target"
+ENVIRONMENT = TARGET / "peers"
+PAINLEVE = TARGET / "release" / "painleve"
+
+# Simulated seconds: a few CPU seconds each.
+PAINLEVE_S, SCIPY_S, MUJOCO_S, SICONOS_S = 20_000, 60, 100, 30
+
+PARADOX = {
+    "painleve": "decided by the signs of p and b: impact without collision, Routh's process in closed form",
+    "SciPy": "the same rules, written again over `solve_ivp` and its events",
+    "MuJoCo": "not seen: contact is soft and convex, penetration throws the tip; what follows depends on softness and step",
+    "Siconos": "not seen: impulses per step under Newton's law of impact; the inconsistent state shows as an impulse",
+}
+
+
+def python_with(package, version_probe):
+    """The environment's Python with a package, or why there is none."""
+    python = ENVIRONMENT / "bin" / "python"
+    if not python.exists():
+        venv.create(ENVIRONMENT, with_pip=True)
+    if subprocess.run([python, "-c", version_probe], capture_output=True).returncode:
+        install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *package]
+        done = subprocess.run(install, capture_output=True, text=True)
+        if done.returncode:
+            raise RuntimeError(f"pip cannot install {' '.join(package)}: {last_line(done.stderr)}")
+    return python
+
+
+def last_line(text):
+    return (text.strip().splitlines() or ["no reason given"])[-1]
+
+
+def peer(python, script, simulated_s):
+    done = subprocess.run([python, HERE / script, str(simulated_s)], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{script} fails: {last_line(done.stderr)}")
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def painleve():
+    arguments = "study bifurcation --mu 0.6 --v-belt=-0.4 --initial a --threads 1 --json".split()
+    arguments += ["--transient-s", "0", "--record-s", str(PAINLEVE_S), "--relative-tolerance", "1e-9"]
+
+    def cpu_s():
+        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return usage.ru_utime + usage.ru_stime
+
+    before_s = cpu_s()
+    done = subprocess.run([PAINLEVE, *arguments], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    row = json.loads(done.stdout)["rows"][0]
+    return {
+        "simulated_s": PAINLEVE_S,
+        "cpu_s": cpu_s() - before_s,
+        "touches_per_s": row["impacts_per_s"],
+        "apex_m": row["apex_m"],
+        "max_theta1_dot_rad_s": row["max_theta1_dot_rad_s"],
+        "settings": "DOP853 with located events, relative tolerance 1e-09; start of the program included",
+    }
+
+
+def scipy():
+    return peer(python_with(["numpy", "scipy"], "import scipy"), "bounce_scipy.py", SCIPY_S)
+
+
+def mujoco():
+    return peer(python_with(["mujoco"], "import mujoco"), "bounce_mujoco.py", MUJOCO_S)
+
+
+def siconos():
+    python = "/usr/bin/python3"
+    if subprocess.run([python, "-c", "import siconos.kernel"], capture_output=True).returncode:
+        raise RuntimeError("not installed; on Debian: apt-get install python3-siconos")
+    return peer(python, "bounce_siconos.py", SICONOS_S)
+
+
+def main():
+    if not PAINLEVE.exists():
+        sys.exit(f"there is no {PAINLEVE}: run cargo build --release")
+    # One thread each, as painleve has.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+    print("| program | simulated s per CPU s | painleve is faster by | touches per s | apex | largest θ̇₁ | the paradox |")
+    print("|---|---|---|---|---|---|---|")
+    ours, notes = None, []
+    for name, measure in {"painleve": painleve, "SciPy": scipy, "MuJoCo": mujoco, "Siconos": siconos}.items():
+        try:
+            result = measure()
+        except (RuntimeError, OSError, subprocess.CalledProcessError) as error:
+            if name == "painleve":
+                raise
+            print(f"| {name} | missing: {error} | | | | | {PARADOX[name]} |")
+            continue
+        speed = result["simulated_s"] / result["cpu_s"]
+        ours = ours or speed
+        last = f"; last touch at {result['last_touch_s']:.1f} s" if "last_touch_s" in result else ""
+        notes.append(f"{name}: {result['simulated_s']:g} s simulated{last}; {result['settings']}.")
+        print(
+            f"| {name} | {speed:,.{0 if speed > 100 else 1}f} | {ours / speed:,.0f} × | {result['touches_per_s']:.1f} "
+            f"| {result['apex_m'] * 1e3:.1f} mm | {result['max_theta1_dot_rad_s']:.2f} rad/s | {PARADOX[name]} |",
+            flush=True,
+        )
+    print()
+    print("\n".join(notes))
+
+
+main()

@@ -1,0 +1,112 @@
+//! Rows of a study as lines of a table, one row at a time.
+
+use std::collections::BTreeMap;
+
+use csv::ByteRecord;
+use serde::Serialize;
+
+use super::{Study, StudyError};
+
+/// A study each of whose rows makes lines of its CSV file by itself, so that the file can
+/// be put together from rows that were computed apart.
+pub trait Tabular: Study {
+    /// One line: a flat struct, whose field names are the header.
+    type Line: Serialize;
+
+    /// The lines of a row, at least one.
+    fn lines(row: &Self::Row) -> Vec<Self::Line>;
+
+    /// Every seed that the rows depend on, by what it is for.
+    ///
+    /// # Errors
+    /// [`StudyError`] if the study is wrong.
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError>;
+}
+
+/// Any [`Tabular`] study, its rows already as text.
+pub trait Table: Sync {
+    /// How many rows there are.
+    fn len(&self) -> usize;
+
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The header and the lines of row `index`, less than [`len`](Table::len).
+    ///
+    /// # Errors
+    /// [`StudyError`] if it cannot be computed.
+    fn records(&self, index: usize) -> Result<Records, StudyError>;
+
+    /// Every seed that the rows depend on, by what it is for.
+    ///
+    /// # Errors
+    /// [`StudyError`] if the study is wrong.
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError>;
+}
+
+/// A row as text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Records {
+    /// Names of the fields.
+    pub header: ByteRecord,
+    /// The lines.
+    pub lines: Vec<ByteRecord>,
+}
+
+impl<S: Tabular> Table for S {
+    fn len(&self) -> usize {
+        Study::len(self)
+    }
+
+    fn records(&self, index: usize) -> Result<Records, StudyError> {
+        records(&S::lines(&self.row(index)?))
+            .map_err(|error| StudyError::Option(format!("row {index} cannot be written: {error}")))
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Tabular::seeds(self)
+    }
+}
+
+fn records(lines: &[impl Serialize]) -> Result<Records, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for line in lines {
+        writer.serialize(line)?;
+    }
+    let text = writer.into_inner().map_err(|error| error.into_error())?;
+    let mut reader = csv::Reader::from_reader(text.as_slice());
+    let header = reader.byte_headers()?.clone();
+    let lines = reader.byte_records().collect::<Result<_, _>>()?;
+    Ok(Records { header, lines })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Serialize)]
+    struct Line {
+        name: &'static str,
+        length_m: Option<f64>,
+    }
+
+    #[test]
+    fn text_comes_back_as_it_was_written() {
+        let lines = [
+            Line {
+                name: "a \"b\", c\nd",
+                length_m: Some(-0.1),
+            },
+            Line {
+                name: "",
+                length_m: None,
+            },
+        ];
+        let records = records(&lines).unwrap();
+        assert_eq!(records.header, vec!["name", "length_m"]);
+        assert_eq!(records.lines[0], vec!["a \"b\", c\nd", "-0.1"]);
+        assert_eq!(records.lines[1], vec!["", ""]);
+    }
+}

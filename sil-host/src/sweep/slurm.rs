@@ -1,0 +1,121 @@
+//! A script for Slurm: one task of a job array for each shard.
+
+use std::path::Path;
+
+/// What the script asks Slurm for.
+#[derive(Clone, Debug)]
+pub struct Job<'a> {
+    /// The `painleve` program, an absolute path.
+    pub program: &'a Path,
+    /// Where it is started, an absolute path.
+    pub directory: &'a Path,
+    /// The sweep's folder, an absolute path.
+    pub folder: &'a Path,
+    /// Shards, as in `3,7,9-12`.
+    pub array: &'a str,
+    /// Cores, and threads, of each.
+    pub cpus: usize,
+    /// Further options of `sbatch`, as in `--time=30`.
+    pub options: &'a [String],
+}
+
+impl Job<'_> {
+    /// The script, or why there cannot be one.
+    ///
+    /// # Errors
+    /// A sentence for the user if a path or option does not fit into a line.
+    pub fn script(&self) -> Result<String, String> {
+        let text = |path: &Path| match path.to_str() {
+            Some(text) if !text.contains(['\n', '"', '\\', '%']) => Ok(text.to_owned()),
+            _ => Err(format!(
+                "{} cannot be in a script for Slurm: choose a path without quotes, backslashes, % and line ends",
+                path.display()
+            )),
+        };
+        let (program, directory) = (text(self.program)?, text(self.directory)?);
+        let folder = text(self.folder)?;
+        let mut options = vec![
+            "--job-name=painleve-sweep".to_owned(),
+            format!("--array={}", self.array),
+            format!("--cpus-per-task={}", self.cpus),
+            "--ntasks=1".to_owned(),
+            // A task whose node fails is run again; what it had finished is skipped.
+            "--requeue".to_owned(),
+            "--open-mode=append".to_owned(),
+            format!("--chdir=\"{directory}\""),
+            format!("--output=\"{folder}/slurm-%a.log\""),
+        ];
+        for option in self.options {
+            if !option.starts_with('-') || option.contains('\n') {
+                return Err(format!(
+                    "--option '{option}' is no option of sbatch; give one as in --option=--time=30"
+                ));
+            }
+            options.push(option.clone());
+        }
+        let options: String = options
+            .iter()
+            .map(|option| format!("#SBATCH {option}\n"))
+            .collect();
+        let (program, folder) = (quoted(&program), quoted(&folder));
+        Ok(format!(
+            "#!/bin/sh\n{options}\n\
+             # The shard is SLURM_ARRAY_TASK_ID.\n\
+             exec {program} sweep run --folder {folder} --threads \"${{SLURM_CPUS_PER_TASK:-1}}\"\n"
+        ))
+    }
+}
+
+/// A word of the shell.
+fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn job<'a>(folder: &'a str, options: &'a [String]) -> Job<'a> {
+        Job {
+            program: Path::new("/opt/pain levé/painleve"),
+            directory: Path::new("/home/x"),
+            folder: Path::new(folder),
+            array: "0,2-4",
+            cpus: 3,
+            options,
+        }
+    }
+
+    #[test]
+    fn the_script_is_what_slurm_and_the_shell_read() {
+        let script = job("/data/it's", &["--time=30".into()]).script().unwrap();
+        for line in [
+            "#!/bin/sh",
+            "#SBATCH --array=0,2-4",
+            "#SBATCH --cpus-per-task=3",
+            "#SBATCH --requeue",
+            "#SBATCH --output=\"/data/it's/slurm-%a.log\"",
+            "#SBATCH --time=30",
+            r#"exec '/opt/pain levé/painleve' sweep run --folder '/data/it'\''s' --threads "${SLURM_CPUS_PER_TASK:-1}""#,
+        ] {
+            assert!(
+                script.lines().any(|one| one == line),
+                "{line} is not in {script}"
+            );
+        }
+        // Slurm stops reading options at the first command.
+        let first = script.lines().position(|line| line.starts_with("exec"));
+        let before = script.lines().take(first.unwrap());
+        let of_slurm = |line: &&str| line.starts_with("#SBATCH");
+        let all = script.lines().filter(of_slurm).count();
+        assert_eq!(before.filter(of_slurm).count(), all);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        assert!(job("/a\"b", &[]).script().is_err());
+        assert!(job("/a\nb", &[]).script().is_err());
+        assert!(job("/a", &["time=30".into()]).script().is_err());
+        assert!(job("/a", &["--x\nrm".into()]).script().is_err());
+    }
+}
