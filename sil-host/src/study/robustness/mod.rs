@@ -259,14 +259,14 @@ impl Study for Robustness {
 
 /// Target of a scenario's last reference, m; NaN without one.
 fn target_m(scenario: &Scenario) -> f64 {
-    let targets = scenario.controller.reference.segments.iter();
-    let last = targets.filter_map(|segment| match segment {
+    let segments = scenario.controller.reference.segments.iter();
+    let mut targets = segments.filter_map(|segment| match segment {
         Segment::MinimumJerk { target_m, .. }
         | Segment::Ramp { target_m, .. }
         | Segment::Step { target_m, .. } => Some(f64::from(*target_m)),
         _ => None,
     });
-    last.last().unwrap_or(f64::NAN)
+    targets.next_back().unwrap_or(f64::NAN)
 }
 
 /// Counts how often the controller gives up a contact that lasts.

@@ -62,7 +62,7 @@ fn draws_are_in_their_ranges_and_all_different() {
     let fast = |sign: f64| {
         drawn
             .iter()
-            .filter(|one| sign * one.belt.profile.speed_m_s(0.0) > 0.0)
+            .filter(move |one| sign * one.belt.profile.speed_m_s(0.0) > 0.0)
     };
     assert!(fast(1.0).count() > 60 && fast(-1.0).count() > 60);
     for pair in drawn.windows(2) {
