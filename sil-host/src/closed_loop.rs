@@ -163,10 +163,15 @@ impl<H: ControllerHost> ClosedLoop<H> {
     /// [`LoopError`] if plant, controller or watcher cannot go on.
     pub fn tick(&mut self, watcher: &mut impl Watcher) -> Result<(), LoopError> {
         let sensor = self.simulation.sample(&mut self.statistics)?;
-        let Answer { frame, round_trip } = self.host.exchange(&sensor)?;
-        let nanoseconds = u64::try_from(round_trip.as_nanos()).unwrap_or(LONGEST_ROUND_TRIP_NS);
-        self.round_trips_ns.saturating_record(nanoseconds);
         self.log.sensor(&sensor);
+        let frame = if self.simulation.sensor_frame_is_lost() {
+            None
+        } else {
+            let Answer { frame, round_trip } = self.host.exchange(&sensor)?;
+            let nanoseconds = u64::try_from(round_trip.as_nanos()).unwrap_or(LONGEST_ROUND_TRIP_NS);
+            self.round_trips_ns.saturating_record(nanoseconds);
+            frame
+        };
         match &frame {
             Some(answer) => {
                 self.log.actuator(answer);

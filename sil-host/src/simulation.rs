@@ -12,6 +12,7 @@ use painleve_shared::status::SupervisorState;
 
 use crate::converters::encoder::Encoders;
 use crate::converters::force_cell::ForceCell;
+use crate::converters::link_loss::{LossyLink, Lost};
 use crate::converters::torque_stage::TorqueStages;
 use crate::plant::motion::theta;
 use crate::plant::{Observer, Plant, PlantError};
@@ -25,6 +26,8 @@ pub struct Simulation {
     encoders: Encoders,
     force_cell: ForceCell,
     torque_stages: TorqueStages,
+    link: LossyLink,
+    lost: Lost,
     tick_hz: f64,
     tick: u64,
     first_tick: u32,
@@ -45,6 +48,8 @@ impl Simulation {
             encoders: Encoders::new(&converters.encoder, seed, &theta(plant.state())),
             force_cell: ForceCell::new(&converters.force, seed),
             torque_stages: TorqueStages::new(&converters.torque),
+            link: LossyLink::new(&converters.link, seed),
+            lost: Lost::default(),
             tick_hz: f64::from(scenario.run.tick_hz),
             tick: 0,
             first_tick: scenario.run.first_tick,
@@ -70,6 +75,7 @@ impl Simulation {
     /// [`PlantError`] if the contact mode of the start cannot be decided.
     pub fn sample(&mut self, observer: &mut impl Observer) -> Result<SensorFrame, PlantError> {
         self.plant.settle(observer)?;
+        self.lost = self.link.draw();
         let (tangential_force, normal_force) = self.force_cell.read(&self.plant.contact_force_n());
         let enabled = self.plant.time_s() >= self.enable_at_s;
         // The counters of the wire wrap.
@@ -86,6 +92,11 @@ impl Simulation {
                 DigitalInputs::default()
             },
         })
+    }
+
+    /// Whether the frame of this tick's sample is lost: the controller must not be given it.
+    pub fn sensor_frame_is_lost(&self) -> bool {
+        self.lost.sensor
     }
 
     /// Everything about this tick, for records.
@@ -116,8 +127,8 @@ impl Simulation {
         }
     }
 
-    /// Takes the controller's answer to this tick's sample, if there is one,
-    /// and goes on to the next tick.
+    /// Takes the controller's answer to this tick's sample, if there is one and it is not
+    /// lost, and goes on to the next tick.
     ///
     /// # Errors
     /// [`PlantError`] if the plant cannot go on.
@@ -126,8 +137,9 @@ impl Simulation {
         answer: Option<&ActuatorFrame>,
         observer: &mut impl Observer,
     ) -> Result<(), PlantError> {
+        let arrived = answer.filter(|_| !self.lost.actuator);
         self.torque_stages
-            .command(answer.map(|frame| frame.torques));
+            .command(arrived.map(|frame| frame.torques));
         let tick = self.tick as f64;
         // From whole numbers, so that nothing accumulates.
         let at = |ticks: f64| (tick + ticks) / self.tick_hz;

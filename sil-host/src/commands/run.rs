@@ -16,7 +16,32 @@ use crate::interrupt::Interrupt;
 use crate::lifetime::Guarded;
 use crate::link::{BusName, Pacing};
 use crate::report::RunReport;
-use crate::scenario::{Scenario, ScenarioError, built_in};
+use crate::scenario::{Scenario, built_in};
+use crate::study::robustness;
+
+/// A run of the robustness campaign.
+#[derive(Clone, Copy, Debug)]
+struct Replay {
+    seed: u64,
+    index: u64,
+}
+
+impl std::str::FromStr for Replay {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        text.split_once(':')
+            .and_then(|(seed, index)| {
+                Some(Self {
+                    seed: seed.parse().ok()?,
+                    index: index.parse().ok()?,
+                })
+            })
+            .ok_or_else(|| {
+                "give the campaign's seed and the run's number, SEED:INDEX, as in 1:42".into()
+            })
+    }
+}
 
 /// Which scenario to run, and how.
 #[derive(Clone, Debug, Args)]
@@ -27,6 +52,9 @@ pub struct ScenarioArguments {
     /// The same as an option.
     #[arg(long = "scenario", value_name = "SCENARIO", conflicts_with = "name")]
     option: Option<String>,
+    /// Run INDEX of `study robustness --seed SEED` instead of a scenario.
+    #[arg(long, value_name = "SEED:INDEX", conflicts_with_all = ["name", "option"])]
+    replay: Option<Replay>,
     /// Override one key, as in belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
@@ -41,12 +69,26 @@ impl ScenarioArguments {
     }
 
     /// The scenario with its overrides, checked.
-    pub fn load(&self) -> Result<Scenario, ScenarioError> {
-        Scenario::load(self.name(), &self.overrides)
+    ///
+    /// # Errors
+    /// [`CommandError`] in one sentence for the user.
+    pub fn load(&self) -> Result<Scenario, CommandError> {
+        match self.replay {
+            Some(Replay { seed, index }) => {
+                let drawn = robustness::scenario(seed, index)?;
+                Ok(drawn.with_overrides("replayed run", &self.overrides)?)
+            }
+            None => Ok(Scenario::load(self.name(), &self.overrides)?),
+        }
     }
 
     fn to_arguments(&self) -> Vec<OsString> {
-        let mut arguments = vec![self.name().into()];
+        let mut arguments: Vec<OsString> = match self.replay {
+            Some(Replay { seed, index }) => {
+                vec!["--replay".into(), format!("{seed}:{index}").into()]
+            }
+            None => vec![self.name().into()],
+        };
         for text in &self.overrides {
             arguments.extend(["--set".into(), text.into()]);
         }

@@ -4,12 +4,14 @@
 //! - [`encoder`]: joint encoders with resolution, offset, noise and latency
 //! - [`force_cell`]: f_n and f_t with resolution, range and noise
 //! - [`torque_stage`]: torque with resolution, saturation, lag and transport delay
+//! - [`link_loss`]: frames that are lost on their way
 //!
 //! Whatever crosses the link is an exact integer; the controller knows the
 //! scalings ([`ConverterSettings::scales`]), never the noise.
 
 pub mod encoder;
 pub mod force_cell;
+pub mod link_loss;
 pub mod noise;
 pub mod torque_stage;
 
@@ -20,6 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use encoder::EncoderSettings;
 use force_cell::ForceCellSettings;
+use link_loss::LinkSettings;
 use torque_stage::TorqueStageSettings;
 
 /// Settings of all converters.
@@ -32,6 +35,8 @@ pub struct ConverterSettings {
     pub force: ForceCellSettings,
     /// Both torque stages.
     pub torque: TorqueStageSettings,
+    /// The link to the controller and back.
+    pub link: LinkSettings,
 }
 
 impl ConverterSettings {
@@ -42,7 +47,8 @@ impl ConverterSettings {
     pub fn validate(&self) -> Result<(), OutOfRange> {
         self.encoder.validate()?;
         self.force.validate()?;
-        self.torque.validate()
+        self.torque.validate()?;
+        self.link.validate()
     }
 
     /// What the controller is told about the converters.

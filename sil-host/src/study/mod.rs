@@ -7,6 +7,9 @@
 //! - [`regions`]: Fig. 3, the solution modes over (θ1, θ̇1)
 //! - [`sliding_range`]: Z_t,sliding, how far a controller slides
 //! - [`closed_loop_bifurcation`]: Fig. 12, the belt's speed with the controller in the loop
+//! - [`robustness`]: random arms, belts and converters, and what each part of the controller contributes
+//! - [`capture`]: a bouncing arm is caught; [`lift_off`]: how soon a lift-off is noticed
+//! - [`contact_watch`], [`distribution`], [`proportion`]: contact, values and success of many runs
 //! - [`case`], [`trial`]: closed loops to study, and running them in this process
 //! - [`bifurcation`]: where over μ × v_belt the arm keeps bouncing, drawn by [`figure_4`]
 //! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: what one does
@@ -21,19 +24,25 @@ pub mod admissible;
 pub mod attractor;
 pub mod belt_line;
 pub mod bifurcation;
+pub mod capture;
 pub mod case;
 pub mod cells;
 pub mod chaos;
 pub mod closed_loop_bifurcation;
+pub mod contact_watch;
+pub mod distribution;
 mod figure_4;
 mod figure_5;
 pub mod grid;
 pub mod initial;
+pub mod lift_off;
 pub mod outcome;
 pub mod paper;
 mod places;
 pub mod poincare;
+pub mod proportion;
 pub mod regions;
+pub mod robustness;
 pub mod settled;
 pub mod sliding_range;
 pub mod tabular;

@@ -36,8 +36,12 @@ impl Trial {
     /// [`PlantError`] if the plant cannot go on.
     pub fn tick(&mut self, observer: &mut impl Observer) -> Result<(), PlantError> {
         let sensor = self.simulation.sample(observer)?;
-        self.answer = self.controller.tick(&sensor);
-        self.simulation.advance(Some(&self.answer), observer)
+        let arrives = !self.simulation.sensor_frame_is_lost();
+        if arrives {
+            self.answer = self.controller.tick(&sensor);
+        }
+        let answer = arrives.then_some(&self.answer);
+        self.simulation.advance(answer, observer)
     }
 
     /// Simulated time, s.
@@ -49,6 +53,11 @@ impl Trial {
     pub fn tip_t_m(&self) -> f64 {
         let plant = self.simulation.plant();
         plant.motion().tip_t_m(plant.state())
+    }
+
+    /// What the controller answered last.
+    pub fn answer(&self) -> &ActuatorFrame {
+        &self.answer
     }
 
     /// The fault that the controller has latched.

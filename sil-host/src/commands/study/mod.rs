@@ -4,11 +4,14 @@
 mod admissible;
 mod bifurcation;
 pub mod campaign;
+mod capture;
 mod cells;
 mod closed_loop_bifurcation;
+mod lift_off;
 pub mod options;
 mod poincare;
 mod regions;
+mod robustness;
 mod sliding_range;
 
 use clap::{Args, Subcommand};
@@ -36,6 +39,14 @@ enum StudyCommand {
     ClosedLoopBifurcation(closed_loop_bifurcation::ClosedLoopBifurcationArguments),
     /// How far each controller slides before it leaves the belt.
     SlidingRange(sliding_range::SlidingRangeArguments),
+    /// A campaign of random arms, belts, converters and losses that the controller is not told of.
+    Robustness(robustness::RobustnessArguments),
+    /// What each part of the controller contributes to the robustness campaign.
+    Ablation(robustness::AblationArguments),
+    /// How soon a bouncing arm is caught.
+    Capture(capture::CaptureArguments),
+    /// How soon a lift-off is noticed, with the force cell and without.
+    LiftOff(lift_off::LiftOffArguments),
 }
 
 /// Computes a study and writes what it came to.
@@ -47,5 +58,9 @@ pub fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
         StudyCommand::Poincare(arguments) => poincare::run(arguments),
         StudyCommand::ClosedLoopBifurcation(arguments) => closed_loop_bifurcation::run(arguments),
         StudyCommand::SlidingRange(arguments) => sliding_range::run(arguments),
+        StudyCommand::Robustness(arguments) => robustness::run(arguments),
+        StudyCommand::Ablation(arguments) => robustness::run_ablation(arguments),
+        StudyCommand::Capture(arguments) => capture::run(arguments),
+        StudyCommand::LiftOff(arguments) => lift_off::run(arguments),
     }
 }

@@ -220,6 +220,14 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     positive(text, 1e-3, 1e6, "seconds")
 }
 
+/// A number of runs on the command line.
+pub fn runs(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(runs @ 1..=10_000_000) => Ok(runs),
+        _ => Err("give a number of runs from 1 to 10000000".into()),
+    }
+}
+
 fn positive(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (least..=most).contains(&value) => Ok(value),

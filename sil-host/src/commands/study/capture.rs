@@ -1,0 +1,34 @@
+//! `painleve study capture`: a bouncing arm is caught.
+
+use clap::Args;
+
+use super::options::{self, OutcomeOptions, Overrides};
+use crate::commands::CommandError;
+use crate::study::capture::{Capture, Captures};
+
+/// Options of `painleve study capture`.
+#[derive(Debug, Args)]
+pub struct CaptureArguments {
+    /// Seed of all runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of runs.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = options::runs)]
+    runs: usize,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    outcome: OutcomeOptions,
+}
+
+/// Computes the study and writes it.
+pub fn run(arguments: &CaptureArguments) -> Result<(), CommandError> {
+    let study = Capture {
+        seed: arguments.seed,
+        runs: arguments.runs,
+        overrides: arguments.overrides.overrides.clone(),
+    };
+    study.check()?;
+    let rows = arguments.outcome.compute(&study)?;
+    arguments.outcome.write(&Captures::new(rows))
+}

@@ -1,0 +1,44 @@
+//! `painleve study lift-off`: how soon a lift-off is noticed.
+
+use clap::Args;
+
+use super::options::{self, OutcomeOptions, Overrides};
+use crate::commands::CommandError;
+use crate::study::lift_off::{LiftOff, LiftOffs};
+
+/// Options of `painleve study lift-off`.
+#[derive(Debug, Args)]
+pub struct LiftOffArguments {
+    /// Seed of all runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of runs.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = options::runs)]
+    runs: usize,
+    /// How long the tip slides before it is led over the edge, s.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 10.0,
+        value_parser = options::seconds,
+        allow_negative_numbers = true
+    )]
+    slide_s: f64,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    outcome: OutcomeOptions,
+}
+
+/// Computes the study and writes it.
+pub fn run(arguments: &LiftOffArguments) -> Result<(), CommandError> {
+    let study = LiftOff {
+        seed: arguments.seed,
+        runs: arguments.runs,
+        slide_s: arguments.slide_s,
+        overrides: arguments.overrides.overrides.clone(),
+    };
+    study.check()?;
+    let rows = arguments.outcome.compute(&study)?;
+    arguments.outcome.write(&LiftOffs::new(rows))
+}

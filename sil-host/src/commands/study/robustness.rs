@@ -1,0 +1,79 @@
+//! `painleve study robustness` and `painleve study ablation`: the campaign, whole and in parts.
+
+use clap::Args;
+
+use super::options::{self, OutcomeOptions, Overrides};
+use crate::commands::CommandError;
+use crate::study::robustness::{Ablation, AblationStudy, Campaign, Part, Robustness};
+
+/// Options of `painleve study robustness`.
+#[derive(Debug, Args)]
+pub struct RobustnessArguments {
+    /// Seed of all runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of runs.
+    #[arg(long, value_name = "N", default_value_t = 10000, value_parser = options::runs)]
+    runs: usize,
+    /// Parts of the controller that are switched off.
+    #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
+    without: Vec<Part>,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    outcome: OutcomeOptions,
+}
+
+/// Options of `painleve study ablation`.
+#[derive(Debug, Args)]
+pub struct AblationArguments {
+    /// Seed of all runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of runs with each part switched off.
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = options::runs)]
+    runs: usize,
+    /// Parts to switch off, one at a time; all by default.
+    #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
+    without: Vec<Part>,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    outcome: OutcomeOptions,
+}
+
+/// Computes the campaign and writes it.
+pub fn run(arguments: &RobustnessArguments) -> Result<(), CommandError> {
+    let parts = arguments.without.iter().flat_map(|part| part.without());
+    let mut overrides: Vec<String> = parts.map(ToString::to_string).collect();
+    overrides.extend(arguments.overrides.overrides.iter().cloned());
+    let study = Robustness {
+        seed: arguments.seed,
+        runs: arguments.runs,
+        overrides,
+    };
+    study.check()?;
+    let rows = arguments.outcome.compute(&study)?;
+    arguments
+        .outcome
+        .write(&Campaign::new(arguments.seed, rows))
+}
+
+/// Computes the campaign without one part after the other, and writes what each contributes.
+pub fn run_ablation(arguments: &AblationArguments) -> Result<(), CommandError> {
+    let study = AblationStudy {
+        campaign: Robustness {
+            seed: arguments.seed,
+            runs: arguments.runs,
+            overrides: arguments.overrides.overrides.clone(),
+        },
+        parts: if arguments.without.is_empty() {
+            Part::ALL.to_vec()
+        } else {
+            arguments.without.clone()
+        },
+    };
+    study.campaign.check()?;
+    let rows = arguments.outcome.compute(&study)?;
+    arguments.outcome.write(&Ablation::new(&study, rows))
+}

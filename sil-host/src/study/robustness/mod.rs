@@ -1,0 +1,320 @@
+//! The robustness campaign: closed loops drawn at random, with an arm, a belt, converters
+//! and a link that the controller is not told about.
+//!
+//! A run succeeds if the tip is captured in time, never leaves the belt again, and ends at
+//! its reference or, where that is beyond the edge, at the governed edge.
+
+mod draw;
+mod outcome;
+mod part;
+
+use painleve_firmware::reference::Segment;
+use painleve_shared::frame::StatusFlags;
+use painleve_shared::{Arm, Posture, Slip};
+use serde::Serialize;
+
+use super::contact_watch::ContactWatch;
+use super::trial::Trial;
+use super::{Study, StudyError};
+use crate::plant::motion::theta;
+use crate::scenario::Scenario;
+
+pub use draw::{admissible_m, scenario};
+pub use outcome::{Ablated, Ablation, Campaign};
+pub use part::Part;
+
+/// A contact that lasts so long is a capture, s.
+pub const CAPTURE_S: f64 = 0.1;
+/// By then it must have lasted so long, s after enabling.
+pub const CAPTURE_LIMIT_S: f64 = 0.5;
+/// Time at the end of a run in which the tip must be at its place, s.
+const WATCHED_S: f64 = 0.1;
+/// How far from its place the tip may end, beyond the encoders' resolution, m.
+const WITHIN_M: f64 = 1e-3;
+/// How far before the true edge a governed reference may be held, m.
+const SHORT_M: f64 = 0.01;
+
+/// The campaign.
+#[derive(Clone, Debug)]
+pub struct Robustness {
+    /// Seed of all runs.
+    pub seed: u64,
+    /// Number of runs.
+    pub runs: usize,
+    /// Changes to every scenario after it is drawn.
+    pub overrides: Vec<String>,
+}
+
+/// What a run came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ending {
+    /// At the reference.
+    Reached,
+    /// At the governed edge, the reference being beyond it.
+    AtEdge,
+    /// At the governed edge, but that is more than 10 mm before the true one.
+    StoppedEarly,
+    /// Elsewhere.
+    NotReached,
+    /// The tip left the belt after its capture.
+    LiftOff,
+    /// The tip was not captured in time.
+    NotCaptured,
+    /// The controller gave up.
+    Fault,
+    /// The plant could not be solved.
+    Unsolved,
+}
+
+impl Ending {
+    /// Whether the run succeeded.
+    pub fn is_success(self) -> bool {
+        matches!(self, Self::Reached | Self::AtEdge)
+    }
+}
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Its number: with the seed of the campaign it defines the run.
+    pub index: usize,
+    /// What it came to.
+    pub ending: Ending,
+    /// Number of the fault that the controller has latched.
+    pub fault: Option<u8>,
+    /// Start of the capture after enabling, s.
+    pub capture_s: Option<f64>,
+    /// Lift-offs after the capture.
+    pub lift_offs: u64,
+    /// When the first of them was, s.
+    pub first_lift_off_s: Option<f64>,
+    /// Largest distance from target or governed edge at the end, m.
+    pub error_m: f64,
+    /// What is tolerated of it, m.
+    pub tolerance_m: f64,
+    /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.
+    pub to_edge_m: f64,
+    /// Times that contact was taken for flight while the tip slid.
+    pub false_alarms: u32,
+    /// Time after capture, s.
+    pub slid_s: f64,
+    /// Where the tip ended, m.
+    pub tip_t_m: f64,
+    /// Target of the reference, m.
+    pub target_m: f64,
+    /// Posture of the start.
+    pub posture: Posture,
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Belt speed, m/s.
+    pub v_belt_m_s: f64,
+    /// Control rate, Hz.
+    pub tick_hz: u32,
+    /// Bits of the encoders.
+    pub encoder_bits: u8,
+    /// Bits of the torque stages.
+    pub torque_bits: u8,
+    /// Lag of the torque stages, s.
+    pub torque_lag_s: f64,
+    /// Delay from sample to torque, ticks.
+    pub delay_ticks: f64,
+    /// Standard deviation of the force cell's noise, N.
+    pub force_noise_n: f64,
+    /// Probability that a frame is lost.
+    pub frame_loss: f64,
+    /// Length of the links, m.
+    pub link_length_m: f64,
+    /// Mass of the links, kg.
+    pub link_mass_kg: f64,
+    /// Stiffness of the spring, N·m/rad.
+    pub stiffness_nm_rad: f64,
+}
+
+impl Robustness {
+    /// The scenario of a run.
+    ///
+    /// # Errors
+    /// [`StudyError`] if an override is wrong.
+    pub fn scenario(&self, index: usize) -> Result<Scenario, StudyError> {
+        let scenario = scenario(self.seed, index as u64)?;
+        Ok(scenario.with_overrides("robustness campaign", &self.overrides)?)
+    }
+
+    /// Makes the first run, so that a wrong override is told before anything runs.
+    ///
+    /// # Errors
+    /// [`StudyError`] if it cannot be made.
+    pub fn check(&self) -> Result<(), StudyError> {
+        Trial::new(&self.scenario(0)?)?;
+        Ok(())
+    }
+}
+
+impl Study for Robustness {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        self.runs
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let scenario = self.scenario(index)?;
+        let end_s = scenario.run.duration_s;
+        let arm = Arm::new(scenario.arm)?;
+        let posture = Posture::of(&theta(&scenario.initial.state()));
+        let v_belt_m_s = scenario.belt.profile.speed_m_s(0.0);
+        let target_m = target_m(&scenario);
+        let enabled_s = scenario.controller.enable_at_s;
+        let mut trial = Trial::new(&scenario)?;
+        let start_m = trial.tip_t_m();
+        let mut watch = ContactWatch::new(enabled_s, CAPTURE_S);
+        let mut alarms = FalseAlarms::default();
+        let (mut of_target_m, mut of_governed_m) = (0.0_f64, 0.0_f64);
+        let mut solved = true;
+        for _ in 0..scenario.run.ticks() {
+            if trial.tick(&mut watch).is_err() {
+                solved = false;
+                break;
+            }
+            alarms.tick(&trial, &watch);
+            if trial.time_s() > end_s - WATCHED_S {
+                let tip_m = trial.tip_t_m();
+                let governed_m = trial.answer().reference_tip.to_metres();
+                of_target_m = of_target_m.max((tip_m - target_m).abs());
+                of_governed_m = of_governed_m.max((tip_m - governed_m).abs());
+            }
+        }
+        let bits = i32::from(scenario.converters.encoder.bits);
+        let count_rad = libm::ldexp(core::f64::consts::TAU, -bits);
+        let tolerance_m =
+            WITHIN_M + count_rad * (scenario.arm.height_m + scenario.arm.link_length_m);
+        let slip = Slip::of(-v_belt_m_s);
+        let stretch = admissible_m(&arm, posture, scenario.belt.friction, slip);
+        let to_edge_m = if target_m > start_m {
+            stretch.end - trial.tip_t_m()
+        } else {
+            trial.tip_t_m() - stretch.start
+        };
+        let at_edge = trial.answer().flags.contains(StatusFlags::AT_EDGE);
+        let captured = watch
+            .captured_s
+            .is_some_and(|start_s| start_s + CAPTURE_S <= enabled_s + CAPTURE_LIMIT_S);
+        let ending = if !solved {
+            Ending::Unsolved
+        } else if trial.fault().is_some() {
+            Ending::Fault
+        } else if !captured {
+            Ending::NotCaptured
+        } else if watch.lift_offs > 0 {
+            Ending::LiftOff
+        } else if of_target_m <= tolerance_m {
+            Ending::Reached
+        } else if at_edge && of_governed_m <= tolerance_m {
+            if to_edge_m > SHORT_M {
+                Ending::StoppedEarly
+            } else {
+                Ending::AtEdge
+            }
+        } else {
+            Ending::NotReached
+        };
+        let converters = &scenario.converters;
+        Ok(Row {
+            index,
+            ending,
+            fault: trial.fault().map(|fault| fault as u8),
+            capture_s: watch.captured_s.map(|start_s| start_s - enabled_s),
+            lift_offs: watch.lift_offs,
+            first_lift_off_s: watch.first_lift_off_s,
+            error_m: if at_edge {
+                of_target_m.min(of_governed_m)
+            } else {
+                of_target_m
+            },
+            tolerance_m,
+            to_edge_m,
+            false_alarms: alarms.count,
+            slid_s: watch
+                .captured_s
+                .map_or(0.0, |start_s| trial.time_s() - start_s),
+            tip_t_m: trial.tip_t_m(),
+            target_m,
+            posture,
+            mu: scenario.belt.friction,
+            v_belt_m_s,
+            tick_hz: scenario.run.tick_hz,
+            encoder_bits: converters.encoder.bits,
+            torque_bits: converters.torque.bits,
+            torque_lag_s: converters.torque.lag_s,
+            delay_ticks: converters.torque.delay_ticks,
+            force_noise_n: converters.force.noise_n,
+            frame_loss: converters.link.frame_loss,
+            link_length_m: scenario.arm.link_length_m,
+            link_mass_kg: scenario.arm.link_mass_kg,
+            stiffness_nm_rad: scenario.arm.stiffness_nm_rad,
+        })
+    }
+}
+
+/// Target of a scenario's last reference, m; NaN without one.
+fn target_m(scenario: &Scenario) -> f64 {
+    let segments = scenario.controller.reference.segments.iter();
+    let mut targets = segments.filter_map(|segment| match segment {
+        Segment::MinimumJerk { target_m, .. }
+        | Segment::Ramp { target_m, .. }
+        | Segment::Step { target_m, .. } => Some(f64::from(*target_m)),
+        _ => None,
+    });
+    targets.next_back().unwrap_or(f64::NAN)
+}
+
+/// Counts how often the controller gives up a contact that lasts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FalseAlarms {
+    /// Alarms so far.
+    pub count: u32,
+    said_contact: bool,
+}
+
+impl FalseAlarms {
+    /// Looks at a tick that has ended: what the controller said, and whether the tip touches.
+    pub fn tick(&mut self, trial: &Trial, watch: &ContactWatch) {
+        let says = trial.answer().flags.contains(StatusFlags::CONTACT);
+        let slides = watch.captured_s.is_some() && watch.lift_offs == 0 && watch.touches();
+        if slides && self.said_contact && !says && trial.fault().is_none() {
+            self.count += 1;
+        }
+        self.said_contact = says;
+    }
+}
+
+/// The same campaign with one part of the controller after the other switched off.
+#[derive(Clone, Debug)]
+pub struct AblationStudy {
+    /// The campaign.
+    pub campaign: Robustness,
+    /// The parts; the whole controller comes first.
+    pub parts: Vec<Part>,
+}
+
+impl Study for AblationStudy {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        (self.parts.len() + 1) * self.campaign.runs
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let mut campaign = self.campaign.clone();
+        let part = index / campaign.runs;
+        if let Some(part) = part.checked_sub(1).and_then(|part| self.parts.get(part)) {
+            let keys = part.without().iter().map(ToString::to_string);
+            campaign.overrides.extend(keys);
+        }
+        campaign.row(index % campaign.runs)
+    }
+}
+
+#[cfg(test)]
+mod tests;
