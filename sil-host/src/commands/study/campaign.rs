@@ -41,9 +41,13 @@ pub fn understand(campaign: &Campaign) -> Result<Understood, String> {
         StudyCommand::Poincare(study) => understood(study.study(), study.scenarios()),
         StudyCommand::ClosedLoopBifurcation(study) => understood(study.study(), study.scenarios()),
         StudyCommand::SlidingRange(study) => understood(study.study(), study.scenarios()),
-        StudyCommand::Admissible(_) | StudyCommand::Regions(_) => {
-            Err(format!("{name} has no rows to deal out"))
-        }
+        // Not among the names above.
+        StudyCommand::Admissible(_)
+        | StudyCommand::Regions(_)
+        | StudyCommand::Robustness(_)
+        | StudyCommand::Ablation(_)
+        | StudyCommand::Capture(_)
+        | StudyCommand::LiftOff(_) => Err(format!("{name} has no rows to deal out")),
     }
 }
 
