@@ -2,6 +2,9 @@
 //! converters: to the edge and not over it, with friction guessed wrongly, on reversed and
 //! standing belts, and out of the bounce.
 
+// Helpers of tests may panic as tests do.
+#![allow(clippy::unwrap_used)]
+
 use painleve_shared::ArmParameters;
 use painleve_shared::frame::StatusFlags;
 use painleve_sil_host::closed_loop::{ClosedLoop, LoopError, LoopResult, Watcher};
