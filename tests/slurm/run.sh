@@ -3,7 +3,7 @@
 #
 # Sets up munge, slurmctld and two slurmd on this machine, each node under its own host name,
 # as two nodes of a cluster; submits a sweep; kills one node with everything that runs on it;
-# waits until Slurm has requeued its shard; merges, and compares the bytes with those that one
+# waits until Slurm has requeued its shard (it waits two minutes first); merges, and compares the bytes with those that one
 # process computes. Everything is taken down at the end.
 #
 #   apt-get install -y --no-install-recommends slurmctld slurmd slurm-client munge
