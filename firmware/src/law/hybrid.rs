@@ -82,7 +82,7 @@ impl Default for HybridSettings {
             position_gain_per_s2: 3000.0,
             velocity_gain_per_s: 100.0,
             position_integral_gain_per_s3: 40_000.0,
-            position_integral_limit_m_s2: 20.0,
+            position_integral_limit_m_s2: 200.0,
             force_time_constant_s: 0.02,
             presses_less: true,
             force_integral_gain_per_s: 5.0,
