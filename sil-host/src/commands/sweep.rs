@@ -87,6 +87,10 @@ struct MergeArguments {
     /// The CSV file; merged.csv in the sweep's folder by default.
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
+    /// The same rows as a Parquet file.
+    #[cfg(feature = "parquet")]
+    #[arg(long, value_name = "PATH")]
+    parquet: Option<PathBuf>,
     #[command(flatten)]
     place: Place,
 }
@@ -253,6 +257,11 @@ fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
     let text = folder::merge(folder, &manifest)?;
     let default = folder.join("merged.csv");
     let path = arguments.csv.as_ref().unwrap_or(&default);
+    #[cfg(feature = "parquet")]
+    if let Some(path) = &arguments.parquet {
+        let columns = crate::sweep::parquet::from_csv(&text).map_err(output)?;
+        atomic_file::write(path, &columns).map_err(output)?;
+    }
     atomic_file::write(path, &text).map_err(output)?;
     folder::tidy(folder);
     say(&format!(

@@ -8,6 +8,7 @@
 //! - [`share`]: which rows are a shard's, and which shard is this process's
 //! - [`shard_file`]: a finished shard, complete or not there
 //! - [`folder`]: which shards are finished, and putting them together
+//! - `parquet`: the merged rows as columns, with the feature of that name
 //! - [`array`]: lists of shards as schedulers read them; [`slurm`]: a script for Slurm
 //!
 //! There is no state but the files, and no process that waits for another.
@@ -16,6 +17,8 @@ pub mod array;
 pub mod campaign;
 pub mod folder;
 pub mod manifest;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod shard_file;
 pub mod share;
 pub mod slurm;
