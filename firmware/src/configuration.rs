@@ -12,6 +12,7 @@ use crate::belt_observer::BeltSettings;
 use crate::contact_guard::GuardSettings;
 use crate::contact_observer::ContactSettings;
 use crate::deadline_monitor::DeadlineLimits;
+use crate::disturbance_observer::DisturbanceSettings;
 use crate::edge_governor::GovernorSettings;
 use crate::estimator::EstimatorSettings;
 use crate::friction_estimator::FrictionSettings;
@@ -51,6 +52,8 @@ pub struct Configuration {
     pub friction: FrictionSettings,
     /// What is known about the belt.
     pub belt: BeltSettings,
+    /// How unknown torques are estimated.
+    pub disturbance: DisturbanceSettings,
     /// How the links' length is calibrated.
     pub calibration: CalibrationSettings,
     /// When the drive is armed, and when it is shut down.
@@ -102,6 +105,7 @@ impl Configuration {
         self.supervisor.validate()?;
         self.friction.validate()?;
         self.belt.validate()?;
+        self.disturbance.validate()?;
         self.calibration.validate()?;
         self.deadlines.validate()?;
         self.law.validate()?;

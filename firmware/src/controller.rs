@@ -12,6 +12,7 @@ use crate::configuration::Configuration;
 use crate::contact_guard::{HalfPlane, nearest_torque_nm};
 use crate::contact_observer::{ContactObserver, GapReading};
 use crate::deadline_monitor::{DeadlineMonitor, Lapse};
+use crate::disturbance_observer::DisturbanceObserver;
 use crate::edge_governor::EdgeGovernor;
 use crate::estimator::{EncoderJump, Estimator};
 use crate::friction_estimator::FrictionEstimator;
@@ -50,6 +51,8 @@ pub struct Controller {
     contact: ContactObserver,
     friction: FrictionEstimator,
     belt: BeltObserver,
+    disturbance: DisturbanceObserver,
+    rate_before: Vector2<f32>,
     calibration: LengthCalibration,
     supervisor: Supervisor,
     monitor: DeadlineMonitor,
@@ -92,13 +95,15 @@ impl Controller {
                 configuration.tick_s(),
             ),
             belt: BeltObserver::new(&configuration.belt),
+            disturbance: DisturbanceObserver::new(&configuration.disturbance, configuration.tick_s()),
+            rate_before: Vector2::zeros(),
             calibration: LengthCalibration::new(
                 &configuration.calibration,
                 configuration.arm.link_length_m,
                 configuration.arm.height_m,
                 configuration.tick_s(),
             ),
-            supervisor: Supervisor::new(configuration.supervisor),
+            supervisor: Supervisor::new(configuration.supervisor, configuration.tick_hz),
             monitor: DeadlineMonitor::new(configuration.deadlines),
             reference: ReferenceGenerator::new(
                 &configuration.reference,
@@ -249,6 +254,7 @@ impl Controller {
             &self.arm,
             self.estimator.theta_rad(),
             self.estimator.theta_dot_rad_s(),
+            self.disturbance.torque_nm(),
         );
         let touched = self.contact.contact();
         // At the end of its range the force cell shows less than there is.
@@ -257,6 +263,16 @@ impl Controller {
             .iter()
             .all(|force| force.0.abs() < range);
         let contact = self.observe(&model, &force_n, in_range);
+        if self.supervisor.drives() && self.contact.confidence() >= 1.0 {
+            let acceleration = (model.theta_dot_rad_s - self.rate_before) / (self.tick_s * elapsed_ticks as f32);
+            let friction = self.friction.estimate();
+            let p_ratio = if contact { model.p_per_kg(friction.coefficient, friction.slip) / model.q.m22 } else { 1.0 };
+            let needed = model.inverse_dynamics_nm(&acceleration, &force_n);
+            let given = Vector2::from(self.telemetry.torque_nm);
+            let residual = painleve_shared::dynamics::generalised_torque_nm(&(needed - given));
+            self.disturbance.update(&residual, p_ratio);
+        }
+        self.rate_before = model.theta_dot_rad_s;
         let state_before = self.supervisor.state();
         self.supervisor
             .tick(frame.inputs, contact, self.law.is_on());

@@ -21,6 +21,8 @@ use crate::reference::TipReference;
 const POINTS_IN_A_HURRY: u32 = 2;
 /// Points from one end of the reach to the other in the search outwards.
 const STEPS_OVER_REACH: f32 = 64.0;
+/// Points that reach from one end over the other, to either side of the tip.
+const MOST_REFUSED: u32 = 128;
 /// Halvings of the last step: 6 mm / 2⁹ is 11 µm.
 const HALVINGS: u32 = 9;
 /// Part of the reach that is used: beyond it the arm is all but straight.
@@ -129,8 +131,11 @@ impl Admissibility<'_> {
 /// What the search is about.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
-    /// From the tip towards the middle of the belt for a point that is admissible.
-    Entering,
+    /// From the tip to either side for a point that is admissible.
+    Entering {
+        /// Points that are not.
+        refused: u32,
+    },
     /// Outwards for one that is not.
     Marching,
     /// Between the two.
@@ -150,19 +155,26 @@ struct Search {
 }
 
 impl Search {
-    /// For the upper edge, from a tip at `tip_t_m`.
-    fn start(tip_t_m: f32) -> Self {
+    /// For the upper edge (`direction` +1) or the lower one (−1), from a tip at `tip_t_m`.
+    fn start(direction: f32, tip_t_m: f32) -> Self {
         Self {
-            direction: 1.0,
+            direction,
             inside_m: tip_t_m,
-            stage: Stage::Entering,
+            stage: Stage::Entering { refused: 0 },
         }
     }
 
     /// The point to look at, m.
     fn point(&self, step_m: f32, reach_m: f32) -> f32 {
         let point = match self.stage {
-            Stage::Entering | Stage::Found => self.inside_m,
+            Stage::Found => self.inside_m,
+            // By turns on the side of the middle of the belt and on the other.
+            Stage::Entering { refused } => {
+                let away_m = step_m * refused.div_ceil(2) as f32;
+                let inwards = refused % 2 == 1;
+                let outwards_m = away_m.copysign(self.inside_m);
+                self.inside_m + if inwards { -outwards_m } else { outwards_m }
+            }
             Stage::Marching => self.inside_m + self.direction * step_m,
             Stage::Halving { beyond_m, .. } => 0.5 * (self.inside_m + beyond_m),
         };
@@ -172,10 +184,13 @@ impl Search {
     /// The search after the point has been looked at.
     fn next(self, point_m: f32, admissible: bool, step_m: f32, reach_m: f32) -> Self {
         let (inside_m, stage) = match (self.stage, admissible) {
-            (Stage::Entering, true) => (point_m, Stage::Marching),
-            // Nothing is admissible: the middle of the belt is the best there is.
-            (Stage::Entering, false) if point_m.abs() <= step_m => (0.0, Stage::Found),
-            (Stage::Entering, false) => (point_m - step_m.copysign(point_m), Stage::Entering),
+            (Stage::Entering { .. }, true) => (point_m, Stage::Marching),
+            // Nothing is admissible: the middle of the belt is as good as any place.
+            (Stage::Entering { refused }, false) if refused >= MOST_REFUSED => (0.0, Stage::Found),
+            (Stage::Entering { refused }, false) => {
+                let refused = refused + 1;
+                (self.inside_m, Stage::Entering { refused })
+            }
             (Stage::Marching, true) if point_m.abs() >= reach_m => (point_m, Stage::Found),
             (Stage::Marching, true) => (point_m, Stage::Marching),
             (Stage::Marching, false) => {
@@ -292,7 +307,7 @@ impl EdgeGovernor {
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
-        let mut search = self.search.unwrap_or(Search::start(tip_t_m));
+        let mut search = self.search.unwrap_or(Search::start(1.0, tip_t_m));
         let points = if self.is_fresh { 1 } else { POINTS_IN_A_HURRY };
         for _ in 0..points {
             let point = search.point(step, reach);
@@ -301,15 +316,12 @@ impl EdgeGovernor {
                 let edge = search.inside_m - search.direction * self.settings.distance_m;
                 if search.direction > 0.0 {
                     self.upper_m = edge;
-                    search = Search {
-                        direction: -1.0,
-                        ..Search::start(tip_t_m)
-                    };
+                    search = Search::start(-1.0, tip_t_m);
                 } else {
                     // A stretch shorter than both distances is a point.
                     self.lower_m = edge.at_most(self.upper_m);
                     self.is_fresh = true;
-                    search = Search::start(tip_t_m);
+                    search = Search::start(1.0, tip_t_m);
                 }
             }
         }

@@ -24,6 +24,7 @@ pub mod contact_guard;
 pub mod contact_observer;
 pub mod controller;
 pub mod deadline_monitor;
+pub mod disturbance_observer;
 pub mod edge_governor;
 pub mod estimator;
 pub mod friction_estimator;

@@ -40,7 +40,7 @@ pub struct Model {
 
 impl Model {
     /// The arm's terms at joint angles θ (rad) and rates θ̇ (rad/s).
-    pub fn new(arm: &Arm<f32>, theta_rad: Vector2<f32>, theta_dot_rad_s: Vector2<f32>) -> Self {
+    pub fn new(arm: &Arm<f32>, theta_rad: Vector2<f32>, theta_dot_rad_s: Vector2<f32>, disturbance_nm: &Vector2<f32>) -> Self {
         let pose = Pose::new(&theta_rad);
         let jacobian = arm.jacobian(&pose);
         let mobility = arm.inverse_mass_matrix(&pose);
@@ -61,7 +61,8 @@ impl Model {
             mass: arm.mass_matrix(&pose),
             mobility,
             bias_nm: arm.passive_torque_nm(&theta_rad, &theta_dot_rad_s, &pose)
-                + arm.centrifugal_torque_nm(&theta_dot_rad_s, &pose),
+                + arm.centrifugal_torque_nm(&theta_dot_rad_s, &pose)
+                - disturbance_nm,
             centripetal_m_s2: arm.centripetal_m_s2(&pose, &theta_dot_rad_s),
             // det J = l² sin(θ2 − θ1).
             inverse_determinant_per_m2: 1.0 / (length * length * bounded),

@@ -6,6 +6,9 @@ use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::status::{Fault, SupervisorState};
 use serde::{Deserialize, Serialize};
 
+/// Longest time of any limit, s: its ticks are countable at the highest rate.
+const LONGEST_S: f64 = 1e4;
+
 /// What to do when contact is lost while tracking.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -19,33 +22,33 @@ pub enum OnLiftOff {
     Fault,
 }
 
-/// Settings of the supervisor.
+/// Settings of the supervisor. Times are rounded to ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SupervisorSettings {
-    /// Ticks in contact, armed, before the reference starts.
-    pub arming_ticks: u32,
-    /// Ticks after which arming without contact is given up.
-    pub arming_limit_ticks: u32,
+    /// Time in contact, armed, before the reference starts, s.
+    pub arming_s: f32,
+    /// Time after which arming without contact is given up, s.
+    pub arming_limit_s: f32,
     /// What to do when contact is lost.
     pub on_lift_off: OnLiftOff,
-    /// Ticks without contact after which the drive is shut down; 0 for never.
-    pub lift_off_limit_ticks: u32,
+    /// Time without contact after which the drive is shut down, s; 0 for never.
+    pub lift_off_limit_s: f32,
     /// Lift-offs in a row from which the tip is brought back …
     pub recoveries_limit: u32,
-    /// … a row being ended by so many ticks in contact.
-    pub recovered_ticks: u32,
+    /// … a row being ended by so long a contact, s.
+    pub recovered_s: f32,
 }
 
 impl Default for SupervisorSettings {
     fn default() -> Self {
         Self {
-            arming_ticks: 10,
-            arming_limit_ticks: 1000,
+            arming_s: 0.01,
+            arming_limit_s: 1.0,
             on_lift_off: OnLiftOff::Recover,
-            lift_off_limit_ticks: 2000,
+            lift_off_limit_s: 2.0,
             recoveries_limit: 10,
-            recovered_ticks: 1000,
+            recovered_s: 1.0,
         }
     }
 }
@@ -56,39 +59,25 @@ impl SupervisorSettings {
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
-        let ticks = |key, value: u32, minimum, maximum| {
-            range::check(key, f64::from(value), minimum, maximum)
-        };
-        ticks(
-            "controller.supervisor.arming_ticks",
-            self.arming_ticks,
+        let time = |key, value, least_s| range::check(key, value, least_s, LONGEST_S);
+        time("controller.supervisor.arming_s", self.arming_s, 0.0)?;
+        time(
+            "controller.supervisor.arming_limit_s",
+            self.arming_limit_s,
+            f64::from(self.arming_s),
+        )?;
+        time(
+            "controller.supervisor.lift_off_limit_s",
+            self.lift_off_limit_s,
             0.0,
-            1e6,
         )?;
-        ticks(
-            "controller.supervisor.arming_limit_ticks",
-            self.arming_limit_ticks,
-            f64::from(self.arming_ticks) + 1.0,
-            1e8,
-        )?;
-        ticks(
-            "controller.supervisor.lift_off_limit_ticks",
-            self.lift_off_limit_ticks,
-            0.0,
-            1e8,
-        )?;
-        ticks(
+        range::check(
             "controller.supervisor.recoveries_limit",
-            self.recoveries_limit,
+            f64::from(self.recoveries_limit),
             0.0,
             1e6,
         )?;
-        ticks(
-            "controller.supervisor.recovered_ticks",
-            self.recovered_ticks,
-            1.0,
-            1e8,
-        )
+        time("controller.supervisor.recovered_s", self.recovered_s, 0.0)
     }
 }
 
@@ -96,6 +85,7 @@ impl SupervisorSettings {
 #[derive(Clone, Copy, Debug)]
 pub struct Supervisor {
     settings: SupervisorSettings,
+    tick_hz: f32,
     state: SupervisorState,
     fault: Option<Fault>,
     /// Ticks in the present state, or in contact while armed.
@@ -107,10 +97,11 @@ pub struct Supervisor {
 }
 
 impl Supervisor {
-    /// An idle supervisor.
-    pub fn new(settings: SupervisorSettings) -> Self {
+    /// An idle supervisor that is called `tick_hz` times a second.
+    pub fn new(settings: SupervisorSettings, tick_hz: f32) -> Self {
         Self {
             settings,
+            tick_hz,
             state: SupervisorState::Idle,
             fault: None,
             ticks: 0,
@@ -183,14 +174,14 @@ impl Supervisor {
                 } else {
                     0
                 };
-                if self.contact_ticks > self.settings.arming_ticks {
+                if self.exceeds(self.contact_ticks, self.settings.arming_s) {
                     self.enter(SupervisorState::Tracking);
-                } else if self.ticks > self.settings.arming_limit_ticks {
+                } else if self.exceeds(self.ticks, self.settings.arming_limit_s) {
                     self.latch(Fault::ContactNotFound);
                 }
             }
             SupervisorState::Tracking => {
-                if self.ticks > self.settings.recovered_ticks {
+                if self.exceeds(self.ticks, self.settings.recovered_s) {
                     self.lift_offs = 0;
                 }
                 if !contact {
@@ -208,14 +199,19 @@ impl Supervisor {
                 }
             }
             SupervisorState::LiftOff => {
-                let limit = self.settings.lift_off_limit_ticks;
+                let limit_s = self.settings.lift_off_limit_s;
                 if contact {
                     self.enter(SupervisorState::Tracking);
-                } else if limit > 0 && self.ticks > limit {
+                } else if limit_s > 0.0 && self.exceeds(self.ticks, limit_s) {
                     self.latch(Fault::LiftOffTooLong);
                 }
             }
         }
+    }
+
+    /// Whether a count of ticks has gone on for longer than `time_s`.
+    fn exceeds(&self, ticks: u32, time_s: f32) -> bool {
+        ticks as f32 > time_s * self.tick_hz
     }
 
     fn enter(&mut self, state: SupervisorState) {
@@ -236,7 +232,7 @@ mod tests {
     const OFF: DigitalInputs = DigitalInputs(0);
 
     fn tracking() -> Supervisor {
-        let mut supervisor = Supervisor::new(SupervisorSettings::default());
+        let mut supervisor = Supervisor::new(SupervisorSettings::default(), 1000.0);
         for _ in 0..12 {
             supervisor.tick(ON, true, true);
         }
@@ -246,7 +242,7 @@ mod tests {
 
     #[test]
     fn enabling_arms_and_confirmed_contact_starts_tracking() {
-        let mut supervisor = Supervisor::new(SupervisorSettings::default());
+        let mut supervisor = Supervisor::new(SupervisorSettings::default(), 1000.0);
         supervisor.tick(OFF, true, true);
         assert_eq!(supervisor.state(), Idle);
         supervisor.tick(ON, true, true);
@@ -256,14 +252,14 @@ mod tests {
 
     #[test]
     fn without_a_law_nothing_arms() {
-        let mut supervisor = Supervisor::new(SupervisorSettings::default());
+        let mut supervisor = Supervisor::new(SupervisorSettings::default(), 1000.0);
         supervisor.tick(ON, true, false);
         assert_eq!(supervisor.state(), Idle);
     }
 
     #[test]
     fn arming_without_contact_is_given_up() {
-        let mut supervisor = Supervisor::new(SupervisorSettings::default());
+        let mut supervisor = Supervisor::new(SupervisorSettings::default(), 1000.0);
         for _ in 0..1002 {
             supervisor.tick(ON, false, true);
         }

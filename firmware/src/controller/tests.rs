@@ -32,6 +32,7 @@ fn configuration() -> Configuration {
         contact: Default::default(),
         friction: Default::default(),
         belt: Default::default(),
+        disturbance: Default::default(),
         calibration: Default::default(),
         supervisor: Default::default(),
         deadlines: Default::default(),

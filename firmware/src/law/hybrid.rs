@@ -292,9 +292,9 @@ impl Hybrid {
         self.wanted_force_n += approach * (settings.normal_force_n - self.wanted_force_n);
         // Anti-windup: no integration in the air, where there is no force to
         // control, nor while the torque is limited.
-        if input.contact && !input.saturated && self.pressing >= 1.0 {
+        if input.contact && !input.saturated {
             let step = settings.force_integral_gain_per_s
-                * (self.wanted_force_n - input.force_n.y)
+                * (self.pressing * self.wanted_force_n - input.force_n.y)
                 * input.tick_s;
             let limit = settings.force_integral_limit_n;
             self.force_integral_n = (self.force_integral_n + step).limited(-limit, limit);

@@ -9,6 +9,7 @@ mod load;
 
 use painleve_firmware::Configuration;
 use painleve_firmware::belt_observer;
+use painleve_firmware::disturbance_observer::DisturbanceSettings;
 use painleve_firmware::contact_guard::GuardSettings;
 use painleve_firmware::contact_observer::ContactSettings;
 use painleve_firmware::deadline_monitor::DeadlineLimits;
@@ -177,6 +178,8 @@ pub struct ControllerSettings {
     pub law: LawSettings,
     /// How the tip is kept pressed on the belt.
     pub guard: GuardSettings,
+    /// How unknown torques are estimated.
+    pub disturbance: DisturbanceSettings,
     /// How the reference is kept off the paradox.
     pub governor: GovernorSettings,
     /// How a tip that left the belt is brought back.
@@ -204,6 +207,7 @@ impl Default for ControllerSettings {
             deadlines: DeadlineLimits::default(),
             law: LawSettings::Hybrid(HybridSettings::default()),
             guard: GuardSettings::default(),
+            disturbance: DisturbanceSettings::default(),
             governor: GovernorSettings::default(),
             recovery: RecoverySettings::default(),
             reference: Program {
@@ -260,6 +264,7 @@ impl Scenario {
             deadlines: settings.deadlines,
             law: settings.law,
             guard: settings.guard,
+            disturbance: settings.disturbance,
             governor: settings.governor,
             recovery: settings.recovery,
             reference: settings.reference.clone(),
