@@ -5,7 +5,7 @@
 
 use painleve_shared::counts::{EncoderScale, LinearScale};
 use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::{Arm, ArmParameters};
+use painleve_shared::{Arm, ArmParameters, Real};
 use serde::{Deserialize, Serialize};
 
 use crate::belt_observer::BeltSettings;
@@ -76,6 +76,13 @@ impl Configuration {
     /// Time between two ticks, s.
     pub fn tick_s(&self) -> f32 {
         1.0 / self.tick_hz
+    }
+
+    /// How far a count of the coarser encoder moves the tip along the belt, m.
+    pub fn tip_count_m(&self) -> f32 {
+        let [one, two] = self.converters.encoders;
+        let count_rad = one.rad_per_count::<f32>().at_least(two.rad_per_count());
+        self.arm.height_m * count_rad
     }
 
     /// Checks every number and makes the arm's model.

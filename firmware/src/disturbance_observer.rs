@@ -1,18 +1,24 @@
 //! What the model does not know, as a torque.
 //!
 //! The equations of motion, M θ̈ + w + c − Jᵀ f − u = d, leave what a wrong mass, spring or
-//! length and unmodelled friction in the joints ask for. Every term on the left is measured,
-//! so that d needs no model of the contact. Near the edge this is what counts: an error d of the
-//! free normal acceleration b = … changes f_n by d/p.
+//! dashpot asks for. Everything on the left is measured, whatever the contact does: d needs
+//! no model of it. Towards the edge it is what counts, as an error of the free normal
+//! acceleration b changes f_n = −b/p by itself over p.
 //!
-//! The residual is low-passed. Forces and torques of one instant belong together; where they
-//! are a few ticks apart, the filter closes a loop through the contact, whose gain is
-//! Q22/p. It is therefore slowed down with p, as the law's friction filter is.
+//! The residual is low-passed. The torque of a tick acts one to a few ticks later than the
+//! force and the motion it is compared with, which closes a loop through the contact with
+//! the gain Q22/p; the filter is slowed down with p to keep that loop calm.
 
 use nalgebra::Vector2;
 use painleve_shared::Real;
+use painleve_shared::dynamics::generalised_torque_nm;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
+
+use crate::model::Model;
+
+/// Part of the residual that is taken over in a tick, at most, for each Q22 of p.
+const SHARE: f32 = 0.05;
 
 /// Settings of the disturbance observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,7 +28,7 @@ pub struct DisturbanceSettings {
     pub enabled: bool,
     /// Bandwidth far from the edge, rad/s.
     pub bandwidth_rad_s: f32,
-    /// Largest disturbance of either joint, N·m.
+    /// Largest disturbance of either link, N·m.
     pub limit_nm: f32,
 }
 
@@ -52,43 +58,141 @@ impl DisturbanceSettings {
     }
 }
 
-/// Largest part of the residual that is taken over in a tick at the edge's own pace.
-const SHARE: f32 = 0.25;
+/// What the equations of motion are balanced with at one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    /// Joint torques (u1, u2) of the tick before, N·m.
+    pub torque_nm: Vector2<f32>,
+    /// Contact force (f_t, f_n), N.
+    pub force_n: Vector2<f32>,
+    /// p of a tip that touches, 1/kg.
+    pub p_per_kg: Option<f32>,
+    /// Time since the tick before, s.
+    pub elapsed_s: f32,
+}
 
 /// The observer with its state.
 #[derive(Clone, Copy, Debug)]
 pub struct DisturbanceObserver {
     settings: DisturbanceSettings,
-    torque_nm: Vector2<f32>,
     tick_s: f32,
+    disturbance_nm: Vector2<f32>,
+    /// θ̇ at the tick before, rad/s.
+    rate_rad_s: Option<Vector2<f32>>,
 }
 
 impl DisturbanceObserver {
-    /// An observer that has seen no disturbance.
+    /// An observer that has seen no disturbance, called every `tick_s`.
     pub fn new(settings: &DisturbanceSettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
-            torque_nm: Vector2::zeros(),
             tick_s,
+            disturbance_nm: Vector2::zeros(),
+            rate_rad_s: None,
         }
     }
 
-    /// The generalised torque d, N·m.
-    pub fn torque_nm(&self) -> &Vector2<f32> {
-        &self.torque_nm
+    /// Generalised torque d that acts on the arm beside those of its model, N·m.
+    pub fn disturbance_nm(&self) -> &Vector2<f32> {
+        &self.disturbance_nm
     }
 
-    /// Takes in what the equations of motion with the present d leave (N·m), where p is
-    /// `p_ratio` of Q22.
-    pub fn update(&mut self, residual_nm: &Vector2<f32>, p_ratio: f32) {
-        if !self.settings.enabled {
+    /// Takes in one tick of an arm whose `model` includes the present d.
+    pub fn update(&mut self, model: &Model, balance: &Balance) {
+        let before = self.rate_rad_s.replace(model.theta_dot_rad_s);
+        let Some(before) = before.filter(|_| self.settings.enabled) else {
             return;
-        }
-        let weight = (self.settings.bandwidth_rad_s * self.tick_s)
-            .at_most(SHARE * p_ratio)
-            .at_least(0.0);
+        };
+        let acceleration = (model.theta_dot_rad_s - before) / balance.elapsed_s;
+        let needed_nm = model.inverse_dynamics_nm(&acceleration, &balance.force_n);
+        let residual_nm = generalised_torque_nm(&(needed_nm - balance.torque_nm));
+        let share = balance
+            .p_per_kg
+            .map_or(1.0, |p| SHARE * (p / model.q.m22).at_least(0.0));
+        let weight = (self.settings.bandwidth_rad_s * self.tick_s).at_most(share);
         let limit = self.settings.limit_nm;
-        self.torque_nm =
-            (self.torque_nm + residual_nm * weight).map(|torque| torque.limited(-limit, limit));
+        self.disturbance_nm = (self.disturbance_nm + residual_nm * weight)
+            .map(|torque| torque.limited(-limit, limit));
+    }
+
+    /// A tick that says nothing: contact is in doubt, or a reading is.
+    pub fn pause(&mut self) {
+        self.rate_rad_s = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_shared::{Arm, ArmParameters};
+    use proptest::prelude::*;
+
+    const TICK_S: f32 = 1e-3;
+
+    /// Where the observer ends that is shown an arm with an unknown torque, moving with a
+    /// constant acceleration under a contact force, for a while.
+    fn observed(
+        disturbance_nm: Vector2<f32>,
+        acceleration: Vector2<f32>,
+        force_n: Vector2<f32>,
+        p_ratio: Option<f32>,
+        ticks: u32,
+    ) -> Vector2<f32> {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let theta = Vector2::new(-0.3, 0.7);
+        let mut observer = DisturbanceObserver::new(&DisturbanceSettings::default(), TICK_S);
+        for tick in 0..ticks {
+            let rate = acceleration * (tick as f32 * TICK_S);
+            let truth = Model::new(&arm, theta, rate, &disturbance_nm);
+            let model = Model::new(&arm, theta, rate, observer.disturbance_nm());
+            observer.update(
+                &model,
+                &Balance {
+                    torque_nm: truth.inverse_dynamics_nm(&acceleration, &force_n),
+                    force_n,
+                    p_per_kg: p_ratio.map(|ratio| ratio * model.q.m22),
+                    elapsed_s: TICK_S,
+                },
+            );
+        }
+        *observer.disturbance_nm()
+    }
+
+    proptest! {
+        /// Whatever force and motion there are, only the unknown torque is found.
+        #[test]
+        fn an_unknown_torque_is_found(
+            d1 in -0.8_f32..0.8, d2 in -0.8_f32..0.8, a1 in -5.0_f32..5.0, a2 in -5.0_f32..5.0,
+            f_t in -15.0_f32..15.0, f_n in 0.0_f32..15.0,
+        ) {
+            let truth = Vector2::new(d1, d2);
+            let found = observed(truth, Vector2::new(a1, a2), Vector2::new(f_t, f_n), None, 500);
+            prop_assert!((found - truth).norm() < 2e-3, "{found} {truth}");
+        }
+    }
+
+    #[test]
+    fn it_is_slow_where_p_is_small() {
+        let truth = Vector2::new(0.5, -0.3);
+        let after = |p_ratio| {
+            let zero = Vector2::zeros();
+            observed(truth, zero, zero, Some(p_ratio), 50).norm() / truth.norm()
+        };
+        // 1 − (1 − 0.02)⁴⁹ and 1 − (1 − 0.05 · 0.02)⁴⁹.
+        assert!((after(1.0) - 0.628).abs() < 2e-3, "{}", after(1.0));
+        assert!((after(0.02) - 0.0478).abs() < 2e-3, "{}", after(0.02));
+        assert_eq!(after(-0.1), 0.0);
+    }
+
+    #[test]
+    fn it_is_limited() {
+        let found = observed(
+            Vector2::new(5.0, -5.0),
+            Vector2::zeros(),
+            Vector2::zeros(),
+            None,
+            500,
+        );
+        assert_eq!(found, Vector2::new(1.0, -1.0));
     }
 }

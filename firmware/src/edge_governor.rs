@@ -43,10 +43,16 @@ pub struct GovernorSettings {
     pub enabled: bool,
     /// Least p as a part of Q22.
     pub minimum_p_ratio: f32,
+    /// What is added to that for slow sampling, times the square of the time between ticks, 1/s²:
+    /// so far does a disturbance move the tip before anything is done about it.
+    pub p_ratio_per_s2: f32,
     /// Deviations of the friction estimate that are added to it.
     pub friction_deviations: f32,
     /// Distance that is kept from where p has its least value, m.
     pub distance_m: f32,
+    /// What is added to that for each count of the encoders at the tip: so far is the tip moved
+    /// to and fro by their rounding.
+    pub distance_counts: f32,
     /// Deceleration with which the reference stops before an edge, m/s².
     pub braking_m_s2: f32,
     /// Fastest approach to a reference that is away from the tip, m/s.
@@ -57,9 +63,11 @@ impl Default for GovernorSettings {
     fn default() -> Self {
         Self {
             enabled: true,
-            minimum_p_ratio: 0.02,
+            minimum_p_ratio: 0.01,
+            p_ratio_per_s2: 1e4,
             friction_deviations: 1.5,
-            distance_m: 1.2e-3,
+            distance_m: 0.6e-3,
+            distance_counts: 4.0,
             braking_m_s2: 1.0,
             catch_up_m_s: 0.3,
         }
@@ -78,6 +86,18 @@ impl GovernorSettings {
             self.minimum_p_ratio,
             0.0,
             0.9,
+        )?;
+        key(
+            "controller.governor.p_ratio_per_s2",
+            self.p_ratio_per_s2,
+            0.0,
+            1e6,
+        )?;
+        key(
+            "controller.governor.distance_counts",
+            self.distance_counts,
+            0.0,
+            1e3,
         )?;
         key(
             "controller.governor.friction_deviations",
@@ -182,7 +202,7 @@ impl Search {
     }
 
     /// The search after the point has been looked at.
-    fn next(self, point_m: f32, admissible: bool, step_m: f32, reach_m: f32) -> Self {
+    fn next(self, point_m: f32, admissible: bool, reach_m: f32) -> Self {
         let (inside_m, stage) = match (self.stage, admissible) {
             (Stage::Entering { .. }, true) => (point_m, Stage::Marching),
             // Nothing is admissible: the middle of the belt is as good as any place.
@@ -226,6 +246,10 @@ impl Search {
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeGovernor {
     settings: GovernorSettings,
+    /// Least p as a part of Q22, for this rate.
+    least_p_ratio: f32,
+    /// Distance from where it has that value, for these encoders, m.
+    distance_m: f32,
     /// Edges of the admissible stretch around the tip, m.
     lower_m: f32,
     upper_m: f32,
@@ -245,9 +269,11 @@ pub struct EdgeGovernor {
 
 impl EdgeGovernor {
     /// A governor that knows no edges but the arm's reach (m).
-    pub fn new(settings: &GovernorSettings, reach_m: f32) -> Self {
+    pub fn new(settings: &GovernorSettings, reach_m: f32, tick_s: f32, count_m: f32) -> Self {
         Self {
             settings: *settings,
+            least_p_ratio: settings.minimum_p_ratio + settings.p_ratio_per_s2 * tick_s * tick_s,
+            distance_m: settings.distance_m + settings.distance_counts * count_m,
             lower_m: -USABLE_REACH * reach_m,
             upper_m: USABLE_REACH * reach_m,
             search: None,
@@ -303,7 +329,7 @@ impl EdgeGovernor {
             posture,
             friction: friction.coefficient + margin,
             slip: friction.slip_seen.then_some(friction.slip),
-            minimum_p_ratio: self.settings.minimum_p_ratio.at_least(minimum_p_ratio),
+            minimum_p_ratio: self.least_p_ratio.at_least(minimum_p_ratio),
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
@@ -311,9 +337,9 @@ impl EdgeGovernor {
         let points = if self.is_fresh { 1 } else { POINTS_IN_A_HURRY };
         for _ in 0..points {
             let point = search.point(step, reach);
-            search = search.next(point, admissibility.at(point), step, reach);
+            search = search.next(point, admissibility.at(point), reach);
             if search.stage == Stage::Found {
-                let edge = search.inside_m - search.direction * self.settings.distance_m;
+                let edge = search.inside_m - search.direction * self.distance_m;
                 if search.direction > 0.0 {
                     self.upper_m = edge;
                     search = Search::start(-1.0, tip_t_m);
@@ -405,10 +431,12 @@ mod tests {
     fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> EdgeGovernor {
         let settings = GovernorSettings {
             minimum_p_ratio: 0.0,
+            p_ratio_per_s2: 0.0,
             distance_m: 0.0,
+            distance_counts: 0.0,
             ..Default::default()
         };
-        let mut governor = EdgeGovernor::new(&settings, arm().reach_on_belt_m());
+        let mut governor = EdgeGovernor::new(&settings, arm().reach_on_belt_m(), TICK_S, 0.0);
         for _ in 0..300 {
             governor.search(&arm(), posture, tip_t_m, friction, 0.0);
         }

@@ -28,7 +28,7 @@ pub struct Model {
     mass: Matrix2<f32>,
     /// M⁻¹, 1/(kg·m²).
     mobility: Matrix2<f32>,
-    /// w + c, N·m.
+    /// w + c − d, N·m.
     bias_nm: Vector2<f32>,
     /// Centripetal acceleration s of the tip, m/s².
     centripetal_m_s2: Vector2<f32>,
@@ -39,8 +39,14 @@ pub struct Model {
 }
 
 impl Model {
-    /// The arm's terms at joint angles θ (rad) and rates θ̇ (rad/s).
-    pub fn new(arm: &Arm<f32>, theta_rad: Vector2<f32>, theta_dot_rad_s: Vector2<f32>, disturbance_nm: &Vector2<f32>) -> Self {
+    /// The arm's terms at joint angles θ (rad) and rates θ̇ (rad/s), with a generalised torque
+    /// d (N·m) that acts on it besides.
+    pub fn new(
+        arm: &Arm<f32>,
+        theta_rad: Vector2<f32>,
+        theta_dot_rad_s: Vector2<f32>,
+        disturbance_nm: &Vector2<f32>,
+    ) -> Self {
         let pose = Pose::new(&theta_rad);
         let jacobian = arm.jacobian(&pose);
         let mobility = arm.inverse_mass_matrix(&pose);
@@ -137,7 +143,7 @@ mod tests {
             let arm = Arm::new(ArmParameters::default()).unwrap();
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
             let theta = arm.joint_angles_on_belt_rad(tip, posture).unwrap();
-            (arm, Model::new(&arm, theta, Vector2::new(w1, w2)))
+            (arm, Model::new(&arm, theta, Vector2::new(w1, w2), &Vector2::zeros()))
         }
     }
 

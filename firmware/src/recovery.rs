@@ -21,7 +21,9 @@ const RAISING_M_S: f32 = 0.1;
 /// Rate at which the height above the belt shrinks on the way down, 1/s.
 const DESCENT_PER_S: f32 = 15.0;
 /// How far below the belt the tip is sent until it is felt to touch, m.
-const DEEPEST_M: f32 = 5e-3;
+const DEEPEST_M: f32 = 0.03;
+/// How many times faster it is lowered below where the belt is believed to be: the links are shorter.
+const SEARCHING: f32 = 4.0;
 
 /// Settings of the recovery.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -156,7 +158,11 @@ impl Recovery {
             away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible)
         });
         // The higher the tip, the faster down; the last stretch at landing speed.
-        let down = settings.landing_speed_m_s + DESCENT_PER_S * flight.height_m.at_least(0.0);
+        let down = if flight.height_m < 0.0 {
+            SEARCHING * settings.landing_speed_m_s
+        } else {
+            settings.landing_speed_m_s + DESCENT_PER_S * flight.height_m
+        };
         let vertical_speed = if !flight.lands {
             let rise = (settings.clearance_m - flight.height_m) / tick_s;
             rise.limited(-down, RAISING_M_S)
@@ -207,14 +213,14 @@ mod tests {
             let mut recovery = Recovery::new(&RecoverySettings::default());
             let edges = (-0.18, 0.155);
             let landing = (0..1000).find_map(|_| {
-                let model = Model::new(&arm, theta, theta_dot);
+                let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
                 let torque = recovery.tick(&arm, &model, Some(edges), 1e-3).torque_nm;
                 for _ in 0..10 {
-                    let model = Model::new(&arm, theta, theta_dot);
+                    let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
                     theta_dot += model.acceleration_rad_s2(&torque, &Vector2::zeros()) * 1e-4;
                     theta += theta_dot * 1e-4;
                 }
-                let model = Model::new(&arm, theta, theta_dot);
+                let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
                 let down = model.gap_m < 0.0 && recovery.flight.is_some_and(|flight| flight.lands);
                 down.then_some(model)
             });

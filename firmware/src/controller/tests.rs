@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::configuration::Converters;
+use crate::deadline_monitor::Lapse;
 use crate::law::LawSettings;
 use crate::law::hybrid::HybridSettings;
 use crate::reference::Program;

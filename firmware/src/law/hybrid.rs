@@ -33,8 +33,8 @@ pub enum FrictionFeedForward {
         time_constant_s: f32,
     },
     /// The estimated friction −μ̂ s α_f, corrected by the reading through a low-pass:
-    /// d̂ += k (f_t + μ̂ s α_f − d̂) with k = min(T/τ, ¼ p̂/Q22), so that the pole of the
-    /// loop through the contact, 1 − k Q22/p, stays near ¾ however close the edge is.
+    /// d̂ += k (f_t + μ̂ s α_f − d̂) with k = min(T/τ, ½ p̂/Q22), so that the pole of the
+    /// loop through the contact, 1 − k Q22/p, stays near ½ however close the edge is.
     Observed {
         /// Time constant τ far from the edge, s.
         time_constant_s: f32,
@@ -81,14 +81,14 @@ impl Default for HybridSettings {
             normal_force_n: 10.0,
             position_gain_per_s2: 3000.0,
             velocity_gain_per_s: 100.0,
-            position_integral_gain_per_s3: 40_000.0,
+            position_integral_gain_per_s3: 20_000.0,
             position_integral_limit_m_s2: 200.0,
             force_time_constant_s: 0.02,
             presses_less: true,
             force_integral_gain_per_s: 5.0,
             force_integral_limit_n: 5.0,
             friction: FrictionFeedForward::Observed {
-                time_constant_s: 0.03,
+                time_constant_s: 0.015,
             },
         }
     }
@@ -173,8 +173,12 @@ impl HybridSettings {
     }
 }
 
-/// Part of the sampling that the loop through the contact may use: its pole is 1 − ¼ p̂/p.
-const OBSERVER_SHARE: f32 = 0.25;
+/// Part of the sampling that the loop through the contact may use: its pole is 1 − ½ p̂/p.
+const OBSERVER_SHARE: f32 = 0.5;
+
+/// Rate at which the friction that is fed forward changes, as a part of f_n, 1/s: at a reversal
+/// of slip it goes through stick without a jerk.
+const FRICTION_SLEW_PER_S: f32 = 100.0;
 
 /// Part of the torque limit up to which the tip is pressed on the belt; the rest is for motion.
 const TORQUE_USED: f32 = 0.95;
@@ -213,6 +217,8 @@ pub struct Hybrid {
     filtered_friction_n: f32,
     /// Slip whose friction was fed forward last.
     slip: Option<Slip>,
+    /// f_t/f_n that was fed forward last.
+    fed_ratio: f32,
     /// Part of the wanted contact force for which there is torque.
     pressing: f32,
 }
@@ -227,6 +233,7 @@ impl Hybrid {
             position_integral_m_s2: 0.0,
             filtered_friction_n: 0.0,
             slip: None,
+            fed_ratio: 0.0,
             pressing: 1.0,
         }
     }
@@ -237,7 +244,9 @@ impl Hybrid {
         if self.settings.force_time_constant_s > 0.0 {
             self.wanted_force_n = input.force_n.y.at_least(0.0);
         }
-        self.filtered_friction_n = input.force_n.x;
+        // Within the cone that is believed in: a force cell at the end of its range shows any ratio.
+        let cone_n = input.friction.coefficient * input.force_n.y.at_least(0.0);
+        self.filtered_friction_n = input.force_n.x.limited(-cone_n, cone_n);
     }
 
     /// Torques for one tick.
@@ -328,15 +337,18 @@ impl Hybrid {
                     friction.slip
                 };
                 let slip = friction.slip_seen.then_some(slip);
+                let ratio = slip.map_or(0.0, |slip| -friction.coefficient * slip.sign::<f32>());
                 if slip != self.slip {
-                    self.slip = slip;
                     self.filtered_friction_n = 0.0;
+                    if self.slip.is_none() {
+                        self.fed_ratio = ratio;
+                    }
+                    self.slip = slip;
                 }
-                let expected = slip.map_or(0.0, |slip| {
-                    -friction.coefficient * slip.sign::<f32>() * normal_force_n
-                });
-                let p = input.model.p_per_kg(friction.coefficient, friction.slip);
-                let share = OBSERVER_SHARE * p / input.model.q.m22;
+                let step = FRICTION_SLEW_PER_S * input.tick_s;
+                self.fed_ratio = ratio.limited(self.fed_ratio - step, self.fed_ratio + step);
+                let expected = self.fed_ratio * normal_force_n;
+                let share = OBSERVER_SHARE * input.p_per_kg / input.model.q.m22;
                 let weight = (input.tick_s / (time_constant_s + input.tick_s))
                     .at_most(share)
                     .at_least(0.0);
@@ -377,7 +389,7 @@ mod tests {
             let theta_rad = arm.joint_angles_on_belt_rad(tip, posture).unwrap();
             let theta_dot_rad_s = arm.joint_rates_on_belt_rad_s(tip, speed, posture);
             let pose = Pose::new(&theta_rad);
-            let model = Model::new(&arm, theta_rad, theta_dot_rad_s);
+            let model = Model::new(&arm, theta_rad, theta_dot_rad_s, &Vector2::zeros());
             let settings = HybridSettings {
                 force_integral_gain_per_s: 0.0,
                 position_integral_gain_per_s3: 0.0,
@@ -390,6 +402,7 @@ mod tests {
                 friction: FrictionEstimate {
                     coefficient: friction, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
                 },
+                p_per_kg: model.p_per_kg(friction, Slip::Positive),
                 force_n: Vector2::zeros(), contact: true, saturated: false,
                 reference, torque_limit_nm: 50.0, tick_s: 1e-3,
             });

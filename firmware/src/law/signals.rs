@@ -20,6 +20,8 @@ pub struct LawInput<'a> {
     pub force_n: Vector2<f32>,
     /// What is known about friction.
     pub friction: FrictionEstimate,
+    /// p with it, 1/kg.
+    pub p_per_kg: f32,
     /// Whether the tip touches the belt.
     pub contact: bool,
     /// Whether the torque of the tick before was limited.

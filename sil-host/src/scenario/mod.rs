@@ -9,10 +9,10 @@ mod load;
 
 use painleve_firmware::Configuration;
 use painleve_firmware::belt_observer;
-use painleve_firmware::disturbance_observer::DisturbanceSettings;
 use painleve_firmware::contact_guard::GuardSettings;
 use painleve_firmware::contact_observer::ContactSettings;
 use painleve_firmware::deadline_monitor::DeadlineLimits;
+use painleve_firmware::disturbance_observer::DisturbanceSettings;
 use painleve_firmware::edge_governor::GovernorSettings;
 use painleve_firmware::estimator::EstimatorSettings;
 use painleve_firmware::friction_estimator::FrictionSettings;

@@ -134,7 +134,9 @@ impl LiftOff {
             Posture::ElbowUp
         };
         let arm = Arm::new(scenario.arm)?;
-        let stretch = admissible_m(&arm, posture, friction, Slip::of(-speed_m_s));
+        let slip = Slip::of(-speed_m_s);
+        let stretches = admissible_m(&arm, posture, friction, slip, 0.0);
+        let stretch = stretches.into_iter().next().unwrap_or(0.0..0.0);
         let inside = (stretch.start + INSIDE_M, stretch.end - INSIDE_M);
         let start_m = draw(inside.0, inside.1);
         // With ż_r > 0 the paradox is ahead at z_t > 0.

@@ -14,8 +14,9 @@ use crate::study::case::Reference;
 
 /// Part of the reach that is used: at its end the arm is straight.
 const USED_REACH: f64 = 0.97;
-/// Distance of the start from the ends of the admissible stretch, m.
-const INSIDE_M: f64 = 5e-3;
+/// Least p as a part of Q22 where the arm is put down. Nearer to the edge an arm without torque
+/// presses on the belt with hundreds of newtons, and sticks to it before the first tick.
+const START_P_RATIO: f64 = 0.2;
 /// How far beyond an edge a target may be, m.
 const BEYOND_M: f64 = 0.02;
 /// Farthest target: within the reach of the arm that the controller believes in, m.
@@ -23,16 +24,25 @@ const FARTHEST_M: f64 = 0.183;
 /// Time after the end of the reference in which the tip comes to rest, s.
 const REST_S: f64 = 2.0;
 
-/// Stretch of z_t (m) around the middle of the belt with p > 0 in a posture and
-/// slip; the longest one, within the part of the reach that is used.
-pub fn admissible_m(arm: &Arm<f64>, posture: Posture, friction: f64, slip: Slip) -> Range<f64> {
+/// Stretches of z_t (m) with p of at least a part of Q22 in a posture and slip, within the part
+/// of the reach that is used; the longest comes first.
+pub fn admissible_m(
+    arm: &Arm<f64>,
+    posture: Posture,
+    friction: f64,
+    slip: Slip,
+    least_p_ratio: f64,
+) -> Vec<Range<f64>> {
     let line = BeltLine::new(arm, posture);
     let reach_m = USED_REACH * arm.reach_on_belt_m();
-    positive_stretches(|tau| line.p(tau, friction, slip))
+    let p = |tau| line.p(tau, friction, slip) - least_p_ratio * line.p(tau, 0.0, slip);
+    let mut stretches: Vec<_> = positive_stretches(p)
         .into_iter()
         .map(|(from, to)| line.tip_t_m(from).max(-reach_m)..line.tip_t_m(to).min(reach_m))
-        .max_by(|one, other| (one.end - one.start).total_cmp(&(other.end - other.start)))
-        .unwrap_or(0.0..0.0)
+        .filter(|stretch| stretch.start < stretch.end)
+        .collect();
+    stretches.sort_by(|one, other| (other.end - other.start).total_cmp(&(one.end - one.start)));
+    stretches
 }
 
 /// The scenario of run `index` of the campaign with a seed, and nothing else.
@@ -79,8 +89,21 @@ pub fn scenario(seed: u64, index: u64) -> Result<Scenario, StudyError> {
         Posture::ElbowUp
     };
     let arm = Arm::new(scenario.arm)?;
-    let stretch = admissible_m(&arm, posture, friction, Slip::of(-speed_m_s));
-    let start_m = draw(stretch.start + INSIDE_M..stretch.end - INSIDE_M);
+    let slip = Slip::of(-speed_m_s);
+    let first = |stretches: Vec<Range<f64>>| {
+        let none = || StudyError::Option("nothing is admissible".into());
+        stretches.into_iter().next().ok_or_else(none)
+    };
+    let start_m = draw(first(admissible_m(
+        &arm,
+        posture,
+        friction,
+        slip,
+        START_P_RATIO,
+    ))?);
+    let mut stretches = admissible_m(&arm, posture, friction, slip, 0.0);
+    stretches.retain(|stretch| stretch.contains(&start_m));
+    let stretch = first(stretches)?;
     let beyond = draw(0.0..1.0) < 0.5;
     let target_m = if !beyond {
         draw(stretch.start..stretch.end)

@@ -13,6 +13,7 @@ use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
 use serde::Serialize;
 
+use super::belt_line::BeltLine;
 use super::contact_watch::ContactWatch;
 use super::trial::Trial;
 use super::{Study, StudyError};
@@ -31,8 +32,11 @@ pub const CAPTURE_LIMIT_S: f64 = 0.5;
 const WATCHED_S: f64 = 0.1;
 /// How far from its place the tip may end, beyond the encoders' resolution, m.
 const WITHIN_M: f64 = 1e-3;
-/// How far before the true edge a governed reference may be held, m.
+/// How far before the true edge a governed reference may be held, m …
 const SHORT_M: f64 = 0.01;
+/// … or with how much of Q22 for p there: where p hardly changes along the belt, a little friction
+/// moves its edge far.
+const SHORT_P_RATIO: f64 = 0.1;
 
 /// The campaign.
 #[derive(Clone, Debug)]
@@ -53,7 +57,7 @@ pub enum Ending {
     Reached,
     /// At the governed edge, the reference being beyond it.
     AtEdge,
-    /// At the governed edge, but that is more than 10 mm before the true one.
+    /// At the governed edge, but that is more than 10 mm before the true one, and p not small.
     StoppedEarly,
     /// Elsewhere.
     NotReached,
@@ -95,6 +99,8 @@ pub struct Row {
     pub tolerance_m: f64,
     /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.
     pub to_edge_m: f64,
+    /// p at the tip as a part of Q22.
+    pub p_ratio: f64,
     /// Times that contact was taken for flight while the tip slid.
     pub false_alarms: u32,
     /// Time after capture, s.
@@ -190,7 +196,14 @@ impl Study for Robustness {
         let tolerance_m =
             WITHIN_M + count_rad * (scenario.arm.height_m + scenario.arm.link_length_m);
         let slip = Slip::of(-v_belt_m_s);
-        let stretch = admissible_m(&arm, posture, scenario.belt.friction, slip);
+        let friction = scenario.belt.friction;
+        let mut stretches = admissible_m(&arm, posture, friction, slip, 0.0);
+        stretches.retain(|stretch| stretch.contains(&start_m));
+        let stretch = stretches.pop().unwrap_or(start_m..start_m);
+        let line = BeltLine::new(&arm, posture);
+        let p_ratio = line.tau(trial.tip_t_m()).map_or(f64::NAN, |tau| {
+            line.p(tau, friction, slip) / line.p(tau, 0.0, slip)
+        });
         let to_edge_m = if target_m > start_m {
             stretch.end - trial.tip_t_m()
         } else {
@@ -211,7 +224,7 @@ impl Study for Robustness {
         } else if of_target_m <= tolerance_m {
             Ending::Reached
         } else if at_edge && of_governed_m <= tolerance_m {
-            if to_edge_m > SHORT_M {
+            if to_edge_m > SHORT_M && p_ratio > SHORT_P_RATIO {
                 Ending::StoppedEarly
             } else {
                 Ending::AtEdge
@@ -234,6 +247,7 @@ impl Study for Robustness {
             },
             tolerance_m,
             to_edge_m,
+            p_ratio,
             false_alarms: alarms.count,
             slid_s: watch
                 .captured_s

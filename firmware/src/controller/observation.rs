@@ -1,0 +1,118 @@
+//! What a tick's readings say: about contact, friction, the belt, the links and unknown torques.
+
+use nalgebra::Vector2;
+use painleve_shared::frame::SensorFrame;
+
+use super::Controller;
+use crate::contact_observer::GapReading;
+use crate::disturbance_observer::Balance;
+use crate::friction_estimator::FrictionEstimate;
+use crate::model::Model;
+
+/// Friction above the estimate that a throw may be explained by.
+const THROWN_BY_FRICTION: f32 = 0.4;
+
+/// What is known after a tick's readings.
+pub(super) struct Observation {
+    /// Whether the tip touches, and whether it did before.
+    pub contact: bool,
+    pub touched: bool,
+    /// Contact force (f_t, f_n), N.
+    pub force_n: Vector2<f32>,
+    /// What is known about friction, and p with it, 1/kg.
+    pub friction: FrictionEstimate,
+    pub p_per_kg: f32,
+}
+
+impl Controller {
+    /// Takes in a frame's readings, `elapsed_ticks` after the ones before.
+    pub(super) fn observe(
+        &mut self,
+        model: &Model,
+        frame: &SensorFrame,
+        elapsed_ticks: u32,
+    ) -> Observation {
+        let scale = self.configuration.converters.force;
+        let force_n = Vector2::new(
+            scale.value(frame.tangential_force.0),
+            scale.value(frame.normal_force.0),
+        );
+        // At the end of its range the force cell shows less than there is.
+        let range = scale.maximum_counts();
+        let in_range = [frame.tangential_force, frame.normal_force]
+            .iter()
+            .all(|force| force.0.abs() < range);
+        let gap = self.gap(model);
+        let touched = self.contact.contact();
+        let contact = self.contact.update(force_n.y, &gap);
+        let certain = self.contact.confidence() >= 1.0;
+        if contact {
+            if !touched && let Some(slip) = self.belt.slip(model.tip_velocity_m_s.x) {
+                self.friction.expect_slip(slip);
+            }
+            if in_range {
+                self.friction.update(&force_n);
+            }
+            if certain {
+                let length = self.calibration.update(gap.gap_m);
+                self.arm = self.arm.with_link_length(length);
+            }
+        } else if touched {
+            self.thrown(model);
+        }
+        let friction = self.friction.estimate();
+        self.belt.update(
+            model.tip_velocity_m_s.x,
+            contact.then_some(&friction),
+            self.tick_s,
+        );
+        let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
+        if certain && in_range && self.supervisor.drives() {
+            self.disturbance.update(
+                model,
+                &Balance {
+                    torque_nm: self.telemetry.torque_nm.into(),
+                    force_n,
+                    p_per_kg: contact.then_some(p_per_kg),
+                    elapsed_s: elapsed_ticks as f32 * self.tick_s,
+                },
+            );
+        } else {
+            self.disturbance.pause();
+        }
+        Observation {
+            contact,
+            touched,
+            force_n,
+            friction,
+            p_per_kg,
+        }
+    }
+
+    /// Gap and jump of the tip as the encoders show them.
+    fn gap(&self, model: &Model) -> GapReading {
+        let residual = self.estimator.residual_rad();
+        let innovation = self.estimator.innovation_rad();
+        let jacobian = &model.jacobian;
+        let count = self.estimator.count_rad();
+        GapReading {
+            gap_m: model.gap_m + jacobian.m21 * residual.x + jacobian.m22 * residual.y,
+            // Half a count of either encoder; the second one turns θ2 alone.
+            gap_error_m: 0.5 * (model.tip_m.x.abs() * count.x + jacobian.m22.abs() * count.y),
+            jump_m: jacobian.m11 * innovation.x + jacobian.m12 * innovation.y,
+            jump_error_m: 0.5
+                * ((jacobian.m11 + jacobian.m12).abs() * count.x + jacobian.m12.abs() * count.y),
+        }
+    }
+
+    /// The tip has just left the belt. Where a little more friction than estimated explains
+    /// that, it is taken to be the reason.
+    fn thrown(&mut self, model: &Model) {
+        let friction = self.friction.estimate();
+        let coupling = friction.slip.sign::<f32>() * model.q.m12;
+        let critical = model.q.m22 / coupling;
+        if coupling > 0.0 && critical < friction.coefficient + THROWN_BY_FRICTION {
+            self.friction.thrown(critical);
+        }
+    }
+}
