@@ -60,7 +60,7 @@ pub fn nearest_torque_nm(
     plane: &HalfPlane,
     limit_nm: f32,
 ) -> (Vector2<f32>, bool) {
-    let limited = wanted_nm.map(|torque| torque.limited(-limit_nm, limit_nm));
+    let limited = wanted_nm.map(|torque| torque.within(limit_nm));
     let normal = &plane.normal;
     let square = normal.norm_squared();
     if normal.dot(&limited) <= plane.bound || square <= 0.0 {
@@ -71,12 +71,12 @@ pub fn nearest_torque_nm(
     let foot = wanted_nm + normal * step;
     // Where the foot is outside the box, the nearest point of the line inside it
     // has one torque at its limit and the other from the line.
-    let first = foot.x.limited(-limit_nm, limit_nm);
+    let first = foot.x.within(limit_nm);
     let second = along(plane.bound - normal.x * first, normal.y, foot.y);
     if second.abs() <= limit_nm {
         return (Vector2::new(first, second), true);
     }
-    let second = second.limited(-limit_nm, limit_nm);
+    let second = second.within(limit_nm);
     let first = along(plane.bound - normal.y * second, normal.x, first);
     if first.abs() <= limit_nm {
         (Vector2::new(first, second), true)

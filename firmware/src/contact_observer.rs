@@ -129,7 +129,7 @@ impl ContactObserver {
         let change = match self.settings.evidence {
             Evidence::ForceCell => {
                 let above = normal_force_n - 0.5 * self.settings.contact_n;
-                (self.slope_per_n * above).limited(-FORCE_LIMIT, FORCE_LIMIT)
+                (self.slope_per_n * above).within(FORCE_LIMIT)
             }
             Evidence::Encoders => {
                 let uncertainty = gap.gap_error_m + self.settings.gap_uncertainty_m;
@@ -142,7 +142,7 @@ impl ContactObserver {
                 change
             }
         };
-        self.log_odds = (self.log_odds + change).limited(-CERTAIN, CERTAIN);
+        self.log_odds = (self.log_odds + change).within(CERTAIN);
         if self.contact {
             self.contact = self.log_odds > -DECISION;
         } else {

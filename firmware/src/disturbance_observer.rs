@@ -111,8 +111,8 @@ impl DisturbanceObserver {
             .map_or(1.0, |p| SHARE * (p / model.q.m22).at_least(0.0));
         let weight = (self.settings.bandwidth_rad_s * self.tick_s).at_most(share);
         let limit = self.settings.limit_nm;
-        self.disturbance_nm = (self.disturbance_nm + residual_nm * weight)
-            .map(|torque| torque.limited(-limit, limit));
+        self.disturbance_nm =
+            (self.disturbance_nm + residual_nm * weight).map(|torque| torque.within(limit));
     }
 
     /// A tick that says nothing: contact is in doubt, or a reading is.

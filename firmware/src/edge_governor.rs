@@ -198,7 +198,7 @@ impl Search {
             Stage::Marching => self.inside_m + self.direction * step_m,
             Stage::Halving { beyond_m, .. } => 0.5 * (self.inside_m + beyond_m),
         };
-        point.limited(-reach_m, reach_m)
+        point.within(reach_m)
     }
 
     /// The search after the point has been looked at.
@@ -394,8 +394,9 @@ impl EdgeGovernor {
         );
         // Beyond an edge that has moved in, the limit above forbids nothing but going further.
         let step = 2.0 * settings.braking_m_s2 * tick_s;
-        let velocity = velocity.limited(self.velocity_m_s - step, self.velocity_m_s + step);
-        let acceleration = (velocity - self.velocity_m_s) / tick_s;
+        let change = (velocity - self.velocity_m_s).within(step);
+        let velocity = self.velocity_m_s + change;
+        let acceleration = change / tick_s;
         self.velocity_m_s = velocity;
         self.position_m += velocity * tick_s;
         TipReference {

@@ -146,7 +146,7 @@ impl Estimator {
                 counts,
                 angle_rad: angle + self.angle_gain * innovation,
                 rate_rad_s: (rate + self.rate_gain_per_s * innovation)
-                    .limited(-self.rate_limit_rad_s, self.rate_limit_rad_s),
+                    .within(self.rate_limit_rad_s),
                 innovation_rad: innovation,
             }
         };

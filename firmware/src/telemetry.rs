@@ -25,7 +25,7 @@ pub struct Telemetry {
     pub normal_force_n: f32,
     /// Measured tangential force, N.
     pub tangential_force_n: f32,
-    /// Commanded joint torques u1, u2, N·m.
+    /// Joint torques u1, u2 as given, rounded to counts, N·m.
     pub torque_nm: [f32; 2],
     /// Whether the tip is taken to touch.
     pub contact: bool,

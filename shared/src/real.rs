@@ -40,6 +40,17 @@ pub trait Real: RealField + Copy {
         }
     }
 
+    /// The nearest number within `±limit`, a limit of at least zero; NaN stays NaN. One comparison
+    /// where [`limited`](Self::limited) needs two.
+    #[inline]
+    fn within(self, limit: Self) -> Self {
+        if self.abs() > limit {
+            bounded(limit, self)
+        } else {
+            self
+        }
+    }
+
     /// The lesser of this number and `maximum`; NaN stays NaN. A comparison: the standard
     /// library's `min` is a function call on a Cortex-M4F.
     #[inline]
@@ -64,6 +75,14 @@ pub trait Real: RealField + Copy {
 
     /// Square root, correctly rounded; NaN below zero.
     fn square_root(self) -> Self;
+}
+
+/// `limit` with the sign of `value`. Out of the way, as limits are rarely reached: inlined, the
+/// compiler would compute it every time rather than jump.
+#[cold]
+#[inline(never)]
+fn bounded<T: Real>(limit: T, value: T) -> T {
+    limit.copysign(value)
 }
 
 impl Real for f64 {

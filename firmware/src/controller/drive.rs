@@ -46,18 +46,17 @@ impl Controller {
         }
         let limit = self.configuration.torque_limit_nm;
         let scale = self.configuration.converters.torque;
-        let limited = wanted_nm.map(|torque| torque.limited(-limit, limit));
         // What rounding took away is given with the next tick: near the edge, where p is
         // small, half a count of constant torque would be a newton of force.
-        let owed = (limited + self.rounding_nm).map(|torque| torque.limited(-limit, limit));
+        let owed = (wanted_nm + self.rounding_nm).map(|torque| torque.within(limit));
         let (counts_1, over_1) = scale.counts(owed.x);
         let (counts_2, over_2) = scale.counts(owed.y);
         let given = Vector2::new(scale.value(counts_1), scale.value(counts_2));
         let half = 0.5 * scale.per_count();
-        self.rounding_nm = (owed - given).map(|rest| rest.limited(-half, half));
-        let saturated = over_1 || over_2 || limited != *wanted_nm;
+        self.rounding_nm = (owed - given).map(|rest| rest.within(half));
+        let saturated = over_1 || over_2 || wanted_nm.amax() > limit;
         self.answer.torques = [TorqueCounts(counts_1), TorqueCounts(counts_2)];
-        self.telemetry.torque_nm = limited.into();
+        self.telemetry.torque_nm = given.into();
         self.telemetry.saturated = saturated;
         if saturated {
             self.telemetry.saturated_ticks = self.telemetry.saturated_ticks.wrapping_add(1);

@@ -246,7 +246,7 @@ impl Hybrid {
         }
         // Within the cone that is believed in: a force cell at the end of its range shows any ratio.
         let cone_n = input.friction.coefficient * input.force_n.y.at_least(0.0);
-        self.filtered_friction_n = input.force_n.x.limited(-cone_n, cone_n);
+        self.filtered_friction_n = input.force_n.x.within(cone_n);
     }
 
     /// Torques for one tick.
@@ -285,8 +285,7 @@ impl Hybrid {
         if input.contact && !input.saturated {
             let limit = settings.position_integral_limit_m_s2;
             let step = settings.position_integral_gain_per_s3 * error * input.tick_s;
-            self.position_integral_m_s2 =
-                (self.position_integral_m_s2 + step).limited(-limit, limit);
+            self.position_integral_m_s2 = (self.position_integral_m_s2 + step).within(limit);
         }
         input.reference.acceleration_m_s2
             + settings.position_gain_per_s2 * error
@@ -306,7 +305,7 @@ impl Hybrid {
                 * (self.pressing * self.wanted_force_n - input.force_n.y)
                 * input.tick_s;
             let limit = settings.force_integral_limit_n;
-            self.force_integral_n = (self.force_integral_n + step).limited(-limit, limit);
+            self.force_integral_n = (self.force_integral_n + step).within(limit);
         }
         self.wanted_force_n + self.force_integral_n
     }
@@ -346,7 +345,7 @@ impl Hybrid {
                     self.slip = slip;
                 }
                 let step = FRICTION_SLEW_PER_S * input.tick_s;
-                self.fed_ratio = ratio.limited(self.fed_ratio - step, self.fed_ratio + step);
+                self.fed_ratio += (ratio - self.fed_ratio).within(step);
                 let expected = self.fed_ratio * normal_force_n;
                 let share = OBSERVER_SHARE * input.p_per_kg / input.model.q.m22;
                 let weight = (input.tick_s / (time_constant_s + input.tick_s))

@@ -118,8 +118,7 @@ impl Pid {
         if !input.saturated {
             let limit = self.settings.integral_limit_nm;
             let step = Vector2::new(ki_1 * error.x, ki_2 * error.y) * input.tick_s;
-            self.integral_nm =
-                (self.integral_nm + step).map(|torque| torque.limited(-limit, limit));
+            self.integral_nm = (self.integral_nm + step).map(|torque| torque.within(limit));
         }
         LawOutput {
             torque_nm: Vector2::new(
