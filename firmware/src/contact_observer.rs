@@ -8,7 +8,9 @@
 //!   encoder, h = ½ (|z_t| Δθ₁ + l |sin θ₂| Δθ₂₁). A gap above h is no contact. An impact without
 //!   collision also stops the slip (the impulse goes on until slip dies): the tip's velocity
 //!   along the belt jumps by the belt's speed, which the tracking loops see at
-//!   once. The gap that follows confirms it.
+//!   once. The gap that follows confirms it. Without an impact the tip, which friction no longer
+//!   pulls, runs ahead of what the loops expect under the wanted contact force: together with
+//!   the beginning of a gap that is flight.
 //!
 //! Either alone is enough; together the force cell, when it is there, decides first.
 
@@ -17,9 +19,9 @@ use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 
 /// Log-odds beyond which contact or flight is taken for certain.
-const CERTAIN: f32 = 8.0;
+const CERTAIN: f32 = 6.0;
 /// Log-odds at which the decision changes.
-const DECISION: f32 = 4.0;
+const DECISION: f32 = 3.0;
 /// Most that the force cell may add in one tick.
 const FORCE_LIMIT: f32 = 6.0;
 /// Most that a gap may add, and take away.
@@ -27,6 +29,10 @@ const GAP_FOR: f32 = 2.0;
 const GAP_AGAINST: f32 = 6.0;
 /// Slope of the log-odds over the gap in units of its uncertainty.
 const GAP_SLOPE: f32 = 16.0;
+/// Release of the tip, in units of its uncertainty, that makes flight of a smaller gap …
+const RELEASE_RATIO: f32 = 1.5;
+/// … of so many times its uncertainty, at once.
+const RELEASE_GAP: f32 = 0.9;
 /// Jump of the tip along the belt, in units of its uncertainty, that an impact explains better.
 const JUMP_RATIO: f32 = 2.5;
 
@@ -59,7 +65,7 @@ impl Default for ContactSettings {
     fn default() -> Self {
         Self {
             evidence: Evidence::ForceCell,
-            contact_n: 0.3,
+            contact_n: 0.5,
             force_noise_n: 0.1,
             gap_uncertainty_m: 15e-6,
         }
@@ -99,6 +105,8 @@ pub struct GapReading {
     pub gap_error_m: f32,
     /// How far the tip moved along the belt beyond what the tracking loops expected, m.
     pub jump_m: f32,
+    /// The same in the direction in which the tip goes when the contact force is gone, m.
+    pub release_m: f32,
     /// Largest error of that, m.
     pub jump_error_m: f32,
 }
@@ -135,6 +143,11 @@ impl ContactObserver {
                 let uncertainty = gap.gap_error_m + self.settings.gap_uncertainty_m;
                 let mut change =
                     (GAP_SLOPE * (1.0 - gap.gap_m / uncertainty)).limited(-GAP_AGAINST, GAP_FOR);
+                if gap.release_m > RELEASE_RATIO * gap.jump_error_m
+                    && gap.gap_m > RELEASE_GAP * uncertainty
+                {
+                    change = -(CERTAIN + DECISION);
+                }
                 // A jump alone leaves it open; the gap that follows decides.
                 if gap.jump_m.abs() > JUMP_RATIO * gap.jump_error_m && self.log_odds > 0.0 {
                     change = change.min(0.0) - self.log_odds;
@@ -188,6 +201,7 @@ mod tests {
             gap_m,
             gap_error_m: 50e-6,
             jump_m: 0.0,
+            release_m: 0.0,
             jump_error_m: 60e-6,
         }
     }
@@ -203,7 +217,7 @@ mod tests {
         let nothing = GapReading::default();
         assert!(!observer.flight(), "at the start there is doubt");
         assert_eq!(ticks_until(true, || observer.update(0.5, &nothing)), 2);
-        for force in [0.2, 0.05, 0.3, 0.1, 0.25, 0.15] {
+        for force in [0.3, 0.15, 0.4, 0.2, 0.35, 0.25] {
             assert!(observer.update(force, &nothing), "{force}");
         }
         for _ in 0..3 {
@@ -224,6 +238,25 @@ mod tests {
         assert!(observer.contact());
         assert!(ticks_until(false, || observer.update(10.0, &gap(100e-6))) <= 3);
         assert!(ticks_until(true, || observer.update(0.0, &gap(0.0))) <= 8);
+    }
+
+    #[test]
+    fn a_release_with_the_beginning_of_a_gap_is_flight_and_neither_alone_is() {
+        let release = |gap_m, release_m| GapReading {
+            release_m,
+            ..gap(gap_m)
+        };
+        let sees_flight = |reading| {
+            let mut observer = observer(Evidence::Encoders);
+            for _ in 0..20 {
+                observer.update(0.0, &gap(0.0));
+            }
+            !observer.update(0.0, &reading)
+        };
+        assert!(sees_flight(release(62e-6, 200e-6)));
+        assert!(!sees_flight(release(62e-6, -200e-6)));
+        assert!(!sees_flight(release(62e-6, 80e-6)));
+        assert!(!sees_flight(release(40e-6, 200e-6)));
     }
 
     #[test]

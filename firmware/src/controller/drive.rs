@@ -34,6 +34,7 @@ impl Controller {
         self.apply(&torque_nm);
         let given_nm = Vector2::from(self.telemetry.torque_nm);
         let acceleration = model.acceleration_rad_s2(&given_nm, &output.contact_force_n);
+        self.expected_force_n = output.contact_force_n;
         self.expected_acceleration = Vector2::new(acceleration.x, acceleration.y - acceleration.x);
     }
 

@@ -95,7 +95,12 @@ impl Controller {
         let innovation = self.estimator.innovation_rad();
         let jacobian = &model.jacobian;
         let count = self.estimator.count_rad();
+        // Acceleration along the belt that the contact force is expected to cause.
+        let force = &self.expected_force_n;
+        let pull_m_s2 = model.q.m11 * force.x + model.q.m12 * force.y;
+        let jump_m = jacobian.m11 * innovation.x + jacobian.m12 * innovation.y;
         GapReading {
+            release_m: -jump_m * pull_m_s2.signum(),
             gap_m: model.gap_m + jacobian.m21 * residual.x + jacobian.m22 * residual.y,
             // Half a count of either encoder; the second one turns θ2 alone.
             gap_error_m: 0.5 * (model.tip_m.x.abs() * count.x + jacobian.m22.abs() * count.y),
