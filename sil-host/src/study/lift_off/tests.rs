@@ -1,0 +1,45 @@
+//! Small studies of lift-off, with the governor and without.
+
+use super::*;
+use crate::study::{Outcome, rows};
+
+#[test]
+fn lift_offs_are_thrown_and_noticed_alike_on_any_number_of_threads() {
+    let study = LiftOff {
+        seed: 1,
+        runs: 8,
+        slide_s: 1.0,
+        overrides: Vec::new(),
+    };
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| rows(&study, || ()).unwrap())
+    };
+    let found = on(1);
+    assert_eq!(found, on(3));
+    let outcome = LiftOffs::new(found);
+    for of in &outcome.evidence {
+        assert!(of.lift_offs >= 4, "{}", outcome.table());
+        assert!(of.in_time > 0 && of.slid_h > 0.0, "{}", outcome.table());
+    }
+    assert!(
+        outcome
+            .rows
+            .iter()
+            .filter_map(|row| row.noticed_s)
+            .all(|time_s| time_s >= 0.0)
+    );
+}
+
+#[test]
+fn with_its_governor_the_tip_stays_down() {
+    let study = LiftOff {
+        seed: 1,
+        runs: 2,
+        slide_s: 0.5,
+        overrides: vec!["controller.governor.enabled=true".into()],
+    };
+    for row in rows(&study, || ()).unwrap() {
+        assert_eq!((row.lift_off_s, row.noticed_s), (None, None), "{row:?}");
+    }
+}
