@@ -58,6 +58,8 @@ pub struct Row {
     pub tip_t_m: f64,
     /// Whether the tip was caught in time and held its reference.
     pub success: bool,
+    /// Whether the plant could be solved to the end; what else is here is as far as it could.
+    pub solved: bool,
 }
 
 impl Capture {
@@ -105,11 +107,12 @@ impl Study for Capture {
         let mut trial = Trial::new(&scenario)?;
         let mut watch = ContactWatch::new(enabled_s, 0.0);
         let mut error_m = 0.0_f64;
+        let mut solved = true;
         for _ in 0..scenario.run.ticks() {
-            trial.tick(&mut watch).map_err(|source| StudyError::Plant {
-                row: format!("capture {index}"),
-                source,
-            })?;
+            if trial.tick(&mut watch).is_err() {
+                solved = false;
+                break;
+            }
             if trial.time_s() > end_s - WATCHED_S {
                 let reference_m = trial.answer().reference_tip.to_metres();
                 error_m = error_m.max((trial.tip_t_m() - reference_m).abs());
@@ -125,7 +128,8 @@ impl Study for Capture {
             error_m,
             fault,
             tip_t_m: trial.tip_t_m(),
-            success: capture_s <= LIMIT_S && error_m <= WITHIN_M && fault.is_none(),
+            success: solved && capture_s <= LIMIT_S && error_m <= WITHIN_M && fault.is_none(),
+            solved,
         })
     }
 }
@@ -135,6 +139,8 @@ impl Study for Capture {
 pub struct Captures {
     /// Runs that succeeded.
     pub success: Proportion,
+    /// Runs whose plant could not be solved; the distributions are of the others.
+    pub unsolved: usize,
     /// Times to capture, s.
     pub capture_s: Option<Percentiles>,
     /// Distances from the reference at the end, m.
@@ -146,10 +152,15 @@ pub struct Captures {
 impl Captures {
     /// Of all rows.
     pub fn new(rows: Vec<Row>) -> Self {
-        let of = |value: fn(&Row) -> f64| Percentiles::of(rows.iter().map(value).collect());
+        let solved: Vec<&Row> = rows.iter().filter(|row| row.solved).collect();
+        let of = |value: fn(&Row) -> f64| {
+            let values = solved.iter().map(|row| value(row));
+            Percentiles::of(values.collect())
+        };
         let successes = rows.iter().filter(|row| row.success).count();
         Self {
             success: Proportion::new(successes, rows.len()),
+            unsolved: rows.len() - solved.len(),
             capture_s: of(|row| row.capture_s),
             error_m: of(|row| row.error_m),
             rows,
@@ -167,6 +178,9 @@ impl Outcome for Captures {
     fn table(&self) -> Table {
         let mut table = outcome::table(["what", "median", "90 %", "99 %", "max"]);
         table.add_row(["success (95 %)", &self.success.to_string(), "", "", ""]);
+        if self.unsolved > 0 {
+            table.add_row(["unsolved", &self.unsolved.to_string(), "", "", ""]);
+        }
         let lines = [
             ("time to capture (ms)", self.capture_s),
             ("error at the end (mm)", self.error_m),
@@ -180,8 +194,9 @@ impl Outcome for Captures {
             }
         }
         for row in self.rows.iter().filter(|row| !row.success) {
+            let ending = if row.solved { "failed" } else { "unsolved" };
             table.add_row([
-                format!("run {} failed", row.index),
+                format!("run {} {ending}", row.index),
                 format!("on at {} s", row.enabled_s),
                 format!("noise {}", row.noise_seed),
                 format!("{:.0} ms", 1e3 * row.capture_s),
@@ -192,7 +207,8 @@ impl Outcome for Captures {
     }
 
     fn svg(&self) -> Result<String, PlotError> {
-        let times: Vec<f64> = self.rows.iter().map(|row| row.capture_s).collect();
+        let solved = self.rows.iter().filter(|row| row.solved);
+        let times: Vec<f64> = solved.map(|row| row.capture_s).collect();
         let note = "last bar: that long or longer".to_string();
         Chart {
             title: "Capture of the bouncing arm".into(),
@@ -237,5 +253,34 @@ mod tests {
         };
         let row = study.row(0).unwrap();
         assert!(!row.success && row.capture_s > LIMIT_S, "{row:?}");
+    }
+
+    #[test]
+    fn a_run_that_cannot_be_solved_is_counted_and_none_of_the_others_is_lost() {
+        let unsolvable = [
+            "belt.friction=10",
+            "arm.stiffness_nm_rad=189.7",
+            "arm.damping_nms_rad=10",
+            "initial.theta1_deg=28.0864",
+            "initial.theta2_deg=-24.0783",
+            "solver.chatter_speed_m_s=1e-8",
+        ];
+        let study = Capture {
+            seed: 1,
+            runs: 1,
+            overrides: unsolvable.map(String::from).into(),
+        };
+        let mut rows = super::super::rows(&study, || ()).unwrap();
+        assert!(!rows[0].solved && !rows[0].success, "{rows:?}");
+        let caught = Row {
+            solved: true,
+            success: true,
+            capture_s: 0.2,
+            ..rows[0].clone()
+        };
+        rows.push(caught);
+        let captures = Captures::new(rows);
+        assert_eq!((captures.unsolved, captures.success.successes), (1, 1));
+        assert_eq!(captures.capture_s.map(|times| times.count), Some(1));
     }
 }

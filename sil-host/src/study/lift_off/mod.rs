@@ -71,6 +71,8 @@ pub struct Row {
     pub false_alarms: u32,
     /// Time for which the tip slid before, s.
     pub slid_s: f64,
+    /// Whether the plant could be solved to the end; what else is here is as far as it could.
+    pub solved: bool,
 }
 
 impl LiftOff {
@@ -163,16 +165,15 @@ impl Study for LiftOff {
         let mut watch = ContactWatch::new(SETTLING_S, 0.0);
         let mut alarms = FalseAlarms::default();
         let mut noticed_s = None;
+        let mut solved = true;
         for _ in 0..scenario.run.ticks() {
             // The controller answers the sample at the start of the tick.
             let sampled_s = trial.time_s();
             let flying = flight.start_s;
-            trial
-                .tick(&mut (&mut flight, &mut watch))
-                .map_err(|source| StudyError::Plant {
-                    row: format!("lift-off {index}"),
-                    source,
-                })?;
+            if trial.tick(&mut (&mut flight, &mut watch)).is_err() {
+                solved = false;
+                break;
+            }
             alarms.tick(&trial, &watch);
             let Some(start_s) = flying else { continue };
             if !trial.answer().flags.contains(StatusFlags::CONTACT) {
@@ -184,13 +185,14 @@ impl Study for LiftOff {
             }
         }
         // The flight may still have to end.
-        while flight.start_s.is_some() && flight.end_s.is_none() && trial.time_s() < 1e4 {
-            let ended = trial.tick(&mut (&mut flight, &mut watch));
-            if ended.is_err() || trial.time_s() > scenario.run.duration_s + LATE_S {
+        let patience_s = scenario.run.duration_s + LATE_S;
+        while solved && flight.start_s.is_some() && flight.end_s.is_none() {
+            solved = trial.tick(&mut (&mut flight, &mut watch)).is_ok();
+            if trial.time_s() > patience_s {
                 break;
             }
         }
-        let end_s = flight.start_s.unwrap_or(scenario.run.duration_s);
+        let end_s = flight.start_s.unwrap_or(trial.time_s());
         Ok(Row {
             index: index / 2,
             evidence: scenario.controller.contact.evidence,
@@ -202,7 +204,8 @@ impl Study for LiftOff {
                 .and_then(|start_s| flight.end_s.map(|end_s| end_s - start_s)),
             noticed_s,
             false_alarms: alarms.count,
-            slid_s: end_s - SETTLING_S,
+            slid_s: (end_s - SETTLING_S).max(0.0),
+            solved,
         })
     }
 }

@@ -26,6 +26,8 @@ pub struct OfEvidence {
     pub in_time: usize,
     /// Those of them that were noticed never.
     pub missed: usize,
+    /// Runs whose plant could not be solved; of these only false alarms and sliding are counted.
+    pub unsolved: usize,
     /// Times to the notice of long flights, s.
     pub noticed_s: Option<Percentiles>,
     /// Lengths of all flights, s.
@@ -47,7 +49,9 @@ pub struct LiftOffs {
 
 impl Row {
     fn is_long(&self, bar_s: f64) -> bool {
-        self.lift_off_s.is_some() && self.flight_s.is_none_or(|flight_s| flight_s > bar_s)
+        self.solved
+            && self.lift_off_s.is_some()
+            && self.flight_s.is_none_or(|flight_s| flight_s > bar_s)
     }
 }
 
@@ -64,17 +68,19 @@ impl LiftOffs {
         let evidence = LiftOff::EVIDENCE.map(|evidence| {
             let bar_s = bar_s(evidence);
             let of: Vec<&Row> = rows.iter().filter(|row| row.evidence == evidence).collect();
+            let solved = || of.iter().filter(|row| row.solved);
             let long: Vec<&&Row> = of.iter().filter(|row| row.is_long(bar_s)).collect();
             let noticed: Vec<f64> = long.iter().filter_map(|row| row.noticed_s).collect();
             OfEvidence {
                 evidence,
                 bar_s,
-                lift_offs: of.iter().filter(|row| row.lift_off_s.is_some()).count(),
+                lift_offs: solved().filter(|row| row.lift_off_s.is_some()).count(),
                 long_flights: long.len(),
                 in_time: noticed.iter().filter(|time_s| **time_s <= bar_s).count(),
                 missed: long.len() - noticed.len(),
+                unsolved: of.len() - solved().count(),
                 noticed_s: Percentiles::of(noticed),
-                flight_s: Percentiles::of(of.iter().filter_map(|row| row.flight_s).collect()),
+                flight_s: Percentiles::of(solved().filter_map(|row| row.flight_s).collect()),
                 false_alarms: of.iter().map(|row| row.false_alarms).sum(),
                 slid_h: of.iter().map(|row| row.slid_s).sum::<f64>() / 3600.0,
             }
@@ -101,6 +107,7 @@ impl Outcome for LiftOffs {
             "longer than the bar",
             "in time",
             "missed",
+            "unsolved",
             "median, 90, 99 %, max (ms)",
             "false alarms",
         ]);
@@ -116,6 +123,7 @@ impl Outcome for LiftOffs {
                 of.long_flights.to_string(),
                 of.in_time.to_string(),
                 of.missed.to_string(),
+                of.unsolved.to_string(),
                 times,
                 format!("{} in {:.2} h", of.false_alarms, of.slid_h),
             ]);

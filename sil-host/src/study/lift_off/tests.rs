@@ -43,3 +43,25 @@ fn with_its_governor_the_tip_stays_down() {
         assert_eq!((row.lift_off_s, row.noticed_s), (None, None), "{row:?}");
     }
 }
+
+#[test]
+fn runs_that_cannot_be_solved_are_counted_and_none_of_the_others_is_lost() {
+    let unsolvable = [
+        "belt.friction=10",
+        "belt.profile.speed_m_s=0.4",
+        "arm.stiffness_nm_rad=100",
+        "solver.chatter_speed_m_s=1e-8",
+    ];
+    let study = LiftOff {
+        seed: 1,
+        runs: 4,
+        slide_s: 0.2,
+        overrides: unsolvable.map(String::from).into(),
+    };
+    let rows = rows(&study, || ()).unwrap();
+    let outcome = LiftOffs::new(rows);
+    for of in &outcome.evidence {
+        assert!((1..4).contains(&of.unsolved), "{}", outcome.table());
+        assert!(of.lift_offs + of.unsolved <= 4, "{}", outcome.table());
+    }
+}
