@@ -3,7 +3,7 @@
 use comfy_table::Table;
 use serde::Serialize;
 
-use super::Row;
+use super::{LIMIT_S, Row};
 use crate::plot::PlotError;
 use crate::plot::chart::Chart;
 use crate::plot::style::BLUE_INK;
@@ -89,10 +89,10 @@ impl Outcome for Captures {
         let note = "last bar: that long or longer".to_string();
         Chart {
             title: "Capture of the bouncing arm".into(),
-            subtitle: format!("caught within 0.5 s and held (95 %): {}", self.success),
+            subtitle: format!("caught within {LIMIT_S} s and held: {}", self.success),
             x_title: "Time from enabling to the last landing (s)".into(),
             x: Some(0.0..0.6),
-            panels: vec![histogram("Runs", note, BLUE_INK, 0.6, &times)],
+            panels: vec![histogram("Runs", note, BLUE_INK, 0.6, LIMIT_S, &times)],
         }
         .svg()
     }

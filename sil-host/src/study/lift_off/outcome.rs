@@ -11,6 +11,9 @@ use crate::plot::style::{BLUE_INK, ORANGE};
 use crate::study::distribution::{Percentiles, histogram};
 use crate::study::outcome::{self, Outcome};
 
+/// End of the figure's axis, ms.
+const FARTHEST_MS: f64 = 20.0;
+
 /// What came of one kind of evidence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfEvidence {
@@ -134,21 +137,23 @@ impl Outcome for LiftOffs {
     fn svg(&self) -> Result<String, PlotError> {
         let panel = |title: &str, evidence, colour| {
             let bar_s = bar_s(evidence);
-            let long = |row: &&Row| row.evidence == evidence && row.is_long(bar_s);
-            let times = self.rows.iter().filter(long);
-            let times: Vec<f64> = times.filter_map(|row| Some(1e3 * row.noticed_s?)).collect();
+            let is_long = |row: &&Row| row.evidence == evidence && row.is_long(bar_s);
+            let long = self.rows.iter().filter(is_long);
+            let times = long.clone().filter_map(|row| Some(1e3 * row.noticed_s?));
+            let times: Vec<f64> = times.collect();
+            let limit_ms = 1e3 * bar_s;
             let note = format!(
-                "{} lift-offs of more than {} ms; last bar: that long or longer",
+                "{} of {} flights of more than {limit_ms} ms noticed; last bar: that long or longer",
                 times.len(),
-                1e3 * bar_s
+                long.count(),
             );
-            histogram(title, note, colour, 15.0, &times)
+            histogram(title, note, colour, FARTHEST_MS, limit_ms, &times)
         };
         Chart {
             title: "How soon a lift-off is noticed".into(),
-            subtitle: "led over the edge without governor; bars: 5 ms and 10 ms".into(),
+            subtitle: "tips led over the edge p = 0 without the governor".into(),
             x_title: "Time from lift-off to the sample that shows it (ms)".into(),
-            x: Some(0.0..15.0),
+            x: Some(0.0..FARTHEST_MS),
             panels: vec![
                 panel("With the force cell (runs)", Evidence::ForceCell, BLUE_INK),
                 panel("From the encoders (runs)", Evidence::Encoders, ORANGE),

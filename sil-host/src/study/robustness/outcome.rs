@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{AblationStudy, Ending, Part, Row};
 use crate::plot::PlotError;
 use crate::plot::chart::{Chart, Mark, Panel};
-use crate::plot::style::{BLUE_INK, GREEN, VERMILLION};
+use crate::plot::style::{BLACK_INK, BLUE_INK, GREEN, VERMILLION};
 use crate::study::outcome::{self, Outcome};
 use crate::study::proportion::Proportion;
 
@@ -93,29 +93,33 @@ impl Outcome for Campaign {
     }
 
     fn svg(&self) -> Result<String, PlotError> {
-        let dots = |name: &str, colour, success, y: fn(&Row) -> f64| Mark::Dots {
-            name: name.into(),
-            colour,
-            size: if success { 4 } else { 12 },
-            points: self
-                .rows
-                .iter()
+        // Thousands of dots would hide each other, and a hundred small ones are hard to see.
+        let size = if self.rows.len() > 2000 { 4 } else { 9 };
+        let dots = |name: &str, colour, size, success, y: fn(&Row) -> f64| {
+            let rows = self.rows.iter();
+            let points = rows
                 .filter(|row| row.ending.is_success() == success)
-                .map(|row| (row.v_belt_m_s, y(row)))
-                .collect(),
+                .map(|row| (row.v_belt_m_s, y(row)));
+            let points: Vec<_> = points.collect();
+            Mark::Dots {
+                name: format!("{name}: {} runs", points.len()),
+                colour,
+                size,
+                points,
+            }
         };
         let panel = |title: &str, y: fn(&Row) -> f64, range| Panel {
             title: title.into(),
             y: Some(range),
             marks: vec![
-                dots("success", BLUE_INK, true, y),
-                dots("failure", VERMILLION, false, y),
+                dots("success", BLUE_INK, size, true, y),
+                dots("failure", VERMILLION, 14, false, y),
             ],
             ..Panel::default()
         };
         Chart {
             title: "Robustness".into(),
-            subtitle: format!("success (95 %): {}", self.success),
+            subtitle: format!("success, with its 95 % interval: {}", self.success),
             x_title: "Belt speed (m/s)".into(),
             x: Some(-1.05..1.05),
             panels: vec![
@@ -243,32 +247,38 @@ impl Outcome for Ablation {
 
     fn svg(&self) -> Result<String, PlotError> {
         let count = self.rows.len();
+        let runs = self.rows.first().map_or(0, |row| row.runs);
         let mut marks = Vec::new();
         for (index, row) in self.rows.iter().enumerate() {
             let top = (count - index) as f64;
             marks.push(Mark::Label {
-                at: (1.0, top - 0.25),
+                at: (1.0, top - 0.3),
                 centred: false,
                 text: format!("{}: {:.1} %", row.name(), 100.0 * row.rate),
             });
-            let mut bar = |colour, width, from: f64, to: f64, at| {
+            let mut bar = |name: &str, colour, width, from: f64, to: f64| {
                 marks.push(Mark::Line {
-                    name: String::new(),
+                    name: if index == 0 {
+                        name.into()
+                    } else {
+                        String::new()
+                    },
                     colour,
                     width,
                     dashed: false,
-                    points: vec![(100.0 * from, at), (100.0 * to, at)],
+                    points: vec![(100.0 * from, top - 0.7), (100.0 * to, top - 0.7)],
                 });
             };
-            bar(GREEN, 16, 0.0, row.rate, top - 0.7);
-            bar(VERMILLION, 5, row.lower, row.upper, top - 0.7);
+            bar("success", GREEN, 16, 0.0, row.rate);
+            bar("95 % interval", BLACK_INK, 4, row.lower, row.upper);
         }
         Chart {
             title: "What each part contributes".into(),
-            subtitle: "the same robustness campaign with one part switched off".into(),
-            x_title: "Success, with its 95 % interval (%)".into(),
+            subtitle: format!("the same {runs} runs of the robustness campaign each time"),
+            x_title: "Success (%)".into(),
             x: Some(0.0..101.0),
             panels: vec![Panel {
+                title: "With one part of the controller switched off".into(),
                 y: Some(0.0..count.max(1) as f64),
                 y_ticks: 0,
                 height: 80 * count.max(1) as i32,
