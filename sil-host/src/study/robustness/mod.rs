@@ -4,7 +4,9 @@
 //! A run succeeds if the tip is captured in time, never leaves the belt again, and ends at
 //! its reference or, where that is beyond the edge, at the governed edge.
 
+mod ablation;
 mod draw;
+mod false_alarms;
 mod outcome;
 mod part;
 
@@ -20,8 +22,10 @@ use super::{Study, StudyError};
 use crate::plant::motion::theta;
 use crate::scenario::Scenario;
 
+pub use ablation::{Ablated, Ablation, AblationStudy};
 pub use draw::{admissible_m, scenario};
-pub use outcome::{Ablated, Ablation, Campaign};
+pub use false_alarms::FalseAlarms;
+pub use outcome::Campaign;
 pub use part::Part;
 
 /// A contact that lasts so long is a capture, s.
@@ -281,53 +285,6 @@ fn target_m(scenario: &Scenario) -> f64 {
         _ => None,
     });
     targets.next_back().unwrap_or(f64::NAN)
-}
-
-/// Counts how often the controller gives up a contact that lasts.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FalseAlarms {
-    /// Alarms so far.
-    pub count: u32,
-    said_contact: bool,
-}
-
-impl FalseAlarms {
-    /// Looks at a tick that has ended: what the controller said, and whether the tip touches.
-    pub fn tick(&mut self, trial: &Trial, watch: &ContactWatch) {
-        let says = trial.answer().flags.contains(StatusFlags::CONTACT);
-        let slides = watch.captured_s.is_some() && watch.lift_offs == 0 && watch.touches();
-        if slides && self.said_contact && !says && trial.fault().is_none() {
-            self.count += 1;
-        }
-        self.said_contact = says;
-    }
-}
-
-/// The same campaign with one part of the controller after the other switched off.
-#[derive(Clone, Debug)]
-pub struct AblationStudy {
-    /// The campaign.
-    pub campaign: Robustness,
-    /// The parts; the whole controller comes first.
-    pub parts: Vec<Part>,
-}
-
-impl Study for AblationStudy {
-    type Row = Row;
-
-    fn len(&self) -> usize {
-        (self.parts.len() + 1) * self.campaign.runs
-    }
-
-    fn row(&self, index: usize) -> Result<Row, StudyError> {
-        let mut campaign = self.campaign.clone();
-        let part = index / campaign.runs;
-        if let Some(part) = part.checked_sub(1).and_then(|part| self.parts.get(part)) {
-            let keys = part.without().iter().map(ToString::to_string);
-            campaign.overrides.extend(keys);
-        }
-        campaign.row(index % campaign.runs)
-    }
 }
 
 #[cfg(test)]
