@@ -4,6 +4,7 @@ use clap::Args;
 
 use super::options::{self, OutcomeOptions, Overrides};
 use crate::commands::CommandError;
+use crate::study::StudyError;
 use crate::study::capture::{Capture, Captures};
 
 /// Options of `painleve study capture`.
@@ -21,14 +22,25 @@ pub struct CaptureArguments {
     outcome: OutcomeOptions,
 }
 
+impl CaptureArguments {
+    /// The study that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the key that is wrong.
+    pub fn study(&self) -> Result<Capture, StudyError> {
+        let study = Capture {
+            seed: self.seed,
+            runs: self.runs,
+            overrides: self.overrides.overrides.clone(),
+        };
+        study.check()?;
+        Ok(study)
+    }
+}
+
 /// Computes the study and writes it.
 pub fn run(arguments: &CaptureArguments) -> Result<(), CommandError> {
-    let study = Capture {
-        seed: arguments.seed,
-        runs: arguments.runs,
-        overrides: arguments.overrides.overrides.clone(),
-    };
-    study.check()?;
+    let study = arguments.study()?;
     let rows = arguments.outcome.compute(&study)?;
     arguments.outcome.write(&Captures::new(rows))
 }

@@ -4,6 +4,7 @@ use clap::Args;
 
 use super::options::{self, OutcomeOptions, Overrides};
 use crate::commands::CommandError;
+use crate::study::StudyError;
 use crate::study::robustness::{Ablation, AblationStudy, Campaign, Part, Robustness};
 
 /// Options of `painleve study robustness`.
@@ -42,17 +43,28 @@ pub struct AblationArguments {
     outcome: OutcomeOptions,
 }
 
+impl RobustnessArguments {
+    /// The campaign that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the key that is wrong.
+    pub fn study(&self) -> Result<Robustness, StudyError> {
+        let parts = self.without.iter().flat_map(|part| part.without());
+        let mut overrides: Vec<String> = parts.map(ToString::to_string).collect();
+        overrides.extend(self.overrides.overrides.iter().cloned());
+        let study = Robustness {
+            seed: self.seed,
+            runs: self.runs,
+            overrides,
+        };
+        study.check()?;
+        Ok(study)
+    }
+}
+
 /// Computes the campaign and writes it.
 pub fn run(arguments: &RobustnessArguments) -> Result<(), CommandError> {
-    let parts = arguments.without.iter().flat_map(|part| part.without());
-    let mut overrides: Vec<String> = parts.map(ToString::to_string).collect();
-    overrides.extend(arguments.overrides.overrides.iter().cloned());
-    let study = Robustness {
-        seed: arguments.seed,
-        runs: arguments.runs,
-        overrides,
-    };
-    study.check()?;
+    let study = arguments.study()?;
     let rows = arguments.outcome.compute(&study)?;
     arguments
         .outcome

@@ -2,11 +2,14 @@
 
 mod outcome;
 
+use std::collections::BTreeMap;
+
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
 use super::contact_watch::ContactWatch;
+use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
 use crate::scenario::Scenario;
@@ -128,6 +131,18 @@ impl Study for Capture {
             success: solved && capture_s <= LIMIT_S && error_m <= WITHIN_M && fault.is_none(),
             solved,
         })
+    }
+}
+
+impl Tabular for Capture {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(BTreeMap::from([("runs".into(), self.seed)]))
     }
 }
 

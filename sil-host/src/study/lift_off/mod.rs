@@ -7,6 +7,8 @@
 mod first_flight;
 mod outcome;
 
+use std::collections::BTreeMap;
+
 use painleve_firmware::contact_observer::Evidence;
 use painleve_firmware::reference::Segment;
 use painleve_shared::frame::StatusFlags;
@@ -17,6 +19,7 @@ use serde::Serialize;
 
 use super::contact_watch::ContactWatch;
 use super::robustness::{FalseAlarms, admissible_m};
+use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
 use crate::plant::belt::BeltProfile;
@@ -207,6 +210,18 @@ impl Study for LiftOff {
             slid_s: (end_s - SETTLING_S).max(0.0),
             solved,
         })
+    }
+}
+
+impl Tabular for LiftOff {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(BTreeMap::from([("runs".into(), self.seed)]))
     }
 }
 
