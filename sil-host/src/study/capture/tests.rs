@@ -1,6 +1,7 @@
 //! Small studies of capture, with torque and without.
 
 use super::*;
+use crate::study::outcome::plain;
 use crate::study::{Outcome, rows};
 
 #[test]
@@ -59,4 +60,33 @@ fn a_run_that_cannot_be_solved_is_counted_and_none_of_the_others_is_lost() {
     let captures = Captures::new(rows);
     assert_eq!((captures.unsolved, captures.success.successes), (1, 1));
     assert_eq!(captures.capture_s.map(|times| times.count), Some(1));
+}
+
+/// Made by hand, so that no change of the controller changes it.
+#[test]
+fn the_table_names_the_runs_that_failed() {
+    let row = |index: usize, capture_s: f64, error_m: f64| Row {
+        index,
+        enabled_s: 5.0 + 0.125 * index as f64,
+        noise_seed: 40 + index as u64,
+        capture_s,
+        error_m,
+        fault: None,
+        tip_t_m: 0.12,
+        success: capture_s <= LIMIT_S && error_m <= WITHIN_M,
+        solved: true,
+    };
+    let unsolved = Row {
+        success: false,
+        solved: false,
+        ..row(4, 0.05, 0.0)
+    };
+    let rows = vec![
+        row(0, 0.15, 1e-4),
+        row(1, 0.25, 2e-4),
+        row(2, 0.75, 3e-4),
+        row(3, 0.2, 0.005),
+        unsolved,
+    ];
+    insta::assert_snapshot!(plain(&Captures::new(rows)));
 }

@@ -1,6 +1,7 @@
 //! Small studies of lift-off, with the governor and without.
 
 use super::*;
+use crate::study::outcome::plain;
 use crate::study::{Outcome, rows};
 
 #[test]
@@ -64,4 +65,42 @@ fn runs_that_cannot_be_solved_are_counted_and_none_of_the_others_is_lost() {
         assert!((1..4).contains(&of.unsolved), "{}", outcome.table());
         assert!(of.lift_offs + of.unsolved <= 4, "{}", outcome.table());
     }
+}
+
+/// Made by hand, so that no change of the controller changes it.
+#[test]
+fn the_table_tells_early_late_short_and_missed_apart() {
+    let row = |evidence, flight_s: f64, noticed_s: Option<f64>| Row {
+        index: 0,
+        evidence,
+        mu: 0.6,
+        v_belt_m_s: -0.4,
+        lift_off_s: Some(3.0),
+        flight_s: Some(flight_s),
+        noticed_s,
+        false_alarms: 0,
+        slid_s: 720.0,
+        solved: true,
+    };
+    let [cell, encoders] = LiftOff::EVIDENCE;
+    let stays_down = Row {
+        lift_off_s: None,
+        flight_s: None,
+        false_alarms: 2,
+        ..row(cell, 0.0, None)
+    };
+    let unsolved = Row {
+        solved: false,
+        ..row(encoders, 0.1, Some(0.001))
+    };
+    let rows = vec![
+        row(cell, 0.1, Some(0.003)),
+        row(cell, 0.1, Some(0.006)),
+        row(cell, 0.004, Some(0.002)),
+        stays_down,
+        row(encoders, 0.1, Some(0.008)),
+        row(encoders, 0.02, None),
+        unsolved,
+    ];
+    insta::assert_snapshot!(plain(&LiftOffs::new(rows)));
 }

@@ -61,7 +61,7 @@ pub struct Ablated {
     pub not_reached: usize,
     /// Runs without capture.
     pub not_captured: usize,
-    /// Runs with a fault.
+    /// Runs with a fault, or whose plant could not be solved.
     pub faults: usize,
     /// Mean distance from target or governed edge at the end, mm.
     pub mean_error_mm: f64,
@@ -126,7 +126,7 @@ impl Outcome for Ablation {
             "lift-off",
             "not reached",
             "not captured",
-            "fault",
+            "fault or unsolved",
             "mean error (mm)",
         ]);
         for row in &self.rows {

@@ -216,4 +216,6 @@ fn target_m(scenario: &Scenario) -> f64 {
 }
 
 #[cfg(test)]
+mod tables;
+#[cfg(test)]
 mod tests;
