@@ -11,10 +11,16 @@ use crate::study::lift_off::{LiftOff, LiftOffs};
 #[derive(Debug, Args)]
 pub struct LiftOffArguments {
     /// Seed of all runs.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Number of runs.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = options::runs)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1000,
+        value_parser = options::runs,
+        allow_negative_numbers = true
+    )]
     runs: usize,
     /// How long the tip slides before it is led over the edge, s.
     #[arg(

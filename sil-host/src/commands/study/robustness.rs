@@ -11,10 +11,16 @@ use crate::study::robustness::{Ablation, AblationStudy, Campaign, Part, Robustne
 #[derive(Debug, Args)]
 pub struct RobustnessArguments {
     /// Seed of all runs.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Number of runs.
-    #[arg(long, value_name = "N", default_value_t = 10000, value_parser = options::runs)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 10000,
+        value_parser = options::runs,
+        allow_negative_numbers = true
+    )]
     runs: usize,
     /// Parts of the controller that are switched off.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
@@ -29,10 +35,16 @@ pub struct RobustnessArguments {
 #[derive(Debug, Args)]
 pub struct AblationArguments {
     /// Seed of all runs.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Number of runs with each part switched off.
-    #[arg(long, value_name = "N", default_value_t = 500, value_parser = options::runs)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 500,
+        value_parser = options::runs,
+        allow_negative_numbers = true
+    )]
     runs: usize,
     /// Parts to switch off, one at a time; all by default.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
