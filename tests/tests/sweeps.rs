@@ -61,6 +61,34 @@ fn any_number_of_shards_and_threads_merges_to_what_the_study_writes() {
 }
 
 #[test]
+fn campaigns_of_random_runs_are_merged_too() {
+    for (study, options) in [
+        (
+            "robustness",
+            &[("runs", "7"), ("seed", "3"), ("without", "governor,guard")][..],
+        ),
+        ("capture", &[("runs", "5"), ("set", "run.tick_hz=500")]),
+        ("lift-off", &[("runs", "4"), ("slide-s", "0.3")]),
+    ] {
+        let alone = Bench::new("sweep-random");
+        let mut line = vec!["study".into(), study.into(), "--csv".into(), "a.csv".into()];
+        let mut campaign = format!("study = '{study}'\n");
+        for (option, value) in options {
+            line.extend([format!("--{option}"), (*value).to_owned()]);
+            campaign += &format!("{option} = '{value}'\n");
+        }
+        text(&alone.run(&line.iter().map(String::as_str).collect::<Vec<_>>()));
+        let expected = read(&alone, "a.csv");
+        assert!(expected.iter().filter(|&&byte| byte == b'\n').count() > 5);
+        for shards in ["1", "3"] {
+            let bench = planned("sweep-random-shards", &campaign, shards);
+            text(&bench.run(&["sweep", "run", "--all"]));
+            assert_eq!(merged(&bench), expected, "{study} in {shards} shards");
+        }
+    }
+}
+
+#[test]
 fn rows_of_several_lines_are_merged_too() {
     let campaign = "study = 'poincare'\nv-belt = '-0.5:-0.3:0.05'\ntransient-s = 5\nrecord-s = 2";
     let bench = planned("sweep-lines", campaign, "3");

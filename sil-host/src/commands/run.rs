@@ -53,7 +53,12 @@ pub struct ScenarioArguments {
     #[arg(long = "scenario", value_name = "SCENARIO", conflicts_with = "name")]
     option: Option<String>,
     /// Run INDEX of `study robustness --seed SEED` instead of a scenario.
-    #[arg(long, value_name = "SEED:INDEX", conflicts_with_all = ["name", "option"])]
+    #[arg(
+        long,
+        value_name = "SEED:INDEX",
+        conflicts_with_all = ["name", "option"],
+        allow_hyphen_values = true
+    )]
     replay: Option<Replay>,
     /// Override one key, as in belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]

@@ -4,9 +4,12 @@ use plotters::style::RGBColor;
 use serde::Serialize;
 
 use crate::plot::chart::{Mark, Panel};
+use crate::plot::style::VERMILLION;
 
 /// Bars of a histogram.
 const BARS: usize = 60;
+/// Their width in drawn units; they are some 29 apart.
+const BAR_WIDTH: u32 = 25;
 
 /// Where values lie.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -43,26 +46,46 @@ impl Percentiles {
     }
 }
 
-/// A panel with the number of values in equal bins from 0 to `end`; larger ones are in the last.
-pub fn histogram(title: &str, note: String, colour: RGBColor, end: f64, values: &[f64]) -> Panel {
+/// A panel with the number of values in equal bins from 0 to `end`, larger ones in the last,
+/// beside the `limit` that values shall keep.
+pub fn histogram(
+    title: &str,
+    note: String,
+    colour: RGBColor,
+    end: f64,
+    limit: f64,
+    values: &[f64],
+) -> Panel {
     let width = end / BARS as f64;
     let mut counts = [0_u32; BARS];
     for value in values {
         let bin = (value / width).max(0.0) as usize;
         counts[bin.min(BARS - 1)] += 1;
     }
-    let mut points = Vec::with_capacity(4 * BARS);
-    for (bin, count) in counts.iter().enumerate() {
-        let (left, right) = (bin as f64 * width, (bin + 1) as f64 * width);
-        let top = f64::from(*count);
-        points.extend([(left, 0.0), (left, top), (right, top), (right, 0.0)]);
+    let mut points = Vec::with_capacity(3 * BARS);
+    for (bin, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let middle = (bin as f64 + 0.5) * width;
+        points.extend([(middle, 0.0), (middle, f64::from(*count)), (f64::NAN, 0.0)]);
     }
-    let highest = counts.iter().max().map_or(1.0, |count| f64::from(*count));
+    let highest = counts.iter().copied().max().unwrap_or(0).max(1);
+    let top = 1.08 * f64::from(highest);
+    let bars = Mark::Line {
+        name: String::new(),
+        colour,
+        width: BAR_WIDTH,
+        dashed: false,
+        points,
+    };
     Panel {
         title: title.into(),
         note,
-        y: Some(0.0..1.08 * highest.max(1.0)),
-        marks: vec![Mark::line("", colour, points)],
+        y: Some(0.0..top),
+        // Runs are whole.
+        y_ticks: highest.clamp(2, 6) as usize,
+        marks: vec![
+            bars,
+            Mark::dashed("limit", VERMILLION, vec![(limit, 0.0), (limit, top)]),
+        ],
         ..Panel::default()
     }
 }
@@ -86,11 +109,14 @@ mod tests {
             String::new(),
             RGBColor(0, 0, 0),
             6.0,
+            5.0,
             &[0.0, 0.05, 9.0],
         );
         let Mark::Line { points, .. } = &panel.marks[0] else {
             panic!("no line");
         };
-        assert_eq!((points[1].1, points[4 * BARS - 2].1), (2.0, 1.0));
+        assert_eq!(points[..2], [(0.05, 0.0), (0.05, 2.0)]);
+        assert_eq!(points[3..5], [(5.95, 0.0), (5.95, 1.0)]);
+        assert_eq!(points.len(), 6);
     }
 }

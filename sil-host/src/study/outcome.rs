@@ -56,3 +56,9 @@ pub fn name(value: &impl Serialize) -> String {
         other => format!("{other:?}"),
     }
 }
+
+/// The table as it is without a terminal, for snapshots.
+#[cfg(test)]
+pub fn plain(outcome: &impl Outcome) -> String {
+    outcome.table().force_no_tty().to_string()
+}

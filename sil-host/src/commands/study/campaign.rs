@@ -11,11 +11,14 @@ use crate::study::{StudyError, tabular::Tabular};
 use crate::sweep::campaign::{Campaign, Understood};
 
 /// Studies whose rows can be computed apart.
-const STUDIES: [&str; 4] = [
+const STUDIES: [&str; 7] = [
     "bifurcation",
     "poincare",
     "closed-loop-bifurcation",
     "sliding-range",
+    "robustness",
+    "capture",
+    "lift-off",
 ];
 
 /// Options that say where an outcome goes and who computes it, which a sweep says itself.
@@ -41,13 +44,13 @@ pub fn understand(campaign: &Campaign) -> Result<Understood, String> {
         StudyCommand::Poincare(study) => understood(study.study(), study.scenarios()),
         StudyCommand::ClosedLoopBifurcation(study) => understood(study.study(), study.scenarios()),
         StudyCommand::SlidingRange(study) => understood(study.study(), study.scenarios()),
+        StudyCommand::Robustness(study) => understood(study.study(), Vec::new()),
+        StudyCommand::Capture(study) => understood(study.study(), Vec::new()),
+        StudyCommand::LiftOff(study) => understood(study.study(), Vec::new()),
         // Not among the names above.
-        StudyCommand::Admissible(_)
-        | StudyCommand::Regions(_)
-        | StudyCommand::Robustness(_)
-        | StudyCommand::Ablation(_)
-        | StudyCommand::Capture(_)
-        | StudyCommand::LiftOff(_) => Err(format!("{name} has no rows to deal out")),
+        StudyCommand::Admissible(_) | StudyCommand::Regions(_) | StudyCommand::Ablation(_) => {
+            Err(format!("{name} has no rows to deal out"))
+        }
     }
 }
 
@@ -134,6 +137,9 @@ mod tests {
             ("poincare", 321),
             ("closed-loop-bifurcation", 181),
             ("sliding-range", 16),
+            ("robustness", 10_000),
+            ("capture", 1000),
+            ("lift-off", 2000),
         ] {
             let understood = understand(&campaign(study, &[])).unwrap();
             assert_eq!(understood.table.len(), rows, "{study}");

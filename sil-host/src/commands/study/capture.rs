@@ -4,16 +4,23 @@ use clap::Args;
 
 use super::options::{self, OutcomeOptions, Overrides};
 use crate::commands::CommandError;
+use crate::study::StudyError;
 use crate::study::capture::{Capture, Captures};
 
 /// Options of `painleve study capture`.
 #[derive(Debug, Args)]
 pub struct CaptureArguments {
     /// Seed of all runs.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Number of runs.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = options::runs)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1000,
+        value_parser = options::runs,
+        allow_negative_numbers = true
+    )]
     runs: usize,
     #[command(flatten)]
     overrides: Overrides,
@@ -21,14 +28,25 @@ pub struct CaptureArguments {
     outcome: OutcomeOptions,
 }
 
+impl CaptureArguments {
+    /// The study that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the key that is wrong.
+    pub fn study(&self) -> Result<Capture, StudyError> {
+        let study = Capture {
+            seed: self.seed,
+            runs: self.runs,
+            overrides: self.overrides.overrides.clone(),
+        };
+        study.check()?;
+        Ok(study)
+    }
+}
+
 /// Computes the study and writes it.
 pub fn run(arguments: &CaptureArguments) -> Result<(), CommandError> {
-    let study = Capture {
-        seed: arguments.seed,
-        runs: arguments.runs,
-        overrides: arguments.overrides.overrides.clone(),
-    };
-    study.check()?;
+    let study = arguments.study()?;
     let rows = arguments.outcome.compute(&study)?;
     arguments.outcome.write(&Captures::new(rows))
 }

@@ -4,16 +4,23 @@ use clap::Args;
 
 use super::options::{self, OutcomeOptions, Overrides};
 use crate::commands::CommandError;
+use crate::study::StudyError;
 use crate::study::lift_off::{LiftOff, LiftOffs};
 
 /// Options of `painleve study lift-off`.
 #[derive(Debug, Args)]
 pub struct LiftOffArguments {
     /// Seed of all runs.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Number of runs.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = options::runs)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1000,
+        value_parser = options::runs,
+        allow_negative_numbers = true
+    )]
     runs: usize,
     /// How long the tip slides before it is led over the edge, s.
     #[arg(
@@ -30,15 +37,26 @@ pub struct LiftOffArguments {
     outcome: OutcomeOptions,
 }
 
+impl LiftOffArguments {
+    /// The study that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the key that is wrong.
+    pub fn study(&self) -> Result<LiftOff, StudyError> {
+        let study = LiftOff {
+            seed: self.seed,
+            runs: self.runs,
+            slide_s: self.slide_s,
+            overrides: self.overrides.overrides.clone(),
+        };
+        study.check()?;
+        Ok(study)
+    }
+}
+
 /// Computes the study and writes it.
 pub fn run(arguments: &LiftOffArguments) -> Result<(), CommandError> {
-    let study = LiftOff {
-        seed: arguments.seed,
-        runs: arguments.runs,
-        slide_s: arguments.slide_s,
-        overrides: arguments.overrides.overrides.clone(),
-    };
-    study.check()?;
+    let study = arguments.study()?;
     let rows = arguments.outcome.compute(&study)?;
     arguments.outcome.write(&LiftOffs::new(rows))
 }

@@ -4,16 +4,23 @@ use clap::Args;
 
 use super::options::{self, OutcomeOptions, Overrides};
 use crate::commands::CommandError;
+use crate::study::StudyError;
 use crate::study::robustness::{Ablation, AblationStudy, Campaign, Part, Robustness};
 
 /// Options of `painleve study robustness`.
 #[derive(Debug, Args)]
 pub struct RobustnessArguments {
     /// Seed of all runs.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Number of runs.
-    #[arg(long, value_name = "N", default_value_t = 10000, value_parser = options::runs)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 10000,
+        value_parser = options::runs,
+        allow_negative_numbers = true
+    )]
     runs: usize,
     /// Parts of the controller that are switched off.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
@@ -28,10 +35,16 @@ pub struct RobustnessArguments {
 #[derive(Debug, Args)]
 pub struct AblationArguments {
     /// Seed of all runs.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Number of runs with each part switched off.
-    #[arg(long, value_name = "N", default_value_t = 500, value_parser = options::runs)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 500,
+        value_parser = options::runs,
+        allow_negative_numbers = true
+    )]
     runs: usize,
     /// Parts to switch off, one at a time; all by default.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
@@ -42,17 +55,28 @@ pub struct AblationArguments {
     outcome: OutcomeOptions,
 }
 
+impl RobustnessArguments {
+    /// The campaign that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the key that is wrong.
+    pub fn study(&self) -> Result<Robustness, StudyError> {
+        let parts = self.without.iter().flat_map(|part| part.without());
+        let mut overrides: Vec<String> = parts.map(ToString::to_string).collect();
+        overrides.extend(self.overrides.overrides.iter().cloned());
+        let study = Robustness {
+            seed: self.seed,
+            runs: self.runs,
+            overrides,
+        };
+        study.check()?;
+        Ok(study)
+    }
+}
+
 /// Computes the campaign and writes it.
 pub fn run(arguments: &RobustnessArguments) -> Result<(), CommandError> {
-    let parts = arguments.without.iter().flat_map(|part| part.without());
-    let mut overrides: Vec<String> = parts.map(ToString::to_string).collect();
-    overrides.extend(arguments.overrides.overrides.iter().cloned());
-    let study = Robustness {
-        seed: arguments.seed,
-        runs: arguments.runs,
-        overrides,
-    };
-    study.check()?;
+    let study = arguments.study()?;
     let rows = arguments.outcome.compute(&study)?;
     arguments
         .outcome

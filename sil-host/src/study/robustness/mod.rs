@@ -4,25 +4,33 @@
 //! A run succeeds if the tip is captured in time, never leaves the belt again, and ends at
 //! its reference or, where that is beyond the edge, at the governed edge.
 
+mod ablation;
 mod draw;
+mod false_alarms;
 mod outcome;
 mod part;
+mod row;
+
+use std::collections::BTreeMap;
 
 use painleve_firmware::reference::Segment;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
-use serde::Serialize;
 
 use super::belt_line::BeltLine;
 use super::contact_watch::ContactWatch;
+use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
 use crate::plant::motion::theta;
 use crate::scenario::Scenario;
 
+pub use ablation::{Ablated, Ablation, AblationStudy};
 pub use draw::{admissible_m, scenario};
-pub use outcome::{Ablated, Ablation, Campaign};
+pub use false_alarms::FalseAlarms;
+pub use outcome::Campaign;
 pub use part::Part;
+pub use row::{Ending, Row};
 
 /// A contact that lasts so long is a capture, s.
 pub const CAPTURE_S: f64 = 0.1;
@@ -47,94 +55,6 @@ pub struct Robustness {
     pub runs: usize,
     /// Changes to every scenario after it is drawn.
     pub overrides: Vec<String>,
-}
-
-/// What a run came to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Ending {
-    /// At the reference.
-    Reached,
-    /// At the governed edge, the reference being beyond it.
-    AtEdge,
-    /// At the governed edge, but that is more than 10 mm before the true one, and p not small.
-    StoppedEarly,
-    /// Elsewhere.
-    NotReached,
-    /// The tip left the belt after its capture.
-    LiftOff,
-    /// The tip was not captured in time.
-    NotCaptured,
-    /// The controller gave up.
-    Fault,
-    /// The plant could not be solved.
-    Unsolved,
-}
-
-impl Ending {
-    /// Whether the run succeeded.
-    pub fn is_success(self) -> bool {
-        matches!(self, Self::Reached | Self::AtEdge)
-    }
-}
-
-/// One run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
-    /// Its number: with the seed of the campaign it defines the run.
-    pub index: usize,
-    /// What it came to.
-    pub ending: Ending,
-    /// Number of the fault that the controller has latched.
-    pub fault: Option<u8>,
-    /// Start of the capture after enabling, s.
-    pub capture_s: Option<f64>,
-    /// Lift-offs after the capture.
-    pub lift_offs: u64,
-    /// When the first of them was, s.
-    pub first_lift_off_s: Option<f64>,
-    /// Largest distance from target or governed edge at the end, m.
-    pub error_m: f64,
-    /// What is tolerated of it, m.
-    pub tolerance_m: f64,
-    /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.
-    pub to_edge_m: f64,
-    /// p at the tip as a part of Q22.
-    pub p_ratio: f64,
-    /// Times that contact was taken for flight while the tip slid.
-    pub false_alarms: u32,
-    /// Time after capture, s.
-    pub slid_s: f64,
-    /// Where the tip ended, m.
-    pub tip_t_m: f64,
-    /// Target of the reference, m.
-    pub target_m: f64,
-    /// Posture of the start.
-    pub posture: Posture,
-    /// Friction coefficient μ.
-    pub mu: f64,
-    /// Belt speed, m/s.
-    pub v_belt_m_s: f64,
-    /// Control rate, Hz.
-    pub tick_hz: u32,
-    /// Bits of the encoders.
-    pub encoder_bits: u8,
-    /// Bits of the torque stages.
-    pub torque_bits: u8,
-    /// Lag of the torque stages, s.
-    pub torque_lag_s: f64,
-    /// Delay from sample to torque, ticks.
-    pub delay_ticks: f64,
-    /// Standard deviation of the force cell's noise, N.
-    pub force_noise_n: f64,
-    /// Probability that a frame is lost.
-    pub frame_loss: f64,
-    /// Length of the links, m.
-    pub link_length_m: f64,
-    /// Mass of the links, kg.
-    pub link_mass_kg: f64,
-    /// Stiffness of the spring, N·m/rad.
-    pub stiffness_nm_rad: f64,
 }
 
 impl Robustness {
@@ -271,6 +191,18 @@ impl Study for Robustness {
     }
 }
 
+impl Tabular for Robustness {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(BTreeMap::from([("runs".into(), self.seed)]))
+    }
+}
+
 /// Target of a scenario's last reference, m; NaN without one.
 fn target_m(scenario: &Scenario) -> f64 {
     let segments = scenario.controller.reference.segments.iter();
@@ -283,52 +215,7 @@ fn target_m(scenario: &Scenario) -> f64 {
     targets.next_back().unwrap_or(f64::NAN)
 }
 
-/// Counts how often the controller gives up a contact that lasts.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FalseAlarms {
-    /// Alarms so far.
-    pub count: u32,
-    said_contact: bool,
-}
-
-impl FalseAlarms {
-    /// Looks at a tick that has ended: what the controller said, and whether the tip touches.
-    pub fn tick(&mut self, trial: &Trial, watch: &ContactWatch) {
-        let says = trial.answer().flags.contains(StatusFlags::CONTACT);
-        let slides = watch.captured_s.is_some() && watch.lift_offs == 0 && watch.touches();
-        if slides && self.said_contact && !says && trial.fault().is_none() {
-            self.count += 1;
-        }
-        self.said_contact = says;
-    }
-}
-
-/// The same campaign with one part of the controller after the other switched off.
-#[derive(Clone, Debug)]
-pub struct AblationStudy {
-    /// The campaign.
-    pub campaign: Robustness,
-    /// The parts; the whole controller comes first.
-    pub parts: Vec<Part>,
-}
-
-impl Study for AblationStudy {
-    type Row = Row;
-
-    fn len(&self) -> usize {
-        (self.parts.len() + 1) * self.campaign.runs
-    }
-
-    fn row(&self, index: usize) -> Result<Row, StudyError> {
-        let mut campaign = self.campaign.clone();
-        let part = index / campaign.runs;
-        if let Some(part) = part.checked_sub(1).and_then(|part| self.parts.get(part)) {
-            let keys = part.without().iter().map(ToString::to_string);
-            campaign.overrides.extend(keys);
-        }
-        campaign.row(index % campaign.runs)
-    }
-}
-
+#[cfg(test)]
+mod tables;
 #[cfg(test)]
 mod tests;

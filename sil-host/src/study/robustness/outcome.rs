@@ -1,14 +1,14 @@
-//! Campaigns and ablations as tables and figures.
+//! Campaigns as tables and figures.
 
 use std::collections::BTreeMap;
 
 use comfy_table::Table;
 use serde::Serialize;
 
-use super::{AblationStudy, Ending, Part, Row};
+use super::{Ending, Row};
 use crate::plot::PlotError;
 use crate::plot::chart::{Chart, Mark, Panel};
-use crate::plot::style::{BLUE_INK, GREEN, VERMILLION};
+use crate::plot::style::{BLUE_INK, VERMILLION};
 use crate::study::outcome::{self, Outcome};
 use crate::study::proportion::Proportion;
 
@@ -58,7 +58,8 @@ impl Campaign {
         }
     }
 
-    fn count(&self, ending: Ending) -> usize {
+    /// How many runs ended in this way.
+    pub fn count(&self, ending: Ending) -> usize {
         self.endings.get(&ending).copied().unwrap_or(0)
     }
 }
@@ -93,29 +94,33 @@ impl Outcome for Campaign {
     }
 
     fn svg(&self) -> Result<String, PlotError> {
-        let dots = |name: &str, colour, success, y: fn(&Row) -> f64| Mark::Dots {
-            name: name.into(),
-            colour,
-            size: if success { 4 } else { 12 },
-            points: self
-                .rows
-                .iter()
+        // Thousands of dots would hide each other, and a hundred small ones are hard to see.
+        let size = if self.rows.len() > 2000 { 4 } else { 9 };
+        let dots = |name: &str, colour, size, success, y: fn(&Row) -> f64| {
+            let rows = self.rows.iter();
+            let points = rows
                 .filter(|row| row.ending.is_success() == success)
-                .map(|row| (row.v_belt_m_s, y(row)))
-                .collect(),
+                .map(|row| (row.v_belt_m_s, y(row)));
+            let points: Vec<_> = points.collect();
+            Mark::Dots {
+                name: format!("{name}: {} runs", points.len()),
+                colour,
+                size,
+                points,
+            }
         };
         let panel = |title: &str, y: fn(&Row) -> f64, range| Panel {
             title: title.into(),
             y: Some(range),
             marks: vec![
-                dots("success", BLUE_INK, true, y),
-                dots("failure", VERMILLION, false, y),
+                dots("success", BLUE_INK, size, true, y),
+                dots("failure", VERMILLION, 14, false, y),
             ],
             ..Panel::default()
         };
         Chart {
             title: "Robustness".into(),
-            subtitle: format!("success (95 %): {}", self.success),
+            subtitle: format!("success, with its 95 % interval: {}", self.success),
             x_title: "Belt speed (m/s)".into(),
             x: Some(-1.05..1.05),
             panels: vec![
@@ -131,150 +136,6 @@ impl Outcome for Campaign {
                     11.5..18.5,
                 ),
             ],
-        }
-        .svg()
-    }
-}
-
-/// What the campaign comes to without a part.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Ablated {
-    /// The part that is switched off; none for the whole controller.
-    pub without: Option<Part>,
-    /// The keys that do it.
-    pub keys: String,
-    /// Runs.
-    pub runs: usize,
-    /// Runs that succeeded.
-    pub successes: usize,
-    /// Part of them.
-    pub rate: f64,
-    /// Lower end of its 95 % interval.
-    pub lower: f64,
-    /// Upper end of its 95 % interval.
-    pub upper: f64,
-    /// Runs with a lift-off after capture.
-    pub lift_offs: usize,
-    /// Runs that ended elsewhere, or at an edge that is none.
-    pub not_reached: usize,
-    /// Runs without capture.
-    pub not_captured: usize,
-    /// Runs with a fault.
-    pub faults: usize,
-    /// Mean distance from target or governed edge at the end, mm.
-    pub mean_error_mm: f64,
-}
-
-/// What each part contributes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Ablation {
-    /// The whole controller, then one line per part.
-    pub rows: Vec<Ablated>,
-}
-
-impl Ablation {
-    /// Of all rows of a study.
-    pub fn new(study: &AblationStudy, rows: Vec<Row>) -> Self {
-        let runs = study.campaign.runs.max(1);
-        let without = std::iter::once(None).chain(study.parts.iter().copied().map(Some));
-        let rows = without
-            .zip(rows.chunks(runs))
-            .map(|(without, rows)| {
-                let campaign = Campaign::new(study.campaign.seed, rows.to_vec());
-                let errors: f64 = rows.iter().map(|row| row.error_m).sum();
-                Ablated {
-                    without,
-                    keys: without.map_or(String::new(), |part| part.without().join(" ")),
-                    runs: campaign.success.runs,
-                    successes: campaign.success.successes,
-                    rate: campaign.success.rate,
-                    lower: campaign.success.lower,
-                    upper: campaign.success.upper,
-                    lift_offs: campaign.count(Ending::LiftOff),
-                    not_reached: campaign.count(Ending::NotReached)
-                        + campaign.count(Ending::StoppedEarly),
-                    not_captured: campaign.count(Ending::NotCaptured),
-                    faults: campaign.count(Ending::Fault) + campaign.count(Ending::Unsolved),
-                    mean_error_mm: 1e3 * errors / rows.len() as f64,
-                }
-            })
-            .collect();
-        Self { rows }
-    }
-}
-
-impl Ablated {
-    fn name(&self) -> String {
-        let part = |part: &Part| format!("without {}", outcome::name(part));
-        self.without.as_ref().map_or("everything".into(), part)
-    }
-}
-
-impl Outcome for Ablation {
-    type Line = Ablated;
-
-    fn lines(&self) -> Vec<Ablated> {
-        self.rows.clone()
-    }
-
-    fn table(&self) -> Table {
-        let mut table = outcome::table([
-            "controller",
-            "success (95 %)",
-            "lift-off",
-            "not reached",
-            "not captured",
-            "fault",
-            "mean error (mm)",
-        ]);
-        for row in &self.rows {
-            table.add_row([
-                row.name(),
-                Proportion::new(row.successes, row.runs).to_string(),
-                row.lift_offs.to_string(),
-                row.not_reached.to_string(),
-                row.not_captured.to_string(),
-                row.faults.to_string(),
-                format!("{:.2}", row.mean_error_mm),
-            ]);
-        }
-        table
-    }
-
-    fn svg(&self) -> Result<String, PlotError> {
-        let count = self.rows.len();
-        let mut marks = Vec::new();
-        for (index, row) in self.rows.iter().enumerate() {
-            let top = (count - index) as f64;
-            marks.push(Mark::Label {
-                at: (1.0, top - 0.25),
-                centred: false,
-                text: format!("{}: {:.1} %", row.name(), 100.0 * row.rate),
-            });
-            let mut bar = |colour, width, from: f64, to: f64, at| {
-                marks.push(Mark::Line {
-                    name: String::new(),
-                    colour,
-                    width,
-                    dashed: false,
-                    points: vec![(100.0 * from, at), (100.0 * to, at)],
-                });
-            };
-            bar(GREEN, 16, 0.0, row.rate, top - 0.7);
-            bar(VERMILLION, 5, row.lower, row.upper, top - 0.7);
-        }
-        Chart {
-            title: "What each part contributes".into(),
-            subtitle: "the same robustness campaign with one part switched off".into(),
-            x_title: "Success, with its 95 % interval (%)".into(),
-            x: Some(0.0..101.0),
-            panels: vec![Panel {
-                y: Some(0.0..count.max(1) as f64),
-                y_ticks: 0,
-                height: 80 * count.max(1) as i32,
-                marks,
-                ..Panel::default()
-            }],
         }
         .svg()
     }

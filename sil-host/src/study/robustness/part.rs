@@ -26,11 +26,13 @@ pub enum Part {
     PressesLess,
     /// The normal force is approached slowly after landing.
     ForceRamp,
+    /// Unknown torques are estimated.
+    Disturbance,
 }
 
 impl Part {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Guard,
         Self::Governor,
         Self::Recovery,
@@ -41,6 +43,7 @@ impl Part {
         Self::ForceIntegral,
         Self::PressesLess,
         Self::ForceRamp,
+        Self::Disturbance,
     ];
 
     /// The overrides that switch it off.
@@ -59,6 +62,7 @@ impl Part {
             Self::ForceIntegral => &["controller.law.hybrid.force_integral_gain_per_s=0"],
             Self::PressesLess => &["controller.law.hybrid.presses_less=false"],
             Self::ForceRamp => &["controller.law.hybrid.force_time_constant_s=0"],
+            Self::Disturbance => &["controller.disturbance.enabled=false"],
         }
     }
 }
