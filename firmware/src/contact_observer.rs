@@ -174,6 +174,11 @@ impl ContactObserver {
         !self.contact && self.log_odds < -DECISION
     }
 
+    /// Whether that is certain.
+    pub fn is_certain(&self) -> bool {
+        self.log_odds.abs() >= CERTAIN
+    }
+
     /// How sure that is: 0 at the point of changing the decision, 1 for certain.
     pub fn confidence(&self) -> f32 {
         let toward = if self.contact {

@@ -187,9 +187,14 @@ impl Controller {
             self.posture = posture;
         }
         let tracks = state == SupervisorState::Tracking && state_before == SupervisorState::Armed;
-        if armed || tracks || (lands && state == SupervisorState::Armed) {
+        if armed || (lands && state == SupervisorState::Armed) {
             let program = &self.configuration.reference;
             self.reference.restart(program, tip_t_m);
+        }
+        if tracks {
+            // The tip has been dragged while friction was not known, and what it is
+            // taken to be where has changed with the links' length.
+            self.reference.start_from(tip_t_m);
         }
         let landing_p_ratio = if recovering {
             self.configuration.recovery.minimum_p_ratio

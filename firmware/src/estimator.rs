@@ -183,10 +183,9 @@ impl Estimator {
         })
     }
 
-    /// Measured less estimated absolute joint angles, rad: what the last tick left of the
-    /// innovation.
-    pub fn residual_rad(&self) -> Vector2<f32> {
-        self.innovation_rad() * (1.0 - self.angle_gain)
+    /// Part of the innovation that a tick leaves: measured less estimated angles.
+    pub fn residual_share(&self) -> f32 {
+        1.0 - self.angle_gain
     }
 
     /// One count of each encoder, rad.

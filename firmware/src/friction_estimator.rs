@@ -27,6 +27,10 @@ const REVERSAL_FRACTION: f32 = 0.8;
 /// that believing it at once would confirm itself, to and fro.
 const REVERSAL_TICKS: u8 = 3;
 
+/// Ticks without a sign of stick that end it: what is fed forward in stick is not what it is while
+/// sliding, and going to and fro between them every tick would shake the tip off.
+const STICK_TICKS: u8 = 3;
+
 /// Settings of the friction estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -122,7 +126,8 @@ pub struct FrictionEstimator {
     slip_seen: bool,
     /// Ticks in a row that speak for a slip the other way.
     contrary_ticks: u8,
-    sticks: bool,
+    /// Ticks for which the tip is still taken to stick.
+    stick_ticks: u8,
     sticking_s: f32,
 }
 
@@ -139,7 +144,7 @@ impl FrictionEstimator {
             slip: Slip::Positive,
             slip_seen: false,
             contrary_ticks: 0,
-            sticks: false,
+            stick_ticks: 0,
             sticking_s: 0.0,
         }
     }
@@ -149,9 +154,9 @@ impl FrictionEstimator {
         let first_variance = self.settings.first_deviation * self.settings.first_deviation;
         let drift = self.settings.drift_per_sqrt_s;
         self.variance = (self.variance + drift * drift * self.tick_s).at_most(first_variance);
-        self.sticks = false;
         self.observe_slip(force_n);
         if force_n.y < self.settings.observable_n {
+            self.stick_ticks = 0;
             return;
         }
         let ratio = -self.slip.sign::<f32>() * force_n.x / force_n.y;
@@ -163,12 +168,17 @@ impl FrictionEstimator {
         if innovation < -gate {
             self.sticking_s += self.tick_s;
             if self.sticking_s < self.settings.stick_limit_s {
-                self.sticks = true;
+                self.stick_ticks = STICK_TICKS;
                 return;
             }
+            self.stick_ticks = 0;
             self.variance = first_variance;
         } else if innovation > gate {
+            self.stick_ticks = 0;
             self.variance = first_variance;
+        } else if self.stick_ticks > 0 {
+            self.stick_ticks -= 1;
+            return;
         }
         self.sticking_s = 0.0;
         let gain = self.variance / (self.variance + ratio_variance);
@@ -187,6 +197,7 @@ impl FrictionEstimator {
             self.slip = slip;
             self.slip_seen = true;
             self.contrary_ticks = 0;
+            self.stick_ticks = 0;
         }
     }
 
@@ -211,7 +222,7 @@ impl FrictionEstimator {
             deviation: self.variance.square_root(),
             slip: self.slip,
             slip_seen: self.slip_seen,
-            sticks: self.sticks,
+            sticks: self.stick_ticks > 0,
         }
     }
 }

@@ -151,6 +151,11 @@ impl ReferenceGenerator {
         }
     }
 
+    /// Starts the present segment, which has not begun yet, from `start_m` (m).
+    pub fn start_from(&mut self, start_m: f32) {
+        self.start_m = start_m;
+    }
+
     /// Appends a segment.
     ///
     /// # Errors

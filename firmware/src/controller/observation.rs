@@ -45,7 +45,7 @@ impl Controller {
         let gap = self.gap(model);
         let touched = self.contact.contact();
         let contact = self.contact.update(force_n.y, &gap);
-        let certain = self.contact.confidence() >= 1.0;
+        let certain = self.contact.is_certain();
         if contact {
             if !touched && let Some(slip) = self.belt.slip(model.tip_velocity_m_s.x) {
                 self.friction.expect_slip(slip);
@@ -91,8 +91,8 @@ impl Controller {
 
     /// Gap and jump of the tip as the encoders show them.
     fn gap(&self, model: &Model) -> GapReading {
-        let residual = self.estimator.residual_rad();
         let innovation = self.estimator.innovation_rad();
+        let residual = innovation * self.estimator.residual_share();
         let jacobian = &model.jacobian;
         let count = self.estimator.count_rad();
         // Acceleration along the belt that the contact force is expected to cause.
