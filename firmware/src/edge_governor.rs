@@ -10,10 +10,13 @@
 //! of a tick is bounded and the edges follow the friction estimate, within a tenth of a
 //! second at 1 kHz.
 
-use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::{Arm, Posture, Real, Slip};
-use serde::{Deserialize, Serialize};
+mod search;
+mod settings;
 
+use painleve_shared::{Arm, Posture, Real};
+
+use self::search::{Admissibility, Search};
+pub use self::settings::GovernorSettings;
 use crate::friction_estimator::FrictionEstimate;
 use crate::reference::TipReference;
 
@@ -21,10 +24,6 @@ use crate::reference::TipReference;
 const POINTS_IN_A_HURRY: u32 = 2;
 /// Points from one end of the reach to the other in the search outwards.
 const STEPS_OVER_REACH: f32 = 64.0;
-/// Points that reach from one end over the other, to either side of the tip.
-const MOST_REFUSED: u32 = 128;
-/// Halvings of the last step: 6 mm / 2⁹ is 11 µm.
-const HALVINGS: u32 = 9;
 /// Part of the reach that is used: beyond it the arm is all but straight.
 const USABLE_REACH: f32 = 0.995;
 
@@ -34,213 +33,6 @@ const JUMP_M: f32 = 2e-3;
 const CAUGHT_M: f32 = 2e-5;
 /// Rate at which the last stretch to a target is made, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
-
-/// Settings of the edge governor.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GovernorSettings {
-    /// Whether the reference is governed.
-    pub enabled: bool,
-    /// Least p as a part of Q22.
-    pub minimum_p_ratio: f32,
-    /// What is added to that for slow sampling, times the square of the time between ticks, 1/s²:
-    /// so far does a disturbance move the tip before anything is done about it.
-    pub p_ratio_per_s2: f32,
-    /// Deviations of the friction estimate that are added to it.
-    pub friction_deviations: f32,
-    /// Distance that is kept from where p has its least value, m.
-    pub distance_m: f32,
-    /// What is added to that for each count of the encoders at the tip: so far is the tip moved
-    /// to and fro by their rounding.
-    pub distance_counts: f32,
-    /// Deceleration with which the reference stops before an edge, m/s².
-    pub braking_m_s2: f32,
-    /// Fastest approach to a reference that is away from the tip, m/s.
-    pub catch_up_m_s: f32,
-}
-
-impl Default for GovernorSettings {
-    fn default() -> Self {
-        Self {
-            enabled: true,
-            minimum_p_ratio: 0.01,
-            p_ratio_per_s2: 1e4,
-            friction_deviations: 1.5,
-            distance_m: 0.6e-3,
-            distance_counts: 4.0,
-            braking_m_s2: 1.0,
-            catch_up_m_s: 0.3,
-        }
-    }
-}
-
-impl GovernorSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let key = |key, value, minimum, maximum| range::check(key, value, minimum, maximum);
-        key(
-            "controller.governor.minimum_p_ratio",
-            self.minimum_p_ratio,
-            0.0,
-            0.9,
-        )?;
-        key(
-            "controller.governor.p_ratio_per_s2",
-            self.p_ratio_per_s2,
-            0.0,
-            1e6,
-        )?;
-        key(
-            "controller.governor.distance_counts",
-            self.distance_counts,
-            0.0,
-            1e3,
-        )?;
-        key(
-            "controller.governor.friction_deviations",
-            self.friction_deviations,
-            0.0,
-            10.0,
-        )?;
-        key("controller.governor.distance_m", self.distance_m, 0.0, 0.1)?;
-        key(
-            "controller.governor.braking_m_s2",
-            self.braking_m_s2,
-            1e-3,
-            1e3,
-        )?;
-        key(
-            "controller.governor.catch_up_m_s",
-            self.catch_up_m_s,
-            1e-3,
-            10.0,
-        )
-    }
-}
-
-/// Friction with its margin, and where on the belt it is asked about.
-#[derive(Clone, Copy, Debug)]
-struct Admissibility<'a> {
-    arm: &'a Arm<f32>,
-    posture: Posture,
-    /// μ̂ plus margin.
-    friction: f32,
-    /// Direction of slip; `None` while it has not been seen.
-    slip: Option<Slip>,
-    minimum_p_ratio: f32,
-}
-
-impl Admissibility<'_> {
-    fn at(&self, tip_t_m: f32) -> bool {
-        self.arm
-            .coupling_on_belt(tip_t_m, self.posture)
-            .is_some_and(|coupling| {
-                let against = match self.slip {
-                    Some(slip) => slip.sign::<f32>() * coupling,
-                    // It must do for either.
-                    None => coupling.abs(),
-                };
-                1.0 - self.friction * against >= self.minimum_p_ratio
-            })
-    }
-}
-
-/// What the search is about.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Stage {
-    /// From the tip to either side for a point that is admissible.
-    Entering {
-        /// Points that are not.
-        refused: u32,
-    },
-    /// Outwards for one that is not.
-    Marching,
-    /// Between the two.
-    Halving { beyond_m: f32, times: u32 },
-    /// Done: the edge is at the inside.
-    Found,
-}
-
-/// The search for one end of the admissible stretch, and how far it is.
-#[derive(Clone, Copy, Debug)]
-struct Search {
-    /// +1 towards the upper edge, −1 towards the lower one.
-    direction: f32,
-    /// Last point on the tip's side of the edge, m.
-    inside_m: f32,
-    stage: Stage,
-}
-
-impl Search {
-    /// For the upper edge (`direction` +1) or the lower one (−1), from a tip at `tip_t_m`.
-    fn start(direction: f32, tip_t_m: f32) -> Self {
-        Self {
-            direction,
-            inside_m: tip_t_m,
-            stage: Stage::Entering { refused: 0 },
-        }
-    }
-
-    /// The point to look at, m.
-    fn point(&self, step_m: f32, reach_m: f32) -> f32 {
-        let point = match self.stage {
-            Stage::Found => self.inside_m,
-            // By turns on the side of the middle of the belt and on the other.
-            Stage::Entering { refused } => {
-                let away_m = step_m * refused.div_ceil(2) as f32;
-                let inwards = refused % 2 == 1;
-                let outwards_m = away_m.copysign(self.inside_m);
-                self.inside_m + if inwards { -outwards_m } else { outwards_m }
-            }
-            Stage::Marching => self.inside_m + self.direction * step_m,
-            Stage::Halving { beyond_m, .. } => 0.5 * (self.inside_m + beyond_m),
-        };
-        point.within(reach_m)
-    }
-
-    /// The search after the point has been looked at.
-    fn next(self, point_m: f32, admissible: bool, reach_m: f32) -> Self {
-        let (inside_m, stage) = match (self.stage, admissible) {
-            (Stage::Entering { .. }, true) => (point_m, Stage::Marching),
-            // Nothing is admissible: the middle of the belt is as good as any place.
-            (Stage::Entering { refused }, false) if refused >= MOST_REFUSED => (0.0, Stage::Found),
-            (Stage::Entering { refused }, false) => {
-                let refused = refused + 1;
-                (self.inside_m, Stage::Entering { refused })
-            }
-            (Stage::Marching, true) if point_m.abs() >= reach_m => (point_m, Stage::Found),
-            (Stage::Marching, true) => (point_m, Stage::Marching),
-            (Stage::Marching, false) => {
-                let halving = Stage::Halving {
-                    beyond_m: point_m,
-                    times: 0,
-                };
-                (self.inside_m, halving)
-            }
-            (Stage::Halving { times, .. }, _) if times >= HALVINGS => (self.inside_m, Stage::Found),
-            (Stage::Halving { beyond_m, times }, true) => {
-                let times = times + 1;
-                (point_m, Stage::Halving { beyond_m, times })
-            }
-            (Stage::Halving { times, .. }, false) => {
-                let halving = Stage::Halving {
-                    beyond_m: point_m,
-                    times: times + 1,
-                };
-                (self.inside_m, halving)
-            }
-            (Stage::Found, _) => (self.inside_m, Stage::Found),
-        };
-        Self {
-            inside_m,
-            stage,
-            ..self
-        }
-    }
-}
 
 /// The governor with its state.
 #[derive(Clone, Copy, Debug)]
@@ -338,7 +130,7 @@ impl EdgeGovernor {
         for _ in 0..points {
             let point = search.point(step, reach);
             search = search.next(point, admissibility.at(point), reach);
-            if search.stage == Stage::Found {
+            if search.is_over() {
                 let edge = search.inside_m - search.direction * self.distance_m;
                 if search.direction > 0.0 {
                     self.upper_m = edge;
@@ -410,7 +202,7 @@ impl EdgeGovernor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_shared::ArmParameters;
+    use painleve_shared::{ArmParameters, Slip};
     use proptest::prelude::*;
 
     const TICK_S: f32 = 1e-3;

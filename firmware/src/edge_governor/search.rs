@@ -1,0 +1,135 @@
+//! The search for an end of the admissible stretch, one point of the belt at a time.
+
+use painleve_shared::{Arm, Posture, Real, Slip};
+
+/// Points that reach from one end over the other, to either side of the tip.
+const MOST_REFUSED: u32 = 128;
+/// Halvings of the last step: 6 mm / 2⁹ is 11 µm.
+const HALVINGS: u32 = 9;
+
+/// Friction with its margin, and where on the belt it is asked about.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Admissibility<'a> {
+    pub(super) arm: &'a Arm<f32>,
+    pub(super) posture: Posture,
+    /// μ̂ plus margin.
+    pub(super) friction: f32,
+    /// Direction of slip; `None` while it has not been seen.
+    pub(super) slip: Option<Slip>,
+    pub(super) minimum_p_ratio: f32,
+}
+
+impl Admissibility<'_> {
+    /// Whether sliding has a solution there with p to spare.
+    pub(super) fn at(&self, tip_t_m: f32) -> bool {
+        self.arm
+            .coupling_on_belt(tip_t_m, self.posture)
+            .is_some_and(|coupling| {
+                let against = match self.slip {
+                    Some(slip) => slip.sign::<f32>() * coupling,
+                    // It must do for either.
+                    None => coupling.abs(),
+                };
+                1.0 - self.friction * against >= self.minimum_p_ratio
+            })
+    }
+}
+
+/// What the search is about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    /// From the tip to either side for a point that is admissible.
+    Entering {
+        /// Points that are not.
+        refused: u32,
+    },
+    /// Outwards for one that is not.
+    Marching,
+    /// Between the two.
+    Halving { beyond_m: f32, times: u32 },
+    /// Done: the edge is at the inside.
+    Found,
+}
+
+/// The search for one end of the admissible stretch, and how far it is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Search {
+    /// +1 towards the upper edge, −1 towards the lower one.
+    pub(super) direction: f32,
+    /// Last point on the tip's side of the edge, m.
+    pub(super) inside_m: f32,
+    stage: Stage,
+}
+
+impl Search {
+    /// For the upper edge (`direction` +1) or the lower one (−1), from a tip at `tip_t_m`.
+    pub(super) fn start(direction: f32, tip_t_m: f32) -> Self {
+        Self {
+            direction,
+            inside_m: tip_t_m,
+            stage: Stage::Entering { refused: 0 },
+        }
+    }
+
+    /// Whether the edge has been found: at the inside.
+    pub(super) fn is_over(&self) -> bool {
+        self.stage == Stage::Found
+    }
+
+    /// The point to look at, m.
+    pub(super) fn point(&self, step_m: f32, reach_m: f32) -> f32 {
+        let point = match self.stage {
+            Stage::Found => self.inside_m,
+            // By turns on the side of the middle of the belt and on the other.
+            Stage::Entering { refused } => {
+                let away_m = step_m * refused.div_ceil(2) as f32;
+                let inwards = refused % 2 == 1;
+                let outwards_m = away_m.copysign(self.inside_m);
+                self.inside_m + if inwards { -outwards_m } else { outwards_m }
+            }
+            Stage::Marching => self.inside_m + self.direction * step_m,
+            Stage::Halving { beyond_m, .. } => 0.5 * (self.inside_m + beyond_m),
+        };
+        point.within(reach_m)
+    }
+
+    /// The search after the point has been looked at.
+    pub(super) fn next(self, point_m: f32, admissible: bool, reach_m: f32) -> Self {
+        let (inside_m, stage) = match (self.stage, admissible) {
+            (Stage::Entering { .. }, true) => (point_m, Stage::Marching),
+            // Nothing is admissible: the middle of the belt is as good as any place.
+            (Stage::Entering { refused }, false) if refused >= MOST_REFUSED => (0.0, Stage::Found),
+            (Stage::Entering { refused }, false) => {
+                let refused = refused + 1;
+                (self.inside_m, Stage::Entering { refused })
+            }
+            (Stage::Marching, true) if point_m.abs() >= reach_m => (point_m, Stage::Found),
+            (Stage::Marching, true) => (point_m, Stage::Marching),
+            (Stage::Marching, false) => {
+                let halving = Stage::Halving {
+                    beyond_m: point_m,
+                    times: 0,
+                };
+                (self.inside_m, halving)
+            }
+            (Stage::Halving { times, .. }, _) if times >= HALVINGS => (self.inside_m, Stage::Found),
+            (Stage::Halving { beyond_m, times }, true) => {
+                let times = times + 1;
+                (point_m, Stage::Halving { beyond_m, times })
+            }
+            (Stage::Halving { times, .. }, false) => {
+                let halving = Stage::Halving {
+                    beyond_m: point_m,
+                    times: times + 1,
+                };
+                (self.inside_m, halving)
+            }
+            (Stage::Found, _) => (self.inside_m, Stage::Found),
+        };
+        Self {
+            inside_m,
+            stage,
+            ..self
+        }
+    }
+}
