@@ -35,7 +35,7 @@ impl Default for GovernorSettings {
             p_ratio_per_s2: 1e4,
             friction_deviations: 1.5,
             distance_m: 0.6e-3,
-            distance_counts: 4.0,
+            distance_counts: 3.0,
             braking_m_s2: 1.0,
             catch_up_m_s: 0.3,
         }
