@@ -46,7 +46,12 @@ pub fn run() -> Result<(), ChoreError> {
             let folder = workspace().join("target/debian");
             let folder = folder.to_string_lossy();
             let build = [&build[..], &["-Zbuild-std=core", "--target-dir", &folder]].concat();
-            let environment = [("RUSTC", DEBIAN_RUSTC), ("RUSTC_BOOTSTRAP", "1")];
+            let environment = [
+                ("RUSTC", DEBIAN_RUSTC),
+                ("RUSTC_BOOTSTRAP", "1"),
+                // Debian's compiler comes without the linker that the target names.
+                ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld"),
+            ];
             run_with("/usr/bin/cargo", &build, &environment)?;
             for name in ["painleve-qemu", "painleve-qemu-serial", "painleve-f405"] {
                 let built = workspace().join(format!("target/debian/{TARGET}/{PROFILE}/{name}"));
