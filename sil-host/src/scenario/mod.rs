@@ -128,16 +128,21 @@ pub struct InitialState {
 impl Default for InitialState {
     /// The paper's x0,d.
     fn default() -> Self {
-        Self {
-            theta1_deg: -11.4,
-            theta2_deg: -35.1,
-            theta1_dot_rad_s: 0.0,
-            theta2_dot_rad_s: 0.0,
-        }
+        Self::at_rest(-11.4, -35.1)
     }
 }
 
 impl InitialState {
+    /// An arm at rest with these angles from the downward vertical, degrees.
+    pub fn at_rest(theta1_deg: f64, theta2_deg: f64) -> Self {
+        Self {
+            theta1_deg,
+            theta2_deg,
+            theta1_dot_rad_s: 0.0,
+            theta2_dot_rad_s: 0.0,
+        }
+    }
+
     /// As the plant's state.
     pub fn state(&self) -> State {
         State::new(

@@ -213,12 +213,25 @@ pub fn start(arm: &ArmParameters<f64>, posture: Posture) -> Result<InitialState,
                 })?;
         (theta.x.to_degrees(), theta.y.to_degrees())
     };
-    Ok(InitialState {
-        theta1_deg,
-        theta2_deg,
-        theta1_dot_rad_s: 0.0,
-        theta2_dot_rad_s: 0.0,
-    })
+    Ok(InitialState::at_rest(theta1_deg, theta2_deg))
+}
+
+/// An arm at rest in a posture with its tip on the belt at `tip_t_m` (m).
+///
+/// # Errors
+/// [`StudyError`] if that is out of its reach.
+pub fn at_rest_on_belt(
+    arm: &Arm<f64>,
+    tip_t_m: f64,
+    posture: Posture,
+) -> Result<InitialState, StudyError> {
+    let theta = arm
+        .joint_angles_on_belt_rad(tip_t_m, posture)
+        .ok_or_else(|| StudyError::Option(format!("z_t = {tip_t_m} m is out of reach")))?;
+    Ok(InitialState::at_rest(
+        theta.x.to_degrees(),
+        theta.y.to_degrees(),
+    ))
 }
 
 /// The scenario of a case: the controller's own without a reference, the converters, the

@@ -17,13 +17,14 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
+use super::case;
 use super::contact_watch::ContactWatch;
 use super::robustness::{FalseAlarms, admissible_m};
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
 use crate::plant::belt::BeltProfile;
-use crate::scenario::{InitialState, Scenario};
+use crate::scenario::Scenario;
 use first_flight::FirstFlight;
 
 pub use outcome::{LiftOffs, OfEvidence};
@@ -132,15 +133,7 @@ impl LiftOff {
             },
         ]);
         scenario.run.duration_s = self.slide_s + duration_s + PATIENCE_S;
-        let theta = arm
-            .joint_angles_on_belt_rad(start_m, posture)
-            .ok_or_else(|| StudyError::Option(format!("z_t = {start_m} m is out of reach")))?;
-        scenario.initial = InitialState {
-            theta1_deg: theta.x.to_degrees(),
-            theta2_deg: theta.y.to_degrees(),
-            theta1_dot_rad_s: 0.0,
-            theta2_dot_rad_s: 0.0,
-        };
+        scenario.initial = case::at_rest_on_belt(&arm, start_m, posture)?;
         Ok(scenario.with_overrides("lift-off", &self.overrides)?)
     }
 

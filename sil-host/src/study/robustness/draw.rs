@@ -7,10 +7,10 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 use crate::plant::belt::BeltProfile;
-use crate::scenario::{InitialState, Scenario};
+use crate::scenario::Scenario;
 use crate::study::StudyError;
 use crate::study::belt_line::{BeltLine, positive_stretches};
-use crate::study::case::Reference;
+use crate::study::case::{self, Reference};
 
 /// Part of the reach that is used: at its end the arm is straight.
 const USED_REACH: f64 = 0.97;
@@ -120,14 +120,6 @@ pub fn scenario(seed: u64, index: u64) -> Result<Scenario, StudyError> {
     };
     scenario.controller.reference = reference.to(target_m.clamp(-FARTHEST_M, FARTHEST_M));
     scenario.run.duration_s = reference.duration_s() + super::CAPTURE_LIMIT_S + REST_S;
-    let theta = arm
-        .joint_angles_on_belt_rad(start_m, posture)
-        .ok_or_else(|| StudyError::Option(format!("z_t = {start_m} m is out of reach")))?;
-    scenario.initial = InitialState {
-        theta1_deg: theta.x.to_degrees(),
-        theta2_deg: theta.y.to_degrees(),
-        theta1_dot_rad_s: 0.0,
-        theta2_dot_rad_s: 0.0,
-    };
+    scenario.initial = case::at_rest_on_belt(&arm, start_m, posture)?;
     Ok(scenario)
 }
