@@ -8,9 +8,9 @@
 //!   encoder, h = ½ (|z_t| Δθ₁ + l |sin θ₂| Δθ₂₁). A gap above h is no contact. An impact without
 //!   collision also stops the slip (the impulse goes on until slip dies): the tip's velocity
 //!   along the belt jumps by the belt's speed, which the tracking loops see at
-//!   once. The gap that follows confirms it. Without an impact the tip, which friction no longer
-//!   pulls, runs ahead of what the loops expect under the wanted contact force: together with
-//!   the beginning of a gap that is flight.
+//!   once. The gap that follows confirms it. Without an impact the joints, on which the contact
+//!   force acts no more, run ahead of what the loops expect under the wanted one: their
+//!   innovations weigh the wanted force against none, as the force cell's reading does.
 //!
 //! Either alone is enough; together the force cell, when it is there, decides first.
 
@@ -29,10 +29,11 @@ const GAP_FOR: f32 = 2.0;
 const GAP_AGAINST: f32 = 6.0;
 /// Slope of the log-odds over the gap in units of its uncertainty.
 const GAP_SLOPE: f32 = 16.0;
-/// Release of the tip, in units of its uncertainty, that makes flight of a smaller gap …
-const RELEASE_RATIO: f32 = 1.5;
-/// … of so many times its uncertainty, at once.
-const RELEASE_GAP: f32 = 0.9;
+/// Most that a contact force that is missed may take away.
+const RELEASE_AGAINST: f32 = 6.0;
+/// Variance of an innovation, counts²: that of a count's rounding, half as much again by the
+/// tracking loop.
+const INNOVATION_VARIANCE: f32 = 0.125;
 /// Jump of the tip along the belt, in units of its uncertainty, that an impact explains better.
 const JUMP_RATIO: f32 = 2.5;
 
@@ -96,19 +97,22 @@ impl ContactSettings {
     }
 }
 
-/// What the encoders say about the tip at one tick.
+/// What the encoders say about the contact at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GapReading {
+pub struct EncoderReading {
     /// Measured height of the tip over the belt, m.
     pub gap_m: f32,
     /// Largest error of the gap from the encoders' resolution, m.
     pub gap_error_m: f32,
     /// How far the tip moved along the belt beyond what the tracking loops expected, m.
     pub jump_m: f32,
-    /// The same in the direction in which the tip goes when the contact force is gone, m.
-    pub release_m: f32,
     /// Largest error of that, m.
     pub jump_error_m: f32,
+    /// Innovations of the tracking loops along those that the expected contact force leaves in
+    /// the end when it is gone, counts²: their inner product …
+    pub release: f32,
+    /// … which is then the latters' squared length, counts².
+    pub full_release: f32,
 }
 
 /// The log-odds with the decision that follows from them.
@@ -132,24 +136,24 @@ impl ContactObserver {
         }
     }
 
-    /// Takes in one tick's readings: normal force (N) and gap. Returns whether the tip touches.
-    pub fn update(&mut self, normal_force_n: f32, gap: &GapReading) -> bool {
+    /// Takes in one tick's readings: normal force (N) and encoders. Returns whether the tip touches.
+    pub fn update(&mut self, normal_force_n: f32, encoders: &EncoderReading) -> bool {
         let change = match self.settings.evidence {
             Evidence::ForceCell => {
                 let above = normal_force_n - 0.5 * self.settings.contact_n;
                 (self.slope_per_n * above).within(FORCE_LIMIT)
             }
             Evidence::Encoders => {
-                let uncertainty = gap.gap_error_m + self.settings.gap_uncertainty_m;
-                let mut change =
-                    (GAP_SLOPE * (1.0 - gap.gap_m / uncertainty)).limited(-GAP_AGAINST, GAP_FOR);
-                if gap.release_m > RELEASE_RATIO * gap.jump_error_m
-                    && gap.gap_m > RELEASE_GAP * uncertainty
-                {
-                    change = -(CERTAIN + DECISION);
-                }
+                let uncertainty = encoders.gap_error_m + self.settings.gap_uncertainty_m;
+                let gap = (GAP_SLOPE * (1.0 - encoders.gap_m / uncertainty))
+                    .limited(-GAP_AGAINST, GAP_FOR);
+                let release = ((0.5 * encoders.full_release - encoders.release)
+                    / INNOVATION_VARIANCE)
+                    .limited(-RELEASE_AGAINST, 0.0);
+                let mut change = gap + release;
                 // A jump alone leaves it open; the gap that follows decides.
-                if gap.jump_m.abs() > JUMP_RATIO * gap.jump_error_m && self.log_odds > 0.0 {
+                let jumps = encoders.jump_m.abs() > JUMP_RATIO * encoders.jump_error_m;
+                if jumps && self.log_odds > 0.0 {
                     change = change.min(0.0) - self.log_odds;
                 }
                 change
@@ -201,13 +205,13 @@ mod tests {
         })
     }
 
-    fn gap(gap_m: f32) -> GapReading {
-        GapReading {
+    fn gap(gap_m: f32) -> EncoderReading {
+        EncoderReading {
             gap_m,
             gap_error_m: 50e-6,
             jump_m: 0.0,
-            release_m: 0.0,
             jump_error_m: 60e-6,
+            ..Default::default()
         }
     }
 
@@ -219,7 +223,7 @@ mod tests {
     #[test]
     fn the_force_cell_decides_within_a_few_ticks_and_does_not_chatter() {
         let mut observer = observer(Evidence::ForceCell);
-        let nothing = GapReading::default();
+        let nothing = EncoderReading::default();
         assert!(!observer.flight(), "at the start there is doubt");
         assert_eq!(ticks_until(true, || observer.update(0.5, &nothing)), 2);
         for force in [0.3, 0.15, 0.4, 0.2, 0.35, 0.25] {
@@ -246,27 +250,29 @@ mod tests {
     }
 
     #[test]
-    fn a_release_with_the_beginning_of_a_gap_is_flight_and_neither_alone_is() {
-        let release = |gap_m, release_m| GapReading {
-            release_m,
-            ..gap(gap_m)
-        };
-        let sees_flight = |reading| {
+    fn a_contact_force_that_is_missed_is_flight_unless_it_is_too_small_to_be_seen() {
+        // Full release, and the part of it that shows.
+        let ticks_until_flight = |full_release: f32, part: f32| {
+            let reading = |release| EncoderReading {
+                release,
+                full_release,
+                ..gap(0.0)
+            };
             let mut observer = observer(Evidence::Encoders);
             for _ in 0..20 {
-                observer.update(0.0, &gap(0.0));
+                observer.update(0.0, &reading(0.0));
             }
-            !observer.update(0.0, &reading)
+            (1..100).find(|_| !observer.update(0.0, &reading(part * full_release)))
         };
-        assert!(sees_flight(release(62e-6, 200e-6)));
-        assert!(!sees_flight(release(62e-6, -200e-6)));
-        assert!(!sees_flight(release(62e-6, 80e-6)));
-        assert!(!sees_flight(release(40e-6, 200e-6)));
+        assert_eq!(ticks_until_flight(9.0, 1.0), Some(3));
+        assert_eq!(ticks_until_flight(9.0, 0.4), None);
+        assert_eq!(ticks_until_flight(9.0, -3.0), None);
+        assert_eq!(ticks_until_flight(0.1, 1.0), None);
     }
 
     #[test]
     fn a_jump_alone_is_no_flight_but_makes_a_small_gap_one() {
-        let jump = GapReading {
+        let jump = EncoderReading {
             jump_m: 300e-6,
             ..gap(20e-6)
         };

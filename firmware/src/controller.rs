@@ -53,8 +53,8 @@ pub struct Controller {
     posture: Posture,
     /// θ̈ of q' expected until the next tick, rad/s².
     expected_acceleration: Vector2<f32>,
-    /// Contact force (f_t, f_n) expected with it, N.
-    expected_force_n: Vector2<f32>,
+    /// What of it the contact force is expected to cause, rad/s².
+    contact_acceleration: Vector2<f32>,
     /// Torque that rounding to counts still owes, N·m.
     rounding_nm: Vector2<f32>,
     last_sequence: Option<u32>,
@@ -113,7 +113,7 @@ impl Controller {
             recovery: Recovery::new(&configuration.recovery),
             posture: Posture::ElbowDown,
             expected_acceleration: Vector2::zeros(),
-            expected_force_n: Vector2::zeros(),
+            contact_acceleration: Vector2::zeros(),
             rounding_nm: Vector2::zeros(),
             last_sequence: None,
             unread_ticks: 0,
@@ -295,7 +295,7 @@ impl Controller {
         self.telemetry.recovering = false;
         self.telemetry.at_edge = false;
         self.expected_acceleration = Vector2::zeros();
-        self.expected_force_n = Vector2::zeros();
+        self.contact_acceleration = Vector2::zeros();
         self.rounding_nm = Vector2::zeros();
         self.report(tick);
     }

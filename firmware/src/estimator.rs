@@ -183,6 +183,25 @@ impl Estimator {
         })
     }
 
+    /// Measured less expected joint angles q' at the last tick, counts.
+    pub fn innovation_counts(&self) -> Vector2<f32> {
+        let [lsb_1, lsb_2] = self.rad_per_count;
+        self.joints.map_or_else(Vector2::zeros, |[one, two]| {
+            Vector2::new(one.innovation_rad / lsb_1, two.innovation_rad / lsb_2)
+        })
+    }
+
+    /// Innovation, counts, that an acceleration of q' (rad/s²) leaves in the end if the loops
+    /// are not told of it: θ̈ T²/(1 − z)².
+    pub fn lag_counts(&self, acceleration_rad_s2: &Vector2<f32>) -> Vector2<f32> {
+        let [lsb_1, lsb_2] = self.rad_per_count;
+        let lag_s2 = self.tick_s / self.rate_gain_per_s;
+        Vector2::new(
+            acceleration_rad_s2.x * lag_s2 / lsb_1,
+            acceleration_rad_s2.y * lag_s2 / lsb_2,
+        )
+    }
+
     /// Part of the innovation that a tick leaves: measured less estimated angles.
     pub fn residual_share(&self) -> f32 {
         1.0 - self.angle_gain

@@ -103,16 +103,15 @@ impl Model {
         joint_torque_nm(&-(self.jacobian.transpose() * force_n))
     }
 
-    /// Joint acceleration θ̈ (rad/s²) under joint torques (u1, u2), N·m, and a contact force
-    /// (f_t, f_n), N: M⁻¹ (u − w − c + Jᵀ f).
-    pub fn acceleration_rad_s2(
-        &self,
-        torque_nm: &Vector2<f32>,
-        force_n: &Vector2<f32>,
-    ) -> Vector2<f32> {
-        let load =
-            generalised_torque_nm(torque_nm) - self.bias_nm + self.jacobian.transpose() * force_n;
-        self.mobility * load
+    /// Joint acceleration θ̈ (rad/s²) of an arm without contact under joint torques (u1, u2), N·m:
+    /// M⁻¹ (u − w − c).
+    pub fn free_acceleration_rad_s2(&self, torque_nm: &Vector2<f32>) -> Vector2<f32> {
+        self.mobility * (generalised_torque_nm(torque_nm) - self.bias_nm)
+    }
+
+    /// Joint acceleration θ̈ (rad/s²) that a contact force (f_t, f_n), N, adds: M⁻¹ Jᵀ f.
+    pub fn contact_acceleration_rad_s2(&self, force_n: &Vector2<f32>) -> Vector2<f32> {
+        self.mobility * (self.jacobian.transpose() * force_n)
     }
 
     /// Free normal acceleration as a function of the joint torques,
@@ -155,7 +154,8 @@ mod tests {
             let acceleration = Vector2::new(a1, a2);
             let force = Vector2::new(-0.6 * f_n, f_n);
             let torque = model.inverse_dynamics_nm(&acceleration, &force);
-            let found = model.acceleration_rad_s2(&torque, &force);
+            let found =
+                model.free_acceleration_rad_s2(&torque) + model.contact_acceleration_rad_s2(&force);
             prop_assert!((found - acceleration).norm() < 0.02, "{} {}", found, acceleration);
         }
 

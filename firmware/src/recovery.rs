@@ -217,7 +217,7 @@ mod tests {
                 let torque = recovery.tick(&arm, &model, Some(edges), 1e-3).torque_nm;
                 for _ in 0..10 {
                     let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
-                    theta_dot += model.acceleration_rad_s2(&torque, &Vector2::zeros()) * 1e-4;
+                    theta_dot += model.free_acceleration_rad_s2(&torque) * 1e-4;
                     theta += theta_dot * 1e-4;
                 }
                 let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());

@@ -33,9 +33,11 @@ impl Controller {
         }
         self.apply(&torque_nm);
         let given_nm = Vector2::from(self.telemetry.torque_nm);
-        let acceleration = model.acceleration_rad_s2(&given_nm, &output.contact_force_n);
-        self.expected_force_n = output.contact_force_n;
-        self.expected_acceleration = Vector2::new(acceleration.x, acceleration.y - acceleration.x);
+        let of_encoders = |theta: Vector2<f32>| Vector2::new(theta.x, theta.y - theta.x);
+        self.contact_acceleration =
+            of_encoders(model.contact_acceleration_rad_s2(&output.contact_force_n));
+        self.expected_acceleration =
+            of_encoders(model.free_acceleration_rad_s2(&given_nm)) + self.contact_acceleration;
     }
 
     /// Limits the wanted torques and turns them into counts.

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use painleve_shared::frame::SensorFrame;
 
 use super::Controller;
-use crate::contact_observer::GapReading;
+use crate::contact_observer::EncoderReading;
 use crate::disturbance_observer::Balance;
 use crate::friction_estimator::FrictionEstimate;
 use crate::model::Model;
@@ -42,9 +42,9 @@ impl Controller {
         let in_range = [frame.tangential_force, frame.normal_force]
             .iter()
             .all(|force| force.0.abs() < range);
-        let gap = self.gap(model);
+        let encoders = self.encoder_reading(model);
         let touched = self.contact.contact();
-        let contact = self.contact.update(force_n.y, &gap);
+        let contact = self.contact.update(force_n.y, &encoders);
         let certain = self.contact.is_certain();
         if contact {
             if !touched && let Some(slip) = self.belt.slip(model.tip_velocity_m_s.x) {
@@ -54,7 +54,7 @@ impl Controller {
                 self.friction.update(&force_n);
             }
             if certain {
-                let length = self.calibration.update(gap.gap_m);
+                let length = self.calibration.update(encoders.gap_m);
                 self.arm = self.arm.with_link_length(length);
             }
         } else if touched {
@@ -89,18 +89,17 @@ impl Controller {
         }
     }
 
-    /// Gap and jump of the tip as the encoders show them.
-    fn gap(&self, model: &Model) -> GapReading {
+    /// What the encoders show of the contact.
+    fn encoder_reading(&self, model: &Model) -> EncoderReading {
         let innovation = self.estimator.innovation_rad();
         let residual = innovation * self.estimator.residual_share();
         let jacobian = &model.jacobian;
         let count = self.estimator.count_rad();
-        // Acceleration along the belt that the contact force is expected to cause.
-        let force = &self.expected_force_n;
-        let pull_m_s2 = model.q.m11 * force.x + model.q.m12 * force.y;
-        let jump_m = jacobian.m11 * innovation.x + jacobian.m12 * innovation.y;
-        GapReading {
-            release_m: -jump_m * pull_m_s2.signum(),
+        // What the innovation settles at when the contact force is gone.
+        let release = -self.estimator.lag_counts(&self.contact_acceleration);
+        EncoderReading {
+            release: release.dot(&self.estimator.innovation_counts()),
+            full_release: release.norm_squared(),
             gap_m: model.gap_m + jacobian.m21 * residual.x + jacobian.m22 * residual.y,
             // Half a count of either encoder; the second one turns θ2 alone.
             gap_error_m: 0.5 * (model.tip_m.x.abs() * count.x + jacobian.m22.abs() * count.y),
