@@ -5,14 +5,10 @@
 //!   f_c and none: (f_c/σ²) (f − f_c/2). A noisy reading near zero does not chatter, and a
 //!   clear one decides within two or three ticks.
 //! - **Encoders**: the height of the tip over the belt is known to within half a count of either
-//!   encoder, h = ½ (|z_t| Δθ₁ + l |sin θ₂| Δθ₂₁). A gap above h is no contact. An impact without
-//!   collision also stops the slip (the impulse goes on until slip dies): the tip's velocity
-//!   along the belt jumps by the belt's speed, which the tracking loops see at
-//!   once. The gap that follows confirms it. Without an impact the joints, on which the contact
-//!   force acts no more, run ahead of what the loops expect under the wanted one: their
-//!   innovations weigh the wanted force against none, as the force cell's reading does.
-//!
-//! Either alone is enough; together the force cell, when it is there, decides first.
+//!   encoder, h = ½ (|z_t| Δθ₁ + l |sin θ₂| Δθ₂₁). A gap beyond h is no contact. And joints on
+//!   which the contact force acts no more run ahead of what the tracking loops expect under the
+//!   wanted one: their innovations weigh the wanted force against none, as the force cell's
+//!   reading does.
 
 use painleve_shared::Real;
 use painleve_shared::range::{self, OutOfRange};
@@ -31,11 +27,8 @@ const GAP_AGAINST: f32 = 6.0;
 const GAP_SLOPE: f32 = 16.0;
 /// Most that a contact force that is missed may take away.
 const RELEASE_AGAINST: f32 = 6.0;
-/// Variance of an innovation, counts²: that of a count's rounding, half as much again by the
-/// tracking loop.
-const INNOVATION_VARIANCE: f32 = 0.125;
-/// Jump of the tip along the belt, in units of its uncertainty, that an impact explains better.
-const JUMP_RATIO: f32 = 2.5;
+/// Variance of an innovation, counts²: that of a rounding.
+const INNOVATION_VARIANCE: f32 = 1.0 / 12.0;
 
 /// Which readings decide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -102,12 +95,8 @@ impl ContactSettings {
 pub struct EncoderReading {
     /// Measured height of the tip over the belt, m.
     pub gap_m: f32,
-    /// Largest error of the gap from the encoders' resolution, m.
-    pub gap_error_m: f32,
-    /// How far the tip moved along the belt beyond what the tracking loops expected, m.
-    pub jump_m: f32,
     /// Largest error of that, m.
-    pub jump_error_m: f32,
+    pub gap_error_m: f32,
     /// Innovations of the tracking loops along those that the expected contact force leaves in
     /// the end when it is gone, counts²: their inner product …
     pub release: f32,
@@ -115,10 +104,18 @@ pub struct EncoderReading {
     pub full_release: f32,
 }
 
+impl EncoderReading {
+    /// Whether the tip seems to be below the belt: the links are shorter than they are taken to be.
+    pub fn is_below_belt(&self) -> bool {
+        self.gap_m < -self.gap_error_m
+    }
+}
+
 /// The log-odds with the decision that follows from them.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactObserver {
-    settings: ContactSettings,
+    /// f_c, N.
+    contact_n: f32,
     /// f_c/σ², 1/N.
     slope_per_n: f32,
     log_odds: f32,
@@ -129,36 +126,30 @@ impl ContactObserver {
     /// An observer that takes the tip to be in the air.
     pub fn new(settings: &ContactSettings) -> Self {
         Self {
-            settings: *settings,
+            contact_n: settings.contact_n,
             slope_per_n: settings.contact_n / (settings.force_noise_n * settings.force_noise_n),
             log_odds: -DECISION,
             contact: false,
         }
     }
 
-    /// Takes in one tick's readings: normal force (N) and encoders. Returns whether the tip touches.
-    pub fn update(&mut self, normal_force_n: f32, encoders: &EncoderReading) -> bool {
-        let change = match self.settings.evidence {
-            Evidence::ForceCell => {
-                let above = normal_force_n - 0.5 * self.settings.contact_n;
-                (self.slope_per_n * above).within(FORCE_LIMIT)
-            }
-            Evidence::Encoders => {
-                let uncertainty = encoders.gap_error_m + self.settings.gap_uncertainty_m;
-                let gap = (GAP_SLOPE * (1.0 - encoders.gap_m / uncertainty))
-                    .limited(-GAP_AGAINST, GAP_FOR);
-                let release = ((0.5 * encoders.full_release - encoders.release)
-                    / INNOVATION_VARIANCE)
-                    .limited(-RELEASE_AGAINST, 0.0);
-                let mut change = gap + release;
-                // A jump alone leaves it open; the gap that follows decides.
-                let jumps = encoders.jump_m.abs() > JUMP_RATIO * encoders.jump_error_m;
-                if jumps && self.log_odds > 0.0 {
-                    change = change.min(0.0) - self.log_odds;
-                }
-                change
-            }
-        };
+    /// Takes in one tick's normal force from the force cell, N. Returns whether the tip touches.
+    pub fn update_from_force(&mut self, normal_force_n: f32) -> bool {
+        let above = normal_force_n - 0.5 * self.contact_n;
+        self.weigh((self.slope_per_n * above).within(FORCE_LIMIT))
+    }
+
+    /// Takes in what one tick's encoders say. Returns whether the tip touches.
+    pub fn update_from_encoders(&mut self, encoders: &EncoderReading) -> bool {
+        let gap = (GAP_SLOPE * (1.0 - encoders.gap_m.abs() / encoders.gap_error_m))
+            .limited(-GAP_AGAINST, GAP_FOR);
+        let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
+            .limited(-RELEASE_AGAINST, 0.0);
+        self.weigh(gap + release)
+    }
+
+    /// Adds to the log-odds; decides.
+    fn weigh(&mut self, change: f32) -> bool {
         self.log_odds = (self.log_odds + change).within(CERTAIN);
         if self.contact {
             self.contact = self.log_odds > -DECISION;
@@ -198,19 +189,14 @@ impl ContactObserver {
 mod tests {
     use super::*;
 
-    fn observer(evidence: Evidence) -> ContactObserver {
-        ContactObserver::new(&ContactSettings {
-            evidence,
-            ..Default::default()
-        })
+    fn observer() -> ContactObserver {
+        ContactObserver::new(&ContactSettings::default())
     }
 
     fn gap(gap_m: f32) -> EncoderReading {
         EncoderReading {
             gap_m,
-            gap_error_m: 50e-6,
-            jump_m: 0.0,
-            jump_error_m: 60e-6,
+            gap_error_m: 65e-6,
             ..Default::default()
         }
     }
@@ -222,31 +208,30 @@ mod tests {
 
     #[test]
     fn the_force_cell_decides_within_a_few_ticks_and_does_not_chatter() {
-        let mut observer = observer(Evidence::ForceCell);
-        let nothing = EncoderReading::default();
+        let mut observer = observer();
         assert!(!observer.flight(), "at the start there is doubt");
-        assert_eq!(ticks_until(true, || observer.update(0.5, &nothing)), 2);
+        assert_eq!(ticks_until(true, || observer.update_from_force(0.5)), 2);
         for force in [0.3, 0.15, 0.4, 0.2, 0.35, 0.25] {
-            assert!(observer.update(force, &nothing), "{force}");
+            assert!(observer.update_from_force(force), "{force}");
         }
         for _ in 0..3 {
-            observer.update(10.0, &nothing);
+            observer.update_from_force(10.0);
         }
         assert_eq!(observer.confidence(), 1.0);
-        assert!(ticks_until(false, || observer.update(0.0, &nothing)) <= 3);
-        assert!(!observer.update(0.1, &nothing));
+        assert!(ticks_until(false, || observer.update_from_force(0.0)) <= 3);
+        assert!(!observer.update_from_force(0.1));
     }
 
     #[test]
     fn a_gap_that_the_encoders_resolve_is_no_contact() {
-        let mut observer = observer(Evidence::Encoders);
+        let mut observer = observer();
         for tick in 0..1000 {
             // Quantisation alone.
-            observer.update(0.0, &gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
+            observer.update_from_encoders(&gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
         }
         assert!(observer.contact());
-        assert!(ticks_until(false, || observer.update(10.0, &gap(100e-6))) <= 3);
-        assert!(ticks_until(true, || observer.update(0.0, &gap(0.0))) <= 8);
+        assert!(ticks_until(false, || observer.update_from_encoders(&gap(100e-6))) <= 3);
+        assert!(ticks_until(true, || observer.update_from_encoders(&gap(0.0))) <= 8);
     }
 
     #[test]
@@ -258,31 +243,15 @@ mod tests {
                 full_release,
                 ..gap(0.0)
             };
-            let mut observer = observer(Evidence::Encoders);
+            let mut observer = observer();
             for _ in 0..20 {
-                observer.update(0.0, &reading(0.0));
+                observer.update_from_encoders(&reading(0.0));
             }
-            (1..100).find(|_| !observer.update(0.0, &reading(part * full_release)))
+            (1..100).find(|_| !observer.update_from_encoders(&reading(part * full_release)))
         };
         assert_eq!(ticks_until_flight(9.0, 1.0), Some(3));
         assert_eq!(ticks_until_flight(9.0, 0.4), None);
         assert_eq!(ticks_until_flight(9.0, -3.0), None);
         assert_eq!(ticks_until_flight(0.1, 1.0), None);
-    }
-
-    #[test]
-    fn a_jump_alone_is_no_flight_but_makes_a_small_gap_one() {
-        let jump = EncoderReading {
-            jump_m: 300e-6,
-            ..gap(20e-6)
-        };
-        let mut observer = observer(Evidence::Encoders);
-        for _ in 0..20 {
-            observer.update(0.0, &gap(0.0));
-        }
-        assert!(observer.update(0.0, &jump));
-        assert!(observer.update(0.0, &gap(20e-6)));
-        observer.update(0.0, &jump);
-        assert!(!observer.update(0.0, &gap(90e-6)));
     }
 }

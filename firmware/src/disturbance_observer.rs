@@ -106,11 +106,15 @@ impl DisturbanceObserver {
         let acceleration = (model.theta_dot_rad_s - before) / balance.elapsed_s;
         let needed_nm = model.inverse_dynamics_nm(&acceleration, &balance.force_n);
         let residual_nm = generalised_torque_nm(&(needed_nm - balance.torque_nm));
+        let limit = self.settings.limit_nm;
+        // Both may be at the limit, with opposite signs; more than that is an impact.
+        if residual_nm.amax() > 2.0 * limit {
+            return;
+        }
         let share = balance
             .p_per_kg
             .map_or(1.0, |p| SHARE * (p / model.q.m22).at_least(0.0));
         let weight = (self.settings.bandwidth_rad_s * self.tick_s).at_most(share);
-        let limit = self.settings.limit_nm;
         self.disturbance_nm =
             (self.disturbance_nm + residual_nm * weight).map(|torque| torque.within(limit));
     }
@@ -187,12 +191,24 @@ mod tests {
     #[test]
     fn it_is_limited() {
         let found = observed(
-            Vector2::new(5.0, -5.0),
+            Vector2::new(1.9, -1.5),
             Vector2::zeros(),
             Vector2::zeros(),
             None,
             500,
         );
         assert_eq!(found, Vector2::new(1.0, -1.0));
+    }
+
+    #[test]
+    fn an_impact_is_not_taken_for_a_torque() {
+        let found = observed(
+            Vector2::zeros(),
+            Vector2::new(3000.0, -2000.0),
+            Vector2::new(-6.0, 10.0),
+            None,
+            1,
+        );
+        assert_eq!(found, Vector2::zeros());
     }
 }

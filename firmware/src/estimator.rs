@@ -81,6 +81,7 @@ pub struct Estimator {
     angle_gain: f32,
     rate_gain_per_s: f32,
     joints: Option<[TrackingLoop; 2]>,
+    moved: bool,
 }
 
 impl Estimator {
@@ -100,6 +101,7 @@ impl Estimator {
             angle_gain: 1.0 - pole * pole,
             rate_gain_per_s: (1.0 - pole) * (1.0 - pole) * tick_hz,
             joints: None,
+            moved: false,
         }
     }
 
@@ -110,31 +112,30 @@ impl Estimator {
     /// set the angles with zero rates.
     ///
     /// # Errors
-    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the
-    /// estimate stays as it was.
+    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the loops start again
+    /// from these readings.
     pub fn update(
         &mut self,
         readings: &[EncoderCounts; 2],
         elapsed_ticks: u32,
         acceleration_rad_s2: &Vector2<f32>,
     ) -> Result<(), EncoderJump> {
-        let [scale_1, scale_2] = self.scales;
-        let [reading_1, reading_2] = *readings;
         let Some([joint_1, joint_2]) = self.joints else {
-            self.joints = Some([
-                self.start(scale_1, self.rad_per_count[0], reading_1),
-                self.start(scale_2, self.rad_per_count[1], reading_2),
-            ]);
+            self.start(readings);
             return Ok(());
         };
+        let [scale_1, scale_2] = self.scales;
+        let [reading_1, reading_2] = *readings;
         let moved_1 = scale_1.difference(joint_1.reading, reading_1);
         let moved_2 = scale_2.difference(joint_2.reading, reading_2);
         let ticks = elapsed_ticks.clamp(1, 1000) as i32;
         if moved_1.abs() > self.jump_counts[0].saturating_mul(ticks)
             || moved_2.abs() > self.jump_counts[1].saturating_mul(ticks)
         {
+            self.start(readings);
             return Err(EncoderJump);
         }
+        self.moved = moved_1 != 0 || moved_2 != 0;
         let elapsed_s = ticks as f32 * self.tick_s;
         let follow = |joint: TrackingLoop, reading, moved: i32, lsb: f32, acceleration: f32| {
             let counts = joint.counts.wrapping_add(moved);
@@ -158,15 +159,25 @@ impl Estimator {
         Ok(())
     }
 
-    fn start(&self, scale: EncoderScale, lsb: f32, reading: EncoderCounts) -> TrackingLoop {
-        let counts = scale.counts_from_zero(reading);
-        TrackingLoop {
-            reading,
-            counts,
-            angle_rad: counts as f32 * lsb,
-            rate_rad_s: 0.0,
-            innovation_rad: 0.0,
-        }
+    /// Starts both loops from these readings, at rest.
+    fn start(&mut self, readings: &[EncoderCounts; 2]) {
+        let [scale_1, scale_2] = self.scales;
+        let [reading_1, reading_2] = *readings;
+        let [lsb_1, lsb_2] = self.rad_per_count;
+        let joint = |scale: EncoderScale, lsb: f32, reading| {
+            let counts = scale.counts_from_zero(reading);
+            TrackingLoop {
+                reading,
+                counts,
+                angle_rad: counts as f32 * lsb,
+                rate_rad_s: 0.0,
+                innovation_rad: 0.0,
+            }
+        };
+        self.joints = Some([
+            joint(scale_1, lsb_1, reading_1),
+            joint(scale_2, lsb_2, reading_2),
+        ]);
     }
 
     /// Absolute joint angles θ = (θ1, θ2), rad; zero before the first readings.
@@ -181,6 +192,11 @@ impl Estimator {
         self.joints.map_or_else(Vector2::zeros, |[one, two]| {
             Vector2::new(one.innovation_rad, one.innovation_rad + two.innovation_rad)
         })
+    }
+
+    /// Whether the last readings differed from the ones before.
+    pub fn moved(&self) -> bool {
+        self.moved
     }
 
     /// Measured less expected joint angles q' at the last tick, counts.
@@ -262,16 +278,15 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_refused_and_changes_nothing() {
-        let mut estimator = track(|_| (0.2, 0.1), 0.0, 10);
-        let before = estimator.theta_rad();
+    fn a_jump_is_told_and_the_loops_start_again_from_there() {
         let jumped = [SCALE.reading(0.5), SCALE.reading(0.1)];
-        assert_eq!(
-            estimator.update(&jumped, 1, &Vector2::zeros()),
-            Err(EncoderJump)
-        );
-        assert_eq!(estimator.theta_rad(), before);
+        let mut estimator = track(|t| (0.2 + t, 0.1), 0.0, 10);
+        let jump = estimator.update(&jumped, 1, &Vector2::zeros());
+        assert_eq!(jump, Err(EncoderJump));
+        assert!((estimator.theta_rad() - Vector2::new(0.5, 0.6)).norm() < 6e-4);
+        assert_eq!(estimator.theta_dot_rad_s(), Vector2::zeros());
         // Over a longer time the same difference is a motion.
+        let mut estimator = track(|_| (0.2, 0.1), 0.0, 10);
         assert!(estimator.update(&jumped, 10, &Vector2::zeros()).is_ok());
     }
 }

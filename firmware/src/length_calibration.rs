@@ -8,6 +8,9 @@ use painleve_shared::Real;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 
+/// Part of a reading's error that no mean takes away: roundings in a row are not independent.
+const LASTING_ERROR: f32 = 0.1;
+
 /// Settings of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -90,6 +93,28 @@ impl LengthCalibration {
         }
         self.length_m
     }
+
+    /// Begins anew with a tip that is taken to be on the belt at this measured gap (m), because it
+    /// cannot be below; returns the length, m.
+    pub fn restart(&mut self, measured_gap_m: f32) -> f32 {
+        self.readings = 0.0;
+        self.update(measured_gap_m)
+    }
+
+    /// Whether no length has been looked for yet.
+    pub fn is_open(&self) -> bool {
+        self.settings.enabled && self.readings == 0.0
+    }
+
+    /// Largest error (m) of a gap whose readings are wrong by at most `reading_error_m`: the
+    /// length's mean is of such readings, too.
+    pub fn gap_error_m(&self, reading_error_m: f32) -> f32 {
+        if self.readings > 0.0 {
+            reading_error_m * (1.0 + LASTING_ERROR + 1.0 / self.readings.square_root())
+        } else {
+            reading_error_m
+        }
+    }
 }
 
 #[cfg(test)]
@@ -126,6 +151,31 @@ mod tests {
             length_m = calibration.update(gap_m(0.205, length_m) + error_m);
         }
         assert!((length_m - 0.205).abs() < 1e-6, "{length_m}");
+    }
+
+    #[test]
+    fn a_restart_forgets_what_was_read_before() {
+        let mut calibration = calibration();
+        assert!(calibration.is_open());
+        let mut length_m = 0.21;
+        for _ in 0..10 {
+            length_m = calibration.update(gap_m(0.2205, length_m));
+        }
+        assert!(!calibration.is_open());
+        length_m = calibration.restart(gap_m(0.205, length_m));
+        assert!((length_m - 0.205).abs() < 1e-6, "{length_m}");
+    }
+
+    #[test]
+    fn a_gap_is_the_more_certain_the_more_readings_the_length_is_of() {
+        let mut calibration = calibration();
+        assert_eq!(calibration.gap_error_m(50e-6), 50e-6, "nothing is read");
+        let errors_m: [f32; 100] = core::array::from_fn(|_| {
+            calibration.update(0.0);
+            calibration.gap_error_m(50e-6)
+        });
+        assert!((errors_m[0] - 105e-6).abs() < 1e-9 && (errors_m[99] - 60e-6).abs() < 1e-9);
+        assert!(errors_m.is_sorted_by(|before, after| before > after));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use painleve_shared::frame::SensorFrame;
 
 use super::Controller;
-use crate::contact_observer::EncoderReading;
+use crate::contact_observer::{EncoderReading, Evidence};
 use crate::disturbance_observer::Balance;
 use crate::friction_estimator::FrictionEstimate;
 use crate::model::Model;
@@ -42,9 +42,16 @@ impl Controller {
         let in_range = [frame.tangential_force, frame.normal_force]
             .iter()
             .all(|force| force.0.abs() < range);
-        let encoders = self.encoder_reading(model);
+        let gap_m = self.gap_m(model);
         let touched = self.contact.contact();
-        let contact = self.contact.update(force_n.y, &encoders);
+        let contact = match self.configuration.contact.evidence {
+            Evidence::ForceCell => self.contact.update_from_force(force_n.y),
+            Evidence::Encoders => {
+                let mut encoders = self.encoder_reading(model, gap_m);
+                self.find_belt(&mut encoders);
+                self.contact.update_from_encoders(&encoders)
+            }
+        };
         let certain = self.contact.is_certain();
         if contact {
             if !touched && let Some(slip) = self.belt.slip(model.tip_velocity_m_s.x) {
@@ -53,8 +60,8 @@ impl Controller {
             if in_range {
                 self.friction.update(&force_n);
             }
-            if certain {
-                let length = self.calibration.update(encoders.gap_m);
+            if certain && self.estimator.moved() {
+                let length = self.calibration.update(gap_m);
                 self.arm = self.arm.with_link_length(length);
             }
         } else if touched {
@@ -89,23 +96,40 @@ impl Controller {
         }
     }
 
-    /// What the encoders show of the contact.
-    fn encoder_reading(&self, model: &Model) -> EncoderReading {
-        let innovation = self.estimator.innovation_rad();
-        let residual = innovation * self.estimator.residual_share();
+    /// Without a force cell the belt is taken to be where the tip was lowest: where it starts, and
+    /// from then on wherever it gets below that.
+    fn find_belt(&mut self, encoders: &mut EncoderReading) {
+        let starts = self.calibration.is_open();
+        if starts || encoders.is_below_belt() {
+            let length = self.calibration.restart(encoders.gap_m);
+            self.arm = self.arm.with_link_length(length);
+        }
+        if starts {
+            encoders.gap_m = 0.0;
+        }
+    }
+
+    /// Measured height of the tip over the belt, m.
+    fn gap_m(&self, model: &Model) -> f32 {
+        let residual = self.estimator.innovation_rad() * self.estimator.residual_share();
         let jacobian = &model.jacobian;
+        model.gap_m + jacobian.m21 * residual.x + jacobian.m22 * residual.y
+    }
+
+    /// What the encoders show of the contact.
+    fn encoder_reading(&self, model: &Model, gap_m: f32) -> EncoderReading {
         let count = self.estimator.count_rad();
+        // Half a count of either encoder; the second one turns θ2 alone.
+        let rounding_m =
+            0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
         // What the innovation settles at when the contact force is gone.
         let release = -self.estimator.lag_counts(&self.contact_acceleration);
         EncoderReading {
+            gap_m,
+            gap_error_m: self.configuration.contact.gap_uncertainty_m
+                + self.calibration.gap_error_m(rounding_m),
             release: release.dot(&self.estimator.innovation_counts()),
             full_release: release.norm_squared(),
-            gap_m: model.gap_m + jacobian.m21 * residual.x + jacobian.m22 * residual.y,
-            // Half a count of either encoder; the second one turns θ2 alone.
-            gap_error_m: 0.5 * (model.tip_m.x.abs() * count.x + jacobian.m22.abs() * count.y),
-            jump_m: jacobian.m11 * innovation.x + jacobian.m12 * innovation.y,
-            jump_error_m: 0.5
-                * ((jacobian.m11 + jacobian.m12).abs() * count.x + jacobian.m12.abs() * count.y),
         }
     }
 

@@ -139,7 +139,7 @@ mod tests {
             ("sliding-range", 16),
             ("robustness", 10_000),
             ("capture", 1000),
-            ("lift-off", 2200),
+            ("lift-off", 2400),
         ] {
             let understood = understand(&campaign(study, &[])).unwrap();
             assert_eq!(understood.table.len(), rows, "{study}");

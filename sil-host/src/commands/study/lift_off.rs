@@ -17,7 +17,7 @@ pub struct LiftOffArguments {
     #[arg(
         long,
         value_name = "N",
-        default_value_t = 1100,
+        default_value_t = 1200,
         value_parser = options::runs,
         allow_negative_numbers = true
     )]

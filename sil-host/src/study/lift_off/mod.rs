@@ -65,7 +65,8 @@ pub struct Row {
     pub mu: f64,
     /// Belt speed, m/s.
     pub v_belt_m_s: f64,
-    /// When the tip left the belt, s; none if it never did.
+    /// When the tip left the belt for longer than the bar, else for the last time, s; none if it
+    /// never did.
     pub lift_off_s: Option<f64>,
     /// Time to the first touch after it, s.
     pub flight_s: Option<f64>,
@@ -77,6 +78,14 @@ pub struct Row {
     pub slid_s: f64,
     /// Whether the plant could be solved to the end; what else is here is as far as it could.
     pub solved: bool,
+}
+
+/// Within which time a lift-off shall be noticed, s.
+fn bar_s(evidence: Evidence) -> f64 {
+    match evidence {
+        Evidence::ForceCell => 5e-3,
+        Evidence::Encoders => 10e-3,
+    }
 }
 
 impl LiftOff {
@@ -157,7 +166,8 @@ impl Study for LiftOff {
     fn row(&self, index: usize) -> Result<Row, StudyError> {
         let scenario = self.scenario(index)?;
         let mut trial = Trial::new(&scenario)?;
-        let mut flight = FirstFlight::new(SETTLING_S);
+        let bar_s = bar_s(scenario.controller.contact.evidence);
+        let mut flight = FirstFlight::new(SETTLING_S, bar_s);
         let mut watch = ContactWatch::new(SETTLING_S, 0.0);
         let mut alarms = FalseAlarms::default();
         let mut noticed_s = None;
@@ -176,7 +186,8 @@ impl Study for LiftOff {
                 noticed_s = Some(sampled_s - start_s);
                 break;
             }
-            if flight.end_s.is_some_and(|end_s| sampled_s > end_s + LATE_S) {
+            let is_late = |end_s| sampled_s > end_s + LATE_S;
+            if flight.is_over() && flight.end_s.is_some_and(is_late) {
                 break;
             }
         }
@@ -188,7 +199,7 @@ impl Study for LiftOff {
                 break;
             }
         }
-        let end_s = flight.start_s.unwrap_or(trial.time_s());
+        let end_s = watch.first_lift_off_s.unwrap_or(trial.time_s());
         Ok(Row {
             index: index / 2,
             evidence: scenario.controller.contact.evidence,

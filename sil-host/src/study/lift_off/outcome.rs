@@ -4,7 +4,7 @@ use comfy_table::Table;
 use painleve_firmware::contact_observer::Evidence;
 use serde::Serialize;
 
-use super::{LiftOff, Row};
+use super::{LiftOff, Row, bar_s};
 use crate::plot::PlotError;
 use crate::plot::chart::Chart;
 use crate::plot::style::{BLUE_INK, ORANGE};
@@ -55,13 +55,6 @@ impl Row {
         self.solved
             && self.lift_off_s.is_some()
             && self.flight_s.is_none_or(|flight_s| flight_s > bar_s)
-    }
-}
-
-fn bar_s(evidence: Evidence) -> f64 {
-    match evidence {
-        Evidence::ForceCell => 5e-3,
-        Evidence::Encoders => 10e-3,
     }
 }
 
