@@ -59,7 +59,7 @@ impl EstimatorSettings {
 pub struct EncoderJump;
 
 /// Tracking loop of one joint.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct TrackingLoop {
     reading: EncoderCounts,
     /// Unwrapped, counts from angle zero.
@@ -75,12 +75,16 @@ struct TrackingLoop {
 pub struct Estimator {
     scales: [EncoderScale; 2],
     rad_per_count: [f32; 2],
+    /// What an acceleration of 1 rad/s² leaves as innovation that the loops are not told of, counts.
+    lag_counts_s2: Vector2<f32>,
     jump_counts: [i32; 2],
     rate_limit_rad_s: f32,
     tick_s: f32,
     angle_gain: f32,
     rate_gain_per_s: f32,
-    joints: Option<[TrackingLoop; 2]>,
+    /// Whether there have been readings; before, everything is zero.
+    started: bool,
+    joints: [TrackingLoop; 2],
     moved: bool,
 }
 
@@ -90,17 +94,20 @@ impl Estimator {
         let tick_s = 1.0 / tick_hz;
         let pole = libm::expf(-settings.bandwidth_rad_s * tick_s);
         let rad_per_count = scales.map(|scale| scale.rad_per_count::<f32>());
+        let rate_gain_per_s = (1.0 - pole) * (1.0 - pole) * tick_hz;
         Self {
             scales,
             rad_per_count,
+            lag_counts_s2: Vector2::from(rad_per_count.map(|lsb| tick_s / rate_gain_per_s / lsb)),
             // One count more than the limit, for the rounding of two readings.
             jump_counts: rad_per_count
                 .map(|lsb| (settings.rate_limit_rad_s * tick_s / lsb) as i32 + 2),
             rate_limit_rad_s: settings.rate_limit_rad_s,
             tick_s,
             angle_gain: 1.0 - pole * pole,
-            rate_gain_per_s: (1.0 - pole) * (1.0 - pole) * tick_hz,
-            joints: None,
+            rate_gain_per_s,
+            started: false,
+            joints: Default::default(),
             moved: false,
         }
     }
@@ -120,11 +127,12 @@ impl Estimator {
         elapsed_ticks: u32,
         acceleration_rad_s2: &Vector2<f32>,
     ) -> Result<(), EncoderJump> {
-        let Some([joint_1, joint_2]) = self.joints else {
+        if !self.started {
             self.start(readings);
             return Ok(());
-        };
-        let [scale_1, scale_2] = self.scales;
+        }
+        let [joint_1, joint_2] = &mut self.joints;
+        let [scale_1, scale_2] = &self.scales;
         let [reading_1, reading_2] = *readings;
         let moved_1 = scale_1.difference(joint_1.reading, reading_1);
         let moved_2 = scale_2.difference(joint_2.reading, reading_2);
@@ -137,61 +145,52 @@ impl Estimator {
         }
         self.moved = moved_1 != 0 || moved_2 != 0;
         let elapsed_s = ticks as f32 * self.tick_s;
-        let follow = |joint: TrackingLoop, reading, moved: i32, lsb: f32, acceleration: f32| {
-            let counts = joint.counts.wrapping_add(moved);
-            let rate = joint.rate_rad_s + acceleration * elapsed_s;
-            let angle = joint.angle_rad + 0.5 * (joint.rate_rad_s + rate) * elapsed_s;
-            let innovation = counts as f32 * lsb - angle;
-            TrackingLoop {
-                reading,
-                counts,
-                angle_rad: angle + self.angle_gain * innovation,
-                rate_rad_s: (rate + self.rate_gain_per_s * innovation)
-                    .within(self.rate_limit_rad_s),
-                innovation_rad: innovation,
-            }
-        };
+        let follow =
+            |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32, acceleration: f32| {
+                joint.reading = reading;
+                joint.counts = joint.counts.wrapping_add(moved);
+                let rate = joint.rate_rad_s + acceleration * elapsed_s;
+                let angle = joint.angle_rad + 0.5 * (joint.rate_rad_s + rate) * elapsed_s;
+                let innovation = joint.counts as f32 * lsb - angle;
+                joint.angle_rad = angle + self.angle_gain * innovation;
+                joint.rate_rad_s =
+                    (rate + self.rate_gain_per_s * innovation).within(self.rate_limit_rad_s);
+                joint.innovation_rad = innovation;
+            };
         let [lsb_1, lsb_2] = self.rad_per_count;
-        self.joints = Some([
-            follow(joint_1, reading_1, moved_1, lsb_1, acceleration_rad_s2.x),
-            follow(joint_2, reading_2, moved_2, lsb_2, acceleration_rad_s2.y),
-        ]);
+        follow(joint_1, reading_1, moved_1, lsb_1, acceleration_rad_s2.x);
+        follow(joint_2, reading_2, moved_2, lsb_2, acceleration_rad_s2.y);
         Ok(())
     }
 
     /// Starts both loops from these readings, at rest.
     fn start(&mut self, readings: &[EncoderCounts; 2]) {
-        let [scale_1, scale_2] = self.scales;
-        let [reading_1, reading_2] = *readings;
-        let [lsb_1, lsb_2] = self.rad_per_count;
-        let joint = |scale: EncoderScale, lsb: f32, reading| {
+        self.started = true;
+        for (joint, ((scale, lsb), reading)) in self
+            .joints
+            .iter_mut()
+            .zip(self.scales.iter().zip(self.rad_per_count).zip(*readings))
+        {
             let counts = scale.counts_from_zero(reading);
-            TrackingLoop {
+            *joint = TrackingLoop {
                 reading,
                 counts,
                 angle_rad: counts as f32 * lsb,
-                rate_rad_s: 0.0,
-                innovation_rad: 0.0,
-            }
-        };
-        self.joints = Some([
-            joint(scale_1, lsb_1, reading_1),
-            joint(scale_2, lsb_2, reading_2),
-        ]);
+                ..Default::default()
+            };
+        }
     }
 
     /// Absolute joint angles θ = (θ1, θ2), rad; zero before the first readings.
     pub fn theta_rad(&self) -> Vector2<f32> {
-        self.joints.map_or_else(Vector2::zeros, |[one, two]| {
-            Vector2::new(one.angle_rad, one.angle_rad + two.angle_rad)
-        })
+        let [one, two] = &self.joints;
+        Vector2::new(one.angle_rad, one.angle_rad + two.angle_rad)
     }
 
     /// Measured less expected absolute joint angles at the last tick, rad.
     pub fn innovation_rad(&self) -> Vector2<f32> {
-        self.joints.map_or_else(Vector2::zeros, |[one, two]| {
-            Vector2::new(one.innovation_rad, one.innovation_rad + two.innovation_rad)
-        })
+        let [one, two] = &self.joints;
+        Vector2::new(one.innovation_rad, one.innovation_rad + two.innovation_rad)
     }
 
     /// Whether the last readings differed from the ones before.
@@ -201,21 +200,15 @@ impl Estimator {
 
     /// Measured less expected joint angles q' at the last tick, counts.
     pub fn innovation_counts(&self) -> Vector2<f32> {
+        let [one, two] = &self.joints;
         let [lsb_1, lsb_2] = self.rad_per_count;
-        self.joints.map_or_else(Vector2::zeros, |[one, two]| {
-            Vector2::new(one.innovation_rad / lsb_1, two.innovation_rad / lsb_2)
-        })
+        Vector2::new(one.innovation_rad / lsb_1, two.innovation_rad / lsb_2)
     }
 
     /// Innovation, counts, that an acceleration of q' (rad/s²) leaves in the end if the loops
     /// are not told of it: θ̈ T²/(1 − z)².
     pub fn lag_counts(&self, acceleration_rad_s2: &Vector2<f32>) -> Vector2<f32> {
-        let [lsb_1, lsb_2] = self.rad_per_count;
-        let lag_s2 = self.tick_s / self.rate_gain_per_s;
-        Vector2::new(
-            acceleration_rad_s2.x * lag_s2 / lsb_1,
-            acceleration_rad_s2.y * lag_s2 / lsb_2,
-        )
+        acceleration_rad_s2.component_mul(&self.lag_counts_s2)
     }
 
     /// Part of the innovation that a tick leaves: measured less estimated angles.
@@ -230,9 +223,8 @@ impl Estimator {
 
     /// Absolute joint rates θ̇, rad/s; zero before the second readings.
     pub fn theta_dot_rad_s(&self) -> Vector2<f32> {
-        self.joints.map_or_else(Vector2::zeros, |[one, two]| {
-            Vector2::new(one.rate_rad_s, one.rate_rad_s + two.rate_rad_s)
-        })
+        let [one, two] = &self.joints;
+        Vector2::new(one.rate_rad_s, one.rate_rad_s + two.rate_rad_s)
     }
 }
 

@@ -120,8 +120,7 @@ impl Controller {
     fn encoder_reading(&self, model: &Model, gap_m: f32) -> EncoderReading {
         let count = self.estimator.count_rad();
         // Half a count of either encoder; the second one turns θ2 alone.
-        let rounding_m =
-            0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
+        let rounding_m = 0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
         // What the innovation settles at when the contact force is gone.
         let release = -self.estimator.lag_counts(&self.contact_acceleration);
         EncoderReading {

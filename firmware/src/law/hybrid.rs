@@ -36,6 +36,18 @@ const LEAST_PRESSING: f32 = 0.1;
 
 /// The part of `pressing_nm` that leaves both joints within ±`limit_nm` together with `motion_nm`.
 fn affordable(motion_nm: &Vector2<f32>, pressing_nm: &Vector2<f32>, limit_nm: f32) -> f32 {
+    if (motion_nm + pressing_nm).amax() <= limit_nm {
+        1.0
+    } else {
+        affordable_part(motion_nm, pressing_nm, limit_nm)
+    }
+}
+
+/// Out of the way, like everything that is rarely needed: inlined, the compiler would divide
+/// every time rather than jump.
+#[cold]
+#[inline(never)]
+fn affordable_part(motion_nm: &Vector2<f32>, pressing_nm: &Vector2<f32>, limit_nm: f32) -> f32 {
     let of_joint = |motion: f32, pressing: f32| {
         if (motion + pressing).abs() <= limit_nm {
             1.0
