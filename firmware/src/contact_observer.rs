@@ -97,6 +97,8 @@ pub struct EncoderReading {
     pub gap_m: f32,
     /// Largest error of that, m.
     pub gap_error_m: f32,
+    /// Whether the readings differ from the ones before.
+    pub moved: bool,
     /// Innovations of the tracking loops along those that the expected contact force leaves in
     /// the end when it is gone, counts²: their inner product …
     pub release: f32,
@@ -145,7 +147,13 @@ impl ContactObserver {
             .limited(-GAP_AGAINST, GAP_FOR);
         let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
             .limited(-RELEASE_AGAINST, 0.0);
-        self.weigh(gap + release)
+        let change = gap + release;
+        // The same readings once more say nothing more against contact.
+        self.weigh(if encoders.moved {
+            change
+        } else {
+            change.at_least(0.0)
+        })
     }
 
     /// Adds to the log-odds; decides.
@@ -197,6 +205,7 @@ mod tests {
         EncoderReading {
             gap_m,
             gap_error_m: 65e-6,
+            moved: true,
             ..Default::default()
         }
     }
@@ -232,6 +241,22 @@ mod tests {
         assert!(observer.contact());
         assert!(ticks_until(false, || observer.update_from_encoders(&gap(100e-6))) <= 3);
         assert!(ticks_until(true, || observer.update_from_encoders(&gap(0.0))) <= 8);
+    }
+
+    #[test]
+    fn a_reading_that_stays_says_nothing_more_against_contact() {
+        let mut observer = observer();
+        for _ in 0..20 {
+            observer.update_from_encoders(&gap(0.0));
+        }
+        let stays = EncoderReading {
+            moved: false,
+            ..gap(80e-6)
+        };
+        for _ in 0..100 {
+            assert!(observer.update_from_encoders(&stays));
+        }
+        assert!(ticks_until(false, || observer.update_from_encoders(&gap(80e-6))) <= 3);
     }
 
     #[test]

@@ -166,6 +166,7 @@ impl Estimator {
     /// Starts both loops from these readings, at rest.
     fn start(&mut self, readings: &[EncoderCounts; 2]) {
         self.started = true;
+        self.moved = true;
         for (joint, ((scale, lsb), reading)) in self
             .joints
             .iter_mut()

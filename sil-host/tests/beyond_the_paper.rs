@@ -12,6 +12,8 @@ use painleve_sil_host::controller_host::InProcess;
 use painleve_sil_host::record::Sample;
 use painleve_sil_host::scenario::Scenario;
 use painleve_sil_host::simulation::Simulation;
+use painleve_sil_host::study::robustness::Robustness;
+use painleve_sil_host::study::rows;
 
 /// 0.5 % of the force cell's range.
 const NOISE: &str = "converters.force.noise_n=0.1";
@@ -208,6 +210,24 @@ fn links_longer_than_the_data_sheet_says_do_not_move_the_tip() {
         "{}",
         without.final_tip_t_m
     );
+}
+
+#[test]
+fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
+    let successes = |overrides: &[&str]| {
+        let campaign = Robustness {
+            seed: 2,
+            runs: 60,
+            overrides: overrides.iter().map(ToString::to_string).collect(),
+        };
+        let rows = rows(&campaign, || ()).unwrap();
+        rows.iter().filter(|row| row.ending.is_success()).count()
+    };
+    const ENCODERS: &str = "controller.contact.evidence=encoders";
+    let with = successes(&[ENCODERS]);
+    assert!(with >= 58, "{with}");
+    let without = successes(&[ENCODERS, "controller.calibration.enabled=false"]);
+    assert!(without < 30, "{without}");
 }
 
 /// The arm with a spring that is `stiffness` times what the controller believes, taken elbow up

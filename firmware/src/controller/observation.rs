@@ -127,6 +127,7 @@ impl Controller {
             gap_m,
             gap_error_m: self.configuration.contact.gap_uncertainty_m
                 + self.calibration.gap_error_m(rounding_m),
+            moved: self.estimator.moved(),
             release: release.dot(&self.estimator.innovation_counts()),
             full_release: release.norm_squared(),
         }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::configuration::Converters;
+use crate::contact_observer::Evidence;
 use crate::deadline_monitor::Lapse;
 use crate::law::LawSettings;
 use crate::law::hybrid::HybridSettings;
@@ -153,6 +154,26 @@ fn a_joint_that_jumps_is_a_fault_at_once() {
     let mut bad = frame(20);
     bad.joints[0].0 ^= 1 << 12;
     assert_fault(&mut tracking(), &bad, Fault::EncoderJump);
+}
+
+#[test]
+fn after_a_jump_the_encoders_tell_that_the_tip_is_in_the_air() {
+    let mut configuration = configuration();
+    configuration.contact.evidence = Evidence::Encoders;
+    let mut controller = Controller::new(&configuration).unwrap();
+    let touches = |answer: ActuatorFrame| answer.flags.contains(StatusFlags::CONTACT);
+    assert!(touches(run(&mut controller, 0..20)));
+    let encoder = configuration.converters.encoders[0];
+    // 5 cm up and on.
+    let thrown = |tick| {
+        let mut thrown = frame(tick);
+        thrown.joints[0] = encoder.reading((-4.4 - f64::from(tick)).to_radians());
+        thrown
+    };
+    controller.tick(&thrown(20));
+    let answer = controller.tick(&thrown(21));
+    assert_eq!(answer.latched_fault(), Some(Fault::EncoderJump));
+    assert!(!touches(answer));
 }
 
 #[test]
