@@ -2,6 +2,7 @@
 
 use std::env;
 use std::fmt;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -13,6 +14,15 @@ impl fmt::Display for ChoreError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
     }
+}
+
+/// Writes a line to standard output.
+///
+/// # Errors
+/// If that is closed.
+pub fn say(line: &str) -> Result<(), ChoreError> {
+    writeln!(std::io::stdout(), "{line}")
+        .map_err(|cause| ChoreError(format!("cannot write to stdout: {cause}")))
 }
 
 /// The workspace's folder.

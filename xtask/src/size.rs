@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use serde_json::Value;
 
 use crate::build_fw;
-use crate::command::{ChoreError, run_cargo, workspace};
+use crate::command::{ChoreError, run_cargo, say, workspace};
 
 /// Most flash for code and constants, bytes.
 const FLASH_LIMIT: u64 = 64 * 1024;
@@ -37,23 +37,28 @@ pub fn run() -> Result<(), ChoreError> {
         let error = |reason: String| ChoreError(format!("{}: {reason}", path.display()));
         let bytes = std::fs::read(&path).map_err(|cause| error(cause.to_string()))?;
         let image = object::File::parse(&*bytes).map_err(|cause| error(cause.to_string()))?;
-        println!("{name}");
+        say(name)?;
         for (what, size, limit) in [
             ("flash", flash_bytes(&image), FLASH_LIMIT),
             ("static RAM", ram_bytes(&image), RAM_LIMIT),
         ] {
-            over.extend(check(name, what, size, limit));
+            over.extend(check(name, what, size, limit)?);
         }
-        println!("  largest symbols");
+        say("  largest symbols")?;
         let mut symbols: Vec<_> = image.symbols().collect();
         symbols.sort_by_key(|symbol| std::cmp::Reverse(symbol.size()));
         for symbol in symbols.iter().take(LARGEST) {
             let name = rustc_demangle::demangle(symbol.name().unwrap_or("?"));
-            println!("  {:>7}  {name:#}", symbol.size());
+            say(&format!("  {:>7}  {name:#}", symbol.size()))?;
         }
     }
-    println!("painleve-qemu, most of every built-in scenario");
-    over.extend(check("painleve-qemu", "stack", stack_bytes()?, STACK_LIMIT));
+    say("painleve-qemu, most of every built-in scenario")?;
+    over.extend(check(
+        "painleve-qemu",
+        "stack",
+        stack_bytes()?,
+        STACK_LIMIT,
+    )?);
     if over.is_empty() {
         Ok(())
     } else {
@@ -62,10 +67,12 @@ pub fn run() -> Result<(), ChoreError> {
 }
 
 /// Prints a size against its limit; says so if it is over.
-fn check(name: &str, what: &str, size: u64, limit: u64) -> Option<String> {
+fn check(name: &str, what: &str, size: u64, limit: u64) -> Result<Option<String>, ChoreError> {
     let share = 100.0 * size as f64 / limit as f64;
-    println!("  {what:<10} {size:>7} of {limit:>6} bytes ({share:.0} %)");
-    (size > limit).then(|| format!("{name} takes {size} of {limit} bytes of {what}"))
+    say(&format!(
+        "  {what:<10} {size:>7} of {limit:>6} bytes ({share:.0} %)"
+    ))?;
+    Ok((size > limit).then(|| format!("{name} takes {size} of {limit} bytes of {what}")))
 }
 
 /// Most stack that any scenario takes, measured on the emulated board. It is taken while the

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use clap::Args;
 use serde_json::Value;
 
-use crate::command::{ChoreError, run_cargo, workspace};
+use crate::command::{ChoreError, run_cargo, say, workspace};
 
 /// Options of the soak.
 #[derive(Debug, Args)]
@@ -65,6 +65,6 @@ fn soak(host: &str, duration_s: f64) -> Result<(), ChoreError> {
             )));
         }
     }
-    println!("{host}: {report}");
+    say(&format!("{host}: {report}"))?;
     Ok(())
 }
