@@ -34,7 +34,7 @@ impl Default for GovernorSettings {
             minimum_p_ratio: 0.01,
             p_ratio_per_s2: 1e4,
             friction_deviations: 1.5,
-            distance_m: 0.6e-3,
+            distance_m: 0.5e-3,
             distance_counts: 3.0,
             braking_m_s2: 1.0,
             catch_up_m_s: 0.3,
