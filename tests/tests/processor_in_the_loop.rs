@@ -73,39 +73,53 @@ fn budget() -> serde_json::Value {
     serde_json::from_str(include_str!("../budget.json")).expect("valid JSON")
 }
 
+/// Runs a scenario on both: equal to the last count, and within what the budget has under `key`.
+fn assert_equal_within_budget(name: &str, overrides: &[String], key: &str) {
+    let budget = budget();
+    let scenario = Scenario::load(name, overrides).unwrap();
+    let simulation = Simulation::new(&scenario).unwrap();
+    let mut closed_loop = ClosedLoop::new(simulation, Both::new(&scenario));
+    for _ in 0..scenario.run.ticks() {
+        closed_loop.tick(&mut ()).unwrap();
+    }
+    let (_, mut both) = closed_loop.finish();
+    let tick_hz = scenario.run.tick_hz;
+    let report = TimingReport::of_board(name, tick_hz, &both.times, &mut both.emulated);
+    let report = report.unwrap();
+    let stack_bytes = report.stack_bytes.unwrap();
+    let health = report.board.unwrap();
+    let nothing_else = Health {
+        stack_bytes,
+        ticks: scenario.run.ticks() as u32,
+        ..Default::default()
+    };
+    assert_eq!(health, nothing_else, "{name}");
+    let most = budget[key][name].as_u64();
+    let most = most.unwrap_or_else(|| panic!("budget.json says nothing of {name}"));
+    assert!(
+        u64::from(report.max) <= most,
+        "{name}: more than the {most} instructions of budget.json: {:?}",
+        report.worst,
+    );
+    assert!(
+        u64::from(stack_bytes) <= budget["stack_bytes"].as_u64().unwrap(),
+        "{name}: {stack_bytes} bytes of stack are more than budget.json allows",
+    );
+}
+
 #[test]
 fn the_image_answers_every_built_in_scenario_with_the_same_counts_within_budget() {
-    let budget = budget();
     for name in built_in::names() {
-        let scenario = Scenario::load(name, &[]).unwrap();
-        let simulation = Simulation::new(&scenario).unwrap();
-        let mut closed_loop = ClosedLoop::new(simulation, Both::new(&scenario));
-        for _ in 0..scenario.run.ticks() {
-            closed_loop.tick(&mut ()).unwrap();
-        }
-        let (_, mut both) = closed_loop.finish();
-        let tick_hz = scenario.run.tick_hz;
-        let report = TimingReport::of_board(name, tick_hz, &both.times, &mut both.emulated);
-        let report = report.unwrap();
-        let stack_bytes = report.stack_bytes.unwrap();
-        let health = report.board.unwrap();
-        let nothing_else = Health {
-            stack_bytes,
-            ticks: scenario.run.ticks() as u32,
-            ..Default::default()
-        };
-        assert_eq!(health, nothing_else, "{name}");
-        let most = budget["worst_tick_instructions"][name].as_u64();
-        let most = most.unwrap_or_else(|| panic!("budget.json says nothing of {name}"));
-        assert!(
-            u64::from(report.max) <= most,
-            "{name}: more than the {most} instructions of budget.json: {:?}",
-            report.worst,
-        );
-        assert!(
-            u64::from(stack_bytes) <= budget["stack_bytes"].as_u64().unwrap(),
-            "{name}: {stack_bytes} bytes of stack are more than budget.json allows",
-        );
+        assert_equal_within_budget(name, &[], "worst_tick_instructions");
+    }
+}
+
+#[test]
+fn the_image_tells_contact_from_the_encoders_with_the_same_counts_within_budget() {
+    let encoders = ["controller.contact.evidence=encoders".to_string()];
+    for name in ["edge", "capture"] {
+        let key = "worst_tick_instructions_from_encoders";
+        assert_equal_within_budget(name, &encoders, key);
     }
 }
 
