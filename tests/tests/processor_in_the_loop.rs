@@ -2,6 +2,9 @@
 //! controller on this machine: equal to the last bit, in every run, and within the
 //! budget of instructions and stack in `budget.json`.
 
+// Helpers of tests may panic as tests do.
+#![allow(clippy::unwrap_used)]
+
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
