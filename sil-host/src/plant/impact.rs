@@ -72,9 +72,10 @@ pub struct Impact {
     pub impulse_ns: Vector2<f64>,
 }
 
-/// Why there is no end of a collision.
+/// Why there is no end of a collision. It takes a Q that is singular: at full stretch the tip
+/// cannot give way to an impulse along the links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the impact process does not end: the normal velocity never turns")]
+#[error("the impact process does not end: the arm is straight, and no impulse turns its tip")]
 pub struct EndlessImpact;
 
 /// The process at some impulse.

@@ -171,7 +171,8 @@ fn from_table(origin: &str, table: Table) -> Result<Scenario, ScenarioError> {
     })
 }
 
-/// The scenario with one key changed. The key must be one that the scenario has.
+/// The scenario with one key changed. The key must be one that the scenario has or, like
+/// `controller.belt.given_m_s`, may have.
 fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioError> {
     let wrong = || ScenarioError::Override { text: text.into() };
     let (key, value) = text.split_once('=').ok_or_else(wrong)?;
@@ -191,14 +192,23 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
         key: key.into(),
         message: error.to_string(),
     })?;
+    let unknown = |message| ScenarioError::Key {
+        origin: "--set".into(),
+        key: key.into(),
+        message,
+    };
+    // What to say if a key that is not there turns out not to be an optional one.
+    let mut missing = None;
     let mut place = &mut root;
     for part in key.split('.') {
         let next = match place {
             Value::Table(table) => {
-                let known = table.keys().cloned().collect::<Vec<_>>().join(", ");
-                table
-                    .get_mut(part)
-                    .ok_or(format!("there is no '{part}' here, only: {known}"))
+                if !table.contains_key(part) && missing.is_none() {
+                    let known = table.keys().cloned().collect::<Vec<_>>().join(", ");
+                    missing = Some(format!("there is no '{part}' here, only: {known}"));
+                }
+                let empty = || Value::Table(Table::new());
+                Ok(table.entry(part).or_insert_with(empty))
             }
             Value::Array(array) => {
                 let count = array.len();
@@ -209,21 +219,22 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
             }
             _ => Err(format!("'{part}' is inside a single value")),
         };
-        place = next.map_err(|message| ScenarioError::Key {
-            origin: "--set".into(),
-            key: key.into(),
-            message,
-        })?;
+        place = next.map_err(unknown)?;
     }
     *place = match (&*place, value) {
         // A whole number is a number.
         (Value::Float(_), Value::Integer(integer)) => Value::Float(integer as f64),
         (_, value) => value,
     };
-    match root {
-        Value::Table(table) => from_table("--set", table),
-        _ => Err(wrong()),
-    }
+    let Value::Table(table) = root else {
+        return Err(wrong());
+    };
+    from_table("--set", table).map_err(|error| match (missing, error) {
+        // There is such a key, but not such a value.
+        (_, error @ ScenarioError::Key { .. }) if error.to_string().contains("invalid ") => error,
+        (Some(message), _) => unknown(message),
+        (None, error) => error,
+    })
 }
 
 #[cfg(test)]
@@ -256,11 +267,33 @@ mod tests {
     }
 
     #[test]
+    fn overrides_set_keys_that_are_optional() {
+        let scenario = load(&[
+            "controller.belt.given_m_s=-0.4",
+            "controller.arm.link_length_m=0.2",
+        ])
+        .unwrap();
+        assert_eq!(scenario.controller.belt.given_m_s, Some(-0.4));
+        let arm = scenario.controller.arm.unwrap();
+        assert_eq!((arm.link_length_m, arm.link_mass_kg), (0.2, 0.12));
+        let message = message(&["controller.belt.given_m_s=fast"]);
+        assert!(message.contains("given_m_s: invalid type"), "{message}");
+    }
+
+    #[test]
     fn mistakes_are_named_with_what_is_allowed() {
         for (overrides, parts) in [
             (
                 &["belt.frction=0.4"][..],
                 &["belt.frction", "friction, profile"][..],
+            ),
+            (
+                &["controller.arm.lenght_m=0.2"],
+                &["controller.arm.lenght_m"],
+            ),
+            (
+                &["controller.law.pid.integral_gain=1"],
+                &["no 'pid' here", "hybrid"],
             ),
             (&["belt.friction=nan"], &["belt.friction = NaN", "0 to 10"]),
             (&["belt.friction=inf"], &["belt.friction = inf", "0 to 10"]),
