@@ -37,7 +37,7 @@ pub enum Evidence {
     /// The force cell.
     #[default]
     ForceCell,
-    /// The encoders: for an arm without a force cell.
+    /// The encoders. Friction estimate and force loop go on reading the force cell.
     Encoders,
 }
 

@@ -230,6 +230,35 @@ fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
     assert!(without < 30, "{without}");
 }
 
+/// No readings of forces at all, so that friction and the belt's speed have to be given.
+const NO_FORCE_CELL: [&str; 8] = [
+    "controller.contact.evidence=encoders",
+    "controller.law.hybrid.friction={ model = { friction = 0.6, belt_speed_m_s = -0.4 } }",
+    "controller.law.hybrid.force_integral_gain_per_s=0",
+    "controller.disturbance.enabled=false",
+    "converters.force={ range_n = 0.01, noise_n = 0.0 }",
+    "controller.contact.contact_n=0.005",
+    "controller.contact.force_noise_n=0.001",
+    "controller.belt.given_m_s=-0.4",
+];
+
+#[test]
+fn an_arm_without_any_force_cell_slides_with_friction_given_and_is_caught() {
+    for scenario in ["hybrid-elbow-down", "hybrid-elbow-up", "capture"] {
+        let (result, course) = run(scenario, &NO_FORCE_CELL);
+        assert_eq!(result.fault, None, "{scenario}");
+        assert!(
+            course.rest_error_m < 0.5e-3,
+            "{scenario}: {}",
+            course.rest_error_m
+        );
+        // In `capture` it is switched on after 1.5 s.
+        let flies_until_s = if scenario == "capture" { 2.0 } else { 0.0 };
+        let last_s = course.last_flight_s;
+        assert!(last_s <= flies_until_s, "{scenario}: {last_s} s");
+    }
+}
+
 /// The arm with a spring that is `stiffness` times what the controller believes, taken elbow up
 /// through the middle of the belt, where p is a thirtieth of Q22 at μ = 0.85.
 fn with_a_wrong_spring(stiffness: f64, overrides: &[&str]) -> (LoopResult, Course) {

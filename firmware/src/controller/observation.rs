@@ -96,8 +96,8 @@ impl Controller {
         }
     }
 
-    /// Without a force cell the belt is taken to be where the tip was lowest: where it starts, and
-    /// from then on wherever it gets below that.
+    /// Where the encoders decide, the belt is taken to be where the tip was lowest: where it
+    /// starts, and from then on wherever it gets below that.
     fn find_belt(&mut self, encoders: &mut EncoderReading) {
         let starts = self.calibration.is_open();
         if starts || encoders.is_below_belt() {
