@@ -197,7 +197,8 @@ impl<'a> Process<'a> {
 
     /// Impulse until the work has grown by `work` from `start` in the present phase.
     fn until_work(&self, start: f64, work: f64) -> Option<f64> {
-        let missing = start + work - self.work;
+        // In this order nothing cancels while no work has been returned yet.
+        let missing = work - (self.work - start);
         let (speed, rate) = (self.velocity.y.max(0.0), self.rates().y);
         if missing <= 0.0 {
             Some(0.0)
@@ -366,6 +367,18 @@ mod tests {
             prop_assert!((here.velocity_m_s.x + there.velocity_m_s.x).abs() < 1e-12);
             prop_assert!((here.velocity_m_s.y - there.velocity_m_s.y).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn a_restitution_next_to_nothing_loses_no_digits() {
+        let q = Matrix2::new(0.5, 0.0, 0.0, 0.5);
+        let law = ImpactLaw {
+            law: Restitution::Energetic,
+            restitution: 1.121_366_726_204_905_8e-5,
+        };
+        let v_n = -1.247_754_208_626_461;
+        let end = collide(&q, 0.0, &law, Vector2::new(0.0, v_n)).unwrap();
+        assert!((end.velocity_m_s.y + law.restitution * v_n).abs() < 1e-15);
     }
 
     #[test]
