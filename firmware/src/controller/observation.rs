@@ -60,6 +60,7 @@ impl Controller {
             if in_range {
                 self.friction.update(&force_n);
             }
+            // A reading that stays would weigh more for nothing but time.
             if certain && self.estimator.moved() {
                 let length = self.calibration.update(gap_m);
                 self.arm = self.arm.with_link_length(length);

@@ -186,17 +186,12 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
         .ok()
         .and_then(|mut table| table.remove("value"))
         .unwrap_or_else(|| Value::String(value.into()));
-    let origin = format!("--set {key}");
-    let mut root = Value::try_from(&scenario).map_err(|error| ScenarioError::Key {
-        origin: origin.clone(),
-        key: key.into(),
-        message: error.to_string(),
-    })?;
-    let unknown = |message| ScenarioError::Key {
+    let wrong_key = |message| ScenarioError::Key {
         origin: "--set".into(),
         key: key.into(),
         message,
     };
+    let mut root = Value::try_from(&scenario).map_err(|error| wrong_key(error.to_string()))?;
     // What to say if a key that is not there turns out not to be an optional one.
     let mut missing = None;
     let mut place = &mut root;
@@ -219,7 +214,7 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
             }
             _ => Err(format!("'{part}' is inside a single value")),
         };
-        place = next.map_err(unknown)?;
+        place = next.map_err(wrong_key)?;
     }
     *place = match (&*place, value) {
         // A whole number is a number.
@@ -229,11 +224,11 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
     let Value::Table(table) = root else {
         return Err(wrong());
     };
-    from_table("--set", table).map_err(|error| match (missing, error) {
+    from_table("--set", table).map_err(|error| match (missing, &error) {
         // There is such a key, but not such a value.
-        (_, error @ ScenarioError::Key { .. }) if error.to_string().contains("invalid ") => error,
-        (Some(message), _) => unknown(message),
-        (None, error) => error,
+        (_, ScenarioError::Key { message, .. }) if message.starts_with("invalid ") => error,
+        (Some(message), _) => wrong_key(message),
+        (None, _) => error,
     })
 }
 
