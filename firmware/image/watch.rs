@@ -1,7 +1,7 @@
 //! What is counted between two configurations, for the host and for the log.
 
 use painleve_firmware::Controller;
-use painleve_firmware::deadline_monitor::Lapse;
+use painleve_firmware::supervise::deadline_monitor::Lapse;
 use painleve_shared::message::{Health, Plant};
 use painleve_shared::status::{Fault, SupervisorState};
 

@@ -8,19 +8,19 @@ use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Arm, ArmParameters, Real};
 use serde::{Deserialize, Serialize};
 
-use crate::belt_observer::BeltSettings;
-use crate::contact_guard::GuardSettings;
-use crate::contact_observer::ContactSettings;
-use crate::deadline_monitor::DeadlineLimits;
-use crate::disturbance_observer::DisturbanceSettings;
-use crate::edge_governor::GovernorSettings;
-use crate::estimator::EstimatorSettings;
-use crate::friction_estimator::FrictionSettings;
+use crate::estimate::belt::BeltSettings;
+use crate::estimate::calibration::CalibrationSettings;
+use crate::estimate::contact::ContactSettings;
+use crate::estimate::disturbance::DisturbanceSettings;
+use crate::estimate::friction::FrictionSettings;
+use crate::estimate::joints::EstimatorSettings;
+use crate::guard::GuardSettings;
 use crate::law::LawSettings;
-use crate::length_calibration::CalibrationSettings;
-use crate::recovery::RecoverySettings;
-use crate::reference::Program;
-use crate::supervisor::SupervisorSettings;
+use crate::recover::RecoverySettings;
+use crate::refer::governor::GovernorSettings;
+use crate::refer::reference::Program;
+use crate::supervise::deadline_monitor::DeadlineLimits;
+use crate::supervise::supervisor::SupervisorSettings;
 
 /// The converters' scalings as the controller knows them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

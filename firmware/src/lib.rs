@@ -6,11 +6,10 @@
 //! gives the same bits everywhere: single precision, no fused multiply-add, sine and
 //! cosine from `painleve-shared`. Nothing here allocates, panics or loops without bound.
 //!
-//! One tick, in order: [`controller`] checks the frame; [`estimator`] turns counts into
-//! angles and rates; [`contact_detector`] decides whether the tip touches;
-//! [`supervisor`] decides what may be done; [`reference`](mod@reference) says where the tip
-//! should be; [`law`] computes torques; the torques are limited and turned into
-//! counts. [`deadline_monitor`] watches over what is around the tick; [`telemetry`]
+//! The folders are in the order of one tick: [`controller`] checks the frame; [`estimate`]
+//! turns counts into angles, rates, contact and friction; [`supervise`] decides what may be
+//! done; [`refer`] says where the tip should be; [`law`] computes torques, or [`recover`]
+//! brings a thrown tip back; [`guard`] keeps the tip pressed to the belt. [`telemetry`]
 //! shows what went on inside.
 
 #![no_std]
@@ -18,22 +17,14 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod belt_observer;
 pub mod configuration;
-pub mod contact_guard;
-pub mod contact_observer;
 pub mod controller;
-pub mod deadline_monitor;
-pub mod disturbance_observer;
-pub mod edge_governor;
-pub mod estimator;
-pub mod friction_estimator;
+pub mod estimate;
+pub mod guard;
 pub mod law;
-pub mod length_calibration;
-pub mod model;
-pub mod recovery;
-pub mod reference;
-pub mod supervisor;
+pub mod recover;
+pub mod refer;
+pub mod supervise;
 pub mod telemetry;
 
 pub use configuration::Configuration;

@@ -3,7 +3,7 @@
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
 use super::Controller;
-use crate::deadline_monitor::{DeadlineMonitor, Lapse};
+use crate::supervise::deadline_monitor::{DeadlineMonitor, Lapse};
 
 /// Ticks without readings are not counted further: a fault is latched long before.
 const UNREAD_TICKS_LIMIT: u32 = 1 << 16;

@@ -7,9 +7,9 @@ use painleve_shared::status::Fault;
 
 use super::Controller;
 use super::observation::Observation;
-use crate::contact_guard::{HalfPlane, nearest_torque_nm};
+use crate::estimate::model::Model;
+use crate::guard::{HalfPlane, nearest_torque_nm};
 use crate::law::signals::LawOutput;
-use crate::model::Model;
 
 impl Controller {
     /// Turns a law's answer into counts: kept on the belt, limited, checked.

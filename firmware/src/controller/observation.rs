@@ -4,10 +4,10 @@ use nalgebra::Vector2;
 use painleve_shared::frame::SensorFrame;
 
 use super::Controller;
-use crate::contact_observer::{EncoderReading, Evidence};
-use crate::disturbance_observer::Balance;
-use crate::friction_estimator::FrictionEstimate;
-use crate::model::Model;
+use crate::estimate::contact::{EncoderReading, Evidence};
+use crate::estimate::disturbance::Balance;
+use crate::estimate::friction::FrictionEstimate;
+use crate::estimate::model::Model;
 
 /// Friction above the estimate that a throw may be explained by.
 const THROWN_BY_FRICTION: f32 = 0.4;

@@ -2,11 +2,11 @@
 
 use super::*;
 use crate::configuration::Converters;
-use crate::contact_observer::Evidence;
-use crate::deadline_monitor::Lapse;
+use crate::estimate::contact::Evidence;
 use crate::law::LawSettings;
 use crate::law::hybrid::HybridSettings;
-use crate::reference::Program;
+use crate::refer::reference::Program;
+use crate::supervise::deadline_monitor::Lapse;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
 use painleve_shared::frame::DigitalInputs;
 

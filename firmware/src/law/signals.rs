@@ -3,9 +3,9 @@
 use nalgebra::Vector2;
 use painleve_shared::{Arm, Posture};
 
-use crate::friction_estimator::FrictionEstimate;
-use crate::model::Model;
-use crate::reference::TipReference;
+use crate::estimate::friction::FrictionEstimate;
+use crate::estimate::model::Model;
+use crate::refer::reference::TipReference;
 
 /// What a law knows at one tick.
 #[derive(Clone, Copy, Debug)]

@@ -8,20 +8,20 @@ pub mod built_in;
 mod load;
 
 use painleve_firmware::Configuration;
-use painleve_firmware::belt_observer;
-use painleve_firmware::contact_guard::GuardSettings;
-use painleve_firmware::contact_observer::ContactSettings;
-use painleve_firmware::deadline_monitor::DeadlineLimits;
-use painleve_firmware::disturbance_observer::DisturbanceSettings;
-use painleve_firmware::edge_governor::GovernorSettings;
-use painleve_firmware::estimator::EstimatorSettings;
-use painleve_firmware::friction_estimator::FrictionSettings;
+use painleve_firmware::estimate::belt;
+use painleve_firmware::estimate::calibration::CalibrationSettings;
+use painleve_firmware::estimate::contact::ContactSettings;
+use painleve_firmware::estimate::disturbance::DisturbanceSettings;
+use painleve_firmware::estimate::friction::FrictionSettings;
+use painleve_firmware::estimate::joints::EstimatorSettings;
+use painleve_firmware::guard::GuardSettings;
 use painleve_firmware::law::LawSettings;
 use painleve_firmware::law::hybrid::HybridSettings;
-use painleve_firmware::length_calibration::CalibrationSettings;
-use painleve_firmware::recovery::RecoverySettings;
-use painleve_firmware::reference::{Program, Segment};
-use painleve_firmware::supervisor::SupervisorSettings;
+use painleve_firmware::recover::RecoverySettings;
+use painleve_firmware::refer::governor::GovernorSettings;
+use painleve_firmware::refer::reference::{Program, Segment};
+use painleve_firmware::supervise::deadline_monitor::DeadlineLimits;
+use painleve_firmware::supervise::supervisor::SupervisorSettings;
 use painleve_shared::ArmParameters;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
@@ -172,7 +172,7 @@ pub struct ControllerSettings {
     /// How friction is estimated.
     pub friction: FrictionSettings,
     /// What the controller knows about the belt.
-    pub belt: belt_observer::BeltSettings,
+    pub belt: belt::BeltSettings,
     /// How the links' length is calibrated.
     pub calibration: CalibrationSettings,
     /// When the drive is armed, and when it is shut down.
@@ -206,7 +206,7 @@ impl Default for ControllerSettings {
             estimator: EstimatorSettings::default(),
             contact: ContactSettings::default(),
             friction: FrictionSettings::default(),
-            belt: belt_observer::BeltSettings::default(),
+            belt: belt::BeltSettings::default(),
             calibration: CalibrationSettings::default(),
             supervisor: SupervisorSettings::default(),
             deadlines: DeadlineLimits::default(),

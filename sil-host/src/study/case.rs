@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use nalgebra::Vector2;
-use painleve_firmware::reference::{Program, Segment};
+use painleve_firmware::refer::reference::{Program, Segment};
 use painleve_shared::{Arm, ArmParameters, Posture};
 use serde::{Serialize, Serializer};
 

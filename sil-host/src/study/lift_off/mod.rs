@@ -9,8 +9,8 @@ mod outcome;
 
 use std::collections::BTreeMap;
 
-use painleve_firmware::contact_observer::Evidence;
-use painleve_firmware::reference::Segment;
+use painleve_firmware::estimate::contact::Evidence;
+use painleve_firmware::refer::reference::Segment;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
 use rand::rngs::ChaCha8Rng;

@@ -1,7 +1,7 @@
 //! Lift-offs as a table and as histograms, the bars beside.
 
 use comfy_table::Table;
-use painleve_firmware::contact_observer::Evidence;
+use painleve_firmware::estimate::contact::Evidence;
 use serde::Serialize;
 
 use super::{LiftOff, Row, bar_s};

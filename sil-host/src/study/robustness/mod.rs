@@ -13,7 +13,7 @@ mod row;
 
 use std::collections::BTreeMap;
 
-use painleve_firmware::reference::Segment;
+use painleve_firmware::refer::reference::Segment;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
 

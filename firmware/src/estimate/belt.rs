@@ -10,7 +10,7 @@ use painleve_shared::Slip;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 
-use crate::friction_estimator::FrictionEstimate;
+use crate::estimate::friction::FrictionEstimate;
 
 /// Settings of the belt observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -15,7 +15,7 @@ use painleve_shared::dynamics::generalised_torque_nm;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 
-use crate::model::Model;
+use crate::estimate::model::Model;
 
 /// Part of the residual that is taken over in a tick, at most, for each Q22 of p.
 const SHARE: f32 = 0.05;

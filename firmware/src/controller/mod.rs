@@ -14,21 +14,21 @@ use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::{Arm, Posture, Slip};
 
 use self::arrival::Arrival;
-use crate::belt_observer::BeltObserver;
 use crate::configuration::Configuration;
-use crate::contact_observer::ContactObserver;
-use crate::deadline_monitor::DeadlineMonitor;
-use crate::disturbance_observer::DisturbanceObserver;
-use crate::edge_governor::EdgeGovernor;
-use crate::estimator::{EncoderJump, Estimator};
-use crate::friction_estimator::FrictionEstimator;
+use crate::estimate::belt::BeltObserver;
+use crate::estimate::calibration::LengthCalibration;
+use crate::estimate::contact::ContactObserver;
+use crate::estimate::disturbance::DisturbanceObserver;
+use crate::estimate::friction::FrictionEstimator;
+use crate::estimate::joints::{EncoderJump, Estimator};
+use crate::estimate::model::Model;
 use crate::law::Law;
 use crate::law::signals::LawInput;
-use crate::length_calibration::LengthCalibration;
-use crate::model::Model;
-use crate::recovery::Recovery;
-use crate::reference::{QueueFull, ReferenceGenerator, Segment, TipReference};
-use crate::supervisor::Supervisor;
+use crate::recover::Recovery;
+use crate::refer::governor::EdgeGovernor;
+use crate::refer::reference::{QueueFull, ReferenceGenerator, Segment, TipReference};
+use crate::supervise::deadline_monitor::DeadlineMonitor;
+use crate::supervise::supervisor::Supervisor;
 use crate::telemetry::Telemetry;
 
 /// The controller: configuration and state of one arm.

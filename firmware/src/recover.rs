@@ -11,8 +11,8 @@ use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Arm, Posture, Real};
 use serde::{Deserialize, Serialize};
 
+use crate::estimate::model::Model;
 use crate::law::signals::LawOutput;
-use crate::model::Model;
 
 /// Distance from the landing place within which the tip is lowered, m.
 const OVER_LANDING_PLACE_M: f32 = 2e-3;

@@ -17,8 +17,8 @@ use painleve_shared::{Arm, Posture, Real};
 
 use self::search::{Admissibility, Search};
 pub use self::settings::GovernorSettings;
-use crate::friction_estimator::FrictionEstimate;
-use crate::reference::TipReference;
+use crate::estimate::friction::FrictionEstimate;
+use crate::refer::reference::TipReference;
 
 /// Points looked at in one tick while the edges are not known.
 const POINTS_IN_A_HURRY: u32 = 2;

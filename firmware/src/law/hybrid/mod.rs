@@ -230,9 +230,9 @@ impl Hybrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::friction_estimator::FrictionEstimate;
-    use crate::model::Model;
-    use crate::reference::TipReference;
+    use crate::estimate::friction::FrictionEstimate;
+    use crate::estimate::model::Model;
+    use crate::refer::reference::TipReference;
     use painleve_shared::dynamics::generalised_torque_nm;
     use painleve_shared::{Arm, ArmParameters, Pose, Posture};
     use proptest::prelude::*;

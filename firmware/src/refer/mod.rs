@@ -1,0 +1,5 @@
+//! Where the tip should be: the reference, and the governor that keeps it inside the
+//! admissible stretch of the belt.
+
+pub mod governor;
+pub mod reference;
