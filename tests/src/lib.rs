@@ -23,7 +23,7 @@ pub fn program() -> &'static Path {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
         let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let built = Command::new(cargo)
-            .args(["build", "--release", "--package", "painleve-sil-host"])
+            .args(["build", "--release", "--package", "painleve-command"])
             .args(["--message-format", "json"])
             .current_dir(&workspace)
             .stderr(Stdio::inherit())

@@ -15,10 +15,10 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::pty::openpty;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
+use painleve_board::Serial;
+use painleve_plant::scenario::Scenario;
 use painleve_shared::message::Plant;
-use painleve_sil_host::board::Serial;
-use painleve_sil_host::lifetime::{Guarded, kill_with_parent};
-use painleve_sil_host::scenario::Scenario;
+use painleve_system::lifetime::{Guarded, kill_with_parent};
 
 use crate::serial_image;
 

@@ -3,15 +3,15 @@
 
 use std::time::{Duration, Instant};
 
+use painleve_board::{Board, OnBoard, Serial};
+use painleve_plant::closed_loop::{ClosedLoop, LoopResult};
+use painleve_plant::controller_host::{ControllerHost, InProcess};
+use painleve_plant::scenario::Scenario;
+use painleve_plant::simulation::Simulation;
 use painleve_shared::counts::{ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::{Plant, Response};
 use painleve_shared::status::{Fault, SupervisorState};
-use painleve_sil_host::board::{Board, Serial};
-use painleve_sil_host::closed_loop::{ClosedLoop, LoopResult};
-use painleve_sil_host::controller_host::{ControllerHost, InProcess, OnBoard};
-use painleve_sil_host::scenario::Scenario;
-use painleve_sil_host::simulation::Simulation;
 use painleve_tests::Bench;
 use painleve_tests::line::{Direction, Line, Noise};
 use serde_json::Value;

@@ -8,17 +8,17 @@
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
+use painleve_board::timing::{TickTimes, TimingReport};
+use painleve_board::{Board, Emulator};
 use painleve_firmware::{Configuration, Controller};
+use painleve_plant::closed_loop::ClosedLoop;
+use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
+use painleve_plant::scenario::{Scenario, built_in};
+use painleve_plant::simulation::Simulation;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::Health;
 use painleve_shared::status::{Fault, SupervisorState};
-use painleve_sil_host::board::{Board, Emulator};
-use painleve_sil_host::closed_loop::ClosedLoop;
-use painleve_sil_host::controller_host::{Answer, ControllerHost, HostError};
-use painleve_sil_host::scenario::{Scenario, built_in};
-use painleve_sil_host::simulation::Simulation;
-use painleve_sil_host::timing::{TickTimes, TimingReport};
 use painleve_tests::{Bench, child_of, image, is_running, signal};
 
 /// Gives every frame to both controllers and compares what they answer.

@@ -1,9 +1,9 @@
 //! The main job, end to end: two processes over shared memory, and what they leave.
 
-use painleve_sil_host::closed_loop::ClosedLoop;
-use painleve_sil_host::controller_host::InProcess;
-use painleve_sil_host::scenario::{Scenario, built_in};
-use painleve_sil_host::simulation::Simulation;
+use painleve_plant::closed_loop::ClosedLoop;
+use painleve_plant::controller_host::InProcess;
+use painleve_plant::scenario::{Scenario, built_in};
+use painleve_plant::simulation::Simulation;
 use painleve_tests::Bench;
 use serde_json::Value;
 

@@ -30,7 +30,7 @@ const IMAGES: [&str; 2] = ["painleve-f405", "painleve-qemu"];
 /// If the build or the measurement fails, or an image is larger than it may be.
 pub fn run() -> Result<(), ChoreError> {
     build_fw::run()?;
-    run_cargo(&["build", "--release", "--package", "painleve-sil-host"])?;
+    run_cargo(&["build", "--release", "--package", "painleve-command"])?;
     let mut over = Vec::new();
     for name in IMAGES {
         let path = build_fw::image(name);

@@ -27,7 +27,7 @@ const TICKS_BEFORE_WRAP: u32 = 10_000;
 /// # Errors
 /// If a run fails, or says anything but what it must.
 pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
-    run_cargo(&["build", "--release", "--package", "painleve-sil-host"])?;
+    run_cargo(&["build", "--release", "--package", "painleve-command"])?;
     soak("native", 3600.0 * arguments.hours)?;
     if arguments.qemu_minutes > 0.0 {
         soak("qemu", 60.0 * arguments.qemu_minutes)?;

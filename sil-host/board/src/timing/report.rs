@@ -1,0 +1,142 @@
+//! The report about ticks: for programs as JSON, for people as a table.
+
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{CellAlignment, Table};
+use painleve_shared::message::Health;
+use serde::{Deserialize, Serialize};
+
+use super::tick_times::WorstTick;
+use super::{TickTimes, Unit};
+use crate::{Board, BoardError, LineHealth};
+
+/// What the ticks of one scenario cost. The names are a contract: add to them, never rename.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TimingReport {
+    /// The scenario.
+    pub scenario: String,
+    /// Control rate, Hz.
+    pub tick_hz: u32,
+    /// What ran the controller.
+    pub host: String,
+    /// What was measured: `tick` for the work of a tick, `wake-up` for its lateness.
+    pub measured: String,
+    /// Unit of all costs.
+    pub unit: Unit,
+    /// Ticks controlled.
+    pub ticks: u64,
+    /// Cheapest tick.
+    pub min: u32,
+    /// Median.
+    pub median: u32,
+    /// 99.9th percentile.
+    pub p999: u32,
+    /// Most expensive tick.
+    pub max: u32,
+    /// The same, with its circumstances.
+    pub worst: Option<WorstTick>,
+    /// Ticks that were not done when the next was due.
+    pub missed_deadlines: u64,
+    /// Most stack ever used on a board, bytes.
+    pub stack_bytes: Option<u32>,
+    /// What a board has counted.
+    pub board: Option<Health>,
+    /// What the host has counted on a board's line.
+    pub line: Option<LineHealth>,
+    /// Costs with the number of ticks that had them, ascending.
+    pub histogram: Vec<(u32, u64)>,
+}
+
+impl TimingReport {
+    /// About the ticks of a board, which is asked what it has counted.
+    ///
+    /// # Errors
+    /// [`BoardError`] if the board does not answer.
+    pub fn of_board<B: Board>(
+        scenario: &str,
+        tick_hz: u32,
+        times: &TickTimes,
+        board: &mut B,
+    ) -> Result<Self, BoardError> {
+        let health = board.health()?;
+        Ok(Self {
+            stack_bytes: Some(health.stack_bytes),
+            board: Some(health),
+            line: board.line(),
+            missed_deadlines: health.overruns.into(),
+            ..Self::new(scenario, tick_hz, B::HOST, "tick", board.unit(), times)
+        })
+    }
+
+    /// About ticks on whatever `host`.
+    pub fn new(
+        scenario: &str,
+        tick_hz: u32,
+        host: &str,
+        measured: &str,
+        unit: Unit,
+        times: &TickTimes,
+    ) -> Self {
+        Self {
+            scenario: scenario.into(),
+            tick_hz,
+            host: host.into(),
+            measured: measured.into(),
+            unit,
+            ticks: times.ticks(),
+            min: times.at_quantile(0.0),
+            median: times.at_quantile(0.5),
+            p999: times.at_quantile(0.999),
+            max: times.at_quantile(1.0),
+            worst: times.worst().cloned(),
+            missed_deadlines: 0,
+            stack_bytes: None,
+            board: None,
+            line: None,
+            histogram: times.histogram(),
+        }
+    }
+}
+
+/// Reports as a table, one row for each.
+pub fn table(reports: &[TimingReport]) -> String {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    let first = reports.first();
+    let head = first.map_or(String::new(), |first| {
+        format!("{} on {}, {}", first.measured, first.host, first.unit)
+    });
+    table.set_header([
+        head.as_str(),
+        "rate",
+        "ticks",
+        "min",
+        "median",
+        "p99.9",
+        "max",
+        "worst tick",
+        "missed",
+        "stack",
+    ]);
+    for report in reports {
+        let worst = report.worst.as_ref().map_or("–".into(), |worst| {
+            format!("{}, {}", worst.tick, worst.state)
+        });
+        let stack = report.stack_bytes;
+        table.add_row([
+            report.scenario.clone(),
+            format!("{} Hz", report.tick_hz),
+            report.ticks.to_string(),
+            report.min.to_string(),
+            report.median.to_string(),
+            report.p999.to_string(),
+            report.max.to_string(),
+            worst,
+            report.missed_deadlines.to_string(),
+            stack.map_or("–".into(), |bytes| format!("{bytes} B")),
+        ]);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table.to_string()
+}

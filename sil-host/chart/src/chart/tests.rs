@@ -1,0 +1,119 @@
+//! Charts of anything stay within their bounds, with a legend of what has a name.
+
+use super::*;
+use crate::style::{BLUE_INK, GREEN, ORANGE, VERMILLION};
+use proptest::prelude::*;
+
+fn chart(marks: Vec<Mark>) -> Chart {
+    Chart {
+        title: "a < b".into(),
+        x_title: "x (m)".into(),
+        panels: vec![Panel {
+            title: "y (N)".into(),
+            marks,
+            ..Panel::default()
+        }],
+        ..Chart::default()
+    }
+}
+
+fn count(svg: &str, part: &str) -> usize {
+    svg.matches(part).count()
+}
+
+#[test]
+fn what_has_a_name_is_in_the_legend_and_titles_are_escaped() {
+    let svg = chart(vec![
+        Mark::line("solid", BLUE_INK, vec![(0.0, 1.0), (1.0, 2.0)]),
+        Mark::dashed("", GREEN, vec![(0.0, 2.0), (1.0, 1.0)]),
+        Mark::Span {
+            name: "span".into(),
+            colour: ORANGE,
+            opacity: 0.5,
+            x: 0.2..0.4,
+        },
+        Mark::Cells {
+            x: 0.0..1.0,
+            y: 1.0..2.0,
+            columns: 2,
+            palette: vec![("cell".into(), VERMILLION)],
+            cells: vec![0, 0, 9, 0],
+        },
+        Mark::Label {
+            at: (0.5, 1.5),
+            centred: true,
+            text: "word".into(),
+        },
+    ])
+    .svg()
+    .unwrap();
+    for text in [
+        "solid", "span", "cell", "word", "a &lt; b", "x (m)", "y (N)",
+    ] {
+        assert!(
+            svg.contains(&format!("\n{text}\n")),
+            "{text} is not in {svg}"
+        );
+    }
+    // The lower row is one rectangle, the upper one has a clear cell; one more is the legend's.
+    assert_eq!(count(&svg, "fill=\"#D55E00\""), 3);
+}
+
+#[test]
+fn lines_are_interrupted_by_nan_and_dots_that_coincide_are_one() {
+    let points = vec![
+        (0.0, 0.0),
+        (1.0, 1.0),
+        (2.0, f64::NAN),
+        (3.0, 1.0),
+        (4.0, 0.0),
+    ];
+    let svg = chart(vec![Mark::line("", BLUE_INK, points)]).svg().unwrap();
+    assert_eq!(count(&svg, "stroke=\"#0072B2\""), 2);
+    let dots = Mark::Dots {
+        name: String::new(),
+        colour: GREEN,
+        size: 4,
+        points: vec![(0.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.5, f64::NAN)],
+    };
+    assert_eq!(count(&chart(vec![dots]).svg().unwrap(), "#009E73"), 2);
+}
+
+#[test]
+fn long_legends_get_a_row_of_their_own() {
+    let height = |name: &str| {
+        let marks = (0..3).map(|_| Mark::line(name, BLUE_INK, vec![(0.0, 0.0), (1.0, 1.0)]));
+        let svg = chart(marks.collect()).svg().unwrap();
+        let (_, rest) = svg.split_once("height=\"").unwrap();
+        rest.split_once('"').unwrap().0.parse::<i32>().unwrap()
+    };
+    assert_eq!(height(&"long name ".repeat(5)), height("short") + ROW / 2);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn any_numbers_give_a_figure_within_its_bounds(
+        points in prop::collection::vec(
+            (any::<f64>(), prop_oneof![Just(0.1), any::<f64>()]), 0..20,
+        ),
+        dashed: bool,
+    ) {
+        let mark = if dashed { Mark::dashed } else { Mark::line };
+        let dots = Mark::Dots {
+            name: "d".into(),
+            colour: GREEN,
+            size: 2,
+            points: points.clone(),
+        };
+        let svg = chart(vec![mark("l", BLUE_INK, points), dots]).svg().unwrap();
+        prop_assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        for line in svg.lines().filter_map(|line| line.split_once("points=\"")) {
+            let (points, _) = line.1.split_once('"').unwrap();
+            for (x, y) in points.split_whitespace().filter_map(|point| point.split_once(',')) {
+                let (x, y): (i32, i32) = (x.parse().unwrap(), y.parse().unwrap());
+                prop_assert!((0..=WIDTH).contains(&x) && (0..=2000).contains(&y));
+            }
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! What the link alone costs, one sensor frame there and one actuator frame back
+//! between two processes, and beside it what a lockstep tick costs in all: the same
+//! exchange with the plant at one end and the controller at the other.
+//!
+//! Besides criterion's time per round trip it prints round trips per second and
+//! their percentiles; the maximum is the scheduler's more than the link's.
+
+use std::process::{Child, Command, ExitCode};
+use std::time::{Duration, Instant};
+
+use criterion::Criterion;
+use hdrhistogram::Histogram;
+use painleve_link::lockstep::Lockstep;
+use painleve_link::{BusName, ControllerEnd, LinkError, Pacing, PlantEnd, Received, Session};
+use painleve_plant::closed_loop::ClosedLoop;
+use painleve_plant::scenario::{Scenario, built_in};
+use painleve_plant::simulation::Simulation;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+
+/// Set for the second process: the bus on which it answers.
+const BUS: &str = "PAINLEVE_BENCH_BUS";
+const ROUND_TRIPS: u32 = 500_000;
+/// Covers criterion's analysis, during which no frames are sent.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> ExitCode {
+    let outcome = match std::env::var(BUS) {
+        Ok(bus) => answer_all(&bus),
+        Err(_) => bench(),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn bench() -> Outcome<()> {
+    let mut ping_pong = PingPong::start()?;
+
+    // `cargo test` runs benches once, without `--bench`.
+    if std::env::args().any(|argument| argument == "--bench") {
+        let round_trips = RoundTrips::measure(|| ping_pong.round_trip())?;
+        println!("bare ping-pong of the frames: {round_trips}");
+        println!("lockstep run, plant included: {}\n", lockstep()?);
+    }
+    let mut criterion = Criterion::default().configure_from_args();
+    let mut failure = None;
+    criterion.bench_function("link/ping_pong", |bencher| {
+        bencher.iter(|| {
+            if failure.is_none() {
+                failure = ping_pong.round_trip().err();
+            }
+        })
+    });
+    criterion.final_summary();
+    match failure {
+        Some(error) => Err(error.into()),
+        None => ping_pong.end(),
+    }
+}
+
+/// The default scenario against the program's own controller process.
+fn lockstep() -> Outcome<RoundTrips> {
+    let scenario = Scenario::load(built_in::DEFAULT, &["run.duration_s=1000".into()])?;
+    let bus = BusName::unique();
+    let session = Session {
+        tick_hz: scenario.run.tick_hz,
+        pacing: Pacing::Lockstep,
+        configuration: postcard::to_stdvec(&scenario.controller_configuration())?,
+    };
+    let mut plant = PlantEnd::create(&bus, &session)?;
+    let mut controller = AnsweringProcess(
+        Command::new(env!("CARGO_BIN_EXE_painleve"))
+            .args(["controller", "--wait-s", "5", "--bus", bus.as_str()])
+            .spawn()?,
+    );
+    plant.wait_for_controller(Duration::from_secs(5))?;
+    let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario)?, Lockstep(plant));
+    let ticks = RoundTrips::measure(|| closed_loop.tick(&mut ()))?;
+    closed_loop.finish().1.0.end()?;
+    controller.0.wait()?;
+    Ok(ticks)
+}
+
+/// The bare exchange of frames with a second process that only echoes them.
+struct PingPong {
+    plant: PlantEnd,
+    echo: AnsweringProcess,
+    tick: u32,
+}
+
+impl PingPong {
+    fn start() -> Outcome<Self> {
+        let bus = BusName::unique();
+        let session = Session {
+            tick_hz: 1000,
+            pacing: Pacing::Lockstep,
+            configuration: Vec::new(),
+        };
+        let mut plant = PlantEnd::create(&bus, &session)?;
+        let echo = AnsweringProcess::start(&bus)?;
+        plant.wait_for_controller(Duration::from_secs(5))?;
+        Ok(Self {
+            plant,
+            echo,
+            tick: 0,
+        })
+    }
+
+    fn round_trip(&mut self) -> Result<(), LinkError> {
+        self.tick = self.tick.wrapping_add(1);
+        self.plant.exchange(&SensorFrame {
+            tick: self.tick,
+            sequence: self.tick,
+            ..SensorFrame::default()
+        })?;
+        Ok(())
+    }
+
+    fn end(mut self) -> Outcome<()> {
+        self.plant.end()?;
+        self.echo.0.wait()?;
+        Ok(())
+    }
+}
+
+/// The process that answers; killed if the bench fails.
+struct AnsweringProcess(Child);
+
+impl AnsweringProcess {
+    fn start(bus: &BusName) -> Outcome<Self> {
+        let echo = Command::new(std::env::current_exe()?)
+            .env(BUS, bus.as_str())
+            .spawn()?;
+        Ok(Self(echo))
+    }
+}
+
+impl Drop for AnsweringProcess {
+    fn drop(&mut self) {
+        // Both fail only if it has already ended.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn answer_all(bus: &str) -> Outcome<()> {
+    let (mut controller, _) = ControllerEnd::open(&bus.parse()?, Duration::from_secs(5))?;
+    controller.set_silence_limit(PATIENCE);
+    while let Received::Frame(frame) = controller.receive()? {
+        controller.send(&ActuatorFrame {
+            tick: frame.tick,
+            sequence: frame.sequence,
+            ..ActuatorFrame::default()
+        })?;
+    }
+    Ok(())
+}
+
+/// Many round trips, each timed.
+struct RoundTrips {
+    per_s: f64,
+    latency_ns: Histogram<u32>,
+}
+
+impl RoundTrips {
+    fn measure<E: std::error::Error + 'static>(
+        mut round_trip: impl FnMut() -> Result<(), E>,
+    ) -> Outcome<Self> {
+        let mut latency_ns = Histogram::new(3)?;
+        for _ in 0..ROUND_TRIPS / 10 {
+            round_trip()?;
+        }
+        let start = Instant::now();
+        let mut last = start;
+        for _ in 0..ROUND_TRIPS {
+            round_trip()?;
+            let now = Instant::now();
+            latency_ns.record((now - last).as_nanos() as u64)?;
+            last = now;
+        }
+        Ok(Self {
+            per_s: f64::from(ROUND_TRIPS) / start.elapsed().as_secs_f64(),
+            latency_ns,
+        })
+    }
+}
+
+impl std::fmt::Display for RoundTrips {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let us = |quantile| self.latency_ns.value_at_quantile(quantile) as f64 * 1e-3;
+        write!(
+            f,
+            "{:.0} round trips/s, in µs: p50 {:.2}, p99 {:.2}, p99.9 {:.2}, max {:.1}",
+            self.per_s,
+            us(0.5),
+            us(0.99),
+            us(0.999),
+            self.latency_ns.max() as f64 * 1e-3
+        )
+    }
+}

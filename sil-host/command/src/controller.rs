@@ -1,0 +1,56 @@
+//! `painleve controller`: the firmware's controller in a process of its own.
+
+use std::time::Duration;
+
+use clap::Args;
+use painleve_firmware::{Configuration, Controller};
+use painleve_link::{BusName, ControllerEnd, Pacing, Received};
+use painleve_system::interrupt::Interrupt;
+use painleve_system::lifetime;
+use painleve_system::realtime::request_realtime;
+
+use super::CommandError;
+
+/// Options of `painleve controller`.
+#[derive(Debug, Args)]
+pub struct ControllerArguments {
+    /// Bus on which the plant is.
+    #[arg(long)]
+    bus: BusName,
+    /// How long to wait for the plant, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
+    wait_s: f64,
+    /// End when the process that started this one does.
+    #[arg(long, hide = true)]
+    end_with_parent: bool,
+}
+
+/// Answers the plant's frames until its session ends.
+pub fn run(arguments: &ControllerArguments) -> Result<(), CommandError> {
+    if arguments.end_with_parent {
+        lifetime::end_with_parent()?;
+    }
+    let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    let wait = Duration::from_secs_f64(arguments.wait_s);
+    let (mut end, session) = ControllerEnd::open(&arguments.bus, wait)?;
+    let bad_session = |reason: String| {
+        CommandError::Process(format!(
+            "the plant on bus {} sent a configuration that this controller refuses: {reason}",
+            arguments.bus
+        ))
+    };
+    let configuration: Configuration = postcard::from_bytes(&session.configuration)
+        .map_err(|error| bad_session(error.to_string()))?;
+    let mut controller =
+        Controller::new(&configuration).map_err(|error| bad_session(error.to_string()))?;
+    if session.pacing == Pacing::Realtime {
+        eprintln!("controller: {}", request_realtime());
+    }
+    while let Received::Frame(frame) = end.receive()? {
+        end.send(&controller.tick(&frame))?;
+        if interrupt.is_requested() {
+            return Err(CommandError::Interrupted);
+        }
+    }
+    Ok(())
+}

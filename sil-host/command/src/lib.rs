@@ -1,0 +1,162 @@
+//! The `painleve` command: its subcommands, their options, their errors.
+
+mod bridge;
+mod controller;
+mod figures;
+mod output;
+mod plant;
+mod run;
+mod scenarios;
+mod study;
+mod sweep;
+mod timing;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use painleve_board::BoardError;
+use painleve_link::LinkError;
+use painleve_plant::closed_loop::LoopError;
+use painleve_plant::scenario::ScenarioError;
+use painleve_study::StudyError;
+use painleve_study::sweep::SweepError;
+
+/// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
+///
+/// Without a subcommand, `run` is run.
+#[derive(Debug, Parser)]
+#[command(name = "painleve", version, args_conflicts_with_subcommands = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: run::RunArguments,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Start plant and controller as two processes and report what happened.
+    Run(run::RunArguments),
+    /// Simulate belt and arm, and wait for a controller on the bus.
+    Plant(plant::PlantArguments),
+    /// Run the controller for the plant on the bus.
+    Controller(controller::ControllerArguments),
+    /// Run the controller's image on a board for the plant on the bus.
+    Bridge(bridge::BridgeArguments),
+    /// What control ticks cost: instructions, cycles, or lateness, with the worst of all.
+    Timing(timing::TimingArguments),
+    /// List the built-in scenarios, or print one as TOML with every key.
+    Scenarios(scenarios::ScenariosArguments),
+    /// Compute one of the paper's studies as numbers, data files and figures.
+    Study(study::StudyArguments),
+    /// Compute a study in shards, on many machines.
+    Sweep(sweep::SweepArguments),
+    /// Make all of the paper's studies, with one page that sets them beside the paper.
+    Figures(figures::FiguresArguments),
+}
+
+/// Exit code of a process whose peer is missing or has died.
+const PEER_FAILED: u8 = 3;
+
+/// Why a command failed. Every message is one sentence for the user.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandError {
+    /// The scenario is wrong.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The run ended early.
+    #[error(transparent)]
+    Loop(#[from] LoopError),
+    /// The peer is missing, gone or wrong.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The board that runs the controller is missing, gone or wrong.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+    /// A file cannot be written.
+    #[error("{0}")]
+    Output(String),
+    /// A study has no outcome.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// There is no sweep, or not all of one.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+    /// A process of the run cannot be started or has died.
+    #[error("{0}")]
+    Process(String),
+    /// A process of the run has failed and said why.
+    #[error("")]
+    Told {
+        /// Its exit code.
+        code: u8,
+    },
+    /// Ctrl-C or a request to end.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl CommandError {
+    /// 1: the plant failed, or a sweep is incomplete; 2: bad input; 3: a peer is missing or has died;
+    /// 4: an output cannot be written; 130: interrupted.
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Scenario(_) => 2,
+            Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
+                StudyError::Scenario(_) | StudyError::Option(_) | StudyError::Range(_) => 2,
+                StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
+                StudyError::Plot(_) => 4,
+            },
+            Self::Sweep(SweepError::Incomplete(_)) => 1,
+            Self::Sweep(SweepError::Output(_)) => 4,
+            Self::Sweep(_) => 2,
+            Self::Loop(LoopError::Plant(_)) => 1,
+            Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => {
+                PEER_FAILED
+            }
+            Self::Loop(LoopError::Watcher(_)) | Self::Output(_) => 4,
+            Self::Loop(LoopError::Interrupted) | Self::Interrupted => 130,
+            Self::Told { code } => *code,
+        }
+    }
+}
+
+impl From<std::io::Error> for CommandError {
+    /// What the system refuses a process, outside files and links.
+    fn from(error: std::io::Error) -> Self {
+        Self::Process(error.to_string())
+    }
+}
+
+/// A time in seconds on the command line.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=86_400.0).contains(&seconds) => Ok(seconds),
+        _ => Err("give a number of seconds from 0 to 86400".into()),
+    }
+}
+
+/// Runs the command line; the exit code is the process's.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command.unwrap_or(Command::Run(cli.run)) {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Plant(arguments) => plant::run(&arguments),
+        Command::Controller(arguments) => controller::run(&arguments),
+        Command::Bridge(arguments) => bridge::run(&arguments),
+        Command::Timing(arguments) => timing::run(&arguments),
+        Command::Scenarios(arguments) => scenarios::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
+        Command::Figures(arguments) => figures::run(&arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            if !matches!(error, CommandError::Told { .. }) {
+                eprintln!("error: {error}");
+            }
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

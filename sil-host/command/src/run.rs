@@ -1,0 +1,327 @@
+//! `painleve run`: plant and controller as two processes, started, watched and ended together.
+
+use std::ffi::OsString;
+use std::io::Read;
+use std::path::PathBuf;
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use painleve_board::{emulator, serial};
+use painleve_link::{BusName, Pacing};
+use painleve_plant::scenario::{Scenario, built_in};
+use painleve_record::report::RunReport;
+use painleve_study::robustness;
+use painleve_system::interrupt::Interrupt;
+use painleve_system::lifetime::Guarded;
+
+use super::bridge::ImageArguments;
+use super::output::OutputArguments;
+use super::{CommandError, PEER_FAILED};
+
+/// A run of the robustness campaign.
+#[derive(Clone, Copy, Debug)]
+struct Replay {
+    seed: u64,
+    index: u64,
+}
+
+impl std::str::FromStr for Replay {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        text.split_once(':')
+            .and_then(|(seed, index)| {
+                Some(Self {
+                    seed: seed.parse().ok()?,
+                    index: index.parse().ok()?,
+                })
+            })
+            .ok_or_else(|| {
+                "give the campaign's seed and the run's number, SEED:INDEX, as in 1:42".into()
+            })
+    }
+}
+
+/// Which scenario to run, and how.
+#[derive(Clone, Debug, Args)]
+pub struct ScenarioArguments {
+    /// Built-in scenario or TOML file.
+    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
+    name: String,
+    /// The same as an option.
+    #[arg(long = "scenario", value_name = "SCENARIO", conflicts_with = "name")]
+    option: Option<String>,
+    /// Run INDEX of `study robustness --seed SEED` instead of a scenario.
+    #[arg(
+        long,
+        value_name = "SEED:INDEX",
+        conflicts_with_all = ["name", "option"],
+        allow_hyphen_values = true
+    )]
+    replay: Option<Replay>,
+    /// Override one key, as in belt.friction=0.4; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// As fast as it goes and deterministic, or by the clock.
+    #[arg(long, value_enum, default_value = "lockstep")]
+    pub pacing: Pacing,
+}
+
+impl ScenarioArguments {
+    fn name(&self) -> &str {
+        self.option.as_deref().unwrap_or(&self.name)
+    }
+
+    /// The scenario with its overrides, checked.
+    ///
+    /// # Errors
+    /// [`CommandError`] in one sentence for the user.
+    pub fn load(&self) -> Result<Scenario, CommandError> {
+        match self.replay {
+            Some(Replay { seed, index }) => {
+                let drawn = robustness::scenario(seed, index)?;
+                Ok(drawn.with_overrides("replayed run", &self.overrides)?)
+            }
+            None => Ok(Scenario::load(self.name(), &self.overrides)?),
+        }
+    }
+
+    fn to_arguments(&self) -> Vec<OsString> {
+        let mut arguments: Vec<OsString> = match self.replay {
+            Some(Replay { seed, index }) => {
+                vec!["--replay".into(), format!("{seed}:{index}").into()]
+            }
+            None => vec![self.name().into()],
+        };
+        for text in &self.overrides {
+            arguments.extend(["--set".into(), text.into()]);
+        }
+        arguments.extend(["--pacing".into(), self.pacing.name().into()]);
+        arguments
+    }
+}
+
+/// What runs the controller.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Host {
+    /// The firmware's controller in a process of its own.
+    #[default]
+    Native,
+    /// The image of the flash target under QEMU.
+    Qemu,
+    /// A flashed board behind the serial port --port.
+    Serial,
+}
+
+/// Options of `painleve run`.
+#[derive(Clone, Debug, Args)]
+pub struct RunArguments {
+    #[command(flatten)]
+    scenario: ScenarioArguments,
+    /// Bus on which plant and controller meet; unique by default.
+    #[arg(long)]
+    bus: Option<BusName>,
+    /// What runs the controller.
+    #[arg(long, value_enum, default_value_t)]
+    host: Host,
+    /// Serial port of the board, as in /dev/ttyUSB0.
+    #[arg(long, value_name = "PATH", required_if_eq("host", "serial"))]
+    port: Option<PathBuf>,
+    #[command(flatten)]
+    image: ImageArguments,
+    #[command(flatten)]
+    output: OutputArguments,
+    /// Print one JSON object on stdout instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Children that are started here see each other come and go, so that they
+/// may take their time to start.
+const START_WAIT_S: &str = "10";
+
+/// How often the children are looked at.
+const WATCH: Duration = Duration::from_millis(10);
+
+/// How long the plant may take to notice and tell that the controller is gone.
+/// With stopping it by force, all are gone within 2 s.
+const PLANT_NOTICE: Duration = Duration::from_millis(1000);
+
+/// How long the controller may take to end after the plant has.
+const CONTROLLER_END: Duration = Duration::from_millis(1700);
+
+/// How long a bridge may take to end after the plant has missed it.
+const BRIDGE_END: Duration = Duration::from_millis(300);
+
+/// Runs a scenario as two processes and reports.
+pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
+    // Before anything is started, so that there is one message about it.
+    arguments.scenario.load()?;
+    if arguments.host == Host::Qemu {
+        emulator::check(&arguments.image.path())?;
+    }
+    if let (Host::Serial, Some(port)) = (arguments.host, &arguments.port) {
+        serial::check(port)?;
+    }
+    let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
+
+    let mut plant_arguments: Vec<OsString> = vec!["plant".into()];
+    plant_arguments.extend(arguments.scenario.to_arguments());
+    plant_arguments.extend(arguments.output.to_arguments());
+    plant_arguments.push("--json".into());
+    let host = arguments.host.to_possible_value();
+    let host = host.as_ref().map_or("native", |host| host.get_name());
+    plant_arguments.extend(["--host-name".into(), host.into()]);
+    if arguments.host == Host::Serial {
+        plant_arguments.push("--board-keeps-time".into());
+    }
+    let mut plant = start(plant_arguments, &bus, Stdio::inherit())?;
+    // Its complaints matter only while the plant has none, a log at once.
+    let stderr = if arguments.image.log {
+        Stdio::inherit()
+    } else {
+        Stdio::piped()
+    };
+    let mut controller = start(controller_arguments(arguments), &bus, stderr)?;
+
+    let plant_status = loop {
+        if interrupt.is_requested() {
+            return Err(CommandError::Interrupted);
+        }
+        if let Some(status) = plant.ended()? {
+            break status;
+        }
+        if let Some(status) = controller.ended()?
+            && !status.success()
+        {
+            // The plant notices by itself and says so; if it does not, this does.
+            if let Some(plant_status) = wait(&mut plant, PLANT_NOTICE)? {
+                break plant_status;
+            }
+            return Err(CommandError::Process(format!(
+                "the controller process ended early ({status}){}",
+                said(&mut controller)
+            )));
+        }
+        std::thread::sleep(WATCH);
+    };
+    if !plant_status.success() {
+        // A plant that blames the controller does not know why a board stopped; its bridge does.
+        if plant_status.code() == Some(i32::from(PEER_FAILED))
+            && arguments.host != Host::Native
+            && wait(&mut controller, BRIDGE_END)?.is_some_and(|status| !status.success())
+        {
+            eprintln!("error{}", said(&mut controller));
+        }
+        return Err(failure(plant_status));
+    }
+    let controller_status = wait(&mut controller, CONTROLLER_END)?;
+    match controller_status {
+        Some(status) if status.success() => {}
+        Some(status) => {
+            return Err(CommandError::Process(format!(
+                "the controller process failed ({status}){}",
+                said(&mut controller)
+            )));
+        }
+        None => {
+            return Err(CommandError::Process(
+                "the controller process did not end with its plant".into(),
+            ));
+        }
+    }
+    eprint!("{}", read(controller.child().stderr.take()));
+    let text = read(plant.child().stdout.take());
+    let report: RunReport = serde_json::from_str(&text).map_err(|error| {
+        CommandError::Process(format!("the plant process gave no report: {error}"))
+    })?;
+    print(&report, arguments.json)
+}
+
+fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
+    let image = &arguments.image;
+    let mut line: Vec<OsString> = match arguments.host {
+        Host::Native => return vec!["controller".into()],
+        Host::Qemu => vec!["bridge".into(), "qemu".into()],
+        Host::Serial => vec!["bridge".into(), "serial".into()],
+    };
+    line.extend(["--scenario-name".into(), arguments.scenario.name().into()]);
+    if arguments.host == Host::Serial {
+        for (option, path) in [("--port", &arguments.port), ("--timing", &image.timing)] {
+            if let Some(path) = path {
+                line.extend([option.into(), path.into()]);
+            }
+        }
+    } else {
+        line.extend(image.to_arguments());
+    }
+    line
+}
+
+fn start(arguments: Vec<OsString>, bus: &BusName, stderr: Stdio) -> Result<Guarded, CommandError> {
+    let program = std::env::current_exe()?;
+    let child = Command::new(&program)
+        .args(arguments)
+        .args(["--bus", bus.as_str()])
+        .args(["--wait-s", START_WAIT_S, "--end-with-parent"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(stderr)
+        .spawn()
+        .map_err(|error| {
+            CommandError::Process(format!("cannot start {}: {error}", program.display()))
+        })?;
+    Ok(Guarded::new(child))
+}
+
+fn wait(child: &mut Guarded, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
+    let start = std::time::Instant::now();
+    while start.elapsed() < limit {
+        if let Some(status) = child.ended()? {
+            return Ok(Some(status));
+        }
+        std::thread::sleep(WATCH);
+    }
+    Ok(None)
+}
+
+/// A plant that exits with a code has said why; one that was killed has not.
+fn failure(status: ExitStatus) -> CommandError {
+    match status.code().and_then(|code| u8::try_from(code).ok()) {
+        Some(code) => CommandError::Told { code },
+        None => CommandError::Process(format!("the plant process ended early ({status})")),
+    }
+}
+
+fn said(child: &mut Guarded) -> String {
+    let text = read(child.child().stderr.take());
+    let text = text.trim().trim_start_matches("error: ");
+    if text.is_empty() {
+        String::new()
+    } else {
+        format!(": {text}")
+    }
+}
+
+/// Everything a pipe holds once its process has ended; what cannot be read is left out.
+fn read(pipe: Option<impl Read>) -> String {
+    let mut text = String::new();
+    if let Some(mut pipe) = pipe {
+        let _ = pipe.read_to_string(&mut text);
+    }
+    text
+}
+
+/// Prints a report for programs or for people.
+pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
+    use std::io::Write;
+    let text = if json {
+        serde_json::to_string(report).map_err(|error| CommandError::Output(error.to_string()))?
+    } else {
+        report.table()
+    };
+    writeln!(std::io::stdout(), "{text}")
+        .map_err(|error| CommandError::Output(format!("cannot write to stdout: {error}")))
+}

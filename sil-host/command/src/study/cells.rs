@@ -1,0 +1,76 @@
+//! Options of the studies that run the arm without control over a grid of cells.
+
+use clap::Args;
+use painleve_study::cells::{Cells, RELATIVE_TOLERANCE};
+use painleve_study::initial::Initials;
+use painleve_study::{Grid, StudyError};
+
+use super::options::BaseOptions;
+
+/// Options that such studies share.
+#[derive(Debug, Args)]
+pub struct CellOptions {
+    /// Initial conditions: the paper's a, d, u, and any number of random ones, as in a,d,random:8.
+    #[arg(long, value_name = "LIST", default_value = "a")]
+    initial: Initials,
+    /// Seed of the random initial conditions.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How long each cell runs before it is watched, s.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 250.0,
+        allow_negative_numbers = true
+    )]
+    transient_s: f64,
+    /// How long it is watched, s.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 50.0,
+        allow_negative_numbers = true
+    )]
+    record_s: f64,
+    /// Error of one step of the plant relative to its state, the absolute one a tenth of it
+    /// [default: 1e-11].
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
+    relative_tolerance: Option<f64>,
+    #[command(flatten)]
+    base: BaseOptions,
+}
+
+impl CellOptions {
+    /// Name of the scenario that they start from.
+    pub fn scenario(&self) -> &str {
+        self.base.name()
+    }
+
+    /// The cells over grids of friction and belt speed, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the option or key that is wrong.
+    pub fn cells(&self, mu: &Grid, v_belt: &Grid) -> Result<Cells, StudyError> {
+        let scenario = self.base.load(&[
+            ("belt.friction", "--mu"),
+            ("belt.profile", "--v-belt"),
+            ("initial", "--initial"),
+            ("run.seed", "--seed"),
+            ("run.duration_s", "--transient-s and --record-s"),
+            ("solver.relative_tolerance", "--relative-tolerance"),
+            ("solver.absolute_tolerance", "--relative-tolerance"),
+        ])?;
+        let cells = Cells {
+            plant: scenario.plant_parameters(),
+            relative_tolerance: self.relative_tolerance.unwrap_or(RELATIVE_TOLERANCE),
+            mu: mu.values().to_vec(),
+            v_belt_m_s: v_belt.values().to_vec(),
+            initial: self.initial.list().to_vec(),
+            seed: self.seed,
+            transient_s: self.transient_s,
+            record_s: self.record_s,
+        };
+        cells.check()?;
+        Ok(cells)
+    }
+}

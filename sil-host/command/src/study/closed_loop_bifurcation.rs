@@ -1,0 +1,126 @@
+//! `painleve study closed-loop-bifurcation`: Fig. 12.
+
+use clap::Args;
+use painleve_study::case::{self, Controller, Converters, Reference};
+use painleve_study::closed_loop_bifurcation::{ClosedLoopBifurcation, Diagram};
+use painleve_study::initial::Initials;
+use painleve_study::{Grid, StudyError};
+
+use super::options::{OutcomeOptions, Overrides, seconds};
+use crate::CommandError;
+
+/// Options of `painleve study closed-loop-bifurcation`.
+#[derive(Debug, Args)]
+pub struct ClosedLoopBifurcationArguments {
+    /// pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same with known
+    /// friction), hybrid (as built in), or any scenario or file.
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        default_value = "hybrid"
+    )]
+    controller: Vec<Controller>,
+    /// Ideal (as in the paper), hardware, or the scenario's own.
+    #[arg(
+        long,
+        value_name = "SETS",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "hardware"
+    )]
+    converters: Vec<Converters>,
+    /// Friction coefficients μ, FROM:TO:STEP or a list.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "0.6",
+        allow_hyphen_values = true
+    )]
+    mu: Grid,
+    /// Belt speeds, m/s.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "-1:-0.1:0.005",
+        allow_hyphen_values = true
+    )]
+    v_belt: Grid,
+    /// Initial conditions, as in d,u,a,random:3; the posture is that of the start.
+    #[arg(long, value_name = "LIST", default_value = "d")]
+    initial: Initials,
+    /// Seed of the random initial conditions.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// minimum-jerk:SECONDS, ramp:SECONDS or step.
+    #[arg(long, default_value = "minimum-jerk:3")]
+    reference: Reference,
+    /// Target of the reference, m; the paper's farthest one for law and posture by default.
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    target_m: Option<f64>,
+    /// How long each cell runs before it is watched, s; the paper has 250.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 20.0,
+        value_parser = seconds,
+        allow_negative_numbers = true
+    )]
+    transient_s: f64,
+    /// How long it is watched, s; the paper has 50.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 10.0,
+        value_parser = seconds,
+        allow_negative_numbers = true
+    )]
+    record_s: f64,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    outcome: OutcomeOptions,
+}
+
+impl ClosedLoopBifurcationArguments {
+    /// The study that is asked for, checked.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the option or key that is wrong.
+    pub fn study(&self) -> Result<ClosedLoopBifurcation, StudyError> {
+        self.overrides.refuse(&[
+            ("belt.friction", "--mu"),
+            ("belt.profile", "--v-belt"),
+            ("initial", "--initial"),
+            ("controller.reference", "--reference and --target-m"),
+            ("run.duration_s", "--transient-s and --record-s"),
+        ])?;
+        let study = ClosedLoopBifurcation {
+            controllers: self.controller.clone(),
+            converters: self.converters.clone(),
+            mu: self.mu.values().to_vec(),
+            v_belt_m_s: self.v_belt.values().to_vec(),
+            initial: self.initial.list().to_vec(),
+            seed: self.seed,
+            reference: self.reference,
+            target_m: self.target_m,
+            transient_s: self.transient_s,
+            record_s: self.record_s,
+            overrides: self.overrides.overrides.clone(),
+        };
+        study.check()?;
+        Ok(study)
+    }
+
+    /// The scenarios of its own that it starts from.
+    pub fn scenarios(&self) -> Vec<&str> {
+        case::own_scenarios(&self.controller)
+    }
+}
+
+/// Computes the diagram and writes it.
+pub fn run(arguments: &ClosedLoopBifurcationArguments) -> Result<(), CommandError> {
+    let study = arguments.study()?;
+    let rows = arguments.outcome.compute(&study)?;
+    arguments.outcome.write(&Diagram::new(rows))
+}

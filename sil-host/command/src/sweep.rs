@@ -1,0 +1,305 @@
+//! `painleve sweep`: a study in shards, on many machines.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use painleve_study::outcome;
+use painleve_study::sweep::campaign::{Campaign, Understood};
+use painleve_study::sweep::manifest::Manifest;
+use painleve_study::sweep::share::{self, ShardOption, Share};
+use painleve_study::sweep::slurm::Job;
+use painleve_study::sweep::{SweepError, array, folder, shard_file};
+use painleve_system::atomic_file;
+
+use super::CommandError;
+use super::study::campaign::understand;
+use super::study::options::{Threads, output};
+
+/// Options of `painleve sweep`.
+#[derive(Debug, Args)]
+pub struct SweepArguments {
+    #[command(subcommand)]
+    command: SweepCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum SweepCommand {
+    /// Deal the rows of a campaign out to shards and write the manifest.
+    Plan(PlanArguments),
+    /// Compute one shard, or all that are missing; finished ones are skipped.
+    Run(RunArguments),
+    /// Show which shards are finished.
+    Status(StatusArguments),
+    /// Print the shards that are not finished in array syntax, as in 3,7,9-12.
+    Missing(Place),
+    /// Put all shards together; refuses gaps and duplicates.
+    Merge(MergeArguments),
+    /// Write a script that submits the missing shards to a scheduler.
+    Submit(SubmitArguments),
+}
+
+/// Which sweep.
+#[derive(Debug, Args)]
+struct Place {
+    /// Folder of the sweep: its manifest and its shards.
+    #[arg(long, value_name = "PATH", default_value = "out/sweep")]
+    folder: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct PlanArguments {
+    /// TOML file: study = "bifurcation" and its options, as on the command line.
+    campaign: PathBuf,
+    /// How many shards; a few minutes of work each is a good size.
+    #[arg(long, value_name = "N")]
+    shards: NonZeroUsize,
+    #[command(flatten)]
+    place: Place,
+}
+
+#[derive(Debug, Args)]
+struct RunArguments {
+    /// Shard K of N, K from 0; by default what the scheduler says in SLURM_ARRAY_TASK_ID,
+    /// HQ_TASK_ID, JOB_COMPLETION_INDEX or OMPI_COMM_WORLD_RANK.
+    #[arg(long, value_name = "K/N", allow_hyphen_values = true)]
+    shard: Option<ShardOption>,
+    /// Compute all shards that are missing, one after the other.
+    #[arg(long, conflicts_with = "shard")]
+    all: bool,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    place: Place,
+}
+
+#[derive(Debug, Args)]
+struct StatusArguments {
+    /// Print one JSON object on stdout instead of the table.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    place: Place,
+}
+
+#[derive(Debug, Args)]
+struct MergeArguments {
+    /// The CSV file; merged.csv in the sweep's folder by default.
+    #[arg(long, value_name = "PATH")]
+    csv: Option<PathBuf>,
+    /// The same rows as a Parquet file.
+    #[cfg(feature = "parquet")]
+    #[arg(long, value_name = "PATH")]
+    parquet: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
+}
+
+#[derive(Debug, Args)]
+struct SubmitArguments {
+    #[command(subcommand)]
+    scheduler: Scheduler,
+}
+
+#[derive(Debug, Subcommand)]
+enum Scheduler {
+    /// Write sweep.sbatch, a job array of the missing shards; submitting it is up to you.
+    Slurm(SlurmArguments),
+}
+
+#[derive(Debug, Args)]
+struct SlurmArguments {
+    /// Cores of each shard.
+    #[arg(long, value_name = "N", default_value = "1")]
+    cpus: NonZeroUsize,
+    /// A further option of sbatch, as in --option=--time=30; may be repeated.
+    #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]
+    options: Vec<String>,
+    /// The script; sweep.sbatch in the sweep's folder by default.
+    #[arg(long, value_name = "PATH")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
+}
+
+/// Runs one step of a sweep.
+pub fn run(arguments: &SweepArguments) -> Result<(), CommandError> {
+    match &arguments.command {
+        SweepCommand::Plan(arguments) => plan(arguments),
+        SweepCommand::Run(arguments) => compute(arguments),
+        SweepCommand::Status(arguments) => status(arguments),
+        SweepCommand::Missing(place) => missing(&place.folder),
+        SweepCommand::Merge(arguments) => merge(arguments),
+        SweepCommand::Submit(SubmitArguments {
+            scheduler: Scheduler::Slurm(arguments),
+        }) => submit_slurm(arguments),
+    }
+}
+
+fn plan(arguments: &PlanArguments) -> Result<(), CommandError> {
+    let path = &arguments.campaign;
+    let campaign = Campaign::load(path)?;
+    let understood = understand(&campaign).map_err(|message| SweepError::Campaign {
+        path: path.clone(),
+        message,
+    })?;
+    let manifest = Manifest::new(campaign, &understood, arguments.shards.get())?;
+    let folder = &arguments.place.folder;
+    let is_new = manifest.write(folder)?;
+    say(&format!(
+        "{}{}: campaign {}, {} rows in {} shards",
+        Manifest::path(folder).display(),
+        if is_new { "" } else { " (there already)" },
+        manifest.campaign_hash(),
+        manifest.rows,
+        manifest.shards,
+    ))
+}
+
+/// The manifest and the study that it describes.
+fn load(folder: &Path) -> Result<(Manifest, Understood), SweepError> {
+    let manifest = Manifest::load(folder)?;
+    let understood = understand(&manifest.campaign).map_err(|message| SweepError::Manifest {
+        path: Manifest::path(folder),
+        message,
+    })?;
+    manifest.check(folder, &understood)?;
+    Ok((manifest, understood))
+}
+
+fn compute(arguments: &RunArguments) -> Result<(), CommandError> {
+    let folder = &arguments.place.folder;
+    let (manifest, understood) = load(folder)?;
+    let shards = if arguments.all {
+        (0..manifest.shards).collect()
+    } else {
+        let variable = |name: &str| std::env::var(name).ok();
+        vec![share::shard(arguments.shard, manifest.shards, variable)?]
+    };
+    for shard in shards {
+        compute_shard(arguments, &manifest, &understood, shard)?;
+    }
+    Ok(())
+}
+
+fn compute_shard(
+    arguments: &RunArguments,
+    manifest: &Manifest,
+    understood: &Understood,
+    shard: usize,
+) -> Result<(), CommandError> {
+    let folder = &arguments.place.folder;
+    let path = shard_file::path(folder, shard);
+    let name = format!("shard {shard}/{}", manifest.shards);
+    if path.exists() {
+        match shard_file::read(&path, manifest) {
+            Ok(found) if found.shard == shard => return say(&format!("{name}: finished before")),
+            Ok(found) => eprintln!(
+                "{} holds shard {}: computed again",
+                path.display(),
+                found.shard
+            ),
+            Err(reason) => eprintln!("{} {reason}: computed again", path.display()),
+        }
+    } else {
+        // Whether it can be written is known before anything is computed.
+        atomic_file::AtomicFile::create(&path).map_err(output)?;
+    }
+    let share = Share::new(understood.table.as_ref(), shard, manifest.shards);
+    let records = arguments.threads.compute(&name, &share)?;
+    shard_file::write(folder, manifest, shard, share.rows(), &records)?;
+    say(&format!(
+        "{name}: {} rows in {}",
+        share.rows().len(),
+        path.display()
+    ))
+}
+
+fn status(arguments: &StatusArguments) -> Result<(), CommandError> {
+    let folder = &arguments.place.folder;
+    let manifest = Manifest::load(folder)?;
+    let status = folder::status(folder, &manifest)?;
+    if arguments.json {
+        return say(&serde_json::to_string(&status).map_err(output)?);
+    }
+    let mut table = outcome::table(["sweep", &folder.display().to_string()]);
+    table.add_row(["campaign", manifest.campaign_hash()]);
+    table.add_row(["study", &manifest.campaign.study]);
+    table.add_row(["rows", &status.rows.to_string()]);
+    let finished = format!("{} of {}", status.finished, status.shards);
+    table.add_row(["finished shards", &finished]);
+    let missing = if status.missing.is_empty() {
+        "none"
+    } else {
+        &status.missing
+    };
+    table.add_row(["missing shards", missing]);
+    for file in &status.unusable {
+        table.add_row([&file.file.display().to_string(), &file.reason]);
+    }
+    for duplicate in &status.duplicates {
+        for file in &duplicate.files {
+            let reason = format!("is one of several of shard {}", duplicate.shard);
+            table.add_row([&file.display().to_string(), &reason]);
+        }
+    }
+    say(&table.to_string())
+}
+
+fn missing(folder: &Path) -> Result<(), CommandError> {
+    let manifest = Manifest::load(folder)?;
+    say(&array::syntax(&folder::missing(folder, &manifest)?))
+}
+
+fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
+    let folder = &arguments.place.folder;
+    let manifest = Manifest::load(folder)?;
+    let text = folder::merge(folder, &manifest)?;
+    let default = folder.join("merged.csv");
+    let path = arguments.csv.as_ref().unwrap_or(&default);
+    #[cfg(feature = "parquet")]
+    if let Some(path) = &arguments.parquet {
+        let columns = painleve_study::sweep::parquet::from_csv(&text).map_err(output)?;
+        atomic_file::write(path, &columns).map_err(output)?;
+    }
+    atomic_file::write(path, &text).map_err(output)?;
+    folder::tidy(folder);
+    say(&format!(
+        "{}: {} rows of {} shards",
+        path.display(),
+        manifest.rows,
+        manifest.shards
+    ))
+}
+
+fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
+    let folder = &arguments.place.folder;
+    let manifest = Manifest::load(folder)?;
+    let array = array::syntax(&folder::missing(folder, &manifest)?);
+    if array.is_empty() {
+        return say("every shard is finished: `painleve sweep merge` puts them together");
+    }
+    let job = Job {
+        program: &std::env::current_exe()?,
+        directory: &std::env::current_dir()?,
+        folder: &std::path::absolute(folder)?,
+        array: &array,
+        cpus: arguments.cpus.get(),
+        options: &arguments.options,
+    };
+    let script = job.script().map_err(SweepError::Shard)?;
+    let default = folder.join("sweep.sbatch");
+    let path = arguments.out.as_ref().unwrap_or(&default);
+    atomic_file::write(path, script.as_bytes()).map_err(output)?;
+    say(&format!(
+        "{0}: shards {array}; submit with: sbatch {0}",
+        path.display()
+    ))
+}
+
+/// One line, or a table, on stdout.
+fn say(text: &str) -> Result<(), CommandError> {
+    use std::io::Write;
+    writeln!(std::io::stdout(), "{text}")
+        .map_err(|error| CommandError::Output(format!("cannot write to stdout: {error}")))
+}

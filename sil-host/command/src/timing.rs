@@ -1,0 +1,175 @@
+//! `painleve timing`: what control ticks cost, on every host of the controller.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use painleve_board::emulator::{self, Emulator};
+use painleve_board::timing::figure;
+use painleve_board::timing::{Metronome, TimingReport, Unit, report};
+use painleve_board::{Board, OnBoard, Serial};
+use painleve_plant::closed_loop::{ClosedLoop, LoopError, Watcher};
+use painleve_plant::controller_host::{ControllerHost, InProcess};
+use painleve_plant::sample::Sample;
+use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
+use painleve_plant::simulation::Simulation;
+use painleve_shared::message::Plant;
+use painleve_system::atomic_file::{self, AtomicFile};
+use painleve_system::interrupt::Interrupt;
+use painleve_system::realtime::request_realtime;
+
+use super::CommandError;
+use super::run::Host;
+
+/// Options of `painleve timing`.
+#[derive(Debug, Args)]
+pub struct TimingArguments {
+    /// Built-in scenarios or TOML files; all that are built in by default.
+    #[arg(value_name = "SCENARIO")]
+    names: Vec<String>,
+    /// Override one key of all of them, as in run.tick_hz=10000; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Instructions of the image under QEMU, cycles of a board, or wake-ups of this PC by the clock.
+    #[arg(long, value_enum, default_value = "qemu")]
+    host: Host,
+    /// Serial port of the board, as in /dev/ttyUSB0.
+    #[arg(long, value_name = "PATH", required_if_eq("host", "serial"))]
+    port: Option<PathBuf>,
+    /// The controller's image for QEMU; the workspace's own build by default.
+    #[arg(long, value_name = "PATH")]
+    elf: Option<PathBuf>,
+    /// Print a JSON array on stdout instead of the table.
+    #[arg(long)]
+    json: bool,
+    /// Write histograms as a figure.
+    #[arg(long, value_name = "PATH")]
+    svg: Option<PathBuf>,
+}
+
+/// Runs every scenario and reports what its ticks cost.
+pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
+    let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
+    let names: Vec<&str> = match arguments.names.as_slice() {
+        [] => built_in::names().collect(),
+        names => names.iter().map(String::as_str).collect(),
+    };
+    // Whatever is wrong is said before the first of them runs.
+    let scenarios = names
+        .iter()
+        .map(|name| Scenario::load(name, &arguments.overrides))
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(path) = &arguments.svg {
+        AtomicFile::create(path).map_err(|error| output(&error))?;
+    }
+    let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    if arguments.host == Host::Native {
+        eprintln!("controller: {}", request_realtime());
+    }
+    let reports = scenarios
+        .iter()
+        .map(|scenario| measure(arguments, scenario, &interrupt))
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(path) = &arguments.svg {
+        let figure = figure::svg(&reports).map_err(|error| output(&error))?;
+        atomic_file::write(path, figure.as_bytes()).map_err(|error| output(&error))?;
+    }
+    if arguments.json {
+        let text = serde_json::to_string(&reports).map_err(|error| output(&error))?;
+        println!("{text}");
+    } else {
+        println!("{}", report::table(&reports));
+    }
+    Ok(())
+}
+
+fn measure(
+    arguments: &TimingArguments,
+    scenario: &Scenario,
+    interrupt: &Interrupt,
+) -> Result<TimingReport, CommandError> {
+    let configuration = scenario.controller_configuration();
+    match (arguments.host, &arguments.port) {
+        (Host::Serial, Some(port)) => {
+            let board = Serial::open(port, &configuration, Plant::Realtime)?;
+            on_board(scenario, board, interrupt)
+        }
+        (Host::Native, _) => by_the_clock(scenario, interrupt),
+        (Host::Qemu | Host::Serial, _) => {
+            let image = arguments.elf.clone();
+            let image = image.unwrap_or_else(emulator::default_image);
+            let board = Emulator::start(&image, &configuration, false)?;
+            on_board(scenario, board, interrupt)
+        }
+    }
+}
+
+fn on_board<B: Board>(
+    scenario: &Scenario,
+    board: B,
+    interrupt: &Interrupt,
+) -> Result<TimingReport, CommandError> {
+    let OnBoard { mut board, times } = drive(scenario, OnBoard::new(board), interrupt)?;
+    let tick_hz = scenario.run.tick_hz;
+    Ok(TimingReport::of_board(
+        &scenario.name,
+        tick_hz,
+        &times,
+        &mut board,
+    )?)
+}
+
+fn by_the_clock(scenario: &Scenario, interrupt: &Interrupt) -> Result<TimingReport, CommandError> {
+    let configuration = scenario.controller_configuration();
+    let range = |source| out_of_range(scenario, source);
+    let controller = InProcess::new(&configuration).map_err(range)?;
+    let metronome = Metronome::start(controller, &configuration)?;
+    let (lateness_ns, missed_deadlines) = drive(scenario, metronome, interrupt)?.finish();
+    let (name, unit) = (&scenario.name, Unit::Nanoseconds);
+    let tick_hz = scenario.run.tick_hz;
+    let host = Host::Native.to_possible_value();
+    let host = host.as_ref().map_or("native", |host| host.get_name());
+    Ok(TimingReport {
+        missed_deadlines,
+        ..TimingReport::new(name, tick_hz, host, "wake-up", unit, &lateness_ns)
+    })
+}
+
+fn drive<H: ControllerHost>(
+    scenario: &Scenario,
+    host: H,
+    interrupt: &Interrupt,
+) -> Result<H, CommandError> {
+    let simulation = Simulation::new(scenario).map_err(|source| out_of_range(scenario, source))?;
+    let mut closed_loop = ClosedLoop::new(simulation, host);
+    for _ in 0..scenario.run.ticks() {
+        closed_loop.tick(&mut UntilAsked(interrupt))?;
+    }
+    Ok(closed_loop.finish().1)
+}
+
+fn out_of_range(scenario: &Scenario, source: painleve_shared::range::OutOfRange) -> ScenarioError {
+    ScenarioError::Range {
+        origin: scenario.name.clone(),
+        source,
+    }
+}
+
+/// Watches for nothing but a request to end.
+struct UntilAsked<'a>(&'a Interrupt);
+
+impl Watcher for UntilAsked<'_> {
+    fn wants_samples(&self) -> bool {
+        false
+    }
+
+    fn sample(&mut self, _: &Sample) -> Result<(), LoopError> {
+        Ok(())
+    }
+
+    fn tick(&mut self) -> Result<(), LoopError> {
+        if self.0.is_requested() {
+            return Err(LoopError::Interrupted);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,82 @@
+//! A controller in another process, by the clock: a tick lasts as long as its
+//! simulated time, and an answer that is not there at its end is missed.
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use hdrhistogram::Histogram;
+use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
+use painleve_shared::frame::SensorFrame;
+use painleve_system::realtime::Pacer;
+
+use crate::PlantEnd;
+
+/// How long to poll for an answer without sleeping.
+const BUSY: Duration = Duration::from_micros(100);
+
+/// Sleep between two polls after that.
+const NAP: Duration = Duration::from_micros(50);
+
+/// The link's plant end with absolute deadlines.
+pub struct Paced {
+    end: PlantEnd,
+    pacer: Pacer,
+    /// Part of a tick in which an answer is in time.
+    patience: Duration,
+    lateness_ns: Histogram<u64>,
+    missed_deadlines: u64,
+    period: Duration,
+}
+
+impl Paced {
+    /// Starts the clock at `tick_hz`.
+    ///
+    /// # Errors
+    /// If the clock cannot be read.
+    pub fn start(end: PlantEnd, tick_hz: u32) -> io::Result<Self> {
+        let period = Duration::from_secs(1) / tick_hz;
+        Ok(Self {
+            end,
+            pacer: Pacer::start(period)?,
+            patience: period.mul_f64(0.9),
+            lateness_ns: Histogram::new_with_max(60_000_000_000, 3).map_err(io::Error::other)?,
+            missed_deadlines: 0,
+            period,
+        })
+    }
+
+    /// How late the wake-ups were, ns, and how many came a whole tick or more late; and the link.
+    pub fn finish(self) -> (Histogram<u64>, u64, PlantEnd) {
+        (self.lateness_ns, self.missed_deadlines, self.end)
+    }
+}
+
+impl ControllerHost for Paced {
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
+        let start = Instant::now();
+        self.end.send(frame).map_err(HostError::new)?;
+        let mut answer = None;
+        let mut round_trip = self.period;
+        while start.elapsed() < self.patience {
+            match self.end.try_receive().map_err(HostError::new)? {
+                Some(received) if received.tick == frame.tick => {
+                    answer = Some(received);
+                    round_trip = start.elapsed();
+                    break;
+                }
+                // The late answer to a tick that has been given up.
+                Some(_) => {}
+                None if start.elapsed() < BUSY => std::thread::yield_now(),
+                None => std::thread::sleep(NAP),
+            }
+        }
+        let late = self.pacer.wait().map_err(HostError::new)?;
+        let nanoseconds = u64::try_from(late.as_nanos()).unwrap_or(u64::MAX);
+        self.lateness_ns.saturating_record(nanoseconds);
+        self.missed_deadlines += u64::from(late >= self.period);
+        Ok(Answer {
+            frame: answer,
+            round_trip,
+        })
+    }
+}

@@ -1,0 +1,570 @@
+//! Both ends together: threads for what is said, processes for what dies.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use iceoryx2::prelude::{Config, FileName, SemanticString};
+use nix::sys::signal::Signal;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+
+use super::*;
+
+/// Longer than any pause of a busy test machine.
+const PATIENT: Duration = Duration::from_secs(20);
+const SHORT: Duration = Duration::from_millis(100);
+
+/// A bus with a file prefix of its own, so that a test sees what it leaves.
+#[derive(Clone)]
+struct TestBus {
+    name: BusName,
+    config: Config,
+    files: Option<Arc<Files>>,
+}
+
+/// The files of a test, removed at its end even if it fails.
+struct Files {
+    prefix: String,
+}
+
+impl Files {
+    fn left(&self) -> Vec<PathBuf> {
+        let mut left = Vec::new();
+        find(Path::new("/dev/shm"), &self.prefix, &mut left);
+        let folder = services::default_config().global.root_path().to_string();
+        find(Path::new(&folder), &self.prefix, &mut left);
+        left
+    }
+}
+
+impl Drop for Files {
+    fn drop(&mut self) {
+        for path in self.left() {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+}
+
+impl TestBus {
+    fn new() -> Self {
+        let bus = Self::named(BusName::unique());
+        let prefix = bus.config.global.prefix.to_string();
+        Self {
+            files: Some(Arc::new(Files { prefix })),
+            ..bus
+        }
+    }
+
+    fn named(name: BusName) -> Self {
+        let mut config = services::default_config();
+        let prefix = format!("iox2_test_{name}_");
+        config.global.prefix = FileName::new(prefix.as_bytes()).unwrap();
+        Self {
+            name,
+            config,
+            files: None,
+        }
+    }
+
+    fn plant(&self) -> Result<PlantEnd, LinkError> {
+        let mut plant = PlantEnd::create_with(&self.name, &session(), &self.config)?;
+        plant.set_silence_limit(PATIENT);
+        Ok(plant)
+    }
+
+    fn controller(&self, timeout: Duration) -> Result<(ControllerEnd, Session), LinkError> {
+        let (mut controller, session) =
+            ControllerEnd::open_with(&self.name, timeout, &self.config)?;
+        controller.set_silence_limit(PATIENT);
+        Ok((controller, session))
+    }
+
+    /// A controller in a thread that answers every frame, and its count of them.
+    fn echo(&self) -> thread::JoinHandle<Result<u32, LinkError>> {
+        let bus = self.clone();
+        thread::spawn(move || answer_all(bus.controller(PATIENT)?.0))
+    }
+
+    /// This test binary once more, as one end in a process of its own.
+    fn process(&self, role: &str) -> Process {
+        let child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "tests::end_in_a_process"])
+            .args(["--ignored", "--nocapture"])
+            .env(ROLE, role)
+            .env(BUS, self.name.as_str())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        Process(child)
+    }
+
+    #[track_caller]
+    fn assert_nothing_left(&self) {
+        let mut left = self.files.as_ref().unwrap().left();
+        // The count of nodes: one page for the whole machine, kept by iceoryx2.
+        left.retain(|path| path.extension().is_none_or(|e| e != "global_mgmt"));
+        assert!(left.is_empty(), "left behind: {left:?}");
+    }
+}
+
+fn find(folder: &Path, prefix: &str, found: &mut Vec<PathBuf>) {
+    // Another run may remove its own meanwhile: what cannot be read is gone.
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            find(&path, prefix, found);
+        } else if entry.file_name().to_string_lossy().starts_with(prefix) {
+            found.push(path);
+        }
+    }
+}
+
+/// What [`end_in_a_process`] says once its end is open.
+const OPEN: &str = "end is open";
+const ROLE: &str = "PAINLEVE_TEST_ROLE";
+const BUS: &str = "PAINLEVE_TEST_BUS";
+
+/// Killed, as by SIGKILL, when dropped.
+struct Process(Child);
+
+impl Process {
+    fn wait_until_open(&mut self) {
+        let said = BufReader::new(self.0.stdout.take().unwrap());
+        assert!(
+            said.lines().any(|line| line.unwrap().ends_with(OPEN)),
+            "the process has failed to open its end"
+        );
+    }
+
+    fn kill(&mut self) {
+        self.0.kill().unwrap();
+        self.0.wait().unwrap();
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// Not a test: one end, in the process that [`TestBus::process`] starts.
+#[test]
+#[ignore = "the other process of a test"]
+fn end_in_a_process() {
+    let Ok(role) = std::env::var(ROLE) else {
+        return;
+    };
+    let bus = TestBus::named(std::env::var(BUS).unwrap().parse().unwrap());
+    match role.as_str() {
+        "controller" => {
+            let (controller, _) = bus.controller(PATIENT).unwrap();
+            println!("{OPEN}");
+            answer_all(controller).unwrap();
+        }
+        "plant" => {
+            let mut plant = bus.plant().unwrap();
+            println!("{OPEN}");
+            plant.wait_for_controller(PATIENT).unwrap();
+            for tick in 0.. {
+                plant.exchange(&sensor(tick)).unwrap();
+            }
+        }
+        // A controller that holds the bus and says nothing.
+        "mute" => {
+            let _end = bus.controller(PATIENT).unwrap();
+            println!("{OPEN}");
+            thread::sleep(PATIENT);
+        }
+        other => panic!("no role {other}"),
+    }
+}
+
+fn session() -> Session {
+    Session {
+        tick_hz: 1000,
+        pacing: Pacing::Lockstep,
+        configuration: vec![1, 2, 3],
+    }
+}
+
+fn sensor(tick: u32) -> SensorFrame {
+    SensorFrame {
+        tick,
+        sequence: tick.wrapping_mul(3),
+        ..SensorFrame::default()
+    }
+}
+
+fn answer(frame: &SensorFrame) -> ActuatorFrame {
+    ActuatorFrame {
+        tick: frame.tick,
+        sequence: frame.sequence,
+        ..ActuatorFrame::default()
+    }
+}
+
+fn answer_all(mut controller: ControllerEnd) -> Result<u32, LinkError> {
+    let mut count = 0;
+    while let Received::Frame(frame) = controller.receive()? {
+        controller.send(&answer(&frame))?;
+        count += 1;
+    }
+    Ok(count)
+}
+
+#[test]
+fn every_tick_goes_there_and_back() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    let first = u32::MAX - 500;
+    for n in 0..1000 {
+        let frame = sensor(first.wrapping_add(n));
+        assert_eq!(plant.exchange(&frame).unwrap(), answer(&frame));
+    }
+    plant.end().unwrap();
+    assert_eq!(controller.join().unwrap().unwrap(), 1000);
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn a_late_controller_learns_the_session_and_gets_the_frames_from_then_on() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    for tick in 0..10 {
+        plant.send(&sensor(tick)).unwrap();
+    }
+    let controller = {
+        let bus = bus.clone();
+        thread::spawn(move || {
+            let (mut controller, session) = bus.controller(PATIENT).unwrap();
+            (session, controller.receive().unwrap())
+        })
+    };
+    plant.wait_for_controller(PATIENT).unwrap();
+    plant.send(&sensor(10)).unwrap();
+    let (learned, received) = controller.join().unwrap();
+    assert_eq!(learned, session());
+    assert_eq!(received, Received::Frame(sensor(10)));
+    drop(plant);
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn frames_sent_in_a_burst_arrive_in_order_and_before_the_end() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let (sent, all_sent) = std::sync::mpsc::channel();
+    let controller = {
+        let bus = bus.clone();
+        thread::spawn(move || {
+            let (mut controller, _) = bus.controller(PATIENT).unwrap();
+            all_sent.recv().unwrap();
+            let mut ticks = Vec::new();
+            while let Received::Frame(frame) = controller.receive().unwrap() {
+                ticks.push(frame.tick);
+            }
+            ticks
+        })
+    };
+    plant.wait_for_controller(PATIENT).unwrap();
+    let burst = FRAME_BUFFER as u32 + 6;
+    for tick in 0..burst {
+        plant.send(&sensor(tick)).unwrap();
+    }
+    plant.end().unwrap();
+    sent.send(()).unwrap();
+    // More than fit: the oldest six are lost.
+    assert_eq!(controller.join().unwrap(), (6..burst).collect::<Vec<_>>());
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn answers_are_received_without_waiting() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    assert!(plant.try_receive().unwrap().is_none());
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    for tick in 0..3 {
+        plant.send(&sensor(tick)).unwrap();
+    }
+    let mut answered = Vec::new();
+    while answered.len() < 3 {
+        match plant.try_receive().unwrap() {
+            Some(frame) => answered.push(frame.tick),
+            None => thread::yield_now(),
+        }
+    }
+    assert_eq!(answered, [0, 1, 2]);
+    plant.end().unwrap();
+    controller.join().unwrap().unwrap();
+}
+
+#[test]
+fn a_second_plant_is_refused_and_the_first_goes_on() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let error = bus.plant().err().unwrap();
+    assert!(matches!(&error, LinkError::BusInUse { bus: named } if *named == bus.name));
+    assert!(error.to_string().contains(bus.name.as_str()));
+
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    plant.exchange(&sensor(1)).unwrap();
+    plant.end().unwrap();
+    controller.join().unwrap().unwrap();
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn a_second_controller_is_refused_and_the_first_goes_on() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    let error = bus.controller(PATIENT).err().unwrap();
+    assert!(matches!(&error, LinkError::ControllerInUse { bus: named } if *named == bus.name));
+
+    plant.exchange(&sensor(1)).unwrap();
+    plant.end().unwrap();
+    controller.join().unwrap().unwrap();
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn buses_side_by_side_never_meet() {
+    let a = TestBus::new();
+    let b = TestBus {
+        name: BusName::unique(),
+        ..a.clone()
+    };
+    let mut plants = [a.plant().unwrap(), b.plant().unwrap()];
+    let controllers = [a.echo(), b.echo()];
+    for (index, plant) in plants.iter_mut().enumerate() {
+        plant.wait_for_controller(PATIENT).unwrap();
+        for tick in 0..=index as u32 {
+            plant.exchange(&sensor(tick)).unwrap();
+        }
+    }
+    for plant in plants {
+        plant.end().unwrap();
+    }
+    assert_eq!(controllers.map(|c| c.join().unwrap().unwrap()), [1, 2]);
+    a.assert_nothing_left();
+}
+
+#[test]
+fn a_missing_plant_is_an_error_that_says_what_to_start() {
+    let bus = TestBus::new();
+    let error = bus.controller(SHORT).err().unwrap();
+    assert!(matches!(error, LinkError::PlantMissing { .. }));
+    let advice = format!("painleve plant --bus {}", bus.name);
+    assert!(error.to_string().contains(&advice), "{error}");
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn a_missing_controller_is_an_error_that_says_what_to_start() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let error = plant.wait_for_controller(SHORT).unwrap_err();
+    assert!(matches!(error, LinkError::ControllerMissing { .. }));
+    let advice = format!("painleve controller --bus {}", bus.name);
+    assert!(error.to_string().contains(&advice), "{error}");
+    assert!(matches!(
+        plant.exchange(&sensor(0)),
+        Err(LinkError::ControllerGone { .. })
+    ));
+}
+
+#[test]
+fn a_plant_that_leaves_without_ending_the_session_is_noticed() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    plant.exchange(&sensor(0)).unwrap();
+    drop(plant);
+    assert!(matches!(
+        controller.join().unwrap(),
+        Err(LinkError::PlantGone { .. })
+    ));
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn an_answer_to_another_tick_is_an_error() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let controller = {
+        let bus = bus.clone();
+        thread::spawn(move || {
+            let (mut controller, _) = bus.controller(PATIENT).unwrap();
+            controller.receive().unwrap();
+            controller.send(&answer(&sensor(6))).unwrap();
+            controller.receive().unwrap()
+        })
+    };
+    plant.wait_for_controller(PATIENT).unwrap();
+    assert!(matches!(
+        plant.exchange(&sensor(7)),
+        Err(LinkError::WrongTick {
+            asked: 7,
+            answered: 6,
+            ..
+        })
+    ));
+    plant.end().unwrap();
+    assert_eq!(controller.join().unwrap(), Received::End);
+}
+
+#[test]
+fn a_silent_controller_is_noticed_though_it_lives() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let _mute = bus.process("mute");
+    plant.wait_for_controller(PATIENT).unwrap();
+    plant.set_silence_limit(SHORT);
+    assert!(matches!(
+        plant.exchange(&sensor(0)),
+        Err(LinkError::ControllerSilent { .. })
+    ));
+    plant.send(&sensor(1)).unwrap();
+    let error = loop {
+        match plant.try_receive() {
+            Ok(_) => thread::sleep(Duration::from_millis(1)),
+            Err(error) => break error,
+        }
+    };
+    assert!(matches!(error, LinkError::ControllerSilent { .. }));
+}
+
+#[test]
+fn a_silent_plant_is_noticed_though_it_lives() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let controller = {
+        let bus = bus.clone();
+        thread::spawn(move || {
+            let (mut controller, _) = bus.controller(PATIENT).unwrap();
+            controller.set_silence_limit(SHORT);
+            controller.receive()
+        })
+    };
+    plant.wait_for_controller(PATIENT).unwrap();
+    assert!(matches!(
+        controller.join().unwrap(),
+        Err(LinkError::PlantSilent { .. })
+    ));
+}
+
+#[test]
+fn a_killed_controller_is_noticed_and_the_bus_can_be_used_again() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let mut killed = bus.process("controller");
+    plant.wait_for_controller(PATIENT).unwrap();
+    plant.exchange(&sensor(0)).unwrap();
+    killed.kill();
+    // Long before the silence limit, which would be another error.
+    assert!(matches!(
+        plant.exchange(&sensor(1)),
+        Err(LinkError::ControllerGone { .. })
+    ));
+    plant.send(&sensor(2)).unwrap();
+    let error = loop {
+        match plant.try_receive() {
+            Ok(_) => thread::sleep(Duration::from_millis(1)),
+            Err(error) => break error,
+        }
+    };
+    assert!(matches!(error, LinkError::ControllerGone { .. }));
+
+    // The surviving plant can go on with another controller...
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    plant.exchange(&sensor(3)).unwrap();
+    plant.end().unwrap();
+    controller.join().unwrap().unwrap();
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn a_killed_plant_is_noticed_and_the_bus_can_be_used_again() {
+    let bus = TestBus::new();
+    let mut killed = bus.process("plant");
+    let (mut survivor, _) = bus.controller(PATIENT).unwrap();
+    for _ in 0..100 {
+        let Received::Frame(frame) = survivor.receive().unwrap() else {
+            panic!("the plant has not ended the session");
+        };
+        survivor.send(&answer(&frame)).unwrap();
+    }
+    killed.kill();
+    // A new plant comes up while the survivor is still there.
+    let restarted = {
+        let bus = bus.clone();
+        thread::spawn(move || {
+            let mut plant = bus.plant().unwrap();
+            plant.wait_for_controller(PATIENT).unwrap();
+            plant.exchange(&sensor(0)).unwrap();
+            plant.end().unwrap();
+        })
+    };
+    let error = loop {
+        match survivor.receive() {
+            Ok(Received::Frame(frame)) => survivor.send(&answer(&frame)).unwrap(),
+            Ok(Received::End) => panic!("the plant was killed before any end"),
+            Err(error) => break error,
+        }
+    };
+    assert!(matches!(error, LinkError::PlantGone { .. }), "{error}");
+    drop(survivor);
+
+    assert_eq!(bus.echo().join().unwrap().unwrap(), 1);
+    restarted.join().unwrap();
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn what_two_killed_processes_leave_is_removed_by_the_next() {
+    let bus = TestBus::new();
+    let mut plant = bus.process("plant");
+    let mut mute = bus.process("mute");
+    mute.wait_until_open();
+    plant.kill();
+    mute.kill();
+
+    let mut plant = bus.plant().unwrap();
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    plant.exchange(&sensor(0)).unwrap();
+    plant.end().unwrap();
+    controller.join().unwrap().unwrap();
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn ctrl_c_is_left_alone() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    plant.exchange(&sensor(0)).unwrap();
+
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    let caught = u64::from_str_radix(caught.unwrap().trim(), 16).unwrap();
+    for signal in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP] {
+        assert_eq!(caught >> (signal as u32 - 1) & 1, 0, "{signal} is caught");
+    }
+    plant.end().unwrap();
+    controller.join().unwrap().unwrap();
+}

@@ -1,0 +1,208 @@
+//! The closed loop: sample, exchange, record, advance, tick by tick.
+
+use hdrhistogram::Histogram;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::status::Fault;
+use xxhash_rust::xxh3::Xxh3;
+
+use crate::controller_host::{Answer, ControllerHost, HostError};
+use crate::mechanics::PlantError;
+use crate::mechanics::statistics::Statistics;
+use crate::sample::Sample;
+use crate::simulation::Simulation;
+
+/// Time at the start of a run in which the normal force may still settle, s.
+const SETTLING_S: f64 = 0.05;
+
+/// Longest round trip that is told apart from longer ones, ns.
+const LONGEST_ROUND_TRIP_NS: u64 = 60_000_000_000;
+
+/// Why a run ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum LoopError {
+    /// The plant cannot go on.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The controller is gone.
+    #[error(transparent)]
+    Host(#[from] HostError),
+    /// Somebody who watches the run cannot go on, a record that cannot be written, say.
+    #[error(transparent)]
+    Watcher(Box<dyn std::error::Error + Send + Sync>),
+    /// The process has been asked to end.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Watches a run tick by tick.
+pub trait Watcher {
+    /// Whether [`Watcher::sample`] wants to be called at all.
+    fn wants_samples(&self) -> bool {
+        true
+    }
+
+    /// Takes in everything about one tick.
+    ///
+    /// # Errors
+    /// [`LoopError`] ends the run.
+    fn sample(&mut self, sample: &Sample) -> Result<(), LoopError>;
+
+    /// Called at the end of every tick.
+    ///
+    /// # Errors
+    /// [`LoopError`] ends the run.
+    fn tick(&mut self) -> Result<(), LoopError> {
+        Ok(())
+    }
+}
+
+/// Watches nothing.
+impl Watcher for () {
+    fn wants_samples(&self) -> bool {
+        false
+    }
+
+    fn sample(&mut self, _: &Sample) -> Result<(), LoopError> {
+        Ok(())
+    }
+}
+
+/// A simulation and a controller host, with what is counted about them.
+pub struct ClosedLoop<H> {
+    simulation: Simulation,
+    host: H,
+    statistics: Statistics,
+    log: LogHash,
+    round_trips_ns: Histogram<u64>,
+    last_answer: ActuatorFrame,
+    saturated_ticks: u64,
+    stale_ticks: u64,
+}
+
+/// Hash of every sensor and actuator frame in order. Each field enters as
+/// little-endian bytes, so that the hash is the same on every host.
+#[derive(Clone, Default)]
+struct LogHash(Xxh3);
+
+impl LogHash {
+    fn sensor(&mut self, frame: &SensorFrame) {
+        self.word(frame.tick);
+        self.word(frame.sequence);
+        for joint in frame.joints {
+            self.word(joint.0);
+        }
+        self.word(frame.normal_force.0.cast_unsigned());
+        self.word(frame.tangential_force.0.cast_unsigned());
+        self.word(frame.inputs.0);
+    }
+
+    fn actuator(&mut self, frame: &ActuatorFrame) {
+        self.word(frame.tick);
+        self.word(frame.sequence);
+        for torque in frame.torques {
+            self.word(torque.0.cast_unsigned());
+        }
+        self.word(frame.reference_tip.0.cast_unsigned());
+        self.word(frame.estimated_tip.0.cast_unsigned());
+        self.word(u32::from(frame.state) | u32::from(frame.fault) << 8);
+        self.word(u32::from(frame.flags.0));
+    }
+
+    fn word(&mut self, word: u32) {
+        self.0.update(&word.to_le_bytes());
+    }
+
+    fn hex(&self) -> String {
+        format!("{:032x}", self.0.digest128())
+    }
+}
+
+/// What was counted in a run.
+#[derive(Clone, Debug)]
+pub struct LoopResult {
+    /// Ticks run.
+    pub ticks: u64,
+    /// What the plant did.
+    pub statistics: Statistics,
+    /// Tip position at the end, m.
+    pub final_tip_t_m: f64,
+    /// Reference at the end, m.
+    pub final_reference_m: f64,
+    /// Ticks on which the controller limited its torque.
+    pub saturated_ticks: u64,
+    /// Ticks without an answer in time.
+    pub stale_ticks: u64,
+    /// Fault latched at the end.
+    pub fault: Option<Fault>,
+    /// Round trips, ns.
+    pub round_trips_ns: Histogram<u64>,
+    /// Hash of all frames, 32 hexadecimal digits.
+    pub log_hash: String,
+}
+
+impl<H: ControllerHost> ClosedLoop<H> {
+    /// A loop at the start of its simulation.
+    pub fn new(simulation: Simulation, host: H) -> Self {
+        Self {
+            simulation,
+            host,
+            statistics: Statistics::new(SETTLING_S),
+            log: LogHash::default(),
+            // Bounds are valid constants; three digits as everywhere.
+            round_trips_ns: Histogram::new_with_max(LONGEST_ROUND_TRIP_NS, 3)
+                .unwrap_or_else(|_| unreachable!("constant histogram bounds")),
+            last_answer: ActuatorFrame::default(),
+            saturated_ticks: 0,
+            stale_ticks: 0,
+        }
+    }
+
+    /// Runs one control tick.
+    ///
+    /// # Errors
+    /// [`LoopError`] if plant, controller or watcher cannot go on.
+    pub fn tick(&mut self, watcher: &mut impl Watcher) -> Result<(), LoopError> {
+        let sensor = self.simulation.sample(&mut self.statistics)?;
+        self.log.sensor(&sensor);
+        let frame = if self.simulation.sensor_frame_is_lost() {
+            None
+        } else {
+            let Answer { frame, round_trip } = self.host.exchange(&sensor)?;
+            let nanoseconds = u64::try_from(round_trip.as_nanos()).unwrap_or(LONGEST_ROUND_TRIP_NS);
+            self.round_trips_ns.saturating_record(nanoseconds);
+            frame
+        };
+        match &frame {
+            Some(answer) => {
+                self.log.actuator(answer);
+                self.last_answer = *answer;
+                let saturated = painleve_shared::frame::StatusFlags::SATURATED;
+                self.saturated_ticks += u64::from(answer.flags.contains(saturated));
+            }
+            None => self.stale_ticks += 1,
+        }
+        if watcher.wants_samples() {
+            watcher.sample(&self.simulation.describe(&sensor, &self.last_answer))?;
+        }
+        self.simulation
+            .advance(frame.as_ref(), &mut self.statistics)?;
+        watcher.tick()
+    }
+
+    /// Ends the run.
+    pub fn finish(self) -> (LoopResult, H) {
+        let plant = self.simulation.plant();
+        let result = LoopResult {
+            ticks: self.simulation.ticks(),
+            statistics: self.statistics,
+            final_tip_t_m: plant.motion().tip_t_m(plant.state()),
+            final_reference_m: self.last_answer.reference_tip.to_metres(),
+            saturated_ticks: self.saturated_ticks,
+            stale_ticks: self.stale_ticks,
+            fault: self.last_answer.latched_fault(),
+            round_trips_ns: self.round_trips_ns,
+            log_hash: self.log.hex(),
+        };
+        (result, self.host)
+    }
+}

@@ -1,0 +1,68 @@
+//! Whatever runs the controller, as the closed loop sees it.
+//!
+//! [`InProcess`] is a library call, for studies and tests. Hosts in other processes and on
+//! boards live in crates of their own.
+
+use std::time::{Duration, Instant};
+
+use painleve_firmware::{Configuration, Controller};
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::range::OutOfRange;
+
+/// The answer to one sensor frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer {
+    /// The controller's frame; `None` if it did not come in time.
+    pub frame: Option<ActuatorFrame>,
+    /// Time from sending the sensor frame to having the answer.
+    pub round_trip: Duration,
+}
+
+/// Why there are no answers any more: the reason of whatever runs the controller.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+pub struct HostError(Box<dyn std::error::Error + Send + Sync>);
+
+impl HostError {
+    /// The reason of a particular host.
+    pub fn new(reason: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self(Box::new(reason))
+    }
+}
+
+/// Something that answers sensor frames.
+pub trait ControllerHost {
+    /// Sends one frame and waits for its answer or the end of the tick.
+    ///
+    /// # Errors
+    /// [`HostError`] if there is no controller to answer any more.
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError>;
+}
+
+/// The controller in this very process.
+pub struct InProcess {
+    controller: Controller,
+}
+
+impl InProcess {
+    /// A controller with this configuration.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn new(configuration: &Configuration) -> Result<Self, OutOfRange> {
+        Ok(Self {
+            controller: Controller::new(configuration)?,
+        })
+    }
+}
+
+impl ControllerHost for InProcess {
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
+        let start = Instant::now();
+        let answer = self.controller.tick(frame);
+        Ok(Answer {
+            frame: Some(answer),
+            round_trip: start.elapsed(),
+        })
+    }
+}

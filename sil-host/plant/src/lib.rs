@@ -1,0 +1,17 @@
+//! The simulated plant and the controller in a closed loop with it, in one process.
+//!
+//! - [`mechanics`]: the arm on its belt, as a hybrid rigid-body model
+//! - [`converters`]: encoders, force cell, torque stages and the link's losses
+//! - [`scenario`]: everything that defines a run, as a TOML file
+//! - [`simulation`]: the plant as the controller's wires see it
+//! - [`controller_host`]: whatever runs the controller
+//! - [`closed_loop`]: sample, exchange, record, advance
+//! - [`sample`]: both frames of a tick and the truth behind them, for records
+
+pub mod closed_loop;
+pub mod controller_host;
+pub mod converters;
+pub mod mechanics;
+pub mod sample;
+pub mod scenario;
+pub mod simulation;

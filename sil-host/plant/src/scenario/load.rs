@@ -1,0 +1,340 @@
+//! Scenarios from names, files and overrides.
+
+use std::fs;
+use std::path::PathBuf;
+
+use painleve_shared::range::OutOfRange;
+use toml::{Table, Value};
+
+use super::{Scenario, built_in};
+use crate::mechanics::Plant;
+
+/// Why there is no scenario to run.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    /// Neither a built-in name nor a file.
+    #[error("no built-in scenario and no file is called '{name}'; built in are: {known}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The built-in names.
+        known: String,
+    },
+    /// The file cannot be read.
+    #[error("cannot read scenario file {}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file holds nothing.
+    #[error("scenario file {} is empty", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The text is not TOML.
+    #[error("{origin} is not TOML: {message}")]
+    Syntax {
+        /// File or scenario.
+        origin: String,
+        /// What is wrong and where.
+        message: String,
+    },
+    /// A key is unknown or has the wrong type.
+    #[error("{origin}: {key}: {message}")]
+    Key {
+        /// File, scenario or option.
+        origin: String,
+        /// Path of the key.
+        key: String,
+        /// What is wrong and what is allowed.
+        message: String,
+    },
+    /// An override is not of the form key=value.
+    #[error("--set '{text}' is not of the form key=value, as in --set belt.friction=0.4")]
+    Override {
+        /// What was given.
+        text: String,
+    },
+    /// A value is out of range.
+    #[error("{origin}: {source}")]
+    Range {
+        /// File or scenario.
+        origin: String,
+        /// Which and what is allowed.
+        source: OutOfRange,
+    },
+}
+
+impl Scenario {
+    /// The built-in scenario or file called `name`, with overrides `key=value`
+    /// applied in order, checked as a whole.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user.
+    pub fn load(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
+        let scenario = Self::load_unplaced(name, overrides)?;
+        let plant = Plant::new(&scenario.plant_parameters(), scenario.initial.state());
+        plant.map_err(|source| ScenarioError::Range {
+            origin: origin(name),
+            source,
+        })?;
+        Ok(scenario)
+    }
+
+    /// The same for studies that place the arm themselves: the start is not checked
+    /// against the belt.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user.
+    pub fn load_unplaced(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
+        from_table(&origin(name), read(name)?)?.with_overrides(&origin(name), overrides)
+    }
+
+    /// This scenario with overrides `key=value` applied in order, its numbers checked.
+    /// `origin` says in messages what they were applied to.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user.
+    pub fn with_overrides(
+        mut self,
+        origin: &str,
+        overrides: &[String],
+    ) -> Result<Self, ScenarioError> {
+        for text in overrides {
+            self = with_override(self, text)?;
+        }
+        self.validate().map_err(|source| ScenarioError::Range {
+            origin: origin.into(),
+            source,
+        })?;
+        Ok(self)
+    }
+}
+
+/// What a scenario's name stands for, in messages.
+fn origin(name: &str) -> String {
+    match built_in::text(name) {
+        Some(_) => format!("scenario {name}"),
+        None => format!("scenario file {name}"),
+    }
+}
+
+fn read(name: &str) -> Result<Table, ScenarioError> {
+    let origin = origin(name);
+    if let Some(text) = built_in::text(name) {
+        return parse(&origin, text);
+    }
+    let path = PathBuf::from(name);
+    if !path.exists() {
+        return Err(ScenarioError::Unknown {
+            name: name.into(),
+            known: built_in::names().collect::<Vec<_>>().join(", "),
+        });
+    }
+    let text = fs::read_to_string(&path).map_err(|source| ScenarioError::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    let mut table = parse(&origin, &text)?;
+    if table.is_empty() {
+        return Err(ScenarioError::Empty { path });
+    }
+    if let (false, Some(stem)) = (table.contains_key("name"), path.file_stem()) {
+        table.insert("name".into(), Value::String(stem.to_string_lossy().into()));
+    }
+    Ok(table)
+}
+
+fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
+    text.parse().map_err(|error: toml::de::Error| {
+        let line = error
+            .span()
+            .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
+        ScenarioError::Syntax {
+            origin: origin.into(),
+            message: match line {
+                Some(line) => format!("line {line}: {}", error.message()),
+                None => error.message().into(),
+            },
+        }
+    })
+}
+
+fn from_table(origin: &str, table: Table) -> Result<Scenario, ScenarioError> {
+    serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
+        origin: origin.into(),
+        key: error.path().to_string(),
+        message: error.inner().message().replace('\n', " "),
+    })
+}
+
+/// The scenario with one key changed. The key must be one that the scenario has or, like
+/// `controller.belt.given_m_s`, may have.
+fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioError> {
+    let wrong = || ScenarioError::Override { text: text.into() };
+    let (key, value) = text.split_once('=').ok_or_else(wrong)?;
+    let (key, value) = (key.trim(), value.trim());
+    if key.is_empty() || value.is_empty() {
+        return Err(wrong());
+    }
+    // A bare word is a string, so that names need no quotes inside quotes.
+    let value = format!("value = {value}")
+        .parse::<Table>()
+        .ok()
+        .and_then(|mut table| table.remove("value"))
+        .unwrap_or_else(|| Value::String(value.into()));
+    let wrong_key = |message| ScenarioError::Key {
+        origin: "--set".into(),
+        key: key.into(),
+        message,
+    };
+    let mut root = Value::try_from(&scenario).map_err(|error| wrong_key(error.to_string()))?;
+    // What to say if a key that is not there turns out not to be an optional one.
+    let mut missing = None;
+    let mut place = &mut root;
+    for part in key.split('.') {
+        let next = match place {
+            Value::Table(table) => {
+                if !table.contains_key(part) && missing.is_none() {
+                    let known = table.keys().cloned().collect::<Vec<_>>().join(", ");
+                    missing = Some(format!("there is no '{part}' here, only: {known}"));
+                }
+                let empty = || Value::Table(Table::new());
+                Ok(table.entry(part).or_insert_with(empty))
+            }
+            Value::Array(array) => {
+                let count = array.len();
+                part.parse::<usize>()
+                    .ok()
+                    .and_then(|index| array.get_mut(index))
+                    .ok_or(format!("'{part}' is not one of its {count} items, from 0"))
+            }
+            _ => Err(format!("'{part}' is inside a single value")),
+        };
+        place = next.map_err(wrong_key)?;
+    }
+    *place = match (&*place, value) {
+        // A whole number is a number.
+        (Value::Float(_), Value::Integer(integer)) => Value::Float(integer as f64),
+        (_, value) => value,
+    };
+    let Value::Table(table) = root else {
+        return Err(wrong());
+    };
+    from_table("--set", table).map_err(|error| match (missing, &error) {
+        // There is such a key, but not such a value.
+        (_, ScenarioError::Key { message, .. }) if message.starts_with("invalid ") => error,
+        (Some(message), _) => wrong_key(message),
+        (None, _) => error,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn load(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
+        let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+        Scenario::load("hybrid-elbow-down", &overrides)
+    }
+
+    fn message(overrides: &[&str]) -> String {
+        load(overrides).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn overrides_change_one_key_each() {
+        let scenario = load(&[
+            "belt.friction=0.4",
+            "run.duration_s=2",
+            "impact.law=energetic",
+            "controller.reference.0.minimum-jerk.target_m=0.1",
+            "belt.profile={ kind = \"sine\", mean_m_s = -0.4, amplitude_m_s = 0.1, frequency_hz = 2.0 }",
+        ])
+        .unwrap();
+        assert_eq!(scenario.belt.friction, 0.4);
+        assert_eq!(scenario.run.duration_s, 2.0);
+        assert_eq!(scenario.belt.profile.speed_m_s(0.0), -0.4);
+        assert_eq!(scenario.name, "hybrid-elbow-down");
+    }
+
+    #[test]
+    fn overrides_set_keys_that_are_optional() {
+        let scenario = load(&[
+            "controller.belt.given_m_s=-0.4",
+            "controller.arm.link_length_m=0.2",
+        ])
+        .unwrap();
+        assert_eq!(scenario.controller.belt.given_m_s, Some(-0.4));
+        let arm = scenario.controller.arm.unwrap();
+        assert_eq!((arm.link_length_m, arm.link_mass_kg), (0.2, 0.12));
+        let message = message(&["controller.belt.given_m_s=fast"]);
+        assert!(message.contains("given_m_s: invalid type"), "{message}");
+    }
+
+    #[test]
+    fn mistakes_are_named_with_what_is_allowed() {
+        for (overrides, parts) in [
+            (
+                &["belt.frction=0.4"][..],
+                &["belt.frction", "friction, profile"][..],
+            ),
+            (
+                &["controller.arm.lenght_m=0.2"],
+                &["controller.arm.lenght_m"],
+            ),
+            (
+                &["controller.law.pid.integral_gain=1"],
+                &["no 'pid' here", "hybrid"],
+            ),
+            (&["belt.friction=nan"], &["belt.friction = NaN", "0 to 10"]),
+            (&["belt.friction=inf"], &["belt.friction = inf", "0 to 10"]),
+            (&["belt.friction=-1"], &["belt.friction = -1", "0 to 10"]),
+            (&["arm.height_m=0.42"], &["arm.height_m = 0.42", "0.41958"]),
+            (&["belt.friction"], &["belt.friction", "key=value"]),
+            (&["run.tick_hz=0"], &["run.tick_hz = 0", "10 to"]),
+            (&["run.seed=-1"], &["run.seed"]),
+            (
+                &["impact.law=newton"],
+                &["impact.law", "poisson", "energetic"],
+            ),
+            (&["initial.theta1_deg=0"], &["initial tip height"]),
+            (
+                &["controller.reference.0.minimum-jerk.target_m=0.5"],
+                &["controller.reference.target_m", "0.42"],
+            ),
+        ] {
+            let message = message(overrides);
+            for part in parts {
+                assert!(message.contains(part), "'{part}' is not in: {message}");
+            }
+            assert!(!message.contains('\n'), "{message}");
+        }
+    }
+
+    #[test]
+    fn files_may_be_partial_but_not_empty_and_not_misspelt() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("slow.toml");
+        let load = |text: &str| {
+            fs::write(&path, text).unwrap();
+            Scenario::load(path.to_str().unwrap(), &[])
+        };
+        let scenario = load("[belt]\nfriction = 0.5\n").unwrap();
+        assert_eq!(
+            (scenario.belt.friction, scenario.name.as_str()),
+            (0.5, "slow")
+        );
+        let message = |text| load(text).unwrap_err().to_string();
+        assert!(message("").contains("is empty"));
+        assert!(message("[belt\n").contains("line 1"));
+        assert!(message("[belt]\nspeed = 1\n").contains("speed"));
+        assert!(message("[belt]\nfriction = \"high\"\n").contains("belt.friction"));
+        let missing = Scenario::load("no-such-scenario", &[]).unwrap_err();
+        assert!(missing.to_string().contains("hybrid-elbow-down"));
+        assert!(Scenario::load(folder.path().to_str().unwrap(), &[]).is_err());
+    }
+}

@@ -1,0 +1,298 @@
+//! A scenario: everything that defines a run, as a TOML file with units in the
+//! key names.
+//!
+//! Every key has a default (the run of `hybrid-elbow-down`), unknown keys are
+//! refused, and every number is checked before anything starts.
+
+pub mod built_in;
+mod load;
+
+use painleve_firmware::Configuration;
+use painleve_firmware::estimate::belt;
+use painleve_firmware::estimate::calibration::CalibrationSettings;
+use painleve_firmware::estimate::contact::ContactSettings;
+use painleve_firmware::estimate::disturbance::DisturbanceSettings;
+use painleve_firmware::estimate::friction::FrictionSettings;
+use painleve_firmware::estimate::joints::EstimatorSettings;
+use painleve_firmware::guard::GuardSettings;
+use painleve_firmware::law::LawSettings;
+use painleve_firmware::law::hybrid::HybridSettings;
+use painleve_firmware::recover::RecoverySettings;
+use painleve_firmware::refer::governor::GovernorSettings;
+use painleve_firmware::refer::reference::{Program, Segment};
+use painleve_firmware::supervise::deadline_monitor::DeadlineLimits;
+use painleve_firmware::supervise::supervisor::SupervisorSettings;
+use painleve_shared::ArmParameters;
+use painleve_shared::range::{self, OutOfRange};
+use serde::{Deserialize, Serialize};
+
+use crate::converters::ConverterSettings;
+use crate::mechanics::belt::BeltProfile;
+use crate::mechanics::impact::ImpactLaw;
+use crate::mechanics::motion::State;
+use crate::mechanics::{PlantParameters, SolverSettings};
+
+pub use load::ScenarioError;
+
+/// Everything that defines a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Scenario {
+    /// Short name, for reports and files.
+    pub name: String,
+    /// One sentence about the run.
+    pub description: String,
+    /// How long, how fast, which seed.
+    pub run: RunSettings,
+    /// The arm of the plant, and, unless `controller.arm` says otherwise, of the controller's model.
+    pub arm: ArmParameters<f64>,
+    /// Friction and speed of the belt.
+    pub belt: BeltSettings,
+    /// How the tip bounces.
+    pub impact: ImpactLaw,
+    /// Accuracy of the plant.
+    pub solver: SolverSettings,
+    /// Where the arm starts.
+    pub initial: InitialState,
+    /// Encoders, force cell and torque stages.
+    pub converters: ConverterSettings,
+    /// The controller.
+    pub controller: ControllerSettings,
+}
+
+/// How long, how fast, which seed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RunSettings {
+    /// Simulated time, s.
+    pub duration_s: f64,
+    /// Control rate, Hz.
+    pub tick_hz: u32,
+    /// Seed of all noise.
+    pub seed: u64,
+    /// Tick and sequence number of the first frame: near 2³² the counters wrap early.
+    pub first_tick: u32,
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        Self {
+            duration_s: 6.0,
+            tick_hz: 1000,
+            seed: 1,
+            first_tick: 0,
+        }
+    }
+}
+
+impl RunSettings {
+    /// Control ticks of the whole run.
+    pub fn ticks(&self) -> u64 {
+        (self.duration_s * f64::from(self.tick_hz)).round() as u64
+    }
+}
+
+/// Friction and speed of the belt.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BeltSettings {
+    /// Friction coefficient μ.
+    pub friction: f64,
+    /// Speed over time.
+    pub profile: BeltProfile,
+}
+
+impl Default for BeltSettings {
+    fn default() -> Self {
+        Self {
+            friction: 0.6,
+            profile: BeltProfile::default(),
+        }
+    }
+}
+
+/// Where the arm starts.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InitialState {
+    /// θ1, degrees from the downward vertical.
+    pub theta1_deg: f64,
+    /// θ2, degrees from the downward vertical.
+    pub theta2_deg: f64,
+    /// θ̇1, rad/s.
+    pub theta1_dot_rad_s: f64,
+    /// θ̇2, rad/s.
+    pub theta2_dot_rad_s: f64,
+}
+
+impl Default for InitialState {
+    /// The paper's x0,d.
+    fn default() -> Self {
+        Self::at_rest(-11.4, -35.1)
+    }
+}
+
+impl InitialState {
+    /// An arm at rest with these angles from the downward vertical, degrees.
+    pub fn at_rest(theta1_deg: f64, theta2_deg: f64) -> Self {
+        Self {
+            theta1_deg,
+            theta2_deg,
+            theta1_dot_rad_s: 0.0,
+            theta2_dot_rad_s: 0.0,
+        }
+    }
+
+    /// As the plant's state.
+    pub fn state(&self) -> State {
+        State::new(
+            self.theta1_deg.to_radians(),
+            self.theta2_deg.to_radians(),
+            self.theta1_dot_rad_s,
+            self.theta2_dot_rad_s,
+        )
+    }
+}
+
+/// The controller's part of a scenario.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ControllerSettings {
+    /// When the drive is enabled, s.
+    pub enable_at_s: f64,
+    /// Largest torque on either joint, N·m.
+    pub torque_limit_nm: f32,
+    /// The arm that the controller believes in; the plant's if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arm: Option<ArmParameters<f32>>,
+    /// How rates are estimated.
+    pub estimator: EstimatorSettings,
+    /// When the tip is taken to touch.
+    pub contact: ContactSettings,
+    /// How friction is estimated.
+    pub friction: FrictionSettings,
+    /// What the controller knows about the belt.
+    pub belt: belt::BeltSettings,
+    /// How the links' length is calibrated.
+    pub calibration: CalibrationSettings,
+    /// When the drive is armed, and when it is shut down.
+    pub supervisor: SupervisorSettings,
+    /// How many lapses in a row are survived.
+    pub deadlines: DeadlineLimits,
+    /// The control law.
+    pub law: LawSettings,
+    /// How the tip is kept pressed on the belt.
+    pub guard: GuardSettings,
+    /// How unknown torques are estimated.
+    pub disturbance: DisturbanceSettings,
+    /// How the reference is kept off the paradox.
+    pub governor: GovernorSettings,
+    /// How a tip that left the belt is brought back.
+    pub recovery: RecoverySettings,
+    /// Where the tip shall go.
+    pub reference: Program,
+}
+
+impl Default for ControllerSettings {
+    fn default() -> Self {
+        let segment = Segment::MinimumJerk {
+            target_m: 0.148,
+            duration_s: 3.0,
+        };
+        Self {
+            enable_at_s: 0.0,
+            torque_limit_nm: 5.0,
+            arm: None,
+            estimator: EstimatorSettings::default(),
+            contact: ContactSettings::default(),
+            friction: FrictionSettings::default(),
+            belt: belt::BeltSettings::default(),
+            calibration: CalibrationSettings::default(),
+            supervisor: SupervisorSettings::default(),
+            deadlines: DeadlineLimits::default(),
+            law: LawSettings::Hybrid(HybridSettings::default()),
+            guard: GuardSettings::default(),
+            disturbance: DisturbanceSettings::default(),
+            governor: GovernorSettings::default(),
+            recovery: RecoverySettings::default(),
+            reference: Program {
+                segments: [segment].into_iter().collect(),
+            },
+        }
+    }
+}
+
+impl Default for Scenario {
+    /// The paper's hybrid law from x0,d at hardware-like quantisation.
+    fn default() -> Self {
+        Self {
+            name: "unnamed".into(),
+            description: String::new(),
+            run: RunSettings::default(),
+            arm: ArmParameters::default(),
+            belt: BeltSettings::default(),
+            impact: ImpactLaw::default(),
+            solver: SolverSettings::default(),
+            initial: InitialState::default(),
+            converters: ConverterSettings::default(),
+            controller: ControllerSettings::default(),
+        }
+    }
+}
+
+impl Scenario {
+    /// The plant's part.
+    pub fn plant_parameters(&self) -> PlantParameters {
+        PlantParameters {
+            arm: self.arm,
+            friction: self.belt.friction,
+            belt: self.belt.profile,
+            impact: self.impact,
+            solver: self.solver,
+        }
+    }
+
+    /// The controller's part, as it is sent to whatever runs the controller.
+    pub fn controller_configuration(&self) -> Configuration {
+        let settings = &self.controller;
+        Configuration {
+            tick_hz: self.run.tick_hz as f32,
+            arm: settings.arm.unwrap_or_else(|| self.arm.cast()),
+            converters: self.converters.scales(),
+            torque_limit_nm: settings.torque_limit_nm,
+            estimator: settings.estimator,
+            contact: settings.contact,
+            supervisor: settings.supervisor,
+            friction: settings.friction,
+            belt: settings.belt,
+            calibration: settings.calibration,
+            deadlines: settings.deadlines,
+            law: settings.law,
+            guard: settings.guard,
+            disturbance: settings.disturbance,
+            governor: settings.governor,
+            recovery: settings.recovery,
+            reference: settings.reference.clone(),
+        }
+    }
+
+    /// Checks every number, the plant's initial state excepted (see
+    /// [`Plant::new`](crate::mechanics::Plant::new)).
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        range::check("run.duration_s", self.run.duration_s, 1e-3, 1e7)?;
+        range::check("run.tick_hz", f64::from(self.run.tick_hz), 10.0, 1e5)?;
+        range::check(
+            "controller.enable_at_s",
+            self.controller.enable_at_s,
+            0.0,
+            1e7,
+        )?;
+        self.arm.validate()?;
+        self.converters.validate()?;
+        self.controller_configuration().validate()?;
+        Ok(())
+    }
+}

@@ -1,0 +1,181 @@
+//! The plant as the controller's wires see it: sample, command, sample, …
+//!
+//! Between two ticks at most three things happen at given instants: the torque
+//! changes (a fraction of a tick after it), the encoders capture (a
+//! fraction of a tick before the next one), and the next tick.
+
+use nalgebra::Vector2;
+use painleve_shared::ActuatorFrame;
+use painleve_shared::frame::{DigitalInputs, SensorFrame};
+use painleve_shared::range::OutOfRange;
+use painleve_shared::status::SupervisorState;
+
+use crate::converters::encoder::Encoders;
+use crate::converters::force_cell::ForceCell;
+use crate::converters::link_loss::{LossyLink, Lost};
+use crate::converters::torque_stage::TorqueStages;
+use crate::mechanics::motion::theta;
+use crate::mechanics::{Observer, Plant, PlantError};
+use crate::sample::Sample;
+use crate::scenario::Scenario;
+
+/// A plant with its converters at a control rate.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    plant: Plant,
+    encoders: Encoders,
+    force_cell: ForceCell,
+    torque_stages: TorqueStages,
+    link: LossyLink,
+    lost: Lost,
+    tick_hz: f64,
+    tick: u64,
+    first_tick: u32,
+    enable_at_s: f64,
+}
+
+impl Simulation {
+    /// The scenario at its start.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
+        scenario.validate()?;
+        let plant = Plant::new(&scenario.plant_parameters(), scenario.initial.state())?;
+        let converters = &scenario.converters;
+        let seed = scenario.run.seed;
+        Ok(Self {
+            encoders: Encoders::new(&converters.encoder, seed, &theta(plant.state())),
+            force_cell: ForceCell::new(&converters.force, seed),
+            torque_stages: TorqueStages::new(&converters.torque),
+            link: LossyLink::new(&converters.link, seed),
+            lost: Lost::default(),
+            tick_hz: f64::from(scenario.run.tick_hz),
+            tick: 0,
+            first_tick: scenario.run.first_tick,
+            enable_at_s: scenario.controller.enable_at_s,
+            plant,
+        })
+    }
+
+    /// The plant.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Ticks since the start.
+    pub fn ticks(&self) -> u64 {
+        self.tick
+    }
+
+    /// What the controller is told at this tick. Called once per tick: noise
+    /// is drawn here.
+    ///
+    /// # Errors
+    /// [`PlantError`] if the contact mode of the start cannot be decided.
+    pub fn sample(&mut self, observer: &mut impl Observer) -> Result<SensorFrame, PlantError> {
+        self.plant.settle(observer)?;
+        self.lost = self.link.draw();
+        let (tangential_force, normal_force) = self.force_cell.read(&self.plant.contact_force_n());
+        let enabled = self.plant.time_s() >= self.enable_at_s;
+        // The counters of the wire wrap.
+        let tick = self.first_tick.wrapping_add(self.tick as u32);
+        Ok(SensorFrame {
+            tick,
+            sequence: tick,
+            joints: self.encoders.readings(),
+            normal_force,
+            tangential_force,
+            inputs: if enabled {
+                DigitalInputs::ENABLE
+            } else {
+                DigitalInputs::default()
+            },
+        })
+    }
+
+    /// Whether the frame of this tick's sample is lost: the controller must not be given it.
+    pub fn sensor_frame_is_lost(&self) -> bool {
+        self.lost.sensor
+    }
+
+    /// Everything about this tick, for records.
+    pub fn describe(&self, sensor: &SensorFrame, actuator: &ActuatorFrame) -> Sample {
+        let (time_s, state) = (self.plant.time_s(), self.plant.state());
+        let motion = self.plant.motion();
+        let mode = self.plant.mode();
+        let terms = motion.terms(time_s, state);
+        let force = motion.force_n(time_s, mode, &terms);
+        let slip = motion.relative_velocity_m_s(time_s, state).x;
+        Sample {
+            time_s,
+            sensor: *sensor,
+            actuator: *actuator,
+            theta_rad: [state[0], state[1]],
+            theta_dot_rad_s: [state[2], state[3]],
+            tip_t_m: motion.tip_t_m(state),
+            gap_m: motion.gap_m(state),
+            slip_velocity_m_s: slip,
+            belt_speed_m_s: motion.belt.speed_m_s(time_s),
+            normal_force_n: force.y,
+            tangential_force_n: force.x,
+            b_m_s2: terms.b(),
+            p_per_kg: terms.p(motion.friction, painleve_shared::Slip::of(slip)),
+            torque_nm: self.plant.torque_nm().into(),
+            reference_tip_t_m: reference_m(actuator),
+            mode,
+        }
+    }
+
+    /// Takes the controller's answer to this tick's sample, if there is one and it is not
+    /// lost, and goes on to the next tick.
+    ///
+    /// # Errors
+    /// [`PlantError`] if the plant cannot go on.
+    pub fn advance(
+        &mut self,
+        answer: Option<&ActuatorFrame>,
+        observer: &mut impl Observer,
+    ) -> Result<(), PlantError> {
+        let arrived = answer.filter(|_| !self.lost.actuator);
+        self.torque_stages
+            .command(arrived.map(|frame| frame.torques));
+        let tick = self.tick as f64;
+        // From whole numbers, so that nothing accumulates.
+        let at = |ticks: f64| (tick + ticks) / self.tick_hz;
+        let change = self.torque_stages.change_after_tick();
+        let capture = 1.0 - self.encoders.capture_before_tick();
+
+        let mut captured = false;
+        if capture < change {
+            self.plant.advance(at(capture), observer)?;
+            self.encoders.capture(&self.angles());
+            captured = true;
+        }
+        if change > 0.0 {
+            self.plant.advance(at(change), observer)?;
+        }
+        self.plant
+            .command_torque(self.torque_stages.target_nm(), self.torque_stages.lag_s());
+        if !captured {
+            self.plant.advance(at(capture), observer)?;
+            self.encoders.capture(&self.angles());
+        }
+        self.tick += 1;
+        self.plant.advance(at(1.0), observer)
+    }
+
+    fn angles(&self) -> Vector2<f64> {
+        theta(self.plant.state())
+    }
+}
+
+/// The reference that the controller follows, m; NaN while it follows none.
+fn reference_m(actuator: &ActuatorFrame) -> f64 {
+    match actuator.supervisor_state() {
+        Some(SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff) => {
+            actuator.reference_tip.to_metres()
+        }
+        _ => f64::NAN,
+    }
+}

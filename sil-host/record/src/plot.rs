@@ -1,0 +1,657 @@
+//! One run over time: tip position, normal force, torques, contact mode, b and p.
+//!
+//! Panels are stacked on one time axis as in the paper's simulation figures. Where
+//! the tip is off the belt, every panel is shaded, so that cause and effect line up.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use painleve_chart::PlotError;
+use painleve_chart::axis::{ValueAxis, label};
+use painleve_chart::decimate::{Bin, Decimator, Extent};
+use painleve_chart::style::{
+    self, Area, BLACK_INK, BLUE_INK, Drawn, GREEN, GREY, GRID, HEADING, LEGEND, NOTE, ORANGE, SKY,
+    SUBTITLE, TICK, TITLE, VERMILLION, text, text_width, ticks, without_straight_ons,
+};
+use painleve_plant::mechanics::motion::ContactMode;
+use painleve_plant::sample::Sample;
+use painleve_system::atomic_file;
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+
+/// Signals of the figure, by their place in a bin.
+mod signal {
+    pub(super) const TIP: usize = 0;
+    pub(super) const REFERENCE: usize = 1;
+    pub(super) const NORMAL_FORCE: usize = 2;
+    pub(super) const U1: usize = 3;
+    pub(super) const U2: usize = 4;
+    pub(super) const B: usize = 5;
+    pub(super) const P: usize = 6;
+    pub(super) const COUNT: usize = 7;
+}
+
+struct Curve {
+    signal: usize,
+    name: &'static str,
+    colour: RGBColor,
+    width: u32,
+}
+
+struct Panel {
+    title: &'static str,
+    unit: &'static str,
+    /// In the order of the legend; the first is drawn on top.
+    curves: &'static [Curve],
+    /// How to read the panel.
+    note: &'static str,
+    /// A line at zero, always in view.
+    zero_line: bool,
+    /// Shortest value axis, so that noise on a constant stays small.
+    minimum_span: f64,
+}
+
+const TIP_PANEL: Panel = Panel {
+    title: "Tip position zₜ",
+    unit: "m",
+    curves: &[
+        Curve {
+            signal: signal::TIP,
+            name: "tip zₜ",
+            colour: BLACK_INK,
+            width: 3,
+        },
+        // Wide and below, so that both can be seen where they agree.
+        Curve {
+            signal: signal::REFERENCE,
+            name: "reference zₜ*",
+            colour: ORANGE,
+            width: 9,
+        },
+    ],
+    note: "",
+    zero_line: false,
+    minimum_span: 0.002,
+};
+const FORCE_PANEL: Panel = Panel {
+    title: "Normal force fₙ",
+    unit: "N",
+    curves: &[Curve {
+        signal: signal::NORMAL_FORCE,
+        name: "",
+        colour: BLUE_INK,
+        width: 3,
+    }],
+    note: "",
+    zero_line: true,
+    minimum_span: 1.0,
+};
+const TORQUE_PANEL: Panel = Panel {
+    title: "Joint torques u₁, u₂",
+    unit: "N·m",
+    curves: &[
+        Curve {
+            signal: signal::U1,
+            name: "u₁",
+            colour: BLACK_INK,
+            width: 3,
+        },
+        Curve {
+            signal: signal::U2,
+            name: "u₂",
+            colour: VERMILLION,
+            width: 5,
+        },
+    ],
+    note: "",
+    zero_line: true,
+    minimum_span: 0.5,
+};
+const B_PANEL: Panel = Panel {
+    title: "Free normal acceleration b",
+    unit: "m/s²",
+    curves: &[Curve {
+        signal: signal::B,
+        name: "",
+        colour: BLUE_INK,
+        width: 3,
+    }],
+    note: "lift-off where b ≥ 0",
+    zero_line: true,
+    minimum_span: 1.0,
+};
+const P_PANEL: Panel = Panel {
+    title: "Contact coefficient p",
+    unit: "1/kg",
+    curves: &[Curve {
+        signal: signal::P,
+        name: "",
+        colour: GREEN,
+        width: 3,
+    }],
+    note: "paradox where p ≤ 0",
+    zero_line: true,
+    minimum_span: 0.5,
+};
+
+/// Lanes of the contact mode, from top to bottom.
+const LANES: [(ContactMode, &str, RGBColor); 4] = [
+    (ContactMode::SlidePositive, "slide +", BLUE_INK),
+    (ContactMode::SlideNegative, "slide −", SKY),
+    (ContactMode::Stick, "stick", GREEN),
+    (ContactMode::Flight, "flight", VERMILLION),
+];
+
+const WIDTH: i32 = 2000;
+const LEFT: i32 = 170;
+const RIGHT: i32 = 50;
+const TITLE_HEIGHT: i32 = 124;
+const HEADER_HEIGHT: i32 = 50;
+const PANEL_HEIGHT: i32 = 200;
+const LANE_HEIGHT: i32 = 34;
+const GAP: i32 = 18;
+const TIME_AXIS_HEIGHT: i32 = 110;
+const HEIGHT: i32 = TITLE_HEIGHT
+    + 5 * (HEADER_HEIGHT + PANEL_HEIGHT + GAP)
+    + HEADER_HEIGHT
+    + LANES.len() as i32 * LANE_HEIGHT
+    + TIME_AXIS_HEIGHT;
+
+const TIME_TICKS: usize = 10;
+const VALUE_TICKS: usize = 5;
+
+/// The figure of one run; memory does not grow with the length of the run.
+#[derive(Clone, Debug)]
+pub struct RunPlot {
+    title: String,
+    subtitle: String,
+    samples: Decimator<{ signal::COUNT }>,
+}
+
+impl RunPlot {
+    /// An empty figure. The subtitle has room for about 110 characters.
+    pub fn new(title: impl Into<String>, subtitle: impl Into<String>) -> Self {
+        // Control characters are not allowed in XML.
+        let printable = |text: String| text.replace(char::is_control, " ");
+        Self {
+            title: printable(title.into()),
+            subtitle: printable(subtitle.into()),
+            samples: Decimator::default(),
+        }
+    }
+
+    /// Adds a sample; never allocates. Values may be infinite or NaN: an infinity is
+    /// shown as off scale, NaN as a gap.
+    #[inline]
+    pub fn push(&mut self, sample: &Sample) {
+        let mut values = [0.0; signal::COUNT];
+        values[signal::TIP] = sample.tip_t_m;
+        values[signal::REFERENCE] = sample.reference_tip_t_m;
+        values[signal::NORMAL_FORCE] = sample.normal_force_n;
+        values[signal::U1] = sample.torque_nm[0];
+        values[signal::U2] = sample.torque_nm[1];
+        values[signal::B] = sample.b_m_s2;
+        values[signal::P] = sample.p_per_kg;
+        self.samples.push(sample.time_s, values, flag(sample.mode));
+    }
+
+    /// The figure as SVG text.
+    ///
+    /// # Errors
+    /// [`PlotError::Draw`] if the drawing library refuses, which it has no reason to.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        style::svg((WIDTH, HEIGHT), |root| self.draw(root))
+    }
+
+    /// Writes the figure to an SVG file, whole or not at all.
+    ///
+    /// # Errors
+    /// [`PlotError`] if the file cannot be written.
+    pub fn write(&self, path: impl Into<PathBuf>) -> Result<(), PlotError> {
+        Ok(atomic_file::write(path, self.svg()?.as_bytes())?)
+    }
+
+    fn draw(&self, root: &Area<'_>) -> Drawn {
+        text(root, &self.title, &TITLE, (LEFT, 44), HPos::Left)?;
+        text(root, &self.subtitle, &SUBTITLE, (LEFT, 90), HPos::Left)?;
+
+        let figure = Figure {
+            root,
+            bins: self.samples.bins(),
+            time: time_range(self.samples.bins()),
+        };
+        let mut top = TITLE_HEIGHT;
+        for panel in [&TIP_PANEL, &FORCE_PANEL, &TORQUE_PANEL] {
+            figure.draw_panel(panel, top)?;
+            top += HEADER_HEIGHT + PANEL_HEIGHT + GAP;
+        }
+        figure.draw_modes(top)?;
+        top += HEADER_HEIGHT + LANES.len() as i32 * LANE_HEIGHT + GAP;
+        figure.draw_panel(&B_PANEL, top)?;
+        top += HEADER_HEIGHT + PANEL_HEIGHT + GAP;
+        figure.draw_panel(&P_PANEL, top)?;
+        figure.draw_time_axis(top + HEADER_HEIGHT + PANEL_HEIGHT)
+    }
+}
+
+/// What all panels share.
+struct Figure<'a, 'svg> {
+    root: &'a Area<'svg>,
+    bins: &'a [Bin<{ signal::COUNT }>],
+    time: Range<f64>,
+}
+
+impl Figure<'_, '_> {
+    fn draw_panel(&self, panel: &Panel, top: i32) -> Drawn {
+        let axis = ValueAxis::new(
+            panel
+                .curves
+                .iter()
+                .flat_map(|curve| self.bins.iter().map(|bin| bin.extents[curve.signal])),
+            panel.zero_line.then_some(0.0),
+            panel.minimum_span,
+        );
+        self.draw_header(panel, &axis, top)?;
+
+        let top = top + HEADER_HEIGHT;
+        let bottom = top + PANEL_HEIGHT;
+        let y = |value: f64| {
+            let part = (axis.clamp(value) - axis.range.start) / (axis.range.end - axis.range.start);
+            bottom - (part * f64::from(PANEL_HEIGHT)).round() as i32
+        };
+        self.draw_flights(top, bottom)?;
+        self.draw_time_grid(top, bottom)?;
+        let (ticks, step) = ticks(&axis.range, VALUE_TICKS);
+        for tick in ticks {
+            self.line([(LEFT, y(tick)), (WIDTH - RIGHT, y(tick))], GRID, 2)?;
+            self.tick_label(&label(tick, step), (LEFT - 14, y(tick)), HPos::Right)?;
+        }
+        if panel.zero_line {
+            self.line([(LEFT, y(0.0)), (WIDTH - RIGHT, y(0.0))], GREY, 3)?;
+        }
+        for curve in panel.curves.iter().rev() {
+            self.draw_curve(curve, y)?;
+        }
+        self.draw_off_scale_marks(panel, &axis, top, bottom)?;
+        self.draw_frame(top, bottom)
+    }
+
+    /// Title with unit and what is off scale; legend or note to the right.
+    fn draw_header(&self, panel: &Panel, axis: &ValueAxis, top: i32) -> Drawn {
+        let title = format!("{} ({})", panel.title, panel.unit);
+        self.draw_heading(&title, panel.note, top)?;
+        let middle = top + HEADER_HEIGHT / 2;
+        let off_scale = axis.off_scale_note(panel.unit);
+        let after_title = LEFT + text_width(&title, &HEADING) + 60;
+        text(
+            self.root,
+            &off_scale,
+            &NOTE,
+            (after_title, middle),
+            HPos::Left,
+        )?;
+
+        let mut x = WIDTH - RIGHT;
+        for curve in panel.curves.iter().rev() {
+            if curve.name.is_empty() {
+                continue;
+            }
+            x -= text_width(curve.name, &LEGEND);
+            text(self.root, curve.name, &LEGEND, (x, middle), HPos::Left)?;
+            x -= 80;
+            self.line([(x, middle), (x + 66, middle)], curve.colour, curve.width)?;
+            x -= 50;
+        }
+        Ok(())
+    }
+
+    fn draw_heading(&self, title: &str, note: &str, top: i32) -> Drawn {
+        let middle = top + HEADER_HEIGHT / 2;
+        text(self.root, title, &HEADING, (LEFT, middle), HPos::Left)?;
+        text(self.root, note, &NOTE, (WIDTH - RIGHT, middle), HPos::Right)
+    }
+
+    fn draw_curve(&self, curve: &Curve, y: impl Fn(f64) -> i32) -> Drawn {
+        for part in self.bins.split(|bin| bin.extents[curve.signal].is_empty()) {
+            let points = part.iter().flat_map(|bin| {
+                let extent = bin.extents[curve.signal];
+                let (start, end) = (self.x(bin.start_s), self.x(bin.end_s));
+                let middle = (start + end) / 2;
+                // Within a pixel or two, rising or falling is all that can be seen.
+                let (sooner, later) = if extent.first <= extent.last {
+                    (extent.min, extent.max)
+                } else {
+                    (extent.max, extent.min)
+                };
+                [
+                    (start, y(extent.first)),
+                    (middle, y(sooner)),
+                    (middle, y(later)),
+                    (end, y(extent.last)),
+                ]
+            });
+            match without_straight_ons(points).as_slice() {
+                [] => {}
+                [only] => {
+                    let radius = curve.width as i32 + 2;
+                    let dot = Circle::new(*only, radius, curve.colour.filled());
+                    self.root.draw(&dot)?;
+                }
+                points => {
+                    let style = curve.colour.stroke_width(curve.width);
+                    self.root.draw(&PathElement::new(points, style))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A small triangle at the edge beyond which a curve went.
+    fn draw_off_scale_marks(
+        &self,
+        panel: &Panel,
+        axis: &ValueAxis,
+        top: i32,
+        bottom: i32,
+    ) -> Drawn {
+        const HALF_WIDTH: i32 = 9;
+        const MARK_HEIGHT: i32 = 15;
+        type Beyond = fn(&Extent, &Range<f64>) -> bool;
+        let edges: [(i32, i32, Beyond); 2] = [
+            (top, MARK_HEIGHT, |extent, range| extent.max > range.end),
+            (bottom, -MARK_HEIGHT, |extent, range| {
+                extent.min < range.start
+            }),
+        ];
+        for curve in panel.curves {
+            for (edge, height, beyond) in edges {
+                let mut free_from = i32::MIN;
+                for bin in self.bins {
+                    let x = self.x(bin.start_s);
+                    if x < free_from || !beyond(&bin.extents[curve.signal], &axis.range) {
+                        continue;
+                    }
+                    free_from = x + 2 * HALF_WIDTH;
+                    let triangle = [
+                        (x, edge),
+                        (x - HALF_WIDTH, edge + height),
+                        (x + HALF_WIDTH, edge + height),
+                    ];
+                    self.root
+                        .draw(&Polygon::new(triangle, curve.colour.filled()))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_modes(&self, top: i32) -> Drawn {
+        let note = "± is the direction of slip; flight is shaded in every panel";
+        self.draw_heading("Contact mode", note, top)?;
+        let top = top + HEADER_HEIGHT;
+        let bottom = top + LANES.len() as i32 * LANE_HEIGHT;
+        self.draw_time_grid(top, bottom)?;
+        let mut lane_top = top;
+        for (mode, name, colour) in LANES {
+            self.tick_label(name, (LEFT - 14, lane_top + LANE_HEIGHT / 2), HPos::Right)?;
+            for (start, end) in self.times_of(mode) {
+                let lane = [(start, lane_top + 4), (end, lane_top + LANE_HEIGHT - 4)];
+                self.root.draw(&Rectangle::new(lane, colour.filled()))?;
+            }
+            lane_top += LANE_HEIGHT;
+            self.line([(LEFT, lane_top), (WIDTH - RIGHT, lane_top)], GRID, 2)?;
+        }
+        self.draw_frame(top, bottom)
+    }
+
+    fn draw_flights(&self, top: i32, bottom: i32) -> Drawn {
+        for (start, end) in self.times_of(ContactMode::Flight) {
+            let shade = VERMILLION.mix(0.12).filled();
+            self.root
+                .draw(&Rectangle::new([(start, top), (end, bottom)], shade))?;
+        }
+        Ok(())
+    }
+
+    /// Where the mode occurs, from pixel to pixel; at least two pixels wide, so that
+    /// the shortest flight is seen.
+    fn times_of(&self, mode: ContactMode) -> Vec<(i32, i32)> {
+        let mut times: Vec<(i32, i32)> = Vec::new();
+        for (index, bin) in self.bins.iter().enumerate() {
+            if bin.flags & flag(mode) == 0 {
+                continue;
+            }
+            // A mode lasts until the next sample.
+            let end_s = self
+                .bins
+                .get(index + 1)
+                .map_or(self.time.end, |next| next.start_s);
+            let start = self.x(bin.start_s).min(WIDTH - RIGHT - 2);
+            let end = self.x(end_s).max(start + 2);
+            match times.last_mut() {
+                Some(last) if start <= last.1 + 1 => last.1 = last.1.max(end),
+                _ => times.push((start, end)),
+            }
+        }
+        times
+    }
+
+    fn draw_time_axis(&self, top: i32) -> Drawn {
+        let (ticks, step) = ticks(&self.time, TIME_TICKS);
+        for tick in ticks {
+            self.tick_label(&label(tick, step), (self.x(tick), top + 26), HPos::Center)?;
+        }
+        let middle = (LEFT + WIDTH - RIGHT) / 2;
+        let title = if self.bins.is_empty() {
+            "Simulated time (s): no samples"
+        } else {
+            "Simulated time (s)"
+        };
+        text(self.root, title, &HEADING, (middle, top + 68), HPos::Center)
+    }
+
+    fn draw_time_grid(&self, top: i32, bottom: i32) -> Drawn {
+        for tick in ticks(&self.time, TIME_TICKS).0 {
+            self.line([(self.x(tick), top), (self.x(tick), bottom)], GRID, 2)?;
+        }
+        Ok(())
+    }
+
+    fn draw_frame(&self, top: i32, bottom: i32) -> Drawn {
+        let (left, right) = (LEFT, WIDTH - RIGHT);
+        let corners = [
+            (left, top),
+            (right, top),
+            (right, bottom),
+            (left, bottom),
+            (left, top),
+        ];
+        self.line(corners, GREY, 2)
+    }
+
+    fn line<const N: usize>(&self, points: [(i32, i32); N], colour: RGBColor, width: u32) -> Drawn {
+        self.root
+            .draw(&PathElement::new(points, colour.stroke_width(width)))
+    }
+
+    fn tick_label(&self, label: &str, at: (i32, i32), side: HPos) -> Drawn {
+        text(self.root, label, &TICK, at, side)
+    }
+
+    fn x(&self, time_s: f64) -> i32 {
+        let part = (time_s - self.time.start) / (self.time.end - self.time.start);
+        LEFT + (part.clamp(0.0, 1.0) * f64::from(WIDTH - RIGHT - LEFT)).round() as i32
+    }
+}
+
+fn flag(mode: ContactMode) -> u8 {
+    1 << mode as u8
+}
+
+/// From the first sample to one sample after the last, where its mode ends; a second
+/// if there are fewer than two.
+fn time_range<const SIGNALS: usize>(bins: &[Bin<SIGNALS>]) -> Range<f64> {
+    // Farther off, neighbouring ticks could not be told apart.
+    const FAR_S: f64 = 1e9;
+    let start = bins.iter().fold(FAR_S, |start, bin| start.min(bin.start_s));
+    let end = bins.iter().fold(-FAR_S, |end, bin| end.max(bin.end_s));
+    let (start, end) = (start.max(-FAR_S), end.min(FAR_S));
+    let samples: u64 = bins.iter().map(Bin::samples).sum();
+    match bins {
+        [] => 0.0..1.0,
+        _ if end - start > 1e-9 * (1.0 + start.abs()) => {
+            start..end + (end - start) / samples.saturating_sub(1).max(1) as f64
+        }
+        _ => start..start + 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A tip that follows its reference, then leaves the belt for one tick.
+    fn sample(tick: u32) -> Sample {
+        let time_s = f64::from(tick) * 1e-3;
+        Sample {
+            time_s,
+            tip_t_m: 0.1 * time_s,
+            reference_tip_t_m: 0.1 * time_s,
+            normal_force_n: if tick == 500 { 480.0 } else { 10.0 },
+            torque_nm: [1.0, 2.0],
+            b_m_s2: -5.0,
+            p_per_kg: 0.4,
+            mode: if tick == 501 {
+                ContactMode::Flight
+            } else {
+                ContactMode::SlidePositive
+            },
+            ..Sample::default()
+        }
+    }
+
+    fn plot(ticks: u32) -> RunPlot {
+        let mut plot = RunPlot::new("hybrid <elbow> & down", "seed\u{7} 1");
+        (0..ticks).for_each(|tick| plot.push(&sample(tick)));
+        plot
+    }
+
+    /// The texts of a figure in the order drawn.
+    fn texts(svg: &str) -> Vec<&str> {
+        svg.split("<text ")
+            .skip(1)
+            .filter_map(|element| element.split_once('>')?.1.split_once("</text>"))
+            .map(|(text, _)| text.trim())
+            .collect()
+    }
+
+    /// Filled rectangles of a colour, which only lanes and shades are.
+    fn rectangles(svg: &str, colour: RGBColor) -> usize {
+        let RGBColor(r, g, b) = colour;
+        let fill = format!("fill=\"#{r:02X}{g:02X}{b:02X}\" stroke=\"none\"");
+        svg.lines()
+            .filter(|line| line.starts_with("<rect") && line.contains(&fill))
+            .count()
+    }
+
+    #[test]
+    fn panels_are_titled_with_their_units() {
+        let svg = plot(2000).svg().unwrap();
+        let texts = texts(&svg);
+        for expected in [
+            "hybrid &lt;elbow&gt; &amp; down",
+            "seed  1",
+            "Tip position zₜ (m)",
+            "tip zₜ",
+            "reference zₜ*",
+            "Normal force fₙ (N)",
+            "off scale: up to 480 N",
+            "Joint torques u₁, u₂ (N·m)",
+            "u₁",
+            "u₂",
+            "Contact mode",
+            "slide +",
+            "slide −",
+            "stick",
+            "flight",
+            "Free normal acceleration b (m/s²)",
+            "Contact coefficient p (1/kg)",
+            "Simulated time (s)",
+            "2.0",
+        ] {
+            assert!(texts.contains(&expected), "{expected} not in {texts:?}");
+        }
+        assert!(svg.starts_with("<svg width=\"1000\""));
+        assert!(svg.trim_end().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn a_flight_of_one_tick_shows_in_its_lane_and_shades_all_panels_of_a_long_run() {
+        let svg = plot(100_000).svg().unwrap();
+        assert_eq!(rectangles(&svg, VERMILLION), 1 + 5);
+        assert_eq!(rectangles(&svg, BLUE_INK), 1);
+        assert_eq!(rectangles(&plot(500).svg().unwrap(), VERMILLION), 0);
+    }
+
+    #[test]
+    fn a_figure_does_not_grow_with_the_run() {
+        let short = plot(2_000).svg().unwrap().len();
+        let long = plot(300_000).svg().unwrap().len();
+        assert!(long < 2 * short, "{short} {long}");
+    }
+
+    #[test]
+    fn runs_of_hardly_any_samples_are_drawn() {
+        for ticks in 0..4 {
+            let svg = plot(ticks).svg().unwrap();
+            assert!(svg.trim_end().ends_with("</svg>"));
+            assert!(!svg.contains("NaN"));
+        }
+        let svg = plot(0).svg().unwrap();
+        assert!(texts(&svg).contains(&"Simulated time (s): no samples"));
+    }
+
+    #[test]
+    fn a_figure_is_written_whole_and_an_unwritable_path_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out/run.svg");
+        let plot = plot(10);
+        plot.write(&path).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), plot.svg().unwrap());
+        let error = plot.write(path.join("run.svg")).unwrap_err().to_string();
+        assert!(error.contains("run.svg/run.svg"), "{error}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn any_numbers_give_a_figure_within_its_bounds(
+            values in prop::collection::vec(
+                (any::<f64>(), any::<f64>(), prop_oneof![Just(0.1), any::<f64>()]), 0..20,
+            ),
+        ) {
+            let mut plot = RunPlot::new("", "");
+            for (time_s, value, other) in values {
+                plot.push(&Sample {
+                    time_s,
+                    tip_t_m: value,
+                    normal_force_n: other,
+                    torque_nm: [value, other],
+                    b_m_s2: -value,
+                    p_per_kg: other,
+                    ..Sample::default()
+                });
+            }
+            let svg = plot.svg().unwrap();
+            prop_assert!(!svg.contains("NaN") && !svg.contains("inf"));
+            for line in svg.lines().filter_map(|line| line.split_once("points=\"")) {
+                let (points, _) = line.1.split_once('"').unwrap();
+                for (x, y) in points.split_whitespace().filter_map(|point| point.split_once(',')) {
+                    let (x, y): (i32, i32) = (x.parse().unwrap(), y.parse().unwrap());
+                    prop_assert!((0..=WIDTH).contains(&x) && (0..=HEIGHT).contains(&y));
+                }
+            }
+        }
+    }
+}

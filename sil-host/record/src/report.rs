@@ -1,0 +1,229 @@
+//! What a run comes to: one JSON object for programs, one table for people.
+
+use std::time::Duration;
+
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{CellAlignment, Table};
+use hdrhistogram::Histogram;
+use painleve_plant::closed_loop::LoopResult;
+use painleve_plant::scenario::Scenario;
+use serde::{Deserialize, Serialize};
+
+/// Percentiles of a time, µs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Percentiles {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// 99.9th percentile.
+    pub p999: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl Percentiles {
+    /// Percentiles of a histogram of nanoseconds.
+    pub fn of_ns(histogram: &Histogram<u64>) -> Self {
+        let at = |quantile| histogram.value_at_quantile(quantile) as f64 * 1e-3;
+        Self {
+            p50: at(0.5),
+            p99: at(0.99),
+            p999: at(0.999),
+            max: histogram.max() as f64 * 1e-3,
+        }
+    }
+}
+
+/// Result of a run. The names are a contract: add to them, never rename.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunReport {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Name of the control law.
+    pub controller: String,
+    /// What ran the controller.
+    pub host: String,
+    /// Control ticks run.
+    pub ticks: u64,
+    /// Control rate, Hz.
+    pub tick_hz: u32,
+    /// Simulated time, s.
+    pub sim_s: f64,
+    /// Time it took, s.
+    pub wall_s: f64,
+    /// Simulated over wall time.
+    pub realtime_factor: f64,
+    /// Times that contact ended in flight.
+    pub lift_offs: u64,
+    /// When this first happened, s.
+    pub first_lift_off_s: Option<f64>,
+    /// Collisions of the tip with the belt.
+    pub impacts: u64,
+    /// Impacts without collision.
+    pub impacts_without_collision: u64,
+    /// Largest tip position, m.
+    pub max_tip_t_m: f64,
+    /// Tip position at the end, m.
+    pub final_tip_t_m: f64,
+    /// Reference at the end, m.
+    pub final_reference_m: f64,
+    /// Smallest normal force after the first 50 ms, N; null for shorter runs.
+    pub min_normal_force_n: Option<f64>,
+    /// Largest joint torque, N·m.
+    pub peak_torque_nm: f64,
+    /// Part of the time in contact.
+    pub contact_fraction: f64,
+    /// Ticks on which the controller limited its torque.
+    pub saturated_ticks: u64,
+    /// Ticks whose answer did not come in time.
+    pub stale_ticks: u64,
+    /// Time from sensor frame to answer, µs.
+    pub round_trip_us: Percentiles,
+    /// Hash of every sensor and actuator frame in order.
+    pub log_hash: String,
+    /// Seed of all noise.
+    pub seed: u64,
+    /// How the run was paced.
+    pub pacing: String,
+    /// Number of the fault latched at the end, null for none.
+    pub fault: Option<u8>,
+    /// What that fault is.
+    pub fault_description: Option<String>,
+    /// Lateness of wake-ups in real-time pacing, µs.
+    pub wake_up_us: Option<Percentiles>,
+    /// Wake-ups later than a whole tick in real-time pacing.
+    pub missed_deadlines: Option<u64>,
+}
+
+impl RunReport {
+    /// Puts together what a run came to.
+    pub fn new(
+        scenario: &Scenario,
+        host: &str,
+        pacing: &str,
+        result: &LoopResult,
+        wall: Duration,
+    ) -> Self {
+        let statistics = &result.statistics;
+        let sim_s = result.ticks as f64 / f64::from(scenario.run.tick_hz);
+        let wall_s = wall.as_secs_f64();
+        let force = statistics.min_normal_force_n;
+        Self {
+            scenario: scenario.name.clone(),
+            controller: scenario.controller.law.name().into(),
+            host: host.into(),
+            ticks: result.ticks,
+            tick_hz: scenario.run.tick_hz,
+            sim_s,
+            wall_s,
+            realtime_factor: sim_s / wall_s.max(1e-9),
+            lift_offs: statistics.lift_offs,
+            first_lift_off_s: statistics.first_lift_off_s,
+            impacts: statistics.impacts,
+            impacts_without_collision: statistics.impacts_without_collision,
+            max_tip_t_m: statistics.max_tip_t_m,
+            final_tip_t_m: result.final_tip_t_m,
+            final_reference_m: result.final_reference_m,
+            min_normal_force_n: force.is_finite().then_some(force),
+            peak_torque_nm: statistics.peak_torque_nm,
+            contact_fraction: statistics.contact_fraction(),
+            saturated_ticks: result.saturated_ticks,
+            stale_ticks: result.stale_ticks,
+            round_trip_us: Percentiles::of_ns(&result.round_trips_ns),
+            log_hash: result.log_hash.clone(),
+            seed: scenario.run.seed,
+            pacing: pacing.into(),
+            fault: result.fault.map(|fault| fault as u8),
+            fault_description: result.fault.map(|fault| fault.description().into()),
+            wake_up_us: None,
+            missed_deadlines: None,
+        }
+    }
+
+    /// The report as a table.
+    pub fn table(&self) -> String {
+        let mut table = Table::new();
+        table.load_style(UTF8_FULL_CONDENSED);
+        table.set_header([self.scenario.as_str(), ""]);
+        let mut row = |name: &str, value: String| {
+            table.add_row([name, value.as_str()]);
+        };
+        row(
+            "controller",
+            format!(
+                "{}, {} Hz, {} host, {}",
+                self.controller, self.tick_hz, self.host, self.pacing
+            ),
+        );
+        let lift_offs = match self.first_lift_off_s {
+            Some(first) => format!("{} (first at {first:.3} s)", self.lift_offs),
+            None => self.lift_offs.to_string(),
+        };
+        row("lift-offs", lift_offs);
+        row(
+            "impacts",
+            format!(
+                "{} and {} without collision",
+                self.impacts, self.impacts_without_collision
+            ),
+        );
+        row(
+            "time in contact",
+            format!("{:.2} %", 100.0 * self.contact_fraction),
+        );
+        row(
+            "tip at the end",
+            format!(
+                "{:+.2} mm, reference {:+.2} mm",
+                1e3 * self.final_tip_t_m,
+                1e3 * self.final_reference_m
+            ),
+        );
+        row("farthest tip", format!("{:+.2} mm", 1e3 * self.max_tip_t_m));
+        let force = self
+            .min_normal_force_n
+            .map_or("–".into(), |force| format!("{force:.2} N"));
+        row("smallest normal force", force);
+        row("largest torque", format!("{:.2} N·m", self.peak_torque_nm));
+        row(
+            "ticks",
+            format!(
+                "{}, {} with limited torque, {} without answer",
+                self.ticks, self.saturated_ticks, self.stale_ticks
+            ),
+        );
+        row("round trip", microseconds(&self.round_trip_us));
+        if let Some(wake_up) = &self.wake_up_us {
+            row("wake-up lateness", microseconds(wake_up));
+        }
+        if let Some(missed) = self.missed_deadlines {
+            row("missed deadlines", missed.to_string());
+        }
+        row(
+            "simulated",
+            format!(
+                "{:.2} s in {:.2} s ({:.1}× real time)",
+                self.sim_s, self.wall_s, self.realtime_factor
+            ),
+        );
+        if let (Some(number), Some(description)) = (self.fault, &self.fault_description) {
+            row("fault", format!("{number}: {description}"));
+        }
+        row("hash of all frames", self.log_hash.clone());
+        if let Some(column) = table.column_mut(0) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        table.to_string()
+    }
+}
+
+fn microseconds(percentiles: &Percentiles) -> String {
+    let Percentiles {
+        p50,
+        p99,
+        p999,
+        max,
+    } = percentiles;
+    format!("p50 {p50:.1} · p99 {p99:.1} · p99.9 {p999:.1} · max {max:.1} µs")
+}

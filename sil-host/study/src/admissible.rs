@@ -1,0 +1,323 @@
+//! Table II: the tip positions at which p > 0, so that neither an indeterminate nor an
+//! inconsistent solution is near, and the least friction with which the paradox is possible.
+
+use comfy_table::Table;
+use painleve_chart::style::{BLUE_INK, GREY, VERMILLION};
+use painleve_chart::{Chart, Mark, Panel, PlotError};
+use painleve_shared::range;
+use painleve_shared::{Arm, ArmParameters, Posture, Slip};
+use serde::Serialize;
+
+use super::belt_line::{BeltLine, least, positive_stretches};
+use super::outcome::{self, Outcome};
+use super::{StudyError, paper};
+
+/// Points of a curve in the figure.
+const CURVE_POINTS: usize = 400;
+
+/// Where p > 0 at one friction coefficient, while the tip slips with ż_r > 0.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Admissible {
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Least friction coefficient with which p = 0 somewhere on the belt.
+    pub critical_friction: f64,
+    /// Where that is, m.
+    pub critical_tip_t_m: f64,
+    /// In which posture.
+    pub critical_posture: Posture,
+    /// Farthest the tip reaches on the belt, m.
+    pub reach_m: f64,
+    /// θ2 > θ1.
+    pub elbow_up: Intervals,
+    /// θ2 < θ1.
+    pub elbow_down: Intervals,
+    #[serde(skip)]
+    arm: ArmParameters<f64>,
+}
+
+/// Where p > 0 in one posture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Intervals {
+    /// Tip positions z_t from … to, m, in order.
+    pub intervals_m: Vec<[f64; 2]>,
+    /// The paper's interval, where it gives one.
+    pub paper_m: Option<[f64; 2]>,
+    /// Upper end of ours minus that of the paper's, m.
+    pub difference_m: Option<f64>,
+    /// Friction coefficient of the paper's grid (steps of 0.1) at which the upper end is the
+    /// paper's to its three digits, and that end, m: the paper's own μ, unless it slipped.
+    pub paper_fits: Option<PaperFits>,
+}
+
+/// Where a value of the paper is right.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PaperFits {
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Upper end there, m.
+    pub to_m: f64,
+}
+
+/// Computes the admissible intervals of an arm at one friction coefficient.
+///
+/// # Errors
+/// [`StudyError::Range`] if the arm or the friction coefficient is out of range.
+pub fn admissible(parameters: &ArmParameters<f64>, mu: f64) -> Result<Admissible, StudyError> {
+    range::check("--mu", mu, 0.0, 10.0)?;
+    let arm = Arm::new(*parameters)?;
+    let critical = |posture| {
+        let line = BeltLine::new(&arm, posture);
+        let (tau, friction) = least(|tau| line.friction_of_zero_p(tau, Slip::Positive));
+        (friction, line.tip_t_m(tau), posture)
+    };
+    let (up, down) = (critical(Posture::ElbowUp), critical(Posture::ElbowDown));
+    let (critical_friction, critical_tip_t_m, critical_posture) =
+        if up.0 < down.0 { up } else { down };
+    Ok(Admissible {
+        mu,
+        critical_friction,
+        critical_tip_t_m,
+        critical_posture,
+        reach_m: arm.reach_on_belt_m(),
+        elbow_up: intervals(&arm, Posture::ElbowUp, mu),
+        elbow_down: intervals(&arm, Posture::ElbowDown, mu),
+        arm: *parameters,
+    })
+}
+
+fn intervals(arm: &Arm<f64>, posture: Posture, mu: f64) -> Intervals {
+    let line = BeltLine::new(arm, posture);
+    let at = |mu: f64| -> Vec<[f64; 2]> {
+        positive_stretches(|tau| line.p(tau, mu, Slip::Positive))
+            .into_iter()
+            .map(|(from, to)| [line.tip_t_m(from), line.tip_t_m(to)])
+            .collect()
+    };
+    let intervals_m = at(mu);
+    let paper_m = paper::admissible_m(arm.parameters(), mu, posture);
+    let upper = paper_m.map(|[_, upper]| upper);
+    let fits = |upper: f64| {
+        (1..=10).find_map(|tenths| {
+            let mu = f64::from(tenths) / 10.0;
+            let to_m = at(mu).first()?[1];
+            ((to_m - upper).abs() <= 5e-4).then_some(PaperFits { mu, to_m })
+        })
+    };
+    Intervals {
+        difference_m: upper
+            .zip(intervals_m.first())
+            .map(|(upper, ours)| ours[1] - upper),
+        paper_fits: upper.and_then(fits),
+        intervals_m,
+        paper_m,
+    }
+}
+
+/// One interval.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Line {
+    mu: f64,
+    posture: Posture,
+    from_m: f64,
+    to_m: f64,
+    paper_from_m: Option<f64>,
+    paper_to_m: Option<f64>,
+    difference_m: Option<f64>,
+    critical_friction: f64,
+}
+
+impl Admissible {
+    fn postures(&self) -> [(Posture, &'static str, &Intervals); 2] {
+        [
+            (Posture::ElbowUp, "elbow up", &self.elbow_up),
+            (Posture::ElbowDown, "elbow down", &self.elbow_down),
+        ]
+    }
+}
+
+impl Outcome for Admissible {
+    type Line = Line;
+
+    fn lines(&self) -> Vec<Line> {
+        let mut lines = Vec::new();
+        for (posture, _, intervals) in self.postures() {
+            for &[from_m, to_m] in &intervals.intervals_m {
+                lines.push(Line {
+                    mu: self.mu,
+                    posture,
+                    from_m,
+                    to_m,
+                    paper_from_m: intervals.paper_m.map(|paper| paper[0]),
+                    paper_to_m: intervals.paper_m.map(|paper| paper[1]),
+                    difference_m: intervals.difference_m,
+                    critical_friction: self.critical_friction,
+                });
+            }
+        }
+        lines
+    }
+
+    fn table(&self) -> Table {
+        let mut table = outcome::table([
+            format!("μ = {}", self.mu),
+            "p > 0 for zₜ (m)".into(),
+            "the paper".into(),
+            "upper end, ours − paper".into(),
+            "the paper's upper end fits".into(),
+        ]);
+        let dash = || "–".to_owned();
+        for (_, name, intervals) in self.postures() {
+            let ours: Vec<String> = intervals
+                .intervals_m
+                .iter()
+                .map(|[from, to]| format!("{from:.5} … {to:.5}"))
+                .collect();
+            table.add_row([
+                name.into(),
+                if ours.is_empty() {
+                    "nowhere".into()
+                } else {
+                    ours.join(", ")
+                },
+                intervals
+                    .paper_m
+                    .map_or_else(dash, |[from, to]| format!("{from} … {to}")),
+                intervals
+                    .difference_m
+                    .map_or_else(dash, |metres| format!("{:+.2} mm", 1e3 * metres)),
+                intervals
+                    .paper_fits
+                    .map_or_else(dash, |fits| format!("μ = {}: {:.5}", fits.mu, fits.to_m)),
+            ]);
+        }
+        let posture = match self.critical_posture {
+            Posture::ElbowUp => "elbow up",
+            Posture::ElbowDown => "elbow down",
+        };
+        table.add_row([
+            "critical friction".into(),
+            format!(
+                "{:.6}, {posture} at zₜ = {:.4} m",
+                self.critical_friction, self.critical_tip_t_m
+            ),
+            paper::critical_friction(&self.arm)
+                .map_or_else(dash, |mu| format!("{mu} (steps of 0.1)")),
+            dash(),
+            dash(),
+        ]);
+        table
+    }
+
+    fn svg(&self) -> Result<String, PlotError> {
+        let mut marks = Vec::new();
+        // The arm has been checked before.
+        if let Ok(arm) = Arm::new(self.arm) {
+            for ((posture, name, _), colour) in
+                self.postures().into_iter().zip([BLUE_INK, VERMILLION])
+            {
+                let line = BeltLine::new(&arm, posture);
+                let points = (0..=CURVE_POINTS).map(|index| {
+                    let tau = core::f64::consts::PI * (index as f64 / CURVE_POINTS as f64 - 0.5);
+                    (line.tip_t_m(tau), line.p(tau, self.mu, Slip::Positive))
+                });
+                marks.push(Mark::line(name, colour, points.collect()));
+            }
+        }
+        let (low, high) = (-self.reach_m, self.reach_m);
+        marks.push(Mark::line("p = 0", GREY, vec![(low, 0.0), (high, 0.0)]));
+        Chart {
+            title: "Admissible configurations (Table II)".into(),
+            subtitle: format!(
+                "μ = {} · slip żᵣ > 0 · critical friction {:.5}",
+                self.mu, self.critical_friction
+            ),
+            x_title: "Tip position zₜ (m)".into(),
+            x: Some(low..high),
+            panels: vec![Panel {
+                title: "Contact coefficient p (1/kg)".into(),
+                note: "paradox where p ≤ 0".into(),
+                marks,
+                ..Panel::default()
+            }],
+        }
+        .svg()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(mu: f64) -> Admissible {
+        admissible(&ArmParameters::default(), mu).unwrap()
+    }
+
+    #[test]
+    fn table_two_of_the_paper_and_its_one_slip() {
+        let ours = at(0.6);
+        let [[from, to]] = ours.elbow_up.intervals_m[..] else {
+            panic!("{ours:?}");
+        };
+        assert!(
+            (from + 0.184_102_6).abs() < 1e-6 && (to - 0.182_686).abs() < 5e-7,
+            "{ours:?}"
+        );
+        assert_eq!(format!("{to:.3}"), "0.183");
+        let [[from, to]] = ours.elbow_down.intervals_m[..] else {
+            panic!("{ours:?}");
+        };
+        assert!(
+            (from + 0.184_102_6).abs() < 1e-6 && (to - 0.164_705).abs() < 5e-7,
+            "{ours:?}"
+        );
+        // What the paper prints for elbow down is its value at μ = 0.5.
+        assert_eq!(
+            format!("{:.3}", at(0.5).elbow_down.intervals_m[0][1]),
+            "0.168"
+        );
+        assert_eq!(ours.elbow_down.paper_fits.unwrap().mu, 0.5);
+        assert_eq!(ours.elbow_up.paper_fits.unwrap().mu, 0.6);
+        assert!((ours.elbow_down.difference_m.unwrap() + 0.003_29).abs() < 1e-5);
+    }
+
+    #[test]
+    fn p_vanishes_at_the_ends_to_rounding() {
+        let arm = Arm::new(ArmParameters::default()).unwrap();
+        for mu in [0.37, 0.4, 0.6, 1.0, 3.0] {
+            let ours = at(mu);
+            for (posture, intervals) in [
+                (Posture::ElbowUp, &ours.elbow_up),
+                (Posture::ElbowDown, &ours.elbow_down),
+            ] {
+                let line = BeltLine::new(&arm, posture);
+                for end in intervals.intervals_m.iter().flatten() {
+                    if end.abs() < ours.reach_m {
+                        let p = line.p(line.tau(*end).unwrap(), mu, Slip::Positive);
+                        assert!(p.abs() < 1e-11, "p({end}) = {p}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_critical_friction_parts_one_interval_from_two() {
+        let critical = at(0.6).critical_friction;
+        assert!((critical - 0.363_96).abs() < 5e-6, "{critical}");
+        assert!((at(0.6).critical_tip_t_m - 0.1782).abs() < 5e-5);
+        let whole = at(critical - 1e-9);
+        assert_eq!(whole.elbow_down.intervals_m.len(), 1);
+        assert_eq!(whole.elbow_down.intervals_m[0][1], whole.reach_m);
+        assert_eq!(at(critical + 1e-9).elbow_down.intervals_m.len(), 2);
+        assert_eq!(at(0.0).elbow_up.intervals_m.len(), 1);
+    }
+
+    #[test]
+    fn friction_out_of_range_is_refused_by_name() {
+        for mu in [f64::NAN, -0.1, 11.0] {
+            let error = admissible(&ArmParameters::default(), mu).unwrap_err();
+            assert!(error.to_string().starts_with("--mu = "), "{error}");
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! Fig. 4: where in friction and belt speed the arm keeps bouncing, by brute force.
+//!
+//! Every cell is run through a transient and then watched. The arm bounces if its tip leaves the belt
+//! while it is watched; the paper's measure, the largest θ̇1, is above zero there
+//! and zero up to rounding elsewhere.
+
+use std::collections::BTreeMap;
+
+use comfy_table::Table;
+use painleve_chart::PlotError;
+use serde::Serialize;
+
+use super::attractor::Attractor;
+use super::cells::Cells;
+use super::initial::Initial;
+use super::outcome::{self, Outcome};
+use super::tabular::Tabular;
+use super::{Study, StudyError, figure_4, paper};
+
+/// The diagram, cell by cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bifurcation {
+    /// Its cells.
+    pub cells: Cells,
+}
+
+/// What the arm does in one cell.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Belt speed, m/s.
+    pub v_belt_m_s: f64,
+    /// Initial condition: `a`, `d`, `u` or `random:K`.
+    pub initial: String,
+    /// Largest θ̇1, rad/s.
+    pub max_theta1_dot_rad_s: f64,
+    /// Whether the tip keeps leaving the belt.
+    pub bouncing: bool,
+    /// Part of the time in contact.
+    pub contact_fraction: f64,
+    /// Highest point of the tip over the belt, m.
+    pub apex_m: f64,
+    /// Impacts with the belt per second.
+    pub impacts_per_s: f64,
+    /// Where it started: θ1, degrees.
+    pub start_theta1_deg: f64,
+    /// θ2, degrees.
+    pub start_theta2_deg: f64,
+    /// θ̇1, rad/s.
+    pub start_theta1_dot_rad_s: f64,
+    /// θ̇2, rad/s.
+    pub start_theta2_dot_rad_s: f64,
+}
+
+impl Study for Bifurcation {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let Cells {
+            transient_s,
+            record_s,
+            ..
+        } = self.cells;
+        let cell = self.cells.cell(index)?;
+        let mut plant = self.cells.plant_of(&cell)?;
+        let attractor = Attractor::of(&mut plant, transient_s, record_s).map_err(|source| {
+            StudyError::Plant {
+                row: cell.to_string(),
+                source,
+            }
+        })?;
+        Ok(Row {
+            mu: cell.mu,
+            v_belt_m_s: cell.v_belt_m_s,
+            initial: cell.initial.to_string(),
+            max_theta1_dot_rad_s: attractor.max_theta1_dot_rad_s,
+            bouncing: attractor.is_bouncing(),
+            contact_fraction: attractor.contact_fraction(),
+            apex_m: attractor.apex_m,
+            impacts_per_s: attractor.impacts as f64 / record_s,
+            start_theta1_deg: cell.start[0].to_degrees(),
+            start_theta2_deg: cell.start[1].to_degrees(),
+            start_theta1_dot_rad_s: cell.start[2],
+            start_theta2_dot_rad_s: cell.start[3],
+        })
+    }
+}
+
+impl Tabular for Bifurcation {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(self.cells.seeds())
+    }
+}
+
+/// The whole diagram.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagram {
+    /// All cells, in the order of their numbers.
+    pub rows: Vec<Row>,
+    /// Where the arm bounces.
+    pub windows: Vec<Window>,
+    #[serde(skip)]
+    settings: Cells,
+}
+
+/// Where the arm bounces at one friction coefficient.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Window {
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Initial condition; `random` for all random ones together, of which one that bounces
+    /// is enough.
+    pub initial: String,
+    /// Belt speeds from … to, m/s: the outermost of neighbouring ones that bounce.
+    pub v_belt_m_s: Vec<[f64; 2]>,
+    /// Cells that bounce.
+    pub bouncing: usize,
+    /// Cells in all.
+    pub cells: usize,
+    /// Largest θ̇1, rad/s.
+    pub max_theta1_dot_rad_s: f64,
+    /// The paper's belt speeds, if it has any bounces there, m/s.
+    pub paper_m_s: Option<[f64; 2]>,
+}
+
+impl Diagram {
+    /// Puts the rows of a study together.
+    pub fn new(study: &Bifurcation, rows: Vec<Row>) -> Self {
+        let settings = study.cells.clone();
+        let mut diagram = Self {
+            rows,
+            windows: Vec::new(),
+            settings,
+        };
+        diagram.windows = (0..diagram.settings.mu.len())
+            .flat_map(|mu| {
+                let groups = diagram.groups();
+                groups.into_iter().map(move |group| (mu, group))
+            })
+            .map(|(mu, group)| diagram.window(mu, group))
+            .collect();
+        diagram
+    }
+
+    /// What was varied.
+    pub fn settings(&self) -> &Cells {
+        &self.settings
+    }
+
+    /// Names of the initial conditions, all random ones as one.
+    pub fn groups(&self) -> Vec<&'static str> {
+        let initial = self.settings.initial.iter();
+        let mut groups: Vec<&str> = initial.map(|one| one.group()).collect();
+        groups.dedup();
+        groups
+    }
+
+    /// The rows of one friction coefficient, belt speed (both by place) and group of initial conditions.
+    pub fn at(&self, mu: usize, v_belt: usize, group: &str) -> impl Iterator<Item = &Row> {
+        let Cells {
+            v_belt_m_s,
+            initial,
+            ..
+        } = &self.settings;
+        let first = (mu * v_belt_m_s.len() + v_belt) * initial.len();
+        let rows = &self.rows[first..first + initial.len()];
+        rows.iter()
+            .zip(initial)
+            .filter(move |(_, initial)| initial.group() == group)
+            .map(|(row, _)| row)
+    }
+
+    /// Places of the belt speeds in rising order.
+    pub fn rising_speeds(&self) -> Vec<usize> {
+        let speeds = &self.settings.v_belt_m_s;
+        let mut places: Vec<usize> = (0..speeds.len()).collect();
+        places.sort_by(|&one, &other| speeds[one].total_cmp(&speeds[other]));
+        places
+    }
+
+    fn window(&self, place: usize, group: &str) -> Window {
+        let mu = self.settings.mu[place];
+        let paper = paper::critical_friction(&self.settings.plant.arm)
+            .filter(|critical| mu >= *critical && group == Initial::A.group());
+        let mut window = Window {
+            mu,
+            initial: group.to_owned(),
+            v_belt_m_s: Vec::new(),
+            bouncing: 0,
+            cells: 0,
+            max_theta1_dot_rad_s: f64::NEG_INFINITY,
+            paper_m_s: paper.map(|_| paper::BOUNCING_M_S),
+        };
+        let mut goes_on = false;
+        for v_belt in self.rising_speeds() {
+            let speed = self.settings.v_belt_m_s[v_belt];
+            let mut bouncing = false;
+            for row in self.at(place, v_belt, group) {
+                window.cells += 1;
+                window.bouncing += usize::from(row.bouncing);
+                window.max_theta1_dot_rad_s =
+                    window.max_theta1_dot_rad_s.max(row.max_theta1_dot_rad_s);
+                bouncing |= row.bouncing;
+            }
+            match window.v_belt_m_s.last_mut() {
+                Some(stretch) if bouncing && goes_on => stretch[1] = speed,
+                _ if bouncing => window.v_belt_m_s.push([speed, speed]),
+                _ => {}
+            }
+            goes_on = bouncing;
+        }
+        window
+    }
+}
+
+impl Outcome for Diagram {
+    type Line = Row;
+
+    fn lines(&self) -> Vec<Row> {
+        self.rows.clone()
+    }
+
+    fn table(&self) -> Table {
+        let mut table = outcome::table([
+            "μ",
+            "from",
+            "bouncing for v_belt in m/s",
+            "cells",
+            "largest θ̇1 in rad/s",
+            "paper: v_belt in m/s",
+        ]);
+        let stretch = |[from, to]: [f64; 2]| format!("{from} … {to}");
+        for window in &self.windows {
+            let speeds: Vec<String> = window.v_belt_m_s.iter().copied().map(stretch).collect();
+            table.add_row([
+                window.mu.to_string(),
+                window.initial.clone(),
+                if speeds.is_empty() {
+                    "none".to_owned()
+                } else {
+                    speeds.join(", ")
+                },
+                format!("{} of {}", window.bouncing, window.cells),
+                format!("{:.3}", window.max_theta1_dot_rad_s + 0.0),
+                window.paper_m_s.map_or("none".to_owned(), stretch),
+            ]);
+        }
+        table
+    }
+
+    fn svg(&self) -> Result<String, PlotError> {
+        figure_4::chart(self).svg()
+    }
+}

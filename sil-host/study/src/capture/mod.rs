@@ -1,0 +1,150 @@
+//! Capture: the arm bounces without control, and the controller is switched on at a random phase.
+
+mod outcome;
+
+use std::collections::BTreeMap;
+
+use painleve_plant::scenario::Scenario;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use serde::Serialize;
+
+use super::contact_watch::ContactWatch;
+use super::tabular::Tabular;
+use super::trial::Trial;
+use super::{Study, StudyError};
+
+pub use outcome::Captures;
+
+/// Time for which the arm bounces at least before it is caught, s.
+const BOUNCES_S: f64 = 5.0;
+/// Stretch of time within which the controller is switched on, s; many bounces.
+const PHASES_S: f64 = 2.0;
+/// How long a run goes on from then, s.
+const CAUGHT_S: f64 = 2.0;
+/// By then the tip must have left the belt for the last time, s.
+const LIMIT_S: f64 = 0.5;
+/// Time at the end in which the tip must be at its reference, s, and how near, m.
+const WATCHED_S: f64 = 0.1;
+const WITHIN_M: f64 = 1e-3;
+
+/// What to study.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    /// Seed of all runs.
+    pub seed: u64,
+    /// Number of runs.
+    pub runs: usize,
+    /// Changes to every scenario.
+    pub overrides: Vec<String>,
+}
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Its number.
+    pub index: usize,
+    /// When the controller was switched on, s.
+    pub enabled_s: f64,
+    /// Seed of its noise.
+    pub noise_seed: u64,
+    /// Time from there to the end of the last flight, s.
+    pub capture_s: f64,
+    /// Largest distance from the reference at the end, m.
+    pub error_m: f64,
+    /// Number of the fault that the controller has latched.
+    pub fault: Option<u8>,
+    /// Where the tip ended, m.
+    pub tip_t_m: f64,
+    /// Whether the tip was caught in time and held its reference.
+    pub success: bool,
+    /// Whether the plant could be solved to the end; what else is here is as far as it could.
+    pub solved: bool,
+}
+
+impl Capture {
+    /// The scenario of a run: x0,a, 0.5 % noise of the force cell, no reference but the
+    /// place where the tip is caught.
+    ///
+    /// # Errors
+    /// [`StudyError`] if an override is wrong.
+    pub fn scenario(&self, index: usize) -> Result<Scenario, StudyError> {
+        let mut generator = ChaCha8Rng::seed_from_u64(self.seed);
+        generator.set_stream(index as u64);
+        let mut scenario = Scenario::load_unplaced("hybrid-elbow-down", &[])?;
+        scenario.initial.theta1_deg = 32.0;
+        scenario.initial.theta2_deg = 18.27;
+        scenario.converters.force.noise_n = 0.1;
+        scenario.controller.reference.segments.clear();
+        let enable_at_s = BOUNCES_S + generator.random_range(0.0..PHASES_S);
+        scenario.controller.enable_at_s = enable_at_s;
+        scenario.run.duration_s = enable_at_s + CAUGHT_S;
+        scenario.run.seed = generator.random::<u64>() >> 1;
+        Ok(scenario.with_overrides("capture", &self.overrides)?)
+    }
+
+    /// Makes the first run, so that a wrong override is told before anything runs.
+    ///
+    /// # Errors
+    /// [`StudyError`] if it cannot be made.
+    pub fn check(&self) -> Result<(), StudyError> {
+        Trial::new(&self.scenario(0)?)?;
+        Ok(())
+    }
+}
+
+impl Study for Capture {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        self.runs
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let scenario = self.scenario(index)?;
+        let enabled_s = scenario.controller.enable_at_s;
+        let end_s = scenario.run.duration_s;
+        let mut trial = Trial::new(&scenario)?;
+        let mut watch = ContactWatch::new(enabled_s, 0.0);
+        let mut error_m = 0.0_f64;
+        let mut solved = true;
+        for _ in 0..scenario.run.ticks() {
+            if trial.tick(&mut watch).is_err() {
+                solved = false;
+                break;
+            }
+            if trial.time_s() > end_s - WATCHED_S {
+                let reference_m = trial.answer().reference_tip.to_metres();
+                error_m = error_m.max((trial.tip_t_m() - reference_m).abs());
+            }
+        }
+        let capture_s = watch.last_flight_end_s - enabled_s;
+        let fault = trial.fault().map(|fault| fault as u8);
+        Ok(Row {
+            index,
+            enabled_s,
+            noise_seed: scenario.run.seed,
+            capture_s,
+            error_m,
+            fault,
+            tip_t_m: trial.tip_t_m(),
+            success: solved && capture_s <= LIMIT_S && error_m <= WITHIN_M && fault.is_none(),
+            solved,
+        })
+    }
+}
+
+impl Tabular for Capture {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(BTreeMap::from([("runs".into(), self.seed)]))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,98 @@
+//! Captures as a table and as a histogram, the limit beside.
+
+use comfy_table::Table;
+use painleve_chart::style::BLUE_INK;
+use painleve_chart::{Chart, PlotError};
+use serde::Serialize;
+
+use super::{LIMIT_S, Row};
+use crate::distribution::{Percentiles, histogram};
+use crate::outcome::{self, Outcome};
+use crate::proportion::Proportion;
+
+/// What came of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Captures {
+    /// Runs that succeeded.
+    pub success: Proportion,
+    /// Runs whose plant could not be solved; the distributions are of the others.
+    pub unsolved: usize,
+    /// Times to capture, s.
+    pub capture_s: Option<Percentiles>,
+    /// Distances from the reference at the end, m.
+    pub error_m: Option<Percentiles>,
+    /// All runs.
+    pub rows: Vec<Row>,
+}
+
+impl Captures {
+    /// Of all rows.
+    pub fn new(rows: Vec<Row>) -> Self {
+        let solved: Vec<&Row> = rows.iter().filter(|row| row.solved).collect();
+        let of = |value: fn(&Row) -> f64| {
+            let values = solved.iter().map(|row| value(row));
+            Percentiles::of(values.collect())
+        };
+        let successes = rows.iter().filter(|row| row.success).count();
+        Self {
+            success: Proportion::new(successes, rows.len()),
+            unsolved: rows.len() - solved.len(),
+            capture_s: of(|row| row.capture_s),
+            error_m: of(|row| row.error_m),
+            rows,
+        }
+    }
+}
+
+impl Outcome for Captures {
+    type Line = Row;
+
+    fn lines(&self) -> Vec<Row> {
+        self.rows.clone()
+    }
+
+    fn table(&self) -> Table {
+        let mut table = outcome::table(["what", "median", "90 %", "99 %", "max"]);
+        table.add_row(["success (95 %)", &self.success.to_string(), "", "", ""]);
+        if self.unsolved > 0 {
+            table.add_row(["unsolved", &self.unsolved.to_string(), "", "", ""]);
+        }
+        let lines = [
+            ("time to capture (ms)", self.capture_s),
+            ("error at the end (mm)", self.error_m),
+        ];
+        for (what, values) in lines {
+            if let Some(values) = values {
+                let of = [values.median, values.p90, values.p99, values.max];
+                let mut line = vec![what.to_string()];
+                line.extend(of.map(|value| format!("{:.3}", 1e3 * value)));
+                table.add_row(line);
+            }
+        }
+        for row in self.rows.iter().filter(|row| !row.success) {
+            let ending = if row.solved { "failed" } else { "unsolved" };
+            table.add_row([
+                format!("run {} {ending}", row.index),
+                format!("on at {} s", row.enabled_s),
+                format!("noise {}", row.noise_seed),
+                format!("{:.0} ms", 1e3 * row.capture_s),
+                format!("{:.2} mm", 1e3 * row.error_m),
+            ]);
+        }
+        table
+    }
+
+    fn svg(&self) -> Result<String, PlotError> {
+        let solved = self.rows.iter().filter(|row| row.solved);
+        let times: Vec<f64> = solved.map(|row| row.capture_s).collect();
+        let note = "last bar: that long or longer".to_string();
+        Chart {
+            title: "Capture of the bouncing arm".into(),
+            subtitle: format!("caught within {LIMIT_S} s and held: {}", self.success),
+            x_title: "Time from enabling to the last landing (s)".into(),
+            x: Some(0.0..0.6),
+            panels: vec![histogram("Runs", note, BLUE_INK, 0.6, LIMIT_S, &times)],
+        }
+        .svg()
+    }
+}

@@ -1,0 +1,92 @@
+//! Small studies of capture, with torque and without.
+
+use super::*;
+use crate::outcome::plain;
+use crate::{Outcome, rows};
+
+#[test]
+fn bouncing_arms_are_caught_alike_on_any_number_of_threads() {
+    let study = Capture {
+        seed: 1,
+        runs: 6,
+        overrides: Vec::new(),
+    };
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| rows(&study, || ()).unwrap())
+    };
+    let found = on(1);
+    assert_eq!(found, on(2));
+    let captures = Captures::new(found);
+    assert!(captures.success.successes >= 5, "{}", captures.table());
+    assert!(captures.rows.iter().any(|row| row.capture_s > 0.0));
+}
+
+#[test]
+fn an_arm_without_torque_is_not_caught() {
+    let study = Capture {
+        seed: 1,
+        runs: 1,
+        overrides: vec!["controller.torque_limit_nm=0".into()],
+    };
+    let row = study.row(0).unwrap();
+    assert!(!row.success && row.capture_s > LIMIT_S, "{row:?}");
+}
+
+#[test]
+fn a_run_that_cannot_be_solved_is_counted_and_none_of_the_others_is_lost() {
+    let unsolvable = [
+        "belt.friction=10",
+        "arm.stiffness_nm_rad=189.7",
+        "arm.damping_nms_rad=10",
+        "initial.theta1_deg=28.0864",
+        "initial.theta2_deg=-24.0783",
+        "solver.chatter_speed_m_s=1e-8",
+    ];
+    let study = Capture {
+        seed: 1,
+        runs: 1,
+        overrides: unsolvable.map(String::from).into(),
+    };
+    let mut rows = rows(&study, || ()).unwrap();
+    assert!(!rows[0].solved && !rows[0].success, "{rows:?}");
+    let caught = Row {
+        solved: true,
+        success: true,
+        capture_s: 0.2,
+        ..rows[0].clone()
+    };
+    rows.push(caught);
+    let captures = Captures::new(rows);
+    assert_eq!((captures.unsolved, captures.success.successes), (1, 1));
+    assert_eq!(captures.capture_s.map(|times| times.count), Some(1));
+}
+
+/// Made by hand, so that no change of the controller changes it.
+#[test]
+fn the_table_names_the_runs_that_failed() {
+    let row = |index: usize, capture_s: f64, error_m: f64| Row {
+        index,
+        enabled_s: 5.0 + 0.125 * index as f64,
+        noise_seed: 40 + index as u64,
+        capture_s,
+        error_m,
+        fault: None,
+        tip_t_m: 0.12,
+        success: capture_s <= LIMIT_S && error_m <= WITHIN_M,
+        solved: true,
+    };
+    let unsolved = Row {
+        success: false,
+        solved: false,
+        ..row(4, 0.05, 0.0)
+    };
+    let rows = vec![
+        row(0, 0.15, 1e-4),
+        row(1, 0.25, 2e-4),
+        row(2, 0.75, 3e-4),
+        row(3, 0.2, 0.005),
+        unsolved,
+    ];
+    insta::assert_snapshot!(plain(&Captures::new(rows)));
+}

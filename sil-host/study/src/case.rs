@@ -1,0 +1,389 @@
+//! A closed loop to study: which controller, in which posture, behind which converters,
+//! following which kind of reference. Every case is a scenario.
+
+use core::fmt;
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+use nalgebra::Vector2;
+use painleve_firmware::refer::reference::{Program, Segment};
+use painleve_plant::converters::ConverterSettings;
+use painleve_plant::scenario::{InitialState, RunSettings, Scenario};
+use painleve_shared::{Arm, ArmParameters, Posture};
+use serde::{Serialize, Serializer};
+
+use super::StudyError;
+
+/// Which controller.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Controller {
+    /// The paper's PID.
+    Pid,
+    /// The paper's hybrid law with the paper's gains.
+    HybridPaper,
+    /// The same with the friction of a known belt instead of the measured one. The paper's
+    /// continuous law contains itself, through the friction that it measures; this is what it
+    /// is where that loop is solved at every instant.
+    HybridPaperModel,
+    /// The hybrid law as it comes built in.
+    Hybrid,
+    /// The controller of another built-in scenario or of a scenario file.
+    Scenario(String),
+}
+
+impl Controller {
+    /// The paper's and ours.
+    pub const ALL: [Self; 4] = [
+        Self::Pid,
+        Self::HybridPaper,
+        Self::HybridPaperModel,
+        Self::Hybrid,
+    ];
+
+    /// Built-in scenario or file that holds it for a posture, and what must be changed.
+    fn source(&self, posture: Posture) -> (&str, &'static [&'static str]) {
+        match (self, posture) {
+            (Self::Pid, Posture::ElbowUp) => ("pid-elbow-up", &[]),
+            (Self::Pid, Posture::ElbowDown) => ("pid-elbow-down", &[]),
+            // The paper's K'_I is 650 from x0,d and 0 from x0,u.
+            (Self::HybridPaper | Self::HybridPaperModel, Posture::ElbowUp) => (
+                "paper-gains",
+                &["controller.law.hybrid.force_integral_gain_per_s=0"],
+            ),
+            (Self::HybridPaper | Self::HybridPaperModel, Posture::ElbowDown) => {
+                ("paper-gains", &[])
+            }
+            (Self::Hybrid, Posture::ElbowUp) => ("hybrid-elbow-up", &[]),
+            (Self::Hybrid, Posture::ElbowDown) => ("hybrid-elbow-down", &[]),
+            (Self::Scenario(name), _) => (name, &[]),
+        }
+    }
+}
+
+impl fmt::Display for Controller {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Pid => "pid",
+            Self::HybridPaper => "hybrid-paper",
+            Self::HybridPaperModel => "hybrid-paper-model",
+            Self::Hybrid => "hybrid",
+            Self::Scenario(name) => name,
+        })
+    }
+}
+
+impl FromStr for Controller {
+    type Err = std::convert::Infallible;
+
+    /// Any other name is a scenario's, looked up when the case is made.
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        let known = Self::ALL
+            .into_iter()
+            .find(|controller| controller.to_string() == name);
+        Ok(known.unwrap_or_else(|| Self::Scenario(name.into())))
+    }
+}
+
+impl Serialize for Controller {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// Which encoders, force cell and torque stages, and how often they are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Converters {
+    /// Close to the paper's continuous control: 10 kHz, 22 bits and more, no noise, no delay.
+    Ideal,
+    /// 1 kHz, 14-bit encoders, 12-bit force and torque, noise, a sample of delay.
+    Hardware,
+    /// Whatever the controller's scenario has.
+    Own,
+}
+
+/// How the reference goes from the start to its target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reference {
+    /// Minimum jerk within so many seconds.
+    MinimumJerk(f32),
+    /// Constant speed within so many seconds.
+    Ramp(f32),
+    /// At once.
+    Step,
+}
+
+impl Reference {
+    /// How long it takes, s.
+    pub fn duration_s(self) -> f64 {
+        match self {
+            Self::MinimumJerk(duration_s) | Self::Ramp(duration_s) => f64::from(duration_s),
+            Self::Step => 0.0,
+        }
+    }
+
+    /// The reference to a target (m), as the controller's queue.
+    pub fn to(self, target_m: f64) -> Program {
+        let target_m = target_m as f32;
+        let segment = match self {
+            Self::MinimumJerk(duration_s) => Segment::MinimumJerk {
+                target_m,
+                duration_s,
+            },
+            Self::Ramp(duration_s) => Segment::Ramp {
+                target_m,
+                duration_s,
+            },
+            Self::Step => Segment::Step {
+                target_m,
+                duration_s: 0.0,
+            },
+        };
+        Program {
+            segments: [segment].into_iter().collect(),
+        }
+    }
+}
+
+impl fmt::Display for Reference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::MinimumJerk(duration_s) => write!(f, "minimum-jerk:{duration_s}"),
+            Self::Ramp(duration_s) => write!(f, "ramp:{duration_s}"),
+            Self::Step => f.write_str("step"),
+        }
+    }
+}
+
+impl FromStr for Reference {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let allowed =
+            || format!("'{text}' is no reference; give minimum-jerk:SECONDS, ramp:SECONDS or step");
+        let Some((kind, seconds)) = text.split_once(':') else {
+            return (text == "step").then_some(Self::Step).ok_or_else(allowed);
+        };
+        let duration_s: f32 = seconds.parse().map_err(|_| allowed())?;
+        if !(1e-3..=1e4).contains(&duration_s) {
+            return Err(format!(
+                "'{text}' takes {duration_s} s; a reference takes 0.001 to 10000 s"
+            ));
+        }
+        match kind {
+            "minimum-jerk" => Ok(Self::MinimumJerk(duration_s)),
+            "ramp" => Ok(Self::Ramp(duration_s)),
+            _ => Err(allowed()),
+        }
+    }
+}
+
+impl Serialize for Reference {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// z_t of the paper's x0,d and x0,u, m.
+const START_M: f64 = -0.1624;
+
+/// Where a closed loop starts in a posture: the paper's x0,d or x0,u; for an arm of
+/// another shape at rest on the belt at the same z_t.
+///
+/// # Errors
+/// [`StudyError::Option`] if the arm does not reach there.
+pub fn start(arm: &ArmParameters<f64>, posture: Posture) -> Result<InitialState, StudyError> {
+    let of_paper = ArmParameters::<f64>::default();
+    let down = InitialState::default();
+    let (theta1_deg, theta2_deg) = if arm.link_length_m == of_paper.link_length_m
+        && arm.height_m == of_paper.height_m
+    {
+        match posture {
+            Posture::ElbowDown => (down.theta1_deg, down.theta2_deg),
+            Posture::ElbowUp => (down.theta2_deg, down.theta1_deg),
+        }
+    } else {
+        let theta: Vector2<f64> = Arm::new(*arm)?
+                .joint_angles_on_belt_rad(START_M, posture)
+                .ok_or_else(|| {
+                    StudyError::Option(format!(
+                        "an arm of two links of {} m, {} m over the belt, does not reach the start at z_t = {START_M} m",
+                        arm.link_length_m, arm.height_m
+                    ))
+                })?;
+        (theta.x.to_degrees(), theta.y.to_degrees())
+    };
+    Ok(InitialState::at_rest(theta1_deg, theta2_deg))
+}
+
+/// An arm at rest in a posture with its tip on the belt at `tip_t_m` (m).
+///
+/// # Errors
+/// [`StudyError`] if that is out of its reach.
+pub fn at_rest_on_belt(
+    arm: &Arm<f64>,
+    tip_t_m: f64,
+    posture: Posture,
+) -> Result<InitialState, StudyError> {
+    let theta = arm
+        .joint_angles_on_belt_rad(tip_t_m, posture)
+        .ok_or_else(|| StudyError::Option(format!("z_t = {tip_t_m} m is out of reach")))?;
+    Ok(InitialState::at_rest(
+        theta.x.to_degrees(),
+        theta.y.to_degrees(),
+    ))
+}
+
+/// The scenario of a case: the controller's own without a reference, the converters, the
+/// overrides in this order, and then the start in the posture.
+///
+/// # Errors
+/// [`StudyError`] naming the controller if there is no such scenario or a key is wrong.
+pub fn scenario(
+    controller: &Controller,
+    posture: Posture,
+    converters: Converters,
+    overrides: &[String],
+) -> Result<Scenario, StudyError> {
+    let (name, changes) = controller.source(posture);
+    let changes: Vec<String> = changes.iter().map(ToString::to_string).collect();
+    let mut scenario = Scenario::load_unplaced(name, &changes)?;
+    // It may be out of reach of the arm that is to be studied.
+    scenario.controller.reference = Program::default();
+    match converters {
+        Converters::Ideal => {
+            let ideal = Scenario::load_unplaced("paper-gains", &[])?;
+            scenario.run.tick_hz = ideal.run.tick_hz;
+            scenario.converters = ideal.converters;
+            if *controller == Controller::Pid {
+                scenario.controller.estimator = ideal.controller.estimator;
+            }
+        }
+        Converters::Hardware => {
+            scenario.run.tick_hz = RunSettings::default().tick_hz;
+            scenario.converters = ConverterSettings::default();
+            if let Controller::HybridPaper | Controller::HybridPaperModel = controller {
+                // Such gains need the wide loop that the PID has.
+                let wide = Scenario::load_unplaced("pid-elbow-down", &[])?;
+                scenario.controller.estimator = wide.controller.estimator;
+            }
+        }
+        Converters::Own => {}
+    }
+    let origin = format!("controller {controller}");
+    let mut scenario = scenario.with_overrides(&origin, overrides)?;
+    if *controller == Controller::HybridPaperModel {
+        let (friction, speed_m_s) = (scenario.belt.friction, scenario.belt.profile.speed_m_s(0.0));
+        let model = format!(
+            "controller.law.hybrid.friction={{ model = {{ friction = {friction:?}, belt_speed_m_s = {speed_m_s:?} }} }}"
+        );
+        scenario = scenario.with_overrides(&origin, &[model])?;
+    }
+    scenario.initial = start(&scenario.arm, posture)?;
+    Ok(scenario)
+}
+
+/// The seed of each controller's converters, as `noise of hybrid`.
+///
+/// # Errors
+/// [`StudyError`] naming the controller if there is no such scenario or a key is wrong.
+pub fn noise_seeds(
+    controllers: &[Controller],
+    overrides: &[String],
+) -> Result<BTreeMap<String, u64>, StudyError> {
+    let seed = |controller| {
+        let scenario = scenario(controller, Posture::ElbowDown, Converters::Own, overrides)?;
+        Ok((format!("noise of {controller}"), scenario.run.seed))
+    };
+    controllers.iter().map(seed).collect()
+}
+
+/// The scenarios that are not known by the names of [`Controller::ALL`].
+pub fn own_scenarios(controllers: &[Controller]) -> Vec<&str> {
+    let own = controllers
+        .iter()
+        .filter_map(|controller| match controller {
+            Controller::Scenario(name) => Some(name.as_str()),
+            _ => None,
+        });
+    own.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_firmware::law::LawSettings;
+
+    #[test]
+    fn cases_are_the_built_in_scenarios_behind_other_converters() {
+        for posture in [Posture::ElbowUp, Posture::ElbowDown] {
+            for controller in Controller::ALL {
+                for converters in [Converters::Ideal, Converters::Hardware] {
+                    let scenario = scenario(&controller, posture, converters, &[]).unwrap();
+                    let ideal = converters == Converters::Ideal;
+                    assert_eq!(scenario.run.tick_hz, if ideal { 10_000 } else { 1000 });
+                    assert_eq!(
+                        scenario.converters.encoder.bits,
+                        if ideal { 24 } else { 14 }
+                    );
+                    let theta = painleve_plant::mechanics::motion::theta(&scenario.initial.state());
+                    assert_eq!(Posture::of(&theta), posture);
+                }
+            }
+        }
+        let own =
+            |posture| scenario(&Controller::HybridPaper, posture, Converters::Own, &[]).unwrap();
+        let integral = |scenario: Scenario| match scenario.controller.law {
+            LawSettings::Hybrid(law) => law.force_integral_gain_per_s,
+            _ => panic!("not the hybrid law"),
+        };
+        assert_eq!(integral(own(Posture::ElbowDown)), 650.0);
+        assert_eq!(integral(own(Posture::ElbowUp)), 0.0);
+    }
+
+    #[test]
+    fn overrides_come_last_and_an_arm_of_another_shape_starts_on_the_belt() {
+        let overrides = ["run.tick_hz=2000".into(), "arm.height_m=0.36".into()];
+        let case = scenario(
+            &Controller::Hybrid,
+            Posture::ElbowUp,
+            Converters::Ideal,
+            &overrides,
+        )
+        .unwrap();
+        assert_eq!(case.run.tick_hz, 2000);
+        let plant =
+            painleve_plant::mechanics::Plant::new(&case.plant_parameters(), case.initial.state())
+                .unwrap();
+        assert!((plant.motion().tip_t_m(plant.state()) - START_M).abs() < 1e-12);
+        assert!(plant.motion().gap_m(plant.state()).abs() < 1e-15);
+        let far = ["arm.height_m=0.415".into()];
+        let error =
+            scenario(&Controller::Hybrid, Posture::ElbowUp, Converters::Own, &far).unwrap_err();
+        assert!(error.to_string().contains("does not reach"), "{error}");
+    }
+
+    #[test]
+    fn references_are_read_as_they_are_written() {
+        for text in ["minimum-jerk:3", "ramp:2.5", "step"] {
+            assert_eq!(text.parse::<Reference>().unwrap().to_string(), text);
+        }
+        for text in [
+            "", "jerk", "jerk:3", "ramp", "ramp:", "ramp:0", "ramp:-1", "ramp:nan", "step:1",
+        ] {
+            assert!(
+                text.parse::<Reference>().unwrap_err().contains(text),
+                "{text}"
+            );
+        }
+        let error = "ramp:1e9".parse::<Reference>().unwrap_err();
+        assert!(error.contains("0.001 to 10000 s"), "{error}");
+    }
+
+    #[test]
+    fn an_unknown_controller_is_told_with_what_there_is() {
+        let Ok(controller) = "no-such-law".parse::<Controller>();
+        let error = scenario(&controller, Posture::ElbowUp, Converters::Own, &[]).unwrap_err();
+        assert!(error.to_string().contains("no-such-law"), "{error}");
+    }
+}

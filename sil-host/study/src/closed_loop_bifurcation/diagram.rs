@@ -1,0 +1,189 @@
+//! The cells put together: sections over the belt's speed, as a table and as a figure.
+
+use comfy_table::Table;
+use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, ORANGE, VERMILLION};
+use painleve_chart::{Chart, Mark, Panel, PlotError};
+use serde::Serialize;
+
+use super::Row;
+use crate::case::{Controller, Converters};
+use crate::outcome::{self, Outcome};
+use crate::paper;
+
+/// The whole diagram.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagram {
+    /// All cells, in the order of their numbers.
+    pub rows: Vec<Row>,
+    /// One per controller, converter set, friction coefficient and initial condition.
+    pub sections: Vec<Section>,
+}
+
+/// One controller over all belt speeds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Section {
+    /// Controller.
+    pub controller: Controller,
+    /// Converter set.
+    pub converters: Converters,
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Initial condition.
+    pub initial: String,
+    /// Belt speeds in all.
+    pub cells: usize,
+    /// Belt speeds at which the arm keeps bouncing, m/s.
+    pub bouncing_m_s: Vec<f64>,
+    /// Belt speeds at which the tip left the belt at any time, m/s.
+    pub lifted_m_s: Vec<f64>,
+    /// Cells that end with a fault.
+    pub faults: usize,
+    /// Largest θ̇1 while watched, rad/s.
+    pub max_theta1_dot_rad_s: f64,
+    /// Largest distance of the tip from its target at the end, m.
+    pub max_error_m: f64,
+}
+
+impl Section {
+    fn is_of(&self, row: &Row) -> bool {
+        (&self.controller, self.converters, self.mu, &self.initial)
+            == (&row.controller, row.converters, row.mu, &row.initial)
+    }
+}
+
+impl Diagram {
+    /// Puts the rows of a study together.
+    pub fn new(rows: Vec<Row>) -> Self {
+        let mut sections: Vec<Section> = Vec::new();
+        for row in &rows {
+            let place = sections.iter().position(|section| section.is_of(row));
+            let place = place.unwrap_or_else(|| {
+                sections.push(Section {
+                    controller: row.controller.clone(),
+                    converters: row.converters,
+                    mu: row.mu,
+                    initial: row.initial.clone(),
+                    cells: 0,
+                    bouncing_m_s: Vec::new(),
+                    lifted_m_s: Vec::new(),
+                    faults: 0,
+                    max_theta1_dot_rad_s: f64::NEG_INFINITY,
+                    max_error_m: 0.0,
+                });
+                sections.len() - 1
+            });
+            let section = &mut sections[place];
+            section.cells += 1;
+            if row.bouncing {
+                section.bouncing_m_s.push(row.v_belt_m_s);
+            }
+            if row.lift_offs > 0 {
+                section.lifted_m_s.push(row.v_belt_m_s);
+            }
+            section.faults += usize::from(row.fault.is_some());
+            section.max_theta1_dot_rad_s =
+                section.max_theta1_dot_rad_s.max(row.max_theta1_dot_rad_s);
+            section.max_error_m = section.max_error_m.max((row.tip_t_m - row.target_m).abs());
+        }
+        Self { rows, sections }
+    }
+}
+
+impl Outcome for Diagram {
+    type Line = Row;
+
+    fn lines(&self) -> Vec<Row> {
+        self.rows.clone()
+    }
+
+    fn table(&self) -> Table {
+        let mut table = outcome::table([
+            "controller",
+            "converters",
+            "μ",
+            "from",
+            "keeps bouncing",
+            "left the belt at all",
+            "faults",
+            "largest θ̇₁ (rad/s)",
+            "farthest from target (mm)",
+            "the paper",
+        ]);
+        for section in &self.sections {
+            let of_cells = |speeds: &[f64]| match (speeds.first(), speeds.last()) {
+                (Some(first), Some(last)) => {
+                    format!(
+                        "{} of {} ({first} … {last} m/s)",
+                        speeds.len(),
+                        section.cells
+                    )
+                }
+                _ => format!("0 of {}", section.cells),
+            };
+            table.add_row([
+                section.controller.to_string(),
+                outcome::name(&section.converters),
+                section.mu.to_string(),
+                section.initial.clone(),
+                of_cells(&section.bouncing_m_s),
+                of_cells(&section.lifted_m_s),
+                section.faults.to_string(),
+                format!("{:.3}", section.max_theta1_dot_rad_s),
+                format!("{:.2}", 1e3 * section.max_error_m),
+                paper::closed_loop_bounces(&section.controller, &section.initial)
+                    .unwrap_or("–")
+                    .into(),
+            ]);
+        }
+        table
+    }
+
+    fn svg(&self) -> Result<String, PlotError> {
+        const COLOURS: [plotters::style::RGBColor; 5] =
+            [BLUE_INK, VERMILLION, GREEN, ORANGE, BLACK_INK];
+        let mut panels: Vec<Panel> = Vec::new();
+        let together = |one: &Section, other: &Section| {
+            (&one.controller, one.converters) == (&other.controller, other.converters)
+        };
+        for sections in self.sections.chunk_by(together) {
+            let marks = sections.iter().zip(COLOURS.iter().cycle());
+            let marks = marks.map(|(section, colour)| {
+                let rows = self.rows.iter().filter(|row| section.is_of(row));
+                let mut points: Vec<(f64, f64)> = rows
+                    .map(|row| (row.v_belt_m_s, row.max_theta1_dot_rad_s))
+                    .collect();
+                points.sort_by(|one, other| one.0.total_cmp(&other.0));
+                let bouncing = section.bouncing_m_s.len();
+                let name = format!(
+                    "μ = {} from x₀,{}: bounces at {bouncing} of {}",
+                    section.mu, section.initial, section.cells
+                );
+                Mark::line(&name, *colour, points)
+            });
+            let first = &sections[0];
+            let highest = sections.iter().fold(1.0, |high: f64, section| {
+                high.max(section.max_theta1_dot_rad_s)
+            });
+            panels.push(Panel {
+                title: format!(
+                    "Largest θ̇₁ (rad/s): {}, {} converters",
+                    first.controller,
+                    outcome::name(&first.converters)
+                ),
+                y: Some(-0.1 * highest..1.1 * highest),
+                height: 360,
+                marks: marks.collect(),
+                ..Panel::default()
+            });
+        }
+        Chart {
+            title: "Belt speed with the controller in the loop (Fig. 12)".into(),
+            subtitle: "the firmware's controller in this process, behind the same converters"
+                .into(),
+            x_title: "Belt speed v_belt (m/s)".into(),
+            x: None,
+            panels,
+        }
+        .svg()
+    }
+}

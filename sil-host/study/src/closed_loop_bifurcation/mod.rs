@@ -1,0 +1,227 @@
+//! Fig. 12: the bifurcation diagram with the controller in the loop.
+//!
+//! Every cell is a closed loop that takes the tip to a target, and is then left running
+//! through a transient before it is watched, as in the open loop. Encoders of finite
+//! resolution keep the joints trembling, so that the largest θ̇1 is never quite zero: the
+//! arm bounces if its tip leaves the belt while it is watched.
+
+mod diagram;
+
+use std::collections::BTreeMap;
+
+use painleve_plant::mechanics::motion::{State, theta};
+use painleve_plant::mechanics::statistics::Statistics;
+use painleve_plant::scenario::{InitialState, Scenario};
+use painleve_shared::{Arm, Posture};
+use serde::Serialize;
+
+use super::attractor::Attractor;
+use super::case::{self, Controller, Converters, Reference};
+use super::initial::Initial;
+use super::tabular::Tabular;
+use super::trial::Trial;
+use super::{Study, StudyError, paper};
+
+pub use diagram::{Diagram, Section};
+
+/// What to study: all combinations, the last varying fastest.
+#[derive(Clone, Debug)]
+pub struct ClosedLoopBifurcation {
+    /// Controllers.
+    pub controllers: Vec<Controller>,
+    /// Converter sets.
+    pub converters: Vec<Converters>,
+    /// Friction coefficients μ.
+    pub mu: Vec<f64>,
+    /// Belt speeds, m/s.
+    pub v_belt_m_s: Vec<f64>,
+    /// Initial conditions.
+    pub initial: Vec<Initial>,
+    /// Seed of the random ones.
+    pub seed: u64,
+    /// How the reference goes to its target.
+    pub reference: Reference,
+    /// Target, m; if absent the paper's Z_t,sliding of law and posture.
+    pub target_m: Option<f64>,
+    /// How long a cell runs before it is watched, s.
+    pub transient_s: f64,
+    /// How long it is watched, s.
+    pub record_s: f64,
+    /// Changes to every scenario.
+    pub overrides: Vec<String>,
+}
+
+/// What the closed loop does in one cell.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Controller.
+    pub controller: Controller,
+    /// Converter set.
+    pub converters: Converters,
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Belt speed, m/s.
+    pub v_belt_m_s: f64,
+    /// Initial condition: `a`, `d`, `u` or `random:K`.
+    pub initial: String,
+    /// Largest θ̇1 while watched, rad/s.
+    pub max_theta1_dot_rad_s: f64,
+    /// Whether the tip left the belt while watched.
+    pub bouncing: bool,
+    /// Part of the watched time in contact.
+    pub contact_fraction: f64,
+    /// Times the tip left the belt in the whole run.
+    pub lift_offs: u64,
+    /// When it first did, s.
+    pub first_lift_off_s: Option<f64>,
+    /// Number of the fault that the controller has latched at the end.
+    pub fault: Option<u8>,
+    /// Target of the reference, m.
+    pub target_m: f64,
+    /// Where the tip is at the end, m.
+    pub tip_t_m: f64,
+}
+
+impl ClosedLoopBifurcation {
+    /// Makes every cell once, so that a mistake is told before anything runs.
+    ///
+    /// # Errors
+    /// [`StudyError`] of the first cell that cannot be run.
+    pub fn check(&self) -> Result<(), StudyError> {
+        for index in 0..self.len() {
+            Trial::new(&self.scenario(index)?.1)?;
+        }
+        Ok(())
+    }
+
+    /// What a row starts with, and its scenario.
+    fn scenario(&self, index: usize) -> Result<(Cell<'_>, Scenario), StudyError> {
+        let mut rest = index;
+        let mut place = |count: usize| {
+            let place = rest % count;
+            rest /= count;
+            place
+        };
+        let initial = self.initial[place(self.initial.len())];
+        let v_belt_m_s = self.v_belt_m_s[place(self.v_belt_m_s.len())];
+        let mu = self.mu[place(self.mu.len())];
+        let converters = self.converters[place(self.converters.len())];
+        let controller = &self.controllers[place(self.controllers.len())];
+
+        let mut overrides = self.overrides.clone();
+        overrides.push(format!("belt.friction={mu}"));
+        overrides.push(format!(
+            "belt.profile={{ kind = \"constant\", speed_m_s = {v_belt_m_s:?} }}"
+        ));
+        let posture = |state: &State| Posture::of(&theta(state));
+        let of_letter = match initial {
+            Initial::D => Some(Posture::ElbowDown),
+            Initial::U => Some(Posture::ElbowUp),
+            Initial::A | Initial::Random(_) => None,
+        };
+        let guess = of_letter.unwrap_or(Posture::ElbowDown);
+        let mut scenario = case::scenario(controller, guess, converters, &overrides)?;
+        let mut start_posture = guess;
+        if of_letter.is_none() {
+            let arm = Arm::new(scenario.arm)?;
+            let state = initial.state(&arm, self.seed, index as u64);
+            start_posture = posture(&state);
+            if start_posture != guess {
+                scenario = case::scenario(controller, start_posture, converters, &overrides)?;
+            }
+            scenario.initial = InitialState {
+                theta1_deg: state[0].to_degrees(),
+                theta2_deg: state[1].to_degrees(),
+                theta1_dot_rad_s: state[2],
+                theta2_dot_rad_s: state[3],
+            };
+        }
+        let target_m = self
+            .target_m
+            .unwrap_or_else(|| paper::target_m(controller, start_posture));
+        scenario.controller.reference = self.reference.to(target_m);
+        let cell = Cell {
+            controller,
+            converters,
+            mu,
+            v_belt_m_s,
+            initial,
+            target_m,
+        };
+        Ok((cell, scenario))
+    }
+}
+
+struct Cell<'a> {
+    controller: &'a Controller,
+    converters: Converters,
+    mu: f64,
+    v_belt_m_s: f64,
+    initial: Initial,
+    target_m: f64,
+}
+
+impl Study for ClosedLoopBifurcation {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        self.controllers.len()
+            * self.converters.len()
+            * self.mu.len()
+            * self.v_belt_m_s.len()
+            * self.initial.len()
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let (cell, scenario) = self.scenario(index)?;
+        let failed = |source| StudyError::Plant {
+            row: format!(
+                "{} at mu = {}, v_belt = {} m/s from {}",
+                cell.controller, cell.mu, cell.v_belt_m_s, cell.initial
+            ),
+            source,
+        };
+        let mut trial = Trial::new(&scenario)?;
+        let ticks = |seconds: f64| (seconds * f64::from(scenario.run.tick_hz)).round() as u64;
+        let (mut statistics, mut attractor) = (Statistics::new(0.0), Attractor::default());
+        for _ in 0..ticks(self.transient_s) {
+            trial.tick(&mut statistics).map_err(failed)?;
+        }
+        for _ in 0..ticks(self.record_s) {
+            let mut both = (&mut statistics, &mut attractor);
+            trial.tick(&mut both).map_err(failed)?;
+        }
+        Ok(Row {
+            controller: cell.controller.clone(),
+            converters: cell.converters,
+            mu: cell.mu,
+            v_belt_m_s: cell.v_belt_m_s,
+            initial: cell.initial.to_string(),
+            max_theta1_dot_rad_s: attractor.max_theta1_dot_rad_s,
+            bouncing: attractor.is_bouncing(),
+            contact_fraction: attractor.contact_fraction(),
+            lift_offs: statistics.lift_offs,
+            first_lift_off_s: statistics.first_lift_off_s,
+            fault: trial.fault().map(|fault| fault as u8),
+            target_m: cell.target_m,
+            tip_t_m: trial.tip_t_m(),
+        })
+    }
+}
+
+impl Tabular for ClosedLoopBifurcation {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        let mut seeds = case::noise_seeds(&self.controllers, &self.overrides)?;
+        seeds.insert("initial".into(), self.seed);
+        Ok(seeds)
+    }
+}
+
+#[cfg(test)]
+mod tests;

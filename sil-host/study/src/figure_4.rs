@@ -1,0 +1,202 @@
+//! Fig. 4 drawn: a section at one friction coefficient as curves, a whole diagram as maps.
+
+use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, GREY, SKY, VERMILLION};
+use painleve_chart::{Chart, Mark, Panel};
+use plotters::style::RGBColor;
+
+use super::bifurcation::{Diagram, Row};
+use super::cells::Cells;
+use super::initial::Initial;
+use super::places::Places;
+
+/// Colours of a map from little to much, after the quiet one: told apart in grey as well.
+const RISING: [RGBColor; 6] = [
+    RGBColor(0xFD, 0xE7, 0x25),
+    RGBColor(0x90, 0xD7, 0x43),
+    RGBColor(0x35, 0xB7, 0x79),
+    RGBColor(0x21, 0x90, 0x8C),
+    RGBColor(0x3B, 0x52, 0x8B),
+    RGBColor(0x44, 0x01, 0x54),
+];
+
+/// Where the arm is quiet.
+const QUIET: RGBColor = RGBColor(0xF2, 0xF2, 0xF2);
+
+/// The figure.
+pub fn chart(diagram: &Diagram) -> Chart {
+    let Cells {
+        mu,
+        transient_s,
+        record_s,
+        ..
+    } = diagram.settings();
+    let groups = diagram.groups();
+    let watched = format!("largest θ̇1 within {record_s} s after {transient_s} s of transient");
+    match mu.as_slice() {
+        [mu] => Chart {
+            title: format!("Bifurcation diagram at μ = {mu}"),
+            subtitle: format!("no control, {watched} (paper: Fig. 4)"),
+            x_title: "belt speed v_belt in m/s".into(),
+            x: None,
+            panels: vec![section(diagram, &groups), apexes(diagram, &groups)],
+        },
+        _ => Chart {
+            title: "Bifurcation diagram over belt speed and friction".into(),
+            subtitle: format!("no control, {watched}; dashed: where the paper has bounces"),
+            x_title: "belt speed v_belt in m/s".into(),
+            x: Some(Places::of(&diagram.settings().v_belt_m_s).ends()),
+            panels: groups.iter().map(|group| map(diagram, group)).collect(),
+        },
+    }
+}
+
+/// Name of a group of initial conditions, its colour, and whether its line is dashed.
+fn look(group: &str) -> (String, RGBColor, bool) {
+    match group {
+        "a" => ("from x0,a".into(), BLACK_INK, false),
+        "d" => ("from x0,d".into(), VERMILLION, true),
+        "u" => ("from x0,u".into(), BLUE_INK, true),
+        _ => ("from random states".into(), GREEN, false),
+    }
+}
+
+/// A value of each cell of a section against belt speed; where several random states start
+/// at the same speed, a dot for each.
+fn curve(diagram: &Diagram, group: &str, value: impl Fn(&Row) -> f64) -> Mark {
+    let (name, colour, dashed) = look(group);
+    let points = diagram
+        .rising_speeds()
+        .into_iter()
+        .flat_map(|place| diagram.at(0, place, group))
+        .map(|row| (row.v_belt_m_s, value(row)))
+        .collect();
+    if group == Initial::Random(1).group() {
+        return Mark::Dots {
+            name,
+            colour,
+            size: 8,
+            points,
+        };
+    }
+    Mark::Line {
+        name,
+        colour,
+        width: 4,
+        dashed,
+        points,
+    }
+}
+
+fn curves(diagram: &Diagram, groups: &[&str], value: impl Fn(&Row) -> f64) -> Vec<Mark> {
+    // The one that is named first lies on top.
+    let lines = groups.iter().rev();
+    lines.map(|group| curve(diagram, group, &value)).collect()
+}
+
+fn section(diagram: &Diagram, groups: &[&str]) -> Panel {
+    let mut marks = Vec::new();
+    if let Some([from, to]) = diagram.windows.iter().find_map(|window| window.paper_m_s) {
+        marks.push(Mark::Span {
+            name: format!("bouncing in the paper, {from} … {to} m/s").replace('-', "−"),
+            colour: SKY,
+            opacity: 0.25,
+            x: from..to,
+        });
+    }
+    marks.extend(curves(diagram, groups, |row| row.max_theta1_dot_rad_s));
+    Panel {
+        title: "largest θ̇1 in rad/s".into(),
+        marks,
+        ..Panel::default()
+    }
+}
+
+fn apexes(diagram: &Diagram, groups: &[&str]) -> Panel {
+    Panel {
+        title: "apex of the tip in mm".into(),
+        height: 300,
+        y_ticks: 4,
+        marks: curves(diagram, groups, |row| 1e3 * row.apex_m)
+            .into_iter()
+            .map(without_name)
+            .collect(),
+        ..Panel::default()
+    }
+}
+
+/// What the panel above has named already.
+fn without_name(mut mark: Mark) -> Mark {
+    if let Mark::Line { name, .. } | Mark::Dots { name, .. } = &mut mark {
+        name.clear();
+    }
+    mark
+}
+
+fn map(diagram: &Diagram, group: &str) -> Panel {
+    let settings = diagram.settings();
+    let (columns, lines) = (Places::of(&settings.v_belt_m_s), Places::of(&settings.mu));
+    let strongest = |mu: usize, speed: usize| {
+        let rows = diagram.at(mu, speed, group).filter(|row| row.bouncing);
+        let speeds = rows.map(|row| row.max_theta1_dot_rad_s);
+        speeds.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let values: Vec<f64> = lines
+        .nearest
+        .iter()
+        .flat_map(|&mu| columns.nearest.iter().map(move |&speed| (mu, speed)))
+        .map(|(mu, speed)| strongest(mu, speed))
+        .collect();
+    let (palette, cells) = shades(&values);
+    let mut marks = vec![Mark::Cells {
+        x: columns.ends(),
+        y: lines.ends(),
+        columns: columns.nearest.len(),
+        palette,
+        cells,
+    }];
+    let paper = diagram
+        .windows
+        .iter()
+        .filter(|window| window.initial == group);
+    let least = paper.clone().filter(|window| window.paper_m_s.is_some());
+    let least = least.map(|window| window.mu).fold(f64::INFINITY, f64::min);
+    if let Some([from, to]) = paper.filter_map(|window| window.paper_m_s).next() {
+        let (bottom, top) = (least - 0.5 * lines.step, lines.ends().end);
+        marks.push(Mark::dashed(
+            "",
+            GREY,
+            vec![(from, top), (from, bottom), (to, bottom), (to, top)],
+        ));
+    }
+    Panel {
+        title: format!("μ, {}", look(group).0),
+        note: "largest θ̇1 in rad/s:".into(),
+        y: Some(lines.ends()),
+        y_ticks: 10,
+        height: 560,
+        marks,
+    }
+}
+
+/// A palette for values, and the place of each in it; minus infinity is quiet.
+fn shades(values: &[f64]) -> (Vec<(String, RGBColor)>, Vec<u8>) {
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let low = finite().fold(f64::INFINITY, f64::min).floor();
+    let high = finite().fold(f64::NEG_INFINITY, f64::max).ceil();
+    let mut palette = vec![("quiet".to_owned(), QUIET)];
+    if low > high {
+        return (palette, vec![0; values.len()]);
+    }
+    let width = ((high - low) / RISING.len() as f64).ceil().max(1.0);
+    let used = ((high - low) / width).ceil().max(1.0) as usize;
+    for (shade, colour) in RISING.iter().enumerate().take(used) {
+        let from = low + width * shade as f64;
+        palette.push((format!("{from}–{}", from + width), *colour));
+    }
+    let place = |value: &f64| match value.is_finite() {
+        true => 1 + (((value - low) / width) as usize).min(used - 1) as u8,
+        false => 0,
+    };
+    let cells = values.iter().map(place).collect();
+    (palette, cells)
+}

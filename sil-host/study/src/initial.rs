@@ -1,0 +1,232 @@
+//! Initial conditions of a bifurcation study: the paper's by their letters, or drawn at random.
+//!
+//! Random ones come from a ChaCha stream that is numbered by the row, so that a row is
+//! the same wherever and after whatever it is computed.
+
+use core::fmt;
+
+use painleve_plant::mechanics::motion::State;
+use painleve_shared::{Arm, Posture};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+
+/// Where a run starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Initial {
+    /// The paper's x0,a: θ = (32°, 18.27°), at rest on the belt, in the paradox.
+    A,
+    /// Its x0,d: θ = (−11.4°, −35.1°), at rest on the belt, elbow down.
+    D,
+    /// Its x0,u: θ = (−35.1°, −11.4°), at the same place elbow up.
+    U,
+    /// The number of a random one within its cell, from 1.
+    Random(u32),
+}
+
+/// A list of initial conditions, as in `a,d,random:3`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Initials(Vec<Initial>);
+
+/// Most random initial conditions per cell.
+const MOST_RANDOM: u32 = 1_000_000;
+
+/// Why a text is no list of initial conditions.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InitialError {
+    /// A part is none of them.
+    #[error(
+        "'{part}' in '{text}' is no initial condition; give a, d, u or random:N, as in a,d,random:3"
+    )]
+    Unknown {
+        /// What was given.
+        text: String,
+        /// The part.
+        part: String,
+    },
+    /// The number of random ones.
+    #[error("'{part}' in '{text}': give a number from 1 to {MOST_RANDOM}")]
+    Number {
+        /// What was given.
+        text: String,
+        /// The part.
+        part: String,
+    },
+    /// The same twice.
+    #[error("'{part}' is twice in '{text}'; give every initial condition once")]
+    Twice {
+        /// What was given.
+        text: String,
+        /// The part.
+        part: String,
+    },
+}
+
+impl Initials {
+    /// In order; at least one.
+    pub fn list(&self) -> &[Initial] {
+        &self.0
+    }
+}
+
+impl core::str::FromStr for Initials {
+    type Err = InitialError;
+
+    fn from_str(text: &str) -> Result<Self, InitialError> {
+        let mut list: Vec<Initial> = Vec::new();
+        for part in text.split(',').map(str::trim) {
+            let (text, part) = (|| text.to_owned(), || part.to_owned());
+            let more: Vec<Initial> = match part().split_once(':') {
+                Some(("random", number)) => match number.parse() {
+                    Ok(number @ 1..=MOST_RANDOM) => (1..=number).map(Initial::Random).collect(),
+                    _ => {
+                        return Err(InitialError::Number {
+                            text: text(),
+                            part: part(),
+                        });
+                    }
+                },
+                _ => vec![match part().as_str() {
+                    "a" => Initial::A,
+                    "d" => Initial::D,
+                    "u" => Initial::U,
+                    _ => {
+                        return Err(InitialError::Unknown {
+                            text: text(),
+                            part: part(),
+                        });
+                    }
+                }],
+            };
+            if more.first().is_some_and(|first| list.contains(first)) {
+                return Err(InitialError::Twice {
+                    text: text(),
+                    part: part(),
+                });
+            }
+            list.extend(more);
+        }
+        Ok(Self(list))
+    }
+}
+
+impl fmt::Display for Initial {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Random(number) => write!(formatter, "random:{number}"),
+            _ => formatter.write_str(self.group()),
+        }
+    }
+}
+
+/// Highest random start over the belt, m.
+const RANDOM_HEIGHT_M: f64 = 0.03;
+
+/// Fastest random joint, rad/s.
+const RANDOM_RATE_RAD_S: f64 = 5.0;
+
+/// Part of the reach in which random starts lie; at its end the arm is straight.
+const RANDOM_REACH: f64 = 0.98;
+
+impl Initial {
+    /// Its name without a number.
+    pub fn group(self) -> &'static str {
+        match self {
+            Self::A => "a",
+            Self::D => "d",
+            Self::U => "u",
+            Self::Random(_) => "random",
+        }
+    }
+
+    /// The state for an arm. A random one has its tip anywhere within reach, up to 3 cm over
+    /// the belt (less over a high belt), the elbow either way and each joint at up to 5 rad/s; it depends on
+    /// `seed`, `row` and the arm, and on nothing else.
+    pub fn state(self, arm: &Arm<f64>, seed: u64, row: u64) -> State {
+        let at_rest = |theta1_deg: f64, theta2_deg: f64| {
+            State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0)
+        };
+        match self {
+            Self::A => at_rest(32.0, 18.27),
+            Self::D => at_rest(-11.4, -35.1),
+            Self::U => at_rest(-35.1, -11.4),
+            Self::Random(_) => random_state(arm, seed, row),
+        }
+    }
+}
+
+fn random_state(arm: &Arm<f64>, seed: u64, row: u64) -> State {
+    let mut generator = ChaCha8Rng::seed_from_u64(seed);
+    generator.set_stream(row);
+    let parameters = arm.parameters();
+    let height_m = (parameters.height_m * 0.5).min(RANDOM_HEIGHT_M) * generator.random::<f64>();
+    let depth_m = parameters.height_m - height_m;
+    let reach_m = 2.0 * parameters.link_length_m;
+    let widest_m = RANDOM_REACH * libm::sqrt((reach_m - depth_m) * (reach_m + depth_m));
+    let mut symmetric = |limit: f64| generator.random_range(-limit..=limit);
+    let tip_m = nalgebra::Vector2::new(symmetric(widest_m), -depth_m);
+    let rates = [(); 2].map(|()| symmetric(RANDOM_RATE_RAD_S));
+    let posture = if generator.random() {
+        Posture::ElbowUp
+    } else {
+        Posture::ElbowDown
+    };
+    // Within reach by construction; straight down is too.
+    let theta = arm
+        .joint_angles_rad(&tip_m, posture)
+        .unwrap_or_else(nalgebra::Vector2::zeros);
+    State::new(theta.x, theta.y, rates[0], rates[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_plant::mechanics::{Plant, PlantParameters};
+    use painleve_shared::ArmParameters;
+    use proptest::prelude::*;
+
+    #[test]
+    fn lists_are_read_and_written() {
+        let list: Initials = "a, d,u,random:2".parse().unwrap();
+        let names: Vec<String> = list.list().iter().map(ToString::to_string).collect();
+        assert_eq!(names, ["a", "d", "u", "random:1", "random:2"]);
+    }
+
+    #[test]
+    fn mistakes_are_told_with_what_is_allowed() {
+        for (text, part) in [
+            (
+                "",
+                "'' in '' is no initial condition; give a, d, u or random:N",
+            ),
+            ("a,b", "'b' in 'a,b'"),
+            ("random", "'random' in 'random' is no"),
+            ("random:0", "from 1 to 1000000"),
+            ("random:x", "from 1 to"),
+            ("random:-1", "from 1 to"),
+            ("a,d,a", "'a' is twice"),
+            ("random:2,random:3", "'random:3' is twice"),
+        ] {
+            let message = text.parse::<Initials>().unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        }
+    }
+
+    proptest! {
+        /// Also by the plant, which refuses starts inside the belt.
+        #[test]
+        fn random_states_are_all_different_and_over_the_belt(
+            seed: u64, row in 0_u64..u64::MAX, height_m in 0.05_f64..0.41,
+        ) {
+            let parameters = PlantParameters {
+                arm: ArmParameters { height_m, ..Default::default() },
+                ..Default::default()
+            };
+            let arm = Arm::new(parameters.arm).unwrap();
+            let state = Initial::Random(1).state(&arm, seed, row);
+            prop_assert_eq!(state, Initial::Random(1).state(&arm, seed, row));
+            prop_assert!(state != Initial::Random(1).state(&arm, seed, row + 1));
+            prop_assert!(state != Initial::Random(1).state(&arm, seed ^ 1, row));
+            prop_assert!(Plant::new(&parameters, state).is_ok());
+        }
+    }
+}

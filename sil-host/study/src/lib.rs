@@ -1,0 +1,190 @@
+//! The paper's studies: pure functions from settings to rows.
+//!
+//! - [`grid`]: the values of a parameter, `FROM:TO:STEP` or a list
+//! - [`outcome`]: what a study came to, as JSON, CSV, table and figure
+//! - [`paper`]: the values to set beside
+//! - [`admissible`]: Table II, where on the belt p > 0; [`belt_line`]: the postures it looks at
+//! - [`regions`]: Fig. 3, the solution modes over (θ1, θ̇1)
+//! - [`sliding_range`]: Z_t,sliding, how far a controller slides
+//! - [`closed_loop_bifurcation`]: Fig. 12, the belt's speed with the controller in the loop
+//! - [`robustness`]: random arms, belts and converters, and what each part of the controller contributes
+//! - [`capture`]: a bouncing arm is caught; [`lift_off`]: how soon a lift-off is noticed
+//! - [`contact_watch`], [`distribution`], [`proportion`]: contact, values and success of many runs
+//! - [`case`], [`trial`]: closed loops to study, and running them in this process
+//! - [`bifurcation`]: where over μ × v_belt the arm keeps bouncing, drawn by [`figure_4`]
+//! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: what one does
+//! - [`poincare`]: how it bounces, drawn by [`figure_5`]
+//! - [`tabular`]: rows as lines of a table, one at a time
+//! - [`chaos`]: periodic or chaotic, by the largest Lyapunov exponent
+//! - [`figures`]: the page that sets the studies beside the paper
+//! - [`sweep`]: studies in shards, on many machines
+//!
+//! A study is a list of rows that know nothing of each other ([`Study`]), so that they
+//! can be computed in any order, on any number of threads, or in shards.
+
+pub mod admissible;
+pub mod attractor;
+pub mod belt_line;
+pub mod bifurcation;
+pub mod capture;
+pub mod case;
+pub mod cells;
+pub mod chaos;
+pub mod closed_loop_bifurcation;
+pub mod contact_watch;
+pub mod distribution;
+mod figure_4;
+mod figure_5;
+pub mod figures;
+pub mod grid;
+pub mod initial;
+pub mod lift_off;
+pub mod outcome;
+pub mod paper;
+mod places;
+pub mod poincare;
+pub mod proportion;
+pub mod regions;
+pub mod robustness;
+pub mod settled;
+pub mod sliding_range;
+pub mod sweep;
+pub mod tabular;
+pub mod trial;
+
+use painleve_chart::PlotError;
+use painleve_plant::closed_loop::LoopError;
+use painleve_plant::mechanics::PlantError;
+use painleve_plant::scenario::ScenarioError;
+use painleve_shared::range::OutOfRange;
+use rayon::prelude::*;
+
+pub use grid::{Grid, GridError};
+pub use outcome::Outcome;
+
+/// Why a study has no outcome.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// The scenario that the study varies is wrong.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// An option of the study is wrong.
+    #[error("{0}")]
+    Option(String),
+    /// A parameter is out of range.
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
+    /// The plant of one row cannot go on.
+    #[error("{row}: {source}")]
+    Plant {
+        /// The row's parameters.
+        row: String,
+        /// Why.
+        source: PlantError,
+    },
+    /// The closed loop of one row cannot go on.
+    #[error("{row}: {source}")]
+    Loop {
+        /// The row's parameters.
+        row: String,
+        /// Why.
+        source: LoopError,
+    },
+    /// There is no figure.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+}
+
+/// A numbered list of rows, each of which depends on nothing but its number.
+pub trait Study: Sync {
+    /// One row of the outcome.
+    type Row: Send;
+
+    /// How many rows there are.
+    fn len(&self) -> usize;
+
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Row `index`, less than [`len`](Study::len).
+    ///
+    /// # Errors
+    /// [`StudyError`] if it cannot be computed.
+    fn row(&self, index: usize) -> Result<Self::Row, StudyError>;
+}
+
+/// All rows in order, computed on the threads of the current rayon pool; `done` is
+/// called after each.
+///
+/// # Errors
+/// The error of the first row that has one, whatever the number of threads.
+pub fn rows<S: Study>(study: &S, done: impl Fn() + Sync) -> Result<Vec<S::Row>, StudyError> {
+    let rows: Vec<Result<S::Row, StudyError>> = (0..study.len())
+        .into_par_iter()
+        // Rows differ much in cost.
+        .with_max_len(1)
+        .map(|index| {
+            let row = study.row(index);
+            done();
+            row
+        })
+        .collect();
+    rows.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Squares;
+
+    impl Study for Squares {
+        type Row = usize;
+
+        fn len(&self) -> usize {
+            100
+        }
+
+        fn row(&self, index: usize) -> Result<usize, StudyError> {
+            match index {
+                70 | 30 => Err(StudyError::Option(format!("row {index}"))),
+                _ => Ok(index * index),
+            }
+        }
+    }
+
+    struct First(usize);
+
+    impl Study for First {
+        type Row = usize;
+
+        fn len(&self) -> usize {
+            self.0
+        }
+
+        fn row(&self, index: usize) -> Result<usize, StudyError> {
+            Squares.row(index)
+        }
+    }
+
+    #[test]
+    fn rows_and_errors_do_not_depend_on_the_number_of_threads() {
+        for threads in [1, 2, 7] {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            let done = std::sync::atomic::AtomicUsize::new(0);
+            let count = || {
+                done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            };
+            let expected: Vec<usize> = (0..30).map(|i| i * i).collect();
+            assert_eq!(pool.install(|| rows(&First(30), count)).unwrap(), expected);
+            assert_eq!(done.into_inner(), 30);
+            let error = pool.install(|| rows(&Squares, || ())).unwrap_err();
+            assert_eq!(error.to_string(), "row 30");
+        }
+    }
+}

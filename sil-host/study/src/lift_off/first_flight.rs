@@ -1,0 +1,64 @@
+//! The first flight of some length, at the plant's own resolution.
+
+use painleve_plant::mechanics::motion::State;
+use painleve_plant::mechanics::{Event, Observer, PlantStep};
+
+/// Watches for the first flight that is long enough to be noticed in time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FirstFlight {
+    from_s: f64,
+    shortest_s: f64,
+    /// When it began, or a shorter one before it, s.
+    pub(super) start_s: Option<f64>,
+    /// When the tip touched again, s.
+    pub(super) end_s: Option<f64>,
+}
+
+impl FirstFlight {
+    /// Watches from `from_s` on for a flight of more than `shortest_s`.
+    pub(super) fn new(from_s: f64, shortest_s: f64) -> Self {
+        Self {
+            from_s,
+            shortest_s,
+            start_s: None,
+            end_s: None,
+        }
+    }
+
+    /// Whether a flight is over that was long enough.
+    pub(super) fn is_over(&self) -> bool {
+        self.end_s
+            .zip(self.start_s)
+            .is_some_and(|(end_s, start_s)| end_s - start_s > self.shortest_s)
+    }
+
+    /// The tip leaves the belt: a flight before that was too short does not count.
+    fn leaves(&mut self, time_s: f64) {
+        if self.start_s.is_none() || (self.end_s.is_some() && !self.is_over()) {
+            self.start_s = Some(time_s);
+            self.end_s = None;
+        }
+    }
+}
+
+impl Observer for FirstFlight {
+    fn step(&mut self, step: &PlantStep<'_>) {
+        if step.start_s < self.from_s {
+            return;
+        }
+        match (step.mode.is_contact(), self.start_s) {
+            (false, _) => self.leaves(step.start_s),
+            (true, Some(_)) => {
+                self.end_s.get_or_insert(step.start_s);
+            }
+            _ => {}
+        }
+    }
+
+    fn event(&mut self, time_s: f64, event: Event, _: &State) {
+        let touch = matches!(event, Event::Impact { .. } | Event::ImpactWithoutCollision);
+        if touch && self.start_s.is_some_and(|start_s| start_s < time_s) {
+            self.end_s.get_or_insert(time_s);
+        }
+    }
+}

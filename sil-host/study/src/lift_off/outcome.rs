@@ -1,0 +1,156 @@
+//! Lift-offs as a table and as histograms, the bars beside.
+
+use comfy_table::Table;
+use painleve_chart::style::{BLUE_INK, ORANGE};
+use painleve_chart::{Chart, PlotError};
+use painleve_firmware::estimate::contact::Evidence;
+use serde::Serialize;
+
+use super::{LiftOff, Row, bar_s};
+use crate::distribution::{Percentiles, histogram};
+use crate::outcome::{self, Outcome};
+
+/// End of the figure's axis, ms.
+const FARTHEST_MS: f64 = 20.0;
+
+/// What came of one kind of evidence.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfEvidence {
+    /// From what the controller tells contact.
+    pub evidence: Evidence,
+    /// Within which time a lift-off shall be noticed, s.
+    pub bar_s: f64,
+    /// Runs in which the tip left the belt.
+    pub lift_offs: usize,
+    /// Those that flew for longer than the bar.
+    pub long_flights: usize,
+    /// Those of them that were noticed in time.
+    pub in_time: usize,
+    /// Those of them that were noticed never.
+    pub missed: usize,
+    /// Runs whose plant could not be solved; of these only false alarms and sliding are counted.
+    pub unsolved: usize,
+    /// Times to the notice of long flights, s.
+    pub noticed_s: Option<Percentiles>,
+    /// Lengths of all flights, s.
+    pub flight_s: Option<Percentiles>,
+    /// False alarms.
+    pub false_alarms: u32,
+    /// Time of sliding, h.
+    pub slid_h: f64,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LiftOffs {
+    /// With the force cell, and without.
+    pub evidence: Vec<OfEvidence>,
+    /// All runs.
+    pub rows: Vec<Row>,
+}
+
+impl Row {
+    fn is_long(&self, bar_s: f64) -> bool {
+        self.solved
+            && self.lift_off_s.is_some()
+            && self.flight_s.is_none_or(|flight_s| flight_s > bar_s)
+    }
+}
+
+impl LiftOffs {
+    /// Of all rows.
+    pub fn new(rows: Vec<Row>) -> Self {
+        let evidence = LiftOff::EVIDENCE.map(|evidence| {
+            let bar_s = bar_s(evidence);
+            let of: Vec<&Row> = rows.iter().filter(|row| row.evidence == evidence).collect();
+            let solved = || of.iter().filter(|row| row.solved);
+            let long: Vec<&&Row> = of.iter().filter(|row| row.is_long(bar_s)).collect();
+            let noticed: Vec<f64> = long.iter().filter_map(|row| row.noticed_s).collect();
+            OfEvidence {
+                evidence,
+                bar_s,
+                lift_offs: solved().filter(|row| row.lift_off_s.is_some()).count(),
+                long_flights: long.len(),
+                in_time: noticed.iter().filter(|time_s| **time_s <= bar_s).count(),
+                missed: long.len() - noticed.len(),
+                unsolved: of.len() - solved().count(),
+                noticed_s: Percentiles::of(noticed),
+                flight_s: Percentiles::of(solved().filter_map(|row| row.flight_s).collect()),
+                false_alarms: of.iter().map(|row| row.false_alarms).sum(),
+                slid_h: of.iter().map(|row| row.slid_s).sum::<f64>() / 3600.0,
+            }
+        });
+        Self {
+            evidence: evidence.into(),
+            rows,
+        }
+    }
+}
+
+impl Outcome for LiftOffs {
+    type Line = Row;
+
+    fn lines(&self) -> Vec<Row> {
+        self.rows.clone()
+    }
+
+    fn table(&self) -> Table {
+        let mut table = outcome::table([
+            "evidence",
+            "bar (ms)",
+            "lift-offs",
+            "longer than the bar",
+            "in time",
+            "missed",
+            "unsolved",
+            "median, 90, 99 %, max (ms)",
+            "false alarms",
+        ]);
+        for of in &self.evidence {
+            let times = of.noticed_s.map_or("–".into(), |times| {
+                let of = [times.median, times.p90, times.p99, times.max];
+                of.map(|time_s| format!("{:.2}", 1e3 * time_s)).join(", ")
+            });
+            table.add_row([
+                outcome::name(&of.evidence),
+                format!("{}", 1e3 * of.bar_s),
+                of.lift_offs.to_string(),
+                of.long_flights.to_string(),
+                of.in_time.to_string(),
+                of.missed.to_string(),
+                of.unsolved.to_string(),
+                times,
+                format!("{} in {:.2} h", of.false_alarms, of.slid_h),
+            ]);
+        }
+        table
+    }
+
+    fn svg(&self) -> Result<String, PlotError> {
+        let panel = |title: &str, evidence, colour| {
+            let bar_s = bar_s(evidence);
+            let is_long = |row: &&Row| row.evidence == evidence && row.is_long(bar_s);
+            let long = self.rows.iter().filter(is_long);
+            let times = long.clone().filter_map(|row| Some(1e3 * row.noticed_s?));
+            let times: Vec<f64> = times.collect();
+            let limit_ms = 1e3 * bar_s;
+            let note = format!(
+                "{} of {} flights of more than {limit_ms} ms noticed; last bar: that long or longer",
+                times.len(),
+                long.count(),
+            );
+            histogram(title, note, colour, FARTHEST_MS, limit_ms, &times)
+        };
+        Chart {
+            title: "How soon a lift-off is noticed".into(),
+            subtitle: "tips led over the edge p = 0 without the governor".into(),
+            x_title: "Time from lift-off to the sample that shows it (ms)".into(),
+            x: Some(0.0..FARTHEST_MS),
+            panels: vec![
+                panel("With the force cell (runs)", Evidence::ForceCell, BLUE_INK),
+                panel("From the encoders (runs)", Evidence::Encoders, ORANGE),
+            ],
+        }
+        .svg()
+    }
+}

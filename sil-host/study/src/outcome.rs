@@ -1,0 +1,63 @@
+//! What a study came to, for programs, for spreadsheets and for people.
+
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{ContentArrangement, Table};
+use painleve_chart::PlotError;
+use serde::Serialize;
+
+/// The outcome of a study. Serialised it is the JSON object of `--json`, whose names are
+/// a contract: add to them, never rename.
+pub trait Outcome: Serialize {
+    /// One line of the CSV file: a flat struct, whose field names are the header.
+    type Line: Serialize;
+
+    /// The lines of the CSV file.
+    fn lines(&self) -> Vec<Self::Line>;
+
+    /// The outcome as a table, with the paper's values beside.
+    fn table(&self) -> Table;
+
+    /// The outcome as a figure, as SVG text.
+    ///
+    /// # Errors
+    /// [`PlotError`] if it cannot be drawn.
+    fn svg(&self) -> Result<String, PlotError>;
+}
+
+/// The CSV file of an outcome, header included.
+///
+/// # Errors
+/// If the lines cannot be written as CSV, which flat structs can.
+pub fn csv(outcome: &impl Outcome) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for line in outcome.lines() {
+        writer.serialize(line)?;
+    }
+    writer
+        .into_inner()
+        .map_err(|error| csv::Error::from(error.into_error()))
+}
+
+/// An empty table in the style of all tables.
+pub fn table<T: Into<comfy_table::Row>>(header: T) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(UTF8_FULL_CONDENSED)
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_header(header);
+    table
+}
+
+/// The name under which a value is serialised.
+pub fn name(value: &impl Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(name)) => name,
+        other => format!("{other:?}"),
+    }
+}
+
+/// The table as it is without a terminal, for snapshots.
+#[cfg(test)]
+pub fn plain(outcome: &impl Outcome) -> String {
+    outcome.table().force_no_tty().to_string()
+}

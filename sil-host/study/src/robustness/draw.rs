@@ -1,0 +1,125 @@
+//! The scenario of one run of the campaign, drawn at random.
+
+use core::ops::Range;
+
+use painleve_plant::mechanics::belt::BeltProfile;
+use painleve_plant::scenario::Scenario;
+use painleve_shared::{Arm, ArmParameters, Posture, Slip};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+
+use crate::StudyError;
+use crate::belt_line::{BeltLine, positive_stretches};
+use crate::case::{self, Reference};
+
+/// Part of the reach that is used: at its end the arm is straight.
+const USED_REACH: f64 = 0.97;
+/// Least p as a part of Q22 where the arm is put down. Nearer to the edge an arm without torque
+/// presses on the belt with hundreds of newtons, and sticks to it before the first tick.
+const START_P_RATIO: f64 = 0.2;
+/// How far beyond an edge a target may be, m.
+const BEYOND_M: f64 = 0.02;
+/// Farthest target: within the reach of the arm that the controller believes in, m.
+const FARTHEST_M: f64 = 0.183;
+/// Time after the end of the reference in which the tip comes to rest, s.
+const REST_S: f64 = 2.0;
+
+/// Stretches of z_t (m) with p of at least a part of Q22 in a posture and slip, within the part
+/// of the reach that is used; the longest comes first.
+pub fn admissible_m(
+    arm: &Arm<f64>,
+    posture: Posture,
+    friction: f64,
+    slip: Slip,
+    least_p_ratio: f64,
+) -> Vec<Range<f64>> {
+    let line = BeltLine::new(arm, posture);
+    let reach_m = USED_REACH * arm.reach_on_belt_m();
+    let p = |tau| line.p(tau, friction, slip) - least_p_ratio * line.p(tau, 0.0, slip);
+    let mut stretches: Vec<_> = positive_stretches(p)
+        .into_iter()
+        .map(|(from, to)| line.tip_t_m(from).max(-reach_m)..line.tip_t_m(to).min(reach_m))
+        .filter(|stretch| stretch.start < stretch.end)
+        .collect();
+    stretches.sort_by(|one, other| (other.end - other.start).total_cmp(&(one.end - one.start)));
+    stretches
+}
+
+/// The scenario of run `index` of the campaign with a seed, and nothing else.
+///
+/// # Errors
+/// [`StudyError`] if the built-in scenario cannot be had.
+pub fn scenario(seed: u64, index: u64) -> Result<Scenario, StudyError> {
+    let mut generator = ChaCha8Rng::seed_from_u64(seed);
+    generator.set_stream(index);
+    let mut draw = |range: Range<f64>| generator.random_range(range);
+    let mut scenario = Scenario::load_unplaced("hybrid-elbow-down", &[])?;
+    scenario.name = format!("robustness-{seed}-{index}");
+    scenario.description = format!("Run {index} of the robustness campaign with seed {seed}");
+    scenario.run.seed = seed.wrapping_add(index.wrapping_mul(0x9e37_79b9_7f4a_7c15)) >> 1;
+    // As many runs per octave.
+    scenario.run.tick_hz = (500.0 * libm::exp2(draw(0.0..libm::log2(10.0)))) as u32;
+
+    let friction = draw(0.2..1.0);
+    let speed_m_s = draw(0.1..1.0) * if draw(0.0..1.0) < 0.5 { -1.0 } else { 1.0 };
+    scenario.belt.friction = friction;
+    scenario.belt.profile = BeltProfile::Constant { speed_m_s };
+
+    let nominal = ArmParameters::<f64>::default();
+    scenario.controller.arm = Some(nominal.cast());
+    scenario.arm = ArmParameters {
+        link_mass_kg: nominal.link_mass_kg * draw(0.95..1.05),
+        link_length_m: nominal.link_length_m * draw(0.95..1.05),
+        stiffness_nm_rad: nominal.stiffness_nm_rad * draw(0.8..1.2),
+        damping_nms_rad: nominal.damping_nms_rad * draw(0.8..1.2),
+        ..nominal
+    };
+
+    let converters = &mut scenario.converters;
+    converters.encoder.bits = draw(12.0..19.0) as u8;
+    converters.force.noise_n = draw(0.0..0.1);
+    converters.torque.bits = draw(10.0..15.0) as u8;
+    converters.torque.lag_s = draw(0.0..1e-3);
+    converters.torque.delay_ticks = draw(0.0..2.0);
+    converters.link.frame_loss = draw(0.0..0.01);
+
+    let posture = if draw(0.0..1.0) < 0.5 {
+        Posture::ElbowDown
+    } else {
+        Posture::ElbowUp
+    };
+    let arm = Arm::new(scenario.arm)?;
+    let slip = Slip::of(-speed_m_s);
+    let first = |stretches: Vec<Range<f64>>| {
+        let none = || StudyError::Option("nothing is admissible".into());
+        stretches.into_iter().next().ok_or_else(none)
+    };
+    let start_m = draw(first(admissible_m(
+        &arm,
+        posture,
+        friction,
+        slip,
+        START_P_RATIO,
+    ))?);
+    let mut stretches = admissible_m(&arm, posture, friction, slip, 0.0);
+    stretches.retain(|stretch| stretch.contains(&start_m));
+    let stretch = first(stretches)?;
+    let beyond = draw(0.0..1.0) < 0.5;
+    let target_m = if !beyond {
+        draw(stretch.start..stretch.end)
+    } else if draw(0.0..1.0) < 0.5 {
+        stretch.start - draw(0.0..BEYOND_M)
+    } else {
+        stretch.end + draw(0.0..BEYOND_M)
+    };
+    let duration_s = draw(2.0..4.0) as f32;
+    let reference = if draw(0.0..1.0) < 0.5 {
+        Reference::MinimumJerk(duration_s)
+    } else {
+        Reference::Ramp(duration_s)
+    };
+    scenario.controller.reference = reference.to(target_m.clamp(-FARTHEST_M, FARTHEST_M));
+    scenario.run.duration_s = reference.duration_s() + super::CAPTURE_LIMIT_S + REST_S;
+    scenario.initial = case::at_rest_on_belt(&arm, start_m, posture)?;
+    Ok(scenario)
+}

@@ -1,0 +1,221 @@
+//! The robustness campaign: closed loops drawn at random, with an arm, a belt, converters
+//! and a link that the controller is not told about.
+//!
+//! A run succeeds if the tip is captured in time, never leaves the belt again, and ends at
+//! its reference or, where that is beyond the edge, at the governed edge.
+
+mod ablation;
+mod draw;
+mod false_alarms;
+mod outcome;
+mod part;
+mod row;
+
+use std::collections::BTreeMap;
+
+use painleve_firmware::refer::reference::Segment;
+use painleve_plant::mechanics::motion::theta;
+use painleve_plant::scenario::Scenario;
+use painleve_shared::frame::StatusFlags;
+use painleve_shared::{Arm, Posture, Slip};
+
+use super::belt_line::BeltLine;
+use super::contact_watch::ContactWatch;
+use super::tabular::Tabular;
+use super::trial::Trial;
+use super::{Study, StudyError};
+
+pub use ablation::{Ablated, Ablation, AblationStudy};
+pub use draw::{admissible_m, scenario};
+pub use false_alarms::FalseAlarms;
+pub use outcome::Campaign;
+pub use part::Part;
+pub use row::{Ending, Row};
+
+/// A contact that lasts so long is a capture, s.
+pub const CAPTURE_S: f64 = 0.1;
+/// By then it must have lasted so long, s after enabling.
+pub const CAPTURE_LIMIT_S: f64 = 0.5;
+/// Time at the end of a run in which the tip must be at its place, s.
+const WATCHED_S: f64 = 0.1;
+/// How far from its place the tip may end, beyond the encoders' resolution, m.
+const WITHIN_M: f64 = 1e-3;
+/// How far before the true edge a governed reference may be held, m …
+const SHORT_M: f64 = 0.01;
+/// … or with how much of Q22 for p there: where p hardly changes along the belt, a little friction
+/// moves its edge far.
+const SHORT_P_RATIO: f64 = 0.1;
+
+/// The campaign.
+#[derive(Clone, Debug)]
+pub struct Robustness {
+    /// Seed of all runs.
+    pub seed: u64,
+    /// Number of runs.
+    pub runs: usize,
+    /// Changes to every scenario after it is drawn.
+    pub overrides: Vec<String>,
+}
+
+impl Robustness {
+    /// The scenario of a run.
+    ///
+    /// # Errors
+    /// [`StudyError`] if an override is wrong.
+    pub fn scenario(&self, index: usize) -> Result<Scenario, StudyError> {
+        let scenario = scenario(self.seed, index as u64)?;
+        Ok(scenario.with_overrides("robustness campaign", &self.overrides)?)
+    }
+
+    /// Makes the first run, so that a wrong override is told before anything runs.
+    ///
+    /// # Errors
+    /// [`StudyError`] if it cannot be made.
+    pub fn check(&self) -> Result<(), StudyError> {
+        Trial::new(&self.scenario(0)?)?;
+        Ok(())
+    }
+}
+
+impl Study for Robustness {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        self.runs
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let scenario = self.scenario(index)?;
+        let end_s = scenario.run.duration_s;
+        let arm = Arm::new(scenario.arm)?;
+        let posture = Posture::of(&theta(&scenario.initial.state()));
+        let v_belt_m_s = scenario.belt.profile.speed_m_s(0.0);
+        let target_m = target_m(&scenario);
+        let enabled_s = scenario.controller.enable_at_s;
+        let mut trial = Trial::new(&scenario)?;
+        let start_m = trial.tip_t_m();
+        let mut watch = ContactWatch::new(enabled_s, CAPTURE_S);
+        let mut alarms = FalseAlarms::default();
+        let (mut of_target_m, mut of_governed_m) = (0.0_f64, 0.0_f64);
+        let mut solved = true;
+        for _ in 0..scenario.run.ticks() {
+            if trial.tick(&mut watch).is_err() {
+                solved = false;
+                break;
+            }
+            alarms.tick(&trial, &watch);
+            if trial.time_s() > end_s - WATCHED_S {
+                let tip_m = trial.tip_t_m();
+                let governed_m = trial.answer().reference_tip.to_metres();
+                of_target_m = of_target_m.max((tip_m - target_m).abs());
+                of_governed_m = of_governed_m.max((tip_m - governed_m).abs());
+            }
+        }
+        let bits = i32::from(scenario.converters.encoder.bits);
+        let count_rad = libm::ldexp(core::f64::consts::TAU, -bits);
+        let tolerance_m =
+            WITHIN_M + count_rad * (scenario.arm.height_m + scenario.arm.link_length_m);
+        let slip = Slip::of(-v_belt_m_s);
+        let friction = scenario.belt.friction;
+        let mut stretches = admissible_m(&arm, posture, friction, slip, 0.0);
+        stretches.retain(|stretch| stretch.contains(&start_m));
+        let stretch = stretches.pop().unwrap_or(start_m..start_m);
+        let line = BeltLine::new(&arm, posture);
+        let p_ratio = line.tau(trial.tip_t_m()).map_or(f64::NAN, |tau| {
+            line.p(tau, friction, slip) / line.p(tau, 0.0, slip)
+        });
+        let to_edge_m = if target_m > start_m {
+            stretch.end - trial.tip_t_m()
+        } else {
+            trial.tip_t_m() - stretch.start
+        };
+        let at_edge = trial.answer().flags.contains(StatusFlags::AT_EDGE);
+        let captured = watch
+            .captured_s
+            .is_some_and(|start_s| start_s + CAPTURE_S <= enabled_s + CAPTURE_LIMIT_S);
+        let ending = if !solved {
+            Ending::Unsolved
+        } else if trial.fault().is_some() {
+            Ending::Fault
+        } else if !captured {
+            Ending::NotCaptured
+        } else if watch.lift_offs > 0 {
+            Ending::LiftOff
+        } else if of_target_m <= tolerance_m {
+            Ending::Reached
+        } else if at_edge && of_governed_m <= tolerance_m {
+            if to_edge_m > SHORT_M && p_ratio > SHORT_P_RATIO {
+                Ending::StoppedEarly
+            } else {
+                Ending::AtEdge
+            }
+        } else {
+            Ending::NotReached
+        };
+        let converters = &scenario.converters;
+        Ok(Row {
+            index,
+            ending,
+            fault: trial.fault().map(|fault| fault as u8),
+            capture_s: watch.captured_s.map(|start_s| start_s - enabled_s),
+            lift_offs: watch.lift_offs,
+            first_lift_off_s: watch.first_lift_off_s,
+            error_m: if at_edge {
+                of_target_m.min(of_governed_m)
+            } else {
+                of_target_m
+            },
+            tolerance_m,
+            to_edge_m,
+            p_ratio,
+            false_alarms: alarms.count,
+            slid_s: watch
+                .captured_s
+                .map_or(0.0, |start_s| trial.time_s() - start_s),
+            tip_t_m: trial.tip_t_m(),
+            target_m,
+            posture,
+            mu: scenario.belt.friction,
+            v_belt_m_s,
+            tick_hz: scenario.run.tick_hz,
+            encoder_bits: converters.encoder.bits,
+            torque_bits: converters.torque.bits,
+            torque_lag_s: converters.torque.lag_s,
+            delay_ticks: converters.torque.delay_ticks,
+            force_noise_n: converters.force.noise_n,
+            frame_loss: converters.link.frame_loss,
+            link_length_m: scenario.arm.link_length_m,
+            link_mass_kg: scenario.arm.link_mass_kg,
+            stiffness_nm_rad: scenario.arm.stiffness_nm_rad,
+        })
+    }
+}
+
+impl Tabular for Robustness {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(BTreeMap::from([("runs".into(), self.seed)]))
+    }
+}
+
+/// Target of a scenario's last reference, m; NaN without one.
+fn target_m(scenario: &Scenario) -> f64 {
+    let segments = scenario.controller.reference.segments.iter();
+    let mut targets = segments.filter_map(|segment| match segment {
+        Segment::MinimumJerk { target_m, .. }
+        | Segment::Ramp { target_m, .. }
+        | Segment::Step { target_m, .. } => Some(f64::from(*target_m)),
+        _ => None,
+    });
+    targets.next_back().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tables;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,141 @@
+//! Campaigns as tables and figures.
+
+use std::collections::BTreeMap;
+
+use comfy_table::Table;
+use painleve_chart::style::{BLUE_INK, VERMILLION};
+use painleve_chart::{Chart, Mark, Panel, PlotError};
+use serde::Serialize;
+
+use super::{Ending, Row};
+use crate::outcome::{self, Outcome};
+use crate::proportion::Proportion;
+
+/// How many of the worst runs are listed.
+const WORST: usize = 20;
+
+/// A campaign's outcome.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Campaign {
+    /// Its seed.
+    pub seed: u64,
+    /// Runs that succeeded.
+    pub success: Proportion,
+    /// How many runs ended in which way.
+    pub endings: BTreeMap<Ending, usize>,
+    /// Times that contact was taken for flight, before any lift-off.
+    pub false_alarms: u32,
+    /// Simulated time after captures, h.
+    pub slid_h: f64,
+    /// Numbers of the worst runs: gravest ending first, then the largest error.
+    pub worst: Vec<usize>,
+    /// All runs.
+    pub rows: Vec<Row>,
+}
+
+impl Campaign {
+    /// Of all rows.
+    pub fn new(seed: u64, rows: Vec<Row>) -> Self {
+        let mut endings = BTreeMap::new();
+        for row in &rows {
+            *endings.entry(row.ending).or_insert(0) += 1;
+        }
+        let successes = rows.iter().filter(|row| row.ending.is_success()).count();
+        let mut failed: Vec<&Row> = rows.iter().filter(|row| !row.ending.is_success()).collect();
+        failed.sort_by(|one, other| {
+            let errors = other.error_m.total_cmp(&one.error_m);
+            other.ending.cmp(&one.ending).then(errors)
+        });
+        Self {
+            seed,
+            success: Proportion::new(successes, rows.len()),
+            endings,
+            false_alarms: rows.iter().map(|row| row.false_alarms).sum(),
+            slid_h: rows.iter().map(|row| row.slid_s).sum::<f64>() / 3600.0,
+            worst: failed.iter().take(WORST).map(|row| row.index).collect(),
+            rows,
+        }
+    }
+
+    /// How many runs ended in this way.
+    pub fn count(&self, ending: Ending) -> usize {
+        self.endings.get(&ending).copied().unwrap_or(0)
+    }
+}
+
+impl Outcome for Campaign {
+    type Line = Row;
+
+    fn lines(&self) -> Vec<Row> {
+        self.rows.clone()
+    }
+
+    fn table(&self) -> Table {
+        let mut table =
+            outcome::table(["what", "runs", "μ", "belt (m/s)", "rate (Hz)", "error (mm)"]);
+        table.add_row(["success (95 %)", &self.success.to_string(), "", "", "", ""]);
+        for (ending, count) in &self.endings {
+            table.add_row([&outcome::name(ending), &count.to_string(), "", "", "", ""]);
+        }
+        let alarms = format!("{} in {:.2} h", self.false_alarms, self.slid_h);
+        table.add_row(["false alarms", &alarms, "", "", "", ""]);
+        for row in self.worst.iter().filter_map(|&index| self.rows.get(index)) {
+            table.add_row([
+                outcome::name(&row.ending),
+                format!("--replay {}:{}", self.seed, row.index),
+                format!("{:.2}", row.mu),
+                format!("{:.2}", row.v_belt_m_s),
+                row.tick_hz.to_string(),
+                format!("{:.2}", 1e3 * row.error_m),
+            ]);
+        }
+        table
+    }
+
+    fn svg(&self) -> Result<String, PlotError> {
+        // Thousands of dots would hide each other, and a hundred small ones are hard to see.
+        let size = if self.rows.len() > 2000 { 4 } else { 9 };
+        let dots = |name: &str, colour, size, success, y: fn(&Row) -> f64| {
+            let rows = self.rows.iter();
+            let points = rows
+                .filter(|row| row.ending.is_success() == success)
+                .map(|row| (row.v_belt_m_s, y(row)));
+            let points: Vec<_> = points.collect();
+            Mark::Dots {
+                name: format!("{name}: {} runs", points.len()),
+                colour,
+                size,
+                points,
+            }
+        };
+        let panel = |title: &str, y: fn(&Row) -> f64, range| Panel {
+            title: title.into(),
+            y: Some(range),
+            marks: vec![
+                dots("success", BLUE_INK, size, true, y),
+                dots("failure", VERMILLION, 14, false, y),
+            ],
+            ..Panel::default()
+        };
+        Chart {
+            title: "Robustness".into(),
+            subtitle: format!("success, with its 95 % interval: {}", self.success),
+            x_title: "Belt speed (m/s)".into(),
+            x: Some(-1.05..1.05),
+            panels: vec![
+                panel("Friction μ (–)", |row| row.mu, 0.15..1.05),
+                panel(
+                    "Control rate (kHz)",
+                    |row| 1e-3 * f64::from(row.tick_hz),
+                    0.0..5.1,
+                ),
+                panel(
+                    "Encoder (bits)",
+                    |row| f64::from(row.encoder_bits),
+                    11.5..18.5,
+                ),
+            ],
+        }
+        .svg()
+    }
+}

@@ -1,0 +1,108 @@
+//! A small campaign, its repeatability and its replay.
+
+use painleve_plant::closed_loop::ClosedLoop;
+use painleve_plant::controller_host::InProcess;
+use painleve_plant::simulation::Simulation;
+
+use super::*;
+use crate::{Outcome, rows};
+
+fn campaign(runs: usize) -> Robustness {
+    Robustness {
+        seed: 1,
+        runs,
+        overrides: Vec::new(),
+    }
+}
+
+#[test]
+fn rows_do_not_depend_on_threads_and_most_succeed() {
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap()
+            .install(|| rows(&campaign(12), || ()).unwrap())
+    };
+    let found = on(1);
+    assert_eq!(found, on(3));
+    let outcome = Campaign::new(1, found);
+    assert!(outcome.success.rate > 0.7, "{}", outcome.table());
+    assert_eq!(outcome.endings.values().sum::<usize>(), 12);
+    let failed = 12 - outcome.success.successes;
+    assert_eq!(outcome.worst.len(), failed);
+}
+
+#[test]
+fn a_run_of_two_ends_does_the_same() {
+    let study = campaign(5);
+    let row = study.row(4).unwrap();
+    let scenario = study.scenario(4).unwrap();
+    let host = InProcess::new(&scenario.controller_configuration()).unwrap();
+    let mut run = ClosedLoop::new(Simulation::new(&scenario).unwrap(), host);
+    for _ in 0..scenario.run.ticks() {
+        run.tick(&mut ()).unwrap();
+    }
+    let (result, _) = run.finish();
+    assert_eq!(result.final_tip_t_m, row.tip_t_m);
+    assert!(result.stale_ticks > 0, "no frame was lost");
+}
+
+#[test]
+fn draws_are_in_their_ranges_and_all_different() {
+    let drawn: Vec<Scenario> = (0..200).map(|index| scenario(7, index).unwrap()).collect();
+    for scenario in &drawn {
+        let speed = scenario.belt.profile.speed_m_s(0.0);
+        assert!((0.1..1.0).contains(&speed.abs()));
+        assert!((500..=5000).contains(&scenario.run.tick_hz));
+        assert!((12..=18).contains(&scenario.converters.encoder.bits));
+        assert!((10..=14).contains(&scenario.converters.torque.bits));
+        let ratio = scenario.arm.link_length_m / 0.21;
+        assert!((0.95..1.05).contains(&ratio));
+        assert_eq!(scenario.controller.arm.unwrap().link_length_m, 0.21);
+        assert!(Simulation::new(scenario).is_ok());
+    }
+    let fast = |sign: f64| {
+        drawn
+            .iter()
+            .filter(move |one| sign * one.belt.profile.speed_m_s(0.0) > 0.0)
+    };
+    assert!(fast(1.0).count() > 60 && fast(-1.0).count() > 60);
+    for pair in drawn.windows(2) {
+        assert_ne!(pair[0].arm, pair[1].arm);
+        assert_ne!(pair[0].run.seed, pair[1].run.seed);
+    }
+}
+
+#[test]
+fn without_its_governor_the_controller_runs_over_the_edge() {
+    let study = AblationStudy {
+        campaign: campaign(10),
+        parts: vec![Part::Governor],
+    };
+    let ablation = Ablation::new(&study, rows(&study, || ()).unwrap());
+    let [whole, without] = &ablation.rows[..] else {
+        panic!("two lines");
+    };
+    assert!(whole.successes > without.successes, "{}", ablation.table());
+}
+
+#[test]
+fn every_part_can_be_switched_off() {
+    for part in Part::ALL {
+        let mut study = campaign(1);
+        study.overrides = part.without().iter().map(ToString::to_string).collect();
+        let changed = study.scenario(0).unwrap();
+        assert_ne!(changed, campaign(1).scenario(0).unwrap(), "{part:?}");
+        study.check().unwrap();
+    }
+}
+
+#[test]
+fn a_wrong_override_is_told_before_anything_runs() {
+    let mut study = campaign(1);
+    study.overrides = vec!["converters.link.frame_loss=2".into()];
+    let error = study.check().unwrap_err().to_string();
+    assert!(
+        error.contains("frame_loss = 2") && error.contains("0 to 1"),
+        "{error}"
+    );
+}

@@ -1,0 +1,304 @@
+//! The folder of a sweep: which shards are finished, and putting them together.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::manifest::Manifest;
+use super::shard_file::{self, Shard};
+use super::{SweepError, array};
+
+/// What is in the folder, shard by shard.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Status {
+    /// How many shards there are.
+    pub shards: usize,
+    /// How many rows.
+    pub rows: usize,
+    /// How many shards are finished.
+    pub finished: usize,
+    /// Shards that are not, as in `3,7,9-12`.
+    pub missing: String,
+    /// Files that are no shard of this sweep, and why.
+    pub unusable: Vec<Unusable>,
+    /// Shards of which there is more than one file.
+    pub duplicates: Vec<Duplicate>,
+}
+
+/// A file that is no shard of this sweep.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Unusable {
+    /// The file.
+    pub file: PathBuf,
+    /// What is wrong with it.
+    pub reason: String,
+}
+
+/// A shard of which there is more than one file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Duplicate {
+    /// Its number.
+    pub shard: usize,
+    /// The files.
+    pub files: Vec<PathBuf>,
+}
+
+/// All files of the folder that call themselves shards, in order of their names.
+struct Contents {
+    whole: Vec<(PathBuf, Shard)>,
+    unusable: Vec<Unusable>,
+}
+
+impl Contents {
+    fn read(folder: &Path, manifest: &Manifest) -> Result<Self, SweepError> {
+        let unreadable = |source| SweepError::unreadable("folder", folder, source);
+        let entries = fs::read_dir(folder).map_err(unreadable)?;
+        let mut paths = Vec::new();
+        for entry in entries {
+            let name = entry.map_err(unreadable)?.file_name();
+            let text = name.to_string_lossy();
+            if text.starts_with("shard-") && text.ends_with(".csv") {
+                paths.push(folder.join(name));
+            }
+        }
+        paths.sort();
+        let (mut whole, mut unusable) = (Vec::new(), Vec::new());
+        for file in paths {
+            match shard_file::read(&file, manifest) {
+                Ok(shard) => whole.push((file, shard)),
+                Err(reason) => unusable.push(Unusable { file, reason }),
+            }
+        }
+        Ok(Self { whole, unusable })
+    }
+
+    /// The files of a shard, which should be one.
+    fn files_of(&self, shard: usize) -> Vec<PathBuf> {
+        let files = self.whole.iter().filter(|(_, whole)| whole.shard == shard);
+        files.map(|(file, _)| file.clone()).collect()
+    }
+}
+
+/// Which shards are not finished.
+///
+/// # Errors
+/// [`SweepError::Unreadable`] if the folder cannot be listed.
+pub fn missing(folder: &Path, manifest: &Manifest) -> Result<Vec<usize>, SweepError> {
+    Ok(missing_in(&Contents::read(folder, manifest)?, manifest))
+}
+
+fn missing_in(contents: &Contents, manifest: &Manifest) -> Vec<usize> {
+    let mut there = vec![false; manifest.shards];
+    for (_, whole) in &contents.whole {
+        there[whole.shard] = true;
+    }
+    (0..manifest.shards)
+        .filter(|&shard| !there[shard])
+        .collect()
+}
+
+/// How far the sweep is.
+///
+/// # Errors
+/// [`SweepError::Unreadable`] if the folder cannot be listed.
+pub fn status(folder: &Path, manifest: &Manifest) -> Result<Status, SweepError> {
+    Ok(status_of(&Contents::read(folder, manifest)?, manifest))
+}
+
+fn status_of(contents: &Contents, manifest: &Manifest) -> Status {
+    let missing = missing_in(contents, manifest);
+    let mut shards: Vec<usize> = contents
+        .whole
+        .iter()
+        .map(|(_, whole)| whole.shard)
+        .collect();
+    shards.sort_unstable();
+    let duplicates = shards
+        .chunk_by(|one, next| one == next)
+        .filter(|same| same.len() > 1)
+        .map(|same| Duplicate {
+            shard: same[0],
+            files: contents.files_of(same[0]),
+        });
+    Status {
+        shards: manifest.shards,
+        rows: manifest.rows,
+        finished: manifest.shards - missing.len(),
+        missing: array::syntax(&missing),
+        duplicates: duplicates.collect(),
+        unusable: contents.unusable.clone(),
+    }
+}
+
+/// The CSV file of the whole study, byte for byte the one that the study writes by itself.
+///
+/// # Errors
+/// [`SweepError::Incomplete`] unless every shard is there once.
+pub fn merge(folder: &Path, manifest: &Manifest) -> Result<Vec<u8>, SweepError> {
+    let contents = Contents::read(folder, manifest)?;
+    refuse(&status_of(&contents, manifest), folder)?;
+    let shards = contents.whole.into_iter().map(|(_, shard)| shard);
+    together(shards.collect(), manifest.rows)
+}
+
+fn refuse(status: &Status, folder: &Path) -> Result<(), SweepError> {
+    let mut reasons = Vec::new();
+    if !status.missing.is_empty() {
+        reasons.push(format!(
+            "shards {} of {} are missing",
+            status.missing, status.shards
+        ));
+    }
+    for Duplicate { shard, files } in &status.duplicates {
+        let names: Vec<String> = files
+            .iter()
+            .map(|file| file.display().to_string())
+            .collect();
+        reasons.push(format!(
+            "shard {shard} is there twice, as {}",
+            names.join(" and ")
+        ));
+    }
+    for Unusable { file, reason } in &status.unusable {
+        reasons.push(format!("{} {reason}", file.display()));
+    }
+    if reasons.is_empty() {
+        return Ok(());
+    }
+    let folder = folder.display();
+    let reasons = reasons.join("; ");
+    Err(SweepError::Incomplete(format!(
+        "{folder} cannot be merged: {reasons}"
+    )))
+}
+
+fn together(shards: Vec<Shard>, rows: usize) -> Result<Vec<u8>, SweepError> {
+    let incomplete = |message: &str| SweepError::Incomplete(message.to_owned());
+    let header = shards.first().map(|shard| shard.header.clone());
+    let header = header.ok_or_else(|| incomplete("there are no shards"))?;
+    if shards.iter().any(|shard| shard.header != header) {
+        return Err(incomplete("the shards do not have the same header"));
+    }
+    let mut all: Vec<_> = shards.into_iter().flat_map(|shard| shard.rows).collect();
+    all.sort_by_key(|(row, _)| *row);
+    if all.iter().map(|(row, _)| *row).ne(0..rows) {
+        return Err(incomplete("the shards do not hold every row once"));
+    }
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let written = writer.write_byte_record(&header).and_then(|()| {
+        let mut lines = all.iter().flat_map(|(_, lines)| lines);
+        lines.try_for_each(|line| writer.write_byte_record(line))
+    });
+    written.map_err(|error| incomplete(&error.to_string()))?;
+    let text = writer.into_inner();
+    text.map_err(|error| incomplete(&error.into_error().to_string()))
+}
+
+/// Removes what processes that were killed while they wrote a shard have left.
+pub fn tidy(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(".shard-") && name.ends_with(".part") {
+            // A file that stays is harmless.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::manifest::tests::manifest;
+    use crate::sweep::share::rows_of;
+    use crate::tabular::Records;
+    use csv::ByteRecord;
+
+    const ROWS: usize = 11;
+
+    fn finish(folder: &Path, shards: usize, shard: usize) {
+        let rows: Vec<usize> = rows_of(shard, shards, ROWS).collect();
+        let records: Vec<Records> = rows
+            .iter()
+            .map(|row| Records {
+                header: ByteRecord::from(vec!["row", "text"]),
+                lines: vec![ByteRecord::from(vec![row.to_string(), "a,b".into()])],
+            })
+            .collect();
+        shard_file::write(folder, &manifest(ROWS, shards), shard, &rows, &records).unwrap();
+    }
+
+    #[test]
+    fn any_number_of_shards_merges_to_the_same_bytes() {
+        let expected: String = (0..ROWS).map(|row| format!("{row},\"a,b\"\n")).collect();
+        for shards in [1, 2, 5, 11] {
+            let folder = tempfile::tempdir().unwrap();
+            let manifest = manifest(ROWS, shards);
+            for shard in (0..shards).rev() {
+                finish(folder.path(), shards, shard);
+            }
+            let merged = merge(folder.path(), &manifest).unwrap();
+            assert_eq!(
+                String::from_utf8(merged).unwrap(),
+                format!("row,text\n{expected}")
+            );
+        }
+    }
+
+    #[test]
+    fn gaps_duplicates_and_broken_files_are_refused_and_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let manifest = manifest(ROWS, 5);
+        let path = |name: &str| folder.path().join(name);
+        for shard in [0, 2, 3] {
+            finish(folder.path(), 5, shard);
+        }
+        assert_eq!(missing(folder.path(), &manifest).unwrap(), [1, 4]);
+        let message = || merge(folder.path(), &manifest).unwrap_err().to_string();
+        assert!(
+            message().contains("shards 1,4 of 5 are missing"),
+            "{}",
+            message()
+        );
+        // Another shard under the name of a missing one.
+        fs::copy(path("shard-0.csv"), path("shard-1.csv")).unwrap();
+        assert_eq!(missing(folder.path(), &manifest).unwrap(), [1, 4]);
+        assert!(
+            message().contains("shard 0 is there twice"),
+            "{}",
+            message()
+        );
+        for shard in [1, 4] {
+            finish(folder.path(), 5, shard);
+        }
+        assert!(merge(folder.path(), &manifest).is_ok());
+        fs::copy(path("shard-0.csv"), path("shard-0 (copy).csv")).unwrap();
+        assert!(message().contains("shard-0 (copy).csv"), "{}", message());
+        fs::remove_file(path("shard-0 (copy).csv")).unwrap();
+        fs::write(path("shard-4.csv"), "row\n").unwrap();
+        let status = status(folder.path(), &manifest).unwrap();
+        assert_eq!((status.finished, status.missing.as_str()), (4, "4"));
+        assert!(status.unusable[0].reason.contains("truncated"));
+        assert!(
+            message().contains("shard-4.csv is truncated"),
+            "{}",
+            message()
+        );
+    }
+
+    #[test]
+    fn only_leftovers_are_tidied() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [".shard-1.csv.x.part", "shard-1.csv", "mine.part"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        tidy(folder.path());
+        let mut left: Vec<_> = fs::read_dir(folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        left.sort();
+        assert_eq!(left, ["mine.part", "shard-1.csv"]);
+    }
+}

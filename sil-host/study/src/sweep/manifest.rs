@@ -1,0 +1,238 @@
+//! The manifest of a sweep: what exactly is computed, and by which program.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use painleve_system::atomic_file;
+use serde::{Deserialize, Serialize};
+use toml::Table;
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::SweepError;
+use super::campaign::{Campaign, Understood};
+use super::share::MOST_SHARDS;
+
+/// Version of this file's own form.
+const FORMAT: u32 = 1;
+
+/// Version of this program.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Git revision from which this program is built; `…-changed` with changes that are not
+/// committed, `unknown` outside a repository.
+const REVISION: &str = env!("PAINLEVE_REVISION");
+
+/// Everything that the rows of a sweep depend on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of the manifest's form.
+    format: u32,
+    /// Version of the program.
+    version: String,
+    /// Git revision of the program.
+    git_revision: String,
+    /// Hash of campaign and scenarios.
+    campaign_hash: String,
+    /// How many rows.
+    pub rows: usize,
+    /// How many shards, numbered from 0.
+    pub shards: usize,
+    /// Every seed, by what it is for.
+    seeds: BTreeMap<String, u64>,
+    /// What is computed.
+    pub campaign: Campaign,
+}
+
+impl Manifest {
+    /// Its file in the sweep's folder.
+    pub fn path(folder: &Path) -> PathBuf {
+        folder.join("manifest.toml")
+    }
+
+    /// Plans a campaign.
+    ///
+    /// # Errors
+    /// [`SweepError`] if there cannot be so many shards.
+    pub fn new(
+        campaign: Campaign,
+        understood: &Understood,
+        shards: usize,
+    ) -> Result<Self, SweepError> {
+        let rows = understood.table.len();
+        if !(1..=rows.min(MOST_SHARDS)).contains(&shards) {
+            let most = rows.min(MOST_SHARDS);
+            return Err(SweepError::Shard(format!(
+                "--shards {shards}: give 1 to {most} for {rows} rows"
+            )));
+        }
+        Ok(Self {
+            format: FORMAT,
+            version: VERSION.into(),
+            git_revision: REVISION.into(),
+            campaign_hash: campaign.hash(&understood.scenarios),
+            rows,
+            shards,
+            seeds: understood.table.seeds()?,
+            campaign,
+        })
+    }
+
+    /// Hash of all of it: what a shard belongs to.
+    pub fn hash(&self) -> String {
+        let text = serde_json::json!(self).to_string();
+        format!("{:032x}", xxh3_128(text.as_bytes()))
+    }
+
+    /// Hash of campaign and scenarios.
+    pub fn campaign_hash(&self) -> &str {
+        &self.campaign_hash
+    }
+
+    /// Writes the manifest into its folder. The same one may be there already; then it is
+    /// left as it is and `false` returned.
+    ///
+    /// # Errors
+    /// [`SweepError`] if another one is there, or it cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<bool, SweepError> {
+        let path = Self::path(folder);
+        if path.exists() {
+            if fs::read_to_string(&path).is_ok_and(|text| text == self.text()) {
+                return Ok(false);
+            }
+            return Err(SweepError::Manifest {
+                path,
+                message:
+                    "another sweep is planned here; choose another --folder or remove this one"
+                        .into(),
+            });
+        }
+        atomic_file::write(path, self.text().as_bytes())?;
+        Ok(true)
+    }
+
+    fn text(&self) -> String {
+        toml::to_string(self).unwrap_or_default()
+    }
+
+    /// Reads the manifest of a sweep that this program planned.
+    ///
+    /// # Errors
+    /// [`SweepError`] if there is none, or another program's.
+    pub fn load(folder: &Path) -> Result<Self, SweepError> {
+        let path = Self::path(folder);
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Err(SweepError::Manifest {
+                    path,
+                    message: "there is none; plan the sweep first, with `painleve sweep plan`, \
+                        or give its --folder"
+                        .into(),
+                });
+            }
+            Err(source) => return Err(SweepError::unreadable("manifest", path, source)),
+        };
+        Self::parse(&text).map_err(|message| SweepError::Manifest { path, message })
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let not_one = |error: &toml::de::Error| format!("is no manifest: {}", error.message());
+        let table: Table = text.parse().map_err(|error| not_one(&error))?;
+        // Before the rest, which another version may have otherwise.
+        let of = |key: &str| table.get(key).map(|value| value.to_string());
+        let told = |key: &str| of(key).unwrap_or_else(|| "nothing".into());
+        for (key, ours) in [
+            ("format", FORMAT.to_string()),
+            ("version", format!("{VERSION:?}")),
+            ("git_revision", format!("{REVISION:?}")),
+        ] {
+            if of(key).as_ref() != Some(&ours) {
+                return Err(format!(
+                    "is of another version: {key} is {}, this program's is {ours}; \
+                     use the program that planned the sweep, or plan it again elsewhere",
+                    told(key)
+                ));
+            }
+        }
+        let manifest: Self = table.try_into().map_err(|error| not_one(&error))?;
+        if manifest.shards == 0 || manifest.shards > manifest.rows {
+            return Err("has been changed: it has more shards than rows, or none".into());
+        }
+        Ok(manifest)
+    }
+
+    /// Checks that the campaign, understood again, is still the one that was planned.
+    ///
+    /// # Errors
+    /// [`SweepError::Manifest`] if it is not.
+    pub fn check(&self, folder: &Path, understood: &Understood) -> Result<(), SweepError> {
+        if self.campaign.hash(&understood.scenarios) == self.campaign_hash
+            && understood.table.len() == self.rows
+        {
+            return Ok(());
+        }
+        let names: Vec<&str> = understood.scenarios.keys().map(String::as_str).collect();
+        Err(SweepError::Manifest {
+            path: Self::path(folder),
+            message: format!(
+                "it or a scenario that it starts from ({}) has been changed since the sweep was \
+                 planned; plan it again elsewhere",
+                names.join(", ")
+            ),
+        })
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A manifest of so many rows of nothing.
+    pub fn manifest(rows: usize, shards: usize) -> Manifest {
+        Manifest {
+            format: FORMAT,
+            version: VERSION.into(),
+            git_revision: REVISION.into(),
+            campaign_hash: "0".into(),
+            rows,
+            shards,
+            seeds: BTreeMap::from([("initial".into(), 1)]),
+            campaign: Campaign {
+                study: "none".into(),
+                options: BTreeMap::from([("mu".into(), vec!["0.6".into()])]),
+            },
+        }
+    }
+
+    #[test]
+    fn it_is_read_as_it_was_written_and_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let ours = manifest(10, 3);
+        assert!(ours.write(folder.path()).unwrap());
+        assert!(!ours.write(folder.path()).unwrap());
+        assert_eq!(Manifest::load(folder.path()).unwrap(), ours);
+        let error = manifest(10, 4).write(folder.path()).unwrap_err();
+        assert!(error.to_string().contains("another sweep"), "{error}");
+        assert_eq!(Manifest::load(folder.path()).unwrap(), ours);
+        assert_ne!(manifest(10, 4).hash(), ours.hash());
+    }
+
+    #[test]
+    fn other_versions_and_changed_files_are_refused() {
+        let text = manifest(10, 3).text();
+        let parse = |from: &str, to: &str| {
+            assert!(text.contains(from), "{text}");
+            Manifest::parse(&text.replace(from, to)).unwrap_err()
+        };
+        let version = format!("\"{VERSION}\"");
+        assert!(parse(&version, "\"9.9.9\"").contains("version is \"9.9.9\""));
+        assert!(parse("format = 1", "format = 2").contains("format is 2"));
+        assert!(parse("format = 1", "").contains("format is nothing"));
+        assert!(parse(REVISION, "feed").contains("git_revision is \"feed\""));
+        assert!(parse("shards = 3", "shards = 11").contains("more shards"));
+        assert!(parse("shards = 3", "shard = 3").contains("no manifest"));
+        assert!(Manifest::parse("").unwrap_err().contains("another version"));
+    }
+}

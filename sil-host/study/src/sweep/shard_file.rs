@@ -1,0 +1,226 @@
+//! A finished shard: CSV whose first field is the row's number in the whole study, and whose
+//! last line says what it is and ends in a checksum of everything before.
+//!
+//! ```text
+//! row,mu,v_belt_m_s,…
+//! 1,0.1,-0.995,…
+//! # shard 1/5 of sweep 4f0c…, 724 rows, xxh3 93ab…
+//! ```
+//!
+//! The file is written in one go under another name and renamed when it is on the disk, so
+//! that it is complete or not there; a disk that lost its tail all the same is noticed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use csv::ByteRecord;
+use painleve_system::atomic_file;
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::SweepError;
+use super::manifest::Manifest;
+use super::share::rows_of;
+use crate::tabular::Records;
+
+const CHECKSUM: &str = ", xxh3 ";
+
+/// The contents of a finished shard.
+#[derive(Debug, PartialEq)]
+pub struct Shard {
+    /// Its number.
+    pub shard: usize,
+    /// Names of the fields.
+    pub header: ByteRecord,
+    /// Row numbers, rising, and the lines of each.
+    pub rows: Vec<(usize, Vec<ByteRecord>)>,
+}
+
+/// Its file in the sweep's folder.
+pub fn path(folder: &Path, shard: usize) -> PathBuf {
+    folder.join(format!("shard-{shard}.csv"))
+}
+
+fn footer(manifest: &Manifest, shard: usize, rows: usize) -> String {
+    let (shards, hash) = (manifest.shards, manifest.hash());
+    format!("# shard {shard}/{shards} of sweep {hash}, {rows} rows{CHECKSUM}")
+}
+
+/// Writes the computed rows of a shard.
+///
+/// # Errors
+/// [`SweepError::Output`] if the file cannot be written; nothing is left then.
+pub fn write(
+    folder: &Path,
+    manifest: &Manifest,
+    shard: usize,
+    rows: &[usize],
+    records: &[Records],
+) -> Result<(), SweepError> {
+    let path = path(folder, shard);
+    let text = text(manifest, shard, rows, records).map_err(|source| {
+        atomic_file::AtomicFileError::Write {
+            path: path.clone(),
+            source: source.into(),
+        }
+    })?;
+    Ok(atomic_file::write(path, &text)?)
+}
+
+fn text(
+    manifest: &Manifest,
+    shard: usize,
+    rows: &[usize],
+    records: &[Records],
+) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    if let Some(first) = records.first() {
+        writer.write_record(std::iter::once(&b"row"[..]).chain(&first.header))?;
+    }
+    for (row, records) in rows.iter().zip(records) {
+        let row = row.to_string();
+        for line in &records.lines {
+            writer.write_record(std::iter::once(row.as_bytes()).chain(line))?;
+        }
+    }
+    let mut text = writer.into_inner().map_err(|error| error.into_error())?;
+    text.extend(footer(manifest, shard, rows.len()).into_bytes());
+    let checksum = xxh3_128(&text);
+    text.extend(format!("{checksum:032x}\n").into_bytes());
+    Ok(text)
+}
+
+/// Reads a shard and checks it against the manifest.
+///
+/// # Errors
+/// What is wrong with it, in words that follow the file's name.
+pub fn read(path: &Path, manifest: &Manifest) -> Result<Shard, String> {
+    let text = fs::read(path).map_err(|error| format!("cannot be read: {error}"))?;
+    let truncated = || "is truncated".to_owned();
+    let whole = text.strip_suffix(b"\n").ok_or_else(truncated)?;
+    let start = whole
+        .iter()
+        .rposition(|&byte| byte == b'\n')
+        .map_or(0, |at| at + 1);
+    let (body, line) = whole.split_at(start);
+    let line = std::str::from_utf8(line).map_err(|_| truncated())?;
+    let (claim, checksum) = line.split_once(CHECKSUM).ok_or_else(truncated)?;
+    let covered = &text[..start + claim.len() + CHECKSUM.len()];
+    if format!("{:032x}", xxh3_128(covered)) != checksum {
+        return Err("does not have the checksum that it ends in".into());
+    }
+    let shard = claim
+        .strip_prefix("# shard ")
+        .and_then(|rest| rest.split_once('/'))
+        .and_then(|(shard, _)| shard.parse::<usize>().ok())
+        .filter(|&shard| shard < manifest.shards)
+        .ok_or("is no shard of this sweep")?;
+    let numbers: Vec<usize> = rows_of(shard, manifest.shards, manifest.rows).collect();
+    if format!("{claim}{CHECKSUM}") != footer(manifest, shard, numbers.len()) {
+        return Err("belongs to another sweep".into());
+    }
+    let (header, rows) = parse(body).map_err(|error| format!("is no table: {error}"))?;
+    if rows.iter().map(|(row, _)| row).ne(&numbers) {
+        return Err(format!(
+            "does not hold the rows of shard {shard}, once each"
+        ));
+    }
+    Ok(Shard {
+        shard,
+        header,
+        rows,
+    })
+}
+
+type Rows = Vec<(usize, Vec<ByteRecord>)>;
+
+fn parse(body: &[u8]) -> Result<(ByteRecord, Rows), String> {
+    let mut reader = csv::Reader::from_reader(body);
+    let rest = |record: &ByteRecord| -> ByteRecord { record.iter().skip(1).collect() };
+    let header = reader.byte_headers().map_err(|error| error.to_string())?;
+    let header = rest(header);
+    let mut rows: Rows = Vec::new();
+    for record in reader.byte_records() {
+        let record = record.map_err(|error| error.to_string())?;
+        let row = record
+            .get(0)
+            .and_then(|field| std::str::from_utf8(field).ok())
+            .and_then(|field| field.parse().ok())
+            .ok_or("a line has no row number")?;
+        match rows.last_mut() {
+            Some((last, lines)) if *last == row => lines.push(rest(&record)),
+            _ => rows.push((row, vec![rest(&record)])),
+        }
+    }
+    Ok((header, rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::manifest::tests::manifest;
+
+    fn records(row: usize) -> Records {
+        Records {
+            header: ByteRecord::from(vec!["name", "x"]),
+            // As many lines as a Poincaré row may have.
+            lines: (0..=row % 3)
+                .map(|line| {
+                    ByteRecord::from(vec![format!("a,\"{row}\"\n# shard"), line.to_string()])
+                })
+                .collect(),
+        }
+    }
+
+    fn written(folder: &Path, manifest: &Manifest, shard: usize) -> Vec<u8> {
+        let rows: Vec<usize> = rows_of(shard, manifest.shards, manifest.rows).collect();
+        let records: Vec<Records> = rows.iter().map(|&row| records(row)).collect();
+        write(folder, manifest, shard, &rows, &records).unwrap();
+        fs::read(path(folder, shard)).unwrap()
+    }
+
+    #[test]
+    fn a_shard_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let manifest = manifest(10, 3);
+        for shard in 0..3 {
+            written(folder.path(), &manifest, shard);
+            let read = read(&path(folder.path(), shard), &manifest).unwrap();
+            assert_eq!(read.shard, shard);
+            assert_eq!(read.header, vec!["name", "x"]);
+            for (row, lines) in read.rows {
+                assert_eq!(lines, records(row).lines);
+            }
+        }
+    }
+
+    #[test]
+    fn every_truncation_and_every_changed_byte_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let manifest = manifest(4, 2);
+        let text = written(folder.path(), &manifest, 1);
+        let path = folder.path().join("broken");
+        for length in 0..text.len() {
+            fs::write(&path, &text[..length]).unwrap();
+            assert!(read(&path, &manifest).is_err(), "{length}");
+            let mut changed = text.clone();
+            changed[length] ^= 1;
+            fs::write(&path, &changed).unwrap();
+            assert!(read(&path, &manifest).is_err(), "{length}");
+        }
+        fs::write(&path, &text).unwrap();
+        assert!(read(&path, &manifest).is_ok());
+    }
+
+    #[test]
+    fn shards_of_other_sweeps_are_told_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let (ours, other) = (manifest(10, 3), manifest(11, 3));
+        written(folder.path(), &other, 0);
+        let error = read(&path(folder.path(), 0), &ours).unwrap_err();
+        assert!(error.contains("another sweep"), "{error}");
+        let few: Vec<usize> = rows_of(1, 3, 10).skip(1).collect();
+        let records: Vec<Records> = few.iter().map(|&row| records(row)).collect();
+        write(folder.path(), &ours, 1, &few, &records).unwrap();
+        assert!(read(&path(folder.path(), 1), &ours).is_err());
+    }
+}

@@ -1,0 +1,66 @@
+//! One closed loop in this process, tick by tick: the same simulation and the same
+//! controller as in a run of two processes, without its record.
+
+use painleve_firmware::Controller;
+use painleve_plant::mechanics::{Observer, PlantError};
+use painleve_plant::scenario::Scenario;
+use painleve_plant::simulation::Simulation;
+use painleve_shared::frame::ActuatorFrame;
+use painleve_shared::range::OutOfRange;
+use painleve_shared::status::Fault;
+
+/// A closed loop that can be stopped as soon as its outcome is known.
+pub struct Trial {
+    simulation: Simulation,
+    controller: Controller,
+    answer: ActuatorFrame,
+}
+
+impl Trial {
+    /// The scenario at its start.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
+        Ok(Self {
+            simulation: Simulation::new(scenario)?,
+            controller: Controller::new(&scenario.controller_configuration())?,
+            answer: ActuatorFrame::default(),
+        })
+    }
+
+    /// Runs one control tick.
+    ///
+    /// # Errors
+    /// [`PlantError`] if the plant cannot go on.
+    pub fn tick(&mut self, observer: &mut impl Observer) -> Result<(), PlantError> {
+        let sensor = self.simulation.sample(observer)?;
+        let arrives = !self.simulation.sensor_frame_is_lost();
+        if arrives {
+            self.answer = self.controller.tick(&sensor);
+        }
+        let answer = arrives.then_some(&self.answer);
+        self.simulation.advance(answer, observer)
+    }
+
+    /// Simulated time, s.
+    pub fn time_s(&self) -> f64 {
+        self.simulation.plant().time_s()
+    }
+
+    /// Where the tip is along the belt, m.
+    pub fn tip_t_m(&self) -> f64 {
+        let plant = self.simulation.plant();
+        plant.motion().tip_t_m(plant.state())
+    }
+
+    /// What the controller answered last.
+    pub fn answer(&self) -> &ActuatorFrame {
+        &self.answer
+    }
+
+    /// The fault that the controller has latched.
+    pub fn fault(&self) -> Option<Fault> {
+        self.answer.latched_fault()
+    }
+}

@@ -1,0 +1,11 @@
+//! What the bench asks of the operating system.
+//!
+//! - [`atomic_file`]: output files that appear whole or not at all
+//! - [`realtime`]: absolute deadlines, real-time priority, locked memory
+//! - [`lifetime`]: child processes that never outlive whoever started them
+//! - [`interrupt`]: Ctrl-C and requests to end
+
+pub mod atomic_file;
+pub mod interrupt;
+pub mod lifetime;
+pub mod realtime;

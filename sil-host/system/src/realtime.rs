@@ -1,0 +1,201 @@
+//! Running by the clock: absolute deadlines, and what the system permits.
+
+use std::fmt;
+use std::io;
+use std::time::Duration;
+
+use nix::errno::Errno;
+use nix::sys::mman::{MlockAllFlags, mlockall};
+use nix::sys::prctl::set_timerslack;
+use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+use nix::sys::time::TimeSpec;
+use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
+use thread_priority::unix::{
+    RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy,
+    thread_native_id,
+};
+use thread_priority::{ThreadPriority, ThreadPriorityValue};
+
+/// Priority under `SCHED_FIFO`: above everything ordinary, just below the
+/// interrupt threads (50) of a real-time kernel, on which the wake-ups depend.
+const FIFO_PRIORITY: u8 = 49;
+
+/// The monotonic clock cannot be waited on.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot wait on the monotonic clock: {0}")]
+pub struct ClockError(#[from] io::Error);
+
+/// Wakes once a period at absolute deadlines of the monotonic clock, so that
+/// lateness never adds up.
+///
+/// A wake-up later than a period is followed by others without sleep until the
+/// deadlines are caught up; none is skipped.
+#[derive(Debug)]
+pub struct Pacer {
+    deadline: TimeSpec,
+    period: TimeSpec,
+}
+
+impl Pacer {
+    /// Starts the clock: the first deadline is one `period` from now.
+    ///
+    /// # Errors
+    /// If the monotonic clock cannot be read.
+    pub fn start(period: Duration) -> io::Result<Self> {
+        Ok(Self {
+            deadline: clock_gettime(ClockId::CLOCK_MONOTONIC)?,
+            period: TimeSpec::from_duration(period),
+        })
+    }
+
+    /// Sleeps until the next deadline; returns how late the wake-up was.
+    ///
+    /// # Errors
+    /// [`ClockError`]. A signal does not end the wait.
+    pub fn wait(&mut self) -> Result<Duration, ClockError> {
+        self.deadline = self.deadline + self.period;
+        loop {
+            match clock_nanosleep(
+                ClockId::CLOCK_MONOTONIC,
+                ClockNanosleepFlags::TIMER_ABSTIME,
+                &self.deadline,
+            ) {
+                Ok(_) => break,
+                Err(Errno::EINTR) => {}
+                Err(error) => return Err(ClockError(error.into())),
+            }
+        }
+        let now = Duration::from(clock_gettime(ClockId::CLOCK_MONOTONIC).map_err(io::Error::from)?);
+        Ok(now.saturating_sub(self.deadline.into()))
+    }
+}
+
+/// Which of the real-time requests were permitted; printed as a one-line notice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RealtimeStatus {
+    /// `SCHED_FIFO` for this thread; the reason if refused.
+    pub scheduling: Result<(), String>,
+    /// Memory of the process locked; the reason if refused.
+    pub memory: Result<(), String>,
+}
+
+impl RealtimeStatus {
+    /// Whether everything was permitted.
+    pub fn is_complete(&self) -> bool {
+        self.scheduling.is_ok() && self.memory.is_ok()
+    }
+}
+
+impl fmt::Display for RealtimeStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.scheduling {
+            Ok(()) => write!(f, "real time: SCHED_FIFO priority {FIFO_PRIORITY}")?,
+            Err(reason) => write!(f, "real time: SCHED_FIFO not permitted ({reason})")?,
+        }
+        match &self.memory {
+            Ok(()) => write!(f, ", memory locked")?,
+            Err(reason) => write!(f, ", memory not locked ({reason})")?,
+        }
+        if !self.is_complete() {
+            write!(
+                f,
+                "; expect late ticks, or raise `ulimit -r` and `ulimit -l`"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Asks for `SCHED_FIFO` for the calling thread and locked memory for the
+/// process, and says what was permitted. Call it once everything is set up:
+/// where locked memory is limited, only what is mapped by then is locked.
+pub fn request_realtime() -> RealtimeStatus {
+    // Wake-ups without the 50 µs of slack of an ordinary thread: needs no
+    // permission, and is no loss where the kernel does not know it.
+    let _ = set_timerslack(1);
+    RealtimeStatus {
+        scheduling: request_fifo(),
+        memory: lock_memory(),
+    }
+}
+
+fn request_fifo() -> Result<(), String> {
+    let priority = ThreadPriorityValue::try_from(FIFO_PRIORITY)?;
+    set_thread_priority_and_policy(
+        thread_native_id(),
+        ThreadPriority::Crossplatform(priority),
+        ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo),
+    )
+    .map_err(|error| match error {
+        thread_priority::Error::OS(code) => Errno::from_raw(code).desc().to_owned(),
+        other => other.to_string(),
+    })
+}
+
+fn lock_memory() -> Result<(), String> {
+    // Under a limit, locking what is yet to come would let a later allocation fail.
+    let unlimited =
+        getrlimit(Resource::RLIMIT_MEMLOCK).is_ok_and(|(soft, _)| soft == RLIM_INFINITY);
+    let mut flags = MlockAllFlags::MCL_CURRENT;
+    flags.set(MlockAllFlags::MCL_FUTURE, unlimited);
+    mlockall(flags).map_err(|error| error.desc().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nix::sys::mman::munlockall;
+
+    #[test]
+    fn deadlines_do_not_drift() {
+        let period = Duration::from_millis(2);
+        let mut pacer = Pacer::start(period).unwrap();
+        let start = pacer.deadline;
+        for _ in 0..10 {
+            pacer.wait().unwrap();
+        }
+        assert_eq!(
+            Duration::from(pacer.deadline) - Duration::from(start),
+            10 * period
+        );
+    }
+
+    #[test]
+    fn a_late_tick_says_how_late_it_is_and_is_caught_up() {
+        let period = Duration::from_millis(1);
+        let mut pacer = Pacer::start(period).unwrap();
+        std::thread::sleep(20 * period);
+        assert!(pacer.wait().unwrap() >= 19 * period);
+        assert!(pacer.wait().unwrap() >= 18 * period);
+    }
+
+    #[test]
+    fn the_notice_is_one_line_and_says_what_was_refused() {
+        let granted = RealtimeStatus {
+            scheduling: Ok(()),
+            memory: Ok(()),
+        };
+        assert_eq!(
+            granted.to_string(),
+            "real time: SCHED_FIFO priority 49, memory locked"
+        );
+        let refused = RealtimeStatus {
+            scheduling: Err("Operation not permitted".to_owned()),
+            memory: Err("Cannot allocate memory".to_owned()),
+        };
+        assert_eq!(
+            refused.to_string(),
+            "real time: SCHED_FIFO not permitted (Operation not permitted), \
+             memory not locked (Cannot allocate memory); \
+             expect late ticks, or raise `ulimit -r` and `ulimit -l`"
+        );
+    }
+
+    #[test]
+    fn asking_is_never_an_error() {
+        // In a thread of its own: the policy ends with it.
+        let status = std::thread::spawn(request_realtime).join().unwrap();
+        assert_eq!(status.to_string().lines().count(), 1);
+        munlockall().unwrap();
+    }
+}
