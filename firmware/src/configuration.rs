@@ -5,7 +5,8 @@
 
 use painleve_shared::counts::{EncoderScale, LinearScale};
 use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::{Arm, ArmParameters, Real};
+use painleve_shared::settings::{SettingValue, Settings};
+use painleve_shared::{Arm, ArmParameters, Real, check_setting};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::belt::BeltSettings;
@@ -31,6 +32,22 @@ pub struct Converters {
     pub force: LinearScale<f32>,
     /// Torque stages, N·m.
     pub torque: LinearScale<f32>,
+}
+
+impl Converters {
+    /// Checks resolutions and ranges.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] with a key relative to the converters.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        for (index, encoder) in self.encoders.iter().enumerate() {
+            encoder
+                .validate()
+                .map_err(|error| error.at(index).inside("encoders"))?;
+        }
+        within("force", self.force.validate())?;
+        within("torque", self.torque.validate())
+    }
 }
 
 /// Configuration of the controller.
@@ -88,44 +105,47 @@ impl Configuration {
     /// Checks every number and makes the arm's model.
     ///
     /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
+    /// [`OutOfRange`] for the first setting that is out of range, with its key relative to the
+    /// configuration: `law.hybrid.normal_force_n`.
     pub fn validate(&self) -> Result<Arm<f32>, OutOfRange> {
-        range::check("run.tick_hz", self.tick_hz, 10.0, 1e5)?;
+        range::check("tick_hz", self.tick_hz, 10.0, 1e5)?;
         let arm = Arm::new(self.arm)?;
-        for encoder in &self.converters.encoders {
-            encoder.validate()?;
-        }
         self.converters
-            .force
-            .validate("converters.force.bits", "converters.force.range_n")?;
-        self.converters
-            .torque
-            .validate("converters.torque.bits", "converters.torque.range_nm")?;
-        range::check(
-            "controller.torque_limit_nm",
-            self.torque_limit_nm,
-            0.0,
-            f64::from(self.converters.torque.range),
+            .validate()
+            .map_err(|error| error.inside("converters"))?;
+        check_setting!(self.torque_limit_nm, 0.0, self.converters.torque.range)?;
+        within("estimator", self.estimator.validate())?;
+        check_setting!(self.estimator.bandwidth_rad_s, 1.0, 3.0 * self.tick_hz)?;
+        within("contact", self.contact.validate())?;
+        check_setting!(self.contact.contact_n, 1e-3, self.converters.force.range)?;
+        check_setting!(
+            self.contact.force_noise_n,
+            1e-4,
+            self.converters.force.range
         )?;
-        self.estimator.validate(self.tick_hz)?;
-        self.contact.validate(self.converters.force.range)?;
-        self.supervisor.validate()?;
-        self.friction.validate()?;
-        self.belt.validate()?;
-        self.disturbance.validate()?;
-        self.calibration.validate()?;
-        self.deadlines.validate()?;
-        self.law.validate()?;
-        self.guard.validate()?;
-        self.governor.validate()?;
-        self.recovery.validate()?;
+        within("supervisor", self.supervisor.validate())?;
+        within("friction", self.friction.validate())?;
+        within("belt", self.belt.validate())?;
+        within("disturbance", self.disturbance.validate())?;
+        within("calibration", self.calibration.validate())?;
+        within("deadlines", self.deadlines.validate())?;
+        within("law", self.law.check(None))?;
+        within("guard", self.guard.validate())?;
+        within("governor", self.governor.validate())?;
+        within("recovery", self.recovery.validate())?;
+        within("reference", self.reference.check(None))?;
         // A governed reference may be out of reach: it is held at the edge.
         let reach_m = if self.governor.enabled {
             2.0 * self.arm.link_length_m
         } else {
             arm.reach_on_belt_m()
         };
-        self.reference.validate(reach_m)?;
+        within("reference", self.reference.check_reach(reach_m))?;
         Ok(arm)
     }
+}
+
+/// Adds the name of a group to the key of an error.
+fn within(group: &'static str, result: Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+    result.map_err(|error| error.inside(group))
 }

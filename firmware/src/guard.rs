@@ -5,41 +5,16 @@
 //! box around it: the nearest point has a closed form.
 
 use nalgebra::Vector2;
-use painleve_shared::Real;
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Real, settings};
 
-/// Settings of the contact guard.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GuardSettings {
-    /// Whether there is a guard.
-    pub enabled: bool,
-    /// Least predicted normal force f_min, N.
-    pub minimum_force_n: f32,
-}
-
-impl Default for GuardSettings {
-    fn default() -> Self {
-        Self {
-            enabled: true,
-            minimum_force_n: 1.0,
-        }
-    }
-}
-
-impl GuardSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check(
-            "controller.guard.minimum_force_n",
-            self.minimum_force_n,
-            0.0,
-            1e3,
-        )
+settings! {
+    /// Settings of the contact guard.
+    #[derive(Copy)]
+    pub struct GuardSettings {
+        /// Whether the contact guard is active.
+        enabled: bool = true;
+        /// Least predicted normal force f_min.
+        minimum_force_n: f32 = 1.0, 0.0..=1e3, "N";
     }
 }
 

@@ -7,9 +7,7 @@
 //! rest lands with the belt's full slip, in the direction in which the stretch is admissible.
 
 use nalgebra::Vector2;
-use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::{Arm, Posture, Real};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Arm, Posture, Real, settings};
 
 use crate::estimate::model::Model;
 use crate::law::signals::LawOutput;
@@ -25,71 +23,20 @@ const DEEPEST_M: f32 = 0.03;
 /// How many times faster it is lowered below where the belt is believed to be: the links are shorter.
 const SEARCHING: f32 = 4.0;
 
-/// Settings of the recovery.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RecoverySettings {
-    /// Bandwidth of the motion in the air, rad/s.
-    pub bandwidth_rad_s: f32,
-    /// Largest acceleration of the joints in the air, rad/s².
-    pub acceleration_rad_s2: f32,
-    /// Height at which the tip is moved along the belt, m.
-    pub clearance_m: f32,
-    /// Speed at which it is lowered, m/s.
-    pub landing_speed_m_s: f32,
-    /// Least p as a part of Q22 where it may land: nearer to the edge impacts throw the tip off.
-    pub minimum_p_ratio: f32,
-}
-
-impl Default for RecoverySettings {
-    fn default() -> Self {
-        Self {
-            bandwidth_rad_s: 60.0,
-            acceleration_rad_s2: 500.0,
-            clearance_m: 1e-3,
-            landing_speed_m_s: 0.02,
-            minimum_p_ratio: 0.2,
-        }
-    }
-}
-
-impl RecoverySettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let key = |key, value, minimum, maximum| range::check(key, value, minimum, maximum);
-        key(
-            "controller.recovery.bandwidth_rad_s",
-            self.bandwidth_rad_s,
-            1.0,
-            1e3,
-        )?;
-        key(
-            "controller.recovery.acceleration_rad_s2",
-            self.acceleration_rad_s2,
-            1.0,
-            1e5,
-        )?;
-        key(
-            "controller.recovery.clearance_m",
-            self.clearance_m,
-            0.0,
-            0.05,
-        )?;
-        key(
-            "controller.recovery.landing_speed_m_s",
-            self.landing_speed_m_s,
-            1e-3,
-            1.0,
-        )?;
-        key(
-            "controller.recovery.minimum_p_ratio",
-            self.minimum_p_ratio,
-            0.0,
-            0.9,
-        )
+settings! {
+    /// Settings of the recovery.
+    #[derive(Copy)]
+    pub struct RecoverySettings {
+        /// Bandwidth of the motion in the air.
+        bandwidth_rad_s: f32 = 60.0, 1.0..=1e3, "rad/s";
+        /// Largest acceleration of the joints in the air.
+        acceleration_rad_s2: f32 = 500.0, 1.0..=1e5, "rad/s²";
+        /// Height above the belt at which the tip moves along it.
+        clearance_m: f32 = 1e-3, 0.0..=0.05, "m";
+        /// Speed at which the tip is lowered onto the belt.
+        landing_speed_m_s: f32 = 0.02, 1e-3..=1.0, "m/s";
+        /// Least p/Q22 where the tip may land: closer to the edge, impacts throw the tip off.
+        minimum_p_ratio: f32 = 0.2, 0.0..=0.9;
     }
 }
 

@@ -85,9 +85,9 @@ impl EncoderScale {
     /// [`OutOfRange`] if `bits` is not within 8 … 24: beyond 24 bits a single
     /// precision angle no longer resolves a count.
     pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("converters.encoder.bits", f64::from(self.bits), 8.0, 24.0)?;
+        range::check("bits", f64::from(self.bits), 8.0, 24.0)?;
         range::check(
-            "converters.encoder.offset_counts",
+            "offset",
             f64::from(self.offset.0),
             0.0,
             f64::from(self.modulus() - 1),
@@ -151,18 +151,14 @@ pub struct LinearScale<T: Real> {
 }
 
 impl<T: Real> LinearScale<T> {
-    /// Checks resolution and range; `bits_key` and `range_key` name them.
+    /// Checks resolution and range.
     ///
     /// # Errors
     /// [`OutOfRange`] if bits are not within 4 … 22 or the range is not positive: beyond 22 bits
     /// single precision no longer tells a value's nearest count.
-    pub fn validate(
-        &self,
-        bits_key: &'static str,
-        range_key: &'static str,
-    ) -> Result<(), OutOfRange> {
-        range::check(bits_key, f64::from(self.bits), 4.0, 22.0)?;
-        range::check(range_key, self.range, 1e-3, 1e6)
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        range::check("bits", f64::from(self.bits), 4.0, 22.0)?;
+        range::check("range", self.range, 1e-3, 1e6)
     }
 
     /// One count in the quantity's unit.

@@ -8,6 +8,7 @@
 //! - [`wire`], [`message`]: the same frames as bytes, for links that are not shared memory,
 //!   and what is said with them
 //! - [`real`], [`range`]: scalars with host-independent functions, and range errors
+//! - [`settings`](mod@settings): settings with default, range, unit and meaning, declared once
 //!
 //! Equations and symbols are those of Marchese, Coraggio, Hogan and di Bernardo,
 //! *Control of Painlevé Paradox in a Robotic System* (arXiv:1907.04070), "the
@@ -16,8 +17,13 @@
 
 #![no_std]
 
+#[cfg(feature = "alloc")]
+extern crate alloc;
 #[cfg(test)]
 extern crate std;
+
+// The macro `settings!` names this crate where `$crate` cannot stand.
+extern crate self as painleve_shared;
 
 pub mod arm;
 pub mod contact;
@@ -28,6 +34,7 @@ pub mod kinematics;
 pub mod message;
 pub mod range;
 pub mod real;
+pub mod settings;
 mod square_root;
 pub mod status;
 pub mod wire;

@@ -1,12 +1,14 @@
 //! Range errors: which key, which value, what is allowed.
 
+use core::fmt::{self, Write};
+
 use crate::Real;
 
-/// A parameter outside its allowed range; NaN and infinities are always outside.
+/// A number outside its allowed range; NaN and infinities are always outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfRange {
-    /// Full name of the key with its unit, as in a scenario file.
-    pub key: &'static str,
+    /// The setting's key.
+    pub key: Key,
     /// The value that was given.
     pub value: f64,
     /// Smallest allowed value.
@@ -15,8 +17,26 @@ pub struct OutOfRange {
     pub maximum: f64,
 }
 
-impl core::fmt::Display for OutOfRange {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+impl OutOfRange {
+    /// The same error with the key relative to what holds the group `name`.
+    #[must_use]
+    pub fn inside(mut self, name: &'static str) -> Self {
+        if let Some(place) = self.key.parts.iter_mut().find(|part| part.is_empty()) {
+            *place = name;
+        }
+        self
+    }
+
+    /// The same error with the key relative to the list in which the value is the item number
+    /// `index`, counted from 0. Indices beyond 15 are shown as `*`.
+    #[must_use]
+    pub fn at(self, index: usize) -> Self {
+        self.inside(INDICES.get(index).copied().unwrap_or("*"))
+    }
+}
+
+impl fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
             "{} = {} is outside the allowed range {} to {}",
@@ -28,11 +48,71 @@ impl core::fmt::Display for OutOfRange {
     }
 }
 
-/// A number as it was written: one that is exact in `f32` with the digits of an `f32`.
-struct Shortest(f64);
+impl core::error::Error for OutOfRange {}
 
-impl core::fmt::Display for Shortest {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+/// Most parts of a key; further ones, from the outside, are left out.
+const MAXIMUM_PARTS: usize = 6;
+
+/// Indices as parts of a key: text that needs no heap.
+const INDICES: [&str; 16] = [
+    "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "14", "15",
+];
+
+/// Where a value stands, from the outermost group to the setting, as in a scenario file:
+/// `controller.law.hybrid.normal_force_n`.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+pub struct Key {
+    /// From the setting outwards; empty ones are not in use.
+    parts: [&'static str; MAXIMUM_PARTS],
+}
+
+impl Key {
+    /// The parts from the outermost group to the setting.
+    pub fn parts(&self) -> impl Iterator<Item = &'static str> {
+        self.parts.into_iter().rev().filter(|part| !part.is_empty())
+    }
+}
+
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, part) in self.parts().enumerate() {
+            if index > 0 {
+                f.write_char('.')?;
+            }
+            f.write_str(part)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "\"{self}\"")
+    }
+}
+
+impl PartialEq<&str> for Key {
+    fn eq(&self, other: &&str) -> bool {
+        let mut rest = Rest(other);
+        write!(rest, "{self}").is_ok() && rest.0.is_empty()
+    }
+}
+
+/// What of a text has not been written yet.
+struct Rest<'a>(&'a str);
+
+impl Write for Rest<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0 = self.0.strip_prefix(text).ok_or(fmt::Error)?;
+        Ok(())
+    }
+}
+
+/// A number as it was written: one that is exact in `f32` with the digits of an `f32`.
+pub struct Shortest(pub f64);
+
+impl fmt::Display for Shortest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let single = self.0 as f32;
         if f64::from(single) == self.0 {
             single.fmt(f)
@@ -41,8 +121,6 @@ impl core::fmt::Display for Shortest {
         }
     }
 }
-
-impl core::error::Error for OutOfRange {}
 
 /// Accepts `value` if it is finite and within `minimum ..= maximum`.
 ///
@@ -55,20 +133,29 @@ pub fn check<T: Real>(
     minimum: f64,
     maximum: f64,
 ) -> Result<(), OutOfRange> {
+    check_value(value, minimum, maximum).map_err(|error| error.inside(key))
+}
+
+/// [`check`] for a value without a key; the caller adds it with [`OutOfRange::inside`].
+///
+/// # Errors
+/// [`OutOfRange`] with an empty key.
+#[inline]
+pub fn check_value<T: Real>(value: T, minimum: f64, maximum: f64) -> Result<(), OutOfRange> {
     // In the value's precision: 0.1 is allowed where 0.1 is the bound, and a microcontroller
     // without double precision compares singles.
     if value >= T::literal(minimum) && value <= T::literal(maximum) && value.is_finite() {
         Ok(())
     } else {
-        Err(refused(key, value.to_f64(), minimum, maximum))
+        Err(refused(value.to_f64(), minimum, maximum))
     }
 }
 
 #[cold]
 #[inline(never)]
-fn refused(key: &'static str, value: f64, minimum: f64, maximum: f64) -> OutOfRange {
+fn refused(value: f64, minimum: f64, maximum: f64) -> OutOfRange {
     OutOfRange {
-        key,
+        key: Key::default(),
         value,
         minimum,
         maximum,
@@ -103,5 +190,23 @@ mod tests {
     fn bounds_are_allowed_and_infinities_are_not() {
         assert!(check("x", 1.0, 0.0, 1.0).is_ok());
         assert!(check("x", f64::INFINITY, 0.0, f64::INFINITY).is_err());
+    }
+
+    #[test]
+    fn keys_grow_from_the_setting_outwards() {
+        let error = check("target_m", 9.0, 0.0, 1.0).unwrap_err();
+        let key = error.inside("ramp").at(2).inside("reference").key;
+        assert_eq!(key.to_string(), "reference.2.ramp.target_m");
+        assert_eq!(key, "reference.2.ramp.target_m");
+        assert!(key != "reference.2.ramp" && key != "reference.2.ramp.target_mm");
+        assert_eq!(key.parts().next(), Some("reference"));
+        assert_eq!(Key::default().parts().next(), None);
+    }
+
+    #[test]
+    fn a_key_that_is_too_deep_loses_its_outermost_parts() {
+        let error = check("x", 9.0, 0.0, 1.0).unwrap_err();
+        let key = (0..20).fold(error, OutOfRange::at).key;
+        assert_eq!(key, "4.3.2.1.0.x");
     }
 }

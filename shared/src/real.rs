@@ -10,10 +10,11 @@
 
 use nalgebra::RealField;
 
+use crate::settings::SettingValue;
 use crate::square_root::square_root;
 
 /// A real number whose elementary functions do not depend on the host.
-pub trait Real: RealField + Copy {
+pub trait Real: RealField + Copy + SettingValue {
     /// The nearest number to an `f64` literal.
     fn literal(value: f64) -> Self;
 

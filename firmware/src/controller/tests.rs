@@ -272,7 +272,7 @@ fn bad_configurations_are_named() {
     let mut bad = configuration();
     bad.torque_limit_nm = f32::NAN;
     let error = Controller::new(&bad).unwrap_err();
-    assert_eq!(error.key, "controller.torque_limit_nm");
+    assert_eq!(error.key, "torque_limit_nm");
     let mut bad = configuration();
     bad.arm.height_m = 0.42;
     assert_eq!(Controller::new(&bad).unwrap_err().key, "arm.height_m");

@@ -5,55 +5,27 @@
 //! observer keeps these bounds; they widen with the acceleration that the belt may have. Once
 //! the tip has slid both ways, or stuck, they meet.
 
-use painleve_shared::Real;
-use painleve_shared::Slip;
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{OutOfRange, Real, Slip, check_setting, settings};
 
 use crate::estimate::friction::FrictionEstimate;
 
-/// Settings of the belt observer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BeltSettings {
-    /// The belt's speed if it is known and constant, m/s.
-    pub given_m_s: Option<f32>,
-    /// Fastest belt, m/s.
-    pub fastest_m_s: f32,
-    /// Largest acceleration of the belt, m/s².
-    pub acceleration_m_s2: f32,
-}
-
-impl Default for BeltSettings {
-    fn default() -> Self {
-        Self {
-            given_m_s: None,
-            fastest_m_s: 2.0,
-            acceleration_m_s2: 2.0,
-        }
+settings! {
+    /// Settings of the belt observer.
+    #[derive(Copy)]
+    pub struct BeltSettings {
+        /// The belt's speed if it is known and constant; at most `fastest_m_s` either way.
+        given_m_s: Option<f32> = None, -100.0..=100.0, "m/s";
+        /// Fastest belt either way.
+        fastest_m_s: f32 = 2.0, 1e-3..=100.0, "m/s";
+        /// Largest acceleration of the belt.
+        acceleration_m_s2: f32 = 2.0, 0.0..=1e3, "m/s²";
     }
+    check Self::relations;
 }
 
 impl BeltSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("controller.belt.fastest_m_s", self.fastest_m_s, 1e-3, 100.0)?;
-        let fastest = f64::from(self.fastest_m_s);
-        range::check(
-            "controller.belt.given_m_s",
-            self.given_m_s.unwrap_or(0.0),
-            -fastest,
-            fastest,
-        )?;
-        range::check(
-            "controller.belt.acceleration_m_s2",
-            self.acceleration_m_s2,
-            0.0,
-            1e3,
-        )
+    fn relations(&self) -> Result<(), OutOfRange> {
+        check_setting!(self.given_m_s, -self.fastest_m_s, self.fastest_m_s)
     }
 }
 

@@ -4,48 +4,21 @@
 //! therefore gives l, better the longer the tip slides. An arm 5 % longer than its
 //! data sheet says would otherwise miss its references by a centimetre and its edges by more.
 
-use painleve_shared::Real;
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Real, settings};
 
 /// Part of a reading's error that no mean takes away: roundings in a row are not independent.
 const LASTING_ERROR: f32 = 0.1;
 
-/// Settings of the calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CalibrationSettings {
-    /// Whether the length is calibrated.
-    pub enabled: bool,
-    /// Largest part by which the length may differ from the nominal one.
-    pub tolerance: f32,
-    /// Time over which the mean is taken at most, s.
-    pub averaging_s: f32,
-}
-
-impl Default for CalibrationSettings {
-    fn default() -> Self {
-        Self {
-            enabled: true,
-            tolerance: 0.08,
-            averaging_s: 2.0,
-        }
-    }
-}
-
-impl CalibrationSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("controller.calibration.tolerance", self.tolerance, 0.0, 0.5)?;
-        range::check(
-            "controller.calibration.averaging_s",
-            self.averaging_s,
-            1e-3,
-            1e4,
-        )
+settings! {
+    /// Settings of the calibration.
+    #[derive(Copy)]
+    pub struct CalibrationSettings {
+        /// Whether the links' length is calibrated.
+        enabled: bool = true;
+        /// Largest deviation from the nominal length, as a part of it.
+        tolerance: f32 = 0.08, 0.0..=0.5;
+        /// Longest time over which the mean is taken.
+        averaging_s: f32 = 2.0, 1e-3..=1e4, "s";
     }
 }
 

@@ -10,9 +10,7 @@
 //!   wanted one: their innovations weigh the wanted force against none, as the force cell's
 //!   reading does.
 
-use painleve_shared::Real;
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Real, settings};
 
 /// Log-odds beyond which contact or flight is taken for certain.
 const CERTAIN: f32 = 6.0;
@@ -30,63 +28,29 @@ const RELEASE_AGAINST: f32 = 6.0;
 /// Variance of an innovation, counts²: that of a rounding.
 const INNOVATION_VARIANCE: f32 = 1.0 / 12.0;
 
-/// Which readings decide.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Evidence {
-    /// The force cell.
-    #[default]
-    ForceCell,
-    /// The encoders. Friction estimate and force loop go on reading the force cell.
-    Encoders,
-}
-
-/// Settings of the contact observer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ContactSettings {
-    /// Which readings decide.
-    pub evidence: Evidence,
-    /// Smallest normal force of a contact, f_c, N.
-    pub contact_n: f32,
-    /// Standard deviation of one reading of the force cell, σ, N.
-    pub force_noise_n: f32,
-    /// Uncertainty of the gap beyond the encoders' resolution, m.
-    pub gap_uncertainty_m: f32,
-}
-
-impl Default for ContactSettings {
-    fn default() -> Self {
-        Self {
-            evidence: Evidence::ForceCell,
-            contact_n: 0.5,
-            force_noise_n: 0.1,
-            gap_uncertainty_m: 15e-6,
-        }
+settings! {
+    /// Which readings decide about contact.
+    #[derive(Copy, Eq)]
+    pub enum Evidence = ForceCell {
+        /// The force cell.
+        "force-cell" => ForceCell,
+        /// The encoders. Friction estimate and force loop still read the force cell.
+        "encoders" => Encoders,
     }
 }
 
-impl ContactSettings {
-    /// Checks the settings against the force cell's range (N).
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self, force_range_n: f32) -> Result<(), OutOfRange> {
-        let key = |key, value, minimum, maximum| range::check(key, value, minimum, maximum);
-        let full = f64::from(force_range_n);
-        key("controller.contact.contact_n", self.contact_n, 1e-3, full)?;
-        key(
-            "controller.contact.force_noise_n",
-            self.force_noise_n,
-            1e-4,
-            full,
-        )?;
-        key(
-            "controller.contact.gap_uncertainty_m",
-            self.gap_uncertainty_m,
-            0.0,
-            0.01,
-        )
+settings! {
+    /// Settings of the contact observer.
+    #[derive(Copy)]
+    pub struct ContactSettings {
+        /// Which readings decide about contact.
+        evidence: Evidence = Evidence::ForceCell;
+        /// Smallest normal force of a contact, f_c; at most the force cell's range.
+        contact_n: f32 = 0.5, 1e-3..=1e6, "N";
+        /// Standard deviation of one reading of the force cell, σ; at most the force cell's range.
+        force_noise_n: f32 = 0.1, 1e-4..=1e6, "N";
+        /// Uncertainty of the gap beyond the encoders' resolution.
+        gap_uncertainty_m: f32 = 15e-6, 0.0..=0.01, "m";
     }
 }
 

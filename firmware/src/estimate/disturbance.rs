@@ -10,51 +10,24 @@
 //! the gain Q22/p; the filter is slowed down with p to keep that loop calm.
 
 use nalgebra::Vector2;
-use painleve_shared::Real;
 use painleve_shared::dynamics::generalised_torque_nm;
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Real, settings};
 
 use crate::estimate::model::Model;
 
 /// Part of the residual that is taken over in a tick, at most, for each Q22 of p.
 const SHARE: f32 = 0.05;
 
-/// Settings of the disturbance observer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DisturbanceSettings {
-    /// Whether the disturbance is estimated.
-    pub enabled: bool,
-    /// Bandwidth far from the edge, rad/s.
-    pub bandwidth_rad_s: f32,
-    /// Largest disturbance of either link, N·m.
-    pub limit_nm: f32,
-}
-
-impl Default for DisturbanceSettings {
-    fn default() -> Self {
-        Self {
-            enabled: true,
-            bandwidth_rad_s: 20.0,
-            limit_nm: 1.0,
-        }
-    }
-}
-
-impl DisturbanceSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check(
-            "controller.disturbance.bandwidth_rad_s",
-            self.bandwidth_rad_s,
-            0.0,
-            1e3,
-        )?;
-        range::check("controller.disturbance.limit_nm", self.limit_nm, 0.0, 1e3)
+settings! {
+    /// Settings of the disturbance observer.
+    #[derive(Copy)]
+    pub struct DisturbanceSettings {
+        /// Whether unknown torques are estimated.
+        enabled: bool = true;
+        /// Bandwidth far from the edge.
+        bandwidth_rad_s: f32 = 20.0, 0.0..=1e3, "rad/s";
+        /// Largest disturbance of either link.
+        limit_nm: f32 = 1.0, 0.0..=1e3, "N·m";
     }
 }
 

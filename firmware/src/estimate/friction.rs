@@ -11,9 +11,7 @@
 //! the cone: in stick its sign says nothing.
 
 use nalgebra::Vector2;
-use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::{Real, Slip};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Real, Slip, settings};
 
 /// Deviations below the estimate at which the tip may stick.
 const STICK_DEVIATIONS: f32 = 5.0;
@@ -31,71 +29,20 @@ const REVERSAL_TICKS: u8 = 3;
 /// sliding, and going to and fro between them every tick would shake the tip off.
 const STICK_TICKS: u8 = 3;
 
-/// Settings of the friction estimator.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FrictionSettings {
-    /// First guess of μ.
-    pub first_guess: f32,
-    /// Standard deviation of the first guess.
-    pub first_deviation: f32,
-    /// How far μ walks, 1/√s.
-    pub drift_per_sqrt_s: f32,
-    /// Normal force below which friction is not observed, N.
-    pub observable_n: f32,
-    /// How long a ratio below the estimate is taken for stick, s.
-    pub stick_limit_s: f32,
-}
-
-impl Default for FrictionSettings {
-    fn default() -> Self {
-        Self {
-            first_guess: 0.6,
-            first_deviation: 0.2,
-            drift_per_sqrt_s: 0.0005,
-            observable_n: 1.0,
-            stick_limit_s: 0.5,
-        }
-    }
-}
-
-impl FrictionSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let key = |key, value, minimum, maximum| range::check(key, value, minimum, maximum);
-        key(
-            "controller.friction.first_guess",
-            self.first_guess,
-            0.0,
-            2.0,
-        )?;
-        key(
-            "controller.friction.first_deviation",
-            self.first_deviation,
-            1e-3,
-            2.0,
-        )?;
-        key(
-            "controller.friction.drift_per_sqrt_s",
-            self.drift_per_sqrt_s,
-            1e-4,
-            1.0,
-        )?;
-        key(
-            "controller.friction.observable_n",
-            self.observable_n,
-            0.01,
-            1e3,
-        )?;
-        key(
-            "controller.friction.stick_limit_s",
-            self.stick_limit_s,
-            0.0,
-            100.0,
-        )
+settings! {
+    /// Settings of the friction estimator.
+    #[derive(Copy)]
+    pub struct FrictionSettings {
+        /// First guess of μ.
+        first_guess: f32 = 0.6, 0.0..=2.0;
+        /// Standard deviation of the first guess, also whenever μ is learnt again.
+        first_deviation: f32 = 0.2, 1e-3..=2.0;
+        /// Random walk of μ.
+        drift_per_sqrt_s: f32 = 0.0005, 1e-4..=1.0, "1/√s";
+        /// Normal force below which friction is not observed.
+        observable_n: f32 = 1.0, 0.01..=1e3, "N";
+        /// How long a ratio below the estimate is taken for stick.
+        stick_limit_s: f32 = 0.5, 0.0..=100.0, "s";
     }
 }
 

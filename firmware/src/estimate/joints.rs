@@ -9,48 +9,17 @@
 //! Both poles lie at z = exp(−ω T): gains 1 − z² and (1 − z)²/T.
 
 use nalgebra::Vector2;
-use painleve_shared::Real;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Real, settings};
 
-/// Settings of the tracking loops.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EstimatorSettings {
-    /// Bandwidth ω of both loops, rad/s.
-    pub bandwidth_rad_s: f32,
-    /// No joint moves faster than this, rad/s; a reading that says so is a fault.
-    pub rate_limit_rad_s: f32,
-}
-
-impl Default for EstimatorSettings {
-    fn default() -> Self {
-        Self {
-            bandwidth_rad_s: 400.0,
-            rate_limit_rad_s: 100.0,
-        }
-    }
-}
-
-impl EstimatorSettings {
-    /// Checks the settings for a control rate of `tick_hz`.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self, tick_hz: f32) -> Result<(), OutOfRange> {
-        range::check(
-            "controller.estimator.bandwidth_rad_s",
-            self.bandwidth_rad_s,
-            1.0,
-            f64::from(tick_hz) * 3.0,
-        )?;
-        range::check(
-            "controller.estimator.rate_limit_rad_s",
-            self.rate_limit_rad_s,
-            1.0,
-            1e4,
-        )
+settings! {
+    /// Settings of the tracking loops.
+    #[derive(Copy)]
+    pub struct EstimatorSettings {
+        /// Bandwidth ω of both tracking loops; at most three times the control rate.
+        bandwidth_rad_s: f32 = 400.0, 1.0..=3e5, "rad/s";
+        /// Fastest joint motion; a faster reading is the fault `EncoderJump`.
+        rate_limit_rad_s: f32 = 100.0, 1.0..=1e4, "rad/s";
     }
 }
 

@@ -9,46 +9,22 @@ pub mod pid;
 pub mod signals;
 
 use nalgebra::Vector2;
-use painleve_shared::range::OutOfRange;
-use serde::{Deserialize, Serialize};
+use painleve_shared::settings;
 
 use hybrid::{Hybrid, HybridSettings};
 use pid::{Pid, PidSettings};
 use signals::{LawInput, LawOutput};
 
-/// Choice and settings of the control law.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LawSettings {
-    /// No law: the drive never arms, torque is zero.
-    #[default]
-    Off,
-    /// The paper's PID on the joints (section III-A).
-    Pid(PidSettings),
-    /// The paper's hybrid force/motion law (section III-B).
-    Hybrid(HybridSettings),
-}
-
-impl LawSettings {
-    /// The law's name.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Pid(_) => "pid",
-            Self::Hybrid(_) => "hybrid",
-        }
-    }
-
-    /// Checks the settings of the chosen law.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        match self {
-            Self::Off => Ok(()),
-            Self::Pid(settings) => settings.validate(),
-            Self::Hybrid(settings) => settings.validate(),
-        }
+settings! {
+    /// Choice and settings of the control law.
+    #[derive(Copy)]
+    pub enum LawSettings = Off {
+        /// No law: the drive never arms, torque is zero.
+        "off" => Off,
+        /// The paper's PID on the joints (section III-A).
+        "pid" => Pid(PidSettings),
+        /// The paper's hybrid force/motion law (section III-B).
+        "hybrid" => Hybrid(HybridSettings),
     }
 }
 

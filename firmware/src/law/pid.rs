@@ -4,69 +4,22 @@
 //! the tip on the belt at z_t* in the posture in which the drive was armed.
 
 use nalgebra::Vector2;
-use painleve_shared::Real;
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Real, settings};
 
 use super::signals::{LawInput, LawOutput};
 
-/// Gains of the PID, for joint 1 and joint 2.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PidSettings {
-    /// K_P, N·m/rad.
-    pub proportional_nm_rad: [f32; 2],
-    /// K_I, N·m/(rad·s).
-    pub integral_nm_rad_s: [f32; 2],
-    /// K_D, N·m·s/rad.
-    pub derivative_nms_rad: [f32; 2],
-    /// Largest torque of the integral action, N·m.
-    pub integral_limit_nm: f32,
-}
-
-impl Default for PidSettings {
-    /// The paper's gains from x0,d.
-    fn default() -> Self {
-        Self {
-            proportional_nm_rad: [200.0, 0.0],
-            integral_nm_rad_s: [25.0, 0.0],
-            derivative_nms_rad: [2.0, 0.0],
-            integral_limit_nm: 5.0,
-        }
-    }
-}
-
-impl PidSettings {
-    /// Checks the gains.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let gains = [
-            (
-                "controller.law.pid.proportional_nm_rad",
-                self.proportional_nm_rad,
-            ),
-            (
-                "controller.law.pid.integral_nm_rad_s",
-                self.integral_nm_rad_s,
-            ),
-            (
-                "controller.law.pid.derivative_nms_rad",
-                self.derivative_nms_rad,
-            ),
-        ];
-        for (key, values) in gains {
-            for value in values {
-                range::check(key, value, 0.0, 1e5)?;
-            }
-        }
-        range::check(
-            "controller.law.pid.integral_limit_nm",
-            self.integral_limit_nm,
-            0.0,
-            1e3,
-        )
+settings! {
+    /// Gains of the PID, for joint 1 and joint 2: the paper's from x0,d.
+    #[derive(Copy)]
+    pub struct PidSettings {
+        /// K_P of joint 1 and of joint 2.
+        proportional_nm_rad: [f32; 2] = [200.0, 0.0], 0.0..=1e5, "N·m/rad";
+        /// K_I of joint 1 and of joint 2.
+        integral_nm_rad_s: [f32; 2] = [25.0, 0.0], 0.0..=1e5, "N·m/(rad·s)";
+        /// K_D of joint 1 and of joint 2.
+        derivative_nms_rad: [f32; 2] = [2.0, 0.0], 0.0..=1e5, "N·m·s/rad";
+        /// Largest torque of the integral action.
+        integral_limit_nm: f32 = 5.0, 0.0..=1e3, "N·m";
     }
 }
 

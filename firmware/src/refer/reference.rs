@@ -5,41 +5,44 @@
 
 use heapless::{Deque, Vec};
 use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::settings;
+use painleve_shared::settings::{Range, SettingValue, Shape, check_each};
 use serde::{Deserialize, Serialize};
 
 /// Most segments that fit into the queue.
 pub const MAXIMUM_SEGMENTS: usize = 16;
 
-/// One piece of the reference z_t*(t).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Segment {
-    /// Stand still.
-    Hold {
-        /// How long, s.
-        duration_s: f32,
-    },
-    /// Jump to the target and stand there.
-    Step {
-        /// Target z_t, m.
-        target_m: f32,
-        /// How long to stand, s.
-        duration_s: f32,
-    },
-    /// Constant speed.
-    Ramp {
-        /// Target z_t, m.
-        target_m: f32,
-        /// How long it takes, s.
-        duration_s: f32,
-    },
-    /// Minimum jerk from rest to rest, 10 s³ − 15 s⁴ + 6 s⁵ (Flash and Hogan 1985).
-    MinimumJerk {
-        /// Target z_t, m.
-        target_m: f32,
-        /// How long it takes, s.
-        duration_s: f32,
-    },
+settings! {
+    /// One piece of the reference z_t*(t).
+    #[derive(Copy)]
+    pub enum Segment {
+        /// Stand still.
+        "hold" => Hold {
+            /// How long to stand still.
+            duration_s: f32, 0.0..=1e5, "s";
+        },
+        /// Jump to the target and stand there.
+        "step" => Step {
+            /// Target z_t; within the arm's reach on the belt.
+            target_m: f32, -20.0..=20.0, "m";
+            /// How long to stand there.
+            duration_s: f32, 0.0..=1e5, "s";
+        },
+        /// Move to the target at constant speed.
+        "ramp" => Ramp {
+            /// Target z_t; within the arm's reach on the belt.
+            target_m: f32, -20.0..=20.0, "m";
+            /// How long the motion takes.
+            duration_s: f32, 0.0..=1e5, "s";
+        },
+        /// Move with minimum jerk from rest to rest, 10 s³ − 15 s⁴ + 6 s⁵ (Flash and Hogan 1985).
+        "minimum-jerk" => MinimumJerk {
+            /// Target z_t; within the arm's reach on the belt.
+            target_m: f32, -20.0..=20.0, "m";
+            /// How long the motion takes.
+            duration_s: f32, 0.0..=1e5, "s";
+        },
+    }
 }
 
 impl Segment {
@@ -62,23 +65,6 @@ impl Segment {
             | Self::MinimumJerk { target_m, .. } => Some(target_m),
         }
     }
-
-    /// Checks target and duration against the arm's reach on the belt (m).
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self, reach_m: f32) -> Result<(), OutOfRange> {
-        range::check(
-            "controller.reference.duration_s",
-            self.duration_s(),
-            0.0,
-            1e5,
-        )?;
-        let reach = f64::from(reach_m);
-        self.target_m().map_or(Ok(()), |target| {
-            range::check("controller.reference.target_m", target, -reach, reach)
-        })
-    }
 }
 
 /// The segments a controller starts with.
@@ -90,14 +76,28 @@ pub struct Program {
 }
 
 impl Program {
-    /// Checks all segments.
+    /// Checks that every target is within `reach_m` of the point of the belt under the first joint.
     ///
     /// # Errors
-    /// As [`Segment::validate`].
-    pub fn validate(&self, reach_m: f32) -> Result<(), OutOfRange> {
-        self.segments
-            .iter()
-            .try_for_each(|segment| segment.validate(reach_m))
+    /// [`OutOfRange`] naming the first target that is not.
+    pub fn check_reach(&self, reach_m: f32) -> Result<(), OutOfRange> {
+        let reach = f64::from(reach_m);
+        for (index, segment) in self.segments.iter().enumerate() {
+            range::check("target_m", segment.target_m().unwrap_or(0.0), -reach, reach)
+                .map_err(|error| error.inside(segment.name()).at(index))?;
+        }
+        Ok(())
+    }
+}
+
+impl SettingValue for Program {
+    const SHAPE: Shape = Shape::List {
+        item: &Segment::SHAPE,
+        maximum_length: MAXIMUM_SEGMENTS,
+    };
+
+    fn check(&self, range: Option<Range>) -> Result<(), OutOfRange> {
+        check_each(&self.segments, range)
     }
 }
 
@@ -295,14 +295,15 @@ mod tests {
 
     #[test]
     fn targets_out_of_reach_are_refused() {
-        let segment = Segment::Step {
+        let hold = Segment::Hold { duration_s: 1.0 };
+        let step = Segment::Step {
             target_m: 0.19,
             duration_s: 1.0,
         };
-        assert_eq!(
-            segment.validate(0.184).unwrap_err().key,
-            "controller.reference.target_m"
-        );
+        let program = program(&[hold, step]);
+        assert_eq!(program.check_reach(0.19), Ok(()));
+        let error = program.check_reach(0.184).unwrap_err();
+        assert_eq!(error.key, "1.step.target_m");
     }
 
     proptest! {

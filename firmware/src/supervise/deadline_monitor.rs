@@ -4,9 +4,8 @@
 //! survived; more than a limit in a row is a fault, which the controller latches
 //! until it is reset.
 
-use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::settings;
 use painleve_shared::status::Fault;
-use serde::{Deserialize, Serialize};
 
 /// One kind of failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,69 +55,33 @@ impl Lapse {
     }
 }
 
-/// How many lapses in a row are survived.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DeadlineLimits {
-    /// Of [`Lapse::Overrun`].
-    pub overruns: u32,
-    /// Of [`Lapse::MissingFrame`].
-    pub missing_frames: u32,
-    /// Of [`Lapse::StaleFrame`].
-    pub stale_frames: u32,
-    /// Of [`Lapse::LostFrame`].
-    pub lost_frames: u32,
-    /// Of [`Lapse::EncoderOutOfRange`] and of [`Lapse::ForceOutOfRange`], each.
-    pub out_of_range_counts: u32,
-    /// Of [`Lapse::Garbage`].
-    pub garbage: u32,
-    /// Of [`Lapse::FailedChecksum`].
-    pub failed_checksums: u32,
-}
-
-impl Default for DeadlineLimits {
-    /// A tick that overruns once may have met a rare branch; twice is a
-    /// processor that is too slow. At 1 kHz the arm moves 10 mm in 20 ms at most. A sensor
-    /// whose answer is disturbed is right again at the next tick, or broken.
-    fn default() -> Self {
-        Self {
-            overruns: 1,
-            missing_frames: 10,
-            stale_frames: 5,
-            lost_frames: 5,
-            out_of_range_counts: 2,
-            garbage: 10,
-            failed_checksums: 10,
-        }
+settings! {
+    /// How many lapses in a row are survived; one more is a fault.
+    ///
+    /// A tick that overruns once may have met a rare branch; twice is a processor that is too
+    /// slow. At 1 kHz the arm moves 10 mm in 20 ms at most. A sensor whose answer is disturbed is
+    /// right again at the next tick, or broken.
+    #[derive(Copy, Eq)]
+    pub struct DeadlineLimits {
+        /// Ticks in a row that may end late; one more is the fault `Overrun`.
+        overruns: u32 = 1, 0..=100;
+        /// Ticks in a row without a sensor frame; one more is the fault `FrameMissing`.
+        missing_frames: u32 = 10, 0..=100;
+        /// Stale frames in a row; one more is the fault `StaleFrame`.
+        stale_frames: u32 = 5, 0..=100;
+        /// Lost frames in a row; one more is the fault `FramesLost`.
+        lost_frames: u32 = 5, 0..=100;
+        /// Impossible readings in a row, of the encoders or of the force cell; one more is the
+        /// fault `EncoderOutOfRange` or `ForceOutOfRange`.
+        out_of_range_counts: u32 = 2, 0..=100;
+        /// Unreadable messages in a row; one more is the fault `CorruptMessages`.
+        garbage: u32 = 10, 0..=100;
+        /// Failed checksums in a row; one more is the fault `CorruptMessages`.
+        failed_checksums: u32 = 10, 0..=100;
     }
 }
 
 impl DeadlineLimits {
-    /// Checks the limits.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        for (key, limit) in [
-            ("controller.deadlines.overruns", self.overruns),
-            ("controller.deadlines.missing_frames", self.missing_frames),
-            ("controller.deadlines.stale_frames", self.stale_frames),
-            ("controller.deadlines.lost_frames", self.lost_frames),
-            (
-                "controller.deadlines.out_of_range_counts",
-                self.out_of_range_counts,
-            ),
-            ("controller.deadlines.garbage", self.garbage),
-            (
-                "controller.deadlines.failed_checksums",
-                self.failed_checksums,
-            ),
-        ] {
-            range::check(key, f64::from(limit), 0.0, 100.0)?;
-        }
-        Ok(())
-    }
-
     fn of(&self, lapse: Lapse) -> u32 {
         match lapse {
             Lapse::Overrun => self.overruns,
@@ -179,6 +142,7 @@ impl DeadlineMonitor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use painleve_shared::settings::Settings;
 
     const ALL: [Lapse; Lapse::COUNT] = [
         Lapse::Overrun,
@@ -226,6 +190,6 @@ mod tests {
             ..Default::default()
         };
         let error = limits.validate().unwrap_err();
-        assert_eq!(error.key, "controller.deadlines.garbage");
+        assert_eq!(error.key, "garbage");
     }
 }

@@ -2,82 +2,47 @@
 //! from everywhere. A fault is latched until a reset.
 
 use painleve_shared::frame::DigitalInputs;
-use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::status::{Fault, SupervisorState};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{OutOfRange, check_setting, settings};
 
-/// Longest time of any limit, s: its ticks are countable at the highest rate.
-const LONGEST_S: f64 = 1e4;
-
-/// What to do when contact is lost while tracking.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum OnLiftOff {
-    /// The tip is brought back onto the belt, a limited number of times.
-    #[default]
-    Recover,
-    /// The law goes on, as in the paper, until the time limit.
-    Continue,
-    /// The fault [`Fault::LiftOffTooLong`] is latched at once.
-    Fault,
-}
-
-/// Settings of the supervisor. Times are rounded to ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SupervisorSettings {
-    /// Time in contact, armed, before the reference starts, s.
-    pub arming_s: f32,
-    /// Time after which arming without contact is given up, s.
-    pub arming_limit_s: f32,
-    /// What to do when contact is lost.
-    pub on_lift_off: OnLiftOff,
-    /// Time without contact after which the drive is shut down, s; 0 for never.
-    pub lift_off_limit_s: f32,
-    /// Lift-offs in a row from which the tip is brought back …
-    pub recoveries_limit: u32,
-    /// … a row being ended by so long a contact, s.
-    pub recovered_s: f32,
-}
-
-impl Default for SupervisorSettings {
-    fn default() -> Self {
-        Self {
-            arming_s: 0.01,
-            arming_limit_s: 1.0,
-            on_lift_off: OnLiftOff::Recover,
-            lift_off_limit_s: 2.0,
-            recoveries_limit: 10,
-            recovered_s: 1.0,
-        }
+settings! {
+    /// What to do when contact is lost while tracking.
+    #[derive(Copy, Eq)]
+    pub enum OnLiftOff = Recover {
+        /// Bring the tip back onto the belt, a limited number of times.
+        "recover" => Recover,
+        /// Let the law go on, as in the paper, until the time limit.
+        "continue" => Continue,
+        /// Latch the fault `LiftOffTooLong` at once.
+        "fault" => Fault,
     }
 }
 
+settings! {
+    /// Settings of the supervisor. Times are rounded to ticks; the longest is countable at the
+    /// highest control rate.
+    #[derive(Copy)]
+    pub struct SupervisorSettings {
+        /// Time in contact before the reference starts.
+        arming_s: f32 = 0.01, 0.0..=1e4, "s";
+        /// Time without contact after which arming ends in the fault `ContactNotFound`; at least
+        /// `arming_s`.
+        arming_limit_s: f32 = 1.0, 0.0..=1e4, "s";
+        /// What to do when contact is lost while tracking.
+        on_lift_off: OnLiftOff = OnLiftOff::Recover;
+        /// Time without contact after which the fault `LiftOffTooLong` is latched; 0 for never.
+        lift_off_limit_s: f32 = 2.0, 0.0..=1e4, "s";
+        /// Lift-offs in a row that are recovered from; one more is the fault `RecoveryFailed`.
+        recoveries_limit: u32 = 10, 0..=1_000_000;
+        /// Time in contact that ends such a row.
+        recovered_s: f32 = 1.0, 0.0..=1e4, "s";
+    }
+    check Self::relations;
+}
+
 impl SupervisorSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let time = |key, value, least_s| range::check(key, value, least_s, LONGEST_S);
-        time("controller.supervisor.arming_s", self.arming_s, 0.0)?;
-        time(
-            "controller.supervisor.arming_limit_s",
-            self.arming_limit_s,
-            f64::from(self.arming_s),
-        )?;
-        time(
-            "controller.supervisor.lift_off_limit_s",
-            self.lift_off_limit_s,
-            0.0,
-        )?;
-        range::check(
-            "controller.supervisor.recoveries_limit",
-            f64::from(self.recoveries_limit),
-            0.0,
-            1e6,
-        )?;
-        time("controller.supervisor.recovered_s", self.recovered_s, 0.0)
+    fn relations(&self) -> Result<(), OutOfRange> {
+        check_setting!(self.arming_limit_s, self.arming_s, 1e4)
     }
 }
 

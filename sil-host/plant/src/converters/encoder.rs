@@ -49,7 +49,8 @@ impl EncoderSettings {
                 bits: self.bits,
                 offset: EncoderCounts(offset),
             }
-            .validate()?;
+            .validate()
+            .map_err(|error| error.inside("encoder").inside("converters"))?;
         }
         range::check("converters.encoder.noise_rad", self.noise_rad, 0.0, 0.1)?;
         range::check(

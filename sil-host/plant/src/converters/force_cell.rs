@@ -38,8 +38,8 @@ impl ForceCellSettings {
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
-        self.scale()
-            .validate("converters.force.bits", "converters.force.range_n")?;
+        range::check("converters.force.bits", f64::from(self.bits), 4.0, 22.0)?;
+        range::check("converters.force.range_n", self.range_n, 1e-3, 1e6)?;
         range::check("converters.force.noise_n", self.noise_n, 0.0, self.range_n)
     }
 

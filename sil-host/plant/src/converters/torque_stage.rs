@@ -40,8 +40,8 @@ impl TorqueStageSettings {
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
-        self.scale()
-            .validate("converters.torque.bits", "converters.torque.range_nm")?;
+        range::check("converters.torque.bits", f64::from(self.bits), 4.0, 22.0)?;
+        range::check("converters.torque.range_nm", self.range_nm, 1e-3, 1e6)?;
         range::check("converters.torque.lag_s", self.lag_s, 0.0, 1.0)?;
         range::check(
             "converters.torque.delay_ticks",

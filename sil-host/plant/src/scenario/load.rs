@@ -303,8 +303,23 @@ mod tests {
             ),
             (&["initial.theta1_deg=0"], &["initial tip height"]),
             (
+                &["controller.law.hybrid.friction.observed.time_constant_s=11"],
+                &[
+                    "controller.law.hybrid.friction.observed.time_constant_s = 11",
+                    "0 to 10",
+                ],
+            ),
+            (
+                &["controller.arm.damping_nms_rad=-1"],
+                &["controller.arm.damping_nms_rad = -1"],
+            ),
+            (
+                &["controller.estimator.bandwidth_rad_s=3001"],
+                &["controller.estimator.bandwidth_rad_s = 3001", "1 to 3000"],
+            ),
+            (
                 &["controller.reference.0.minimum-jerk.target_m=0.5"],
-                &["controller.reference.target_m", "0.42"],
+                &["controller.reference.0.minimum-jerk.target_m", "0.42"],
             ),
         ] {
             let message = message(overrides);

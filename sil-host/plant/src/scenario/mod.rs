@@ -292,7 +292,22 @@ impl Scenario {
         )?;
         self.arm.validate()?;
         self.converters.validate()?;
-        self.controller_configuration().validate()?;
+        self.controller_configuration()
+            .validate()
+            .map_err(|error| self.in_scenario(error))?;
         Ok(())
+    }
+
+    /// An error of the controller's configuration with the key that the setting has here.
+    fn in_scenario(&self, error: OutOfRange) -> OutOfRange {
+        match error.key.parts().next() {
+            Some("tick_hz") => error.inside("run"),
+            Some("converters") => error,
+            Some(name) if name.starts_with("arm.") => match self.controller.arm {
+                Some(_) => error.inside("controller"),
+                None => error,
+            },
+            _ => error.inside("controller"),
+        }
     }
 }

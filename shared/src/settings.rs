@@ -1,0 +1,662 @@
+//! Settings, each declared once: name, type, default, allowed range, unit and meaning.
+//!
+//! The macro [`settings!`](crate::settings!) makes from one declaration the struct with its
+//! documentation, `Default`, serde, the check of every range, and a description of the settings
+//! from which a host makes commented files, schemas and tables. It needs no heap and serves any
+//! crate, as for a control law of one's own:
+//!
+//! ```
+//! use painleve_shared::settings::Settings;
+//!
+//! painleve_shared::settings! {
+//!     /// Settings of an impedance controller.
+//!     #[derive(Copy)]
+//!     pub struct ImpedanceSettings {
+//!         /// Stiffness along the belt.
+//!         stiffness_n_m: f32 = 200.0, 0.0..=1e5, "N/m";
+//!         /// Damping along the belt.
+//!         damping_ns_m: f32 = 10.0, 0.0..=1e4, "N·s/m";
+//!         /// Whether gravity is compensated.
+//!         compensate_gravity: bool = true;
+//!     }
+//! }
+//!
+//! let settings = ImpedanceSettings { damping_ns_m: -1.0, ..Default::default() };
+//! let error = settings.validate().unwrap_err();
+//! assert_eq!(error.key, "damping_ns_m");
+//! assert_eq!(ImpedanceSettings::FIELDS[0].unit, "N/m");
+//! ```
+//!
+//! A choice is an enum, whose variants have the names that they have in files:
+//!
+//! ```
+//! painleve_shared::settings! {
+//!     /// Where the friction that a law compensates comes from.
+//!     #[derive(Copy)]
+//!     pub enum FeedForward = Measured {
+//!         /// The last reading.
+//!         "measured" => Measured,
+//!         /// The reading through a low-pass.
+//!         "filtered" => Filtered {
+//!             /// Time constant.
+//!             time_constant_s: f32, 0.0..=10.0, "s";
+//!         },
+//!     }
+//! }
+//! ```
+//!
+//! A bound that depends on another setting is checked in a function, which the declaration names
+//! after the braces (`check Self::relations;`) and writes with [`check_setting!`](crate::check_setting!).
+
+pub use serde;
+
+use crate::range::{OutOfRange, check_value};
+
+/// A group of settings; [`settings!`](crate::settings!) implements it.
+pub trait Settings {
+    /// Every setting of the group, in the order of the declaration.
+    const FIELDS: &'static [Field];
+
+    /// Checks every setting, those of nested groups included.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for the first setting that is out of range, with a key relative to the group.
+    fn validate(&self) -> Result<(), OutOfRange>;
+}
+
+/// What is known about one setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Field {
+    /// Name, with the unit's suffix.
+    pub key: &'static str,
+    /// One sentence about it.
+    pub meaning: &'static str,
+    /// Unit; empty for a pure number and for what is no number.
+    pub unit: &'static str,
+    /// Allowed values of a number, or of each number in an array. Other settings may narrow it.
+    pub range: Option<Range>,
+    /// What values look like.
+    pub shape: Shape,
+}
+
+/// Smallest and largest allowed value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Smallest allowed value.
+    pub minimum: f64,
+    /// Largest allowed value.
+    pub maximum: f64,
+}
+
+/// What the values of a setting look like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// True or false.
+    Switch,
+    /// A whole number.
+    Integer,
+    /// A number.
+    Number,
+    /// Text.
+    Text,
+    /// A table of further settings.
+    Group(&'static [Field]),
+    /// One of several variants.
+    Choice {
+        /// Name of the key that holds the variant's name; without it a variant with settings is
+        /// a table of one key, the variant's name.
+        tag: Option<&'static str>,
+        /// The variants.
+        variants: &'static [Variant],
+    },
+    /// May be absent.
+    Optional(&'static Shape),
+    /// A fixed number of values.
+    Array {
+        /// Each of them.
+        item: &'static Shape,
+        /// How many.
+        length: usize,
+    },
+    /// Any number of values up to a limit.
+    List {
+        /// Each of them.
+        item: &'static Shape,
+        /// The limit.
+        maximum_length: usize,
+    },
+}
+
+impl Shape {
+    const fn needs_a_range(&self) -> bool {
+        match self {
+            Self::Number => true,
+            Self::Optional(inner) => inner.needs_a_range(),
+            Self::Array { item, .. } | Self::List { item, .. } => item.needs_a_range(),
+            _ => false,
+        }
+    }
+}
+
+/// One variant of a choice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variant {
+    /// Name in files.
+    pub key: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+    /// Settings that come with it: a group or another choice.
+    pub content: Option<Shape>,
+}
+
+/// A type that a setting may have.
+pub trait SettingValue {
+    /// What its values look like.
+    const SHAPE: Shape;
+
+    /// Checks the value, or every value inside, against `range` if it is a number.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] with a key relative to this value.
+    fn check(&self, range: Option<Range>) -> Result<(), OutOfRange>;
+}
+
+macro_rules! numbers {
+    ($shape:ident: $($number:ty as $real:ty),*) => {$(
+        impl SettingValue for $number {
+            const SHAPE: Shape = Shape::$shape;
+
+            #[inline]
+            fn check(&self, range: Option<Range>) -> Result<(), OutOfRange> {
+                range.map_or(Ok(()), |range| {
+                    check_value(*self as $real, range.minimum, range.maximum)
+                })
+            }
+        }
+    )*};
+}
+
+numbers!(Number: f32 as f32, f64 as f64);
+numbers!(Integer: u8 as f32, u16 as f32, u32 as f64, u64 as f64, i32 as f64);
+
+macro_rules! without_a_range {
+    ($($type:ty: $shape:ident),*) => {$(
+        impl SettingValue for $type {
+            const SHAPE: Shape = Shape::$shape;
+
+            fn check(&self, _: Option<Range>) -> Result<(), OutOfRange> {
+                Ok(())
+            }
+        }
+    )*};
+}
+
+without_a_range!(bool: Switch);
+#[cfg(feature = "alloc")]
+without_a_range!(alloc::string::String: Text);
+
+impl<T: SettingValue> SettingValue for Option<T> {
+    const SHAPE: Shape = Shape::Optional(&T::SHAPE);
+
+    fn check(&self, range: Option<Range>) -> Result<(), OutOfRange> {
+        self.as_ref().map_or(Ok(()), |value| value.check(range))
+    }
+}
+
+impl<T: SettingValue, const N: usize> SettingValue for [T; N] {
+    const SHAPE: Shape = Shape::Array {
+        item: &T::SHAPE,
+        length: N,
+    };
+
+    fn check(&self, range: Option<Range>) -> Result<(), OutOfRange> {
+        check_each(self, range)
+    }
+}
+
+/// Checks every value of a list; keys are the values' indices.
+///
+/// # Errors
+/// [`OutOfRange`] for the first value that is out of range.
+pub fn check_each<T: SettingValue>(values: &[T], range: Option<Range>) -> Result<(), OutOfRange> {
+    values
+        .iter()
+        .enumerate()
+        .try_for_each(|(index, value)| value.check(range).map_err(|error| error.at(index)))
+}
+
+/// The declared range of a setting of type `T`: a number without one does not compile.
+#[doc(hidden)]
+pub const fn declared<T: SettingValue>(range: Option<Range>) -> Option<Range> {
+    assert!(
+        range.is_some() || !T::SHAPE.needs_a_range(),
+        "a setting that is a number needs a range"
+    );
+    range
+}
+
+/// Declares a group of settings or a choice; see the [module](crate::settings).
+///
+/// A group: `name: type = default, range, "unit";` under a doc comment for every setting, the
+/// last two as the setting needs them. A choice: `"name" => Variant`, with nothing, a group's type
+/// in parentheses or settings without defaults in braces; `enum Name = Variant` makes a variant
+/// the default, `enum Name by "key"` puts the variant's name under a key beside its settings.
+#[macro_export]
+macro_rules! settings {
+    (@range) => { ::core::option::Option::None };
+    (@range $range:expr) => {{
+        let range = $range;
+        ::core::option::Option::Some($crate::settings::Range {
+            minimum: *range.start() as f64,
+            maximum: *range.end() as f64,
+        })
+    }};
+    (@unit) => { "" };
+    (@unit $unit:literal) => { $unit };
+    (@tag) => { ::core::option::Option::None };
+    (@tag $tag:literal) => { ::core::option::Option::Some($tag) };
+    (@field $field:ident, $type:ty, [$($range:expr)?], [$($unit:literal)?], $($meaning:literal)+) => {
+        $crate::settings::Field {
+            key: stringify!($field),
+            meaning: concat!($($meaning),+).trim_ascii(),
+            unit: $crate::settings!(@unit $($unit)?),
+            range: $crate::settings!(@range $($range)?),
+            shape: <$type as $crate::settings::SettingValue>::SHAPE,
+        }
+    };
+    (@check $value:expr, $field:ident, $type:ty, [$($range:expr)?]) => {
+        $crate::settings::SettingValue::check(
+            $value,
+            const { $crate::settings::declared::<$type>($crate::settings!(@range $($range)?)) },
+        )
+        .map_err(|error| error.inside(stringify!($field)))?
+    };
+    (@content) => { ::core::option::Option::None };
+    (@content ($content:ty)) => {
+        ::core::option::Option::Some(<$content as $crate::settings::SettingValue>::SHAPE)
+    };
+    (@content { $($field:tt)* }) => {
+        ::core::option::Option::Some($crate::settings::Shape::Group(&[$($field)*]))
+    };
+
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis struct $name:ident
+        $(<$($generic:ident: $bound:path $(= $preset:ty)?),+>)? {
+            $(
+                $(#[doc = $meaning:literal])+
+                $field:ident: $type:ty = $default:expr $(, $range:expr $(, $unit:literal)?)?;
+            )*
+        }
+        $(check $relations:expr;)?
+    ) => {
+        $(#[$attribute])*
+        #[derive(
+            Clone, Debug, PartialEq,
+            $crate::settings::serde::Serialize, $crate::settings::serde::Deserialize,
+        )]
+        #[serde(crate = "painleve_shared::settings::serde", default, deny_unknown_fields)]
+        $visibility struct $name $(<$($generic: $bound $(= $preset)?),+>)? {
+            $(
+                $(#[doc = $meaning])+
+                #[doc = concat!(
+                    "\n\nDefault: `", stringify!($default), "`",
+                    $("; allowed: `", stringify!($range), "`", $(" ", $unit,)?)? "."
+                )]
+                pub $field: $type,
+            )*
+        }
+
+        impl $(<$($generic: $bound),+>)? ::core::default::Default for $name $(<$($generic),+>)? {
+            fn default() -> Self {
+                Self { $($field: $default),* }
+            }
+        }
+
+        impl $(<$($generic: $bound),+>)? $crate::settings::Settings for $name $(<$($generic),+>)? {
+            const FIELDS: &'static [$crate::settings::Field] = &[
+                $($crate::settings!(
+                    @field $field, $type, [$($range)?], [$($($unit)?)?], $($meaning)+
+                )),*
+            ];
+
+            fn validate(&self) -> ::core::result::Result<(), $crate::range::OutOfRange> {
+                $($crate::settings!(@check &self.$field, $field, $type, [$($range)?]);)*
+                $($relations(self)?;)?
+                ::core::result::Result::Ok(())
+            }
+        }
+
+        impl $(<$($generic: $bound),+>)? $crate::settings::SettingValue
+            for $name $(<$($generic),+>)?
+        {
+            const SHAPE: $crate::settings::Shape =
+                $crate::settings::Shape::Group(<Self as $crate::settings::Settings>::FIELDS);
+
+            fn check(
+                &self,
+                _: ::core::option::Option<$crate::settings::Range>,
+            ) -> ::core::result::Result<(), $crate::range::OutOfRange> {
+                $crate::settings::Settings::validate(self)
+            }
+        }
+    };
+
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis enum $name:ident $(= $default:ident)? $(by $tag:literal)? {
+            $(
+                $(#[doc = $meaning:literal])+
+                $key:literal => $variant:ident
+                $(($content:ty))?
+                $({
+                    $(
+                        $(#[doc = $field_meaning:literal])+
+                        $field:ident: $type:ty $(, $range:expr $(, $unit:literal)?)?;
+                    )*
+                })?
+            ),* $(,)?
+        }
+    ) => {
+        $(#[$attribute])*
+        #[derive(
+            Clone, Debug, PartialEq,
+            $crate::settings::serde::Serialize, $crate::settings::serde::Deserialize,
+        )]
+        #[serde(
+            crate = "painleve_shared::settings::serde",
+            deny_unknown_fields $(, tag = $tag)?
+        )]
+        $visibility enum $name {
+            $(
+                $(#[doc = $meaning])+
+                #[serde(rename = $key)]
+                $variant
+                $(($content))?
+                $({
+                    $(
+                        $(#[doc = $field_meaning])+
+                        #[doc = concat!(
+                            "\n\n", $("Allowed: `", stringify!($range), "`", $(" ", $unit,)? ".")?
+                        )]
+                        $field: $type,
+                    )*
+                })?
+            ),*
+        }
+
+        $(
+            impl ::core::default::Default for $name {
+                fn default() -> Self {
+                    Self::$default
+                }
+            }
+        )?
+
+        impl $name {
+            /// The variant's name in files.
+            #[allow(dead_code)]
+            pub const fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$variant { .. } => $key),*
+                }
+            }
+        }
+
+        impl $crate::settings::SettingValue for $name {
+            const SHAPE: $crate::settings::Shape = $crate::settings::Shape::Choice {
+                tag: $crate::settings!(@tag $($tag)?),
+                variants: &[$(
+                    $crate::settings::Variant {
+                        key: $key,
+                        meaning: concat!($($meaning),+).trim_ascii(),
+                        content: $crate::settings!(@content
+                            $(($content))?
+                            $({$(
+                                $crate::settings!(
+                                    @field $field, $type, [$($range)?], [$($($unit)?)?],
+                                    $($field_meaning)+
+                                ),
+                            )*})?
+                        ),
+                    }
+                ),*],
+            };
+
+            fn check(
+                &self,
+                _: ::core::option::Option<$crate::settings::Range>,
+            ) -> ::core::result::Result<(), $crate::range::OutOfRange> {
+                $(
+                    $(
+                        if let Self::$variant(content) = self {
+                            return <$content as $crate::settings::SettingValue>::check(
+                                content,
+                                ::core::option::Option::None,
+                            )
+                            .map_err(|error| error.inside($key));
+                        }
+                    )?
+                    $(
+                        if let Self::$variant { $($field),* } = self {
+                            let check = || {
+                                $($crate::settings!(@check $field, $field, $type, [$($range)?]);)*
+                                ::core::result::Result::Ok(())
+                            };
+                            return $crate::settings::in_variant(
+                                check(),
+                                &<Self as $crate::settings::SettingValue>::SHAPE,
+                                $key,
+                            );
+                        }
+                    )?
+                )*
+                ::core::result::Result::Ok(())
+            }
+        }
+    };
+}
+
+/// Adds a variant's name to the key of an error, unless the name is a value beside the settings.
+#[doc(hidden)]
+pub fn in_variant(
+    result: Result<(), OutOfRange>,
+    choice: &Shape,
+    key: &'static str,
+) -> Result<(), OutOfRange> {
+    match choice {
+        Shape::Choice { tag: Some(_), .. } => result,
+        _ => result.map_err(|error| error.inside(key)),
+    }
+}
+
+/// Checks a setting against bounds that depend on other settings:
+/// `check_setting!(self.estimator.bandwidth_rad_s, 1.0, 3.0 * tick_hz)`. The key in the error is
+/// that of the setting relative to `self`; a setting that does not exist does not compile.
+#[macro_export]
+macro_rules! check_setting {
+    ($group:ident $(.$part:ident)+, $minimum:expr, $maximum:expr) => {
+        $crate::settings::SettingValue::check(
+            &$group $(.$part)+,
+            ::core::option::Option::Some($crate::settings::Range {
+                minimum: f64::from($minimum),
+                maximum: f64::from($maximum),
+            }),
+        )
+        .map_err(|error| $crate::settings::inside_all(error, &[$(stringify!($part)),+]))
+    };
+}
+
+/// Adds the names of groups, from the outermost on, to the key of an error.
+#[doc(hidden)]
+#[cold]
+pub fn inside_all(error: OutOfRange, names: &[&'static str]) -> OutOfRange {
+    names
+        .iter()
+        .rev()
+        .fold(error, |error, name| error.inside(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    settings! {
+        /// Settings of a gripper.
+        #[derive(Copy)]
+        pub struct GripperSettings {
+            /// Whether it grips
+            /// at all.
+            enabled: bool = true;
+            /// Force of each finger.
+            force_n: [f32; 2] = [1.0, 2.0], 0.0..=10.0, "N";
+            /// Attempts.
+            attempts: u8 = 3, 0..=5;
+            /// Fastest closing.
+            fastest_m_s: f32 = 0.2, 1e-3..=1.0, "m/s";
+            /// Speed of closing if it is known; at most `fastest_m_s`.
+            speed_m_s: Option<f32> = None, 0.0..=1.0, "m/s";
+            /// How it closes.
+            closing: Closing = Closing::Soft { time_s: 0.1 };
+            /// How it opens.
+            opening: Opening = Opening::Spring {};
+        }
+        check Self::relations;
+    }
+
+    settings! {
+        /// How a gripper closes.
+        #[derive(Copy)]
+        pub enum Closing = Hard {
+            /// At once.
+            "hard" => Hard,
+            /// Slowly.
+            "soft" => Soft {
+                /// How long it takes.
+                time_s: f32, 0.0..=1.0, "s";
+            },
+            /// As another does.
+            "like" => Like(Inner),
+        }
+    }
+
+    settings! {
+        /// How a gripper opens.
+        #[derive(Copy)]
+        pub enum Opening by "kind" {
+            /// By its spring.
+            "spring" => Spring {},
+            /// By its drive.
+            "driven" => Driven {
+                /// Speed.
+                speed_m_s: f64, 0.0..=1.0, "m/s";
+            },
+        }
+    }
+
+    settings! {
+        /// Settings inside a variant.
+        #[derive(Copy)]
+        pub struct Inner {
+            /// Number of teeth.
+            teeth: u32 = 1, 1..=9;
+        }
+    }
+
+    impl GripperSettings {
+        fn relations(&self) -> Result<(), OutOfRange> {
+            check_setting!(self.speed_m_s, 0.0, self.fastest_m_s)
+        }
+    }
+
+    fn message(change: impl FnOnce(&mut GripperSettings)) -> std::string::String {
+        let mut settings = GripperSettings::default();
+        assert_eq!(settings.validate(), Ok(()));
+        change(&mut settings);
+        settings.validate().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_kind_of_setting_is_checked_and_named() {
+        let outside = "is outside the allowed range";
+        assert_eq!(
+            message(|it| it.force_n[1] = 10.5),
+            std::format!("force_n.1 = 10.5 {outside} 0 to 10")
+        );
+        assert_eq!(
+            message(|it| it.attempts = 6),
+            std::format!("attempts = 6 {outside} 0 to 5")
+        );
+        assert_eq!(
+            message(|it| it.speed_m_s = Some(f32::NAN)),
+            std::format!("speed_m_s = NaN {outside} 0 to 1")
+        );
+        assert_eq!(
+            message(|it| it.speed_m_s = Some(0.5)),
+            std::format!("speed_m_s = 0.5 {outside} 0 to 0.2")
+        );
+        assert_eq!(
+            message(|it| it.closing = Closing::Soft { time_s: -1.0 }),
+            std::format!("closing.soft.time_s = -1 {outside} 0 to 1")
+        );
+        assert_eq!(
+            message(|it| it.closing = Closing::Like(Inner { teeth: 0 })),
+            std::format!("closing.like.teeth = 0 {outside} 1 to 9")
+        );
+        assert_eq!(
+            message(|it| it.opening = Opening::Driven { speed_m_s: 2.0 }),
+            std::format!("opening.speed_m_s = 2 {outside} 0 to 1")
+        );
+    }
+
+    #[test]
+    fn the_description_is_the_declaration() {
+        let keys: std::vec::Vec<_> = GripperSettings::FIELDS.iter().map(|it| it.key).collect();
+        assert_eq!(
+            keys,
+            [
+                "enabled",
+                "force_n",
+                "attempts",
+                "fastest_m_s",
+                "speed_m_s",
+                "closing",
+                "opening"
+            ]
+        );
+        let [enabled, force, attempts, ..] = GripperSettings::FIELDS else {
+            panic!("too few");
+        };
+        assert_eq!(enabled.meaning, "Whether it grips at all.");
+        assert_eq!((enabled.range, enabled.shape), (None, Shape::Switch));
+        assert_eq!((force.unit, attempts.unit), ("N", ""));
+        let item = &Shape::Number;
+        assert_eq!(force.shape, Shape::Array { item, length: 2 });
+        let Shape::Choice { tag, variants } = Closing::SHAPE else {
+            panic!("not a choice");
+        };
+        assert_eq!((tag, variants[0].content), (None, None));
+        assert_eq!(Closing::Soft { time_s: 0.0 }.name(), "soft");
+        assert_eq!(
+            variants[2].content,
+            Some(Shape::Group(Inner::FIELDS)),
+            "{variants:?}"
+        );
+    }
+
+    #[test]
+    fn defaults_are_those_declared_and_survive_the_wire() {
+        let settings = GripperSettings {
+            speed_m_s: Some(0.1),
+            closing: Closing::default(),
+            ..Default::default()
+        };
+        assert_eq!((settings.attempts, settings.closing), (3, Closing::Hard));
+        // Internally tagged enums need a format that describes itself.
+        let part = (settings.force_n, settings.speed_m_s, settings.closing);
+        let mut buffer = [0; 64];
+        let bytes = postcard::to_slice(&part, &mut buffer).unwrap();
+        assert_eq!(postcard::from_bytes(bytes), Ok(part));
+    }
+}
