@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use painleve_chart::PlotError;
-use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult, Watcher};
+use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult, Monitor};
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::mechanics::PlantParameters;
 use painleve_plant::sample::Sample;
@@ -287,7 +287,7 @@ impl Makes<'_> {
 /// Draws a run while it goes on.
 struct Drawing(RunPlot);
 
-impl Watcher for Drawing {
+impl Monitor for Drawing {
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
         self.0.push(sample);
         Ok(())
@@ -295,7 +295,7 @@ impl Watcher for Drawing {
 }
 
 /// Runs a scenario in this process.
-fn simulate(scenario: &Scenario, watcher: &mut impl Watcher) -> Result<LoopResult, CommandError> {
+fn simulate(scenario: &Scenario, monitor: &mut impl Monitor) -> Result<LoopResult, CommandError> {
     let range = |source| ScenarioError::Range {
         origin: scenario.name.clone(),
         source,
@@ -304,7 +304,7 @@ fn simulate(scenario: &Scenario, watcher: &mut impl Watcher) -> Result<LoopResul
     let host = InProcess::new(&scenario.controller_configuration()).map_err(range)?;
     let mut running = ClosedLoop::new(simulation, host);
     for _ in 0..scenario.run.ticks() {
-        running.tick(watcher)?;
+        running.tick(monitor)?;
     }
     Ok(running.finish().0)
 }

@@ -114,7 +114,7 @@ impl CommandError {
             Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => {
                 PEER_FAILED
             }
-            Self::Loop(LoopError::Watcher(_)) | Self::Output(_) => 4,
+            Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => 4,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => 130,
             Self::Told { code } => *code,
         }

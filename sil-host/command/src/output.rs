@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use painleve_plant::closed_loop::{LoopError, Watcher};
+use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
 use painleve_record::RunPlot;
@@ -133,7 +133,7 @@ fn progress_bar(ticks: u64) -> ProgressBar {
     bar
 }
 
-impl Watcher for Output {
+impl Monitor for Output {
     fn wants_samples(&self) -> bool {
         self.recorder.is_some() || self.plot.is_some()
     }
@@ -142,7 +142,7 @@ impl Watcher for Output {
         if let Some(recorder) = &mut self.recorder {
             recorder
                 .push(sample)
-                .map_err(|error| LoopError::Watcher(Box::new(error)))?;
+                .map_err(|error| LoopError::Monitor(Box::new(error)))?;
         }
         if let Some((plot, _)) = &mut self.plot {
             plot.push(sample);

@@ -7,7 +7,7 @@ use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
 use painleve_board::timing::{Metronome, TimingReport, Unit, report};
 use painleve_board::{Board, OnBoard, Serial};
-use painleve_plant::closed_loop::{ClosedLoop, LoopError, Watcher};
+use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
@@ -157,7 +157,7 @@ fn out_of_range(scenario: &Scenario, source: painleve_shared::range::OutOfRange)
 /// Watches for nothing but a request to end.
 struct UntilAsked<'a>(&'a Interrupt);
 
-impl Watcher for UntilAsked<'_> {
+impl Monitor for UntilAsked<'_> {
     fn wants_samples(&self) -> bool {
         false
     }

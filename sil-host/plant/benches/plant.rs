@@ -6,17 +6,17 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Vector2;
+use painleve_plant::State;
 use painleve_plant::mechanics::belt::BeltProfile;
-use painleve_plant::mechanics::motion::State;
-use painleve_plant::mechanics::{Plant, PlantParameters};
+use painleve_plant::mechanics::{ArmOnBelt, PlantParameters};
 
-fn plant(theta1_deg: f64, theta2_deg: f64) -> Plant {
+fn plant(theta1_deg: f64, theta2_deg: f64) -> ArmOnBelt {
     let parameters = PlantParameters {
         belt: BeltProfile::Constant { speed_m_s: -0.4 },
         ..Default::default()
     };
     let initial = State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0);
-    Plant::new(&parameters, initial).expect("the paper's arm is valid")
+    ArmOnBelt::new(&parameters, initial).expect("the paper's arm is valid")
 }
 
 fn simulated_seconds(criterion: &mut Criterion) {

@@ -6,10 +6,11 @@ use painleve_shared::status::Fault;
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::controller_host::{Answer, ControllerHost, HostError};
-use crate::mechanics::PlantError;
-use crate::mechanics::statistics::Statistics;
+use crate::mechanics::ArmOnBelt;
+use crate::plant::{Plant, PlantError};
 use crate::sample::Sample;
 use crate::simulation::Simulation;
+use crate::statistics::Statistics;
 
 /// Time at the start of a run in which the normal force may still settle, s.
 const SETTLING_S: f64 = 0.05;
@@ -26,17 +27,17 @@ pub enum LoopError {
     /// The controller is gone.
     #[error(transparent)]
     Host(#[from] HostError),
-    /// Somebody who watches the run cannot go on, a record that cannot be written, say.
+    /// A monitor of the run failed: its record cannot be written, for example.
     #[error(transparent)]
-    Watcher(Box<dyn std::error::Error + Send + Sync>),
+    Monitor(Box<dyn std::error::Error + Send + Sync>),
     /// The process has been asked to end.
     #[error("interrupted")]
     Interrupted,
 }
 
-/// Watches a run tick by tick.
-pub trait Watcher {
-    /// Whether [`Watcher::sample`] wants to be called at all.
+/// Takes in a run tick by tick, and may end it.
+pub trait Monitor {
+    /// Whether [`Monitor::sample`] wants to be called at all.
     fn wants_samples(&self) -> bool {
         true
     }
@@ -56,8 +57,8 @@ pub trait Watcher {
     }
 }
 
-/// Watches nothing.
-impl Watcher for () {
+/// Takes in nothing.
+impl Monitor for () {
     fn wants_samples(&self) -> bool {
         false
     }
@@ -68,8 +69,8 @@ impl Watcher for () {
 }
 
 /// A simulation and a controller host, with what is counted about them.
-pub struct ClosedLoop<H> {
-    simulation: Simulation,
+pub struct ClosedLoop<H, P = ArmOnBelt> {
+    simulation: Simulation<P>,
     host: H,
     statistics: Statistics,
     log: LogHash,
@@ -140,9 +141,9 @@ pub struct LoopResult {
     pub log_hash: String,
 }
 
-impl<H: ControllerHost> ClosedLoop<H> {
+impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
     /// A loop at the start of its simulation.
-    pub fn new(simulation: Simulation, host: H) -> Self {
+    pub fn new(simulation: Simulation<P>, host: H) -> Self {
         Self {
             simulation,
             host,
@@ -160,8 +161,8 @@ impl<H: ControllerHost> ClosedLoop<H> {
     /// Runs one control tick.
     ///
     /// # Errors
-    /// [`LoopError`] if plant, controller or watcher cannot go on.
-    pub fn tick(&mut self, watcher: &mut impl Watcher) -> Result<(), LoopError> {
+    /// [`LoopError`] if plant, controller or monitor cannot go on.
+    pub fn tick(&mut self, monitor: &mut impl Monitor) -> Result<(), LoopError> {
         let sensor = self.simulation.sample(&mut self.statistics)?;
         self.log.sensor(&sensor);
         let frame = if self.simulation.sensor_frame_is_lost() {
@@ -181,21 +182,20 @@ impl<H: ControllerHost> ClosedLoop<H> {
             }
             None => self.stale_ticks += 1,
         }
-        if watcher.wants_samples() {
-            watcher.sample(&self.simulation.describe(&sensor, &self.last_answer))?;
+        if monitor.wants_samples() {
+            monitor.sample(&self.simulation.describe(&sensor, &self.last_answer))?;
         }
         self.simulation
             .advance(frame.as_ref(), &mut self.statistics)?;
-        watcher.tick()
+        monitor.tick()
     }
 
     /// Ends the run.
     pub fn finish(self) -> (LoopResult, H) {
-        let plant = self.simulation.plant();
         let result = LoopResult {
             ticks: self.simulation.ticks(),
             statistics: self.statistics,
-            final_tip_t_m: plant.motion().tip_t_m(plant.state()),
+            final_tip_t_m: self.simulation.plant().snapshot().tip_t_m,
             final_reference_m: self.last_answer.reference_tip.to_metres(),
             saturated_ticks: self.saturated_ticks,
             stale_ticks: self.stale_ticks,

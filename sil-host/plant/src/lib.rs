@@ -1,5 +1,6 @@
 //! The simulated plant and the controller in a closed loop with it, in one process.
 //!
+//! - [`plant`]: what a plant is to all the rest
 //! - [`mechanics`]: the arm on its belt, as a hybrid rigid-body model
 //! - [`converters`]: encoders, force cell, torque stages and the link's losses
 //! - [`scenario`]: everything that defines a run, as a TOML file
@@ -7,11 +8,16 @@
 //! - [`controller_host`]: whatever runs the controller
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`sample`]: both frames of a tick and the truth behind them, for records
+//! - [`statistics`]: counts and extremes of a run
 
 pub mod closed_loop;
 pub mod controller_host;
 pub mod converters;
 pub mod mechanics;
+pub mod plant;
 pub mod sample;
 pub mod scenario;
 pub mod simulation;
+pub mod statistics;
+
+pub use plant::{ContactMode, Event, Plant, PlantError, Probe, Snapshot, State, Step};

@@ -4,7 +4,6 @@
 //! changes (a fraction of a tick after it), the encoders capture (a
 //! fraction of a tick before the next one), and the next tick.
 
-use nalgebra::Vector2;
 use painleve_shared::ActuatorFrame;
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::range::OutOfRange;
@@ -14,15 +13,15 @@ use crate::converters::encoder::Encoders;
 use crate::converters::force_cell::ForceCell;
 use crate::converters::link_loss::{LossyLink, Lost};
 use crate::converters::torque_stage::TorqueStages;
-use crate::mechanics::motion::theta;
-use crate::mechanics::{Observer, Plant, PlantError};
+use crate::mechanics::ArmOnBelt;
+use crate::plant::{Plant, PlantError, Probe};
 use crate::sample::Sample;
 use crate::scenario::Scenario;
 
 /// A plant with its converters at a control rate.
 #[derive(Clone, Debug)]
-pub struct Simulation {
-    plant: Plant,
+pub struct Simulation<P = ArmOnBelt> {
+    plant: P,
     encoders: Encoders,
     force_cell: ForceCell,
     torque_stages: TorqueStages,
@@ -35,17 +34,28 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// The scenario at its start.
+    /// The scenario's own plant and converters at its start.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
         scenario.validate()?;
-        let plant = Plant::new(&scenario.plant_parameters(), scenario.initial.state())?;
+        let plant = ArmOnBelt::new(&scenario.plant_parameters(), scenario.initial.state())?;
+        Self::of(plant, scenario)
+    }
+}
+
+impl<P: Plant> Simulation<P> {
+    /// Any plant at its start, with the scenario's converters.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn of(plant: P, scenario: &Scenario) -> Result<Self, OutOfRange> {
+        scenario.validate()?;
         let converters = &scenario.converters;
         let seed = scenario.run.seed;
         Ok(Self {
-            encoders: Encoders::new(&converters.encoder, seed, &theta(plant.state())),
+            encoders: Encoders::new(&converters.encoder, seed, &plant.joint_angles_rad()),
             force_cell: ForceCell::new(&converters.force, seed),
             torque_stages: TorqueStages::new(&converters.torque),
             link: LossyLink::new(&converters.link, seed),
@@ -59,7 +69,7 @@ impl Simulation {
     }
 
     /// The plant.
-    pub fn plant(&self) -> &Plant {
+    pub fn plant(&self) -> &P {
         &self.plant
     }
 
@@ -73,8 +83,8 @@ impl Simulation {
     ///
     /// # Errors
     /// [`PlantError`] if the contact mode of the start cannot be decided.
-    pub fn sample(&mut self, observer: &mut impl Observer) -> Result<SensorFrame, PlantError> {
-        self.plant.settle(observer)?;
+    pub fn sample(&mut self, probe: &mut impl Probe) -> Result<SensorFrame, PlantError> {
+        self.plant.advance(self.plant.time_s(), probe)?;
         self.lost = self.link.draw();
         let (tangential_force, normal_force) = self.force_cell.read(&self.plant.contact_force_n());
         let enabled = self.plant.time_s() >= self.enable_at_s;
@@ -101,29 +111,11 @@ impl Simulation {
 
     /// Everything about this tick, for records.
     pub fn describe(&self, sensor: &SensorFrame, actuator: &ActuatorFrame) -> Sample {
-        let (time_s, state) = (self.plant.time_s(), self.plant.state());
-        let motion = self.plant.motion();
-        let mode = self.plant.mode();
-        let terms = motion.terms(time_s, state);
-        let force = motion.force_n(time_s, mode, &terms);
-        let slip = motion.relative_velocity_m_s(time_s, state).x;
         Sample {
-            time_s,
+            plant: self.plant.snapshot(),
             sensor: *sensor,
             actuator: *actuator,
-            theta_rad: [state[0], state[1]],
-            theta_dot_rad_s: [state[2], state[3]],
-            tip_t_m: motion.tip_t_m(state),
-            gap_m: motion.gap_m(state),
-            slip_velocity_m_s: slip,
-            belt_speed_m_s: motion.belt.speed_m_s(time_s),
-            normal_force_n: force.y,
-            tangential_force_n: force.x,
-            b_m_s2: terms.b(),
-            p_per_kg: terms.p(motion.friction, painleve_shared::Slip::of(slip)),
-            torque_nm: self.plant.torque_nm().into(),
             reference_tip_t_m: reference_m(actuator),
-            mode,
         }
     }
 
@@ -135,7 +127,7 @@ impl Simulation {
     pub fn advance(
         &mut self,
         answer: Option<&ActuatorFrame>,
-        observer: &mut impl Observer,
+        probe: &mut impl Probe,
     ) -> Result<(), PlantError> {
         let arrived = answer.filter(|_| !self.lost.actuator);
         self.torque_stages
@@ -148,25 +140,21 @@ impl Simulation {
 
         let mut captured = false;
         if capture < change {
-            self.plant.advance(at(capture), observer)?;
-            self.encoders.capture(&self.angles());
+            self.plant.advance(at(capture), probe)?;
+            self.encoders.capture(&self.plant.joint_angles_rad());
             captured = true;
         }
         if change > 0.0 {
-            self.plant.advance(at(change), observer)?;
+            self.plant.advance(at(change), probe)?;
         }
         self.plant
             .command_torque(self.torque_stages.target_nm(), self.torque_stages.lag_s());
         if !captured {
-            self.plant.advance(at(capture), observer)?;
-            self.encoders.capture(&self.angles());
+            self.plant.advance(at(capture), probe)?;
+            self.encoders.capture(&self.plant.joint_angles_rad());
         }
         self.tick += 1;
-        self.plant.advance(at(1.0), observer)
-    }
-
-    fn angles(&self) -> Vector2<f64> {
-        theta(self.plant.state())
+        self.plant.advance(at(1.0), probe)
     }
 }
 

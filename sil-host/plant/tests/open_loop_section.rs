@@ -2,17 +2,18 @@
 //! arm keeps bouncing from x0,a at exactly the reference's belt speeds, and
 //! from x0,d at none.
 
+use painleve_plant::Event;
+use painleve_plant::State;
 use painleve_plant::mechanics::belt::BeltProfile;
-use painleve_plant::mechanics::motion::State;
-use painleve_plant::mechanics::{Event, Observer, Plant, PlantParameters, PlantStep};
+use painleve_plant::mechanics::{ArmOnBelt, ArmProbe, ArmStep, PlantParameters};
 
 const SECTION: &str = include_str!("data/open_loop_section_mu06.csv");
 
 /// Largest θ̇1 seen, rad/s.
 struct Fastest(f64);
 
-impl Observer for Fastest {
-    fn step(&mut self, step: &PlantStep<'_>) {
+impl ArmProbe for Fastest {
+    fn step(&mut self, step: &ArmStep<'_>) {
         self.0 = self.0.max(step.end[2]);
     }
 
@@ -28,7 +29,7 @@ fn fastest(speed_m_s: f64, theta1_deg: f64, theta2_deg: f64) -> f64 {
         ..Default::default()
     };
     let initial = State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0);
-    let mut plant = Plant::new(&parameters, initial).expect("the paper's arm is valid");
+    let mut plant = ArmOnBelt::new(&parameters, initial).expect("the paper's arm is valid");
     plant.advance(250.0, &mut ()).expect("goes on");
     let mut fastest = Fastest(f64::NEG_INFINITY);
     plant.advance(300.0, &mut fastest).expect("goes on");

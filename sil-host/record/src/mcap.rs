@@ -260,7 +260,7 @@ impl LogWriter {
 
     fn write(&mut self, sample: &Sample) -> Result<(), McapError> {
         // Saturates: negative or undefined time becomes zero.
-        let time_ns = (sample.time_s * 1e9).round() as u64;
+        let time_ns = (sample.plant.time_s * 1e9).round() as u64;
         self.write_message(self.plant, time_ns, &PlantMessage::new(sample))?;
         self.write_message(self.sensor, time_ns, &SensorMessage::new(sample))?;
         self.write_message(self.actuator, time_ns, &ActuatorMessage::new(sample))?;
@@ -347,27 +347,27 @@ struct PlantMessage {
 
 impl PlantMessage {
     fn new(sample: &Sample) -> Self {
-        let [theta1_rad, theta2_rad] = sample.theta_rad;
-        let [theta1_dot_rad_s, theta2_dot_rad_s] = sample.theta_dot_rad_s;
-        let [u1_nm, u2_nm] = sample.torque_nm;
+        let [theta1_rad, theta2_rad] = sample.plant.theta_rad;
+        let [theta1_dot_rad_s, theta2_dot_rad_s] = sample.plant.theta_dot_rad_s;
+        let [u1_nm, u2_nm] = sample.plant.torque_nm;
         Self {
             theta1_rad,
             theta2_rad,
             theta1_dot_rad_s,
             theta2_dot_rad_s,
-            tip_t_m: sample.tip_t_m,
+            tip_t_m: sample.plant.tip_t_m,
             reference_tip_t_m: sample.reference_tip_t_m,
-            gap_m: sample.gap_m,
-            slip_velocity_m_s: sample.slip_velocity_m_s,
-            belt_speed_m_s: sample.belt_speed_m_s,
-            normal_force_n: sample.normal_force_n,
-            tangential_force_n: sample.tangential_force_n,
-            b_m_s2: sample.b_m_s2,
-            p_per_kg: sample.p_per_kg,
+            gap_m: sample.plant.gap_m,
+            slip_velocity_m_s: sample.plant.slip_velocity_m_s,
+            belt_speed_m_s: sample.plant.belt_speed_m_s,
+            normal_force_n: sample.plant.normal_force_n,
+            tangential_force_n: sample.plant.tangential_force_n,
+            b_m_s2: sample.plant.b_m_s2,
+            p_per_kg: sample.plant.p_per_kg,
             u1_nm,
             u2_nm,
-            mode: sample.mode.name(),
-            mode_number: sample.mode as u8,
+            mode: sample.plant.mode.name(),
+            mode_number: sample.plant.mode as u8,
         }
     }
 }
@@ -470,26 +470,29 @@ mod tests {
     use painleve_shared::status::{Fault, SupervisorState};
     use serde_json::Value;
 
-    use painleve_plant::mechanics::motion::ContactMode;
+    use painleve_plant::{ContactMode, Snapshot};
 
     fn sample(tick: u32) -> Sample {
         // Quarters, so that reading them back is exact.
         let value = f64::from(tick) * 0.25;
         let mut sample = Sample {
-            time_s: f64::from(tick) * 1e-3,
-            theta_rad: [value, -value],
-            theta_dot_rad_s: [value + 1.0, value + 2.0],
-            tip_t_m: value + 3.0,
-            gap_m: value + 4.0,
-            slip_velocity_m_s: value + 5.0,
-            belt_speed_m_s: -0.5,
-            normal_force_n: value + 6.0,
-            tangential_force_n: value + 7.0,
-            b_m_s2: value + 8.0,
-            p_per_kg: value + 9.0,
-            torque_nm: [value + 10.0, value + 11.0],
+            plant: Snapshot {
+                time_s: f64::from(tick) * 1e-3,
+                theta_rad: [value, -value],
+                theta_dot_rad_s: [value + 1.0, value + 2.0],
+                tip_t_m: value + 3.0,
+                gap_m: value + 4.0,
+                slip_velocity_m_s: value + 5.0,
+                belt_speed_m_s: -0.5,
+                normal_force_n: value + 6.0,
+                tangential_force_n: value + 7.0,
+                b_m_s2: value + 8.0,
+                p_per_kg: value + 9.0,
+                torque_nm: [value + 10.0, value + 11.0],
+                mode: ContactMode::ALL[tick as usize % 4],
+                ..Snapshot::default()
+            },
             reference_tip_t_m: value + 12.0,
-            mode: ContactMode::ALL[tick as usize % 4],
             ..Sample::default()
         };
         sample.sensor.tick = tick;
@@ -540,12 +543,12 @@ mod tests {
             let json: Value = serde_json::from_slice(&message.data).unwrap();
             match message.channel.topic.as_str() {
                 "/plant" => {
-                    assert_eq!(json["theta2_rad"], expected.theta_rad[1]);
-                    assert_eq!(json["tip_t_m"], expected.tip_t_m);
-                    assert_eq!(json["normal_force_n"], expected.normal_force_n);
-                    assert_eq!(json["u2_nm"], expected.torque_nm[1]);
-                    assert_eq!(json["p_per_kg"], expected.p_per_kg);
-                    assert_eq!(json["mode"], expected.mode.name());
+                    assert_eq!(json["theta2_rad"], expected.plant.theta_rad[1]);
+                    assert_eq!(json["tip_t_m"], expected.plant.tip_t_m);
+                    assert_eq!(json["normal_force_n"], expected.plant.normal_force_n);
+                    assert_eq!(json["u2_nm"], expected.plant.torque_nm[1]);
+                    assert_eq!(json["p_per_kg"], expected.plant.p_per_kg);
+                    assert_eq!(json["mode"], expected.plant.mode.name());
                     assert_eq!(json["mode_number"], tick % 4);
                 }
                 "/sensor" => {
@@ -600,8 +603,12 @@ mod tests {
     #[test]
     fn values_that_are_not_finite_become_null() {
         let sample = Sample {
-            b_m_s2: f64::NAN,
-            normal_force_n: f64::INFINITY,
+            plant: Snapshot {
+                b_m_s2: f64::NAN,
+                normal_force_n: f64::INFINITY,
+                ..Snapshot::default()
+            },
+
             ..Sample::default()
         };
         let json = serde_json::to_value(PlantMessage::new(&sample)).unwrap();

@@ -13,7 +13,7 @@ use painleve_chart::style::{
     self, Area, BLACK_INK, BLUE_INK, Drawn, GREEN, GREY, GRID, HEADING, LEGEND, NOTE, ORANGE, SKY,
     SUBTITLE, TICK, TITLE, VERMILLION, text, text_width, ticks, without_straight_ons,
 };
-use painleve_plant::mechanics::motion::ContactMode;
+use painleve_plant::ContactMode;
 use painleve_plant::sample::Sample;
 use painleve_system::atomic_file;
 use plotters::prelude::*;
@@ -185,14 +185,15 @@ impl RunPlot {
     #[inline]
     pub fn push(&mut self, sample: &Sample) {
         let mut values = [0.0; signal::COUNT];
-        values[signal::TIP] = sample.tip_t_m;
+        values[signal::TIP] = sample.plant.tip_t_m;
         values[signal::REFERENCE] = sample.reference_tip_t_m;
-        values[signal::NORMAL_FORCE] = sample.normal_force_n;
-        values[signal::U1] = sample.torque_nm[0];
-        values[signal::U2] = sample.torque_nm[1];
-        values[signal::B] = sample.b_m_s2;
-        values[signal::P] = sample.p_per_kg;
-        self.samples.push(sample.time_s, values, flag(sample.mode));
+        values[signal::NORMAL_FORCE] = sample.plant.normal_force_n;
+        values[signal::U1] = sample.plant.torque_nm[0];
+        values[signal::U2] = sample.plant.torque_nm[1];
+        values[signal::B] = sample.plant.b_m_s2;
+        values[signal::P] = sample.plant.p_per_kg;
+        self.samples
+            .push(sample.plant.time_s, values, flag(sample.plant.mode));
     }
 
     /// The figure as SVG text.
@@ -509,24 +510,28 @@ fn time_range<const SIGNALS: usize>(bins: &[Bin<SIGNALS>]) -> Range<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use painleve_plant::Snapshot;
     use proptest::prelude::*;
 
     /// A tip that follows its reference, then leaves the belt for one tick.
     fn sample(tick: u32) -> Sample {
         let time_s = f64::from(tick) * 1e-3;
         Sample {
-            time_s,
-            tip_t_m: 0.1 * time_s,
-            reference_tip_t_m: 0.1 * time_s,
-            normal_force_n: if tick == 500 { 480.0 } else { 10.0 },
-            torque_nm: [1.0, 2.0],
-            b_m_s2: -5.0,
-            p_per_kg: 0.4,
-            mode: if tick == 501 {
-                ContactMode::Flight
-            } else {
-                ContactMode::SlidePositive
+            plant: Snapshot {
+                time_s,
+                tip_t_m: 0.1 * time_s,
+                normal_force_n: if tick == 500 { 480.0 } else { 10.0 },
+                torque_nm: [1.0, 2.0],
+                b_m_s2: -5.0,
+                p_per_kg: 0.4,
+                mode: if tick == 501 {
+                    ContactMode::Flight
+                } else {
+                    ContactMode::SlidePositive
+                },
+                ..Snapshot::default()
             },
+            reference_tip_t_m: 0.1 * time_s,
             ..Sample::default()
         }
     }
@@ -624,34 +629,38 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
-        #[test]
-        fn any_numbers_give_a_figure_within_its_bounds(
-            values in prop::collection::vec(
-                (any::<f64>(), any::<f64>(), prop_oneof![Just(0.1), any::<f64>()]), 0..20,
-            ),
-        ) {
-            let mut plot = RunPlot::new("", "");
-            for (time_s, value, other) in values {
-                plot.push(&Sample {
-                    time_s,
-                    tip_t_m: value,
-                    normal_force_n: other,
-                    torque_nm: [value, other],
-                    b_m_s2: -value,
-                    p_per_kg: other,
-                    ..Sample::default()
-                });
-            }
-            let svg = plot.svg().unwrap();
-            prop_assert!(!svg.contains("NaN") && !svg.contains("inf"));
-            for line in svg.lines().filter_map(|line| line.split_once("points=\"")) {
-                let (points, _) = line.1.split_once('"').unwrap();
-                for (x, y) in points.split_whitespace().filter_map(|point| point.split_once(',')) {
-                    let (x, y): (i32, i32) = (x.parse().unwrap(), y.parse().unwrap());
-                    prop_assert!((0..=WIDTH).contains(&x) && (0..=HEIGHT).contains(&y));
+            #![proptest_config(ProptestConfig::with_cases(64))]
+            #[test]
+            fn any_numbers_give_a_figure_within_its_bounds(
+                values in prop::collection::vec(
+                    (any::<f64>(), any::<f64>(), prop_oneof![Just(0.1), any::<f64>()]), 0..20,
+                ),
+            ) {
+                let mut plot = RunPlot::new("", "");
+                for (time_s, value, other) in values {
+                    plot.push(&Sample {
+    plant: Snapshot {
+                        time_s,
+                        tip_t_m: value,
+                        normal_force_n: other,
+                        torque_nm: [value, other],
+                        b_m_s2: -value,
+                        p_per_kg: other,
+    ..Snapshot::default()
+    },
+
+    ..Sample::default()
+                    });
+                }
+                let svg = plot.svg().unwrap();
+                prop_assert!(!svg.contains("NaN") && !svg.contains("inf"));
+                for line in svg.lines().filter_map(|line| line.split_once("points=\"")) {
+                    let (points, _) = line.1.split_once('"').unwrap();
+                    for (x, y) in points.split_whitespace().filter_map(|point| point.split_once(',')) {
+                        let (x, y): (i32, i32) = (x.parse().unwrap(), y.parse().unwrap());
+                        prop_assert!((0..=WIDTH).contains(&x) && (0..=HEIGHT).contains(&y));
+                    }
                 }
             }
         }
-    }
 }

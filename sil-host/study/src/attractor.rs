@@ -1,7 +1,7 @@
 //! What an arm does in the long run, as plain numbers.
 
-use painleve_plant::mechanics::motion::{ContactMode, State};
-use painleve_plant::mechanics::{Event, Observer, Plant, PlantError, PlantStep};
+use painleve_plant::mechanics::{ArmOnBelt, MotionError};
+use painleve_plant::{ContactMode, Event, Probe, Snapshot, State, Step};
 
 use super::settled::has_settled;
 
@@ -43,8 +43,8 @@ impl Attractor {
     /// settled for good is not integrated any further.
     ///
     /// # Errors
-    /// [`PlantError`] if the plant cannot go on.
-    pub fn of(plant: &mut Plant, transient_s: f64, record_s: f64) -> Result<Self, PlantError> {
+    /// [`MotionError`] if the plant cannot go on.
+    pub fn of(plant: &mut ArmOnBelt, transient_s: f64, record_s: f64) -> Result<Self, MotionError> {
         let mut attractor = Self::default();
         if advance_or_settle(plant, transient_s)? {
             attractor.contact_s = record_s;
@@ -69,8 +69,8 @@ impl Attractor {
 /// Lets a plant run for `duration_s`; true, and earlier, if it has settled for good.
 ///
 /// # Errors
-/// [`PlantError`] if the plant cannot go on.
-pub fn advance_or_settle(plant: &mut Plant, duration_s: f64) -> Result<bool, PlantError> {
+/// [`MotionError`] if the plant cannot go on.
+pub fn advance_or_settle(plant: &mut ArmOnBelt, duration_s: f64) -> Result<bool, MotionError> {
     let start_s = plant.time_s();
     let looks = (duration_s / SETTLING_LOOK_S).ceil() as u64;
     for look in 1..=looks {
@@ -84,24 +84,18 @@ pub fn advance_or_settle(plant: &mut Plant, duration_s: f64) -> Result<bool, Pla
     Ok(false)
 }
 
-impl Observer for Attractor {
-    fn step(&mut self, step: &PlantStep<'_>) {
-        let (motion, mode) = (step.motion, step.mode);
-        let duration_s = step.end_s - step.start_s;
-        let slope = |t_s: f64, x: &State| motion.derivative(mode, t_s, x)[RATE];
-        let fastest = cubic_maximum(
-            duration_s,
-            [step.start[RATE], slope(step.start_s, step.start)],
-            [step.end[RATE], slope(step.end_s, step.end)],
-        );
+impl Probe for Attractor {
+    fn step(&mut self, step: &impl Step) {
+        let (start, end) = (step.start(), step.end());
+        let duration_s = end.time_s - start.time_s;
+        let rate = |at: &Snapshot| [at.theta_dot_rad_s[0], at.theta_ddot_rad_s2[0]];
+        let fastest = cubic_maximum(duration_s, rate(&start), rate(&end));
         self.max_theta1_dot_rad_s = self.max_theta1_dot_rad_s.max(fastest);
-        if mode == ContactMode::Flight {
+        if step.mode() == ContactMode::Flight {
             self.flight_s += duration_s;
-            let height =
-                |t_s: f64, x: &State| [motion.gap_m(x), motion.relative_velocity_m_s(t_s, x).y];
-            let start = height(step.start_s, step.start);
-            let end = height(step.end_s, step.end);
-            self.apex_m = self.apex_m.max(cubic_maximum(duration_s, start, end));
+            let height = |at: &Snapshot| [at.gap_m, at.gap_rate_m_s];
+            let highest = cubic_maximum(duration_s, height(&start), height(&end));
+            self.apex_m = self.apex_m.max(highest);
         } else {
             self.contact_s += duration_s;
         }
@@ -159,9 +153,9 @@ mod tests {
         }
     }
 
-    fn plant(theta1_deg: f64, theta2_deg: f64) -> Plant {
+    fn plant(theta1_deg: f64, theta2_deg: f64) -> ArmOnBelt {
         let initial = State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0);
-        Plant::new(&PlantParameters::default(), initial).unwrap()
+        ArmOnBelt::new(&PlantParameters::default(), initial).unwrap()
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use comfy_table::Table;
 use painleve_chart::PlotError;
+use painleve_plant::PlantError;
 use serde::Serialize;
 
 use super::attractor::Attractor;
@@ -71,7 +72,7 @@ impl Study for Bifurcation {
         let attractor = Attractor::of(&mut plant, transient_s, record_s).map_err(|source| {
             StudyError::Plant {
                 row: cell.to_string(),
-                source,
+                source: PlantError::new(source),
             }
         })?;
         Ok(Row {

@@ -352,9 +352,11 @@ mod tests {
         )
         .unwrap();
         assert_eq!(case.run.tick_hz, 2000);
-        let plant =
-            painleve_plant::mechanics::Plant::new(&case.plant_parameters(), case.initial.state())
-                .unwrap();
+        let plant = painleve_plant::mechanics::ArmOnBelt::new(
+            &case.plant_parameters(),
+            case.initial.state(),
+        )
+        .unwrap();
         assert!((plant.motion().tip_t_m(plant.state()) - START_M).abs() < 1e-12);
         assert!(plant.motion().gap_m(plant.state()).abs() < 1e-15);
         let far = ["arm.height_m=0.415".into()];

@@ -3,9 +3,9 @@
 use core::fmt;
 use std::collections::BTreeMap;
 
+use painleve_plant::State;
 use painleve_plant::mechanics::belt::BeltProfile;
-use painleve_plant::mechanics::motion::State;
-use painleve_plant::mechanics::{Plant, PlantParameters, SolverSettings};
+use painleve_plant::mechanics::{ArmOnBelt, PlantParameters, SolverSettings};
 use painleve_shared::range::{self, OutOfRange};
 
 use super::StudyError;
@@ -132,7 +132,7 @@ impl Cells {
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first parameter that is out of range.
-    pub fn plant_of(&self, cell: &Cell) -> Result<Plant, OutOfRange> {
+    pub fn plant_of(&self, cell: &Cell) -> Result<ArmOnBelt, OutOfRange> {
         let parameters = PlantParameters {
             friction: cell.mu,
             belt: BeltProfile::Constant {
@@ -145,7 +145,7 @@ impl Cells {
             },
             ..self.plant
         };
-        Plant::new(&parameters, cell.start)
+        ArmOnBelt::new(&parameters, cell.start)
     }
 
     fn start(&self, initial: Initial, row: u64) -> Result<State, OutOfRange> {

@@ -1,7 +1,6 @@
 //! Contact and flight from an instant on, at the plant's own resolution.
 
-use painleve_plant::mechanics::motion::State;
-use painleve_plant::mechanics::{Event, Observer, PlantStep};
+use painleve_plant::{Event, Probe, State, Step};
 
 /// Watches when the tip is caught, and whether it leaves again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,24 +38,24 @@ impl ContactWatch {
     }
 }
 
-impl Observer for ContactWatch {
-    fn step(&mut self, step: &PlantStep<'_>) {
-        if step.end_s <= self.from_s {
+impl Probe for ContactWatch {
+    fn step(&mut self, step: &impl Step) {
+        if step.end_s() <= self.from_s {
             return;
         }
-        if step.mode.is_contact() {
-            let start_s = step.start_s.max(self.from_s);
+        if step.mode().is_contact() {
+            let start_s = step.start_s().max(self.from_s);
             let since_s = *self.contact_since_s.get_or_insert(start_s);
-            if self.captured_s.is_none() && step.end_s - since_s >= self.hold_s {
+            if self.captured_s.is_none() && step.end_s() - since_s >= self.hold_s {
                 self.captured_s = Some(since_s);
             }
             return;
         }
         if self.contact_since_s.take().is_some() && self.captured_s.is_some() {
             self.lift_offs += 1;
-            self.first_lift_off_s.get_or_insert(step.start_s);
+            self.first_lift_off_s.get_or_insert(step.start_s());
         }
-        self.last_flight_end_s = step.end_s;
+        self.last_flight_end_s = step.end_s();
     }
 
     fn event(&mut self, _: f64, _: Event, _: &State) {}

@@ -5,7 +5,7 @@
 
 use core::fmt;
 
-use painleve_plant::mechanics::motion::State;
+use painleve_plant::State;
 use painleve_shared::{Arm, Posture};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -180,7 +180,7 @@ fn random_state(arm: &Arm<f64>, seed: u64, row: u64) -> State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_plant::mechanics::{Plant, PlantParameters};
+    use painleve_plant::mechanics::{ArmOnBelt, PlantParameters};
     use painleve_shared::ArmParameters;
     use proptest::prelude::*;
 
@@ -226,7 +226,7 @@ mod tests {
             prop_assert_eq!(state, Initial::Random(1).state(&arm, seed, row));
             prop_assert!(state != Initial::Random(1).state(&arm, seed, row + 1));
             prop_assert!(state != Initial::Random(1).state(&arm, seed ^ 1, row));
-            prop_assert!(Plant::new(&parameters, state).is_ok());
+            prop_assert!(ArmOnBelt::new(&parameters, state).is_ok());
         }
     }
 }

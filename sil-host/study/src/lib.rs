@@ -53,8 +53,8 @@ pub mod tabular;
 pub mod trial;
 
 use painleve_chart::PlotError;
+use painleve_plant::PlantError;
 use painleve_plant::closed_loop::LoopError;
-use painleve_plant::mechanics::PlantError;
 use painleve_plant::scenario::ScenarioError;
 use painleve_shared::range::OutOfRange;
 use rayon::prelude::*;

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 
 use comfy_table::Table;
 use painleve_chart::PlotError;
+use painleve_plant::PlantError;
+use painleve_plant::mechanics::MotionError;
 use serde::Serialize;
 
 use super::attractor::advance_or_settle;
@@ -54,9 +56,9 @@ impl Study for Poincare {
     fn row(&self, index: usize) -> Result<Row, StudyError> {
         let cell = self.cells.cell(index)?;
         let mut plant = self.cells.plant_of(&cell)?;
-        let failed = |source| StudyError::Plant {
+        let failed = |source: MotionError| StudyError::Plant {
             row: cell.to_string(),
-            source,
+            source: PlantError::new(source),
         };
         let mut returns = Returns::new(self.cells.plant.impact);
         if !advance_or_settle(&mut plant, self.cells.transient_s).map_err(failed)? {

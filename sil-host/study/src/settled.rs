@@ -8,9 +8,10 @@
 //! shrink.
 
 use nalgebra::{Matrix2, Vector2};
-use painleve_plant::mechanics::Plant;
+use painleve_plant::State;
+use painleve_plant::mechanics::ArmOnBelt;
 use painleve_plant::mechanics::belt::BeltProfile;
-use painleve_plant::mechanics::motion::{State, theta, theta_dot};
+use painleve_plant::mechanics::motion::{theta, theta_dot};
 use painleve_plant::mechanics::transition::event_functions;
 use painleve_shared::Pose;
 
@@ -26,7 +27,7 @@ const SLOWEST_DECAY_PER_S: f64 = 1e-3;
 const WELL_AWAY: f64 = 1e-3;
 
 /// Whether the plant, left alone, slides on for ever where it is.
-pub fn has_settled(plant: &Plant) -> bool {
+pub fn has_settled(plant: &ArmOnBelt) -> bool {
     let (mode, state, time_s) = (plant.mode(), plant.state(), plant.time_s());
     let motion = plant.motion();
     let steady_belt = matches!(motion.belt, BeltProfile::Constant { .. });
@@ -69,13 +70,13 @@ pub fn has_settled(plant: &Plant) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use painleve_plant::ContactMode;
     use painleve_plant::mechanics::PlantParameters;
-    use painleve_plant::mechanics::motion::ContactMode;
     use painleve_shared::{Arm, ArmParameters, Posture};
 
-    fn plant(parameters: &PlantParameters, theta1_deg: f64, theta2_deg: f64) -> Plant {
+    fn plant(parameters: &PlantParameters, theta1_deg: f64, theta2_deg: f64) -> ArmOnBelt {
         let initial = State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0);
-        Plant::new(parameters, initial).unwrap()
+        ArmOnBelt::new(parameters, initial).unwrap()
     }
 
     #[test]
@@ -120,12 +121,12 @@ mod tests {
             let theta = arm.joint_angles_on_belt_rad(tip_t_m, Posture::ElbowUp);
             let theta = theta.unwrap();
             let initial = State::new(theta.x, theta.y, 0.0, 0.0);
-            let mut plant = Plant::new(&parameters, initial).unwrap();
+            let mut plant = ArmOnBelt::new(&parameters, initial).unwrap();
             plant.settle(&mut ()).unwrap();
             assert_eq!(plant.mode(), ContactMode::SlidePositive);
             plant
         };
-        let slope = |plant: &Plant| {
+        let slope = |plant: &ArmOnBelt| {
             let motion = plant.motion();
             theta_dot(&motion.derivative(plant.mode(), 0.0, plant.state()))
         };

@@ -2,9 +2,9 @@
 //! controller as in a run of two processes, without its record.
 
 use painleve_firmware::Controller;
-use painleve_plant::mechanics::{Observer, PlantError};
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
+use painleve_plant::{PlantError, Probe};
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::range::OutOfRange;
 use painleve_shared::status::Fault;
@@ -33,14 +33,14 @@ impl Trial {
     ///
     /// # Errors
     /// [`PlantError`] if the plant cannot go on.
-    pub fn tick(&mut self, observer: &mut impl Observer) -> Result<(), PlantError> {
-        let sensor = self.simulation.sample(observer)?;
+    pub fn tick(&mut self, probe: &mut impl Probe) -> Result<(), PlantError> {
+        let sensor = self.simulation.sample(probe)?;
         let arrives = !self.simulation.sensor_frame_is_lost();
         if arrives {
             self.answer = self.controller.tick(&sensor);
         }
         let answer = arrives.then_some(&self.answer);
-        self.simulation.advance(answer, observer)
+        self.simulation.advance(answer, probe)
     }
 
     /// Simulated time, s.

@@ -5,7 +5,7 @@
 // Helpers of tests may panic as tests do.
 #![allow(clippy::unwrap_used)]
 
-use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult, Watcher};
+use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult, Monitor};
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
@@ -33,18 +33,20 @@ struct Course {
     duration_s: f64,
 }
 
-impl Watcher for Course {
+impl Monitor for Course {
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
-        let error_m = (sample.tip_t_m - sample.reference_tip_t_m).abs();
-        if sample.time_s > 0.2 {
+        let error_m = (sample.plant.tip_t_m - sample.reference_tip_t_m).abs();
+        if sample.plant.time_s > 0.2 {
             self.tip_error_m = self.tip_error_m.max(error_m);
-            self.force_error_n = self.force_error_n.max((sample.normal_force_n - 10.0).abs());
+            self.force_error_n = self
+                .force_error_n
+                .max((sample.plant.normal_force_n - 10.0).abs());
         }
-        if sample.time_s > self.duration_s - 1.0 {
+        if sample.plant.time_s > self.duration_s - 1.0 {
             self.rest_error_m = self.rest_error_m.max(error_m);
         }
-        if !sample.mode.is_contact() {
-            self.last_flight_s = sample.time_s;
+        if !sample.plant.mode.is_contact() {
+            self.last_flight_s = sample.plant.time_s;
         }
         self.at_edge = sample.actuator.flags.contains(StatusFlags::AT_EDGE);
         Ok(())

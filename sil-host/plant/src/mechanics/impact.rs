@@ -21,7 +21,8 @@ use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Pose, Slip};
 use serde::{Deserialize, Serialize};
 
-use super::motion::{Motion, State, theta};
+use super::motion::{Motion, theta};
+use crate::plant::State;
 
 /// How much of the compression comes back.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,15 +1,13 @@
 //! Equations of motion in each contact mode, and the contact force that goes with them.
 
-use nalgebra::{Vector2, Vector4};
+use nalgebra::Vector2;
 use painleve_shared::dynamics::generalised_torque_nm;
 use painleve_shared::{Arm, ContactTerms, Pose, Slip};
-use serde::{Deserialize, Serialize};
+
+use crate::plant::{ContactMode, Snapshot, State};
 
 use super::belt::BeltProfile;
 use super::torque::TorqueSegment;
-
-/// State of the arm as one vector: θ1, θ2 (rad), θ̇1, θ̇2 (rad/s).
-pub type State = Vector4<f64>;
 
 /// Joint angles of a state, rad.
 #[inline]
@@ -21,64 +19,6 @@ pub fn theta(state: &State) -> Vector2<f64> {
 #[inline]
 pub fn theta_dot(state: &State) -> Vector2<f64> {
     Vector2::new(state[2], state[3])
-}
-
-/// What holds the tip.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[repr(u8)]
-pub enum ContactMode {
-    /// The tip is off the belt.
-    #[default]
-    Flight = 0,
-    /// It slides with ż_r > 0.
-    SlidePositive = 1,
-    /// It slides with ż_r < 0.
-    SlideNegative = 2,
-    /// It moves with the belt, the force inside the friction cone.
-    Stick = 3,
-}
-
-impl ContactMode {
-    /// All modes, by number.
-    pub const ALL: [Self; 4] = [
-        Self::Flight,
-        Self::SlidePositive,
-        Self::SlideNegative,
-        Self::Stick,
-    ];
-
-    /// Sliding in one direction.
-    pub fn slide(slip: Slip) -> Self {
-        match slip {
-            Slip::Positive => Self::SlidePositive,
-            Slip::Negative => Self::SlideNegative,
-        }
-    }
-
-    /// The direction of sliding.
-    pub fn slip(self) -> Option<Slip> {
-        match self {
-            Self::SlidePositive => Some(Slip::Positive),
-            Self::SlideNegative => Some(Slip::Negative),
-            Self::Flight | Self::Stick => None,
-        }
-    }
-
-    /// Whether the tip touches the belt.
-    pub fn is_contact(self) -> bool {
-        self != Self::Flight
-    }
-
-    /// The mode's name, as it is serialised.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Flight => "flight",
-            Self::SlidePositive => "slide-positive",
-            Self::SlideNegative => "slide-negative",
-            Self::Stick => "stick",
-        }
-    }
 }
 
 /// The arm, the belt and the torque of one stretch of motion.
@@ -119,6 +59,31 @@ impl Motion<'_> {
                     .force_for_acceleration_n(&belt)
                     .unwrap_or_else(Vector2::zeros)
             }
+        }
+    }
+
+    /// Everything about an instant.
+    pub fn snapshot(&self, mode: ContactMode, t_s: f64, state: &State) -> Snapshot {
+        let terms = self.terms(t_s, state);
+        let force_n = self.force_n(t_s, mode, &terms);
+        let relative_m_s = self.relative_velocity_m_s(t_s, state);
+        let slope = self.derivative(mode, t_s, state);
+        Snapshot {
+            time_s: t_s,
+            theta_rad: [state[0], state[1]],
+            theta_dot_rad_s: [state[2], state[3]],
+            theta_ddot_rad_s2: [slope[2], slope[3]],
+            tip_t_m: self.tip_t_m(state),
+            gap_m: self.gap_m(state),
+            gap_rate_m_s: relative_m_s.y,
+            slip_velocity_m_s: relative_m_s.x,
+            belt_speed_m_s: self.belt.speed_m_s(t_s),
+            normal_force_n: force_n.y,
+            tangential_force_n: force_n.x,
+            b_m_s2: terms.b(),
+            p_per_kg: terms.p(self.friction, Slip::of(relative_m_s.x)),
+            torque_nm: self.torque.at(t_s).into(),
+            mode,
         }
     }
 
@@ -219,22 +184,6 @@ impl Motion<'_> {
         match jacobian.lu().solve(&belt) {
             Some(rates) => State::new(state[0], state[1], rates.x, rates.y),
             None => state,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn contact_modes_are_serialised_by_name_and_numbered_in_order() {
-        for (number, mode) in ContactMode::ALL.into_iter().enumerate() {
-            assert_eq!(mode as usize, number);
-            assert_eq!(
-                serde_json::to_value(mode).unwrap(),
-                serde_json::json!(mode.name())
-            );
         }
     }
 }

@@ -1,11 +1,14 @@
 //! Tests of the whole plant against closed forms and conservation laws.
 
-use painleve_shared::{Pose, Posture};
+use painleve_shared::{Arm, ArmParameters, Pose, Posture};
 
-use super::impact::Restitution;
+use crate::plant::{ContactMode, Event, State};
+use crate::statistics::Statistics;
+
+use super::belt::BeltProfile;
+use super::impact::{ImpactLaw, Restitution};
 use super::motion::{theta, theta_dot};
-use super::statistics::Statistics;
-use super::*;
+use super::{ArmOnBelt, ArmProbe, ArmStep, PlantParameters, SolverSettings};
 
 /// The paper's initial conditions, degrees at rest.
 fn at_rest(theta1_deg: f64, theta2_deg: f64) -> State {
@@ -20,8 +23,8 @@ fn x0_d() -> State {
     at_rest(-11.4, -35.1)
 }
 
-fn plant(parameters: &PlantParameters, initial: State) -> Plant {
-    Plant::new(parameters, initial).unwrap()
+fn plant(parameters: &PlantParameters, initial: State) -> ArmOnBelt {
+    ArmOnBelt::new(parameters, initial).unwrap()
 }
 
 /// Largest error of the contact constraint during a run.
@@ -31,8 +34,8 @@ struct ConstraintDrift {
     modes: Vec<ContactMode>,
 }
 
-impl Observer for ConstraintDrift {
-    fn step(&mut self, step: &PlantStep<'_>) {
+impl ArmProbe for ConstraintDrift {
+    fn step(&mut self, step: &ArmStep<'_>) {
         if step.mode.is_contact() {
             self.gap_m = self.gap_m.max(step.motion.gap_m(step.end).abs());
         }
@@ -89,7 +92,7 @@ fn x0_d_slides_to_the_quiet_attractor() {
 fn energy_is_kept_by_a_conservative_bouncing_arm() {
     let mut statistics = Statistics::new(0.0);
     let mut plant = plant(&conservative(), at_rest(40.0, 10.0));
-    let energy = |p: &Plant| p.arm().energy_j(&theta(p.state()), &theta_dot(p.state()));
+    let energy = |p: &ArmOnBelt| p.arm().energy_j(&theta(p.state()), &theta_dot(p.state()));
     let start = energy(&plant);
     let mut worst = 0.0_f64;
     for second in 1..=100 {
@@ -171,7 +174,7 @@ fn a_reversing_belt_makes_the_tip_stick_and_slide_back() {
 
 #[test]
 fn a_start_deep_inside_the_belt_is_refused() {
-    let error = Plant::new(&PlantParameters::default(), at_rest(0.0, 0.0)).unwrap_err();
+    let error = ArmOnBelt::new(&PlantParameters::default(), at_rest(0.0, 0.0)).unwrap_err();
     assert_eq!(error.key, "initial tip height over the belt in m");
 }
 
@@ -248,7 +251,7 @@ fn the_attractor_is_in_torque_balance() {
 }
 
 /// Whether a plant that cannot go on stands at full stretch, where Q is singular.
-fn is_at_full_stretch(plant: &Plant) -> bool {
+fn is_at_full_stretch(plant: &ArmOnBelt) -> bool {
     let tip_t_m = plant.motion().tip_t_m(plant.state());
     (plant.arm().reach_on_belt_m() - tip_t_m.abs()).abs() < 1e-7
 }

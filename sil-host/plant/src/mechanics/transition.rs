@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::dop853::{DenseStep, Step};
 use super::event::{first_negative, stays_above};
-use super::motion::{ContactMode, Motion, State, theta, theta_dot};
+use super::motion::{Motion, theta, theta_dot};
+use crate::plant::{ContactMode, State};
 
 /// What follows where p < 0 and b ≥ 0, so that sliding and flight both solve
 /// the equations.

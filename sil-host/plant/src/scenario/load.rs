@@ -7,7 +7,7 @@ use painleve_shared::range::OutOfRange;
 use toml::{Table, Value};
 
 use super::{Scenario, built_in};
-use crate::mechanics::Plant;
+use crate::mechanics::ArmOnBelt;
 
 /// Why there is no scenario to run.
 #[derive(Debug, thiserror::Error)]
@@ -76,7 +76,7 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
         let scenario = Self::load_unplaced(name, overrides)?;
-        let plant = Plant::new(&scenario.plant_parameters(), scenario.initial.state());
+        let plant = ArmOnBelt::new(&scenario.plant_parameters(), scenario.initial.state());
         plant.map_err(|source| ScenarioError::Range {
             origin: origin(name),
             source,

@@ -29,8 +29,8 @@ use serde::{Deserialize, Serialize};
 use crate::converters::ConverterSettings;
 use crate::mechanics::belt::BeltProfile;
 use crate::mechanics::impact::ImpactLaw;
-use crate::mechanics::motion::State;
 use crate::mechanics::{PlantParameters, SolverSettings};
+use crate::plant::State;
 
 pub use load::ScenarioError;
 
@@ -277,7 +277,7 @@ impl Scenario {
     }
 
     /// Checks every number, the plant's initial state excepted (see
-    /// [`Plant::new`](crate::mechanics::Plant::new)).
+    /// [`ArmOnBelt::new`](crate::mechanics::ArmOnBelt::new)).
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.

@@ -2,9 +2,10 @@
 
 use painleve_plant::mechanics::dop853::{Step, Tolerance};
 use painleve_plant::mechanics::impact::{ImpactKind, ImpactLaw, state_after};
-use painleve_plant::mechanics::motion::{ContactMode, Motion, State, theta};
+use painleve_plant::mechanics::motion::{Motion, theta};
 use painleve_plant::mechanics::transition::event_functions;
-use painleve_plant::mechanics::{Event, Observer, PlantStep};
+use painleve_plant::mechanics::{ArmProbe, ArmStep};
+use painleve_plant::{ContactMode, Event, State};
 use painleve_shared::Pose;
 
 use super::tangent::{Crossing, Tangent, along, along_by, slope_along};
@@ -62,7 +63,7 @@ impl ArmTangent {
     }
 
     /// Carries the deviation across what happened between the last step and this one.
-    fn cross(&mut self, mode: ContactMode, state: &State, now: &PlantStep<'_>) {
+    fn cross(&mut self, mode: ContactMode, state: &State, now: &ArmStep<'_>) {
         let (motion, time_s) = (now.motion, now.start_s);
         let flow_before = motion.derivative(mode, time_s, state);
         let functions = |x: &State| event_functions(motion, mode, time_s, x);
@@ -143,8 +144,8 @@ fn onto_manifold(motion: &Motion<'_>, time_s: f64, mode: ContactMode, state: &St
     }
 }
 
-impl Observer for ArmTangent {
-    fn step(&mut self, now: &PlantStep<'_>) {
+impl ArmProbe for ArmTangent {
+    fn step(&mut self, now: &ArmStep<'_>) {
         if let Some((mode, state)) = self.before
             && (mode != now.mode || !self.impacts.is_empty())
         {

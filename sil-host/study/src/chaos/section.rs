@@ -3,8 +3,8 @@
 use painleve_plant::mechanics::dop853::{Step, Tolerance};
 use painleve_plant::mechanics::event::first_negative;
 use painleve_plant::mechanics::impact::ImpactLaw;
-use painleve_plant::mechanics::motion::State;
-use painleve_plant::mechanics::{Event, Observer, PlantStep};
+use painleve_plant::mechanics::{ArmProbe, ArmStep};
+use painleve_plant::{Event, State};
 
 use super::arm::ArmTangent;
 use super::tangent::Tangent;
@@ -57,7 +57,7 @@ impl Returns {
     }
 
     /// The first time at which θ̇1 turns positive in a step, s, and the state there.
-    fn upward_zero(&mut self, now: &PlantStep<'_>) -> Option<(f64, State)> {
+    fn upward_zero(&mut self, now: &ArmStep<'_>) -> Option<(f64, State)> {
         let (motion, mode, size_s) = (now.motion, now.mode, now.end_s - now.start_s);
         let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
         let slope = derivative(now.start_s, now.start);
@@ -104,8 +104,8 @@ impl Returns {
     }
 }
 
-impl Observer for Returns {
-    fn step(&mut self, now: &PlantStep<'_>) {
+impl ArmProbe for Returns {
+    fn step(&mut self, now: &ArmStep<'_>) {
         let jumped = self
             .tangent
             .before()

@@ -9,9 +9,10 @@ mod diagram;
 
 use std::collections::BTreeMap;
 
-use painleve_plant::mechanics::motion::{State, theta};
-use painleve_plant::mechanics::statistics::Statistics;
+use painleve_plant::State;
+use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{InitialState, Scenario};
+use painleve_plant::statistics::Statistics;
 use painleve_shared::{Arm, Posture};
 use serde::Serialize;
 

@@ -1,9 +1,8 @@
 //! The first flight of some length, at the plant's own resolution.
 
-use painleve_plant::mechanics::motion::State;
-use painleve_plant::mechanics::{Event, Observer, PlantStep};
+use painleve_plant::{Event, Probe, State, Step};
 
-/// Watches for the first flight that is long enough to be noticed in time.
+/// Looks for the first flight that is long enough to be noticed in time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FirstFlight {
     from_s: f64,
@@ -15,7 +14,7 @@ pub(super) struct FirstFlight {
 }
 
 impl FirstFlight {
-    /// Watches from `from_s` on for a flight of more than `shortest_s`.
+    /// Looks from `from_s` on for a flight of more than `shortest_s`.
     pub(super) fn new(from_s: f64, shortest_s: f64) -> Self {
         Self {
             from_s,
@@ -41,15 +40,15 @@ impl FirstFlight {
     }
 }
 
-impl Observer for FirstFlight {
-    fn step(&mut self, step: &PlantStep<'_>) {
-        if step.start_s < self.from_s {
+impl Probe for FirstFlight {
+    fn step(&mut self, step: &impl Step) {
+        if step.start_s() < self.from_s {
             return;
         }
-        match (step.mode.is_contact(), self.start_s) {
-            (false, _) => self.leaves(step.start_s),
+        match (step.mode().is_contact(), self.start_s) {
+            (false, _) => self.leaves(step.start_s()),
             (true, Some(_)) => {
-                self.end_s.get_or_insert(step.start_s);
+                self.end_s.get_or_insert(step.start_s());
             }
             _ => {}
         }

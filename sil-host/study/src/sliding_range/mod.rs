@@ -11,8 +11,8 @@ mod outcome;
 
 use std::collections::BTreeMap;
 
-use painleve_plant::mechanics::statistics::Statistics;
 use painleve_plant::scenario::Scenario;
+use painleve_plant::statistics::Statistics;
 use painleve_shared::{Arm, Posture, Slip};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -4,24 +4,29 @@ use nalgebra::Matrix4;
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::mechanics::impact::Restitution;
 use painleve_plant::mechanics::motion::theta;
-use painleve_plant::mechanics::statistics::Statistics;
-use painleve_plant::mechanics::{Plant, PlantParameters, SolverSettings};
+use painleve_plant::mechanics::{ArmOnBelt, PlantParameters, SolverSettings};
+use painleve_plant::statistics::Statistics;
 use painleve_shared::{Arm, ArmParameters, Pose, Posture};
 
 use super::*;
 
-/// Sees the modes a run goes through.
-#[derive(Default)]
-struct Modes(Vec<ContactMode>);
+/// The deviation from a run, and the modes that the run goes through.
+struct TangentAndModes {
+    tangent: ArmTangent,
+    modes: Vec<ContactMode>,
+}
 
-impl Observer for Modes {
-    fn step(&mut self, step: &PlantStep<'_>) {
-        if self.0.last() != Some(&step.mode) {
-            self.0.push(step.mode);
+impl ArmProbe for TangentAndModes {
+    fn step(&mut self, step: &ArmStep<'_>) {
+        self.tangent.step(step);
+        if self.modes.last() != Some(&step.mode) {
+            self.modes.push(step.mode);
         }
     }
 
-    fn event(&mut self, _: f64, _: Event, _: &State) {}
+    fn event(&mut self, time_s: f64, event: Event, state: &State) {
+        self.tangent.event(time_s, event, state);
+    }
 }
 
 fn accurate() -> PlantParameters {
@@ -42,13 +47,14 @@ fn run(
     direction: State,
     duration_s: f64,
 ) -> (State, State, Vec<ContactMode>) {
-    let mut plant = Plant::new(parameters, start).unwrap();
-    let mut tangent = ArmTangent::new(parameters.impact, Tangent::along(direction));
-    let mut modes = Modes::default();
-    plant
-        .advance(duration_s, &mut (&mut tangent, &mut modes))
-        .unwrap();
-    (*plant.state(), tangent.tangent().deviation(), modes.0)
+    let mut plant = ArmOnBelt::new(parameters, start).unwrap();
+    let mut probe = TangentAndModes {
+        tangent: ArmTangent::new(parameters.impact, Tangent::along(direction)),
+        modes: Vec::new(),
+    };
+    plant.advance(duration_s, &mut probe).unwrap();
+    let deviation = probe.tangent.tangent().deviation();
+    (*plant.state(), deviation, probe.modes)
 }
 
 /// The deviation is the difference of neighbours that start at `start(±ε)`, over 2ε.
@@ -74,7 +80,7 @@ fn assert_as_neighbours(
 /// A state of the bouncing arm, in flight.
 fn bouncing(parameters: &PlantParameters) -> State {
     let initial = State::new(32_f64.to_radians(), 18.27_f64.to_radians(), 0.0, 0.0);
-    let mut plant = Plant::new(parameters, initial).unwrap();
+    let mut plant = ArmOnBelt::new(parameters, initial).unwrap();
     plant.advance(1.0, &mut ()).unwrap();
     while plant.motion().gap_m(plant.state()) < 1e-3 {
         plant.advance(plant.time_s() + 1e-3, &mut ()).unwrap();
@@ -175,7 +181,7 @@ fn a_conservative_arm_keeps_the_volume_of_deviations() {
     let rates = Matrix4::from_columns(&ends.clone().map(|(_, deviation, _)| deviation));
     let volume = rates.determinant() * inertia(&ends[0].0) / inertia(&start);
     assert!((volume - 1.0).abs() < 1e-5, "{volume}");
-    let mut plant = Plant::new(&parameters, start).unwrap();
+    let mut plant = ArmOnBelt::new(&parameters, start).unwrap();
     let mut statistics = Statistics::new(0.0);
     plant.advance(2.0, &mut statistics).unwrap();
     assert!(statistics.impacts >= 2);

@@ -1,7 +1,6 @@
 //! What happened in a run, as plain numbers.
 
-use super::motion::{ContactMode, State};
-use super::{Event, Observer, PlantStep};
+use crate::plant::{ContactMode, Event, Probe, State, Step};
 
 /// Counts and extremes of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,26 +53,20 @@ impl Statistics {
     }
 }
 
-impl Observer for Statistics {
-    fn step(&mut self, step: &PlantStep<'_>) {
-        let motion = step.motion;
-        let duration = step.end_s - step.start_s;
+impl Probe for Statistics {
+    fn step(&mut self, step: &impl Step) {
+        let duration = step.end_s() - step.start_s();
         self.total_s += duration;
-        if step.mode.is_contact() {
+        if step.mode().is_contact() {
             self.contact_s += duration;
         }
-        for (t_s, state) in [(step.start_s, step.start), (step.end_s, step.end)] {
-            self.max_tip_t_m = self.max_tip_t_m.max(motion.tip_t_m(state));
-            self.peak_torque_nm = self.peak_torque_nm.max(motion.torque.at(t_s).amax());
-            if t_s >= self.settling_s {
-                let normal = if step.mode.is_contact() {
-                    let terms = motion.terms(t_s, state);
-                    motion.force_n(t_s, step.mode, &terms).y
-                } else {
-                    0.0
-                };
+        for at in [step.start(), step.end()] {
+            let [u1, u2] = at.torque_nm;
+            self.max_tip_t_m = self.max_tip_t_m.max(at.tip_t_m);
+            self.peak_torque_nm = self.peak_torque_nm.max(u1.abs()).max(u2.abs());
+            if at.time_s >= self.settling_s {
                 // At the instant of a lift-off rounding may leave a negative zero.
-                self.min_normal_force_n = self.min_normal_force_n.min(normal.max(0.0));
+                self.min_normal_force_n = self.min_normal_force_n.min(at.normal_force_n.max(0.0));
             }
         }
     }

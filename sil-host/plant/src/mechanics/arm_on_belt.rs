@@ -1,0 +1,489 @@
+//! The simulated arm on its belt: its state, and how it goes from one event to the next.
+
+use nalgebra::Vector2;
+use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::{Arm, Slip};
+
+use crate::plant::{ContactMode, Event, Plant, PlantError, Probe, Snapshot, State};
+
+use super::belt::BeltProfile;
+use super::dop853::{Step, Tolerance};
+use super::impact::{self, ImpactKind, ImpactLaw};
+use super::motion::{Motion, theta};
+use super::parameters::{PlantParameters, SolverSettings};
+use super::probe::{ArmProbe, ArmStep};
+use super::torque::TorqueSegment;
+use super::transition::{self, Next};
+
+/// Why the plant cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// The integrator needs steps below rounding of the time.
+    #[error("the plant's step size vanished at t = {time_s} s in mode {mode:?}")]
+    StepVanished {
+        /// When, s.
+        time_s: f64,
+        /// In which mode.
+        mode: ContactMode,
+    },
+    /// Events follow each other without time passing.
+    #[error("contact events without end at t = {time_s} s")]
+    EventsWithoutEnd {
+        /// When, s.
+        time_s: f64,
+    },
+    /// A collision has no solution.
+    #[error("at t = {time_s} s: {source}")]
+    EndlessImpact {
+        /// When, s.
+        time_s: f64,
+        /// Which.
+        source: impact::EndlessImpact,
+    },
+}
+
+/// Corrections of an event's time that the first-order change of the state
+/// carries without loss, s.
+const FIRST_ORDER_S: f64 = 1e-8;
+
+/// More events than any motion has within the shortest time that matters.
+const MAXIMUM_EVENTS_AT_ONE_TIME: u32 = 1000;
+
+/// The simulated arm on its belt.
+#[derive(Clone, Debug)]
+pub struct ArmOnBelt {
+    arm: Arm<f64>,
+    friction: f64,
+    belt: BeltProfile,
+    impact: ImpactLaw,
+    solver: SolverSettings,
+    torque: TorqueSegment,
+    time_s: f64,
+    state: State,
+    mode: ContactMode,
+    /// Where the tip came to stick: time (s) and z_t (m).
+    stick_start: (f64, f64),
+    /// The torque or the belt has changed since the mode was decided.
+    unsettled: bool,
+    step_size_s: f64,
+    /// Derivative at the present state, where the last step left it; not after
+    /// anything that changes the state or the equations.
+    end_slope: Option<State>,
+    step: Box<Step<4>>,
+}
+
+impl ArmOnBelt {
+    /// A plant at time zero with zero torque. A tip within 0.1 mm over the belt or
+    /// 1 mm inside it is first put onto the belt.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first parameter that is out of range.
+    pub fn new(parameters: &PlantParameters, initial: State) -> Result<Self, OutOfRange> {
+        let arm = Arm::new(parameters.arm)?;
+        range::check("belt.friction", parameters.friction, 0.0, 10.0)?;
+        parameters.belt.validate()?;
+        parameters.impact.validate()?;
+        parameters.solver.validate()?;
+        let pi = core::f64::consts::PI;
+        range::check("initial.theta1_deg", initial[0].to_degrees(), -180.0, 180.0)?;
+        range::check("initial.theta2_deg", initial[1].to_degrees(), -180.0, 180.0)?;
+        range::check(
+            "initial.theta1_dot_rad_s",
+            initial[2],
+            -100.0 * pi,
+            100.0 * pi,
+        )?;
+        range::check(
+            "initial.theta2_dot_rad_s",
+            initial[3],
+            -100.0 * pi,
+            100.0 * pi,
+        )?;
+
+        let mut plant = Self {
+            arm,
+            friction: parameters.friction,
+            belt: parameters.belt,
+            impact: parameters.impact,
+            solver: parameters.solver,
+            torque: TorqueSegment::constant(Vector2::zeros()),
+            time_s: 0.0,
+            state: initial,
+            mode: ContactMode::Flight,
+            stick_start: (0.0, 0.0),
+            unsettled: false,
+            step_size_s: 1e-3,
+            end_slope: None,
+            step: Box::new(Step::empty()),
+        };
+        let motion = plant.motion();
+        let gap_m = motion.gap_m(&initial);
+        range::check(
+            "initial tip height over the belt in m",
+            gap_m,
+            -INSIDE_AT_START_M,
+            parameters.arm.height_m + 2.0 * parameters.arm.link_length_m,
+        )?;
+        if gap_m < CONTACT_AT_START_M {
+            let on_belt = motion.lowered_onto_belt(&initial);
+            let velocity = motion.relative_velocity_m_s(0.0, &on_belt);
+            if velocity.y <= plant.solver.chatter_speed_m_s {
+                plant.state = motion.onto_belt(&on_belt);
+                plant.mode = ContactMode::slide(Slip::of(velocity.x));
+                plant.unsettled = true;
+            } else {
+                plant.state = on_belt;
+            }
+        }
+        Ok(plant)
+    }
+
+    /// The arm's model.
+    pub fn arm(&self) -> &Arm<f64> {
+        &self.arm
+    }
+
+    /// Present time, s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Present state.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Present contact mode.
+    pub fn mode(&self) -> ContactMode {
+        self.mode
+    }
+
+    /// Joint torques applied now, (u1, u2), N·m.
+    pub fn torque_nm(&self) -> Vector2<f64> {
+        self.torque.at(self.time_s)
+    }
+
+    /// The equations of the present stretch of motion.
+    pub fn motion(&self) -> Motion<'_> {
+        Motion {
+            arm: &self.arm,
+            belt: &self.belt,
+            friction: self.friction,
+            torque: self.torque,
+        }
+    }
+
+    /// Contact force (f_t, f_n) on the tip now, N; impulses are not part of it.
+    pub fn contact_force_n(&self) -> Vector2<f64> {
+        let motion = self.motion();
+        let terms = motion.terms(self.time_s, &self.state);
+        motion.force_n(self.time_s, self.mode, &terms)
+    }
+
+    /// Commands joint torques `target_nm` from now on, through a stage with
+    /// time constant `lag_s` (0 for none).
+    pub fn command_torque(&mut self, target_nm: Vector2<f64>, lag_s: f64) {
+        let next = self.torque.followed_by(self.time_s, target_nm, lag_s);
+        if next.at(self.time_s) != self.torque.at(self.time_s) {
+            self.unsettled = true;
+        }
+        self.end_slope = None;
+        self.torque = next;
+    }
+
+    /// Decides the contact mode at the present time, so that forces are those
+    /// after the last command.
+    ///
+    /// # Errors
+    /// [`MotionError`] if no mode is possible.
+    pub fn settle(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+        if self.unsettled && self.mode.is_contact() {
+            self.enter_contact(probe)?;
+        }
+        self.unsettled = false;
+        Ok(())
+    }
+
+    /// Integrates to time `until_s`.
+    ///
+    /// # Errors
+    /// [`MotionError`]; the plant stands at the time of the error.
+    pub fn advance(&mut self, until_s: f64, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+        while self.time_s < until_s {
+            let corner = self.belt.next_corner_s(self.time_s).min(until_s);
+            self.settle(probe)?;
+            self.advance_smoothly(corner, probe)?;
+            self.unsettled |= corner < until_s;
+        }
+        self.settle(probe)
+    }
+
+    /// Integrates to a time before which torque and belt are smooth.
+    fn advance_smoothly(
+        &mut self,
+        until_s: f64,
+        probe: &mut impl ArmProbe,
+    ) -> Result<(), MotionError> {
+        let mut events = 0;
+        let mut event_s = self.time_s;
+        while self.time_s < until_s {
+            let remaining = until_s - self.time_s;
+            if remaining <= 4.0 * f64::EPSILON * until_s.abs() {
+                self.time_s = until_s;
+                break;
+            }
+            let Some(event) = self.step_or_event(until_s, probe)? else {
+                continue;
+            };
+            events = if event > event_s + 1e-9 {
+                0
+            } else {
+                events + 1
+            };
+            event_s = event;
+            if events > MAXIMUM_EVENTS_AT_ONE_TIME {
+                return Err(MotionError::EventsWithoutEnd { time_s: event });
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes one good step, or goes to the first event in it and returns its time.
+    fn step_or_event(
+        &mut self,
+        until_s: f64,
+        probe: &mut impl ArmProbe,
+    ) -> Result<Option<f64>, MotionError> {
+        let motion = Motion {
+            arm: &self.arm,
+            belt: &self.belt,
+            friction: self.friction,
+            torque: self.torque,
+        };
+        let tolerance = Tolerance {
+            relative: self.solver.relative_tolerance,
+            absolute: self.solver.absolute_tolerance,
+        };
+        let (mode, start_s, start) = (self.mode, self.time_s, self.state);
+        let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
+        let slope = self
+            .end_slope
+            .take()
+            .unwrap_or_else(|| derivative(start_s, &start));
+        let remaining = until_s - start_s;
+        loop {
+            let wanted = self.step_size_s.min(self.solver.maximum_step_s);
+            let size = wanted.min(remaining);
+            self.step
+                .take(&derivative, start_s, &start, &slope, size, &tolerance);
+            if self.step.error <= 1.0 {
+                // A step cut short says nothing against a longer one.
+                let proposed = self.step.proposed_size();
+                self.step_size_s = if size < wanted {
+                    wanted.max(proposed)
+                } else {
+                    proposed
+                };
+                break;
+            }
+            self.step_size_s = if self.step.error.is_finite() {
+                self.step.proposed_size()
+            } else {
+                0.1 * size
+            };
+            if start_s + self.step_size_s == start_s {
+                return Err(MotionError::StepVanished {
+                    time_s: start_s,
+                    mode,
+                });
+            }
+        }
+        self.step.finish(&derivative);
+
+        let mut event = transition::first_event_s(&motion, mode, &mut self.step);
+        if let Some(event_s) = event.as_mut() {
+            // The polynomial that located the event is less accurate than a
+            // step. What a step leaves of the gap is removed by Newton's method in
+            // time, because putting the tip onto the belt by force would change
+            // the energy.
+            for _ in 0..3 {
+                let size = *event_s - start_s;
+                self.step
+                    .take(&derivative, start_s, &start, &slope, size, &tolerance);
+                let correction = transition::landing_correction_s(&motion, mode, &self.step.end);
+                if *event_s + correction <= start_s {
+                    break;
+                }
+                let exact = correction.abs() < FIRST_ORDER_S;
+                if exact {
+                    let end_slope = derivative(*event_s, &self.step.end);
+                    self.step.end += end_slope * correction;
+                }
+                *event_s += correction;
+                if exact {
+                    break;
+                }
+            }
+        }
+        let end_s = event.unwrap_or(if self.step.h == remaining {
+            until_s
+        } else {
+            start_s + self.step.h
+        });
+        let end = match mode {
+            ContactMode::Flight => self.step.end,
+            ContactMode::SlidePositive | ContactMode::SlideNegative => {
+                motion.onto_belt(&self.step.end)
+            }
+            ContactMode::Stick => {
+                let (since, anchor) = self.stick_start;
+                let tip = anchor + self.belt.displacement_m(since, end_s);
+                motion.onto_stick(end_s, tip, &self.step.end)
+            }
+        };
+        probe.step(&ArmStep {
+            motion: &motion,
+            mode,
+            start_s,
+            start: &start,
+            end_s,
+            end: &end,
+        });
+        self.time_s = end_s;
+        self.state = end;
+        if event.is_none() && mode == ContactMode::Flight {
+            self.end_slope = Some(*self.step.end_slope());
+        }
+        if event.is_some() {
+            self.handle_event(probe)?;
+        }
+        Ok(event)
+    }
+
+    /// The tip has landed, or sliding or sticking cannot go on.
+    fn handle_event(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+        if self.mode.is_contact() {
+            let motion = self.motion();
+            let slip = motion.relative_velocity_m_s(self.time_s, &self.state).x;
+            if self
+                .mode
+                .slip()
+                .is_some_and(|s| s.sign::<f64>() * slip <= 0.0)
+            {
+                // Slip has just died; what is left of it is the resolution of time.
+                self.state =
+                    motion.onto_stick(self.time_s, motion.tip_t_m(&self.state), &self.state);
+            }
+            return self.enter_contact(probe);
+        }
+        let motion = self.motion();
+        let state = motion.lowered_onto_belt(&self.state);
+        let approach_m_s = motion.relative_velocity_m_s(self.time_s, &state).y;
+        self.state = state;
+        if approach_m_s < 0.0 {
+            self.collide(probe, Event::Impact { approach_m_s })?;
+        }
+        let motion = self.motion();
+        let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
+        if rebound < self.solver.chatter_speed_m_s {
+            self.state = motion.onto_belt(&self.state);
+            self.enter_contact(probe)?;
+        }
+        Ok(())
+    }
+
+    /// The tip is on the belt without normal velocity: decides what follows.
+    fn enter_contact(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+        // Each throw that does not lift the tip ends its slip, which leaves
+        // only sticking and sliding from rest.
+        for _ in 0..4 {
+            let motion = self.motion();
+            let next =
+                transition::decide(&motion, self.time_s, &self.state, self.solver.indeterminate);
+            match next {
+                Next::Mode(mode) => {
+                    if mode == ContactMode::Stick && self.mode != ContactMode::Stick {
+                        let tip_t_m = motion.tip_t_m(&self.state);
+                        self.state = motion.onto_stick(self.time_s, tip_t_m, &self.state);
+                        self.stick_start = (self.time_s, tip_t_m);
+                    }
+                    self.change_mode(mode, probe);
+                    return Ok(());
+                }
+                Next::Thrown => {
+                    self.collide(probe, Event::ImpactWithoutCollision)?;
+                    let motion = self.motion();
+                    let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
+                    if rebound >= self.solver.chatter_speed_m_s {
+                        self.change_mode(ContactMode::Flight, probe);
+                        return Ok(());
+                    }
+                    self.state = motion.onto_belt(&self.state);
+                }
+            }
+        }
+        Err(MotionError::EventsWithoutEnd {
+            time_s: self.time_s,
+        })
+    }
+
+    fn collide(&mut self, probe: &mut impl ArmProbe, event: Event) -> Result<(), MotionError> {
+        let motion = self.motion();
+        let kind = if event == Event::ImpactWithoutCollision {
+            ImpactKind::WithoutCollision
+        } else {
+            ImpactKind::Collision
+        };
+        self.state = impact::state_after(&motion, &self.impact, self.time_s, &self.state, kind)
+            .map_err(|source| MotionError::EndlessImpact {
+                time_s: self.time_s,
+                source,
+            })?;
+        probe.event(self.time_s, event, &self.state);
+        Ok(())
+    }
+
+    fn change_mode(&mut self, mode: ContactMode, probe: &mut impl ArmProbe) {
+        if mode != self.mode {
+            let from = core::mem::replace(&mut self.mode, mode);
+            probe.event(
+                self.time_s,
+                Event::ModeChange { from, to: mode },
+                &self.state,
+            );
+        }
+    }
+}
+
+impl Plant for ArmOnBelt {
+    fn snapshot(&self) -> Snapshot {
+        self.motion().snapshot(self.mode, self.time_s, &self.state)
+    }
+
+    fn command_torque(&mut self, target_nm: Vector2<f64>, lag_s: f64) {
+        Self::command_torque(self, target_nm, lag_s);
+    }
+
+    fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError> {
+        Self::advance(self, until_s, probe).map_err(PlantError::new)
+    }
+
+    fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    fn joint_angles_rad(&self) -> Vector2<f64> {
+        theta(&self.state)
+    }
+
+    fn contact_force_n(&self) -> Vector2<f64> {
+        Self::contact_force_n(self)
+    }
+}
+
+/// A tip closer to the belt than this at the start is taken to touch it, m: the
+/// paper gives its initial conditions to three digits.
+const CONTACT_AT_START_M: f64 = 1e-4;
+
+/// Deepest start inside the belt that still counts as rounding of a start on it, m.
+const INSIDE_AT_START_M: f64 = 1e-3;

@@ -1,0 +1,63 @@
+//! Seeing the motion of the arm on its belt, with the equations that gave it.
+
+use crate::plant::{ContactMode, Event, Probe, Snapshot, State, Step};
+
+use super::motion::Motion;
+
+/// One accepted step of the arm on its belt.
+#[derive(Clone, Copy, Debug)]
+pub struct ArmStep<'a> {
+    /// The equations of the step.
+    pub motion: &'a Motion<'a>,
+    /// The contact mode during the step.
+    pub mode: ContactMode,
+    /// Start time, s.
+    pub start_s: f64,
+    /// State at the start.
+    pub start: &'a State,
+    /// End time, s.
+    pub end_s: f64,
+    /// State at the end.
+    pub end: &'a State,
+}
+
+/// Sees the motion of the arm on its belt together with its equations.
+pub trait ArmProbe {
+    /// Called after every accepted step.
+    fn step(&mut self, step: &ArmStep<'_>);
+    /// Called at every discontinuity; `state` is the one after it.
+    fn event(&mut self, time_s: f64, event: Event, state: &State);
+}
+
+/// Whoever sees any plant sees this one, too.
+impl<P: Probe> ArmProbe for P {
+    fn step(&mut self, step: &ArmStep<'_>) {
+        Probe::step(self, step);
+    }
+
+    fn event(&mut self, time_s: f64, event: Event, state: &State) {
+        Probe::event(self, time_s, event, state);
+    }
+}
+
+impl Step for ArmStep<'_> {
+    fn start_s(&self) -> f64 {
+        self.start_s
+    }
+
+    fn end_s(&self) -> f64 {
+        self.end_s
+    }
+
+    fn mode(&self) -> ContactMode {
+        self.mode
+    }
+
+    fn start(&self) -> Snapshot {
+        self.motion.snapshot(self.mode, self.start_s, self.start)
+    }
+
+    fn end(&self) -> Snapshot {
+        self.motion.snapshot(self.mode, self.end_s, self.end)
+    }
+}

@@ -1,0 +1,99 @@
+//! What a plant is to the bench: something with two joints and a tip that reads torque and time.
+//!
+//! Converters, closed loop, records and closed-loop studies know a [`Plant`] only. The arm on its
+//! belt ([`crate::mechanics`]) is the one that is built in; `examples/own-plant` adds another.
+
+mod contact_mode;
+mod probe;
+
+use nalgebra::{Vector2, Vector4};
+
+pub use contact_mode::ContactMode;
+pub use probe::{Event, Probe, Step};
+
+/// Both joints as one vector: θ1, θ2 (rad, from the downward vertical), θ̇1, θ̇2 (rad/s).
+pub type State = Vector4<f64>;
+
+/// A machine with two joints whose tip may touch a moving surface.
+///
+/// Time starts at 0 s and only moves in [`advance`](Self::advance). Equal calls must give equal
+/// bits, or runs cannot be repeated.
+pub trait Plant {
+    /// Everything that can be known about the present, after the last torque command.
+    fn snapshot(&self) -> Snapshot;
+
+    /// Commands joint torques (u1, u2) in N·m from now on. The torque reaches them as a
+    /// first-order lag with time constant `lag_s`, at once if that is zero. A plant without
+    /// such a lag may ignore it if its scenarios leave `converters.torque.lag_s` at zero.
+    fn command_torque(&mut self, target_nm: Vector2<f64>, lag_s: f64);
+
+    /// Moves on to time `until_s`, showing every step and every discontinuity to `probe`. To
+    /// advance to the present is to decide what the last command makes of the contact.
+    ///
+    /// # Errors
+    /// [`PlantError`] if the motion cannot be continued.
+    fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError>;
+
+    /// Present time, s.
+    fn time_s(&self) -> f64 {
+        self.snapshot().time_s
+    }
+
+    /// Angles that the encoders read: (θ1, θ2) from the downward vertical, rad.
+    fn joint_angles_rad(&self) -> Vector2<f64> {
+        self.snapshot().theta_rad.into()
+    }
+
+    /// Force of the surface on the tip (f_t, f_n), N; impulses are not part of it.
+    fn contact_force_n(&self) -> Vector2<f64> {
+        let now = self.snapshot();
+        Vector2::new(now.tangential_force_n, now.normal_force_n)
+    }
+}
+
+/// Why a plant cannot go on: the reason of the particular plant.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+pub struct PlantError(Box<dyn std::error::Error + Send + Sync>);
+
+impl PlantError {
+    /// The reason of a particular plant.
+    pub fn new(reason: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self(Box::new(reason))
+    }
+}
+
+/// A plant at an instant. What a plant does not have may stay at its default, zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Snapshot {
+    /// Simulated time, s.
+    pub time_s: f64,
+    /// Angles θ1, θ2 from the downward vertical, rad.
+    pub theta_rad: [f64; 2],
+    /// Their rates, rad/s.
+    pub theta_dot_rad_s: [f64; 2],
+    /// Their accelerations, rad/s².
+    pub theta_ddot_rad_s2: [f64; 2],
+    /// Position of the tip along the belt z_t, m.
+    pub tip_t_m: f64,
+    /// Height of the tip over the belt, m.
+    pub gap_m: f64,
+    /// Velocity at which that height grows, m/s.
+    pub gap_rate_m_s: f64,
+    /// Velocity of the tip relative to the belt ż_r, m/s.
+    pub slip_velocity_m_s: f64,
+    /// Velocity of the belt v_belt, m/s.
+    pub belt_speed_m_s: f64,
+    /// Normal force f_n, N.
+    pub normal_force_n: f64,
+    /// Tangential force f_t, N.
+    pub tangential_force_n: f64,
+    /// Free normal acceleration b, m/s².
+    pub b_m_s2: f64,
+    /// p for the present direction of slip, 1/kg.
+    pub p_per_kg: f64,
+    /// Torques u1, u2 that act on the joints, N·m.
+    pub torque_nm: [f64; 2],
+    /// What holds the tip.
+    pub mode: ContactMode,
+}
