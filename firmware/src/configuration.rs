@@ -5,8 +5,8 @@
 
 use painleve_shared::counts::{EncoderScale, LinearScale};
 use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::settings::{SettingValue, Settings};
-use painleve_shared::{Arm, ArmParameters, Real, check_setting};
+use painleve_shared::settings::Settings;
+use painleve_shared::{Arm, ArmParameters, Real, check_setting, settings};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::belt::BeltSettings;
@@ -17,6 +17,7 @@ use crate::estimate::friction::FrictionSettings;
 use crate::estimate::joints::EstimatorSettings;
 use crate::guard::GuardSettings;
 use crate::law::LawSettings;
+use crate::law::hybrid::HybridSettings;
 use crate::recover::RecoverySettings;
 use crate::refer::governor::GovernorSettings;
 use crate::refer::reference::Program;
@@ -50,7 +51,41 @@ impl Converters {
     }
 }
 
-/// Configuration of the controller.
+settings! {
+    /// Settings of the controller, group by group.
+    pub struct ControllerSettings {
+        /// Largest torque on either joint; at most the torque stages' range.
+        torque_limit_nm: f32 = 5.0, 0.0..=1e6, "N·m";
+        /// How rates are estimated from counts.
+        estimator: EstimatorSettings = EstimatorSettings::default();
+        /// When the tip is taken to touch the belt.
+        contact: ContactSettings = ContactSettings::default();
+        /// How friction is estimated.
+        friction: FrictionSettings = FrictionSettings::default();
+        /// What is known about the belt.
+        belt: BeltSettings = BeltSettings::default();
+        /// How unknown torques are estimated.
+        disturbance: DisturbanceSettings = DisturbanceSettings::default();
+        /// How the links' length is calibrated.
+        calibration: CalibrationSettings = CalibrationSettings::default();
+        /// When the drive is armed, and when it is shut down.
+        supervisor: SupervisorSettings = SupervisorSettings::default();
+        /// How many lapses in a row are survived.
+        deadlines: DeadlineLimits = DeadlineLimits::default();
+        /// The control law.
+        law: LawSettings = LawSettings::Hybrid(HybridSettings::default());
+        /// How the tip is kept pressed on the belt.
+        guard: GuardSettings = GuardSettings::default();
+        /// How the reference is kept off the paradox.
+        governor: GovernorSettings = GovernorSettings::default();
+        /// How a tip that left the belt is brought back.
+        recovery: RecoverySettings = RecoverySettings::default();
+        /// Where the tip shall go, segment after segment.
+        reference: Program = Program::to_the_papers_limit();
+    }
+}
+
+/// Configuration of the controller: what it is connected to, and its settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
     /// Control rate, Hz.
@@ -59,34 +94,8 @@ pub struct Configuration {
     pub arm: ArmParameters<f32>,
     /// What a count is worth.
     pub converters: Converters,
-    /// Largest torque on either joint, N·m.
-    pub torque_limit_nm: f32,
-    /// How rates are estimated from counts.
-    pub estimator: EstimatorSettings,
-    /// When the tip is taken to touch the belt.
-    pub contact: ContactSettings,
-    /// How friction is estimated.
-    pub friction: FrictionSettings,
-    /// What is known about the belt.
-    pub belt: BeltSettings,
-    /// How unknown torques are estimated.
-    pub disturbance: DisturbanceSettings,
-    /// How the links' length is calibrated.
-    pub calibration: CalibrationSettings,
-    /// When the drive is armed, and when it is shut down.
-    pub supervisor: SupervisorSettings,
-    /// How many lapses in a row are survived.
-    pub deadlines: DeadlineLimits,
-    /// The control law.
-    pub law: LawSettings,
-    /// How the tip is kept pressed on the belt.
-    pub guard: GuardSettings,
-    /// How the reference is kept off the paradox.
-    pub governor: GovernorSettings,
-    /// How a tip that left the belt is brought back.
-    pub recovery: RecoverySettings,
-    /// Where the tip shall go.
-    pub reference: Program,
+    /// The settings.
+    pub settings: ControllerSettings,
 }
 
 impl Configuration {
@@ -105,43 +114,38 @@ impl Configuration {
     /// Checks every number and makes the arm's model.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first setting that is out of range, with its key relative to the
-    /// configuration: `law.hybrid.normal_force_n`.
+    /// [`OutOfRange`] for the first setting that is out of range. Its key is relative to
+    /// [`settings`](Self::settings), as in `law.hybrid.normal_force_n`, or begins with `tick_hz`,
+    /// `arm` or `converters`.
+    // Out of line: its errors do not share the stack with the controller that is being made.
+    #[inline(never)]
     pub fn validate(&self) -> Result<Arm<f32>, OutOfRange> {
         range::check("tick_hz", self.tick_hz, 10.0, 1e5)?;
         let arm = Arm::new(self.arm)?;
         self.converters
             .validate()
             .map_err(|error| error.inside("converters"))?;
-        check_setting!(self.torque_limit_nm, 0.0, self.converters.torque.range)?;
-        within("estimator", self.estimator.validate())?;
-        check_setting!(self.estimator.bandwidth_rad_s, 1.0, 3.0 * self.tick_hz)?;
-        within("contact", self.contact.validate())?;
-        check_setting!(self.contact.contact_n, 1e-3, self.converters.force.range)?;
-        check_setting!(
-            self.contact.force_noise_n,
-            1e-4,
-            self.converters.force.range
-        )?;
-        within("supervisor", self.supervisor.validate())?;
-        within("friction", self.friction.validate())?;
-        within("belt", self.belt.validate())?;
-        within("disturbance", self.disturbance.validate())?;
-        within("calibration", self.calibration.validate())?;
-        within("deadlines", self.deadlines.validate())?;
-        within("law", self.law.check(None))?;
-        within("guard", self.guard.validate())?;
-        within("governor", self.governor.validate())?;
-        within("recovery", self.recovery.validate())?;
-        within("reference", self.reference.check(None))?;
+        self.settings.validate()?;
+        self.relations(&arm)?;
+        Ok(arm)
+    }
+
+    /// Checks the settings whose range depends on what the controller is connected to.
+    fn relations(&self, arm: &Arm<f32>) -> Result<(), OutOfRange> {
+        let settings = &self.settings;
+        let force_range_n = self.converters.force.range;
+        let torque_range_nm = self.converters.torque.range;
+        check_setting!(settings.torque_limit_nm, 0.0, torque_range_nm)?;
+        check_setting!(settings.estimator.bandwidth_rad_s, 1.0, 3.0 * self.tick_hz)?;
+        check_setting!(settings.contact.contact_n, 1e-3, force_range_n)?;
+        check_setting!(settings.contact.force_noise_n, 1e-4, force_range_n)?;
         // A governed reference may be out of reach: it is held at the edge.
-        let reach_m = if self.governor.enabled {
+        let reach_m = if settings.governor.enabled {
             2.0 * self.arm.link_length_m
         } else {
             arm.reach_on_belt_m()
         };
-        within("reference", self.reference.check_reach(reach_m))?;
-        Ok(arm)
+        within("reference", settings.reference.check_reach(reach_m))
     }
 }
 

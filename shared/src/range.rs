@@ -5,7 +5,7 @@ use core::fmt::{self, Write};
 use crate::Real;
 
 /// A number outside its allowed range; NaN and infinities are always outside.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OutOfRange {
     /// The setting's key.
     pub key: Key,
@@ -21,17 +21,23 @@ impl OutOfRange {
     /// The same error with the key relative to what holds the group `name`.
     #[must_use]
     pub fn inside(mut self, name: &'static str) -> Self {
+        self.enclose(name);
+        self
+    }
+
+    /// As [`inside`](Self::inside), in place.
+    #[inline(never)]
+    pub fn enclose(&mut self, name: &'static str) {
         if let Some(place) = self.key.parts.iter_mut().find(|part| part.is_empty()) {
             *place = name;
         }
-        self
     }
 
     /// The same error with the key relative to the list in which the value is the item number
     /// `index`, counted from 0. Indices beyond 15 are shown as `*`.
     #[must_use]
     pub fn at(self, index: usize) -> Self {
-        self.inside(INDICES.get(index).copied().unwrap_or("*"))
+        self.inside(index_name(index))
     }
 }
 
@@ -57,6 +63,11 @@ const MAXIMUM_PARTS: usize = 6;
 const INDICES: [&str; 16] = [
     "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "14", "15",
 ];
+
+/// An index as a part of a key.
+pub(crate) fn index_name(index: usize) -> &'static str {
+    INDICES.get(index).copied().unwrap_or("*")
+}
 
 /// Where a value stands, from the outermost group to the setting, as in a scenario file:
 /// `controller.law.hybrid.normal_force_n`.
@@ -133,22 +144,19 @@ pub fn check<T: Real>(
     minimum: f64,
     maximum: f64,
 ) -> Result<(), OutOfRange> {
-    check_value(value, minimum, maximum).map_err(|error| error.inside(key))
-}
-
-/// [`check`] for a value without a key; the caller adds it with [`OutOfRange::inside`].
-///
-/// # Errors
-/// [`OutOfRange`] with an empty key.
-#[inline]
-pub fn check_value<T: Real>(value: T, minimum: f64, maximum: f64) -> Result<(), OutOfRange> {
-    // In the value's precision: 0.1 is allowed where 0.1 is the bound, and a microcontroller
-    // without double precision compares singles.
-    if value >= T::literal(minimum) && value <= T::literal(maximum) && value.is_finite() {
+    if is_within(value, minimum, maximum) {
         Ok(())
     } else {
-        Err(refused(value.to_f64(), minimum, maximum))
+        Err(refused(value.to_f64(), minimum, maximum).inside(key))
     }
+}
+
+/// Whether `value` is finite and within `minimum ..= maximum`.
+#[inline]
+pub(crate) fn is_within<T: Real>(value: T, minimum: f64, maximum: f64) -> bool {
+    // In the value's precision: 0.1 is allowed where 0.1 is the bound, and a microcontroller
+    // without double precision compares singles.
+    value >= T::literal(minimum) && value <= T::literal(maximum) && value.is_finite()
 }
 
 #[cold]

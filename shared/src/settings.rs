@@ -50,10 +50,10 @@
 
 pub use serde;
 
-use crate::range::{OutOfRange, check_value};
+use crate::range::{Key, OutOfRange, index_name, is_within};
 
 /// A group of settings; [`settings!`](crate::settings!) implements it.
-pub trait Settings {
+pub trait Settings: SettingValue {
     /// Every setting of the group, in the order of the declaration.
     const FIELDS: &'static [Field];
 
@@ -61,7 +61,13 @@ pub trait Settings {
     ///
     /// # Errors
     /// [`OutOfRange`] for the first setting that is out of range, with a key relative to the group.
-    fn validate(&self) -> Result<(), OutOfRange>;
+    fn validate(&self) -> Result<(), OutOfRange> {
+        let mut error = OutOfRange::default();
+        match self.check(None, &mut error) {
+            Ok(()) => Ok(()),
+            Err(Refused) => Err(error),
+        }
+    }
 }
 
 /// What is known about one setting.
@@ -157,8 +163,21 @@ pub trait SettingValue {
     /// Checks the value, or every value inside, against `range` if it is a number.
     ///
     /// # Errors
-    /// [`OutOfRange`] with a key relative to this value.
-    fn check(&self, range: Option<Range>) -> Result<(), OutOfRange>;
+    /// [`Refused`]; then `error` says what is out of range, with a key relative to this value.
+    fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused>;
+}
+
+/// A value is out of range. What there is to say about it is written in place: as results, the
+/// errors of all the settings of a group would be on a microcontroller's stack at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Refused;
+
+/// Adds a name to the key of an error.
+#[doc(hidden)]
+#[cold]
+pub fn named(error: &mut OutOfRange, name: &'static str) -> Refused {
+    error.enclose(name);
+    Refused
 }
 
 macro_rules! numbers {
@@ -167,10 +186,20 @@ macro_rules! numbers {
             const SHAPE: Shape = Shape::$shape;
 
             #[inline]
-            fn check(&self, range: Option<Range>) -> Result<(), OutOfRange> {
-                range.map_or(Ok(()), |range| {
-                    check_value(*self as $real, range.minimum, range.maximum)
-                })
+            fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused> {
+                let value = *self as $real;
+                match range {
+                    Some(range) if !is_within(value, range.minimum, range.maximum) => {
+                        *error = OutOfRange {
+                            key: Key::default(),
+                            value: f64::from(value),
+                            minimum: range.minimum,
+                            maximum: range.maximum,
+                        };
+                        Err(Refused)
+                    }
+                    _ => Ok(()),
+                }
             }
         }
     )*};
@@ -184,7 +213,7 @@ macro_rules! without_a_range {
         impl SettingValue for $type {
             const SHAPE: Shape = Shape::$shape;
 
-            fn check(&self, _: Option<Range>) -> Result<(), OutOfRange> {
+            fn check(&self, _: Option<Range>, _: &mut OutOfRange) -> Result<(), Refused> {
                 Ok(())
             }
         }
@@ -198,8 +227,9 @@ without_a_range!(alloc::string::String: Text);
 impl<T: SettingValue> SettingValue for Option<T> {
     const SHAPE: Shape = Shape::Optional(&T::SHAPE);
 
-    fn check(&self, range: Option<Range>) -> Result<(), OutOfRange> {
-        self.as_ref().map_or(Ok(()), |value| value.check(range))
+    fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused> {
+        self.as_ref()
+            .map_or(Ok(()), |value| value.check(range, error))
     }
 }
 
@@ -209,20 +239,26 @@ impl<T: SettingValue, const N: usize> SettingValue for [T; N] {
         length: N,
     };
 
-    fn check(&self, range: Option<Range>) -> Result<(), OutOfRange> {
-        check_each(self, range)
+    fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused> {
+        check_each(self, range, error)
     }
 }
 
 /// Checks every value of a list; keys are the values' indices.
 ///
 /// # Errors
-/// [`OutOfRange`] for the first value that is out of range.
-pub fn check_each<T: SettingValue>(values: &[T], range: Option<Range>) -> Result<(), OutOfRange> {
-    values
-        .iter()
-        .enumerate()
-        .try_for_each(|(index, value)| value.check(range).map_err(|error| error.at(index)))
+/// [`Refused`] for the first value that is out of range.
+pub fn check_each<T: SettingValue>(
+    values: &[T],
+    range: Option<Range>,
+    error: &mut OutOfRange,
+) -> Result<(), Refused> {
+    for (index, value) in values.iter().enumerate() {
+        value
+            .check(range, error)
+            .map_err(|Refused| named(error, index_name(index)))?;
+    }
+    Ok(())
 }
 
 /// The declared range of a setting of type `T`: a number without one does not compile.
@@ -264,12 +300,13 @@ macro_rules! settings {
             shape: <$type as $crate::settings::SettingValue>::SHAPE,
         }
     };
-    (@check $value:expr, $field:ident, $type:ty, [$($range:expr)?]) => {
+    (@check $value:expr, $error:ident, $field:ident, $type:ty, [$($range:expr)?]) => {
         $crate::settings::SettingValue::check(
             $value,
             const { $crate::settings::declared::<$type>($crate::settings!(@range $($range)?)) },
+            $error,
         )
-        .map_err(|error| error.inside(stringify!($field)))?
+        .map_err(|_| $crate::settings::named($error, stringify!($field)))?
     };
     (@content) => { ::core::option::Option::None };
     (@content ($content:ty)) => {
@@ -319,12 +356,6 @@ macro_rules! settings {
                     @field $field, $type, [$($range)?], [$($($unit)?)?], $($meaning)+
                 )),*
             ];
-
-            fn validate(&self) -> ::core::result::Result<(), $crate::range::OutOfRange> {
-                $($crate::settings!(@check &self.$field, $field, $type, [$($range)?]);)*
-                $($relations(self)?;)?
-                ::core::result::Result::Ok(())
-            }
         }
 
         impl $(<$($generic: $bound),+>)? $crate::settings::SettingValue
@@ -333,11 +364,20 @@ macro_rules! settings {
             const SHAPE: $crate::settings::Shape =
                 $crate::settings::Shape::Group(<Self as $crate::settings::Settings>::FIELDS);
 
+            #[inline(never)]
             fn check(
                 &self,
                 _: ::core::option::Option<$crate::settings::Range>,
-            ) -> ::core::result::Result<(), $crate::range::OutOfRange> {
-                $crate::settings::Settings::validate(self)
+                error: &mut $crate::range::OutOfRange,
+            ) -> ::core::result::Result<(), $crate::settings::Refused> {
+                $($crate::settings!(@check &self.$field, error, $field, $type, [$($range)?]);)*
+                $(
+                    if let ::core::result::Result::Err(relation) = $relations(self) {
+                        *error = relation;
+                        return ::core::result::Result::Err($crate::settings::Refused);
+                    }
+                )?
+                ::core::result::Result::Ok(())
             }
         }
     };
@@ -423,31 +463,41 @@ macro_rules! settings {
                 ),*],
             };
 
+            #[inline(never)]
             fn check(
                 &self,
                 _: ::core::option::Option<$crate::settings::Range>,
-            ) -> ::core::result::Result<(), $crate::range::OutOfRange> {
+                error: &mut $crate::range::OutOfRange,
+            ) -> ::core::result::Result<(), $crate::settings::Refused> {
                 $(
                     $(
                         if let Self::$variant(content) = self {
                             return <$content as $crate::settings::SettingValue>::check(
                                 content,
                                 ::core::option::Option::None,
+                                error,
                             )
-                            .map_err(|error| error.inside($key));
+                            .map_err(|_| $crate::settings::named(error, $key));
                         }
                     )?
                     $(
                         if let Self::$variant { $($field),* } = self {
-                            let check = || {
-                                $($crate::settings!(@check $field, $field, $type, [$($range)?]);)*
+                            type Checked = ::core::result::Result<(), $crate::settings::Refused>;
+                            // A variant with empty braces has nothing to check.
+                            #[allow(unused_variables)]
+                            let check = |error: &mut $crate::range::OutOfRange| -> Checked {
+                                $($crate::settings!(
+                                    @check $field, error, $field, $type, [$($range)?]
+                                );)*
                                 ::core::result::Result::Ok(())
                             };
-                            return $crate::settings::in_variant(
-                                check(),
-                                &<Self as $crate::settings::SettingValue>::SHAPE,
-                                $key,
-                            );
+                            return check(error).map_err(|_| {
+                                $crate::settings::in_variant(
+                                    error,
+                                    &<Self as $crate::settings::SettingValue>::SHAPE,
+                                    $key,
+                                )
+                            });
                         }
                     )?
                 )*
@@ -459,14 +509,11 @@ macro_rules! settings {
 
 /// Adds a variant's name to the key of an error, unless the name is a value beside the settings.
 #[doc(hidden)]
-pub fn in_variant(
-    result: Result<(), OutOfRange>,
-    choice: &Shape,
-    key: &'static str,
-) -> Result<(), OutOfRange> {
+#[cold]
+pub fn in_variant(error: &mut OutOfRange, choice: &Shape, key: &'static str) -> Refused {
     match choice {
-        Shape::Choice { tag: Some(_), .. } => result,
-        _ => result.map_err(|error| error.inside(key)),
+        Shape::Choice { tag: Some(_), .. } => Refused,
+        _ => named(error, key),
     }
 }
 
@@ -476,25 +523,32 @@ pub fn in_variant(
 #[macro_export]
 macro_rules! check_setting {
     ($group:ident $(.$part:ident)+, $minimum:expr, $maximum:expr) => {
-        $crate::settings::SettingValue::check(
+        $crate::settings::check_named(
             &$group $(.$part)+,
-            ::core::option::Option::Some($crate::settings::Range {
-                minimum: f64::from($minimum),
-                maximum: f64::from($maximum),
-            }),
+            f64::from($minimum),
+            f64::from($maximum),
+            &[$(stringify!($part)),+],
         )
-        .map_err(|error| $crate::settings::inside_all(error, &[$(stringify!($part)),+]))
     };
 }
 
-/// Adds the names of groups, from the outermost on, to the key of an error.
+/// Checks a value against bounds; `names` are those of its groups, from the outermost on, and its own.
 #[doc(hidden)]
-#[cold]
-pub fn inside_all(error: OutOfRange, names: &[&'static str]) -> OutOfRange {
-    names
-        .iter()
-        .rev()
-        .fold(error, |error, name| error.inside(name))
+#[inline(never)]
+pub fn check_named<T: SettingValue>(
+    value: &T,
+    minimum: f64,
+    maximum: f64,
+    names: &[&'static str],
+) -> Result<(), OutOfRange> {
+    let mut error = OutOfRange::default();
+    let checked = value.check(Some(Range { minimum, maximum }), &mut error);
+    checked.map_err(|Refused| {
+        for name in names.iter().rev() {
+            error.enclose(name);
+        }
+        error
+    })
 }
 
 #[cfg(test)]

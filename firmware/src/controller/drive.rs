@@ -15,7 +15,7 @@ impl Controller {
     /// Turns a law's answer into counts: kept on the belt, limited, checked.
     pub(super) fn drive(&mut self, output: &LawOutput, model: &Model, observed: &Observation) {
         let mut torque_nm = output.torque_nm;
-        let guard = self.configuration.guard;
+        let guard = self.configuration.settings.guard;
         let slides = observed.contact && observed.friction.slip_seen && observed.p_per_kg > 0.0;
         if guard.enabled && slides {
             let (offset, normal) = model.free_normal_acceleration();
@@ -23,7 +23,7 @@ impl Controller {
                 normal,
                 bound: -observed.p_per_kg * guard.minimum_force_n - offset,
             };
-            let limit = self.configuration.torque_limit_nm;
+            let limit = self.configuration.settings.torque_limit_nm;
             let (guarded_nm, acted) = nearest_torque_nm(&torque_nm, &plane, limit);
             if acted {
                 torque_nm = guarded_nm;
@@ -47,7 +47,7 @@ impl Controller {
             self.supervisor.latch(Fault::NotFinite);
             return;
         }
-        let limit = self.configuration.torque_limit_nm;
+        let limit = self.configuration.settings.torque_limit_nm;
         let scale = self.configuration.converters.torque;
         // What rounding took away is given with the next tick: near the edge, where p is
         // small, half a count of constant torque would be a newton of force.

@@ -75,42 +75,42 @@ impl Controller {
             arm,
             tick_s: configuration.tick_s(),
             estimator: Estimator::new(
-                &configuration.estimator,
+                &configuration.settings.estimator,
                 configuration.converters.encoders,
                 configuration.tick_hz,
             ),
-            contact: ContactObserver::new(&configuration.contact),
+            contact: ContactObserver::new(&configuration.settings.contact),
             friction: FrictionEstimator::new(
-                &configuration.friction,
-                configuration.contact.force_noise_n,
+                &configuration.settings.friction,
+                configuration.settings.contact.force_noise_n,
                 configuration.tick_s(),
             ),
-            belt: BeltObserver::new(&configuration.belt),
+            belt: BeltObserver::new(&configuration.settings.belt),
             disturbance: DisturbanceObserver::new(
-                &configuration.disturbance,
+                &configuration.settings.disturbance,
                 configuration.tick_s(),
             ),
             calibration: LengthCalibration::new(
-                &configuration.calibration,
+                &configuration.settings.calibration,
                 configuration.arm.link_length_m,
                 configuration.arm.height_m,
                 configuration.tick_s(),
             ),
-            supervisor: Supervisor::new(configuration.supervisor, configuration.tick_hz),
-            monitor: DeadlineMonitor::new(configuration.deadlines),
+            supervisor: Supervisor::new(configuration.settings.supervisor, configuration.tick_hz),
+            monitor: DeadlineMonitor::new(configuration.settings.deadlines),
             reference: ReferenceGenerator::new(
-                &configuration.reference,
+                &configuration.settings.reference,
                 0.0,
                 configuration.tick_hz,
             ),
             governor: EdgeGovernor::new(
-                &configuration.governor,
+                &configuration.settings.governor,
                 arm.reach_on_belt_m(),
                 configuration.tick_s(),
                 configuration.tip_count_m(),
             ),
-            law: Law::new(&configuration.law),
-            recovery: Recovery::new(&configuration.recovery),
+            law: Law::new(&configuration.settings.law),
+            recovery: Recovery::new(&configuration.settings.recovery),
             posture: Posture::ElbowDown,
             expected_acceleration: Vector2::zeros(),
             contact_acceleration: Vector2::zeros(),
@@ -188,7 +188,7 @@ impl Controller {
         }
         let tracks = state == SupervisorState::Tracking && state_before == SupervisorState::Armed;
         if armed || (lands && state == SupervisorState::Armed) {
-            let program = &self.configuration.reference;
+            let program = &self.configuration.settings.reference;
             self.reference.restart(program, tip_t_m);
         }
         if tracks {
@@ -197,7 +197,7 @@ impl Controller {
             self.reference.start_from(tip_t_m);
         }
         let landing_p_ratio = if recovering {
-            self.configuration.recovery.minimum_p_ratio
+            self.configuration.settings.recovery.minimum_p_ratio
         } else {
             0.0
         };
@@ -232,7 +232,7 @@ impl Controller {
             contact,
             saturated: (self.telemetry.saturated || self.telemetry.guarded) && !starts,
             reference: wanted,
-            torque_limit_nm: self.configuration.torque_limit_nm,
+            torque_limit_nm: self.configuration.settings.torque_limit_nm,
             tick_s: self.tick_s,
         };
         if state == SupervisorState::Armed

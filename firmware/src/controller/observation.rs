@@ -44,7 +44,7 @@ impl Controller {
             .all(|force| force.0.abs() < range);
         let gap_m = self.gap_m(model);
         let touched = self.contact.contact();
-        let contact = match self.configuration.contact.evidence {
+        let contact = match self.configuration.settings.contact.evidence {
             Evidence::ForceCell => self.contact.update_from_force(force_n.y),
             Evidence::Encoders => {
                 let mut encoders = self.encoder_reading(model, gap_m);
@@ -126,7 +126,7 @@ impl Controller {
         let release = -self.estimator.lag_counts(&self.contact_acceleration);
         EncoderReading {
             gap_m,
-            gap_error_m: self.configuration.contact.gap_uncertainty_m
+            gap_error_m: self.configuration.settings.contact.gap_uncertainty_m
                 + self.calibration.gap_error_m(rounding_m),
             moved: self.estimator.moved(),
             release: release.dot(&self.estimator.innovation_counts()),

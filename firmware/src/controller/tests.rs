@@ -1,10 +1,8 @@
 //! Tests of the tick's bookkeeping: frames, faults, limits, counters.
 
 use super::*;
-use crate::configuration::Converters;
+use crate::configuration::{ControllerSettings, Converters};
 use crate::estimate::contact::Evidence;
-use crate::law::LawSettings;
-use crate::law::hybrid::HybridSettings;
 use crate::refer::reference::Program;
 use crate::supervise::deadline_monitor::Lapse;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
@@ -29,20 +27,10 @@ fn configuration() -> Configuration {
                 range: 5.0,
             },
         },
-        torque_limit_nm: 5.0,
-        estimator: Default::default(),
-        contact: Default::default(),
-        friction: Default::default(),
-        belt: Default::default(),
-        disturbance: Default::default(),
-        calibration: Default::default(),
-        supervisor: Default::default(),
-        deadlines: Default::default(),
-        law: LawSettings::Hybrid(HybridSettings::default()),
-        guard: Default::default(),
-        governor: Default::default(),
-        recovery: Default::default(),
-        reference: Program::default(),
+        settings: ControllerSettings {
+            reference: Program::default(),
+            ..Default::default()
+        },
     }
 }
 
@@ -159,7 +147,7 @@ fn a_joint_that_jumps_is_a_fault_at_once() {
 #[test]
 fn after_a_jump_the_encoders_tell_that_the_tip_is_in_the_air() {
     let mut configuration = configuration();
-    configuration.contact.evidence = Evidence::Encoders;
+    configuration.settings.contact.evidence = Evidence::Encoders;
     let mut controller = Controller::new(&configuration).unwrap();
     let touches = |answer: ActuatorFrame| answer.flags.contains(StatusFlags::CONTACT);
     assert!(touches(run(&mut controller, 0..20)));
@@ -243,7 +231,7 @@ fn a_law_that_is_not_finite_is_a_fault() {
 fn torque_is_limited_and_counted() {
     let mut limited = configuration();
     // Less than it takes to hold the arm, so that pressing less does not help.
-    limited.torque_limit_nm = 0.05;
+    limited.settings.torque_limit_nm = 0.05;
     let mut controller = Controller::new(&limited).unwrap();
     let answer = run(&mut controller, 0..20);
     assert!(answer.flags.contains(StatusFlags::SATURATED));
@@ -255,7 +243,7 @@ fn torque_is_limited_and_counted() {
 #[test]
 fn the_tip_is_pressed_less_where_torque_is_short() {
     let mut limited = configuration();
-    limited.torque_limit_nm = 1.5;
+    limited.settings.torque_limit_nm = 1.5;
     let mut controller = Controller::new(&limited).unwrap();
     let answer = run(&mut controller, 0..200);
     assert_ne!(answer.torques, [TorqueCounts(0); 2]);
@@ -270,7 +258,7 @@ fn the_tip_is_pressed_less_where_torque_is_short() {
 #[test]
 fn bad_configurations_are_named() {
     let mut bad = configuration();
-    bad.torque_limit_nm = f32::NAN;
+    bad.settings.torque_limit_nm = f32::NAN;
     let error = Controller::new(&bad).unwrap_err();
     assert_eq!(error.key, "torque_limit_nm");
     let mut bad = configuration();

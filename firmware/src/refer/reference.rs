@@ -6,7 +6,7 @@
 use heapless::{Deque, Vec};
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::settings;
-use painleve_shared::settings::{Range, SettingValue, Shape, check_each};
+use painleve_shared::settings::{Range, Refused, SettingValue, Shape, check_each};
 use serde::{Deserialize, Serialize};
 
 /// Most segments that fit into the queue.
@@ -76,6 +76,17 @@ pub struct Program {
 }
 
 impl Program {
+    /// The paper's limit elbow down, 0.148 m, in three seconds.
+    pub fn to_the_papers_limit() -> Self {
+        let segment = Segment::MinimumJerk {
+            target_m: 0.148,
+            duration_s: 3.0,
+        };
+        Self {
+            segments: [segment].into_iter().collect(),
+        }
+    }
+
     /// Checks that every target is within `reach_m` of the point of the belt under the first joint.
     ///
     /// # Errors
@@ -96,8 +107,8 @@ impl SettingValue for Program {
         maximum_length: MAXIMUM_SEGMENTS,
     };
 
-    fn check(&self, range: Option<Range>) -> Result<(), OutOfRange> {
-        check_each(&self.segments, range)
+    fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused> {
+        check_each(&self.segments, range, error)
     }
 }
 

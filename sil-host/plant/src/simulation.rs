@@ -63,7 +63,7 @@ impl<P: Plant> Simulation<P> {
             tick_hz: f64::from(scenario.run.tick_hz),
             tick: 0,
             first_tick: scenario.run.first_tick,
-            enable_at_s: scenario.controller.enable_at_s,
+            enable_at_s: scenario.run.enable_at_s,
             plant,
         })
     }

@@ -139,7 +139,7 @@ fn a_bouncing_arm_is_caught() {
         let overrides = [
             "initial.theta1_deg=32.0".to_string(),
             "initial.theta2_deg=18.27".to_string(),
-            format!("controller.enable_at_s={enable_s}"),
+            format!("run.enable_at_s={enable_s}"),
             format!("run.duration_s={}", enable_s + 2.0),
             format!("run.seed={seed}"),
             "controller.reference=[]".to_string(),
@@ -198,7 +198,7 @@ fn links_longer_than_the_data_sheet_says_do_not_move_the_tip() {
             &reference,
         ],
     );
-    scenario.controller.arm = Some(ArmParameters::default());
+    scenario.arm_model = Some(ArmParameters::default());
     let (with, _) = run_scenario(&scenario);
     assert!(
         (with.final_tip_t_m - 0.1).abs() < 1e-3,
@@ -268,7 +268,7 @@ fn with_a_wrong_spring(stiffness: f64, overrides: &[&str]) -> (LoopResult, Cours
     let mut all = vec![NOISE, "belt.friction=0.85", reference.as_str()];
     all.extend(overrides);
     let mut scenario = load("hybrid-elbow-up", &all);
-    scenario.controller.arm = Some(scenario.arm.cast());
+    scenario.arm_model = Some(scenario.arm.cast());
     scenario.arm = ArmParameters {
         stiffness_nm_rad: stiffness * scenario.arm.stiffness_nm_rad,
         ..scenario.arm

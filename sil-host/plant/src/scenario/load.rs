@@ -265,11 +265,11 @@ mod tests {
     fn overrides_set_keys_that_are_optional() {
         let scenario = load(&[
             "controller.belt.given_m_s=-0.4",
-            "controller.arm.link_length_m=0.2",
+            "arm_model.link_length_m=0.2",
         ])
         .unwrap();
         assert_eq!(scenario.controller.belt.given_m_s, Some(-0.4));
-        let arm = scenario.controller.arm.unwrap();
+        let arm = scenario.arm_model.unwrap();
         assert_eq!((arm.link_length_m, arm.link_mass_kg), (0.2, 0.12));
         let message = message(&["controller.belt.given_m_s=fast"]);
         assert!(message.contains("given_m_s: invalid type"), "{message}");
@@ -282,10 +282,7 @@ mod tests {
                 &["belt.frction=0.4"][..],
                 &["belt.frction", "friction, profile"][..],
             ),
-            (
-                &["controller.arm.lenght_m=0.2"],
-                &["controller.arm.lenght_m"],
-            ),
+            (&["arm_model.lenght_m=0.2"], &["arm_model.lenght_m"]),
             (
                 &["controller.law.pid.integral_gain=1"],
                 &["no 'pid' here", "hybrid"],
@@ -308,10 +305,6 @@ mod tests {
                     "controller.law.hybrid.friction.observed.time_constant_s = 11",
                     "0 to 10",
                 ],
-            ),
-            (
-                &["controller.arm.damping_nms_rad=-1"],
-                &["controller.arm.damping_nms_rad = -1"],
             ),
             (
                 &["controller.estimator.bandwidth_rad_s=3001"],

@@ -8,20 +8,7 @@ pub mod built_in;
 mod load;
 
 use painleve_firmware::Configuration;
-use painleve_firmware::estimate::belt;
-use painleve_firmware::estimate::calibration::CalibrationSettings;
-use painleve_firmware::estimate::contact::ContactSettings;
-use painleve_firmware::estimate::disturbance::DisturbanceSettings;
-use painleve_firmware::estimate::friction::FrictionSettings;
-use painleve_firmware::estimate::joints::EstimatorSettings;
-use painleve_firmware::guard::GuardSettings;
-use painleve_firmware::law::LawSettings;
-use painleve_firmware::law::hybrid::HybridSettings;
-use painleve_firmware::recover::RecoverySettings;
-use painleve_firmware::refer::governor::GovernorSettings;
-use painleve_firmware::refer::reference::{Program, Segment};
-use painleve_firmware::supervise::deadline_monitor::DeadlineLimits;
-use painleve_firmware::supervise::supervisor::SupervisorSettings;
+use painleve_firmware::configuration::ControllerSettings;
 use painleve_shared::ArmParameters;
 use painleve_shared::range::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
@@ -44,8 +31,11 @@ pub struct Scenario {
     pub description: String,
     /// How long, how fast, which seed.
     pub run: RunSettings,
-    /// The arm of the plant, and, unless `controller.arm` says otherwise, of the controller's model.
+    /// The arm of the plant.
     pub arm: ArmParameters<f64>,
+    /// The arm in the controller's model; the plant's if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arm_model: Option<ArmParameters<f32>>,
     /// Friction and speed of the belt.
     pub belt: BeltSettings,
     /// How the tip bounces.
@@ -68,6 +58,8 @@ pub struct RunSettings {
     pub duration_s: f64,
     /// Control rate, Hz.
     pub tick_hz: u32,
+    /// When ENABLE rises, s.
+    pub enable_at_s: f64,
     /// Seed of all noise.
     pub seed: u64,
     /// Tick and sequence number of the first frame: near 2³² the counters wrap early.
@@ -79,6 +71,7 @@ impl Default for RunSettings {
         Self {
             duration_s: 6.0,
             tick_hz: 1000,
+            enable_at_s: 0.0,
             seed: 1,
             first_tick: 0,
         }
@@ -154,74 +147,6 @@ impl InitialState {
     }
 }
 
-/// The controller's part of a scenario.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ControllerSettings {
-    /// When the drive is enabled, s.
-    pub enable_at_s: f64,
-    /// Largest torque on either joint, N·m.
-    pub torque_limit_nm: f32,
-    /// The arm that the controller believes in; the plant's if absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub arm: Option<ArmParameters<f32>>,
-    /// How rates are estimated.
-    pub estimator: EstimatorSettings,
-    /// When the tip is taken to touch.
-    pub contact: ContactSettings,
-    /// How friction is estimated.
-    pub friction: FrictionSettings,
-    /// What the controller knows about the belt.
-    pub belt: belt::BeltSettings,
-    /// How the links' length is calibrated.
-    pub calibration: CalibrationSettings,
-    /// When the drive is armed, and when it is shut down.
-    pub supervisor: SupervisorSettings,
-    /// How many lapses in a row are survived.
-    pub deadlines: DeadlineLimits,
-    /// The control law.
-    pub law: LawSettings,
-    /// How the tip is kept pressed on the belt.
-    pub guard: GuardSettings,
-    /// How unknown torques are estimated.
-    pub disturbance: DisturbanceSettings,
-    /// How the reference is kept off the paradox.
-    pub governor: GovernorSettings,
-    /// How a tip that left the belt is brought back.
-    pub recovery: RecoverySettings,
-    /// Where the tip shall go.
-    pub reference: Program,
-}
-
-impl Default for ControllerSettings {
-    fn default() -> Self {
-        let segment = Segment::MinimumJerk {
-            target_m: 0.148,
-            duration_s: 3.0,
-        };
-        Self {
-            enable_at_s: 0.0,
-            torque_limit_nm: 5.0,
-            arm: None,
-            estimator: EstimatorSettings::default(),
-            contact: ContactSettings::default(),
-            friction: FrictionSettings::default(),
-            belt: belt::BeltSettings::default(),
-            calibration: CalibrationSettings::default(),
-            supervisor: SupervisorSettings::default(),
-            deadlines: DeadlineLimits::default(),
-            law: LawSettings::Hybrid(HybridSettings::default()),
-            guard: GuardSettings::default(),
-            disturbance: DisturbanceSettings::default(),
-            governor: GovernorSettings::default(),
-            recovery: RecoverySettings::default(),
-            reference: Program {
-                segments: [segment].into_iter().collect(),
-            },
-        }
-    }
-}
-
 impl Default for Scenario {
     /// The paper's hybrid law from x0,d at hardware-like quantisation.
     fn default() -> Self {
@@ -230,6 +155,7 @@ impl Default for Scenario {
             description: String::new(),
             run: RunSettings::default(),
             arm: ArmParameters::default(),
+            arm_model: None,
             belt: BeltSettings::default(),
             impact: ImpactLaw::default(),
             solver: SolverSettings::default(),
@@ -254,25 +180,11 @@ impl Scenario {
 
     /// The controller's part, as it is sent to whatever runs the controller.
     pub fn controller_configuration(&self) -> Configuration {
-        let settings = &self.controller;
         Configuration {
             tick_hz: self.run.tick_hz as f32,
-            arm: settings.arm.unwrap_or_else(|| self.arm.cast()),
+            arm: self.arm_model.unwrap_or_else(|| self.arm.cast()),
             converters: self.converters.scales(),
-            torque_limit_nm: settings.torque_limit_nm,
-            estimator: settings.estimator,
-            contact: settings.contact,
-            supervisor: settings.supervisor,
-            friction: settings.friction,
-            belt: settings.belt,
-            calibration: settings.calibration,
-            deadlines: settings.deadlines,
-            law: settings.law,
-            guard: settings.guard,
-            disturbance: settings.disturbance,
-            governor: settings.governor,
-            recovery: settings.recovery,
-            reference: settings.reference.clone(),
+            settings: self.controller.clone(),
         }
     }
 
@@ -284,12 +196,7 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), OutOfRange> {
         range::check("run.duration_s", self.run.duration_s, 1e-3, 1e7)?;
         range::check("run.tick_hz", f64::from(self.run.tick_hz), 10.0, 1e5)?;
-        range::check(
-            "controller.enable_at_s",
-            self.controller.enable_at_s,
-            0.0,
-            1e7,
-        )?;
+        range::check("run.enable_at_s", self.run.enable_at_s, 0.0, 1e7)?;
         self.arm.validate()?;
         self.converters.validate()?;
         self.controller_configuration()
@@ -303,10 +210,7 @@ impl Scenario {
         match error.key.parts().next() {
             Some("tick_hz") => error.inside("run"),
             Some("converters") => error,
-            Some(name) if name.starts_with("arm.") => match self.controller.arm {
-                Some(_) => error.inside("controller"),
-                None => error,
-            },
+            Some(name) if name.starts_with("arm.") => error,
             _ => error.inside("controller"),
         }
     }

@@ -77,7 +77,7 @@ impl Capture {
         scenario.converters.force.noise_n = 0.1;
         scenario.controller.reference.segments.clear();
         let enable_at_s = BOUNCES_S + generator.random_range(0.0..PHASES_S);
-        scenario.controller.enable_at_s = enable_at_s;
+        scenario.run.enable_at_s = enable_at_s;
         scenario.run.duration_s = enable_at_s + CAUGHT_S;
         scenario.run.seed = generator.random::<u64>() >> 1;
         Ok(scenario.with_overrides("capture", &self.overrides)?)
@@ -102,7 +102,7 @@ impl Study for Capture {
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {
         let scenario = self.scenario(index)?;
-        let enabled_s = scenario.controller.enable_at_s;
+        let enabled_s = scenario.run.enable_at_s;
         let end_s = scenario.run.duration_s;
         let mut trial = Trial::new(&scenario)?;
         let mut watch = ContactWatch::new(enabled_s, 0.0);

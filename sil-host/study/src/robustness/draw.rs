@@ -66,7 +66,7 @@ pub fn scenario(seed: u64, index: u64) -> Result<Scenario, StudyError> {
     scenario.belt.profile = BeltProfile::Constant { speed_m_s };
 
     let nominal = ArmParameters::<f64>::default();
-    scenario.controller.arm = Some(nominal.cast());
+    scenario.arm_model = Some(nominal.cast());
     scenario.arm = ArmParameters {
         link_mass_kg: nominal.link_mass_kg * draw(0.95..1.05),
         link_length_m: nominal.link_length_m * draw(0.95..1.05),

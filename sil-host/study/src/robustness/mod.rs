@@ -91,7 +91,7 @@ impl Study for Robustness {
         let posture = Posture::of(&theta(&scenario.initial.state()));
         let v_belt_m_s = scenario.belt.profile.speed_m_s(0.0);
         let target_m = target_m(&scenario);
-        let enabled_s = scenario.controller.enable_at_s;
+        let enabled_s = scenario.run.enable_at_s;
         let mut trial = Trial::new(&scenario)?;
         let start_m = trial.tip_t_m();
         let mut watch = ContactWatch::new(enabled_s, CAPTURE_S);

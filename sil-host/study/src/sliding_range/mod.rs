@@ -291,7 +291,7 @@ impl Case<'_> {
         let mut trial = Trial::new(&scenario)?;
         let mut statistics = Statistics::new(0.0);
         let criterion = &self.criterion;
-        let end_s = scenario.controller.enable_at_s + self.reference.duration_s();
+        let end_s = scenario.run.enable_at_s + self.reference.duration_s();
         let mut near_since_s = None;
         while trial.time_s() < end_s + criterion.patience_s {
             trial
