@@ -1,14 +1,17 @@
-//! `cargo xtask setup`: what building and running the images needs.
+//! `cargo xtask setup`: what building, emulating and testing the images needs.
 
 use std::process::{Command, Stdio};
 
 use crate::build_fw::{TARGET, debian_can_build, target_is_installed};
-use crate::command::{ChoreError, run_with};
+use crate::command::{ChoreError, run_with, workspace};
 
-/// Adds the Rust target and installs QEMU, unless they are there.
+/// Executes the image for the board in tests; see `tests/flash-image`.
+const UNICORN: &str = "unicorn==2.1.4";
+
+/// Adds the Rust target and installs QEMU and Unicorn, unless they are there.
 ///
 /// # Errors
-/// If neither rustup nor Debian has the target, or QEMU cannot be installed.
+/// If neither rustup nor Debian has the target, or an emulator cannot be installed.
 pub fn run() -> Result<(), ChoreError> {
     if !target_is_installed()
         && run_with("rustup", &["target", "add", TARGET], &[]).is_err()
@@ -20,8 +23,29 @@ pub fn run() -> Result<(), ChoreError> {
     if !starts("qemu-system-arm") {
         install(&["qemu-system-arm"])?;
     }
+    install_unicorn()?;
     eprintln!("ready: `cargo xtask build-fw` builds the images");
     Ok(())
+}
+
+/// Installs Unicorn from PyPI, prebuilt, in an environment of its own under `target/`.
+fn install_unicorn() -> Result<(), ChoreError> {
+    let environment = workspace().join("target/unicorn");
+    let installed = environment.join("installed");
+    if std::fs::read_to_string(&installed).is_ok_and(|version| version == UNICORN) {
+        return Ok(());
+    }
+    let folder = environment.to_string_lossy();
+    let make = || run_with("python3", &["-m", "venv", "--clear", &folder], &[]);
+    if make().is_err() {
+        install(&["python3-venv"])?;
+        make()?;
+    }
+    let python = environment.join("bin/python");
+    let pip = ["-m", "pip", "install", "--quiet", "--no-deps", UNICORN];
+    run_with(&python.to_string_lossy(), &pip, &[])?;
+    std::fs::write(&installed, UNICORN)
+        .map_err(|cause| ChoreError(format!("cannot write {}: {cause}", installed.display())))
 }
 
 /// Whether a program is there.

@@ -1,0 +1,323 @@
+//! The board as it is wired, seen from outside: sensors, switches, torque stages, serial line.
+
+use std::path::PathBuf;
+
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::message::{MAXIMUM_LENGTH, Plant, Request, Response};
+use painleve_shared::wire::{self, Inbox};
+
+use crate::machine::{Machine, Reset};
+use crate::parts::{As5048a, Mcp3304, SpiPart};
+use crate::stm32f4::{Outside, Pin, PinMode, Stm32f4, Transfer};
+use crate::{MILLISECOND, Picoseconds, SECOND};
+
+/// The pin that enables the torque stages.
+pub const STAGES: Pin = (1, 0);
+/// The switch of the safety chain.
+pub const ENABLE: Pin = (2, 0);
+/// The push button that resets a fault.
+pub const RESET: Pin = (2, 1);
+const ENCODER_SELECTS: [Pin; 2] = [(1, 6), (1, 7)];
+const FORCE_SELECT: Pin = (1, 12);
+
+/// Time of a byte on the serial line.
+const BYTE: Picoseconds = 10 * SECOND / 921_600;
+
+/// Random bit errors.
+#[derive(Clone, Debug)]
+pub struct BitErrors {
+    state: u64,
+    /// Of 2^32.
+    threshold: u32,
+    /// Errors so far.
+    pub count: u64,
+}
+
+impl BitErrors {
+    /// With this probability a bit, from this seed.
+    pub fn new(probability: f64, seed: u64) -> Self {
+        Self {
+            state: seed.wrapping_mul(2).wrapping_add(1),
+            threshold: (probability * 4_294_967_296.0) as u32,
+            count: 0,
+        }
+    }
+
+    /// Whether the next bit is flipped.
+    pub fn flips(&mut self) -> bool {
+        // Knuth's linear congruential generator; its upper half.
+        self.state = self
+            .state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let flips = ((self.state >> 32) as u32) < self.threshold;
+        self.count += u64::from(flips);
+        flips
+    }
+}
+
+/// The parts on the pins.
+#[derive(Clone, Debug, Default)]
+pub struct Wiring {
+    /// Encoders of θ1 and of the elbow.
+    pub encoders: [As5048a; 2],
+    /// Converter of the force cell.
+    pub force: Mcp3304,
+    selected: [bool; 3],
+    /// When the pin of the torque stages last went low or was let go, and is still so.
+    pub stages: Option<bool>,
+}
+
+impl Wiring {
+    fn part(&mut self, index: usize) -> &mut dyn SpiPart {
+        match index {
+            0 | 1 => &mut self.encoders[index],
+            _ => &mut self.force,
+        }
+    }
+
+    /// Data-sheet limits that the image has broken.
+    pub fn violations(&self) -> Vec<&'static str> {
+        let encoders = self.encoders.iter().flat_map(|it| &it.violations);
+        encoders.chain(&self.force.violations).copied().collect()
+    }
+}
+
+impl Outside for Wiring {
+    fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds) {
+        if pin == STAGES {
+            self.stages = level;
+        }
+        let selects = [ENCODER_SELECTS[0], ENCODER_SELECTS[1], FORCE_SELECT];
+        if let Some(index) = selects.iter().position(|it| *it == pin) {
+            // Pulled up on the board.
+            let is_selected = level == Some(false);
+            if is_selected != self.selected[index] {
+                self.selected[index] = is_selected;
+                if is_selected {
+                    self.part(index).select(now);
+                } else {
+                    self.part(index).deselect(now);
+                }
+            }
+        }
+    }
+
+    fn transfer(&mut self, bus: usize, transfer: Transfer, now: Picoseconds) -> u16 {
+        let candidates = if bus == 0 { 0..2 } else { 2..3 };
+        let mut answer = u16::MAX;
+        for index in candidates {
+            if self.selected[index] {
+                answer &= self.part(index).transfer(&transfer, now);
+            }
+        }
+        if transfer.bits == 8 {
+            answer & 0xff
+        } else {
+            answer
+        }
+    }
+}
+
+/// What the torque stages get.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Torque {
+    /// Whether the stages are enabled; a pin that nothing drives is `None`.
+    pub enabled: Option<bool>,
+    /// The converter's codes, less the one without torque.
+    pub counts: [i32; 2],
+}
+
+impl Torque {
+    /// Whether the stages cannot drive the arm.
+    pub fn is_off(&self) -> bool {
+        self.enabled == Some(false)
+    }
+}
+
+/// A board with the image in its flash, powered, on a bench.
+pub struct Board {
+    /// The microcontroller.
+    pub machine: Machine<Stm32f4<Wiring>>,
+    inbox: Inbox,
+    heard: usize,
+    /// The line to the board is busy until then.
+    line_free: Picoseconds,
+}
+
+/// The library, from `PAINLEVE_UNICORN` or where `cargo xtask setup` puts it.
+///
+/// # Panics
+/// If it is not there.
+pub fn library() -> PathBuf {
+    if let Some(path) = std::env::var_os("PAINLEVE_UNICORN") {
+        return path.into();
+    }
+    // One folder is named after Python's version.
+    let versions = std::fs::read_dir(workspace().join("target/unicorn/lib"));
+    let mut libraries = versions.into_iter().flatten().flatten().map(|version| {
+        let packages = version.path().join("site-packages");
+        packages.join("unicorn/lib/libunicorn.so.2")
+    });
+    libraries
+        .find(|it| it.exists())
+        .unwrap_or_else(|| panic!("Unicorn is not installed: run `cargo xtask setup`"))
+}
+
+/// The image, from `PAINLEVE_F405` or where `cargo xtask build-fw` puts it.
+pub fn image() -> PathBuf {
+    std::env::var_os("PAINLEVE_F405").map_or_else(
+        || workspace().join("target/thumbv7em-none-eabihf/firmware/painleve-f405"),
+        PathBuf::from,
+    )
+}
+
+fn workspace() -> PathBuf {
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+impl Default for Board {
+    fn default() -> Self {
+        Self::with_oscillator(32_000)
+    }
+}
+
+impl Board {
+    /// Powered, with a healthy arm that is not enabled; nothing has been executed yet.
+    pub fn with_oscillator(watchdog_hz: u64) -> Self {
+        let mut chip = Stm32f4::new(Wiring::default(), watchdog_hz);
+        chip.drive_pin(ENABLE, Some(false));
+        chip.drive_pin(RESET, Some(false));
+        Self {
+            machine: Machine::new(&library(), &image(), chip),
+            inbox: Inbox::new(),
+            heard: 0,
+            line_free: 0,
+        }
+    }
+
+    /// Powered, booted and idle.
+    ///
+    /// # Panics
+    /// If the image was reset meanwhile.
+    pub fn booted() -> Self {
+        let mut board = Self::default();
+        board.machine.run_for(20 * MILLISECOND);
+        assert_eq!(board.machine.resets.len(), 1, "{:?}", board.machine.resets);
+        board
+    }
+
+    /// The parts on the pins.
+    pub fn wiring(&mut self) -> &mut Wiring {
+        &mut self.machine.chip_mut().outside
+    }
+
+    /// What the torque stages get.
+    pub fn torque(&self) -> Torque {
+        let chip = self.machine.chip();
+        let enabled = match chip.pin(STAGES) {
+            PinMode::Output(level) => Some(level),
+            _ => None,
+        };
+        Torque {
+            enabled,
+            counts: chip.dac_codes().map(|code| code as i32 - 2048),
+        }
+    }
+
+    /// Opens or closes the switch of the safety chain.
+    pub fn enable(&mut self, closed: bool) {
+        self.machine.chip_mut().drive_pin(ENABLE, Some(closed));
+    }
+
+    /// Why the microcontroller was reset since power came up.
+    pub fn resets(&self) -> Vec<Reset> {
+        self.machine
+            .resets
+            .iter()
+            .skip(1)
+            .map(|(_, it)| *it)
+            .collect()
+    }
+
+    /// Puts bytes on the line to the board, behind those on their way.
+    pub fn send_bytes(&mut self, bytes: &[u8]) {
+        let start = self.machine.now().max(self.line_free);
+        let usart = &mut self.machine.chip_mut().usart;
+        let mut at = start;
+        for byte in bytes {
+            at += BYTE;
+            usart.incoming.push_back((at, *byte));
+        }
+        self.line_free = at;
+    }
+
+    /// Puts bytes on the line with so much time from one to the next.
+    pub fn send_slowly(&mut self, bytes: &[u8], apart: Picoseconds) {
+        let mut at = self.machine.now().max(self.line_free);
+        for byte in bytes {
+            at += apart;
+            self.machine
+                .chip_mut()
+                .usart
+                .incoming
+                .push_back((at, *byte));
+        }
+        self.line_free = at;
+    }
+
+    /// Sends a request.
+    pub fn send(&mut self, request: &Request<'_>) {
+        let mut buffer = [0; MAXIMUM_LENGTH];
+        let bytes = wire::encode(request, &mut buffer).unwrap_or_else(|error| panic!("{error}"));
+        self.send_bytes(bytes);
+    }
+
+    /// Sends a configuration; the bytes come from postcard.
+    pub fn configure(&mut self, plant: Plant, configuration: &[u8]) -> Option<Response> {
+        self.send(&Request::Configure {
+            plant,
+            configuration,
+        });
+        self.reply(20 * MILLISECOND)
+    }
+
+    /// The next response that is not the answer to a tick, if it comes within `limit`.
+    pub fn reply(&mut self, limit: Picoseconds) -> Option<Response> {
+        let end = self.machine.now() + limit;
+        loop {
+            match self.response(end.saturating_sub(self.machine.now()))? {
+                Response::Actuator { .. } => {}
+                reply => return Some(reply),
+            }
+        }
+    }
+
+    /// The next response, if it comes within `limit`.
+    pub fn response(&mut self, limit: Picoseconds) -> Option<Response> {
+        let end = self.machine.now() + limit;
+        loop {
+            while let Some(byte) = self.machine.chip().usart.outgoing.get(self.heard).copied() {
+                self.heard += 1;
+                if let Some(message) = self.inbox.push(byte)
+                    && let Ok(response) = wire::decode(message)
+                {
+                    return Some(response);
+                }
+            }
+            if self.machine.now() >= end {
+                return None;
+            }
+            self.machine.run_for(MILLISECOND / 50);
+        }
+    }
+
+    /// Sends a frame; the answer, if it comes within three milliseconds.
+    pub fn exchange(&mut self, frame: &SensorFrame) -> Option<ActuatorFrame> {
+        self.send(&Request::Sensor(*frame));
+        match self.response(3 * MILLISECOND) {
+            Some(Response::Actuator { frame, .. }) => Some(frame),
+            _ => None,
+        }
+    }
+}

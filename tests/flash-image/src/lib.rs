@@ -1,0 +1,31 @@
+//! Runs the very image that is flashed, instruction by instruction, on a modelled board.
+//!
+//! - [`unicorn`]: executes instructions
+//! - [`machine`]: exceptions, sleep, resets, time
+//! - [`stm32f4`]: the microcontroller's peripherals
+//! - [`parts`]: the sensors on its SPI buses
+//! - [`board`]: the board's wiring, the host's end of its serial line, the arm's torques
+//! - [`bench`]: the board with the simulated arm on its sensors and stages
+//!
+//! Time is counted in instructions: each takes [`machine::CYCLES_PER_INSTRUCTION`] of the clock that the
+//! image has set up. It is no measure of how long the image takes on silicon.
+
+pub mod bench;
+pub mod board;
+pub mod machine;
+pub mod parts;
+pub mod stm32f4;
+pub mod system_control;
+pub mod unicorn;
+
+/// Picoseconds.
+pub type Picoseconds = u64;
+
+/// One millisecond.
+pub const MILLISECOND: Picoseconds = 1_000_000_000;
+
+/// One microsecond.
+pub const MICROSECOND: Picoseconds = 1_000_000;
+
+/// One second.
+pub const SECOND: Picoseconds = 1_000_000_000_000;

@@ -1,0 +1,612 @@
+//! A microcontroller that executes an image: exceptions, sleep, resets and time around
+//! [`unicorn`](crate::unicorn).
+
+use std::path::Path;
+use std::sync::Arc;
+
+use object::{Object, ObjectSegment, ObjectSymbol};
+
+use crate::Picoseconds;
+use crate::system_control::{Exception, HARD_FAULT, SystemControl};
+use crate::unicorn::{Processor, Register, Surroundings, Unicorn};
+
+/// What an instruction takes, in cycles of the processor's clock: on the safe side for code in flash
+/// behind the accelerator. Nothing that a test asserts depends on its exact value.
+pub const CYCLES_PER_INSTRUCTION: u64 = 2;
+
+/// Return address of an exception whose frame holds floating-point registers.
+const RETURN_TO_HANDLER: u32 = 0xffff_ffe1;
+const RETURN_TO_THREAD: u32 = 0xffff_ffe9;
+
+/// No memory is up here: who jumps there returns from an exception.
+const EXCEPTION_RETURN: u32 = 0xffff_ff00;
+
+/// Words of such a frame.
+const FRAME_WORDS: usize = 26;
+
+/// The microcontroller's peripherals, with what is on its pins.
+pub trait Chip: Clone {
+    /// Start and length of its flash.
+    const FLASH: (u32, usize);
+    /// Start and length of its RAM.
+    const RAM: (u32, usize);
+
+    /// Everything as after a reset, for this reason.
+    fn reset(&mut self, reset: Reset, now: Picoseconds);
+
+    /// A load from a peripheral.
+    fn read(&mut self, address: u32, size: u32, now: Picoseconds) -> u32;
+
+    /// A store to a peripheral.
+    fn write(&mut self, address: u32, size: u32, value: u32, now: Picoseconds);
+
+    /// Lets happen what is due, with access to memory for DMA.
+    fn advance(&mut self, now: Picoseconds, memory: &Processor);
+
+    /// When something happens next by itself.
+    fn next_event(&self) -> Picoseconds;
+
+    /// Interrupt lines, one bit each.
+    fn interrupt_lines(&self) -> u128;
+
+    /// Takes the wish for a non-maskable interrupt.
+    fn take_nmi(&mut self) -> bool;
+
+    /// Whether it is to be reset.
+    fn wants_reset(&self) -> bool;
+
+    /// Takes the wish for a reset.
+    fn take_reset(&mut self) -> Option<Reset>;
+
+    /// The processor's clock, Hz; 0 if it stands still.
+    fn core_hz(&self) -> u64;
+}
+
+/// Why a microcontroller was reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reset {
+    /// Power came up.
+    Power,
+    /// The supply was too low.
+    BrownOut,
+    /// The independent watchdog was not fed.
+    Watchdog,
+    /// The program asked for it.
+    Software,
+    /// The reset pin was low.
+    Pin,
+}
+
+/// Why [`Core::before_instruction`] stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stop {
+    Exception(Exception),
+    Limit,
+    Sleep,
+    Look,
+}
+
+/// Everything of the machine but registers and memory.
+#[derive(Clone)]
+struct Core<C> {
+    chip: C,
+    system: SystemControl,
+    flash: Arc<[u8]>,
+    now: Picoseconds,
+    cycles: u64,
+    instructions: u64,
+    instruction_ps: Picoseconds,
+    next_event: Picoseconds,
+    limit: Picoseconds,
+    instruction_limit: u64,
+    /// Instructions left of a conditional block, which is not interrupted: Unicorn does not keep the
+    /// block's state.
+    conditional: u32,
+    stop: Option<Stop>,
+    /// Something may have changed which exception comes next.
+    is_dirty: bool,
+    candidate: bool,
+}
+
+impl<C: Chip> Core<C> {
+    fn refresh(&mut self) {
+        self.system.set_lines(self.chip.interrupt_lines());
+        self.system.nmi_pending |= self.chip.take_nmi();
+        self.candidate = self.system.wakes();
+        let hz = self.chip.core_hz();
+        let cycles = crate::SECOND * CYCLES_PER_INSTRUCTION;
+        self.instruction_ps = cycles.checked_div(hz).unwrap_or(0);
+        self.next_event = self.chip.next_event();
+        self.is_dirty = false;
+    }
+
+    fn advance(&mut self, memory: &Processor) {
+        self.chip.advance(self.now, memory);
+        self.refresh();
+    }
+
+    fn exception(&self, processor: &Processor) -> Option<Exception> {
+        self.system.next(
+            processor.get(Register::PRIMASK) & 1 != 0,
+            processor.get(Register::BASEPRI) as u8,
+            processor.get(Register::FAULTMASK) & 1 != 0,
+        )
+    }
+
+    fn opcode(&self, address: u32) -> u16 {
+        let at = address.wrapping_sub(C::FLASH.0) as usize;
+        let bytes = self.flash.get(at..at + 2);
+        bytes.map_or(0, |it| u16::from_le_bytes([it[0], it[1]]))
+    }
+}
+
+impl<C: Chip> Surroundings for Core<C> {
+    fn before_instruction(&mut self, address: u32, processor: &Processor) -> bool {
+        if self.is_dirty {
+            self.refresh();
+        }
+        let mut stop = None;
+        if self.conditional == 0 {
+            if self.candidate {
+                stop = self.exception(processor).map(Stop::Exception);
+            }
+            if self.now >= self.limit || self.instructions >= self.instruction_limit {
+                stop = Some(Stop::Limit);
+            } else if self.instruction_ps == 0
+                || self.system.reset_requested
+                || self.chip.wants_reset()
+            {
+                stop = Some(Stop::Look);
+            }
+        }
+        let opcode = self.opcode(address);
+        if stop.is_none() && opcode == 0xbf30 {
+            stop = Some(Stop::Sleep);
+        }
+        if stop.is_some() {
+            self.stop = stop;
+            return false;
+        }
+        if opcode & 0xff00 == 0xbf00 && opcode & 0xf != 0 {
+            self.conditional = 4 - (opcode & 0xf).trailing_zeros();
+        } else {
+            self.conditional = self.conditional.saturating_sub(1);
+        }
+        self.instructions += 1;
+        self.cycles += CYCLES_PER_INSTRUCTION;
+        self.now += self.instruction_ps;
+        if self.now >= self.next_event {
+            self.advance(processor);
+        }
+        true
+    }
+
+    fn read(&mut self, address: u32, size: u32, _: &Processor) -> u32 {
+        self.is_dirty = true;
+        if (0xe000_0000..0xe004_0000).contains(&address) {
+            self.system.read(address, self.cycles)
+        } else {
+            self.chip.read(address, size, self.now)
+        }
+    }
+
+    fn write(&mut self, address: u32, size: u32, value: u32, _: &Processor) {
+        self.is_dirty = true;
+        if (0xe000_0000..0xe004_0000).contains(&address) {
+            self.system.write(address, size, value, self.cycles);
+        } else {
+            self.chip.write(address, size, value, self.now);
+        }
+    }
+}
+
+/// A machine at one instant.
+#[derive(Clone)]
+pub struct Snapshot<C> {
+    core: Core<C>,
+    registers: Vec<u32>,
+    ram: Vec<u8>,
+}
+
+impl<C> Snapshot<C> {
+    /// Where the program was.
+    pub fn program_counter(&self) -> u32 {
+        // Behind the thirteen numbered registers, stack pointer and link register.
+        self.registers[15]
+    }
+}
+
+/// A microcontroller with an image in its flash.
+pub struct Machine<C: Chip> {
+    unicorn: Unicorn<Core<C>>,
+    symbols: Vec<(String, u32)>,
+    /// Resets since power came up, the first of them included.
+    pub resets: Vec<(Picoseconds, Reset)>,
+    /// Hard faults so far.
+    pub hard_faults: u32,
+    /// Where the last one was, and what Unicorn said.
+    pub last_fault: Option<(u32, String)>,
+}
+
+fn registers() -> impl Iterator<Item = Register> {
+    let special = [
+        Register::SP,
+        Register::LR,
+        Register::PC,
+        Register::XPSR,
+        Register::PRIMASK,
+        Register::BASEPRI,
+        Register::FAULTMASK,
+        Register::FPSCR,
+    ];
+    (0..13)
+        .map(Register::r)
+        .chain(special)
+        .chain((0..32).map(Register::s))
+}
+
+impl<C: Chip> Machine<C> {
+    /// Programs an image and brings the power up; nothing has been executed yet.
+    ///
+    /// # Panics
+    /// If image or library cannot be used.
+    pub fn new(library: &Path, image: &Path, chip: C) -> Self {
+        let file = std::fs::read(image)
+            .unwrap_or_else(|error| panic!("no image at {}: {error}", image.display()));
+        let elf = object::File::parse(&*file).unwrap_or_else(|error| panic!("{error}"));
+        let mut flash = vec![0xff; C::FLASH.1];
+        for segment in elf.segments() {
+            let bytes = segment.data().unwrap_or_default();
+            // Initial values lie in flash, behind the code, and are copied by the image.
+            let at = physical_address(&elf, &segment).wrapping_sub(u64::from(C::FLASH.0)) as usize;
+            if let Some(place) = flash.get_mut(at..at + bytes.len()) {
+                place.copy_from_slice(bytes);
+            }
+        }
+        let symbols = elf
+            .symbols()
+            .filter_map(|it| Some((it.name().ok()?.to_owned(), it.address() as u32)))
+            .collect();
+        let core = Core {
+            chip,
+            system: SystemControl::new(C::FLASH.0),
+            flash: flash.as_slice().into(),
+            now: 0,
+            cycles: 0,
+            instructions: 0,
+            instruction_ps: 0,
+            next_event: 0,
+            limit: 0,
+            instruction_limit: u64::MAX,
+            conditional: 0,
+            stop: None,
+            is_dirty: true,
+            candidate: false,
+        };
+        let mut unicorn = Unicorn::new(library, core)
+            .unwrap_or_else(|error| panic!("{}: {error}", library.display()));
+        unicorn.map(C::FLASH.0, C::FLASH.1);
+        unicorn.map(C::RAM.0, C::RAM.1);
+        unicorn.map_peripherals(&[
+            (0x4000_0000, 0x0010_0000),
+            (0x4200_0000, 0x0200_0000),
+            (0x1fff_7000, 0x0000_1000),
+            (0xe000_0000, 0x0010_0000),
+        ]);
+        unicorn.processor().write_memory(C::FLASH.0, &flash);
+        let mut machine = Self {
+            unicorn,
+            symbols,
+            resets: Vec::new(),
+            hard_faults: 0,
+            last_fault: None,
+        };
+        machine.reset(Reset::Power);
+        machine
+    }
+
+    /// The peripherals.
+    pub fn chip(&self) -> &C {
+        &self.unicorn.surroundings().chip
+    }
+
+    /// The peripherals, to change what they see.
+    pub fn chip_mut(&mut self) -> &mut C {
+        let core = self.unicorn.surroundings_mut();
+        core.is_dirty = true;
+        &mut core.chip
+    }
+
+    /// Time since power came up.
+    pub fn now(&self) -> Picoseconds {
+        self.unicorn.surroundings().now
+    }
+
+    /// Instructions executed since power came up.
+    pub fn instructions(&self) -> u64 {
+        self.unicorn.surroundings().instructions
+    }
+
+    /// The program counter.
+    pub fn program_counter(&self) -> u32 {
+        self.unicorn.get(Register::PC)
+    }
+
+    /// The symbol that contains an address, for messages.
+    pub fn symbol_at(&self, address: u32) -> &str {
+        let below = self.symbols.iter().filter(|(_, it)| it & !1 <= address);
+        below
+            .max_by_key(|(_, it)| *it)
+            .map_or("?", |(name, _)| name)
+    }
+
+    /// Resets the microcontroller; memory keeps what it holds.
+    pub fn reset(&mut self, reset: Reset) {
+        let core = self.unicorn.surroundings_mut();
+        core.chip.reset(reset, core.now);
+        core.system = SystemControl::new(C::FLASH.0);
+        core.conditional = 0;
+        core.refresh();
+        let now = core.now;
+        self.resets.push((now, reset));
+        let mut vectors = [0; 8];
+        self.unicorn
+            .processor()
+            .read_memory(C::FLASH.0, &mut vectors);
+        let [a, b, c, d, e, f, g, h] = vectors;
+        for register in registers() {
+            self.unicorn.set(register, 0);
+        }
+        self.unicorn.set(Register::XPSR, 1 << 24);
+        self.unicorn.set(Register::LR, u32::MAX);
+        self.unicorn
+            .set(Register::SP, u32::from_le_bytes([a, b, c, d]));
+        self.unicorn
+            .set(Register::PC, u32::from_le_bytes([e, f, g, h]));
+    }
+
+    /// Everything, to come back to.
+    pub fn snapshot(&self) -> Snapshot<C> {
+        let mut ram = vec![0; C::RAM.1];
+        self.unicorn.processor().read_memory(C::RAM.0, &mut ram);
+        Snapshot {
+            core: self.unicorn.surroundings().clone(),
+            registers: registers().map(|it| self.unicorn.get(it)).collect(),
+            ram,
+        }
+    }
+
+    /// Comes back to a snapshot.
+    pub fn restore(&mut self, snapshot: &Snapshot<C>) {
+        *self.unicorn.surroundings_mut() = snapshot.core.clone();
+        self.unicorn
+            .processor()
+            .write_memory(C::RAM.0, &snapshot.ram);
+        for (register, value) in registers().zip(&snapshot.registers) {
+            self.unicorn.set(register, *value);
+        }
+    }
+
+    /// Runs for this long.
+    pub fn run_for(&mut self, time: Picoseconds) {
+        self.run(self.now() + time, u64::MAX);
+    }
+
+    /// Runs this many instructions, or until `limit`, if the processor sleeps.
+    pub fn run_instructions(&mut self, count: u64, limit: Picoseconds) {
+        self.run(self.now() + limit, self.instructions() + count);
+    }
+
+    /// Raises an interrupt, as its peripheral would.
+    pub fn pend(&mut self, interrupt: usize) {
+        let core = self.unicorn.surroundings_mut();
+        core.system.pend(interrupt);
+        core.is_dirty = true;
+    }
+
+    /// Whether an interrupt of this priority (upper bits of a byte, as in its register) would be taken
+    /// now.
+    pub fn would_take(&self, interrupt: usize) -> bool {
+        let core = self.unicorn.surroundings();
+        let mut system = core.system.clone();
+        system.pend(interrupt);
+        let primask = self.unicorn.get(Register::PRIMASK) & 1 != 0;
+        let basepri = self.unicorn.get(Register::BASEPRI) as u8;
+        core.conditional == 0 && system.next(primask, basepri, false) == Some(interrupt + 16)
+    }
+
+    /// Raises a hard fault, as an instruction that cannot be executed would.
+    pub fn hard_fault(&mut self) {
+        self.hard_faults += 1;
+        let address = self.program_counter();
+        self.enter(HARD_FAULT, address);
+    }
+
+    /// Raises an exception whatever the interrupt controller says, as a disturbed one would.
+    pub fn raise(&mut self, exception: Exception) {
+        let address = self.program_counter();
+        self.enter(exception, address);
+    }
+
+    /// Address of a symbol.
+    pub fn symbol(&self, name: &str) -> Option<u32> {
+        let found = self.symbols.iter().find(|(it, _)| it == name);
+        found.map(|(_, address)| *address)
+    }
+
+    /// Writes a word of memory, as a debugger would.
+    pub fn write_word(&mut self, address: u32, word: u32) {
+        self.unicorn
+            .processor()
+            .write_memory(address, &word.to_le_bytes());
+    }
+
+    fn run(&mut self, limit: Picoseconds, instruction_limit: u64) {
+        let core = self.unicorn.surroundings_mut();
+        core.limit = limit;
+        core.instruction_limit = instruction_limit;
+        core.is_dirty = true;
+        loop {
+            let address = self.unicorn.get(Register::PC);
+            self.unicorn.surroundings_mut().stop = None;
+            let result = self.unicorn.run(address);
+            let address = self.unicorn.get(Register::PC);
+            let core = self.unicorn.surroundings_mut();
+            match (result, core.stop) {
+                (Ok(()), Some(Stop::Limit)) => return,
+                (Ok(()), Some(Stop::Exception(exception))) => self.enter(exception, address),
+                (Ok(()), Some(Stop::Sleep)) => {
+                    if !self.sleep() {
+                        return;
+                    }
+                }
+                (Ok(()), Some(Stop::Look)) => {
+                    if core.system.reset_requested {
+                        self.reset(Reset::Software);
+                    } else if !core.chip.wants_reset() && !self.pass_time_to_next_event() {
+                        return;
+                    }
+                }
+                (Err(_), _) if address >= EXCEPTION_RETURN => self.leave(),
+                (Ok(()), None) | (Err(_), _) => {
+                    self.hard_faults += 1;
+                    self.last_fault = Some((address, format!("{result:?}")));
+                    assert!(
+                        self.unicorn.surroundings().system.present_priority() >= 0,
+                        "locked up at {address:#010x} ({}), {result:?}",
+                        self.symbol_at(address),
+                    );
+                    self.enter(HARD_FAULT, address);
+                }
+            }
+            if let Some(reset) = self.chip_mut().take_reset() {
+                self.reset(reset);
+            }
+        }
+    }
+
+    /// Waits for an interrupt; whether it came before the limit.
+    fn sleep(&mut self) -> bool {
+        loop {
+            let core = self.unicorn.surroundings_mut();
+            core.refresh();
+            if core.candidate {
+                let next = self.unicorn.get(Register::PC) + 2;
+                self.unicorn.set(Register::PC, next);
+                return true;
+            }
+            if !self.pass_time_to_next_event() {
+                return false;
+            }
+            if let Some(reset) = self.chip_mut().take_reset() {
+                self.reset(reset);
+                return true;
+            }
+        }
+    }
+
+    /// Without an instruction; whether the limit has not been reached.
+    fn pass_time_to_next_event(&mut self) -> bool {
+        let (core, processor) = self.unicorn.split();
+        let until = core.next_event.min(core.limit).max(core.now);
+        let hz = core.chip.core_hz();
+        let passed = until - core.now;
+        core.cycles += (u128::from(passed) * u128::from(hz) / u128::from(crate::SECOND)) as u64;
+        core.now = until;
+        core.advance(processor);
+        core.now < core.limit
+    }
+
+    fn enter(&mut self, exception: Exception, return_address: u32) {
+        let unicorn = &mut self.unicorn;
+        let stack_pointer = unicorn.get(Register::SP);
+        let is_unaligned = stack_pointer & 4 != 0;
+        let frame_at = (stack_pointer - 4 * FRAME_WORDS as u32) & !7;
+        let mut status = unicorn.get(Register::XPSR) & !(1 << 9);
+        status |= u32::from(is_unaligned) << 9 | 1 << 24;
+        let mut frame = [0; FRAME_WORDS];
+        for (n, register) in [0, 1, 2, 3, 12].into_iter().enumerate() {
+            frame[n] = unicorn.get(Register::r(register));
+        }
+        frame[5] = unicorn.get(Register::LR);
+        frame[6] = return_address;
+        frame[7] = status;
+        for n in 0..16 {
+            frame[8 + n] = unicorn.get(Register::s(n as i32));
+        }
+        frame[24] = unicorn.get(Register::FPSCR);
+        let bytes: Vec<u8> = frame.iter().flat_map(|it| it.to_le_bytes()).collect();
+        assert!(
+            unicorn.processor().write_memory(frame_at, &bytes),
+            "the stack has overflowed"
+        );
+        let core = unicorn.surroundings_mut();
+        let nested = !core.system.active.is_empty();
+        core.system.enter(exception);
+        core.is_dirty = true;
+        core.conditional = 0;
+        let vector = core.system.vector_table + 4 * exception as u32;
+        let mut handler = [0; 4];
+        unicorn.processor().read_memory(vector, &mut handler);
+        unicorn.set(Register::SP, frame_at);
+        unicorn.set(
+            Register::LR,
+            if nested {
+                RETURN_TO_HANDLER
+            } else {
+                RETURN_TO_THREAD
+            },
+        );
+        unicorn.set(Register::XPSR, 1 << 24);
+        unicorn.set(Register::PC, u32::from_le_bytes(handler));
+    }
+
+    fn leave(&mut self) {
+        let unicorn = &mut self.unicorn;
+        let core = unicorn.surroundings_mut();
+        core.system.leave();
+        core.is_dirty = true;
+        let frame_at = unicorn.get(Register::SP);
+        let mut bytes = [0; 4 * FRAME_WORDS];
+        unicorn.processor().read_memory(frame_at, &mut bytes);
+        let word = |n: usize| {
+            let bytes = &bytes[4 * n..4 * n + 4];
+            u32::from_le_bytes(bytes.try_into().unwrap_or([0; 4]))
+        };
+        for (n, register) in [0, 1, 2, 3, 12].into_iter().enumerate() {
+            unicorn.set(Register::r(register), word(n));
+        }
+        unicorn.set(Register::LR, word(5));
+        for n in 0..16 {
+            unicorn.set(Register::s(n as i32), word(8 + n));
+        }
+        unicorn.set(Register::FPSCR, word(24));
+        let status = word(7);
+        let padding = if status & 1 << 9 != 0 { 4 } else { 0 };
+        unicorn.set(Register::SP, frame_at + 4 * FRAME_WORDS as u32 + padding);
+        unicorn.set(Register::XPSR, status & !(1 << 9) & !0x1ff);
+        unicorn.set(Register::FAULTMASK, 0);
+        unicorn.set(Register::PC, word(6));
+    }
+}
+
+/// Where a segment is programmed.
+fn physical_address(elf: &object::File<'_>, segment: &object::Segment<'_, '_>) -> u64 {
+    use object::read::elf::ProgramHeader;
+    let object::File::Elf32(file) = elf else {
+        return segment.address();
+    };
+    let endian = file.endian();
+    let headers = file.elf_program_headers().iter();
+    let same = |it: &&object::elf::ProgramHeader32<object::Endianness>| {
+        u64::from(it.p_vaddr(endian)) == segment.address()
+            && (
+                u64::from(it.p_offset(endian)),
+                u64::from(it.p_filesz(endian)),
+            ) == segment.file_range()
+    };
+    let mut found = headers.filter(same);
+    found
+        .next()
+        .map_or(segment.address(), |it| it.p_paddr(endian).into())
+}

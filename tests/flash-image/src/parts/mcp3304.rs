@@ -1,0 +1,119 @@
+//! Microchip MCP3304, a converter of 13 bits with four differential pairs (data sheet DS21697).
+
+use super::SpiPart;
+use crate::Picoseconds;
+use crate::stm32f4::Transfer;
+
+/// Fastest clock at 5 V, Hz.
+const FASTEST_HZ: u64 = 2_100_000;
+
+/// Select low to first rising edge: 100 ns.
+const SELECT_SETUP: Picoseconds = 100_000;
+
+/// Select high between two conversions: 475 ns.
+const SELECT_HIGH: Picoseconds = 475_000;
+
+/// One converter.
+#[derive(Clone, Debug, Default)]
+pub struct Mcp3304 {
+    /// Voltages of its channels, counts of 1/4096 of the reference.
+    pub channels: [i32; 8],
+    /// Its lines are cut and read low (`Some(false)`) or high.
+    pub dead: Option<bool>,
+    /// Bit errors on the way to the host.
+    pub bit_errors: Option<super::super::board::BitErrors>,
+    /// Data-sheet limits that were broken.
+    pub violations: Vec<&'static str>,
+    /// Results since the start, the last sixteen of them.
+    pub conversions: Vec<i32>,
+    /// Bits of the command after its start bit.
+    command: u8,
+    /// Bits since the start bit, it included.
+    clocked: u8,
+    conversion: u16,
+    selected: Option<Picoseconds>,
+    deselected: Picoseconds,
+    is_first: bool,
+}
+
+impl Mcp3304 {
+    fn violate(&mut self, what: &'static str) {
+        if !self.violations.contains(&what) {
+            self.violations.push(what);
+        }
+    }
+
+    /// 13 bits, two's complement, of the channel or pair that was asked for.
+    fn convert(&mut self) -> u16 {
+        let channel = usize::from(self.command & 7);
+        let value = if self.command & 8 != 0 {
+            // Single-ended: nothing below ground.
+            self.channels[channel].clamp(0, 4095)
+        } else {
+            (self.channels[channel] - self.channels[channel ^ 1]).clamp(-4096, 4095)
+        };
+        if self.conversions.len() == 16 {
+            self.conversions.remove(0);
+        }
+        self.conversions.push(value);
+        value as u16 & 0x1fff
+    }
+}
+
+impl SpiPart for Mcp3304 {
+    fn select(&mut self, now: Picoseconds) {
+        if self.deselected != 0 && now < self.deselected + SELECT_HIGH {
+            self.violate("MCP3304: select high for less than 475 ns");
+        }
+        self.selected = Some(now);
+        self.clocked = 0;
+        self.command = 0;
+        self.is_first = true;
+    }
+
+    fn deselect(&mut self, now: Picoseconds) {
+        if self.selected.take().is_some() {
+            self.deselected = now;
+        }
+    }
+
+    fn transfer(&mut self, transfer: &Transfer, now: Picoseconds) -> u16 {
+        if transfer.hz > FASTEST_HZ {
+            self.violate("MCP3304: clock beyond 2.1 MHz");
+        }
+        let selected = self.selected.unwrap_or(now);
+        if std::mem::take(&mut self.is_first) && transfer.start < selected + SELECT_SETUP {
+            self.violate("MCP3304: clock less than 100 ns after select");
+        }
+        let mut answer = 0;
+        for bit in (0..transfer.bits).rev() {
+            let input = transfer.value >> bit & 1 != 0;
+            let mut output = true;
+            match self.clocked {
+                0 if !input => {}
+                0 => self.clocked = 1,
+                clocks => {
+                    if (1..=4).contains(&clocks) {
+                        self.command = self.command << 1 | u8::from(input);
+                    }
+                    if clocks == 5 {
+                        self.conversion = self.convert();
+                    }
+                    output = match clocks {
+                        0..=5 => true,
+                        // Null bit, sign, twelve bits; then it repeats them backwards.
+                        6 => false,
+                        7..=19 => self.conversion >> (19 - clocks) & 1 != 0,
+                        _ => false,
+                    };
+                    self.clocked = clocks.saturating_add(1);
+                }
+            }
+            if let Some(errors) = &mut self.bit_errors {
+                output ^= errors.flips();
+            }
+            answer = answer << 1 | u16::from(self.dead.unwrap_or(output));
+        }
+        answer
+    }
+}

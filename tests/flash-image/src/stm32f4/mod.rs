@@ -1,0 +1,435 @@
+//! The STM32F405's peripherals, as far as the image uses them (RM0090). An access to anything else ends
+//! the test.
+
+mod dma;
+mod gpio;
+mod rcc;
+mod spi;
+mod timer;
+mod usart;
+mod watchdog;
+
+pub use spi::Transfer;
+pub use usart::Usart;
+
+use self::dma::Dma;
+use self::gpio::Gpio;
+use self::rcc::Rcc;
+use self::spi::Spi;
+use self::timer::Timer;
+use self::watchdog::Watchdog;
+use crate::Picoseconds;
+use crate::machine::{Chip, Reset};
+use crate::unicorn::Processor;
+
+/// Interrupt numbers.
+const PVD: usize = 1;
+const TIM2: usize = 28;
+const USART1: usize = 37;
+const DMA1_STREAMS: [usize; 8] = [11, 12, 13, 14, 15, 16, 17, 47];
+const DMA2_STREAMS: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
+
+/// Addresses of data registers that DMA serves.
+const USART1_DATA: u32 = 0x4001_1004;
+
+/// A pin: port (0 for A) and number.
+pub type Pin = (usize, usize);
+
+/// What a pin is set up as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PinMode {
+    /// Drives nothing.
+    Input,
+    /// Driven high or low.
+    Output(bool),
+    /// Driven by the peripheral of this number.
+    Alternate(u8),
+    /// Drives nothing, or is a converter's.
+    Analog,
+}
+
+/// What is on the pins.
+pub trait Outside: Clone {
+    /// A pin is now driven high or low, or no more.
+    fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds);
+
+    /// A transfer on a SPI bus (0 for SPI1) has ended; what came back.
+    fn transfer(&mut self, bus: usize, transfer: Transfer, now: Picoseconds) -> u16;
+}
+
+/// The digital-to-analog converter of two channels (RM0090, section 14).
+#[derive(Clone, Debug, Default)]
+struct Dac {
+    control: u32,
+    codes: [u32; 2],
+    writes: u64,
+}
+
+/// The chip with what is on its pins.
+#[derive(Clone)]
+pub struct Stm32f4<O> {
+    /// What is on the pins.
+    pub outside: O,
+    /// Clocks.
+    pub rcc: Rcc,
+    ports: [Gpio; 8],
+    spis: [Spi; 2],
+    /// The serial port to the host.
+    pub usart: Usart,
+    /// The control timer.
+    pub timer: Timer,
+    /// The watchdog.
+    pub watchdog: Watchdog,
+    dac: Dac,
+    dma: [Dma; 2],
+    power: [u32; 2],
+    /// Supply, mV.
+    supply_mv: u32,
+    flash_control: [u32; 8],
+    syscfg: [u32; 16],
+    external_interrupts: [u32; 8],
+    reset: Option<Reset>,
+}
+
+impl<O: Outside> Stm32f4<O> {
+    /// The chip without power; `oscillator_hz` is the watchdog's, 17 to 47 kHz.
+    pub fn new(outside: O, oscillator_hz: u64) -> Self {
+        Self {
+            outside,
+            rcc: Rcc::new(),
+            ports: std::array::from_fn(Gpio::new),
+            spis: Default::default(),
+            usart: Usart::default(),
+            timer: Timer::default(),
+            watchdog: Watchdog::new(oscillator_hz),
+            dac: Dac::default(),
+            dma: Default::default(),
+            power: [0x4000, 0],
+            supply_mv: 3300,
+            flash_control: [0, 0, 0, 0, 0x8000_0000, 0x0fff_aaed, 0, 0],
+            syscfg: [0; 16],
+            external_interrupts: [0; 8],
+            reset: None,
+        }
+    }
+
+    /// What a pin is set up as.
+    pub fn pin(&self, (port, number): Pin) -> PinMode {
+        self.ports[port].pin(number)
+    }
+
+    /// Drives a pin from outside, or lets it go.
+    pub fn drive_pin(&mut self, (port, number): Pin, level: Option<bool>) {
+        self.ports[port].external[number] = level;
+    }
+
+    /// Voltage that a channel of the converter puts out, in parts of the supply; `None` while off.
+    pub fn dac_output(&self, channel: usize) -> Option<f64> {
+        let control = self.dac.control >> (16 * channel);
+        if control & 1 == 0 {
+            return None;
+        }
+        let fraction = f64::from(self.dac.codes[channel]) / 4096.0;
+        // The output buffer reaches to within 0.2 V of either supply.
+        let is_buffered = control & 2 == 0;
+        let margin = if is_buffered { 0.2 / 3.3 } else { 0.0 };
+        Some(fraction.clamp(margin, 1.0 - margin))
+    }
+
+    /// Whether an output buffer cuts the converter's range.
+    pub fn dac_is_buffered(&self) -> bool {
+        self.dac.control & 0x0002_0002 != 0x0002_0002
+    }
+
+    /// The converter's codes.
+    pub fn dac_codes(&self) -> [u32; 2] {
+        self.dac.codes
+    }
+
+    /// How often codes were written.
+    pub fn dac_writes(&self) -> u64 {
+        self.dac.writes
+    }
+
+    /// The supply changes. Below the threshold of the brown-out reset the chip is reset.
+    pub fn set_supply(&mut self, millivolts: u32) {
+        self.supply_mv = millivolts;
+        let level = self.flash_control[5] >> 2 & 3;
+        let threshold = [2700, 2400, 2100, 1800][level as usize];
+        if millivolts < threshold {
+            self.reset = Some(Reset::BrownOut);
+        }
+        if self.supply_is_low() && self.external_interrupts[2] & 1 << 16 != 0 {
+            self.external_interrupts[5] |= 1 << 16;
+        }
+    }
+
+    /// What the supply supervisor says.
+    fn supply_is_low(&self) -> bool {
+        let threshold = 2000 + 100 * (self.power[0] >> 5 & 7);
+        self.power[0] & 1 << 4 != 0 && self.supply_mv < threshold
+    }
+
+    /// Pulls the reset pin down for a moment.
+    pub fn reset_pin(&mut self) {
+        self.reset = Some(Reset::Pin);
+    }
+
+    fn load(&mut self, address: u32, now: Picoseconds) -> u32 {
+        let offset = address & 0x3ff;
+        match address & !0x3ff {
+            0x4000_0000 if self.rcc.is_on(0x40, 0) => {
+                self.timer.read(offset, self.rcc.slow_timer_hz(), now)
+            }
+            0x4000_3000 => self.watchdog.read(offset),
+            0x4000_3800 if self.rcc.is_on(0x40, 14) => self.spis[1].read(offset),
+            0x4000_7000 if self.rcc.is_on(0x40, 28) => match offset {
+                // Voltage scaling is ready at once.
+                0x04 => self.power[1] | 0x4000 | u32::from(self.supply_is_low()) << 2,
+                _ => self.power[0],
+            },
+            0x4000_7400 if self.rcc.is_on(0x40, 29) => match offset {
+                0x00 => self.dac.control,
+                0x08 | 0x2c => self.dac.codes[0],
+                0x14 | 0x30 => self.dac.codes[1],
+                0x20 => self.dac.codes[0] | self.dac.codes[1] << 16,
+                _ => 0,
+            },
+            0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.read(offset),
+            0x4001_3000 if self.rcc.is_on(0x44, 12) => self.spis[0].read(offset),
+            0x4001_3800 => self.syscfg[((offset / 4) & 15) as usize],
+            0x4001_3c00 => self.external_interrupts[((offset / 4) & 7) as usize],
+            0x4002_0000..0x4002_2000 => {
+                let port = ((address - 0x4002_0000) / 0x400) as usize;
+                if self.rcc.is_on(0x30, port as u32) {
+                    self.ports[port].read(offset)
+                } else {
+                    0
+                }
+            }
+            0x4002_3800 => self.rcc.read(offset, now),
+            0x4002_3c00 => self.flash_control[((offset / 4) & 7) as usize],
+            0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].read(offset),
+            0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].read(offset),
+            // A peripheral without its clock.
+            0x4000_0000 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000 | 0x4001_3000
+            | 0x4002_6000 | 0x4002_6400 => 0,
+            // Unique number and size of flash.
+            0x1fff_7800 => 0x1234_5678,
+            _ => panic!("load from {address:#010x}, which is not modelled"),
+        }
+    }
+
+    fn store(&mut self, address: u32, value: u32, now: Picoseconds) {
+        let offset = address & 0x3ff;
+        let (slow, fast) = (self.rcc.slow_bus_hz(), self.rcc.fast_bus_hz());
+        match address & !0x3ff {
+            0x4000_0000 if self.rcc.is_on(0x40, 0) => {
+                let hz = self.rcc.slow_timer_hz();
+                self.timer.write(offset, value, hz, now);
+            }
+            0x4000_3000 => self.watchdog.write(offset, value, now),
+            0x4000_3800 if self.rcc.is_on(0x40, 14) => {
+                self.spis[1].write(offset, value, slow, now);
+            }
+            0x4000_7000 if self.rcc.is_on(0x40, 28) => match offset {
+                0x00 => self.power[0] = value,
+                _ => self.power[1] = value,
+            },
+            0x4000_7400 if self.rcc.is_on(0x40, 29) => self.store_dac(offset, value),
+            0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.write(offset, value, fast, now),
+            0x4001_3000 if self.rcc.is_on(0x44, 12) => {
+                self.spis[0].write(offset, value, fast, now);
+            }
+            0x4001_3800 => self.syscfg[((offset / 4) & 15) as usize] = value,
+            0x4001_3c00 if offset == 0x14 => self.external_interrupts[5] &= !value,
+            0x4001_3c00 => self.external_interrupts[((offset / 4) & 7) as usize] = value,
+            0x4002_0000..0x4002_2000 => {
+                let port = ((address - 0x4002_0000) / 0x400) as usize;
+                if self.rcc.is_on(0x30, port as u32) {
+                    self.store_port(port, offset, value, now);
+                }
+            }
+            0x4002_3800 => self.rcc.write(offset, value, now),
+            0x4002_3c00 => self.store_flash(offset, value),
+            0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].write(offset, value),
+            0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].write(offset, value),
+            0x4000_0000 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000 | 0x4001_3000
+            | 0x4002_6000 | 0x4002_6400 => {}
+            // Debug control.
+            0xe004_2000 => {}
+            _ => panic!("store of {value:#x} to {address:#010x}, which is not modelled"),
+        }
+    }
+
+    fn store_dac(&mut self, offset: u32, value: u32) {
+        self.dac.writes += 1;
+        match offset {
+            0x00 => {
+                self.dac.writes -= 1;
+                self.dac.control = value;
+            }
+            0x08 => self.dac.codes[0] = value & 0xfff,
+            0x14 => self.dac.codes[1] = value & 0xfff,
+            0x20 => self.dac.codes = [value & 0xfff, value >> 16 & 0xfff],
+            _ => {}
+        }
+    }
+
+    fn store_port(&mut self, port: usize, offset: u32, value: u32, now: Picoseconds) {
+        let level = |gpio: &Gpio, pin: usize| match gpio.pin(pin) {
+            PinMode::Output(level) => Some(level),
+            _ => None,
+        };
+        let before = self.ports[port].clone();
+        self.ports[port].write(offset, value);
+        for pin in 0..16 {
+            let now_is = level(&self.ports[port], pin);
+            if now_is != level(&before, pin) {
+                self.outside.pin((port, pin), now_is, now);
+            }
+        }
+    }
+
+    /// Keys unlock the option bytes, which hold the brown-out level.
+    fn store_flash(&mut self, offset: u32, value: u32) {
+        match (offset, value) {
+            (0x08, 0x0819_2a3b) => self.flash_control[2] = 1,
+            (0x08, 0x4c5d_6e7f) if self.flash_control[2] == 1 => self.flash_control[5] &= !1,
+            (0x14, _) if self.flash_control[5] & 1 == 0 => self.flash_control[5] = value & !2,
+            (0x14, _) => {}
+            (0x08, _) => {}
+            _ => self.flash_control[((offset / 4) & 7) as usize] = value,
+        }
+    }
+}
+
+impl<O: Outside> Chip for Stm32f4<O> {
+    const FLASH: (u32, usize) = (0x0800_0000, 1 << 20);
+    const RAM: (u32, usize) = (0x2000_0000, 128 << 10);
+
+    fn reset(&mut self, reset: Reset, now: Picoseconds) {
+        let external = self.ports.each_ref().map(|it| it.external);
+        self.ports = std::array::from_fn(Gpio::new);
+        for (port, external) in self.ports.iter_mut().zip(external) {
+            port.external = external;
+        }
+        for pin in (0..8).flat_map(|port| (0..16).map(move |pin| (port, pin))) {
+            self.outside.pin(pin, None, now);
+        }
+        self.rcc.reset(reset);
+        self.spis = Default::default();
+        self.usart.reset();
+        self.timer = Timer::default();
+        self.watchdog = Watchdog::new(self.watchdog.oscillator_hz);
+        self.dac = Dac {
+            writes: self.dac.writes,
+            ..Dac::default()
+        };
+        self.dma = Default::default();
+        self.power = [0x4000, 0];
+        self.flash_control[2] = 0;
+        self.flash_control[5] |= 1;
+        self.external_interrupts = [0; 8];
+        self.reset = None;
+    }
+
+    fn read(&mut self, address: u32, size: u32, now: Picoseconds) -> u32 {
+        if (0x4200_0000..0x4400_0000).contains(&address) {
+            let (word, bit) = bit_band(address);
+            return self.load(word, now) >> bit & 1;
+        }
+        let word = self.load(address & !3, now);
+        let value = word >> (8 * (address & 3));
+        match size {
+            1 => value & 0xff,
+            2 => value & 0xffff,
+            _ => value,
+        }
+    }
+
+    fn write(&mut self, address: u32, size: u32, value: u32, now: Picoseconds) {
+        if (0x4200_0000..0x4400_0000).contains(&address) {
+            let (word, bit) = bit_band(address);
+            let before = self.load(word, now);
+            return self.store(word, before & !(1 << bit) | (value & 1) << bit, now);
+        }
+        // A narrow store to a peripheral writes the register with the bytes it has.
+        assert!(address & 3 == 0 || size == 4, "store to {address:#010x}");
+        self.store(address, value, now);
+    }
+
+    fn advance(&mut self, now: Picoseconds, memory: &Processor) {
+        let (slow, fast) = (self.rcc.slow_bus_hz(), self.rcc.fast_bus_hz());
+        self.timer.advance(self.rcc.slow_timer_hz(), now);
+        for (bus, hz) in [fast, slow].into_iter().enumerate() {
+            while let Some(transfer) = self.spis[bus].ended(now) {
+                let received = self.outside.transfer(bus, transfer, now);
+                self.spis[bus].complete(received, hz);
+            }
+        }
+        loop {
+            self.usart.advance(fast, now);
+            if self.usart.wants_reading() && self.dma[1].serves(USART1_DATA, true) {
+                let byte = self.usart.take();
+                self.dma[1].store_byte(USART1_DATA, byte, memory);
+            }
+            if self.usart.wants_writing()
+                && let Some(byte) = self.dma[1].load_byte(USART1_DATA, memory)
+            {
+                self.usart.bring(byte, fast, now);
+            }
+            if self.usart.next_event() > now {
+                break;
+            }
+        }
+        if self.watchdog.expires() <= now {
+            self.reset = Some(Reset::Watchdog);
+        }
+    }
+
+    fn next_event(&self) -> Picoseconds {
+        let timer = self.timer.next_event(self.rcc.slow_timer_hz());
+        let dma = self.usart.wants_writing() && self.dma[1].clone().serves(USART1_DATA, false);
+        let spis = self.spis[0].next_event().min(self.spis[1].next_event());
+        timer
+            .min(spis)
+            .min(self.usart.next_event())
+            .min(self.watchdog.expires())
+            .min(if dma { 0 } else { Picoseconds::MAX })
+    }
+
+    fn interrupt_lines(&self) -> u128 {
+        let mut lines = u128::from(self.timer.interrupts()) << TIM2
+            | u128::from(self.usart.interrupts()) << USART1
+            | u128::from(self.external_interrupts[5] & self.external_interrupts[0] & 1 << 16 != 0)
+                << PVD;
+        for stream in 0..8 {
+            lines |= u128::from(self.dma[0].interrupts(stream)) << DMA1_STREAMS[stream];
+            lines |= u128::from(self.dma[1].interrupts(stream)) << DMA2_STREAMS[stream];
+        }
+        lines
+    }
+
+    fn take_nmi(&mut self) -> bool {
+        self.rcc.nmi
+    }
+
+    fn wants_reset(&self) -> bool {
+        self.reset.is_some()
+    }
+
+    fn take_reset(&mut self) -> Option<Reset> {
+        self.reset.take()
+    }
+
+    fn core_hz(&self) -> u64 {
+        self.rcc.core_hz()
+    }
+}
+
+/// The word and the bit that an address of the bit-band alias stands for.
+fn bit_band(address: u32) -> (u32, u32) {
+    let bit = (address - 0x4200_0000) / 4;
+    (0x4000_0000 + bit / 32 * 4, bit % 32)
+}

@@ -1,0 +1,199 @@
+//! Reset and clock control (RM0090, section 7).
+
+use crate::machine::Reset;
+use crate::{MILLISECOND, Picoseconds};
+
+const HSE_ON: u32 = 1 << 16;
+const HSE_READY: u32 = 1 << 17;
+const SECURITY_ON: u32 = 1 << 19;
+const PLL_ON: u32 = 1 << 24;
+const PLL_READY: u32 = 1 << 25;
+
+/// Rate of the internal oscillator, Hz.
+const INTERNAL_HZ: u64 = 16_000_000;
+
+/// Rate of the crystal, Hz.
+const CRYSTAL_HZ: u64 = 8_000_000;
+
+/// Time that a crystal takes to start.
+const CRYSTAL_START: Picoseconds = 2 * MILLISECOND;
+
+/// Registers of the clock control.
+#[derive(Clone, Debug)]
+pub struct Rcc {
+    control: u32,
+    pll: u32,
+    configuration: u32,
+    interrupts: u32,
+    registers: [u32; 32],
+    flags: u32,
+    hse_ready_at: Picoseconds,
+    /// Whether the crystal oscillates once switched on.
+    pub crystal_works: bool,
+    /// The clock security has seen the crystal stop.
+    pub nmi: bool,
+}
+
+impl Rcc {
+    /// As after the first reset.
+    pub fn new() -> Self {
+        Self {
+            control: 0x83,
+            pll: 0x2400_3010,
+            configuration: 0,
+            interrupts: 0,
+            registers: [0; 32],
+            flags: 0,
+            hse_ready_at: Picoseconds::MAX,
+            crystal_works: true,
+            nmi: false,
+        }
+    }
+
+    /// Everything as after a reset; the reasons of resets add up until they are cleared.
+    pub fn reset(&mut self, reset: Reset) {
+        let reason = match reset {
+            Reset::Power => 0x0e00_0000,
+            Reset::BrownOut => 0x0600_0000,
+            Reset::Watchdog => 0x2400_0000,
+            Reset::Software => 0x1400_0000,
+            Reset::Pin => 0x0400_0000,
+        };
+        *self = Self {
+            crystal_works: self.crystal_works,
+            flags: self.flags | reason,
+            ..Self::new()
+        };
+    }
+
+    /// Whether a peripheral's clock is on: offset of its enable register, bit.
+    pub fn is_on(&self, register: u32, bit: u32) -> bool {
+        self.registers[(register / 4) as usize] & 1 << bit != 0
+    }
+
+    fn crystal_is_ready(&self, now: Picoseconds) -> bool {
+        self.crystal_works && self.control & HSE_ON != 0 && now >= self.hse_ready_at
+    }
+
+    /// A load.
+    pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
+        match offset {
+            0x00 => {
+                let ready = if self.crystal_is_ready(now) {
+                    HSE_READY
+                } else {
+                    0
+                };
+                let locked = if self.control & PLL_ON != 0 {
+                    PLL_READY
+                } else {
+                    0
+                };
+                self.control & !(HSE_READY | PLL_READY) | ready | locked
+            }
+            0x04 => self.pll,
+            0x08 => self.configuration & !0xc | (self.configuration & 3) << 2,
+            0x0c => self.interrupts | u32::from(self.nmi) << 7,
+            0x74 => self.flags | self.registers[0x1d] & 1 | (self.registers[0x1d] & 1) << 1,
+            0x10..0x80 => self.registers[(offset / 4) as usize],
+            _ => 0,
+        }
+    }
+
+    /// A store.
+    pub fn write(&mut self, offset: u32, value: u32, now: Picoseconds) {
+        match offset {
+            0x00 => {
+                if value & !self.control & HSE_ON != 0 {
+                    self.hse_ready_at = now + CRYSTAL_START;
+                }
+                self.control = value;
+            }
+            0x04 => self.pll = value,
+            0x08 => self.configuration = value,
+            0x0c => {
+                self.interrupts = value & 0x7f00;
+                if value & 1 << 23 != 0 {
+                    self.nmi = false;
+                }
+            }
+            0x74 => {
+                if value & 1 << 24 != 0 {
+                    self.flags = 0;
+                }
+                self.registers[0x1d] = value & 1;
+            }
+            0x10..0x80 => self.registers[(offset / 4) as usize] = value,
+            _ => {}
+        }
+    }
+
+    /// The crystal stops; with the clock security on the processor goes on from the internal oscillator.
+    pub fn stop_crystal(&mut self) {
+        self.crystal_works = false;
+        if self.control & SECURITY_ON != 0 && self.control & HSE_ON != 0 {
+            self.nmi = true;
+            self.configuration &= !3;
+            self.control &= !(HSE_ON | PLL_ON);
+        }
+    }
+
+    fn pll_hz(&self) -> u64 {
+        let from_crystal = self.pll & 1 << 22 != 0;
+        let input = match (from_crystal, self.crystal_works) {
+            (false, _) => INTERNAL_HZ,
+            (true, true) => CRYSTAL_HZ,
+            (true, false) => 0,
+        };
+        let divisor = u64::from(self.pll & 0x3f).max(1);
+        let multiplier = u64::from(self.pll >> 6 & 0x1ff);
+        let output = 2 * (u64::from(self.pll >> 16 & 3) + 1);
+        input / divisor * multiplier / output
+    }
+
+    /// The system clock before its dividers, Hz; 0 if it stands still.
+    fn system_hz(&self) -> u64 {
+        match self.configuration & 3 {
+            0 => INTERNAL_HZ,
+            1 if self.crystal_works => CRYSTAL_HZ,
+            1 => 0,
+            _ => self.pll_hz(),
+        }
+    }
+
+    /// The processor's clock, Hz.
+    pub fn core_hz(&self) -> u64 {
+        let divisor = match self.configuration >> 4 & 15 {
+            small @ 0..8 => u64::from(small / 8 + 1),
+            large @ 8..12 => 2 << (large - 8),
+            large => 64 << (large - 12),
+        };
+        self.system_hz() / divisor
+    }
+
+    fn bus_divisor(bits: u32) -> u64 {
+        if bits & 4 == 0 { 1 } else { 2 << (bits & 3) }
+    }
+
+    /// Clock of the slow peripherals' bus, Hz.
+    pub fn slow_bus_hz(&self) -> u64 {
+        self.core_hz() / Self::bus_divisor(self.configuration >> 10 & 7)
+    }
+
+    /// Clock of the fast peripherals' bus, Hz.
+    pub fn fast_bus_hz(&self) -> u64 {
+        self.core_hz() / Self::bus_divisor(self.configuration >> 13 & 7)
+    }
+
+    /// Clock of the timers on the slow bus, Hz.
+    pub fn slow_timer_hz(&self) -> u64 {
+        let divisor = Self::bus_divisor(self.configuration >> 10 & 7);
+        self.slow_bus_hz() * if divisor == 1 { 1 } else { 2 }
+    }
+}
+
+impl Default for Rcc {
+    fn default() -> Self {
+        Self::new()
+    }
+}

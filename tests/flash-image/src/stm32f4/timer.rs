@@ -1,0 +1,112 @@
+//! TIM2, counting up (RM0090, section 18).
+
+use crate::{Picoseconds, SECOND};
+
+/// Registers of a timer with 32 bits.
+#[derive(Clone, Debug)]
+pub struct Timer {
+    control: u32,
+    interrupts: u32,
+    flags: u32,
+    prescaler: u32,
+    reload: u32,
+    /// Count at `since`.
+    count: u64,
+    since: Picoseconds,
+    /// Updates so far.
+    pub updates: u64,
+}
+
+impl Default for Timer {
+    fn default() -> Self {
+        Self {
+            control: 0,
+            interrupts: 0,
+            flags: 0,
+            prescaler: 0,
+            reload: u32::MAX,
+            count: 0,
+            since: 0,
+            updates: 0,
+        }
+    }
+}
+
+impl Timer {
+    fn runs(&self) -> bool {
+        self.control & 1 != 0
+    }
+
+    /// Time until the next update, from a count of `count`.
+    fn count_ps(&self, counts: u64, hz: u64) -> Picoseconds {
+        let counts = u128::from(counts) * u128::from(self.prescaler + 1);
+        (counts * u128::from(SECOND) / u128::from(hz.max(1))) as u64
+    }
+
+    /// A load.
+    pub fn read(&self, offset: u32, hz: u64, now: Picoseconds) -> u32 {
+        match offset {
+            0x00 => self.control,
+            0x0c => self.interrupts,
+            0x10 => self.flags,
+            0x24 if self.runs() => {
+                let passed = u128::from(now - self.since) * u128::from(hz) / u128::from(SECOND);
+                (u128::from(self.count) + passed / u128::from(self.prescaler + 1)) as u32
+            }
+            0x24 => self.count as u32,
+            0x28 => self.prescaler,
+            0x2c => self.reload,
+            _ => 0,
+        }
+    }
+
+    /// A store.
+    pub fn write(&mut self, offset: u32, value: u32, hz: u64, now: Picoseconds) {
+        match offset {
+            0x00 => {
+                self.count = self.read(0x24, hz, now).into();
+                self.since = now;
+                self.control = value;
+            }
+            0x0c => self.interrupts = value,
+            0x10 => self.flags &= value,
+            0x14 if value & 1 != 0 => {
+                self.count = 0;
+                self.since = now;
+                self.flags |= 1;
+            }
+            0x24 => {
+                self.count = value.into();
+                self.since = now;
+            }
+            0x28 => self.prescaler = value,
+            0x2c => self.reload = value,
+            _ => {}
+        }
+    }
+
+    /// When it next counts over.
+    pub fn next_event(&self, hz: u64) -> Picoseconds {
+        if self.runs() && hz > 0 {
+            let left = (u64::from(self.reload) + 1).saturating_sub(self.count);
+            self.since + self.count_ps(left, hz)
+        } else {
+            Picoseconds::MAX
+        }
+    }
+
+    /// Lets happen what is due.
+    pub fn advance(&mut self, hz: u64, now: Picoseconds) {
+        while self.next_event(hz) <= now {
+            self.since = self.next_event(hz);
+            self.count = 0;
+            self.flags |= 1;
+            self.updates += 1;
+        }
+    }
+
+    /// Whether the interrupt line is high.
+    pub fn interrupts(&self) -> bool {
+        self.flags & self.interrupts & 1 != 0
+    }
+}

@@ -1,0 +1,194 @@
+//! A USART (RM0090, section 30) and the host's end of its line.
+
+use std::collections::VecDeque;
+
+use crate::{Picoseconds, SECOND};
+
+const OVERRUN: u32 = 1 << 3;
+const FRAMING: u32 = 1 << 1;
+const IDLE: u32 = 1 << 4;
+const RECEIVED: u32 = 1 << 5;
+const COMPLETE: u32 = 1 << 6;
+const EMPTY: u32 = 1 << 7;
+
+/// Registers of a USART.
+#[derive(Clone, Debug)]
+pub struct Usart {
+    flags: u32,
+    baud: u32,
+    control: [u32; 3],
+    received: u32,
+    /// The flags have been read, so that reading the data clears them.
+    armed: bool,
+    waiting: Option<u8>,
+    shifting: Option<(u8, Picoseconds)>,
+    line_idle_at: Option<Picoseconds>,
+    /// Bytes on their way from the host, with the time at which they arrive.
+    pub incoming: VecDeque<(Picoseconds, u8)>,
+    /// Bytes that the host has received.
+    pub outgoing: Vec<u8>,
+    /// Bytes lost because the one before had not been taken.
+    pub overruns: u32,
+}
+
+impl Default for Usart {
+    fn default() -> Self {
+        Self {
+            flags: EMPTY | COMPLETE,
+            baud: 0,
+            control: [0; 3],
+            received: 0,
+            armed: false,
+            waiting: None,
+            shifting: None,
+            line_idle_at: None,
+            incoming: VecDeque::new(),
+            outgoing: Vec::new(),
+            overruns: 0,
+        }
+    }
+}
+
+impl Usart {
+    /// Registers as after a reset; what is on the line stays there.
+    pub fn reset(&mut self) {
+        *self = Self {
+            incoming: std::mem::take(&mut self.incoming),
+            outgoing: std::mem::take(&mut self.outgoing),
+            overruns: self.overruns,
+            ..Self::default()
+        };
+    }
+
+    fn is_enabled(&self) -> bool {
+        self.control[0] & 1 << 13 != 0
+    }
+
+    /// Time of a byte on the line.
+    fn byte(&self, clock_hz: u64) -> Picoseconds {
+        10 * SECOND * u64::from(self.baud.max(1)) / clock_hz.max(1)
+    }
+
+    /// A load.
+    pub fn read(&mut self, offset: u32) -> u32 {
+        match offset {
+            0x00 => {
+                self.armed = true;
+                self.flags
+            }
+            0x04 => {
+                self.flags &= !RECEIVED;
+                if std::mem::take(&mut self.armed) {
+                    self.flags &= !(OVERRUN | FRAMING | IDLE | 5);
+                }
+                self.received
+            }
+            0x08 => self.baud,
+            0x0c => self.control[0],
+            0x10 => self.control[1],
+            0x14 => self.control[2],
+            _ => 0,
+        }
+    }
+
+    /// A store.
+    pub fn write(&mut self, offset: u32, value: u32, clock_hz: u64, now: Picoseconds) {
+        match offset {
+            0x00 => self.flags &= value | !(RECEIVED | COMPLETE),
+            0x04 if self.is_enabled() => self.send(value as u8, clock_hz, now),
+            0x08 => self.baud = value,
+            0x0c => self.control[0] = value,
+            0x10 => self.control[1] = value,
+            0x14 => self.control[2] = value,
+            _ => {}
+        }
+    }
+
+    fn send(&mut self, byte: u8, clock_hz: u64, now: Picoseconds) {
+        self.flags &= !COMPLETE;
+        if self.shifting.is_none() {
+            self.shifting = Some((byte, now + self.byte(clock_hz)));
+        } else {
+            self.waiting = Some(byte);
+            self.flags &= !EMPTY;
+        }
+    }
+
+    /// What happens next.
+    pub fn next_event(&self) -> Picoseconds {
+        let receives = self.incoming.front().map(|(at, _)| *at);
+        let sends = self.shifting.map(|(_, at)| at);
+        [receives, sends, self.line_idle_at]
+            .into_iter()
+            .flatten()
+            .min()
+            .unwrap_or(Picoseconds::MAX)
+    }
+
+    /// Lets happen what is due.
+    pub fn advance(&mut self, clock_hz: u64, now: Picoseconds) {
+        if let Some((byte, at)) = self.shifting
+            && at <= now
+        {
+            self.outgoing.push(byte);
+            self.shifting = self.waiting.take().map(|it| (it, at + self.byte(clock_hz)));
+            self.flags |= EMPTY;
+            if self.shifting.is_none() {
+                self.flags |= COMPLETE;
+            }
+        }
+        if self.line_idle_at.is_some_and(|at| at <= now) {
+            self.line_idle_at = None;
+            self.flags |= IDLE;
+        }
+        while let Some((at, byte)) = self.incoming.front().copied()
+            && at <= now
+        {
+            self.incoming.pop_front();
+            if !self.is_enabled() || self.control[0] & 4 == 0 {
+                continue;
+            }
+            let next = self.incoming.front().map(|(at, _)| *at);
+            let idle_at = at + self.byte(clock_hz);
+            self.line_idle_at = next.is_none_or(|next| next > idle_at).then_some(idle_at);
+            if self.flags & RECEIVED != 0 {
+                self.flags |= OVERRUN;
+                self.overruns += 1;
+            } else {
+                self.received = byte.into();
+                self.flags |= RECEIVED;
+            }
+            // One at a time, so that DMA can take it.
+            break;
+        }
+    }
+
+    /// Whether DMA should take a byte.
+    pub fn wants_reading(&self) -> bool {
+        self.control[2] & 1 << 6 != 0 && self.flags & RECEIVED != 0
+    }
+
+    /// Whether DMA should bring a byte.
+    pub fn wants_writing(&self) -> bool {
+        self.control[2] & 1 << 7 != 0 && self.flags & EMPTY != 0 && self.is_enabled()
+    }
+
+    /// DMA takes a byte.
+    pub fn take(&mut self) -> u8 {
+        self.flags &= !RECEIVED;
+        self.received as u8
+    }
+
+    /// DMA brings a byte.
+    pub fn bring(&mut self, byte: u8, clock_hz: u64, now: Picoseconds) {
+        self.send(byte, clock_hz, now);
+    }
+
+    /// Whether the interrupt line is high.
+    pub fn interrupts(&self) -> bool {
+        let [control, _, third] = self.control;
+        let enabled = self.flags & control & (IDLE | RECEIVED | COMPLETE | EMPTY) != 0;
+        let overrun = self.flags & OVERRUN != 0 && (control & RECEIVED != 0 || third & 1 != 0);
+        enabled || overrun
+    }
+}

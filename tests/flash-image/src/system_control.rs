@@ -1,0 +1,222 @@
+//! The processor's own peripherals: interrupt controller, system control block, cycle counter.
+
+/// Interrupts beyond the sixteen exceptions.
+pub const INTERRUPTS: usize = 96;
+
+/// Number of an exception: 2 NMI, 3 hard fault, 15 SysTick, 16 and up interrupts.
+pub type Exception = usize;
+
+/// Non-maskable interrupt.
+pub const NMI: Exception = 2;
+/// Hard fault.
+pub const HARD_FAULT: Exception = 3;
+
+/// Implemented bits of a priority, from the top of its byte.
+const PRIORITY_MASK: u8 = 0xf0;
+
+/// Registers of the processor's own peripherals.
+#[derive(Clone)]
+pub struct SystemControl {
+    enabled: u128,
+    latched: u128,
+    lines: u128,
+    priorities: [u8; INTERRUPTS],
+    system_priorities: [u8; 16],
+    /// Exceptions being handled, the innermost last.
+    pub active: Vec<Exception>,
+    /// The non-maskable interrupt has been raised.
+    pub nmi_pending: bool,
+    /// Address of the vector table.
+    pub vector_table: u32,
+    /// A reset was asked for.
+    pub reset_requested: bool,
+    /// Cycle counter: enabled, and cycles at which it was 0.
+    cycle_counter_enabled: bool,
+    cycle_counter_zero: u64,
+    trace: u32,
+    coprocessor_access: u32,
+    floating_point_context: u32,
+    system_control: u32,
+}
+
+impl SystemControl {
+    /// As after a reset.
+    pub fn new(vector_table: u32) -> Self {
+        Self {
+            enabled: 0,
+            latched: 0,
+            lines: 0,
+            priorities: [0; INTERRUPTS],
+            system_priorities: [0; 16],
+            active: Vec::new(),
+            nmi_pending: false,
+            vector_table,
+            reset_requested: false,
+            cycle_counter_enabled: false,
+            cycle_counter_zero: 0,
+            trace: 0,
+            coprocessor_access: 0,
+            floating_point_context: 0xc000_0000,
+            system_control: 0,
+        }
+    }
+
+    /// Takes note of the peripherals' interrupt lines.
+    pub fn set_lines(&mut self, lines: u128) {
+        self.latched |= lines & !self.lines;
+        self.lines = lines;
+    }
+
+    /// Raises an interrupt as a peripheral would, whatever its line says.
+    pub fn pend(&mut self, interrupt: usize) {
+        self.latched |= 1 << interrupt;
+    }
+
+    fn pending(&self) -> u128 {
+        let active = self.active.iter().filter(|it| **it >= 16);
+        let active = active.fold(0_u128, |bits, it| bits | 1 << (it - 16));
+        self.enabled & (self.latched | (self.lines & !active))
+    }
+
+    /// Whether something would wake the processor.
+    pub fn wakes(&self) -> bool {
+        self.nmi_pending || self.pending() != 0
+    }
+
+    fn priority(&self, exception: Exception) -> i32 {
+        match exception {
+            NMI => -2,
+            HARD_FAULT => -1,
+            system @ 0..16 => self.system_priorities[system].into(),
+            interrupt => (self.priorities[interrupt - 16] & PRIORITY_MASK).into(),
+        }
+    }
+
+    /// Priority at which the processor runs, masks left out: 256 for none.
+    pub fn present_priority(&self) -> i32 {
+        let active = self.active.iter().map(|it| self.priority(*it));
+        active.min().unwrap_or(256)
+    }
+
+    /// The exception to be taken, if masks and present priority allow it.
+    pub fn next(&self, primask: bool, basepri: u8, faultmask: bool) -> Option<Exception> {
+        if self.nmi_pending && self.present_priority() > -2 {
+            return Some(NMI);
+        }
+        let pending = self.pending();
+        if pending == 0 || primask || faultmask {
+            return None;
+        }
+        let mut best = None;
+        for interrupt in 0..INTERRUPTS {
+            if pending & 1 << interrupt != 0 {
+                let priority = self.priority(interrupt + 16);
+                if best.is_none_or(|(_, least)| priority < least) {
+                    best = Some((interrupt + 16, priority));
+                }
+            }
+        }
+        let (exception, priority) = best?;
+        let mask = match basepri & PRIORITY_MASK {
+            0 => 256,
+            mask => mask.into(),
+        };
+        (priority < self.present_priority().min(mask)).then_some(exception)
+    }
+
+    /// Begins an exception.
+    pub fn enter(&mut self, exception: Exception) {
+        if exception == NMI {
+            self.nmi_pending = false;
+        }
+        if exception >= 16 {
+            self.latched &= !(1 << (exception - 16));
+        }
+        self.active.push(exception);
+    }
+
+    /// Ends the innermost exception.
+    pub fn leave(&mut self) -> Option<Exception> {
+        self.active.pop()
+    }
+
+    /// A load of a word.
+    pub fn read(&self, address: u32, cycles: u64) -> u32 {
+        let word = |bits: u128, first: u32| (bits >> ((address - first) * 8)) as u32;
+        match address {
+            0xe000_1000 => u32::from(self.cycle_counter_enabled) | 0x4000_0000,
+            0xe000_1004 if self.cycle_counter_enabled => (cycles - self.cycle_counter_zero) as u32,
+            0xe000_1004 | 0xe000_1fb4 | 0xe000_1fb0 => 0,
+            0xe000_e010..=0xe000_e01f => 0,
+            0xe000_e100..0xe000_e110 => word(self.enabled, 0xe000_e100),
+            0xe000_e180..0xe000_e190 => word(self.enabled, 0xe000_e180),
+            0xe000_e200..0xe000_e210 => word(self.pending(), 0xe000_e200),
+            0xe000_e280..0xe000_e290 => word(self.pending(), 0xe000_e280),
+            0xe000_e400..0xe000_e460 => {
+                let first = (address - 0xe000_e400) as usize & !3;
+                u32::from_le_bytes(
+                    self.priorities[first..first + 4]
+                        .try_into()
+                        .unwrap_or([0; 4]),
+                )
+            }
+            // Cortex-M4 r0p1.
+            0xe000_ed00 => 0x410f_c241,
+            0xe000_ed04 => self.active.last().copied().unwrap_or(0) as u32,
+            0xe000_ed08 => self.vector_table,
+            0xe000_ed0c => 0xfa05_0000,
+            0xe000_ed10 => self.system_control,
+            0xe000_ed14 => 0x200,
+            0xe000_ed18..=0xe000_ed23 => {
+                let first = (address - 0xe000_ed18) as usize & !3;
+                let bytes = &self.system_priorities[first + 4..first + 8];
+                u32::from_le_bytes(bytes.try_into().unwrap_or([0; 4]))
+            }
+            0xe000_ed24..=0xe000_ed3f => 0,
+            0xe000_ed88 => self.coprocessor_access,
+            0xe000_edf0 => 0,
+            0xe000_edfc => self.trace,
+            0xe000_ef34 => self.floating_point_context,
+            _ => panic!("load from {address:#010x}, which is not modelled"),
+        }
+    }
+
+    /// A store of a word; of a byte for priorities.
+    pub fn write(&mut self, address: u32, size: u32, value: u32, cycles: u64) {
+        let bits = |first: u32| u128::from(value) << ((address - first) * 8);
+        match address {
+            0xe000_1000 => {
+                self.cycle_counter_enabled = value & 1 != 0;
+            }
+            0xe000_1004 => self.cycle_counter_zero = cycles.wrapping_sub(value.into()),
+            // Lock of the trace unit: none on this processor.
+            0xe000_1fb0 => {}
+            0xe000_e100..0xe000_e110 => self.enabled |= bits(0xe000_e100),
+            0xe000_e180..0xe000_e190 => self.enabled &= !bits(0xe000_e180),
+            0xe000_e200..0xe000_e210 => self.latched |= bits(0xe000_e200),
+            0xe000_e280..0xe000_e290 => self.latched &= !bits(0xe000_e280),
+            0xe000_e400..0xe000_e460 => {
+                let first = (address - 0xe000_e400) as usize;
+                for (place, byte) in value.to_le_bytes()[..size as usize].iter().enumerate() {
+                    self.priorities[first + place] = *byte & PRIORITY_MASK;
+                }
+            }
+            0xe000_ed08 => self.vector_table = value,
+            0xe000_ed0c => self.reset_requested |= value >> 16 == 0x05fa && value & 4 != 0,
+            0xe000_ed10 => self.system_control = value,
+            0xe000_ed18..=0xe000_ed23 => {
+                let first = (address - 0xe000_ed18) as usize + 4;
+                for (place, byte) in value.to_le_bytes()[..size as usize].iter().enumerate() {
+                    self.system_priorities[first + place] = *byte & PRIORITY_MASK;
+                }
+            }
+            0xe000_ed24 => {}
+            0xe000_ed28..=0xe000_ed3f => {}
+            0xe000_ed88 => self.coprocessor_access = value,
+            0xe000_edfc => self.trace = value,
+            0xe000_ef00 => self.latched |= 1 << (value & 0x7f),
+            0xe000_ef34 => self.floating_point_context = value,
+            _ => panic!("store of {value:#x} to {address:#010x}, which is not modelled"),
+        }
+    }
+}

@@ -1,0 +1,33 @@
+#![allow(clippy::unwrap_used)]
+//! The image starts on the modelled board and controls a simulated arm as a PC does.
+
+use painleve_firmware::Controller;
+use painleve_flash_image::bench::{encoded, scenario};
+use painleve_flash_image::board::Board;
+use painleve_plant::simulation::Simulation;
+use painleve_plant::statistics::Statistics;
+use painleve_shared::message::{Plant, Response};
+
+#[test]
+fn the_image_boots_and_waits_with_the_stages_off() {
+    let board = Board::booted();
+    assert!(board.torque().is_off());
+}
+
+/// The board's own compiler, arithmetic and serial driver: the same bits.
+#[test]
+fn frames_over_the_serial_line_are_answered_as_on_a_pc() {
+    let scenario = scenario("hybrid-elbow-down");
+    let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
+    let mut simulation = Simulation::new(&scenario).unwrap();
+    let mut statistics = Statistics::new(0.05);
+    let mut board = Board::booted();
+    let ready = board.configure(Plant::Lockstep, &encoded(&scenario));
+    assert!(matches!(ready, Some(Response::Ready { .. })), "{ready:?}");
+    for _ in 0..200 {
+        let frame = simulation.sample(&mut statistics).unwrap();
+        let answer = board.exchange(&frame).expect("an answer in time");
+        assert_eq!(answer, controller.tick(&frame));
+        simulation.advance(Some(&answer), &mut statistics).unwrap();
+    }
+}
