@@ -63,7 +63,7 @@ pub trait Settings: SettingValue {
     /// [`OutOfRange`] for the first setting that is out of range, with a key relative to the group.
     fn validate(&self) -> Result<(), OutOfRange> {
         let mut error = OutOfRange::default();
-        match self.check(None, &mut error) {
+        match self.check(&Bounds::NONE, &mut error) {
             Ok(()) => Ok(()),
             Err(Refused) => Err(error),
         }
@@ -92,6 +92,33 @@ pub struct Range {
     pub minimum: f64,
     /// Largest allowed value.
     pub maximum: f64,
+}
+
+/// What it takes to check one setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Name for the error.
+    pub key: &'static str,
+    /// Allowed values, of numbers.
+    pub range: Option<Range>,
+}
+
+impl Bounds {
+    /// Those of a value without a name.
+    const NONE: Self = Self {
+        key: "",
+        range: None,
+    };
+
+    /// Bounds of a setting of type `T`: a number without a range does not compile.
+    #[doc(hidden)]
+    pub const fn declared<T: SettingValue>(key: &'static str, range: Option<Range>) -> Self {
+        assert!(
+            range.is_some() || !T::SHAPE.needs_a_range(),
+            "a setting that is a number needs a range"
+        );
+        Self { key, range }
+    }
 }
 
 /// What the values of a setting look like.
@@ -160,11 +187,12 @@ pub trait SettingValue {
     /// What its values look like.
     const SHAPE: Shape;
 
-    /// Checks the value, or every value inside, against `range` if it is a number.
+    /// Checks the value, or every value inside, against its bounds.
     ///
     /// # Errors
-    /// [`Refused`]; then `error` says what is out of range, with a key relative to this value.
-    fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused>;
+    /// [`Refused`]; then `error` says what is out of range, with a key that begins with that of
+    /// `bounds`.
+    fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused>;
 }
 
 /// A value is out of range. What there is to say about it is written in place: as results, the
@@ -185,10 +213,11 @@ macro_rules! numbers {
         impl SettingValue for $number {
             const SHAPE: Shape = Shape::$shape;
 
-            #[inline]
-            fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused> {
+            // One copy for all settings keeps a microcontroller's flash free.
+            #[inline(never)]
+            fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
                 let value = *self as $real;
-                match range {
+                match bounds.range {
                     Some(range) if !is_within(value, range.minimum, range.maximum) => {
                         *error = OutOfRange {
                             key: Key::default(),
@@ -196,7 +225,7 @@ macro_rules! numbers {
                             minimum: range.minimum,
                             maximum: range.maximum,
                         };
-                        Err(Refused)
+                        Err(named(error, bounds.key))
                     }
                     _ => Ok(()),
                 }
@@ -213,7 +242,8 @@ macro_rules! without_a_range {
         impl SettingValue for $type {
             const SHAPE: Shape = Shape::$shape;
 
-            fn check(&self, _: Option<Range>, _: &mut OutOfRange) -> Result<(), Refused> {
+            #[inline]
+            fn check(&self, _: &Bounds, _: &mut OutOfRange) -> Result<(), Refused> {
                 Ok(())
             }
         }
@@ -227,9 +257,9 @@ without_a_range!(alloc::string::String: Text);
 impl<T: SettingValue> SettingValue for Option<T> {
     const SHAPE: Shape = Shape::Optional(&T::SHAPE);
 
-    fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused> {
+    fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
         self.as_ref()
-            .map_or(Ok(()), |value| value.check(range, error))
+            .map_or(Ok(()), |value| value.check(bounds, error))
     }
 }
 
@@ -239,8 +269,8 @@ impl<T: SettingValue, const N: usize> SettingValue for [T; N] {
         length: N,
     };
 
-    fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused> {
-        check_each(self, range, error)
+    fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
+        check_each(self, bounds, error)
     }
 }
 
@@ -248,27 +278,20 @@ impl<T: SettingValue, const N: usize> SettingValue for [T; N] {
 ///
 /// # Errors
 /// [`Refused`] for the first value that is out of range.
+#[inline(never)]
 pub fn check_each<T: SettingValue>(
     values: &[T],
-    range: Option<Range>,
+    bounds: &Bounds,
     error: &mut OutOfRange,
 ) -> Result<(), Refused> {
+    let range = bounds.range;
     for (index, value) in values.iter().enumerate() {
+        let key = index_name(index);
         value
-            .check(range, error)
-            .map_err(|Refused| named(error, index_name(index)))?;
+            .check(&Bounds { key, range }, error)
+            .map_err(|Refused| named(error, bounds.key))?;
     }
     Ok(())
-}
-
-/// The declared range of a setting of type `T`: a number without one does not compile.
-#[doc(hidden)]
-pub const fn declared<T: SettingValue>(range: Option<Range>) -> Option<Range> {
-    assert!(
-        range.is_some() || !T::SHAPE.needs_a_range(),
-        "a setting that is a number needs a range"
-    );
-    range
 }
 
 /// Declares a group of settings or a choice; see the [module](crate::settings).
@@ -303,10 +326,14 @@ macro_rules! settings {
     (@check $value:expr, $error:ident, $field:ident, $type:ty, [$($range:expr)?]) => {
         $crate::settings::SettingValue::check(
             $value,
-            const { $crate::settings::declared::<$type>($crate::settings!(@range $($range)?)) },
+            const {
+                &$crate::settings::Bounds::declared::<$type>(
+                    stringify!($field),
+                    $crate::settings!(@range $($range)?),
+                )
+            },
             $error,
-        )
-        .map_err(|_| $crate::settings::named($error, stringify!($field)))?
+        )?
     };
     (@content) => { ::core::option::Option::None };
     (@content ($content:ty)) => {
@@ -367,17 +394,21 @@ macro_rules! settings {
             #[inline(never)]
             fn check(
                 &self,
-                _: ::core::option::Option<$crate::settings::Range>,
+                bounds: &$crate::settings::Bounds,
                 error: &mut $crate::range::OutOfRange,
             ) -> ::core::result::Result<(), $crate::settings::Refused> {
-                $($crate::settings!(@check &self.$field, error, $field, $type, [$($range)?]);)*
-                $(
-                    if let ::core::result::Result::Err(relation) = $relations(self) {
-                        *error = relation;
-                        return ::core::result::Result::Err($crate::settings::Refused);
-                    }
-                )?
-                ::core::result::Result::Ok(())
+                type Checked = ::core::result::Result<(), $crate::settings::Refused>;
+                let check = |error: &mut $crate::range::OutOfRange| -> Checked {
+                    $($crate::settings!(@check &self.$field, error, $field, $type, [$($range)?]);)*
+                    $(
+                        if let ::core::result::Result::Err(relation) = $relations(self) {
+                            *error = relation;
+                            return ::core::result::Result::Err($crate::settings::Refused);
+                        }
+                    )?
+                    ::core::result::Result::Ok(())
+                };
+                check(error).map_err(|_| $crate::settings::named(error, bounds.key))
             }
         }
     };
@@ -466,7 +497,7 @@ macro_rules! settings {
             #[inline(never)]
             fn check(
                 &self,
-                _: ::core::option::Option<$crate::settings::Range>,
+                bounds: &$crate::settings::Bounds,
                 error: &mut $crate::range::OutOfRange,
             ) -> ::core::result::Result<(), $crate::settings::Refused> {
                 $(
@@ -474,10 +505,12 @@ macro_rules! settings {
                         if let Self::$variant(content) = self {
                             return <$content as $crate::settings::SettingValue>::check(
                                 content,
-                                ::core::option::Option::None,
+                                const { &$crate::settings::Bounds::declared::<$content>(
+                                    $key, ::core::option::Option::None,
+                                ) },
                                 error,
                             )
-                            .map_err(|_| $crate::settings::named(error, $key));
+                            .map_err(|_| $crate::settings::named(error, bounds.key));
                         }
                     )?
                     $(
@@ -496,7 +529,8 @@ macro_rules! settings {
                                     error,
                                     &<Self as $crate::settings::SettingValue>::SHAPE,
                                     $key,
-                                )
+                                );
+                                $crate::settings::named(error, bounds.key)
                             });
                         }
                     )?
@@ -510,10 +544,9 @@ macro_rules! settings {
 /// Adds a variant's name to the key of an error, unless the name is a value beside the settings.
 #[doc(hidden)]
 #[cold]
-pub fn in_variant(error: &mut OutOfRange, choice: &Shape, key: &'static str) -> Refused {
-    match choice {
-        Shape::Choice { tag: Some(_), .. } => Refused,
-        _ => named(error, key),
+pub fn in_variant(error: &mut OutOfRange, choice: &Shape, key: &'static str) {
+    if !matches!(choice, Shape::Choice { tag: Some(_), .. }) {
+        error.enclose(key);
     }
 }
 
@@ -542,8 +575,11 @@ pub fn check_named<T: SettingValue>(
     names: &[&'static str],
 ) -> Result<(), OutOfRange> {
     let mut error = OutOfRange::default();
-    let checked = value.check(Some(Range { minimum, maximum }), &mut error);
-    checked.map_err(|Refused| {
+    let bounds = Bounds {
+        key: "",
+        range: Some(Range { minimum, maximum }),
+    };
+    value.check(&bounds, &mut error).map_err(|Refused| {
         for name in names.iter().rev() {
             error.enclose(name);
         }

@@ -6,7 +6,7 @@
 use heapless::{Deque, Vec};
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::settings;
-use painleve_shared::settings::{Range, Refused, SettingValue, Shape, check_each};
+use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape, check_each};
 use serde::{Deserialize, Serialize};
 
 /// Most segments that fit into the queue.
@@ -107,8 +107,8 @@ impl SettingValue for Program {
         maximum_length: MAXIMUM_SEGMENTS,
     };
 
-    fn check(&self, range: Option<Range>, error: &mut OutOfRange) -> Result<(), Refused> {
-        check_each(&self.segments, range, error)
+    fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
+        check_each(&self.segments, bounds, error)
     }
 }
 
