@@ -120,14 +120,11 @@ mod tasks {
             let frame = drive.sample(from_host.take());
             let missing = frame.is_none() && watch.plant == Plant::Realtime;
             let stopped = controller.note(Lapse::MissingFrame, u32::from(missing));
-            let response = match (frame, stopped) {
+            let (frame, elapsed) = match (frame, stopped) {
                 (None, None) => return,
                 (None, Some(stopped)) => {
                     drive.actuate(&stopped);
-                    Response::Actuator {
-                        frame: stopped,
-                        elapsed: 0,
-                    }
+                    (stopped, 0)
                 }
                 (Some(frame), _) => {
                     let start = drive.stopwatch();
@@ -140,17 +137,15 @@ mod tasks {
                         drive.actuate(&stopped);
                         answer = stopped;
                     }
-                    Response::Actuator {
-                        frame: answer,
-                        elapsed,
-                    }
+                    (answer, elapsed)
                 }
             };
+            let change = Change::of(&frame);
+            let response = Response::Actuator { frame, elapsed };
             if cx.local.answers_in.enqueue(response).is_err() {
                 watch.dropped_responses = watch.dropped_responses.wrapping_add(1);
             }
             rtic::pend(LINK);
-            let change = Change::of(controller);
             // What the queue has no room for is not said.
             if change != *cx.local.reported && cx.local.events_in.enqueue(change).is_ok() {
                 *cx.local.reported = change;

@@ -2,6 +2,7 @@
 
 use painleve_firmware::Controller;
 use painleve_firmware::supervise::deadline_monitor::Lapse;
+use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::message::{Health, Plant};
 use painleve_shared::status::{Fault, SupervisorState};
 
@@ -21,12 +22,11 @@ impl Change {
         fault: None,
     };
 
-    /// How things are now.
-    pub fn of(controller: &Controller) -> Self {
-        let telemetry = controller.telemetry();
+    /// How things are by the newest answer.
+    pub fn of(answer: &ActuatorFrame) -> Self {
         Self {
-            state: telemetry.state,
-            fault: telemetry.fault,
+            state: answer.supervisor_state().unwrap_or_default(),
+            fault: answer.latched_fault(),
         }
     }
 }
@@ -65,7 +65,8 @@ impl Watch {
 
     /// Every counter, except the stack: looking at that takes too long to hold up the control task.
     pub fn health(&self, controller: Option<&Controller>) -> Health {
-        let total = |lapse| controller.map_or(0, |controller| controller.monitor().total(lapse));
+        let total =
+            |lapse| controller.map_or(0, |controller| controller.lapse_counts().total(lapse));
         Health {
             stack_bytes: 0,
             ticks: self.ticks,

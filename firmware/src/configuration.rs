@@ -16,8 +16,7 @@ use crate::estimate::disturbance::DisturbanceSettings;
 use crate::estimate::friction::FrictionSettings;
 use crate::estimate::joints::EstimatorSettings;
 use crate::guard::GuardSettings;
-use crate::law::LawSettings;
-use crate::law::hybrid::HybridSettings;
+use crate::law::{Law, LawSettings};
 use crate::recover::RecoverySettings;
 use crate::refer::governor::GovernorSettings;
 use crate::refer::reference::Program;
@@ -53,7 +52,7 @@ impl Converters {
 
 settings! {
     /// Settings of the controller, group by group.
-    pub struct ControllerSettings {
+    pub struct ControllerSettings<L: Law = LawSettings> {
         /// Largest torque on either joint; at most the torque stages' range.
         torque_limit_nm: f32 = 5.0, 0.0..=1e6, "N·m";
         /// How rates are estimated from counts.
@@ -73,7 +72,7 @@ settings! {
         /// How many lapses in a row are survived.
         deadlines: DeadlineLimits = DeadlineLimits::default();
         /// The control law.
-        law: LawSettings = LawSettings::Hybrid(HybridSettings::default());
+        law: L = L::default();
         /// How the tip is kept pressed on the belt.
         guard: GuardSettings = GuardSettings::default();
         /// How the reference is kept off the paradox.
@@ -87,7 +86,7 @@ settings! {
 
 /// Configuration of the controller: what it is connected to, and its settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Configuration {
+pub struct Configuration<L: Law = LawSettings> {
     /// Control rate, Hz.
     pub tick_hz: f32,
     /// The arm as the controller knows it.
@@ -95,10 +94,10 @@ pub struct Configuration {
     /// What a count is worth.
     pub converters: Converters,
     /// The settings.
-    pub settings: ControllerSettings,
+    pub settings: ControllerSettings<L>,
 }
 
-impl Configuration {
+impl<L: Law> Configuration<L> {
     /// Time between two ticks, s.
     pub fn tick_s(&self) -> f32 {
         1.0 / self.tick_hz
@@ -111,7 +110,7 @@ impl Configuration {
         self.arm.height_m * count_rad
     }
 
-    /// Checks every number and makes the arm's model.
+    /// Checks every number, those of the law included, and makes the arm's model.
     ///
     /// # Errors
     /// [`OutOfRange`] for the first setting that is out of range. Its key is relative to

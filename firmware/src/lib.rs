@@ -19,6 +19,7 @@ extern crate std;
 
 pub mod configuration;
 pub mod controller;
+pub mod drive;
 pub mod estimate;
 pub mod guard;
 pub mod law;

@@ -10,7 +10,7 @@ use nalgebra::Vector2;
 use painleve_shared::{Arm, Posture, Real, settings};
 
 use crate::estimate::model::Model;
-use crate::law::signals::LawOutput;
+use crate::law::LawOutput;
 
 /// Distance from the landing place within which the tip is lowered, m.
 const OVER_LANDING_PLACE_M: f32 = 2e-3;
@@ -40,12 +40,25 @@ settings! {
     }
 }
 
-/// The recovery with its state.
+/// Brings the tip back.
 #[derive(Clone, Copy, Debug)]
 pub struct Recovery {
     settings: RecoverySettings,
+    tick_s: f32,
+}
+
+/// What a [`Recovery`] is about to do; nothing while the tip touches.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RecoveryState {
     /// Where to land, m, and the height to have (m), once the tip is in the air.
     flight: Option<Flight>,
+}
+
+impl RecoveryState {
+    /// Posture in which the tip is to land; `None` while there is nothing to recover.
+    pub fn posture(&self) -> Option<Posture> {
+        self.flight.map(|flight| flight.posture)
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -61,35 +74,30 @@ struct Flight {
 }
 
 impl Recovery {
-    /// A recovery that has nothing to do.
-    pub fn new(settings: &RecoverySettings) -> Self {
+    /// A recovery that is called every `tick_s`.
+    pub fn new(settings: &RecoverySettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
-            flight: None,
+            tick_s,
         }
     }
 
-    /// The tip touches: there is nothing to recover any more.
-    pub fn end(&mut self) {
-        self.flight = None;
+    /// Least p as a part of Q22 where the tip may land.
+    pub fn minimum_p_ratio(&self) -> f32 {
+        self.settings.minimum_p_ratio
     }
 
-    /// Posture in which the tip is to land; `None` while there is nothing to recover.
-    pub fn posture(&self) -> Option<Posture> {
-        self.flight.map(|flight| flight.posture)
-    }
-
-    /// Torques for one tick of `tick_s` in the air, with the admissible stretch
+    /// Torques for one tick in the air, with the admissible stretch
     /// `edges_m`; until that is known the tip is held above the belt.
     pub fn tick(
-        &mut self,
+        &self,
+        state: &mut RecoveryState,
         arm: &Arm<f32>,
         model: &Model,
         edges_m: Option<(f32, f32)>,
-        tick_s: f32,
     ) -> LawOutput {
-        let settings = &self.settings;
-        let mut flight = self.flight.unwrap_or(Flight {
+        let (settings, tick_s) = (&self.settings, self.tick_s);
+        let mut flight = state.flight.unwrap_or(Flight {
             landing_m: model.tip_m.x,
             height_m: model.gap_m.at_least(0.0),
             lands: false,
@@ -124,7 +132,7 @@ impl Recovery {
             .unwrap_or(model.theta_rad);
         let path_rate_rad_s = (path_rad - flight.path_rad.unwrap_or(path_rad)) / tick_s;
         flight.path_rad = Some(path_rad);
-        self.flight = Some(flight);
+        state.flight = Some(flight);
 
         let bandwidth = settings.bandwidth_rad_s;
         let wanted = (path_rad - model.theta_rad) * (bandwidth * bandwidth)
@@ -157,18 +165,19 @@ mod tests {
             let at = Vector2::new(tip, height - arm.parameters().height_m);
             let mut theta = arm.joint_angles_rad(&at, posture).unwrap();
             let mut theta_dot = Vector2::new(w1, w2);
-            let mut recovery = Recovery::new(&RecoverySettings::default());
+            let recovery = Recovery::new(&RecoverySettings::default(), 1e-3);
+            let mut state = RecoveryState::default();
             let edges = (-0.18, 0.155);
             let landing = (0..1000).find_map(|_| {
                 let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
-                let torque = recovery.tick(&arm, &model, Some(edges), 1e-3).torque_nm;
+                let torque = recovery.tick(&mut state, &arm, &model, Some(edges)).torque_nm;
                 for _ in 0..10 {
                     let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
                     theta_dot += model.free_acceleration_rad_s2(&torque) * 1e-4;
                     theta += theta_dot * 1e-4;
                 }
                 let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
-                let down = model.gap_m < 0.0 && recovery.flight.is_some_and(|flight| flight.lands);
+                let down = model.gap_m < 0.0 && state.flight.is_some_and(|flight| flight.lands);
                 down.then_some(model)
             });
             let model = landing.unwrap();

@@ -78,6 +78,13 @@ impl StatusFlags {
         self.0 & flags.0 == flags.0
     }
 
+    /// These flags with the bits of `flags` cleared.
+    #[inline]
+    #[must_use]
+    pub fn without(self, flags: Self) -> Self {
+        Self(self.0 & !flags.0)
+    }
+
     /// Sets the bits of `flags` if `condition` holds.
     #[inline]
     pub fn set_if(&mut self, flags: Self, condition: bool) {

@@ -1,14 +1,17 @@
 //! What a sensor frame is good for, and what went wrong with it.
 
-use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::frame::SensorFrame;
 
-use super::Controller;
+use crate::configuration::Converters;
+use crate::drive::torque::LastCommand;
 use crate::supervise::deadline_monitor::{DeadlineMonitor, Lapse};
+use crate::supervise::supervisor::Supervision;
 
 /// Ticks without readings are not counted further: a fault is latched long before.
 const UNREAD_TICKS_LIMIT: u32 = 1 << 16;
 
 /// What a frame is good for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Arrival {
     /// Readings so many ticks after the ones before (1 when none were lost).
     After(u32),
@@ -18,16 +21,30 @@ pub(super) enum Arrival {
     OutOfRange,
 }
 
-impl Controller {
-    /// Takes note of how many times something went wrong around this tick, 0 for a
-    /// good one. If that is now too often in a row, the fault is latched, and the last answer
-    /// without its torque is returned, to be put out at once.
+/// Which frames have come.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ArrivalState {
+    last_sequence: Option<u32>,
+    /// Ticks since the last readings that were taken in, before the present frame's.
+    unread_ticks: u32,
+}
+
+/// Where lapses are counted, and what too many of them stop.
+pub(super) struct Lapses<'a> {
+    pub monitor: &'a mut DeadlineMonitor,
+    pub supervision: &'a mut Supervision,
+    pub command: &'a mut LastCommand,
+}
+
+impl Lapses<'_> {
+    /// Takes note of how many times something went wrong, 0 for a good one. Says whether that has
+    /// just latched a fault.
     #[inline]
-    pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
+    pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
         // A good one, which nearly all are, costs next to nothing.
         if times == 0 {
             self.monitor.note_good(lapse);
-            None
+            false
         } else {
             self.note_bad(lapse, times)
         }
@@ -35,67 +52,70 @@ impl Controller {
 
     #[cold]
     #[inline(never)]
-    fn note_bad(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
-        if !self.monitor.note_bad(lapse, times) || self.supervisor.fault().is_some() {
-            return None;
+    fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
+        let latches = self.monitor.note_bad(lapse, times) && self.supervision.fault().is_none();
+        if latches {
+            self.supervision.latch(lapse.fault());
+            *self.command = LastCommand::default();
         }
-        self.supervisor.latch(lapse.fault());
-        self.shut_down(self.answer.tick);
-        Some(self.answer)
+        latches
     }
+}
 
-    /// How often each kind of lapse has happened.
-    pub fn monitor(&self) -> &DeadlineMonitor {
-        &self.monitor
+/// Looks at a frame before anything is made of it.
+pub(super) fn arrive(
+    converters: &Converters,
+    state: &mut ArrivalState,
+    mut lapses: Lapses<'_>,
+    frame: &SensorFrame,
+) -> Arrival {
+    let last = state
+        .last_sequence
+        .unwrap_or(frame.sequence.wrapping_sub(1));
+    let ahead = frame.sequence.wrapping_sub(last);
+    let mut joints = converters.encoders.iter().zip(frame.joints);
+    let forces = [frame.normal_force, frame.tangential_force];
+    let encoders = joints.all(|(scale, reading)| scale.contains(reading));
+    let forces = forces
+        .iter()
+        .all(|force| converters.force.contains(force.0));
+    if ahead != 1 || !encoders || !forces {
+        return irregular(state, lapses, frame.sequence, ahead, encoders, forces);
     }
-
-    pub(super) fn arrival(&mut self, frame: &SensorFrame) -> Arrival {
-        let last = self.last_sequence.unwrap_or(frame.sequence.wrapping_sub(1));
-        let ahead = frame.sequence.wrapping_sub(last);
-        let converters = &self.configuration.converters;
-        let mut joints = converters.encoders.iter().zip(frame.joints);
-        let forces = [frame.normal_force, frame.tangential_force];
-        let encoders = joints.all(|(scale, reading)| scale.contains(reading));
-        let forces = forces
-            .iter()
-            .all(|force| converters.force.contains(force.0));
-        if ahead != 1 || !encoders || !forces {
-            return self.irregular_arrival(frame.sequence, ahead, encoders, forces);
-        }
-        self.last_sequence = Some(frame.sequence);
-        for lapse in Lapse::OF_FRAMES {
-            self.note(lapse, 0);
-        }
-        Arrival::After(1 + core::mem::take(&mut self.unread_ticks))
+    state.last_sequence = Some(frame.sequence);
+    for lapse in Lapse::OF_FRAMES {
+        lapses.note(lapse, 0);
     }
+    Arrival::After(1 + core::mem::take(&mut state.unread_ticks))
+}
 
-    /// A frame that is not the next one, or has readings (`encoders`, `forces`) out of range.
-    #[cold]
-    #[inline(never)]
-    fn irregular_arrival(
-        &mut self,
-        sequence: u32,
-        ahead: u32,
-        encoders: bool,
-        forces: bool,
-    ) -> Arrival {
-        // More than half the range ahead is behind.
-        let stale = ahead == 0 || ahead > u32::MAX / 2;
-        self.note(Lapse::StaleFrame, u32::from(stale));
-        if stale {
-            return Arrival::Stale;
-        }
-        self.last_sequence = Some(sequence);
-        self.note(Lapse::LostFrame, ahead - 1);
-        self.note(Lapse::EncoderOutOfRange, u32::from(!encoders));
-        self.note(Lapse::ForceOutOfRange, u32::from(!forces));
-        let ticks = ahead.saturating_add(self.unread_ticks);
-        if encoders && forces {
-            self.unread_ticks = 0;
-            Arrival::After(ticks)
-        } else {
-            self.unread_ticks = ticks.min(UNREAD_TICKS_LIMIT);
-            Arrival::OutOfRange
-        }
+/// A frame that is not the next one, or has readings (`encoders`, `forces`) out of range.
+#[cold]
+#[inline(never)]
+fn irregular(
+    state: &mut ArrivalState,
+    mut lapses: Lapses<'_>,
+    sequence: u32,
+    ahead: u32,
+    encoders: bool,
+    forces: bool,
+) -> Arrival {
+    // More than half the range ahead is behind.
+    let stale = ahead == 0 || ahead > u32::MAX / 2;
+    lapses.note(Lapse::StaleFrame, u32::from(stale));
+    if stale {
+        return Arrival::Stale;
+    }
+    state.last_sequence = Some(sequence);
+    lapses.note(Lapse::LostFrame, ahead - 1);
+    lapses.note(Lapse::EncoderOutOfRange, u32::from(!encoders));
+    lapses.note(Lapse::ForceOutOfRange, u32::from(!forces));
+    let ticks = ahead.saturating_add(state.unread_ticks);
+    if encoders && forces {
+        state.unread_ticks = 0;
+        Arrival::After(ticks)
+    } else {
+        state.unread_ticks = ticks.min(UNREAD_TICKS_LIMIT);
+        Arrival::OutOfRange
     }
 }

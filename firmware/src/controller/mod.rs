@@ -1,326 +1,340 @@
-//! One control tick, from sensor counts to torque counts.
+//! One control tick, from sensor counts to torque counts, as a pipeline of stages:
+//!
+//! ```text
+//! frame ─ arrive ─ estimate ─ supervise ─ refer ─ law or recovery ─ torque stages ─ answer
+//!                     ↑                                                  │
+//!                     └──────────────── last command ────────────────────┘
+//! ```
+//!
+//! Each stage is made of settings, which never change, and of a state of its own; what flows from
+//! stage to stage is in the stages' signatures. What a tick did is written to the telemetry at its
+//! end and never read.
 
 mod arrival;
-mod drive;
-mod observation;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::Vector2;
+use painleve_shared::Slip;
 use painleve_shared::counts::{Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
-use painleve_shared::status::{Fault, SupervisorState};
-use painleve_shared::{Arm, Posture, Slip};
+use painleve_shared::status::Fault;
 
-use self::arrival::Arrival;
-use crate::configuration::Configuration;
-use crate::estimate::belt::BeltObserver;
-use crate::estimate::calibration::LengthCalibration;
-use crate::estimate::contact::ContactObserver;
-use crate::estimate::disturbance::DisturbanceObserver;
-use crate::estimate::friction::FrictionEstimator;
-use crate::estimate::joints::{EncoderJump, Estimator};
-use crate::estimate::model::Model;
-use crate::law::Law;
-use crate::law::signals::LawInput;
-use crate::recover::Recovery;
-use crate::refer::governor::EdgeGovernor;
-use crate::refer::reference::{QueueFull, ReferenceGenerator, Segment, TipReference};
-use crate::supervise::deadline_monitor::DeadlineMonitor;
-use crate::supervise::supervisor::Supervisor;
-use crate::telemetry::Telemetry;
+use self::arrival::{Arrival, ArrivalState, Lapses, arrive};
+use crate::configuration::{Configuration, Converters};
+use crate::drive::torque::{LastCommand, NotFinite, TorqueStages};
+use crate::estimate::joints::EncoderJump;
+use crate::estimate::{EstimatesState, Estimators, Readings};
+use crate::law::LawInput;
+use crate::law::{Law, LawSettings};
+use crate::recover::{Recovery, RecoveryState};
+use crate::refer::{References, ReferencesState};
+use crate::supervise::deadline_monitor::{DeadlineMonitor, Lapse};
+use crate::supervise::supervisor::{Supervision, Supervisor};
+use crate::telemetry::{Telemetry, TelemetrySink, Tick};
 
-/// The controller: configuration and state of one arm.
+/// The controller of one arm, with the laws `L`.
 #[derive(Clone, Debug)]
-pub struct Controller {
-    configuration: Configuration,
-    arm: Arm<f32>,
-    tick_s: f32,
-    estimator: Estimator,
-    contact: ContactObserver,
-    friction: FrictionEstimator,
-    belt: BeltObserver,
-    disturbance: DisturbanceObserver,
-    calibration: LengthCalibration,
-    supervisor: Supervisor,
-    monitor: DeadlineMonitor,
-    reference: ReferenceGenerator,
-    governor: EdgeGovernor,
-    law: Law,
-    recovery: Recovery,
-    /// Posture in which the drive was armed or the tip landed.
-    posture: Posture,
-    /// θ̈ of q' expected until the next tick, rad/s².
-    expected_acceleration: Vector2<f32>,
-    /// What of it the contact force is expected to cause, rad/s².
-    contact_acceleration: Vector2<f32>,
-    /// Torque that rounding to counts still owes, N·m.
-    rounding_nm: Vector2<f32>,
-    last_sequence: Option<u32>,
-    /// Ticks since the last readings that were taken in, before the present frame's.
-    unread_ticks: u32,
-    answer: ActuatorFrame,
-    telemetry: Telemetry,
+pub struct Controller<L: Law = LawSettings> {
+    stages: Stages<L>,
+    state: State<L>,
+    last_answer: ActuatorFrame,
 }
 
-impl Controller {
+/// The stages of a tick: settings only.
+#[derive(Clone, Debug)]
+struct Stages<L> {
+    converters: Converters,
+    tick_s: f32,
+    estimators: Estimators,
+    supervisor: Supervisor,
+    references: References,
+    law: L,
+    recovery: Recovery,
+    torques: TorqueStages,
+}
+
+/// What the stages remember from tick to tick.
+#[derive(Clone, Debug)]
+struct State<L: Law> {
+    arrivals: ArrivalState,
+    monitor: DeadlineMonitor,
+    estimates: EstimatesState,
+    supervision: Supervision,
+    references: ReferencesState,
+    law: L::State,
+    recovery: RecoveryState,
+    command: LastCommand,
+}
+
+impl<L: Law> Controller<L> {
     /// A controller that has seen no frame yet.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn new(configuration: &Configuration) -> Result<Self, OutOfRange> {
+    pub fn new(configuration: &Configuration<L>) -> Result<Self, OutOfRange> {
         let arm = configuration.validate()?;
-        Ok(Self {
-            arm,
+        let settings = &configuration.settings;
+        let stages = Stages {
+            converters: configuration.converters,
             tick_s: configuration.tick_s(),
-            estimator: Estimator::new(
-                &configuration.settings.estimator,
-                configuration.converters.encoders,
-                configuration.tick_hz,
+            estimators: Estimators::new(configuration),
+            supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
+            references: References::new(configuration),
+            law: settings.law.clone(),
+            recovery: Recovery::new(&settings.recovery, configuration.tick_s()),
+            torques: TorqueStages::new(
+                &settings.guard,
+                configuration.converters.torque,
+                settings.torque_limit_nm,
             ),
-            contact: ContactObserver::new(&configuration.settings.contact),
-            friction: FrictionEstimator::new(
-                &configuration.settings.friction,
-                configuration.settings.contact.force_noise_n,
-                configuration.tick_s(),
-            ),
-            belt: BeltObserver::new(&configuration.settings.belt),
-            disturbance: DisturbanceObserver::new(
-                &configuration.settings.disturbance,
-                configuration.tick_s(),
-            ),
-            calibration: LengthCalibration::new(
-                &configuration.settings.calibration,
-                configuration.arm.link_length_m,
-                configuration.arm.height_m,
-                configuration.tick_s(),
-            ),
-            supervisor: Supervisor::new(configuration.settings.supervisor, configuration.tick_hz),
-            monitor: DeadlineMonitor::new(configuration.settings.deadlines),
-            reference: ReferenceGenerator::new(
-                &configuration.settings.reference,
-                0.0,
-                configuration.tick_hz,
-            ),
-            governor: EdgeGovernor::new(
-                &configuration.settings.governor,
-                arm.reach_on_belt_m(),
-                configuration.tick_s(),
-                configuration.tip_count_m(),
-            ),
-            law: Law::new(&configuration.settings.law),
-            recovery: Recovery::new(&configuration.settings.recovery),
-            posture: Posture::ElbowDown,
-            expected_acceleration: Vector2::zeros(),
-            contact_acceleration: Vector2::zeros(),
-            rounding_nm: Vector2::zeros(),
-            last_sequence: None,
-            unread_ticks: 0,
-            answer: ActuatorFrame::default(),
-            telemetry: Telemetry::default(),
-            configuration: configuration.clone(),
+        };
+        let state = State {
+            arrivals: ArrivalState::default(),
+            monitor: DeadlineMonitor::new(settings.deadlines),
+            estimates: stages.estimators.start(configuration, arm),
+            supervision: Supervision::default(),
+            references: stages.references.start(&arm),
+            law: L::State::default(),
+            recovery: RecoveryState::default(),
+            command: LastCommand::default(),
+        };
+        Ok(Self {
+            stages,
+            state,
+            last_answer: ActuatorFrame::default(),
         })
-    }
-
-    /// Appends a segment to the reference.
-    ///
-    /// # Errors
-    /// [`QueueFull`]; the reference stays as it was.
-    pub fn push_reference(&mut self, segment: Segment) -> Result<(), QueueFull> {
-        self.reference.push(segment)
-    }
-
-    /// What went on inside at the last tick.
-    pub fn telemetry(&self) -> &Telemetry {
-        &self.telemetry
     }
 
     /// Answers one sensor frame.
     pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
-        let sequence = self.answer.sequence.wrapping_add(1);
-        match self.arrival(frame) {
-            Arrival::After(ticks) => self.answer(frame, ticks),
-            // There is nothing new to go by: the last torque stays, for a while.
-            Arrival::Stale if self.supervisor.drives() => {}
-            Arrival::OutOfRange
-                if self.supervisor.drives() && frame.inputs.contains(DigitalInputs::ENABLE) => {}
-            Arrival::OutOfRange if self.supervisor.drives() => {
-                self.supervisor.disable();
-                self.shut_down(frame.tick);
+        self.tick_into(frame, TelemetrySink::nowhere())
+    }
+
+    /// Answers one sensor frame and writes down what went on inside.
+    pub fn tick_with_telemetry(
+        &mut self,
+        frame: &SensorFrame,
+        telemetry: &mut Telemetry,
+    ) -> ActuatorFrame {
+        self.tick_into(frame, TelemetrySink::to(telemetry))
+    }
+
+    /// Takes note of how many times something went wrong around this tick, 0 for a
+    /// good one. If that is now too often in a row, the fault is latched, and the last answer
+    /// without its torque is returned, to be put out at once.
+    #[inline]
+    pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
+        let State {
+            monitor,
+            supervision,
+            command,
+            ..
+        } = &mut self.state;
+        let mut lapses = Lapses {
+            monitor,
+            supervision,
+            command,
+        };
+        lapses.note(lapse, times).then(|| {
+            self.stop(TelemetrySink::nowhere());
+            self.last_answer
+        })
+    }
+
+    /// How often each kind of lapse has happened.
+    pub fn lapse_counts(&self) -> &DeadlineMonitor {
+        &self.state.monitor
+    }
+
+    #[inline]
+    fn tick_into(&mut self, frame: &SensorFrame, telemetry: TelemetrySink<'_>) -> ActuatorFrame {
+        let State {
+            arrivals,
+            monitor,
+            supervision,
+            command,
+            ..
+        } = &mut self.state;
+        let lapses = Lapses {
+            monitor,
+            supervision,
+            command,
+        };
+        let arrival = arrive(&self.stages.converters, arrivals, lapses, frame);
+        let supervision = &mut self.state.supervision;
+        match arrival {
+            Arrival::After(elapsed_ticks) => {
+                let readings = Readings {
+                    frame,
+                    elapsed_ticks,
+                };
+                self.stages
+                    .tick(&mut self.state, &readings, &mut self.last_answer, telemetry);
             }
-            Arrival::Stale | Arrival::OutOfRange => self.shut_down(frame.tick),
-        }
-        self.answer.tick = frame.tick;
-        self.answer.sequence = sequence;
-        self.answer
-    }
-
-    fn answer(&mut self, frame: &SensorFrame, elapsed_ticks: u32) {
-        let expected = &self.expected_acceleration;
-        if let Err(EncoderJump) = self
-            .estimator
-            .update(&frame.joints, elapsed_ticks, expected)
-        {
-            self.supervisor.latch(Fault::EncoderJump);
-        }
-        let model = Model::new(
-            &self.arm,
-            self.estimator.theta_rad(),
-            self.estimator.theta_dot_rad_s(),
-            self.disturbance.disturbance_nm(),
-        );
-        let observed = self.observe(&model, frame, elapsed_ticks);
-        let contact = observed.contact;
-        let lands = contact && !observed.touched;
-        let state_before = self.supervisor.state();
-        self.supervisor
-            .tick(frame.inputs, contact, self.law.is_on());
-        let state = self.supervisor.state();
-        let armed = state == SupervisorState::Armed && state_before != state;
-        let recovering = self.supervisor.recovers() && self.contact.flight();
-
-        let tip_t_m = model.tip_m.x;
-        if armed {
-            self.posture = Posture::of(&model.theta_rad);
-        } else if let Some(posture) = self.recovery.posture() {
-            self.posture = posture;
-        }
-        let tracks = state == SupervisorState::Tracking && state_before == SupervisorState::Armed;
-        if armed || (lands && state == SupervisorState::Armed) {
-            let program = &self.configuration.settings.reference;
-            self.reference.restart(program, tip_t_m);
-        }
-        if tracks {
-            // The tip has been dragged while friction was not known, and what it is
-            // taken to be where has changed with the links' length.
-            self.reference.start_from(tip_t_m);
-        }
-        let landing_p_ratio = if recovering {
-            self.configuration.settings.recovery.minimum_p_ratio
-        } else {
-            0.0
-        };
-        self.governor.search(
-            &self.arm,
-            self.posture,
-            tip_t_m,
-            &observed.friction,
-            landing_p_ratio,
-        );
-        let wanted = match state {
-            SupervisorState::Armed => self.reference.start(),
-            // A reference does not run away from a tip that is being brought back.
-            SupervisorState::LiftOff if recovering => self.reference.present(),
-            SupervisorState::Tracking | SupervisorState::LiftOff => self.reference.next_tick(),
-            SupervisorState::Idle | SupervisorState::Fault => TipReference {
-                position_m: tip_t_m,
-                ..Default::default()
-            },
-        };
-        let starts = armed || lands;
-        if starts || tracks {
-            self.governor.restart(tip_t_m);
-        }
-        let mut input = LawInput {
-            arm: &self.arm,
-            model: &model,
-            posture: self.posture,
-            force_n: observed.force_n,
-            friction: observed.friction,
-            p_per_kg: observed.p_per_kg,
-            contact,
-            saturated: (self.telemetry.saturated || self.telemetry.guarded) && !starts,
-            reference: wanted,
-            torque_limit_nm: self.configuration.settings.torque_limit_nm,
-            tick_s: self.tick_s,
-        };
-        if state == SupervisorState::Armed
-            || state == SupervisorState::Tracking
-            || state == SupervisorState::LiftOff
-        {
-            input.reference = self.governor.govern(&wanted, self.tick_s);
-        }
-
-        self.telemetry = Telemetry {
-            tick: frame.tick,
-            theta_rad: model.theta_rad.into(),
-            theta_dot_rad_s: model.theta_dot_rad_s.into(),
-            tip_t_m,
-            reference_m: input.reference.position_m,
-            normal_force_n: observed.force_n.y,
-            tangential_force_n: observed.force_n.x,
-            contact,
-            contact_confidence: self.contact.confidence(),
-            friction: input.friction.coefficient,
-            friction_deviation: input.friction.deviation,
-            slip: input.friction.slip,
-            sticks: input.friction.sticks,
-            edges_m: self.governor.edges_m().into(),
-            at_edge: self.governor.is_at_edge(),
-            recovering,
-            guarded: false,
-            ..self.telemetry
-        };
-        if self.supervisor.drives() {
-            let output = if recovering {
-                self.recovery.tick(
-                    &self.arm,
-                    &model,
-                    self.governor.fresh_edges_m(),
-                    self.tick_s,
-                )
-            } else {
-                self.recovery.end();
-                if starts {
-                    self.law.reset(&input);
+            // There is nothing new to go by: the last torque stays, for a while.
+            Arrival::Stale if supervision.drives() => {}
+            Arrival::OutOfRange
+                if supervision.drives() && frame.inputs.contains(DigitalInputs::ENABLE) => {}
+            Arrival::Stale => self.stop(telemetry),
+            Arrival::OutOfRange => {
+                if supervision.drives() {
+                    supervision.disable();
                 }
-                self.law.tick(&input)
-            };
-            self.drive(&output, &model, &observed);
+                self.stop(telemetry);
+            }
         }
-        if self.supervisor.drives() {
-            self.report(frame.tick);
-        } else {
-            self.shut_down(frame.tick);
-        }
+        self.last_answer.tick = frame.tick;
+        self.last_answer.sequence = self.last_answer.sequence.wrapping_add(1);
+        self.last_answer
     }
 
-    /// Torque off.
-    fn shut_down(&mut self, tick: u32) {
-        self.answer.torques = [TorqueCounts(0); 2];
-        self.telemetry.torque_nm = [0.0; 2];
-        self.telemetry.saturated = false;
-        self.telemetry.guarded = false;
-        self.telemetry.recovering = false;
-        self.telemetry.at_edge = false;
-        self.expected_acceleration = Vector2::zeros();
-        self.contact_acceleration = Vector2::zeros();
-        self.rounding_nm = Vector2::zeros();
-        self.report(tick);
+    /// Torque off, without a tick.
+    #[cold]
+    #[inline(never)]
+    fn stop(&mut self, telemetry: TelemetrySink<'_>) {
+        self.state.release();
+        let answer = &mut self.last_answer;
+        answer.torques = [TorqueCounts(0); 2];
+        report(answer, &self.state.supervision);
+        for flag in [
+            StatusFlags::SATURATED,
+            StatusFlags::GUARDED,
+            StatusFlags::AT_EDGE,
+            StatusFlags::RECOVERING,
+        ] {
+            answer.flags = answer.flags.without(flag);
+        }
+        telemetry.stop(&self.state.supervision);
     }
+}
 
-    fn report(&mut self, tick: u32) {
-        let telemetry = &mut self.telemetry;
-        telemetry.tick = tick;
-        telemetry.state = self.supervisor.state();
-        telemetry.fault = self.supervisor.fault();
-        let mut flags = StatusFlags::default();
-        flags.set_if(StatusFlags::CONTACT, telemetry.contact);
-        flags.set_if(StatusFlags::SATURATED, telemetry.saturated);
-        flags.set_if(StatusFlags::REFERENCE_DONE, self.reference.is_done());
-        flags.set_if(StatusFlags::GUARDED, telemetry.guarded);
-        flags.set_if(StatusFlags::AT_EDGE, telemetry.at_edge);
-        flags.set_if(StatusFlags::RECOVERING, telemetry.recovering);
-        flags.set_if(
-            StatusFlags::SLIP_NEGATIVE,
-            telemetry.contact && telemetry.slip == Slip::Negative,
+impl<L: Law> Stages<L> {
+    /// One tick, from readings to the answer.
+    #[inline]
+    fn tick(
+        &self,
+        state: &mut State<L>,
+        readings: &Readings<'_>,
+        answer: &mut ActuatorFrame,
+        telemetry: TelemetrySink<'_>,
+    ) {
+        let joints = self
+            .estimators
+            .follow_joints(&mut state.estimates, readings, &state.command);
+        if let Err(EncoderJump) = joints {
+            state.supervision.latch(Fault::EncoderJump);
+        }
+        let model = state.estimates.model();
+        let contact = self.estimators.observe_contact(
+            &mut state.estimates,
+            &model,
+            readings,
+            &state.command,
+            state.supervision.drives(),
         );
-        flags.set_if(StatusFlags::STICKS, telemetry.contact && telemetry.sticks);
-        self.answer.reference_tip = Micrometres::from_metres(telemetry.reference_m);
-        self.answer.estimated_tip = Micrometres::from_metres(telemetry.tip_t_m);
-        self.answer.state = telemetry.state as u8;
-        self.answer.fault = telemetry.fault.map_or(0, |fault| fault as u8);
-        self.answer.flags = flags;
+        let phase = self.supervisor.tick(
+            &mut state.supervision,
+            readings.frame.inputs,
+            contact.touches,
+            self.law.is_on(),
+        );
+        let arm = &state.estimates.arm;
+        let target = self.references.tick(
+            &mut state.references,
+            arm,
+            &model,
+            &contact,
+            &phase,
+            state.recovery.posture(),
+        );
+        if phase.drives() {
+            let output = if target.recovering {
+                let edges_m = target.fresh_edges_m;
+                self.recovery
+                    .tick(&mut state.recovery, arm, &model, edges_m)
+            } else {
+                state.recovery = RecoveryState::default();
+                let starts = phase.arms || contact.lands;
+                let input = LawInput {
+                    arm,
+                    model: &model,
+                    posture: target.posture,
+                    force_n: contact.force_n,
+                    friction: contact.friction,
+                    p_per_kg: contact.p_per_kg,
+                    contact: contact.touches,
+                    saturated: state.command.is_constrained() && !starts,
+                    reference: target.reference,
+                    torque_limit_nm: self.torques.limit_nm(),
+                    tick_s: self.tick_s,
+                };
+                if starts {
+                    self.law.reset(&mut state.law, &input);
+                }
+                self.law.tick(&mut state.law, &input)
+            };
+            let torques = self
+                .torques
+                .tick(&mut state.command, &output, &model, &contact);
+            if let Err(NotFinite) = torques {
+                state.supervision.latch(Fault::NotFinite);
+            }
+        }
+        if !state.supervision.drives() {
+            state.release();
+        }
+        let tick = Tick {
+            model: &model,
+            contact: &contact,
+            target: &target,
+            command: &state.command,
+            recovering: target.recovering && state.supervision.drives(),
+        };
+        answer.torques = state.command.counts;
+        answer.reference_tip = Micrometres::from_metres(target.reference.position_m);
+        answer.estimated_tip = Micrometres::from_metres(model.tip_m.x);
+        answer.flags = flags(&tick, self.references.is_done(&state.references));
+        report(answer, &state.supervision);
+        telemetry.record(&tick, readings.frame.tick, &state.supervision);
     }
+}
+
+impl<L: Law> State<L> {
+    /// Takes the torque off; whatever was begun in the air is given up.
+    fn release(&mut self) {
+        self.command = LastCommand::default();
+        self.recovery = RecoveryState::default();
+    }
+}
+
+/// State and fault of an answer.
+fn report(answer: &mut ActuatorFrame, supervision: &Supervision) {
+    answer.state = supervision.state() as u8;
+    answer.fault = supervision.fault().map_or(0, |fault| fault as u8);
+}
+
+/// The answer's flags for one tick.
+fn flags(tick: &Tick<'_>, reference_done: bool) -> StatusFlags {
+    let Tick {
+        contact,
+        target,
+        command,
+        recovering,
+        ..
+    } = tick;
+    let friction = &contact.friction;
+    let mut flags = StatusFlags::default();
+    flags.set_if(StatusFlags::CONTACT, contact.touches);
+    flags.set_if(StatusFlags::SATURATED, command.saturated);
+    flags.set_if(StatusFlags::REFERENCE_DONE, reference_done);
+    flags.set_if(StatusFlags::GUARDED, command.guarded);
+    flags.set_if(StatusFlags::AT_EDGE, target.at_edge);
+    flags.set_if(StatusFlags::RECOVERING, *recovering);
+    flags.set_if(
+        StatusFlags::SLIP_NEGATIVE,
+        contact.touches && friction.slip == Slip::Negative,
+    );
+    flags.set_if(StatusFlags::STICKS, contact.touches && friction.sticks);
+    flags
 }

@@ -31,64 +31,78 @@ impl BeltSettings {
 
 /// Bounds of the belt's speed.
 #[derive(Clone, Copy, Debug)]
-pub struct BeltObserver {
-    settings: BeltSettings,
+pub struct BeltState {
     slowest_m_s: f32,
     fastest_m_s: f32,
 }
 
-impl BeltObserver {
-    /// An observer that knows nothing but its settings.
-    pub fn new(settings: &BeltSettings) -> Self {
-        let (slowest_m_s, fastest_m_s) = settings
-            .given_m_s
-            .map_or((-settings.fastest_m_s, settings.fastest_m_s), |speed| {
-                (speed, speed)
-            });
+impl Default for BeltState {
+    /// Nothing is known.
+    fn default() -> Self {
+        Self {
+            slowest_m_s: f32::NEG_INFINITY,
+            fastest_m_s: f32::INFINITY,
+        }
+    }
+}
+
+/// Narrows the bounds of the belt's speed tick by tick.
+#[derive(Clone, Copy, Debug)]
+pub struct BeltEstimator {
+    settings: BeltSettings,
+    tick_s: f32,
+}
+
+impl BeltEstimator {
+    /// An estimator that is called every `tick_s`.
+    pub fn new(settings: &BeltSettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
-            slowest_m_s,
-            fastest_m_s,
+            tick_s,
         }
     }
 
-    /// One tick of `tick_s`: the tip's velocity (m/s) and, in contact, what friction says.
+    /// One tick: the tip's velocity (m/s) and, in contact, what friction says.
     pub fn update(
-        &mut self,
+        &self,
+        state: &mut BeltState,
         tip_velocity_m_s: f32,
         friction: Option<&FrictionEstimate>,
-        tick_s: f32,
     ) {
         if self.settings.given_m_s.is_some() {
             return;
         }
-        let widening = self.settings.acceleration_m_s2 * tick_s;
+        let widening = self.settings.acceleration_m_s2 * self.tick_s;
         let limit = self.settings.fastest_m_s;
-        self.slowest_m_s = (self.slowest_m_s - widening).at_least(-limit);
-        self.fastest_m_s = (self.fastest_m_s + widening).at_most(limit);
+        state.slowest_m_s = (state.slowest_m_s - widening).at_least(-limit);
+        state.fastest_m_s = (state.fastest_m_s + widening).at_most(limit);
         let Some(friction) = friction.filter(|friction| friction.slip_seen) else {
             return;
         };
         if friction.sticks || friction.slip == Slip::Positive {
-            self.fastest_m_s = self.fastest_m_s.at_most(tip_velocity_m_s);
-            self.slowest_m_s = self.slowest_m_s.at_most(self.fastest_m_s);
+            state.fastest_m_s = state.fastest_m_s.at_most(tip_velocity_m_s);
+            state.slowest_m_s = state.slowest_m_s.at_most(state.fastest_m_s);
         }
         if friction.sticks || friction.slip == Slip::Negative {
-            self.slowest_m_s = self.slowest_m_s.at_least(tip_velocity_m_s);
-            self.fastest_m_s = self.fastest_m_s.at_least(self.slowest_m_s);
+            state.slowest_m_s = state.slowest_m_s.at_least(tip_velocity_m_s);
+            state.fastest_m_s = state.fastest_m_s.at_least(state.slowest_m_s);
         }
     }
 
     /// Slowest and fastest speed that the belt may have, m/s.
-    pub fn bounds_m_s(&self) -> (f32, f32) {
-        (self.slowest_m_s, self.fastest_m_s)
+    pub fn bounds_m_s(&self, state: &BeltState) -> (f32, f32) {
+        let known = (state.slowest_m_s, state.fastest_m_s);
+        self.settings
+            .given_m_s
+            .map_or(known, |speed| (speed, speed))
     }
 
     /// Direction of slip of a tip with this velocity (m/s); `None` where the bounds leave it open.
-    pub fn slip(&self, tip_velocity_m_s: f32) -> Option<Slip> {
-        if tip_velocity_m_s > self.fastest_m_s {
+    pub fn slip(&self, state: &BeltState, tip_velocity_m_s: f32) -> Option<Slip> {
+        let (slowest_m_s, fastest_m_s) = self.bounds_m_s(state);
+        if tip_velocity_m_s > fastest_m_s {
             Some(Slip::Positive)
-        } else if tip_velocity_m_s < self.slowest_m_s {
+        } else if tip_velocity_m_s < slowest_m_s {
             Some(Slip::Negative)
         } else {
             None
@@ -112,43 +126,50 @@ mod tests {
 
     #[test]
     fn sliding_both_ways_closes_the_bounds() {
-        let mut belt = BeltObserver::new(&BeltSettings::default());
-        assert_eq!(belt.slip(0.0), None);
-        belt.update(0.1, Some(&friction(Slip::Positive, false)), 1e-3);
-        assert_eq!(belt.slip(0.2), Some(Slip::Positive));
-        belt.update(-0.3, Some(&friction(Slip::Negative, false)), 1e-3);
-        let (slowest, fastest) = belt.bounds_m_s();
+        let belt = BeltEstimator::new(&BeltSettings::default(), 1e-3);
+        let mut state = BeltState::default();
+        assert_eq!(belt.slip(&state, 0.0), None);
+        belt.update(&mut state, 0.1, Some(&friction(Slip::Positive, false)));
+        assert_eq!(belt.slip(&state, 0.2), Some(Slip::Positive));
+        belt.update(&mut state, -0.3, Some(&friction(Slip::Negative, false)));
+        let (slowest, fastest) = belt.bounds_m_s(&state);
         assert!((slowest + 0.3).abs() < 1e-6 && (fastest - 0.102).abs() < 1e-3);
-        assert_eq!(belt.slip(-0.4), Some(Slip::Negative));
+        assert_eq!(belt.slip(&state, -0.4), Some(Slip::Negative));
     }
 
     #[test]
     fn stick_shows_the_speed_and_time_forgets_it() {
-        let mut belt = BeltObserver::new(&BeltSettings::default());
-        belt.update(-0.25, Some(&friction(Slip::Positive, true)), 1e-3);
-        assert_eq!(belt.bounds_m_s(), (-0.25, -0.25));
+        let belt = BeltEstimator::new(&BeltSettings::default(), 1e-3);
+        let mut state = BeltState::default();
+        belt.update(&mut state, -0.25, Some(&friction(Slip::Positive, true)));
+        assert_eq!(belt.bounds_m_s(&state), (-0.25, -0.25));
         for _ in 0..100 {
-            belt.update(0.0, None, 1e-3);
+            belt.update(&mut state, 0.0, None);
         }
-        let (slowest, fastest) = belt.bounds_m_s();
+        let (slowest, fastest) = belt.bounds_m_s(&state);
         assert!((slowest + 0.45).abs() < 1e-3 && (fastest + 0.05).abs() < 1e-3);
     }
 
     #[test]
     fn a_belt_faster_than_its_bounds_moves_them() {
-        let mut belt = BeltObserver::new(&BeltSettings::default());
-        belt.update(-0.5, Some(&friction(Slip::Positive, false)), 1e-3);
-        belt.update(0.5, Some(&friction(Slip::Negative, false)), 1e-3);
-        assert_eq!(belt.bounds_m_s(), (0.5, 0.5));
+        let belt = BeltEstimator::new(&BeltSettings::default(), 1e-3);
+        let mut state = BeltState::default();
+        belt.update(&mut state, -0.5, Some(&friction(Slip::Positive, false)));
+        belt.update(&mut state, 0.5, Some(&friction(Slip::Negative, false)));
+        assert_eq!(belt.bounds_m_s(&state), (0.5, 0.5));
     }
 
     #[test]
     fn a_given_speed_stays() {
-        let mut belt = BeltObserver::new(&BeltSettings {
-            given_m_s: Some(-0.4),
-            ..Default::default()
-        });
-        belt.update(3.0, Some(&friction(Slip::Negative, false)), 1.0);
-        assert_eq!(belt.bounds_m_s(), (-0.4, -0.4));
+        let belt = BeltEstimator::new(
+            &BeltSettings {
+                given_m_s: Some(-0.4),
+                ..Default::default()
+            },
+            1.0,
+        );
+        let mut state = BeltState::default();
+        belt.update(&mut state, 3.0, Some(&friction(Slip::Negative, false)));
+        assert_eq!(belt.bounds_m_s(&state), (-0.4, -0.4));
     }
 }

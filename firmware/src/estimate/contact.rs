@@ -77,49 +77,77 @@ impl EncoderReading {
     }
 }
 
-/// The log-odds with the decision that follows from them.
+/// Weighs readings for contact against flight.
 #[derive(Clone, Copy, Debug)]
-pub struct ContactObserver {
-    /// f_c, N.
-    contact_n: f32,
+pub struct ContactDetector {
+    settings: ContactSettings,
     /// f_c/σ², 1/N.
     slope_per_n: f32,
+}
+
+/// The log-odds of contact with the decision that follows from them.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactState {
     log_odds: f32,
     contact: bool,
 }
 
-impl ContactObserver {
-    /// An observer that takes the tip to be in the air.
-    pub fn new(settings: &ContactSettings) -> Self {
+impl Default for ContactState {
+    /// The tip is taken to be in the air, in doubt.
+    fn default() -> Self {
         Self {
-            contact_n: settings.contact_n,
-            slope_per_n: settings.contact_n / (settings.force_noise_n * settings.force_noise_n),
             log_odds: -DECISION,
             contact: false,
         }
     }
+}
+
+impl ContactDetector {
+    /// A detector with these settings.
+    pub fn new(settings: &ContactSettings) -> Self {
+        Self {
+            settings: *settings,
+            slope_per_n: settings.contact_n / (settings.force_noise_n * settings.force_noise_n),
+        }
+    }
+
+    /// Which readings decide.
+    pub fn evidence(&self) -> Evidence {
+        self.settings.evidence
+    }
+
+    /// Uncertainty of the gap beyond the encoders' resolution, m.
+    pub fn gap_uncertainty_m(&self) -> f32 {
+        self.settings.gap_uncertainty_m
+    }
 
     /// Takes in one tick's normal force from the force cell, N. Returns whether the tip touches.
-    pub fn update_from_force(&mut self, normal_force_n: f32) -> bool {
-        let above = normal_force_n - 0.5 * self.contact_n;
-        self.weigh((self.slope_per_n * above).within(FORCE_LIMIT))
+    pub fn update_from_force(&self, state: &mut ContactState, normal_force_n: f32) -> bool {
+        let above = normal_force_n - 0.5 * self.settings.contact_n;
+        state.weigh((self.slope_per_n * above).within(FORCE_LIMIT))
     }
 
     /// Takes in what one tick's encoders say. Returns whether the tip touches.
-    pub fn update_from_encoders(&mut self, encoders: &EncoderReading) -> bool {
+    pub fn update_from_encoders(
+        &self,
+        state: &mut ContactState,
+        encoders: &EncoderReading,
+    ) -> bool {
         let gap = (GAP_SLOPE * (1.0 - encoders.gap_m.abs() / encoders.gap_error_m))
             .limited(-GAP_AGAINST, GAP_FOR);
         let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
             .limited(-RELEASE_AGAINST, 0.0);
         let change = gap + release;
         // The same readings once more say nothing more against contact.
-        self.weigh(if encoders.moved {
+        state.weigh(if encoders.moved {
             change
         } else {
             change.at_least(0.0)
         })
     }
+}
 
+impl ContactState {
     /// Adds to the log-odds; decides.
     fn weigh(&mut self, change: f32) -> bool {
         self.log_odds = (self.log_odds + change).within(CERTAIN);
@@ -132,21 +160,21 @@ impl ContactObserver {
     }
 
     /// Whether the tip is taken to touch.
-    pub fn contact(&self) -> bool {
+    pub fn touches(&self) -> bool {
         self.contact
     }
 
     /// Whether the tip is in the air beyond doubt; at the start there is doubt.
-    pub fn flight(&self) -> bool {
+    pub fn is_in_flight(&self) -> bool {
         !self.contact && self.log_odds < -DECISION
     }
 
-    /// Whether that is certain.
+    /// Whether contact, or flight, is certain.
     pub fn is_certain(&self) -> bool {
         self.log_odds.abs() >= CERTAIN
     }
 
-    /// How sure that is: 0 at the point of changing the decision, 1 for certain.
+    /// How sure the decision is: 0 at the point of changing it, 1 for certain.
     pub fn confidence(&self) -> f32 {
         let toward = if self.contact {
             self.log_odds
@@ -161,8 +189,8 @@ impl ContactObserver {
 mod tests {
     use super::*;
 
-    fn observer() -> ContactObserver {
-        ContactObserver::new(&ContactSettings::default())
+    fn detector() -> ContactDetector {
+        ContactDetector::new(&ContactSettings::default())
     }
 
     fn gap(gap_m: f32) -> EncoderReading {
@@ -181,46 +209,62 @@ mod tests {
 
     #[test]
     fn the_force_cell_decides_within_a_few_ticks_and_does_not_chatter() {
-        let mut observer = observer();
-        assert!(!observer.flight(), "at the start there is doubt");
-        assert_eq!(ticks_until(true, || observer.update_from_force(0.5)), 2);
+        let (detector, mut state) = (detector(), ContactState::default());
+        assert!(!state.is_in_flight(), "at the start there is doubt");
+        assert_eq!(
+            ticks_until(true, || detector.update_from_force(&mut state, 0.5)),
+            2
+        );
         for force in [0.3, 0.15, 0.4, 0.2, 0.35, 0.25] {
-            assert!(observer.update_from_force(force), "{force}");
+            assert!(detector.update_from_force(&mut state, force), "{force}");
         }
         for _ in 0..3 {
-            observer.update_from_force(10.0);
+            detector.update_from_force(&mut state, 10.0);
         }
-        assert_eq!(observer.confidence(), 1.0);
-        assert!(ticks_until(false, || observer.update_from_force(0.0)) <= 3);
-        assert!(!observer.update_from_force(0.1));
+        assert_eq!(state.confidence(), 1.0);
+        assert!(ticks_until(false, || detector.update_from_force(&mut state, 0.0)) <= 3);
+        assert!(!detector.update_from_force(&mut state, 0.1));
     }
 
     #[test]
     fn a_gap_that_the_encoders_resolve_is_no_contact() {
-        let mut observer = observer();
+        let (detector, mut state) = (detector(), ContactState::default());
         for tick in 0..1000 {
             // Quantisation alone.
-            observer.update_from_encoders(&gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
+            detector
+                .update_from_encoders(&mut state, &gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
         }
-        assert!(observer.contact());
-        assert!(ticks_until(false, || observer.update_from_encoders(&gap(100e-6))) <= 3);
-        assert!(ticks_until(true, || observer.update_from_encoders(&gap(0.0))) <= 8);
+        assert!(state.touches());
+        assert!(
+            ticks_until(false, || detector
+                .update_from_encoders(&mut state, &gap(100e-6)))
+                <= 3
+        );
+        assert!(
+            ticks_until(true, || detector
+                .update_from_encoders(&mut state, &gap(0.0)))
+                <= 8
+        );
     }
 
     #[test]
     fn a_reading_that_stays_says_nothing_more_against_contact() {
-        let mut observer = observer();
+        let (detector, mut state) = (detector(), ContactState::default());
         for _ in 0..20 {
-            observer.update_from_encoders(&gap(0.0));
+            detector.update_from_encoders(&mut state, &gap(0.0));
         }
         let stays = EncoderReading {
             moved: false,
             ..gap(80e-6)
         };
         for _ in 0..100 {
-            assert!(observer.update_from_encoders(&stays));
+            assert!(detector.update_from_encoders(&mut state, &stays));
         }
-        assert!(ticks_until(false, || observer.update_from_encoders(&gap(80e-6))) <= 3);
+        assert!(
+            ticks_until(false, || detector
+                .update_from_encoders(&mut state, &gap(80e-6)))
+                <= 3
+        );
     }
 
     #[test]
@@ -232,11 +276,12 @@ mod tests {
                 full_release,
                 ..gap(0.0)
             };
-            let mut observer = observer();
+            let (detector, mut state) = (detector(), ContactState::default());
             for _ in 0..20 {
-                observer.update_from_encoders(&reading(0.0));
+                detector.update_from_encoders(&mut state, &reading(0.0));
             }
-            (1..100).find(|_| !observer.update_from_encoders(&reading(part * full_release)))
+            (1..100)
+                .find(|_| !detector.update_from_encoders(&mut state, &reading(part * full_release)))
         };
         assert_eq!(ticks_until_flight(9.0, 1.0), Some(3));
         assert_eq!(ticks_until_flight(9.0, 0.4), None);

@@ -44,35 +44,34 @@ pub struct Balance {
     pub elapsed_s: f32,
 }
 
-/// The observer with its state.
+/// The low-pass of the residual.
 #[derive(Clone, Copy, Debug)]
-pub struct DisturbanceObserver {
+pub struct DisturbanceEstimator {
     settings: DisturbanceSettings,
     tick_s: f32,
-    disturbance_nm: Vector2<f32>,
+}
+
+/// The unknown torque, for a [`DisturbanceEstimator`]; none at the start.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DisturbanceState {
+    /// Generalised torque d that acts on the arm beside those of its model, N·m.
+    pub torque_nm: Vector2<f32>,
     /// θ̇ at the tick before, rad/s.
     rate_rad_s: Option<Vector2<f32>>,
 }
 
-impl DisturbanceObserver {
-    /// An observer that has seen no disturbance, called every `tick_s`.
+impl DisturbanceEstimator {
+    /// An estimator that is called every `tick_s`.
     pub fn new(settings: &DisturbanceSettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
             tick_s,
-            disturbance_nm: Vector2::zeros(),
-            rate_rad_s: None,
         }
     }
 
-    /// Generalised torque d that acts on the arm beside those of its model, N·m.
-    pub fn disturbance_nm(&self) -> &Vector2<f32> {
-        &self.disturbance_nm
-    }
-
     /// Takes in one tick of an arm whose `model` includes the present d.
-    pub fn update(&mut self, model: &Model, balance: &Balance) {
-        let before = self.rate_rad_s.replace(model.theta_dot_rad_s);
+    pub fn update(&self, state: &mut DisturbanceState, model: &Model, balance: &Balance) {
+        let before = state.rate_rad_s.replace(model.theta_dot_rad_s);
         let Some(before) = before.filter(|_| self.settings.enabled) else {
             return;
         };
@@ -88,10 +87,12 @@ impl DisturbanceObserver {
             .p_per_kg
             .map_or(1.0, |p| SHARE * (p / model.q.m22).at_least(0.0));
         let weight = (self.settings.bandwidth_rad_s * self.tick_s).at_most(share);
-        self.disturbance_nm =
-            (self.disturbance_nm + residual_nm * weight).map(|torque| torque.within(limit));
+        state.torque_nm =
+            (state.torque_nm + residual_nm * weight).map(|torque| torque.within(limit));
     }
+}
 
+impl DisturbanceState {
     /// A tick that says nothing: contact is in doubt, or a reading is.
     pub fn pause(&mut self) {
         self.rate_rad_s = None;
@@ -106,7 +107,7 @@ mod tests {
 
     const TICK_S: f32 = 1e-3;
 
-    /// Where the observer ends that is shown an arm with an unknown torque, moving with a
+    /// Where the estimate ends of an estimator that is shown an arm with an unknown torque, moving with a
     /// constant acceleration under a contact force, for a while.
     fn observed(
         disturbance_nm: Vector2<f32>,
@@ -117,12 +118,14 @@ mod tests {
     ) -> Vector2<f32> {
         let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
         let theta = Vector2::new(-0.3, 0.7);
-        let mut observer = DisturbanceObserver::new(&DisturbanceSettings::default(), TICK_S);
+        let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), TICK_S);
+        let mut state = DisturbanceState::default();
         for tick in 0..ticks {
             let rate = acceleration * (tick as f32 * TICK_S);
             let truth = Model::new(&arm, theta, rate, &disturbance_nm);
-            let model = Model::new(&arm, theta, rate, observer.disturbance_nm());
-            observer.update(
+            let model = Model::new(&arm, theta, rate, &state.torque_nm);
+            estimator.update(
+                &mut state,
                 &model,
                 &Balance {
                     torque_nm: truth.inverse_dynamics_nm(&acceleration, &force_n),
@@ -132,7 +135,7 @@ mod tests {
                 },
             );
         }
-        *observer.disturbance_nm()
+        state.torque_nm
     }
 
     proptest! {
@@ -173,10 +176,11 @@ mod tests {
         assert_eq!(found, Vector2::new(1.0, -1.0));
     }
 
-    /// What the observer of an arm in balance makes of a sudden change of its rates.
+    /// What the estimator of an arm in balance makes of a sudden change of its rates.
     fn after_a_jump(rate_rad_s: Vector2<f32>) -> Vector2<f32> {
         let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let mut observer = DisturbanceObserver::new(&DisturbanceSettings::default(), TICK_S);
+        let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), TICK_S);
+        let mut state = DisturbanceState::default();
         for rate in [Vector2::zeros(), rate_rad_s] {
             let model = Model::new(&arm, Vector2::new(-0.3, 0.7), rate, &Vector2::zeros());
             let balance = Balance {
@@ -185,9 +189,9 @@ mod tests {
                 p_per_kg: None,
                 elapsed_s: TICK_S,
             };
-            observer.update(&model, &balance);
+            estimator.update(&mut state, &model, &balance);
         }
-        *observer.disturbance_nm()
+        state.torque_nm
     }
 
     #[test]

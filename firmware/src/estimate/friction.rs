@@ -61,12 +61,17 @@ pub struct FrictionEstimate {
     pub sticks: bool,
 }
 
-/// The filter with its state.
+/// The filter's settings.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionEstimator {
     settings: FrictionSettings,
     force_variance_n2: f32,
     tick_s: f32,
+}
+
+/// The filter's state.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionState {
     coefficient: f32,
     variance: f32,
     slip: Slip,
@@ -79,15 +84,21 @@ pub struct FrictionEstimator {
 }
 
 impl FrictionEstimator {
-    /// An estimator that has seen nothing; `force_noise_n` is the standard deviation of one
-    /// reading of the force cell, N.
+    /// An estimator that is called every `tick_s`; `force_noise_n` is the standard deviation of
+    /// one reading of the force cell, N.
     pub fn new(settings: &FrictionSettings, force_noise_n: f32, tick_s: f32) -> Self {
         Self {
             settings: *settings,
             force_variance_n2: force_noise_n * force_noise_n,
             tick_s,
-            coefficient: settings.first_guess,
-            variance: settings.first_deviation * settings.first_deviation,
+        }
+    }
+
+    /// The first guess.
+    pub fn start(&self) -> FrictionState {
+        FrictionState {
+            coefficient: self.settings.first_guess,
+            variance: self.first_variance(),
             slip: Slip::Positive,
             slip_seen: false,
             contrary_ticks: 0,
@@ -96,70 +107,80 @@ impl FrictionEstimator {
         }
     }
 
-    /// Takes in one reading (f_t, f_n), N, of a tip in contact.
-    pub fn update(&mut self, force_n: &Vector2<f32>) {
-        let first_variance = self.settings.first_deviation * self.settings.first_deviation;
-        let drift = self.settings.drift_per_sqrt_s;
-        self.variance = (self.variance + drift * drift * self.tick_s).at_most(first_variance);
-        self.observe_slip(force_n);
-        if force_n.y < self.settings.observable_n {
-            self.stick_ticks = 0;
-            return;
-        }
-        let ratio = -self.slip.sign::<f32>() * force_n.x / force_n.y;
-        let ratio_variance = self.force_variance_n2 * (1.0 + self.coefficient * self.coefficient)
-            / (force_n.y * force_n.y);
-        let innovation = ratio - self.coefficient;
-        let gate = STICK_DEVIATIONS * (self.variance + ratio_variance).square_root()
-            + STICK_FRACTION * self.coefficient;
-        if innovation < -gate {
-            self.sticking_s += self.tick_s;
-            if self.sticking_s < self.settings.stick_limit_s {
-                self.stick_ticks = STICK_TICKS;
-                return;
-            }
-            self.stick_ticks = 0;
-            self.variance = first_variance;
-        } else if innovation > gate {
-            self.stick_ticks = 0;
-            self.variance = first_variance;
-        } else if self.stick_ticks > 0 {
-            self.stick_ticks -= 1;
-            return;
-        }
-        self.sticking_s = 0.0;
-        let gain = self.variance / (self.variance + ratio_variance);
-        self.coefficient = (self.coefficient + gain * innovation).at_least(0.0);
-        self.variance *= 1.0 - gain;
+    fn first_variance(&self) -> f32 {
+        self.settings.first_deviation * self.settings.first_deviation
     }
 
-    fn observe_slip(&mut self, force_n: &Vector2<f32>) {
+    /// Takes in one reading (f_t, f_n), N, of a tip in contact.
+    pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
+        let first_variance = self.first_variance();
+        let drift = self.settings.drift_per_sqrt_s;
+        state.variance = (state.variance + drift * drift * self.tick_s).at_most(first_variance);
+        self.observe_slip(state, force_n);
+        if force_n.y < self.settings.observable_n {
+            state.stick_ticks = 0;
+            return;
+        }
+        let ratio = -state.slip.sign::<f32>() * force_n.x / force_n.y;
+        let ratio_variance = self.force_variance_n2 * (1.0 + state.coefficient * state.coefficient)
+            / (force_n.y * force_n.y);
+        let innovation = ratio - state.coefficient;
+        let gate = STICK_DEVIATIONS * (state.variance + ratio_variance).square_root()
+            + STICK_FRACTION * state.coefficient;
+        if innovation < -gate {
+            state.sticking_s += self.tick_s;
+            if state.sticking_s < self.settings.stick_limit_s {
+                state.stick_ticks = STICK_TICKS;
+                return;
+            }
+            state.stick_ticks = 0;
+            state.variance = first_variance;
+        } else if innovation > gate {
+            state.stick_ticks = 0;
+            state.variance = first_variance;
+        } else if state.stick_ticks > 0 {
+            state.stick_ticks -= 1;
+            return;
+        }
+        state.sticking_s = 0.0;
+        let gain = state.variance / (state.variance + ratio_variance);
+        state.coefficient = (state.coefficient + gain * innovation).at_least(0.0);
+        state.variance *= 1.0 - gain;
+    }
+
+    fn observe_slip(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
         let slip = Slip::of(-force_n.x);
         // Below the noise the sign says nothing.
         let clear = force_n.x * force_n.x > 9.0 * self.force_variance_n2;
-        let cone_n = REVERSAL_FRACTION * self.coefficient * force_n.y;
-        let contrary = clear && slip != self.slip && force_n.x.abs() >= cone_n;
-        self.contrary_ticks = if contrary { self.contrary_ticks + 1 } else { 0 };
-        if self.contrary_ticks >= REVERSAL_TICKS || (clear && !self.slip_seen) {
-            self.slip = slip;
-            self.slip_seen = true;
-            self.contrary_ticks = 0;
-            self.stick_ticks = 0;
+        let cone_n = REVERSAL_FRACTION * state.coefficient * force_n.y;
+        let contrary = clear && slip != state.slip && force_n.x.abs() >= cone_n;
+        state.contrary_ticks = if contrary {
+            state.contrary_ticks + 1
+        } else {
+            0
+        };
+        if state.contrary_ticks >= REVERSAL_TICKS || (clear && !state.slip_seen) {
+            state.slip = slip;
+            state.slip_seen = true;
+            state.contrary_ticks = 0;
+            state.stick_ticks = 0;
         }
     }
 
+    /// Takes in that the tip was thrown off where sliding has no solution from μ = `critical` on.
+    pub fn thrown(&self, state: &mut FrictionState, critical: f32) {
+        if state.coefficient < critical {
+            state.coefficient = critical;
+        }
+        state.variance = self.first_variance();
+    }
+}
+
+impl FrictionState {
     /// Takes in the direction in which a tip that lands will slip.
     pub fn expect_slip(&mut self, slip: Slip) {
         self.slip = slip;
         self.slip_seen = true;
-    }
-
-    /// Takes in that the tip was thrown off where sliding has no solution from μ = `critical` on.
-    pub fn thrown(&mut self, critical: f32) {
-        if self.coefficient < critical {
-            self.coefficient = critical;
-        }
-        self.variance = self.settings.first_deviation * self.settings.first_deviation;
     }
 
     /// Present knowledge.
@@ -190,19 +211,33 @@ mod tests {
         ((bits >> 8) as f32 / (1 << 24) as f32 - 0.5) * 12.0_f32.sqrt() * NOISE_N
     }
 
-    fn slide(estimator: &mut FrictionEstimator, friction: f32, slip: Slip, ticks: u32) {
+    fn slide(tested: &mut Tested, friction: f32, slip: Slip, ticks: u32) {
         for tick in 0..ticks {
             let force = Vector2::new(-friction * slip.sign::<f32>() * 10.0, 10.0);
-            estimator.update(&(force + Vector2::new(noise(2 * tick), noise(2 * tick + 1))));
+            tested.update(&(force + Vector2::new(noise(2 * tick), noise(2 * tick + 1))));
         }
     }
 
-    fn estimator(first_guess: f32) -> FrictionEstimator {
-        let settings = FrictionSettings {
-            first_guess,
-            ..Default::default()
-        };
-        FrictionEstimator::new(&settings, NOISE_N, 1e-3)
+    /// An estimator with its state.
+    struct Tested(FrictionEstimator, FrictionState);
+
+    impl Tested {
+        fn new(first_guess: f32) -> Self {
+            let settings = FrictionSettings {
+                first_guess,
+                ..Default::default()
+            };
+            let estimator = FrictionEstimator::new(&settings, NOISE_N, 1e-3);
+            Self(estimator, estimator.start())
+        }
+
+        fn update(&mut self, force_n: &Vector2<f32>) {
+            self.0.update(&mut self.1, force_n);
+        }
+
+        fn estimate(&self) -> FrictionEstimate {
+            self.1.estimate()
+        }
     }
 
     proptest! {
@@ -211,9 +246,9 @@ mod tests {
             friction in 0.1_f32..1.2, wrong in 0.7_f32..1.3, positive: bool,
         ) {
             let slip = if positive { Slip::Positive } else { Slip::Negative };
-            let mut estimator = estimator(friction * wrong);
-            slide(&mut estimator, friction, slip, 100);
-            let found = estimator.estimate();
+            let mut tested = Tested::new(friction * wrong);
+            slide(&mut tested, friction, slip, 100);
+            let found = tested.estimate();
             prop_assert_eq!(found.slip, slip);
             prop_assert!((found.coefficient - friction).abs() < 0.01, "{:?}", found);
             prop_assert!((found.coefficient - friction).abs() < 5.0 * found.deviation);
@@ -222,51 +257,51 @@ mod tests {
 
     #[test]
     fn nothing_is_learnt_in_the_air() {
-        let mut estimator = estimator(0.4);
+        let mut tested = Tested::new(0.4);
         for tick in 0..1000 {
-            estimator.update(&Vector2::new(noise(tick), 0.1));
+            tested.update(&Vector2::new(noise(tick), 0.1));
         }
-        let found = estimator.estimate();
+        let found = tested.estimate();
         assert_eq!(found.coefficient, 0.4);
         assert!((found.deviation - FrictionSettings::default().first_deviation).abs() < 1e-3);
     }
 
     #[test]
     fn stick_is_not_taken_for_less_friction_but_a_slippery_belt_is() {
-        let mut estimator = estimator(0.6);
-        slide(&mut estimator, 0.6, Slip::Positive, 200);
-        slide(&mut estimator, 0.1, Slip::Positive, 400);
-        assert!(estimator.estimate().sticks);
-        assert!((estimator.estimate().coefficient - 0.6).abs() < 0.01);
-        slide(&mut estimator, 0.1, Slip::Positive, 200);
-        assert!(!estimator.estimate().sticks);
-        assert!((estimator.estimate().coefficient - 0.1).abs() < 0.02);
+        let mut tested = Tested::new(0.6);
+        slide(&mut tested, 0.6, Slip::Positive, 200);
+        slide(&mut tested, 0.1, Slip::Positive, 400);
+        assert!(tested.estimate().sticks);
+        assert!((tested.estimate().coefficient - 0.6).abs() < 0.01);
+        slide(&mut tested, 0.1, Slip::Positive, 200);
+        assert!(!tested.estimate().sticks);
+        assert!((tested.estimate().coefficient - 0.1).abs() < 0.02);
     }
 
     #[test]
     fn only_friction_near_the_other_side_of_the_cone_reverses_the_slip() {
-        let mut estimator = estimator(0.6);
-        slide(&mut estimator, 0.6, Slip::Positive, 200);
-        slide(&mut estimator, 0.4, Slip::Negative, 100);
-        let found = estimator.estimate();
+        let mut tested = Tested::new(0.6);
+        slide(&mut tested, 0.6, Slip::Positive, 200);
+        slide(&mut tested, 0.4, Slip::Negative, 100);
+        let found = tested.estimate();
         assert!(found.slip == Slip::Positive && found.sticks);
-        slide(&mut estimator, 0.6, Slip::Negative, 4);
-        let found = estimator.estimate();
+        slide(&mut tested, 0.6, Slip::Negative, 4);
+        let found = tested.estimate();
         assert!(found.slip == Slip::Negative && !found.sticks);
     }
 
     #[test]
     fn more_friction_is_learnt_at_once() {
-        let mut estimator = estimator(0.3);
-        slide(&mut estimator, 0.3, Slip::Positive, 2000);
-        slide(&mut estimator, 0.7, Slip::Positive, 5);
-        assert!((estimator.estimate().coefficient - 0.7).abs() < 0.02);
+        let mut tested = Tested::new(0.3);
+        slide(&mut tested, 0.3, Slip::Positive, 2000);
+        slide(&mut tested, 0.7, Slip::Positive, 5);
+        assert!((tested.estimate().coefficient - 0.7).abs() < 0.02);
     }
 
     #[test]
     fn a_throw_shows_that_friction_is_at_least_critical() {
-        let mut estimator = estimator(0.5);
-        estimator.thrown(0.58);
-        assert_eq!(estimator.estimate().coefficient, 0.58);
+        let mut tested = Tested::new(0.5);
+        tested.0.thrown(&mut tested.1, 0.58);
+        assert_eq!(tested.estimate().coefficient, 0.58);
     }
 }

@@ -39,9 +39,9 @@ struct TrackingLoop {
     innovation_rad: f32,
 }
 
-/// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates.
+/// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates: its gains.
 #[derive(Clone, Debug)]
-pub struct Estimator {
+pub struct JointEstimator {
     scales: [EncoderScale; 2],
     rad_per_count: [f32; 2],
     /// What an acceleration of 1 rad/s² leaves as innovation that the loops are not told of, counts.
@@ -51,14 +51,19 @@ pub struct Estimator {
     tick_s: f32,
     angle_gain: f32,
     rate_gain_per_s: f32,
+}
+
+/// Angles and rates of both joints, for a [`JointEstimator`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct JointState {
     /// Whether there have been readings; before, everything is zero.
     started: bool,
     joints: [TrackingLoop; 2],
     moved: bool,
 }
 
-impl Estimator {
-    /// An estimator that has seen nothing yet.
+impl JointEstimator {
+    /// An estimator for encoders with these scales, read `tick_hz` times a second.
     pub fn new(settings: &EstimatorSettings, scales: [EncoderScale; 2], tick_hz: f32) -> Self {
         let tick_s = 1.0 / tick_hz;
         let pole = libm::expf(-settings.bandwidth_rad_s * tick_s);
@@ -75,9 +80,6 @@ impl Estimator {
             tick_s,
             angle_gain: 1.0 - pole * pole,
             rate_gain_per_s,
-            started: false,
-            joints: Default::default(),
-            moved: false,
         }
     }
 
@@ -91,16 +93,17 @@ impl Estimator {
     /// [`EncoderJump`] if a joint seems to have moved faster than it can; the loops start again
     /// from these readings.
     pub fn update(
-        &mut self,
+        &self,
+        state: &mut JointState,
         readings: &[EncoderCounts; 2],
         elapsed_ticks: u32,
         acceleration_rad_s2: &Vector2<f32>,
     ) -> Result<(), EncoderJump> {
-        if !self.started {
-            self.start(readings);
+        if !state.started {
+            self.start(state, readings);
             return Ok(());
         }
-        let [joint_1, joint_2] = &mut self.joints;
+        let [joint_1, joint_2] = &mut state.joints;
         let [scale_1, scale_2] = &self.scales;
         let [reading_1, reading_2] = *readings;
         let moved_1 = scale_1.difference(joint_1.reading, reading_1);
@@ -109,10 +112,10 @@ impl Estimator {
         if moved_1.abs() > self.jump_counts[0].saturating_mul(ticks)
             || moved_2.abs() > self.jump_counts[1].saturating_mul(ticks)
         {
-            self.start(readings);
+            self.start(state, readings);
             return Err(EncoderJump);
         }
-        self.moved = moved_1 != 0 || moved_2 != 0;
+        state.moved = moved_1 != 0 || moved_2 != 0;
         let elapsed_s = ticks as f32 * self.tick_s;
         let follow =
             |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32, acceleration: f32| {
@@ -133,10 +136,10 @@ impl Estimator {
     }
 
     /// Starts both loops from these readings, at rest.
-    fn start(&mut self, readings: &[EncoderCounts; 2]) {
-        self.started = true;
-        self.moved = true;
-        for (joint, ((scale, lsb), reading)) in self
+    fn start(&self, state: &mut JointState, readings: &[EncoderCounts; 2]) {
+        state.started = true;
+        state.moved = true;
+        for (joint, ((scale, lsb), reading)) in state
             .joints
             .iter_mut()
             .zip(self.scales.iter().zip(self.rad_per_count).zip(*readings))
@@ -151,26 +154,9 @@ impl Estimator {
         }
     }
 
-    /// Absolute joint angles θ = (θ1, θ2), rad; zero before the first readings.
-    pub fn theta_rad(&self) -> Vector2<f32> {
-        let [one, two] = &self.joints;
-        Vector2::new(one.angle_rad, one.angle_rad + two.angle_rad)
-    }
-
-    /// Measured less expected absolute joint angles at the last tick, rad.
-    pub fn innovation_rad(&self) -> Vector2<f32> {
-        let [one, two] = &self.joints;
-        Vector2::new(one.innovation_rad, one.innovation_rad + two.innovation_rad)
-    }
-
-    /// Whether the last readings differed from the ones before.
-    pub fn moved(&self) -> bool {
-        self.moved
-    }
-
     /// Measured less expected joint angles q' at the last tick, counts.
-    pub fn innovation_counts(&self) -> Vector2<f32> {
-        let [one, two] = &self.joints;
+    pub fn innovation_counts(&self, state: &JointState) -> Vector2<f32> {
+        let [one, two] = &state.joints;
         let [lsb_1, lsb_2] = self.rad_per_count;
         Vector2::new(one.innovation_rad / lsb_1, two.innovation_rad / lsb_2)
     }
@@ -190,6 +176,25 @@ impl Estimator {
     pub fn count_rad(&self) -> Vector2<f32> {
         self.rad_per_count.into()
     }
+}
+
+impl JointState {
+    /// Absolute joint angles θ = (θ1, θ2), rad; zero before the first readings.
+    pub fn theta_rad(&self) -> Vector2<f32> {
+        let [one, two] = &self.joints;
+        Vector2::new(one.angle_rad, one.angle_rad + two.angle_rad)
+    }
+
+    /// Measured less expected absolute joint angles at the last tick, rad.
+    pub fn innovation_rad(&self) -> Vector2<f32> {
+        let [one, two] = &self.joints;
+        Vector2::new(one.innovation_rad, one.innovation_rad + two.innovation_rad)
+    }
+
+    /// Whether the last readings differed from the ones before.
+    pub fn has_moved(&self) -> bool {
+        self.moved
+    }
 
     /// Absolute joint rates θ̇, rad/s; zero before the second readings.
     pub fn theta_dot_rad_s(&self) -> Vector2<f32> {
@@ -207,26 +212,31 @@ mod tests {
         offset: EncoderCounts(16_000),
     };
 
-    fn track(motion: impl Fn(f64) -> (f64, f64), acceleration: f32, ticks: u32) -> Estimator {
-        let mut estimator = Estimator::new(&EstimatorSettings::default(), [SCALE; 2], 1000.0);
+    fn estimator() -> JointEstimator {
+        JointEstimator::new(&EstimatorSettings::default(), [SCALE; 2], 1000.0)
+    }
+
+    fn track(motion: impl Fn(f64) -> (f64, f64), acceleration: f32, ticks: u32) -> JointState {
+        let estimator = estimator();
+        let mut state = JointState::default();
         for tick in 0..ticks {
             let (one, two) = motion(f64::from(tick) * 1e-3);
             let readings = [SCALE.reading(one), SCALE.reading(two)];
             estimator
-                .update(&readings, 1, &Vector2::new(acceleration, 0.0))
+                .update(&mut state, &readings, 1, &Vector2::new(acceleration, 0.0))
                 .unwrap();
         }
-        estimator
+        state
     }
 
     #[test]
     fn a_constant_rate_is_found_from_coarse_counts_through_a_wrap() {
         // θ1 passes the encoder's wrap; the elbow turns the other way.
-        let estimator = track(|t| (0.1 + 1.7 * t, -0.3 - 0.4 * t), 0.0, 400);
-        let rate = estimator.theta_dot_rad_s();
+        let state = track(|t| (0.1 + 1.7 * t, -0.3 - 0.4 * t), 0.0, 400);
+        let rate = state.theta_dot_rad_s();
         assert!((rate.x - 1.7).abs() < 0.1, "{rate}");
         assert!((rate.y - 1.3).abs() < 0.2, "{rate}");
-        let theta = estimator.theta_rad();
+        let theta = state.theta_rad();
         assert!((theta.x - (0.1 + 1.7 * 0.399)).abs() < 6e-4, "{theta}");
     }
 
@@ -242,13 +252,14 @@ mod tests {
     #[test]
     fn a_jump_is_told_and_the_loops_start_again_from_there() {
         let jumped = [SCALE.reading(0.5), SCALE.reading(0.1)];
-        let mut estimator = track(|t| (0.2 + t, 0.1), 0.0, 10);
-        let jump = estimator.update(&jumped, 1, &Vector2::zeros());
+        let mut state = track(|t| (0.2 + t, 0.1), 0.0, 10);
+        let jump = estimator().update(&mut state, &jumped, 1, &Vector2::zeros());
         assert_eq!(jump, Err(EncoderJump));
-        assert!((estimator.theta_rad() - Vector2::new(0.5, 0.6)).norm() < 6e-4);
-        assert_eq!(estimator.theta_dot_rad_s(), Vector2::zeros());
+        assert!((state.theta_rad() - Vector2::new(0.5, 0.6)).norm() < 6e-4);
+        assert_eq!(state.theta_dot_rad_s(), Vector2::zeros());
         // Over a longer time the same difference is a motion.
-        let mut estimator = track(|_| (0.2, 0.1), 0.0, 10);
-        assert!(estimator.update(&jumped, 10, &Vector2::zeros()).is_ok());
+        let mut state = track(|_| (0.2, 0.1), 0.0, 10);
+        let moved = estimator().update(&mut state, &jumped, 10, &Vector2::zeros());
+        assert!(moved.is_ok());
     }
 }

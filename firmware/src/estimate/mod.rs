@@ -1,5 +1,11 @@
-//! What the controller makes of its sensors: joint angles and rates, contact, friction, the
-//! belt's direction, unknown torque, the links' length.
+//! What the controller makes of its sensors.
+//!
+//! - [`joints`]: angles and rates from encoder counts
+//! - [`model`]: the equations of motion there
+//! - [`contact`]: does the tip touch?
+//! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
+//! - [`calibration`]: the links' length
+//! - [`disturbance`]: torques that the model does not know
 
 pub mod belt;
 pub mod calibration;
@@ -8,3 +14,290 @@ pub mod disturbance;
 pub mod friction;
 pub mod joints;
 pub mod model;
+
+use nalgebra::Vector2;
+use painleve_shared::Arm;
+use painleve_shared::counts::LinearScale;
+use painleve_shared::frame::SensorFrame;
+
+use self::belt::{BeltEstimator, BeltState};
+use self::calibration::LengthCalibration;
+use self::contact::{ContactDetector, ContactState, EncoderReading, Evidence};
+use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceState};
+use self::friction::{FrictionEstimate, FrictionEstimator, FrictionState};
+use self::joints::{EncoderJump, JointEstimator, JointState};
+use self::model::Model;
+use crate::configuration::Configuration;
+use crate::drive::torque::LastCommand;
+use crate::law::Law;
+
+/// Friction above the estimate that a throw may be explained by.
+const THROWN_BY_FRICTION: f32 = 0.4;
+
+/// What is known about the contact after a tick's readings.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactEstimate {
+    /// Whether the tip touches.
+    pub touches: bool,
+    /// Whether it touches and did not before.
+    pub lands: bool,
+    /// Whether the tip is in the air beyond doubt.
+    pub in_flight: bool,
+    /// How sure `touches` is, 0 … 1.
+    pub confidence: f32,
+    /// Measured contact force (f_t, f_n), N.
+    pub force_n: Vector2<f32>,
+    /// What is known about friction.
+    pub friction: FrictionEstimate,
+    /// p with that friction, 1/kg.
+    pub p_per_kg: f32,
+}
+
+/// One frame's readings.
+#[derive(Clone, Copy, Debug)]
+pub struct Readings<'a> {
+    /// The frame.
+    pub frame: &'a SensorFrame,
+    /// Ticks since the readings before: 1 unless frames were lost.
+    pub elapsed_ticks: u32,
+}
+
+/// All estimators of one arm.
+#[derive(Clone, Debug)]
+pub struct Estimators {
+    force_scale: LinearScale<f32>,
+    tick_s: f32,
+    joints: JointEstimator,
+    contact: ContactDetector,
+    friction: FrictionEstimator,
+    belt: BeltEstimator,
+    disturbance: DisturbanceEstimator,
+}
+
+/// What the [`Estimators`] remember from tick to tick.
+#[derive(Clone, Copy, Debug)]
+pub struct EstimatesState {
+    /// The arm with its calibrated length.
+    pub arm: Arm<f32>,
+    joints: JointState,
+    contact: ContactState,
+    friction: FrictionState,
+    belt: BeltState,
+    disturbance: DisturbanceState,
+    calibration: LengthCalibration,
+}
+
+impl EstimatesState {
+    /// The arm's model at the estimated angles and rates.
+    #[inline]
+    pub fn model(&self) -> Model {
+        Model::new(
+            &self.arm,
+            self.joints.theta_rad(),
+            self.joints.theta_dot_rad_s(),
+            &self.disturbance.torque_nm,
+        )
+    }
+}
+
+impl Estimators {
+    /// The estimators of a controller with this configuration.
+    pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
+        let tick_s = configuration.tick_s();
+        Self {
+            force_scale: configuration.converters.force,
+            tick_s,
+            joints: JointEstimator::new(
+                &configuration.settings.estimator,
+                configuration.converters.encoders,
+                configuration.tick_hz,
+            ),
+            contact: ContactDetector::new(&configuration.settings.contact),
+            friction: FrictionEstimator::new(
+                &configuration.settings.friction,
+                configuration.settings.contact.force_noise_n,
+                tick_s,
+            ),
+            belt: BeltEstimator::new(&configuration.settings.belt, tick_s),
+            disturbance: DisturbanceEstimator::new(&configuration.settings.disturbance, tick_s),
+        }
+    }
+
+    /// Nothing has been read of this arm yet.
+    pub fn start<L: Law>(&self, configuration: &Configuration<L>, arm: Arm<f32>) -> EstimatesState {
+        EstimatesState {
+            arm,
+            joints: JointState::default(),
+            contact: ContactState::default(),
+            friction: self.friction.start(),
+            belt: BeltState::default(),
+            disturbance: DisturbanceState::default(),
+            calibration: LengthCalibration::new(
+                &configuration.settings.calibration,
+                configuration.arm.link_length_m,
+                configuration.arm.height_m,
+                self.tick_s,
+            ),
+        }
+    }
+
+    /// Takes in the encoders' readings, with what the last command was expected to do.
+    ///
+    /// # Errors
+    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the estimate starts
+    /// again from these readings.
+    #[inline]
+    pub fn follow_joints(
+        &self,
+        state: &mut EstimatesState,
+        readings: &Readings<'_>,
+        last: &LastCommand,
+    ) -> Result<(), EncoderJump> {
+        self.joints.update(
+            &mut state.joints,
+            &readings.frame.joints,
+            readings.elapsed_ticks,
+            &last.expected_acceleration_rad_s2,
+        )
+    }
+
+    /// Takes in what the readings say about contact, friction, belt, links and unknown torques,
+    /// with the arm's model there and the torque that acted until now; `drives` says whether one
+    /// did.
+    #[inline]
+    pub fn observe_contact(
+        &self,
+        state: &mut EstimatesState,
+        model: &Model,
+        readings: &Readings<'_>,
+        last: &LastCommand,
+        drives: bool,
+    ) -> ContactEstimate {
+        let Readings {
+            frame,
+            elapsed_ticks,
+        } = *readings;
+        let force_n = Vector2::new(
+            self.force_scale.value(frame.tangential_force.0),
+            self.force_scale.value(frame.normal_force.0),
+        );
+        // At the end of its range the force cell shows less than there is.
+        let range = self.force_scale.maximum_counts();
+        let force_in_range = [frame.tangential_force, frame.normal_force]
+            .iter()
+            .all(|force| force.0.abs() < range);
+
+        let gap_m = self.gap_m(&state.joints, model);
+        let touched = state.contact.touches();
+        let contact = match self.contact.evidence() {
+            Evidence::ForceCell => self
+                .contact
+                .update_from_force(&mut state.contact, force_n.y),
+            Evidence::Encoders => {
+                let mut encoders = self.encoder_reading(state, model, gap_m, last);
+                find_belt(state, &mut encoders);
+                self.contact
+                    .update_from_encoders(&mut state.contact, &encoders)
+            }
+        };
+        let certain = state.contact.is_certain();
+        let tip_velocity_m_s = model.tip_velocity_m_s.x;
+        if contact {
+            if !touched && let Some(slip) = self.belt.slip(&state.belt, tip_velocity_m_s) {
+                state.friction.expect_slip(slip);
+            }
+            if force_in_range {
+                self.friction.update(&mut state.friction, &force_n);
+            }
+            // A reading that stays would weigh more for nothing but time.
+            if certain && state.joints.has_moved() {
+                let length = state.calibration.update(gap_m);
+                state.arm = state.arm.with_link_length(length);
+            }
+        } else if touched {
+            self.explain_throw(&mut state.friction, model);
+        }
+
+        let friction = state.friction.estimate();
+        let sliding = contact.then_some(&friction);
+        self.belt.update(&mut state.belt, tip_velocity_m_s, sliding);
+        let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
+        if certain && force_in_range && drives {
+            self.disturbance.update(
+                &mut state.disturbance,
+                model,
+                &Balance {
+                    torque_nm: last.torque_nm,
+                    force_n,
+                    p_per_kg: contact.then_some(p_per_kg),
+                    elapsed_s: elapsed_ticks as f32 * self.tick_s,
+                },
+            );
+        } else {
+            state.disturbance.pause();
+        }
+        ContactEstimate {
+            touches: contact,
+            lands: contact && !touched,
+            in_flight: state.contact.is_in_flight(),
+            confidence: state.contact.confidence(),
+            force_n,
+            friction,
+            p_per_kg,
+        }
+    }
+
+    /// Measured height of the tip over the belt, m.
+    fn gap_m(&self, joints: &JointState, model: &Model) -> f32 {
+        let residual = joints.innovation_rad() * self.joints.residual_share();
+        let jacobian = &model.jacobian;
+        model.gap_m + jacobian.m21 * residual.x + jacobian.m22 * residual.y
+    }
+
+    /// What the encoders show of the contact.
+    fn encoder_reading(
+        &self,
+        state: &EstimatesState,
+        model: &Model,
+        gap_m: f32,
+        last: &LastCommand,
+    ) -> EncoderReading {
+        let count = self.joints.count_rad();
+        // Half a count of either encoder; the second one turns θ2 alone.
+        let rounding_m = 0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
+        // What the innovation settles at when the contact force is gone.
+        let release = -self.joints.lag_counts(&last.contact_acceleration_rad_s2);
+        EncoderReading {
+            gap_m,
+            gap_error_m: self.contact.gap_uncertainty_m()
+                + state.calibration.gap_error_m(rounding_m),
+            moved: state.joints.has_moved(),
+            release: release.dot(&self.joints.innovation_counts(&state.joints)),
+            full_release: release.norm_squared(),
+        }
+    }
+
+    /// The tip has just left the belt. Where a little more friction than estimated explains
+    /// that, it is taken to be the reason.
+    fn explain_throw(&self, state: &mut FrictionState, model: &Model) {
+        let friction = state.estimate();
+        let coupling = friction.slip.sign::<f32>() * model.q.m12;
+        let critical = model.q.m22 / coupling;
+        if coupling > 0.0 && critical < friction.coefficient + THROWN_BY_FRICTION {
+            self.friction.thrown(state, critical);
+        }
+    }
+}
+
+/// Where the encoders decide, the belt is taken to be where the tip was lowest: where it
+/// starts, and from then on wherever it gets below that.
+fn find_belt(state: &mut EstimatesState, encoders: &mut EncoderReading) {
+    let starts = state.calibration.is_open();
+    if starts || encoders.is_below_belt() {
+        let length = state.calibration.restart(encoders.gap_m);
+        state.arm = state.arm.with_link_length(length);
+    }
+    if starts {
+        encoders.gap_m = 0.0;
+    }
+}

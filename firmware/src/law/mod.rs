@@ -1,77 +1,165 @@
-//! The control laws, and the choice between them.
+//! The control laws, and sets of laws to choose from.
 //!
-//! - [`signals`]: what a law is given and what it answers
+//! - [`Law`]: what a law is, given a [`LawInput`] and answering with a [`LawOutput`]
+//! - [`off`]: no law
 //! - [`pid`]: the paper's PID on the joints
 //! - [`hybrid`]: the paper's hybrid force/motion law
+//! - [`law_set!`](crate::law_set!): a set of laws, itself a law; [`LawSettings`] is the set that
+//!   comes with the controller
 
 pub mod hybrid;
+pub mod off;
 pub mod pid;
-pub mod signals;
+mod signals;
 
-use nalgebra::Vector2;
-use painleve_shared::settings;
+use core::fmt::Debug;
 
-use hybrid::{Hybrid, HybridSettings};
-use pid::{Pid, PidSettings};
-use signals::{LawInput, LawOutput};
+use painleve_shared::settings::SettingValue;
 
-settings! {
+pub use self::signals::{LawInput, LawOutput};
+use hybrid::HybridSettings;
+use pid::PidSettings;
+
+/// A control law: settings, held once, which compute torques from what is known at a tick and
+/// from a state of their own.
+///
+/// The settings are declared with [`settings!`](painleve_shared::settings!), which checks them and
+/// describes them to the host. A law of one's own is put beside the built-in ones with
+/// [`law_set!`](crate::law_set!).
+///
+/// ```
+/// use painleve_firmware::law::{Law, LawInput, LawOutput};
+///
+/// painleve_shared::settings! {
+///     /// Holds each joint where it is with a damper.
+///     #[derive(Copy)]
+///     pub struct DamperSettings {
+///         /// Damping of each joint.
+///         damping_nms_rad: f32 = 0.1, 0.0..=10.0, "N·m·s/rad";
+///     }
+/// }
+///
+/// impl Law for DamperSettings {
+///     type State = ();
+///
+///     fn tick(&self, _: &mut (), input: &LawInput<'_>) -> LawOutput {
+///         LawOutput {
+///             torque_nm: -input.model.theta_dot_rad_s * self.damping_nms_rad,
+///             contact_force_n: input.force_n,
+///         }
+///     }
+/// }
+/// ```
+pub trait Law: Clone + Debug + Default + SettingValue {
+    /// What the law remembers from tick to tick. The default is the state of a law that has not
+    /// run yet.
+    type State: Clone + Debug + Default;
+
+    /// Whether there is a law at all: without one the drive never arms.
+    fn is_on(&self) -> bool {
+        true
+    }
+
+    /// Starts again; called before the law's tick when the drive is armed and when the tip lands.
+    fn reset(&self, state: &mut Self::State, input: &LawInput<'_>) {
+        let _ = input;
+        *state = Self::State::default();
+    }
+
+    /// Torques for one tick. Takes bounded time, allocates nothing and does not panic; a torque
+    /// that is not a finite number is latched as a fault.
+    fn tick(&self, state: &mut Self::State, input: &LawInput<'_>) -> LawOutput;
+}
+
+/// Declares a set of laws: an enum of their settings that is itself a [`Law`](crate::law::Law), and
+/// a struct of their states. Every set has the variant `Off` (`"off"`) as well, which never arms.
+///
+/// ```
+/// use painleve_firmware::law::{hybrid::HybridSettings, pid::PidSettings};
+///
+/// painleve_firmware::law_set! {
+///     /// The laws of our arm.
+///     pub enum OurLaws = Pid, states OurLawStates {
+///         /// The paper's PID.
+///         "pid" => Pid(PidSettings),
+///         /// The same with other gains by default.
+///         "hybrid" => Hybrid(HybridSettings),
+///     }
+/// }
+///
+/// assert_eq!(OurLaws::default(), OurLaws::Pid(PidSettings::default()));
+/// ```
+#[macro_export]
+macro_rules! law_set {
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis enum $name:ident = $default:ident, states $states:ident {
+            $(
+                $(#[doc = $meaning:literal])+
+                $key:literal => $law:ident($settings:ty)
+            ),* $(,)?
+        }
+    ) => {
+        ::painleve_shared::settings! {
+            $(#[$attribute])*
+            #[derive(Copy)]
+            $visibility enum $name {
+                /// No law: the drive never arms, torque is zero.
+                "off" => Off,
+                $($(#[doc = $meaning])+ $key => $law($settings)),*
+            }
+        }
+
+        impl ::core::default::Default for $name {
+            fn default() -> Self {
+                Self::$default(::core::default::Default::default())
+            }
+        }
+
+        #[doc = concat!("The states of all laws of [`", stringify!($name), "`], each by its law's name.")]
+        #[derive(Clone, Debug, Default)]
+        #[allow(non_snake_case)]
+        $visibility struct $states {
+            $($law: <$settings as $crate::law::Law>::State,)*
+        }
+
+        impl $crate::law::Law for $name {
+            type State = $states;
+
+            fn is_on(&self) -> bool {
+                match self {
+                    Self::Off => $crate::law::Law::is_on(&$crate::law::off::Off {}),
+                    $(Self::$law(law) => $crate::law::Law::is_on(law),)*
+                }
+            }
+
+            fn reset(&self, state: &mut $states, input: &$crate::law::LawInput<'_>) {
+                match self {
+                    Self::Off => $crate::law::Law::reset(&$crate::law::off::Off {}, &mut (), input),
+                    $(Self::$law(law) => $crate::law::Law::reset(law, &mut state.$law, input),)*
+                }
+            }
+
+            fn tick(
+                &self,
+                state: &mut $states,
+                input: &$crate::law::LawInput<'_>,
+            ) -> $crate::law::LawOutput {
+                match self {
+                    Self::Off => $crate::law::Law::tick(&$crate::law::off::Off {}, &mut (), input),
+                    $(Self::$law(law) => $crate::law::Law::tick(law, &mut state.$law, input),)*
+                }
+            }
+        }
+    };
+}
+
+law_set! {
     /// Choice and settings of the control law.
-    #[derive(Copy)]
-    pub enum LawSettings = Off {
-        /// No law: the drive never arms, torque is zero.
-        "off" => Off,
+    pub enum LawSettings = Hybrid, states LawStates {
         /// The paper's PID on the joints (section III-A).
         "pid" => Pid(PidSettings),
         /// The paper's hybrid force/motion law (section III-B).
         "hybrid" => Hybrid(HybridSettings),
-    }
-}
-
-/// A law with its state.
-#[derive(Clone, Copy, Debug)]
-pub enum Law {
-    /// See [`LawSettings::Off`].
-    Off,
-    /// See [`LawSettings::Pid`].
-    Pid(Pid),
-    /// See [`LawSettings::Hybrid`].
-    Hybrid(Hybrid),
-}
-
-impl Law {
-    /// The chosen law in its initial state.
-    pub fn new(settings: &LawSettings) -> Self {
-        match *settings {
-            LawSettings::Off => Self::Off,
-            LawSettings::Pid(settings) => Self::Pid(Pid::new(settings)),
-            LawSettings::Hybrid(settings) => Self::Hybrid(Hybrid::new(settings)),
-        }
-    }
-
-    /// Whether there is a law at all.
-    pub fn is_on(&self) -> bool {
-        !matches!(self, Self::Off)
-    }
-
-    /// Forgets everything; called when the drive is armed.
-    pub fn reset(&mut self, input: &LawInput<'_>) {
-        match self {
-            Self::Off => {}
-            Self::Pid(law) => law.reset(),
-            Self::Hybrid(law) => law.reset(input),
-        }
-    }
-
-    /// Torques for one tick.
-    pub fn tick(&mut self, input: &LawInput<'_>) -> LawOutput {
-        match self {
-            Self::Off => LawOutput {
-                torque_nm: Vector2::zeros(),
-                contact_force_n: Vector2::zeros(),
-            },
-            Self::Pid(law) => law.tick(input),
-            Self::Hybrid(law) => law.tick(input),
-        }
     }
 }

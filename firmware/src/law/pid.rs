@@ -6,7 +6,7 @@
 use nalgebra::Vector2;
 use painleve_shared::{Real, settings};
 
-use super::signals::{LawInput, LawOutput};
+use super::{Law, LawInput, LawOutput};
 
 settings! {
     /// Gains of the PID, for joint 1 and joint 2: the paper's from x0,d.
@@ -23,39 +23,25 @@ settings! {
     }
 }
 
-/// The PID with its integrals.
-#[derive(Clone, Copy, Debug)]
-pub struct Pid {
-    settings: PidSettings,
+/// The PID's integrals.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PidState {
     /// Torque of the integral action, N·m.
     integral_nm: Vector2<f32>,
     /// Joint angles of the last reference within reach, rad.
     wanted_rad: Option<Vector2<f32>>,
 }
 
-impl Pid {
-    /// A PID that has not run yet.
-    pub fn new(settings: PidSettings) -> Self {
-        Self {
-            settings,
-            integral_nm: Vector2::zeros(),
-            wanted_rad: None,
-        }
-    }
+impl Law for PidSettings {
+    type State = PidState;
 
-    /// Forgets the integrals.
-    pub fn reset(&mut self) {
-        *self = Self::new(self.settings);
-    }
-
-    /// Torques for one tick.
-    pub fn tick(&mut self, input: &LawInput<'_>) -> LawOutput {
+    fn tick(&self, state: &mut PidState, input: &LawInput<'_>) -> LawOutput {
         let theta_wanted = input
             .arm
             .joint_angles_on_belt_rad(input.reference.position_m, input.posture)
-            .or(self.wanted_rad)
+            .or(state.wanted_rad)
             .unwrap_or(input.model.theta_rad);
-        self.wanted_rad = Some(theta_wanted);
+        state.wanted_rad = Some(theta_wanted);
         let rate_wanted = input.arm.joint_rates_on_belt_rad_s(
             input.reference.position_m,
             input.reference.velocity_m_s,
@@ -63,20 +49,20 @@ impl Pid {
         );
         let error = elbow_relative(&(theta_wanted - input.model.theta_rad));
         let error_rate = elbow_relative(&(rate_wanted - input.model.theta_dot_rad_s));
-        let [kp_1, kp_2] = self.settings.proportional_nm_rad;
-        let [ki_1, ki_2] = self.settings.integral_nm_rad_s;
-        let [kd_1, kd_2] = self.settings.derivative_nms_rad;
+        let [kp_1, kp_2] = self.proportional_nm_rad;
+        let [ki_1, ki_2] = self.integral_nm_rad_s;
+        let [kd_1, kd_2] = self.derivative_nms_rad;
         // Anti-windup: the integrals stand still while the torque is limited,
         // and never exceed their own limit.
         if !input.saturated {
-            let limit = self.settings.integral_limit_nm;
+            let limit = self.integral_limit_nm;
             let step = Vector2::new(ki_1 * error.x, ki_2 * error.y) * input.tick_s;
-            self.integral_nm = (self.integral_nm + step).map(|torque| torque.within(limit));
+            state.integral_nm = (state.integral_nm + step).map(|torque| torque.within(limit));
         }
         LawOutput {
             torque_nm: Vector2::new(
-                kp_1 * error.x + self.integral_nm.x + kd_1 * error_rate.x,
-                kp_2 * error.y + self.integral_nm.y + kd_2 * error_rate.y,
+                kp_1 * error.x + state.integral_nm.x + kd_1 * error_rate.x,
+                kp_2 * error.y + state.integral_nm.y + kd_2 * error_rate.y,
             ),
             contact_force_n: input.force_n,
         }

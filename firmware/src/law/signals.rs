@@ -34,8 +34,8 @@ pub struct LawInput<'a> {
     pub tick_s: f32,
 }
 
-/// A law's answer.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A law's answer; the default is no torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LawOutput {
     /// Wanted joint torques (u1, u2), N·m, before limits.
     pub torque_nm: Vector2<f32>,

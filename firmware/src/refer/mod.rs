@@ -1,5 +1,153 @@
-//! Where the tip should be: the reference, and the governor that keeps it inside the
-//! admissible stretch of the belt.
+//! Where the tip should be.
+//!
+//! - [`reference`](mod@reference): the segments of the program, tick by tick
+//! - [`governor`]: keeps the reference inside the admissible stretch of the belt
 
 pub mod governor;
 pub mod reference;
+
+use painleve_shared::status::SupervisorState;
+use painleve_shared::{Arm, Posture};
+
+use self::governor::{EdgeGovernor, GovernorState};
+use self::reference::{ReferenceGenerator, ReferenceState, TipReference};
+use crate::configuration::Configuration;
+use crate::estimate::ContactEstimate;
+use crate::estimate::model::Model;
+use crate::law::Law;
+use crate::supervise::supervisor::Phase;
+
+/// Where the tip should be at one tick, and where it may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    /// Where the tip should be.
+    pub reference: TipReference,
+    /// Posture in which it should be there.
+    pub posture: Posture,
+    /// Edges of the admissible stretch of the belt, m.
+    pub edges_m: (f32, f32),
+    /// The edges once they have been found for the present posture and least p.
+    pub fresh_edges_m: Option<(f32, f32)>,
+    /// Whether an edge holds the reference back.
+    pub at_edge: bool,
+    /// Whether the tip is to be brought back onto the belt before it can follow.
+    pub recovering: bool,
+}
+
+/// Follows the program, inside the edges.
+#[derive(Clone, Debug)]
+pub struct References {
+    generator: ReferenceGenerator,
+    governor: EdgeGovernor,
+    /// Least p as a part of Q22 where a tip that is brought back may land.
+    landing_p_ratio: f32,
+}
+
+/// What the [`References`] remember from tick to tick.
+#[derive(Clone, Copy, Debug)]
+pub struct ReferencesState {
+    generator: ReferenceState,
+    governor: GovernorState,
+    /// Posture in which the drive was armed or the tip landed.
+    posture: Posture,
+}
+
+impl References {
+    /// The references of a controller with this configuration.
+    pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
+        Self {
+            generator: ReferenceGenerator::new(
+                &configuration.settings.reference,
+                configuration.tick_hz,
+            ),
+            governor: EdgeGovernor::new(
+                &configuration.settings.governor,
+                configuration.tick_s(),
+                configuration.tip_count_m(),
+            ),
+            landing_p_ratio: configuration.settings.recovery.minimum_p_ratio,
+        }
+    }
+
+    /// Nothing has been followed yet, with this arm.
+    pub fn start(&self, arm: &Arm<f32>) -> ReferencesState {
+        ReferencesState {
+            generator: ReferenceState::default(),
+            governor: GovernorState::new(arm.reach_on_belt_m()),
+            posture: Posture::ElbowDown,
+        }
+    }
+
+    /// Whether the last segment has ended.
+    pub fn is_done(&self, state: &ReferencesState) -> bool {
+        self.generator.is_done(&state.generator)
+    }
+
+    /// The target of one tick. `landing` is the posture in which a thrown tip is being brought
+    /// back.
+    #[inline]
+    pub fn tick(
+        &self,
+        state: &mut ReferencesState,
+        arm: &Arm<f32>,
+        model: &Model,
+        contact: &ContactEstimate,
+        phase: &Phase,
+        landing: Option<Posture>,
+    ) -> Target {
+        let recovering = phase.recovers && contact.in_flight;
+        let tip_t_m = model.tip_m.x;
+        if phase.arms {
+            state.posture = Posture::of(&model.theta_rad);
+        } else if let Some(posture) = landing {
+            state.posture = posture;
+        }
+        let starts = phase.arms || contact.lands;
+        if phase.arms || (contact.lands && phase.state == SupervisorState::Armed) {
+            state.generator = ReferenceState::at(tip_t_m);
+        }
+        if phase.starts_tracking {
+            // The tip has been dragged while friction was not known, and what it is
+            // taken to be where has changed with the links' length.
+            state.generator.start_from(tip_t_m);
+        }
+        let minimum_p_ratio = if recovering {
+            self.landing_p_ratio
+        } else {
+            0.0
+        };
+        self.governor.search(
+            &mut state.governor,
+            arm,
+            state.posture,
+            tip_t_m,
+            &contact.friction,
+            minimum_p_ratio,
+        );
+        let wanted = match phase.state {
+            SupervisorState::Armed => state.generator.start(),
+            // A reference does not run away from a tip that is being brought back.
+            SupervisorState::LiftOff if recovering => self.generator.present(&state.generator),
+            SupervisorState::Tracking | SupervisorState::LiftOff => {
+                self.generator.next_tick(&mut state.generator)
+            }
+            SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
+        };
+        if starts || phase.starts_tracking {
+            state.governor.restart(tip_t_m);
+        }
+        let drives = phase.drives();
+        Target {
+            reference: if drives {
+                self.governor.govern(&mut state.governor, &wanted)
+            } else {
+                wanted
+            },
+            posture: state.posture,
+            edges_m: state.governor.edges_m(),
+            fresh_edges_m: state.governor.fresh_edges_m(),
+            at_edge: drives && state.governor.is_at_edge(),
+            recovering,
+        }
+    }
+}

@@ -1,15 +1,15 @@
-//! Where the tip shall be: a queue of segments along the belt.
+//! Where the tip shall be: segments along the belt, one after the other.
 //!
 //! Each segment starts where the one before ended; after the last one the reference
 //! stands still. Time is counted in ticks, so that nothing drifts.
 
-use heapless::{Deque, Vec};
+use heapless::Vec;
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::settings;
 use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape, check_each};
 use serde::{Deserialize, Serialize};
 
-/// Most segments that fit into the queue.
+/// Most segments of a program.
 pub const MAXIMUM_SEGMENTS: usize = 16;
 
 settings! {
@@ -67,7 +67,7 @@ impl Segment {
     }
 }
 
-/// The segments a controller starts with.
+/// The segments that are followed from every arming on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Program {
@@ -123,42 +123,40 @@ pub struct TipReference {
     pub acceleration_m_s2: f32,
 }
 
-/// The queue is full.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct QueueFull;
+impl TipReference {
+    /// Standing at `position_m`.
+    pub fn at_rest(position_m: f32) -> Self {
+        Self {
+            position_m,
+            ..Self::default()
+        }
+    }
+}
 
-/// Follows the queue of segments tick by tick.
+/// Follows a program tick by tick.
 #[derive(Clone, Debug)]
 pub struct ReferenceGenerator {
+    program: Program,
     tick_hz: f32,
-    queue: Deque<Segment, MAXIMUM_SEGMENTS>,
-    /// Where the present segment started, m.
+}
+
+/// How far a [`ReferenceGenerator`] has got: at the start of its program, from z_t = 0.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReferenceState {
+    /// Present segment of the program.
+    segment: usize,
+    /// Where it started, m.
     start_m: f32,
     /// Ticks since then.
     elapsed_ticks: u32,
 }
 
-impl ReferenceGenerator {
-    /// A generator that stands at `start_m` and then follows `program`.
-    pub fn new(program: &Program, start_m: f32, tick_hz: f32) -> Self {
-        let mut generator = Self {
-            tick_hz,
-            queue: Deque::new(),
+impl ReferenceState {
+    /// Stands at `start_m`, before the first segment.
+    pub fn at(start_m: f32) -> Self {
+        Self {
             start_m,
-            elapsed_ticks: 0,
-        };
-        generator.restart(program, start_m);
-        generator
-    }
-
-    /// Stands at `start_m` and then follows `program`. Takes as long as the program has segments.
-    pub fn restart(&mut self, program: &Program, start_m: f32) {
-        self.start_m = start_m;
-        self.elapsed_ticks = 0;
-        self.queue.clear();
-        for segment in &program.segments {
-            // Cannot fail: the queue has the program's capacity.
-            let _ = self.queue.push_back(*segment);
+            ..Self::default()
         }
     }
 
@@ -167,67 +165,56 @@ impl ReferenceGenerator {
         self.start_m = start_m;
     }
 
-    /// Appends a segment.
-    ///
-    /// # Errors
-    /// [`QueueFull`] if [`MAXIMUM_SEGMENTS`] are waiting already.
-    pub fn push(&mut self, segment: Segment) -> Result<(), QueueFull> {
-        self.queue.push_back(segment).map_err(|_| QueueFull)
-    }
-
     /// Where the present segment started, at rest: what to hold before following.
     pub fn start(&self) -> TipReference {
-        TipReference {
-            position_m: self.start_m,
-            ..Default::default()
+        TipReference::at_rest(self.start_m)
+    }
+}
+
+impl ReferenceGenerator {
+    /// A generator that follows `program`, `tick_hz` ticks a second.
+    pub fn new(program: &Program, tick_hz: f32) -> Self {
+        Self {
+            program: program.clone(),
+            tick_hz,
         }
     }
 
     /// Where the reference has got to, at rest: what to hold while time stands still.
-    pub fn present(&self) -> TipReference {
-        let position_m = self.queue.front().map_or(self.start_m, |segment| {
-            at(segment, self.start_m, self.elapsed_ticks, self.tick_hz).position_m
-        });
-        TipReference {
-            position_m,
-            ..Default::default()
-        }
+    pub fn present(&self, state: &ReferenceState) -> TipReference {
+        let segment = self.program.segments.get(state.segment);
+        TipReference::at_rest(segment.map_or(state.start_m, |segment| {
+            at(segment, state.start_m, state.elapsed_ticks, self.tick_hz).position_m
+        }))
     }
 
     /// Whether the last segment has ended.
-    pub fn is_done(&self) -> bool {
-        self.queue.is_empty()
+    pub fn is_done(&self, state: &ReferenceState) -> bool {
+        state.segment >= self.program.segments.len()
     }
 
     /// The reference of this tick; then time goes on by one tick.
-    pub fn next_tick(&mut self) -> TipReference {
+    pub fn next_tick(&self, state: &mut ReferenceState) -> TipReference {
         // A segment without duration ends at once, so that several may end in one tick.
-        for _ in 0..MAXIMUM_SEGMENTS {
-            let Some(segment) = self.queue.front() else {
-                break;
-            };
+        while let Some(segment) = self.program.segments.get(state.segment) {
             let duration_ticks = segment.duration_s() * self.tick_hz;
-            if (self.elapsed_ticks as f32) < duration_ticks - 0.5 {
-                let reference = at(segment, self.start_m, self.elapsed_ticks, self.tick_hz);
-                self.elapsed_ticks = self.elapsed_ticks.saturating_add(1);
+            if (state.elapsed_ticks as f32) < duration_ticks - 0.5 {
+                let reference = at(segment, state.start_m, state.elapsed_ticks, self.tick_hz);
+                state.elapsed_ticks = state.elapsed_ticks.saturating_add(1);
                 return reference;
             }
-            self.start_m = segment.target_m().unwrap_or(self.start_m);
-            self.elapsed_ticks = 0;
-            self.queue.pop_front();
+            state.start_m = segment.target_m().unwrap_or(state.start_m);
+            state.elapsed_ticks = 0;
+            state.segment += 1;
         }
-        self.start()
+        state.start()
     }
 }
 
 fn at(segment: &Segment, start_m: f32, elapsed_ticks: u32, tick_hz: f32) -> TipReference {
-    let rest = |position_m| TipReference {
-        position_m,
-        ..Default::default()
-    };
     match *segment {
-        Segment::Hold { .. } => rest(start_m),
-        Segment::Step { target_m, .. } => rest(target_m),
+        Segment::Hold { .. } => TipReference::at_rest(start_m),
+        Segment::Step { target_m, .. } => TipReference::at_rest(target_m),
         Segment::Ramp {
             target_m,
             duration_s,
@@ -270,7 +257,7 @@ mod tests {
 
     #[test]
     fn segments_follow_each_other_and_the_last_one_holds() {
-        let mut generator = ReferenceGenerator::new(
+        let generator = ReferenceGenerator::new(
             &program(&[
                 Segment::Hold { duration_s: 0.002 },
                 Segment::Ramp {
@@ -282,26 +269,17 @@ mod tests {
                     duration_s: 0.0,
                 },
             ]),
-            0.0,
             1000.0,
         );
-        let positions: std::vec::Vec<f32> =
-            (0..8).map(|_| generator.next_tick().position_m).collect();
+        let mut state = ReferenceState::default();
+        let positions: std::vec::Vec<f32> = (0..8)
+            .map(|_| generator.next_tick(&mut state).position_m)
+            .collect();
         let expected = [0.0, 0.0, 0.0, 0.025, 0.05, 0.075, -0.1, -0.1];
         for (ours, theirs) in positions.iter().zip(expected) {
             assert!((ours - theirs).abs() < 1e-7, "{positions:?}");
         }
-        assert!(generator.is_done());
-    }
-
-    #[test]
-    fn the_queue_is_bounded() {
-        let mut generator = ReferenceGenerator::new(&Program::default(), 0.0, 1000.0);
-        let hold = Segment::Hold { duration_s: 1.0 };
-        for _ in 0..MAXIMUM_SEGMENTS {
-            assert_eq!(generator.push(hold), Ok(()));
-        }
-        assert_eq!(generator.push(hold), Err(QueueFull));
+        assert!(generator.is_done(&state));
     }
 
     #[test]
@@ -323,11 +301,12 @@ mod tests {
             start in -0.18_f32..0.18, target in -0.18_f32..0.18, duration in 0.1_f32..5.0,
         ) {
             let segment = Segment::MinimumJerk { target_m: target, duration_s: duration };
-            let mut generator = ReferenceGenerator::new(&program(&[segment]), start, 1000.0);
-            let mut before = generator.next_tick();
+            let generator = ReferenceGenerator::new(&program(&[segment]), 1000.0);
+            let mut state = ReferenceState::at(start);
+            let mut before = generator.next_tick(&mut state);
             prop_assert_eq!(before.position_m, start);
-            while !generator.is_done() {
-                let now = generator.next_tick();
+            while !generator.is_done(&state) {
+                let now = generator.next_tick(&mut state);
                 let slope = (now.position_m - before.position_m) * 1000.0;
                 let mean = 0.5 * (now.velocity_m_s + before.velocity_m_s);
                 // The trapezoid's error, jerk · T²/12, and rounding of the positions.

@@ -46,11 +46,16 @@ impl SupervisorSettings {
     }
 }
 
-/// The state machine.
+/// The rules of the state machine.
 #[derive(Clone, Copy, Debug)]
 pub struct Supervisor {
     settings: SupervisorSettings,
     tick_hz: f32,
+}
+
+/// The state machine's state; idle at the start.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Supervision {
     state: SupervisorState,
     fault: Option<Fault>,
     /// Ticks in the present state, or in contact while armed.
@@ -61,21 +66,133 @@ pub struct Supervisor {
     inputs: DigitalInputs,
 }
 
+/// What the supervisor has decided at one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Phase {
+    /// Present state.
+    pub state: SupervisorState,
+    /// Whether the drive has just been armed.
+    pub arms: bool,
+    /// Whether tracking has just started, for the first time since the drive was armed.
+    pub starts_tracking: bool,
+    /// Whether a tip in the air is to be brought back onto the belt.
+    pub recovers: bool,
+}
+
+impl Phase {
+    /// Whether torque may be applied.
+    pub fn drives(&self) -> bool {
+        drives(self.state)
+    }
+}
+
+/// Whether torque may be applied in this state.
+fn drives(state: SupervisorState) -> bool {
+    matches!(
+        state,
+        SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff
+    )
+}
+
 impl Supervisor {
-    /// An idle supervisor that is called `tick_hz` times a second.
+    /// A supervisor that is called `tick_hz` times a second.
     pub fn new(settings: SupervisorSettings, tick_hz: f32) -> Self {
-        Self {
-            settings,
-            tick_hz,
-            state: SupervisorState::Idle,
-            fault: None,
-            ticks: 0,
-            contact_ticks: 0,
-            lift_offs: 0,
-            inputs: DigitalInputs::default(),
+        Self { settings, tick_hz }
+    }
+
+    /// One tick: `has_law` says whether there is anything to arm.
+    pub fn tick(
+        &self,
+        supervision: &mut Supervision,
+        inputs: DigitalInputs,
+        contact: bool,
+        has_law: bool,
+    ) -> Phase {
+        let before = supervision.state;
+        self.advance(supervision, inputs, contact, has_law);
+        let state = supervision.state;
+        Phase {
+            state,
+            arms: state == SupervisorState::Armed && before != state,
+            starts_tracking: state == SupervisorState::Tracking && before == SupervisorState::Armed,
+            recovers: self.settings.on_lift_off == OnLiftOff::Recover && supervision.drives(),
         }
     }
 
+    fn advance(
+        &self,
+        supervision: &mut Supervision,
+        inputs: DigitalInputs,
+        contact: bool,
+        has_law: bool,
+    ) {
+        let before = core::mem::replace(&mut supervision.inputs, inputs);
+        let rises = |bit| inputs.contains(bit) && !before.contains(bit);
+        let enabled = inputs.contains(DigitalInputs::ENABLE);
+        supervision.ticks = supervision.ticks.saturating_add(1);
+        match supervision.state {
+            SupervisorState::Fault => {
+                if rises(DigitalInputs::RESET) {
+                    supervision.fault = None;
+                    supervision.enter(SupervisorState::Idle);
+                }
+            }
+            SupervisorState::Idle => {
+                // An edge, so that a reset alone does not start the drive again.
+                if rises(DigitalInputs::ENABLE) && has_law {
+                    supervision.lift_offs = 0;
+                    supervision.enter(SupervisorState::Armed);
+                }
+            }
+            _ if !enabled => supervision.enter(SupervisorState::Idle),
+            SupervisorState::Armed => {
+                supervision.contact_ticks = if contact {
+                    supervision.contact_ticks.saturating_add(1)
+                } else {
+                    0
+                };
+                if self.exceeds(supervision.contact_ticks, self.settings.arming_s) {
+                    supervision.enter(SupervisorState::Tracking);
+                } else if self.exceeds(supervision.ticks, self.settings.arming_limit_s) {
+                    supervision.latch(Fault::ContactNotFound);
+                }
+            }
+            SupervisorState::Tracking => {
+                if self.exceeds(supervision.ticks, self.settings.recovered_s) {
+                    supervision.lift_offs = 0;
+                }
+                if !contact {
+                    supervision.lift_offs = supervision.lift_offs.saturating_add(1);
+                    let limit = self.settings.recoveries_limit;
+                    match self.settings.on_lift_off {
+                        OnLiftOff::Recover if supervision.lift_offs > limit => {
+                            supervision.latch(Fault::RecoveryFailed);
+                        }
+                        OnLiftOff::Recover | OnLiftOff::Continue => {
+                            supervision.enter(SupervisorState::LiftOff);
+                        }
+                        OnLiftOff::Fault => supervision.latch(Fault::LiftOffTooLong),
+                    }
+                }
+            }
+            SupervisorState::LiftOff => {
+                let limit_s = self.settings.lift_off_limit_s;
+                if contact {
+                    supervision.enter(SupervisorState::Tracking);
+                } else if limit_s > 0.0 && self.exceeds(supervision.ticks, limit_s) {
+                    supervision.latch(Fault::LiftOffTooLong);
+                }
+            }
+        }
+    }
+
+    /// Whether a count of ticks has gone on for longer than `time_s`.
+    fn exceeds(&self, ticks: u32, time_s: f32) -> bool {
+        ticks as f32 > time_s * self.tick_hz
+    }
+}
+
+impl Supervision {
     /// Present state.
     pub fn state(&self) -> SupervisorState {
         self.state
@@ -88,15 +205,7 @@ impl Supervisor {
 
     /// Whether torque may be applied.
     pub fn drives(&self) -> bool {
-        matches!(
-            self.state,
-            SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff
-        )
-    }
-
-    /// Whether a tip in the air is brought back onto the belt.
-    pub fn recovers(&self) -> bool {
-        self.settings.on_lift_off == OnLiftOff::Recover && self.drives()
+        drives(self.state)
     }
 
     /// Latches a fault. The first one stays.
@@ -110,73 +219,6 @@ impl Supervisor {
     /// Stops the drive without looking at anything else.
     pub fn disable(&mut self) {
         self.enter(SupervisorState::Idle);
-    }
-
-    /// One tick: `has_law` says whether there is anything to arm.
-    pub fn tick(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) {
-        let before = core::mem::replace(&mut self.inputs, inputs);
-        let rises = |bit| inputs.contains(bit) && !before.contains(bit);
-        let enabled = inputs.contains(DigitalInputs::ENABLE);
-        self.ticks = self.ticks.saturating_add(1);
-        match self.state {
-            SupervisorState::Fault => {
-                if rises(DigitalInputs::RESET) {
-                    self.fault = None;
-                    self.enter(SupervisorState::Idle);
-                }
-            }
-            SupervisorState::Idle => {
-                // An edge, so that a reset alone does not start the drive again.
-                if rises(DigitalInputs::ENABLE) && has_law {
-                    self.lift_offs = 0;
-                    self.enter(SupervisorState::Armed);
-                }
-            }
-            _ if !enabled => self.enter(SupervisorState::Idle),
-            SupervisorState::Armed => {
-                self.contact_ticks = if contact {
-                    self.contact_ticks.saturating_add(1)
-                } else {
-                    0
-                };
-                if self.exceeds(self.contact_ticks, self.settings.arming_s) {
-                    self.enter(SupervisorState::Tracking);
-                } else if self.exceeds(self.ticks, self.settings.arming_limit_s) {
-                    self.latch(Fault::ContactNotFound);
-                }
-            }
-            SupervisorState::Tracking => {
-                if self.exceeds(self.ticks, self.settings.recovered_s) {
-                    self.lift_offs = 0;
-                }
-                if !contact {
-                    self.lift_offs = self.lift_offs.saturating_add(1);
-                    let limit = self.settings.recoveries_limit;
-                    match self.settings.on_lift_off {
-                        OnLiftOff::Recover if self.lift_offs > limit => {
-                            self.latch(Fault::RecoveryFailed);
-                        }
-                        OnLiftOff::Recover | OnLiftOff::Continue => {
-                            self.enter(SupervisorState::LiftOff);
-                        }
-                        OnLiftOff::Fault => self.latch(Fault::LiftOffTooLong),
-                    }
-                }
-            }
-            SupervisorState::LiftOff => {
-                let limit_s = self.settings.lift_off_limit_s;
-                if contact {
-                    self.enter(SupervisorState::Tracking);
-                } else if limit_s > 0.0 && self.exceeds(self.ticks, limit_s) {
-                    self.latch(Fault::LiftOffTooLong);
-                }
-            }
-        }
-    }
-
-    /// Whether a count of ticks has gone on for longer than `time_s`.
-    fn exceeds(&self, ticks: u32, time_s: f32) -> bool {
-        ticks as f32 > time_s * self.tick_hz
     }
 
     fn enter(&mut self, state: SupervisorState) {
@@ -196,8 +238,31 @@ mod tests {
     const ON: DigitalInputs = DigitalInputs::ENABLE;
     const OFF: DigitalInputs = DigitalInputs(0);
 
-    fn tracking() -> Supervisor {
-        let mut supervisor = Supervisor::new(SupervisorSettings::default(), 1000.0);
+    /// A supervisor with its state.
+    #[derive(Default)]
+    struct Tested(Supervision);
+
+    impl Tested {
+        fn tick(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) {
+            Supervisor::new(SupervisorSettings::default(), 1000.0).tick(
+                &mut self.0,
+                inputs,
+                contact,
+                has_law,
+            );
+        }
+
+        fn state(&self) -> SupervisorState {
+            self.0.state()
+        }
+
+        fn fault(&self) -> Option<Fault> {
+            self.0.fault()
+        }
+    }
+
+    fn tracking() -> Tested {
+        let mut supervisor = Tested::default();
         for _ in 0..12 {
             supervisor.tick(ON, true, true);
         }
@@ -207,7 +272,7 @@ mod tests {
 
     #[test]
     fn enabling_arms_and_confirmed_contact_starts_tracking() {
-        let mut supervisor = Supervisor::new(SupervisorSettings::default(), 1000.0);
+        let mut supervisor = Tested::default();
         supervisor.tick(OFF, true, true);
         assert_eq!(supervisor.state(), Idle);
         supervisor.tick(ON, true, true);
@@ -217,19 +282,19 @@ mod tests {
 
     #[test]
     fn without_a_law_nothing_arms() {
-        let mut supervisor = Supervisor::new(SupervisorSettings::default(), 1000.0);
+        let mut supervisor = Tested::default();
         supervisor.tick(ON, true, false);
         assert_eq!(supervisor.state(), Idle);
     }
 
     #[test]
     fn arming_without_contact_is_given_up() {
-        let mut supervisor = Supervisor::new(SupervisorSettings::default(), 1000.0);
+        let mut supervisor = Tested::default();
         for _ in 0..1002 {
             supervisor.tick(ON, false, true);
         }
         assert_eq!(supervisor.fault(), Some(Fault::ContactNotFound));
-        assert!(!supervisor.drives());
+        assert!(!supervisor.0.drives());
     }
 
     #[test]
@@ -248,8 +313,8 @@ mod tests {
     #[test]
     fn a_fault_is_latched_until_reset_and_needs_a_new_enable() {
         let mut supervisor = tracking();
-        supervisor.latch(Fault::NotFinite);
-        supervisor.latch(Fault::StaleFrame);
+        supervisor.0.latch(Fault::NotFinite);
+        supervisor.0.latch(Fault::StaleFrame);
         for inputs in [ON, OFF, ON] {
             supervisor.tick(inputs, true, true);
             assert_eq!(supervisor.fault(), Some(Fault::NotFinite));

@@ -20,7 +20,7 @@ use nalgebra::Vector2;
 use painleve_shared::{Real, Slip};
 
 pub use self::settings::{FrictionFeedForward, HybridSettings};
-use super::signals::{LawInput, LawOutput};
+use super::{Law, LawInput, LawOutput};
 
 /// Part of the sampling that the loop through the contact may use: its pole is 1 − ½ p̂/p.
 const OBSERVER_SHARE: f32 = 0.5;
@@ -64,12 +64,11 @@ fn affordable_part(motion_nm: &Vector2<f32>, pressing_nm: &Vector2<f32>, limit_n
 /// Wanted acceleration from which on a sticking tip is to break away, m/s².
 const BREAKING_AWAY_M_S2: f32 = 1.0;
 
-/// The hybrid law with its state.
+/// The hybrid law's state.
 #[derive(Clone, Copy, Debug)]
-pub struct Hybrid {
-    settings: HybridSettings,
-    /// Wanted normal force on its way to f_n*, N.
-    wanted_force_n: f32,
+pub struct HybridState {
+    /// Wanted normal force on its way to f_n*, N; f_n* itself before the first reset.
+    wanted_force_n: Option<f32>,
     /// K'_I ∫ (f_n* − f_n) dt, N.
     force_integral_n: f32,
     /// Gain times ∫ (z_t* − z_t) dt, m/s².
@@ -84,12 +83,10 @@ pub struct Hybrid {
     pressing: f32,
 }
 
-impl Hybrid {
-    /// A law that has not run yet.
-    pub fn new(settings: HybridSettings) -> Self {
+impl Default for HybridState {
+    fn default() -> Self {
         Self {
-            settings,
-            wanted_force_n: settings.normal_force_n,
+            wanted_force_n: None,
             force_integral_n: 0.0,
             position_integral_m_s2: 0.0,
             filtered_friction_n: 0.0,
@@ -98,23 +95,28 @@ impl Hybrid {
             pressing: 1.0,
         }
     }
+}
+
+impl Law for HybridSettings {
+    type State = HybridState;
 
     /// Forgets the integrals and starts from the present contact force.
-    pub fn reset(&mut self, input: &LawInput<'_>) {
-        *self = Self::new(self.settings);
-        if self.settings.force_time_constant_s > 0.0 {
-            self.wanted_force_n = input.force_n.y.at_least(0.0);
-        }
+    fn reset(&self, state: &mut HybridState, input: &LawInput<'_>) {
+        let force_n = input.force_n.y.at_least(0.0);
         // Within the cone that is believed in: a force cell at the end of its range shows any ratio.
-        let cone_n = input.friction.coefficient * input.force_n.y.at_least(0.0);
-        self.filtered_friction_n = input.force_n.x.within(cone_n);
+        let cone_n = input.friction.coefficient * force_n;
+        *state = HybridState {
+            wanted_force_n: (self.force_time_constant_s > 0.0).then_some(force_n),
+            filtered_friction_n: input.force_n.x.within(cone_n),
+            ..HybridState::default()
+        };
     }
 
-    /// Torques for one tick.
-    pub fn tick(&mut self, input: &LawInput<'_>) -> LawOutput {
-        let tangential_acceleration = self.tangential_acceleration_m_s2(input);
-        let normal_force = self.normal_force_n(input);
-        let friction_force = self.friction_force_n(input, normal_force, tangential_acceleration);
+    fn tick(&self, state: &mut HybridState, input: &LawInput<'_>) -> LawOutput {
+        let tangential_acceleration = self.commanded_acceleration_m_s2(state, input);
+        let normal_force = self.commanded_force_n(state, input);
+        let friction_force =
+            self.compensated_friction_n(state, input, normal_force, tangential_acceleration);
         let acceleration = input
             .model
             .joint_acceleration_rad_s2(&Vector2::new(tangential_acceleration, 0.0));
@@ -123,7 +125,7 @@ impl Hybrid {
             .model
             .inverse_dynamics_nm(&acceleration, &Vector2::zeros());
         let pressing_nm = input.model.torque_against_nm(&wanted);
-        self.pressing = if self.settings.presses_less {
+        state.pressing = if self.presses_less {
             affordable(
                 &motion_nm,
                 &pressing_nm,
@@ -133,57 +135,60 @@ impl Hybrid {
             1.0
         };
         LawOutput {
-            torque_nm: motion_nm + pressing_nm * self.pressing,
-            contact_force_n: wanted * self.pressing,
+            torque_nm: motion_nm + pressing_nm * state.pressing,
+            contact_force_n: wanted * state.pressing,
         }
     }
+}
 
+impl HybridSettings {
     /// α_v, m/s².
-    fn tangential_acceleration_m_s2(&mut self, input: &LawInput<'_>) -> f32 {
-        let settings = &self.settings;
+    fn commanded_acceleration_m_s2(&self, state: &mut HybridState, input: &LawInput<'_>) -> f32 {
         let error = input.reference.position_m - input.model.tip_m.x;
         let error_rate = input.reference.velocity_m_s - input.model.tip_velocity_m_s.x;
         if input.contact && !input.saturated {
-            let limit = settings.position_integral_limit_m_s2;
-            let step = settings.position_integral_gain_per_s3 * error * input.tick_s;
-            self.position_integral_m_s2 = (self.position_integral_m_s2 + step).within(limit);
+            let limit = self.position_integral_limit_m_s2;
+            let step = self.position_integral_gain_per_s3 * error * input.tick_s;
+            state.position_integral_m_s2 = (state.position_integral_m_s2 + step).within(limit);
         }
         input.reference.acceleration_m_s2
-            + settings.position_gain_per_s2 * error
-            + settings.velocity_gain_per_s * error_rate
-            + self.position_integral_m_s2
+            + self.position_gain_per_s2 * error
+            + self.velocity_gain_per_s * error_rate
+            + state.position_integral_m_s2
     }
 
     /// α_f, N.
-    fn normal_force_n(&mut self, input: &LawInput<'_>) -> f32 {
-        let settings = &self.settings;
-        let approach = input.tick_s / (settings.force_time_constant_s + input.tick_s);
-        self.wanted_force_n += approach * (settings.normal_force_n - self.wanted_force_n);
+    fn commanded_force_n(&self, state: &mut HybridState, input: &LawInput<'_>) -> f32 {
+        let approach = input.tick_s / (self.force_time_constant_s + input.tick_s);
+        let before_n = state.wanted_force_n.unwrap_or(self.normal_force_n);
+        let wanted_n = before_n + approach * (self.normal_force_n - before_n);
+        state.wanted_force_n = Some(wanted_n);
         // Anti-windup: no integration in the air, where there is no force to
         // control, nor while the torque is limited.
         if input.contact && !input.saturated {
-            let step = settings.force_integral_gain_per_s
-                * (self.pressing * self.wanted_force_n - input.force_n.y)
+            let step = self.force_integral_gain_per_s
+                * (state.pressing * wanted_n - input.force_n.y)
                 * input.tick_s;
-            let limit = settings.force_integral_limit_n;
-            self.force_integral_n = (self.force_integral_n + step).within(limit);
+            let limit = self.force_integral_limit_n;
+            state.force_integral_n = (state.force_integral_n + step).within(limit);
         }
-        self.wanted_force_n + self.force_integral_n
+        wanted_n + state.force_integral_n
     }
 
     /// f_t that is fed forward, N, with α_f (N) and α_v (m/s²).
-    fn friction_force_n(
-        &mut self,
+    fn compensated_friction_n(
+        &self,
+        state: &mut HybridState,
         input: &LawInput<'_>,
         normal_force_n: f32,
         tangential_acceleration_m_s2: f32,
     ) -> f32 {
-        match self.settings.friction {
+        match self.friction {
             FrictionFeedForward::Measured => input.force_n.x,
             FrictionFeedForward::Filtered { time_constant_s } => {
                 let weight = input.tick_s / (time_constant_s + input.tick_s);
-                self.filtered_friction_n += weight * (input.force_n.x - self.filtered_friction_n);
-                self.filtered_friction_n
+                state.filtered_friction_n += weight * (input.force_n.x - state.filtered_friction_n);
+                state.filtered_friction_n
             }
             FrictionFeedForward::Observed { time_constant_s } => {
                 let friction = &input.friction;
@@ -198,23 +203,23 @@ impl Hybrid {
                 };
                 let slip = friction.slip_seen.then_some(slip);
                 let ratio = slip.map_or(0.0, |slip| -friction.coefficient * slip.sign::<f32>());
-                if slip != self.slip {
-                    self.filtered_friction_n = 0.0;
-                    if self.slip.is_none() {
-                        self.fed_ratio = ratio;
+                if slip != state.slip {
+                    state.filtered_friction_n = 0.0;
+                    if state.slip.is_none() {
+                        state.fed_ratio = ratio;
                     }
-                    self.slip = slip;
+                    state.slip = slip;
                 }
                 let step = FRICTION_SLEW_PER_S * input.tick_s;
-                self.fed_ratio += (ratio - self.fed_ratio).within(step);
-                let expected = self.fed_ratio * normal_force_n;
+                state.fed_ratio += (ratio - state.fed_ratio).within(step);
+                let expected = state.fed_ratio * normal_force_n;
                 let share = OBSERVER_SHARE * input.p_per_kg / input.model.q.m22;
                 let weight = (input.tick_s / (time_constant_s + input.tick_s))
                     .at_most(share)
                     .at_least(0.0);
                 let rest = input.force_n.x - expected;
-                self.filtered_friction_n += weight * (rest - self.filtered_friction_n);
-                expected + self.filtered_friction_n
+                state.filtered_friction_n += weight * (rest - state.filtered_friction_n);
+                expected + state.filtered_friction_n
             }
             FrictionFeedForward::Model {
                 friction,
@@ -252,12 +257,13 @@ mod tests {
             let model = Model::new(&arm, theta_rad, theta_dot_rad_s, &Vector2::zeros());
             let settings = HybridSettings {
                 force_integral_gain_per_s: 0.0,
+                force_time_constant_s: 0.0,
                 position_integral_gain_per_s3: 0.0,
                 friction: FrictionFeedForward::Model { friction, belt_speed_m_s: -1.0 },
                 ..Default::default()
             };
             let reference = TipReference { position_m: tip + 0.001, velocity_m_s: speed, acceleration_m_s2: 0.7 };
-            let output = Hybrid::new(settings).tick(&LawInput {
+            let input = LawInput {
                 arm: &arm, model: &model, posture,
                 friction: FrictionEstimate {
                     coefficient: friction, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
@@ -265,7 +271,10 @@ mod tests {
                 p_per_kg: model.p_per_kg(friction, Slip::Positive),
                 force_n: Vector2::zeros(), contact: true, saturated: false,
                 reference, torque_limit_nm: 50.0, tick_s: 1e-3,
-            });
+            };
+            let mut state = HybridState::default();
+            settings.reset(&mut state, &input);
+            let output = settings.tick(&mut state, &input);
             let terms = arm.contact_terms(
                 &theta_rad, &theta_dot_rad_s, &pose, &generalised_torque_nm(&output.torque_nm));
             let normal = terms.sliding_normal_force_n(friction, Slip::Positive);

@@ -34,14 +34,20 @@ const CAUGHT_M: f32 = 2e-5;
 /// Rate at which the last stretch to a target is made, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
 
-/// The governor with its state.
+/// The governor's settings for one arm and rate.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeGovernor {
     settings: GovernorSettings,
+    tick_s: f32,
     /// Least p as a part of Q22, for this rate.
     least_p_ratio: f32,
     /// Distance from where it has that value, for these encoders, m.
     distance_m: f32,
+}
+
+/// The edges that an [`EdgeGovernor`] has found, and the reference it follows.
+#[derive(Clone, Copy, Debug)]
+pub struct GovernorState {
     /// Edges of the admissible stretch around the tip, m.
     lower_m: f32,
     upper_m: f32,
@@ -59,13 +65,10 @@ pub struct EdgeGovernor {
     at_edge: bool,
 }
 
-impl EdgeGovernor {
-    /// A governor that knows no edges but the arm's reach (m).
-    pub fn new(settings: &GovernorSettings, reach_m: f32, tick_s: f32, count_m: f32) -> Self {
+impl GovernorState {
+    /// No edges are known but the arm's reach (m).
+    pub fn new(reach_m: f32) -> Self {
         Self {
-            settings: *settings,
-            least_p_ratio: settings.minimum_p_ratio + settings.p_ratio_per_s2 * tick_s * tick_s,
-            distance_m: settings.distance_m + settings.distance_counts * count_m,
             lower_m: -USABLE_REACH * reach_m,
             upper_m: USABLE_REACH * reach_m,
             search: None,
@@ -99,21 +102,35 @@ impl EdgeGovernor {
     pub fn is_at_edge(&self) -> bool {
         self.at_edge
     }
+}
+
+impl EdgeGovernor {
+    /// A governor that is called every `tick_s`, for encoders one count of which moves the tip by
+    /// `count_m`.
+    pub fn new(settings: &GovernorSettings, tick_s: f32, count_m: f32) -> Self {
+        Self {
+            settings: *settings,
+            tick_s,
+            least_p_ratio: settings.minimum_p_ratio + settings.p_ratio_per_s2 * tick_s * tick_s,
+            distance_m: settings.distance_m + settings.distance_counts * count_m,
+        }
+    }
 
     /// Goes on searching for the edges around a tip at `tip_t_m`, with p at least
     /// `minimum_p_ratio` of Q22 or the setting, whichever is more.
     pub fn search(
-        &mut self,
+        &self,
+        state: &mut GovernorState,
         arm: &Arm<f32>,
         posture: Posture,
         tip_t_m: f32,
         friction: &FrictionEstimate,
         minimum_p_ratio: f32,
     ) {
-        if minimum_p_ratio != self.asked_p_ratio {
-            self.asked_p_ratio = minimum_p_ratio;
-            self.search = None;
-            self.is_fresh = false;
+        if minimum_p_ratio != state.asked_p_ratio {
+            state.asked_p_ratio = minimum_p_ratio;
+            state.search = None;
+            state.is_fresh = false;
         }
         let margin = self.settings.friction_deviations * friction.deviation;
         let admissibility = Admissibility {
@@ -125,49 +142,49 @@ impl EdgeGovernor {
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
-        let mut search = self.search.unwrap_or(Search::start(1.0, tip_t_m));
-        let points = if self.is_fresh { 1 } else { POINTS_IN_A_HURRY };
+        let mut search = state.search.unwrap_or(Search::start(1.0, tip_t_m));
+        let points = if state.is_fresh { 1 } else { POINTS_IN_A_HURRY };
         for _ in 0..points {
             let point = search.point(step, reach);
             search = search.next(point, admissibility.at(point), reach);
             if search.is_over() {
                 let edge = search.inside_m - search.direction * self.distance_m;
                 if search.direction > 0.0 {
-                    self.upper_m = edge;
+                    state.upper_m = edge;
                     search = Search::start(-1.0, tip_t_m);
                 } else {
                     // A stretch shorter than both distances is a point.
-                    self.lower_m = edge.at_most(self.upper_m);
-                    self.is_fresh = true;
+                    state.lower_m = edge.at_most(state.upper_m);
+                    state.is_fresh = true;
                     search = Search::start(1.0, tip_t_m);
                 }
             }
         }
-        self.search = Some(search);
+        state.search = Some(search);
     }
 
-    /// The reference to follow instead of `wanted`, a tick of `tick_s` after the last one.
-    pub fn govern(&mut self, wanted: &TipReference, tick_s: f32) -> TipReference {
-        let settings = &self.settings;
+    /// The reference to follow instead of `wanted`, a tick after the last one.
+    pub fn govern(&self, state: &mut GovernorState, wanted: &TipReference) -> TipReference {
+        let (settings, tick_s) = (&self.settings, self.tick_s);
         if !settings.enabled {
             return *wanted;
         }
-        let (lower, upper) = (self.lower_m, self.upper_m);
+        let (lower, upper) = (state.lower_m, state.upper_m);
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
         let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / settings.braking_m_s2;
-        let jumps = (wanted.position_m - self.position_m).abs() > JUMP_M;
-        self.at_edge = outside(wanted.position_m);
-        self.follows = !outside(stop_m)
-            && !self.at_edge
-            && (if self.follows {
+        let jumps = (wanted.position_m - state.position_m).abs() > JUMP_M;
+        state.at_edge = outside(wanted.position_m);
+        state.follows = !outside(stop_m)
+            && !state.at_edge
+            && (if state.follows {
                 !jumps
             } else {
-                (wanted.position_m - self.position_m).abs() < CAUGHT_M
+                (wanted.position_m - state.position_m).abs() < CAUGHT_M
             });
-        if self.follows {
-            self.position_m = wanted.position_m;
-            self.velocity_m_s = speed;
+        if state.follows {
+            state.position_m = wanted.position_m;
+            state.velocity_m_s = speed;
             return *wanted;
         }
         // The fastest speed from which the reference still stops within a distance.
@@ -177,22 +194,22 @@ impl EdgeGovernor {
                 .at_most(APPROACH_PER_S * distance)
         };
         let target = wanted.position_m.limited(lower, upper);
-        let away = target - self.position_m;
+        let away = target - state.position_m;
         let approach = stopping_speed(away.abs()).at_most(settings.catch_up_m_s);
-        let moves_along = if self.at_edge { 0.0 } else { speed };
+        let moves_along = if state.at_edge { 0.0 } else { speed };
         let velocity = (moves_along + approach.copysign(away)).limited(
-            -stopping_speed((self.position_m - lower).at_least(0.0)),
-            stopping_speed((upper - self.position_m).at_least(0.0)),
+            -stopping_speed((state.position_m - lower).at_least(0.0)),
+            stopping_speed((upper - state.position_m).at_least(0.0)),
         );
         // Beyond an edge that has moved in, the limit above forbids nothing but going further.
         let step = 2.0 * settings.braking_m_s2 * tick_s;
-        let change = (velocity - self.velocity_m_s).within(step);
-        let velocity = self.velocity_m_s + change;
+        let change = (velocity - state.velocity_m_s).within(step);
+        let velocity = state.velocity_m_s + change;
         let acceleration = change / tick_s;
-        self.velocity_m_s = velocity;
-        self.position_m += velocity * tick_s;
+        state.velocity_m_s = velocity;
+        state.position_m += velocity * tick_s;
         TipReference {
-            position_m: self.position_m,
+            position_m: state.position_m,
             velocity_m_s: velocity,
             acceleration_m_s2: acceleration,
         }
@@ -221,7 +238,7 @@ mod tests {
         }
     }
 
-    fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> EdgeGovernor {
+    fn governor() -> EdgeGovernor {
         let settings = GovernorSettings {
             minimum_p_ratio: 0.0,
             p_ratio_per_s2: 0.0,
@@ -229,11 +246,15 @@ mod tests {
             distance_counts: 0.0,
             ..Default::default()
         };
-        let mut governor = EdgeGovernor::new(&settings, arm().reach_on_belt_m(), TICK_S, 0.0);
+        EdgeGovernor::new(&settings, TICK_S, 0.0)
+    }
+
+    fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> GovernorState {
+        let mut state = GovernorState::new(arm().reach_on_belt_m());
         for _ in 0..300 {
-            governor.search(&arm(), posture, tip_t_m, friction, 0.0);
+            governor().search(&mut state, &arm(), posture, tip_t_m, friction, 0.0);
         }
-        governor
+        state
     }
 
     #[test]
@@ -255,13 +276,13 @@ mod tests {
 
     /// Goes through the reference `wanted` until it stands; returns where and the largest position.
     fn follow(
-        governor: &mut EdgeGovernor,
+        state: &mut GovernorState,
         wanted: impl Fn(f32) -> TipReference,
     ) -> (TipReference, f32) {
         let mut largest = f32::MIN;
         let mut last = TipReference::default();
         for tick in 0..8000 {
-            last = governor.govern(&wanted(tick as f32 * TICK_S), TICK_S);
+            last = governor().govern(state, &wanted(tick as f32 * TICK_S));
             largest = largest.max(last.position_m);
         }
         (last, largest)
@@ -297,11 +318,11 @@ mod tests {
         fn a_reference_beyond_the_edge_ends_at_it_and_never_passes_it(
             speed in 0.03_f32..0.5, end in 0.166_f32..0.3,
         ) {
-            let mut governor = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
-            governor.restart(0.0);
-            let edge = governor.edges_m().1;
-            let (last, largest) = follow(&mut governor, ramp(0.0, speed, end));
-            prop_assert!(governor.is_at_edge());
+            let mut state = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
+            state.restart(0.0);
+            let edge = state.edges_m().1;
+            let (last, largest) = follow(&mut state, ramp(0.0, speed, end));
+            prop_assert!(state.is_at_edge());
             prop_assert!(largest < edge + 1e-4, "{} {}", largest, edge);
             prop_assert!((last.position_m - edge).abs() < 1e-4 && last.velocity_m_s.abs() < 1e-3);
         }
@@ -310,12 +331,12 @@ mod tests {
         fn a_reference_inside_is_reached_and_then_followed_exactly(
             speed in 0.01_f32..0.3, end in -0.1_f32..0.16, start in -0.15_f32..0.15,
         ) {
-            let mut governor = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
-            governor.restart(start);
-            let (last, _) = follow(&mut governor, ramp(-0.15, speed, end));
+            let mut state = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
+            state.restart(start);
+            let (last, _) = follow(&mut state, ramp(-0.15, speed, end));
             let wanted = ramp(-0.15, speed, end)(7.999);
             prop_assert!((last.position_m - wanted.position_m).abs() < 1e-4, "{:?} {:?}", last, wanted);
-            prop_assert!(!governor.is_at_edge());
+            prop_assert!(!state.is_at_edge());
         }
     }
 }

@@ -1,0 +1,185 @@
+//! From a law's answer to torque counts: kept on the belt, limited, rounded, checked.
+
+use nalgebra::Vector2;
+use painleve_shared::Real;
+use painleve_shared::counts::{LinearScale, TorqueCounts};
+
+use crate::estimate::ContactEstimate;
+use crate::estimate::model::Model;
+use crate::guard::{GuardSettings, HalfPlane, nearest_torque_nm};
+use crate::law::LawOutput;
+
+/// The torques that were commanded last and what they are expected to do: all that the
+/// controller remembers of its output. The default is no torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LastCommand {
+    /// Counts for the torque stages.
+    pub counts: [TorqueCounts; 2],
+    /// Joint torques (u1, u2) that these counts are worth, N·m.
+    pub torque_nm: Vector2<f32>,
+    /// Whether a torque was limited.
+    pub saturated: bool,
+    /// Whether the contact guard changed the torques.
+    pub guarded: bool,
+    /// θ̈ of q' expected until the next tick, rad/s².
+    pub expected_acceleration_rad_s2: Vector2<f32>,
+    /// What of it the contact force is expected to cause, rad/s².
+    pub contact_acceleration_rad_s2: Vector2<f32>,
+    /// Torque that rounding to counts still owes, N·m.
+    rounding_nm: Vector2<f32>,
+}
+
+impl LastCommand {
+    /// Whether the torques were not those that were asked for: integrals have to stand still.
+    pub fn is_constrained(&self) -> bool {
+        self.saturated || self.guarded
+    }
+}
+
+/// A torque was asked for that is not a finite number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotFinite;
+
+/// The torque stages, and what is allowed to be asked of them.
+#[derive(Clone, Copy, Debug)]
+pub struct TorqueStages {
+    guard: GuardSettings,
+    scale: LinearScale<f32>,
+    limit_nm: f32,
+}
+
+impl TorqueStages {
+    /// Stages with this scale, of which ±`limit_nm` (N·m) is used.
+    pub fn new(guard: &GuardSettings, scale: LinearScale<f32>, limit_nm: f32) -> Self {
+        Self {
+            guard: *guard,
+            scale,
+            limit_nm,
+        }
+    }
+
+    /// Largest torque on either joint, N·m.
+    pub fn limit_nm(&self) -> f32 {
+        self.limit_nm
+    }
+
+    /// Turns a law's answer at a tick into a command.
+    ///
+    /// # Errors
+    /// [`NotFinite`] if the law's torque is not a number; the command stays as it was.
+    #[inline]
+    pub fn tick(
+        &self,
+        command: &mut LastCommand,
+        output: &LawOutput,
+        model: &Model,
+        contact: &ContactEstimate,
+    ) -> Result<(), NotFinite> {
+        let (wanted_nm, guarded) = self.pressed(&output.torque_nm, model, contact);
+        self.limit(command, &wanted_nm)?;
+        command.guarded = guarded;
+        let of_encoders = |theta: Vector2<f32>| Vector2::new(theta.x, theta.y - theta.x);
+        command.contact_acceleration_rad_s2 =
+            of_encoders(model.contact_acceleration_rad_s2(&output.contact_force_n));
+        command.expected_acceleration_rad_s2 =
+            of_encoders(model.free_acceleration_rad_s2(&command.torque_nm))
+                + command.contact_acceleration_rad_s2;
+        Ok(())
+    }
+
+    /// The torque (N·m) next to the wanted one that keeps a sliding tip pressed on the belt, and
+    /// whether that is another one.
+    fn pressed(
+        &self,
+        wanted_nm: &Vector2<f32>,
+        model: &Model,
+        contact: &ContactEstimate,
+    ) -> (Vector2<f32>, bool) {
+        let slides = contact.touches && contact.friction.slip_seen && contact.p_per_kg > 0.0;
+        if !(self.guard.enabled && slides) {
+            return (*wanted_nm, false);
+        }
+        let (offset, normal) = model.free_normal_acceleration();
+        let plane = HalfPlane {
+            normal,
+            bound: -contact.p_per_kg * self.guard.minimum_force_n - offset,
+        };
+        match nearest_torque_nm(wanted_nm, &plane, self.limit_nm) {
+            (nearest_nm, true) => (nearest_nm, true),
+            // Not limited yet: that is counted below.
+            (_, false) => (*wanted_nm, false),
+        }
+    }
+
+    /// Limits the wanted torques and turns them into counts.
+    fn limit(&self, command: &mut LastCommand, wanted_nm: &Vector2<f32>) -> Result<(), NotFinite> {
+        // Before clamping, which would turn an infinity into a limit.
+        if !(wanted_nm.x.is_finite() && wanted_nm.y.is_finite()) {
+            return Err(NotFinite);
+        }
+        // What rounding took away is given with the next tick: near the edge, where p is
+        // small, half a count of constant torque would be a newton of force.
+        let owed = (wanted_nm + command.rounding_nm).map(|torque| torque.within(self.limit_nm));
+        let (counts_1, over_1) = self.scale.counts(owed.x);
+        let (counts_2, over_2) = self.scale.counts(owed.y);
+        let given = Vector2::new(self.scale.value(counts_1), self.scale.value(counts_2));
+        let half = 0.5 * self.scale.per_count();
+        command.counts = [TorqueCounts(counts_1), TorqueCounts(counts_2)];
+        command.torque_nm = given;
+        command.saturated = over_1 || over_2 || wanted_nm.amax() > self.limit_nm;
+        command.rounding_nm = (owed - given).map(|rest| rest.within(half));
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stages() -> TorqueStages {
+        let scale = LinearScale {
+            bits: 12,
+            range: 5.0,
+        };
+        TorqueStages::new(&GuardSettings::default(), scale, 5.0)
+    }
+
+    #[test]
+    fn a_torque_that_is_not_a_number_is_refused() {
+        for wanted in [
+            Vector2::new(f32::NAN, 0.0),
+            Vector2::new(0.0, f32::INFINITY),
+        ] {
+            let mut command = LastCommand::default();
+            assert_eq!(stages().limit(&mut command, &wanted), Err(NotFinite));
+            assert_eq!(command, LastCommand::default());
+        }
+    }
+
+    #[test]
+    fn what_rounding_takes_away_is_given_later() {
+        let count = stages().scale.per_count();
+        let wanted = Vector2::new(0.3 * count, -0.3 * count);
+        let mut command = LastCommand::default();
+        let mut sum = Vector2::zeros();
+        for _ in 0..100 {
+            stages().limit(&mut command, &wanted).unwrap();
+            sum += command.torque_nm;
+        }
+        assert!((sum - wanted * 100.0).amax() <= count, "{sum}");
+    }
+
+    #[test]
+    fn a_torque_beyond_the_limit_is_limited_and_flagged() {
+        let mut command = LastCommand::default();
+        stages()
+            .limit(&mut command, &Vector2::new(7.0, -1.0))
+            .unwrap();
+        assert!(command.saturated && command.is_constrained());
+        assert!(command.torque_nm.x <= 5.0);
+        stages()
+            .limit(&mut command, &Vector2::new(4.0, -1.0))
+            .unwrap();
+        assert!(!command.is_constrained());
+    }
+}
