@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
+use painleve_parts::{As5048a, Mcp3304, SpiPart, Transfer};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{MAXIMUM_LENGTH, Plant, Request, Response};
 use painleve_shared::wire::{self, Inbox};
 
 use crate::machine::{Machine, Reset};
-use crate::parts::{As5048a, Mcp3304, SpiPart};
-use crate::stm32f4::{Outside, Pin, PinMode, Stm32f4, Transfer};
+use crate::stm32f4::{Outside, Pin, PinMode, Stm32f4};
 use crate::{MILLISECOND, Picoseconds, SECOND};
 
 /// The pin that enables the torque stages.
@@ -22,39 +22,6 @@ const FORCE_SELECT: Pin = (1, 12);
 
 /// Time of a byte on the serial line.
 const BYTE: Picoseconds = 10 * SECOND / 921_600;
-
-/// Random bit errors.
-#[derive(Clone, Debug)]
-pub struct BitErrors {
-    state: u64,
-    /// Of 2^32.
-    threshold: u32,
-    /// Errors so far.
-    pub count: u64,
-}
-
-impl BitErrors {
-    /// With this probability a bit, from this seed.
-    pub fn new(probability: f64, seed: u64) -> Self {
-        Self {
-            state: seed.wrapping_mul(2).wrapping_add(1),
-            threshold: (probability * 4_294_967_296.0) as u32,
-            count: 0,
-        }
-    }
-
-    /// Whether the next bit is flipped.
-    pub fn flips(&mut self) -> bool {
-        // Knuth's linear congruential generator; its upper half.
-        self.state = self
-            .state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        let flips = ((self.state >> 32) as u32) < self.threshold;
-        self.count += u64::from(flips);
-        flips
-    }
-}
 
 /// The parts on the pins.
 #[derive(Clone, Debug, Default)]
@@ -78,8 +45,8 @@ impl Wiring {
 
     /// Data-sheet limits that the image has broken.
     pub fn violations(&self) -> Vec<&'static str> {
-        let encoders = self.encoders.iter().flat_map(|it| &it.violations);
-        encoders.chain(&self.force.violations).copied().collect()
+        let encoders = self.encoders.iter().flat_map(|it| it.violations());
+        encoders.chain(self.force.violations()).copied().collect()
     }
 }
 

@@ -2,8 +2,7 @@
 //!
 //! - [`unicorn`]: executes instructions
 //! - [`machine`]: exceptions, sleep, resets, time
-//! - [`stm32f4`]: the microcontroller's peripherals
-//! - [`parts`]: the sensors on its SPI buses
+//! - [`stm32f4`]: the microcontroller's peripherals; the sensors on its buses are [`painleve_parts`]
 //! - [`board`]: the board's wiring, the host's end of its serial line, the arm's torques
 //! - [`bench`]: the board with the simulated arm on its sensors and stages
 //!
@@ -13,13 +12,11 @@
 pub mod bench;
 pub mod board;
 pub mod machine;
-pub mod parts;
 pub mod stm32f4;
 pub mod system_control;
 pub mod unicorn;
 
-/// Picoseconds.
-pub type Picoseconds = u64;
+pub use painleve_parts::Picoseconds;
 
 /// One millisecond.
 pub const MILLISECOND: Picoseconds = 1_000_000_000;

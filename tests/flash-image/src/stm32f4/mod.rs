@@ -9,8 +9,9 @@ mod timer;
 mod usart;
 mod watchdog;
 
-pub use spi::Transfer;
 pub use usart::Usart;
+
+use painleve_parts::Transfer;
 
 use self::dma::Dma;
 use self::gpio::Gpio;

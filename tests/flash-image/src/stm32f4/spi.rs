@@ -1,5 +1,7 @@
 //! A SPI master (RM0090, section 28), polled or with its interrupts off.
 
+use painleve_parts::Transfer;
+
 use crate::{Picoseconds, SECOND};
 
 const ENABLED: u32 = 1 << 6;
@@ -7,23 +9,6 @@ const RECEIVED: u32 = 1;
 const EMPTY: u32 = 1 << 1;
 const OVERRUN: u32 = 1 << 6;
 const BUSY: u32 = 1 << 7;
-
-/// One transfer on the wires.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Transfer {
-    /// What the master sends.
-    pub value: u16,
-    /// Its length.
-    pub bits: u8,
-    /// Clock on the wire, Hz.
-    pub hz: u64,
-    /// Clock idles high.
-    pub idles_high: bool,
-    /// Data are taken at the clock's second edge.
-    pub second_edge: bool,
-    /// When its first bit was clocked.
-    pub start: Picoseconds,
-}
 
 /// Registers of a SPI.
 #[derive(Clone, Debug)]

@@ -1,8 +1,6 @@
 //! ams AS5048A, a magnetic angle encoder of 14 bits (data sheet DS000298).
 
-use super::SpiPart;
-use crate::Picoseconds;
-use crate::stm32f4::Transfer;
+use crate::{BitErrors, Picoseconds, SpiPart, Transfer};
 
 /// Fastest clock, Hz.
 const FASTEST_HZ: u64 = 10_000_000;
@@ -31,10 +29,9 @@ pub struct As5048a {
     pub diagnostics: u16,
     /// Its lines are cut and read low (`Some(false)`) or high.
     pub dead: Option<bool>,
-    /// Every bit sent to the host is flipped with this probability, from a generator of its own.
-    pub bit_errors: Option<super::super::board::BitErrors>,
-    /// Data-sheet limits that were broken.
-    pub violations: Vec<&'static str>,
+    /// Errors on its wires, in both directions.
+    pub bit_errors: BitErrors,
+    violations: Vec<&'static str>,
     /// Errors since they were last read.
     pub errors: u16,
     answer: u16,
@@ -53,7 +50,7 @@ impl Default for As5048a {
             // Offset compensation finished, gain in the middle.
             diagnostics: 0x0180,
             dead: None,
-            bit_errors: None,
+            bit_errors: BitErrors::default(),
             violations: Vec::new(),
             errors: 0,
             answer: 0,
@@ -143,16 +140,19 @@ impl SpiPart for As5048a {
         }
         let mut answer = 0;
         for bit in (0..transfer.bits).rev() {
-            self.received = self.received << 1 | u32::from(transfer.value >> bit & 1);
+            let input = self.bit_errors.pass((transfer.value >> bit) & 1 != 0);
+            self.received = (self.received << 1) | u32::from(input);
             let mut out = self.sending & 0x8000 != 0;
-            if let Some(errors) = &mut self.bit_errors {
-                out ^= errors.flips();
-            }
+            out = self.bit_errors.pass(out);
             answer = answer << 1 | u16::from(self.dead.unwrap_or(out));
             self.sending <<= 1;
         }
         self.bits = self.bits.saturating_add(transfer.bits);
         self.last_bit = now;
         answer
+    }
+
+    fn violations(&self) -> &[&'static str] {
+        &self.violations
     }
 }

@@ -1,8 +1,6 @@
 //! Microchip MCP3304, a converter of 13 bits with four differential pairs (data sheet DS21697).
 
-use super::SpiPart;
-use crate::Picoseconds;
-use crate::stm32f4::Transfer;
+use crate::{BitErrors, Picoseconds, SpiPart, Transfer};
 
 /// Fastest clock at 5 V, Hz.
 const FASTEST_HZ: u64 = 2_100_000;
@@ -20,10 +18,9 @@ pub struct Mcp3304 {
     pub channels: [i32; 8],
     /// Its lines are cut and read low (`Some(false)`) or high.
     pub dead: Option<bool>,
-    /// Bit errors on the way to the host.
-    pub bit_errors: Option<super::super::board::BitErrors>,
-    /// Data-sheet limits that were broken.
-    pub violations: Vec<&'static str>,
+    /// Errors on its wires, in both directions.
+    pub bit_errors: BitErrors,
+    violations: Vec<&'static str>,
     /// Results since the start, the last sixteen of them.
     pub conversions: Vec<i32>,
     /// Bits of the command after its start bit.
@@ -87,7 +84,7 @@ impl SpiPart for Mcp3304 {
         }
         let mut answer = 0;
         for bit in (0..transfer.bits).rev() {
-            let input = transfer.value >> bit & 1 != 0;
+            let input = self.bit_errors.pass((transfer.value >> bit) & 1 != 0);
             let mut output = true;
             match self.clocked {
                 0 if !input => {}
@@ -109,11 +106,13 @@ impl SpiPart for Mcp3304 {
                     self.clocked = clocks.saturating_add(1);
                 }
             }
-            if let Some(errors) = &mut self.bit_errors {
-                output ^= errors.flips();
-            }
+            output = self.bit_errors.pass(output);
             answer = answer << 1 | u16::from(self.dead.unwrap_or(output));
         }
         answer
+    }
+
+    fn violations(&self) -> &[&'static str] {
+        &self.violations
     }
 }

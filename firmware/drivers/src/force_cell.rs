@@ -1,0 +1,98 @@
+//! A Microchip MCP3304 (13 bits, signed) behind the bridge amplifiers of a two-axis force cell, SPI mode 0
+//! (data sheet DS21697).
+//!
+//! Each axis is a differential pair: its amplifier's output against the amplifier's reference, so that a
+//! force of either sign is read. Single-ended the converter has no sign. It needs 4.5 to 5.5 V: its
+//! inputs take a level shifter (74AHCT125), its output goes to a pin that stands 5 V.
+
+use embedded_hal::spi::SpiDevice;
+use painleve_shared::counts::ForceCounts;
+
+use crate::{Disturbance, rescale};
+
+/// Resolution, bits.
+pub const BITS: u8 = 13;
+
+/// Fastest clock at 5 V, Hz.
+pub const FASTEST_HZ: u32 = 2_100_000;
+
+/// Select high between two conversions, ns (t_CSH).
+pub const PAUSE_NS: u32 = 475;
+
+/// From select to the first edge, ns (t_SUCS).
+pub const SETUP_NS: u32 = 100;
+
+/// Two conversions of one force differ by no more, counts: the converter's noise.
+const AGREEMENT: i32 = 2;
+
+/// Start bit, differential.
+const CONVERT: u8 = 0b0000_1000;
+
+/// The bit before the sign is always 0.
+const NULL_BIT: u8 = 0b0010_0000;
+
+/// A force cell. The device holds the select pin low for [`SETUP_NS`] before it clocks, and high for
+/// [`PAUSE_NS`] after.
+pub struct ForceCell<D> {
+    device: D,
+}
+
+impl<D: SpiDevice> ForceCell<D> {
+    /// The force cell on this device, in mode 0 and no faster than [`FASTEST_HZ`].
+    pub fn new(device: D) -> Self {
+        Self { device }
+    }
+
+    /// Reads (f_t, f_n) as counts of `bits` bits: f_n on channels 0 (+) and 1 (−), f_t on 2 (+) and 3 (−).
+    /// Takes two conversions of each force; a third, if these two are not the same.
+    pub fn read(
+        &mut self,
+        bits: u8,
+    ) -> (
+        Result<ForceCounts, Disturbance>,
+        Result<ForceCounts, Disturbance>,
+    ) {
+        let [normal, tangential] = [0, 1].map(|pair| {
+            let counts = self.two_of_three(pair);
+            counts.map(|it| ForceCounts(rescale(it, BITS, bits)))
+        });
+        (tangential, normal)
+    }
+
+    /// Two conversions that are the same, or the median of three, if two of these agree.
+    fn two_of_three(&mut self, pair: u8) -> Result<i32, Disturbance> {
+        let first = self.convert(pair);
+        let second = self.convert(pair);
+        if first == second {
+            return first;
+        }
+        match (first, second, self.convert(pair)?) {
+            (Ok(one), Ok(two), three) => {
+                let [low, median, high] = sorted([one, two, three]);
+                let is_agreed = (median - low).min(high - median) <= AGREEMENT;
+                is_agreed.then_some(median).ok_or(Disturbance::Disagreement)
+            }
+            (Ok(one), Err(_), two) | (Err(_), Ok(one), two) if one == two => Ok(two),
+            _ => Err(Disturbance::Disagreement),
+        }
+    }
+
+    fn convert(&mut self, pair: u8) -> Result<i32, Disturbance> {
+        // The upper two bits of three follow the start bit, the third begins the second byte.
+        let mut bytes = [CONVERT | pair, 0, 0];
+        let done = self.device.transfer_in_place(&mut bytes);
+        done.map_err(|_| Disturbance::Bus)?;
+        let [_, high, low] = bytes;
+        if high & NULL_BIT != 0 {
+            return Err(Disturbance::NotZero);
+        }
+        let word = u16::from_be_bytes([high & 0x1f, low]);
+        // Extends the sign of 13 bits.
+        Ok(i32::from((word << 3).cast_signed() >> 3))
+    }
+}
+
+fn sorted(mut values: [i32; 3]) -> [i32; 3] {
+    values.sort_unstable();
+    values
+}

@@ -1,0 +1,41 @@
+//! Drivers of the arm's sensors and switches over `embedded-hal`: the same code on the board and on a PC.
+//!
+//! - [`encoders`]: two AS5048A magnetic encoders on one SPI bus
+//! - [`force_cell`]: an MCP3304 converter behind the force cell's bridge amplifiers
+//! - [`switches`]: ENABLE and RESET, debounced
+//! - [`plausibility`]: whether readings can be those of an arm, before the drive is armed
+//!
+//! No reading is passed on that a single disturbed bit could have changed: a value is read twice, and again
+//! in the same tick if the two differ. If that does not settle it, the reading is lost for this tick, and
+//! the controller goes on as with any other lost reading. Every call ends in bounded time.
+
+#![no_std]
+
+pub mod encoders;
+pub mod force_cell;
+pub mod plausibility;
+pub mod switches;
+
+/// Why a sensor gave no reading in this tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Disturbance {
+    /// The SPI bus or a select pin failed.
+    Bus,
+    /// A word with the wrong parity.
+    Parity,
+    /// The sensor says that it was disturbed.
+    Flagged,
+    /// A bit that is always 0 was 1.
+    NotZero,
+    /// Two readings of the same value differ.
+    Disagreement,
+}
+
+/// Moves a reading of `from` bits to a scale of `to` bits.
+fn rescale(counts: i32, from: u8, to: u8) -> i32 {
+    if to < from {
+        counts >> (from - to)
+    } else {
+        counts << (to - from)
+    }
+}

@@ -1,0 +1,147 @@
+//! Whether readings can be those of an arm, looked at while the drive is not armed.
+//!
+//! A sensor whose lines are cut reads all zeros or all ones; one that hangs repeats itself to the count; two
+//! selects that are shorted give both encoders the same angle. A drive that is armed on such readings
+//! moves an arm that it does not see.
+
+use painleve_shared::counts::{EncoderCounts, ForceCounts};
+
+/// Ticks of readings that are looked at before anything is said.
+pub const TICKS: u16 = 50;
+
+/// Why the drive must not be armed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Implausible {
+    /// Not enough readings yet, or the last one was lost.
+    NotYet,
+    /// An encoder reads all zeros or all ones, to the count.
+    DeadLine,
+    /// Both encoders read the same, to the count.
+    SameAngle,
+    /// An encoder says that its magnet is missing, too near, or not yet measured.
+    Magnet,
+    /// The force cell is at its limit.
+    ForceLimit,
+}
+
+/// Readings of one tick; `None` for one that was lost.
+#[derive(Clone, Copy, Debug)]
+pub struct Readings {
+    /// Both encoders, counts of `encoder_bits`.
+    pub joints: [Option<EncoderCounts>; 2],
+    /// Both forces, counts of `force_bits`.
+    pub forces: [Option<ForceCounts>; 2],
+    /// Whether both magnets are healthy; `None` while not measured.
+    pub magnets: [Option<bool>; 2],
+}
+
+/// Looks at readings tick by tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Plausibility {
+    /// Ticks in a row with every reading there.
+    complete: u16,
+    /// Ticks in a row with both encoders at one angle.
+    same: u16,
+    /// Ticks in a row with an encoder at all zeros or all ones.
+    dead: [u16; 2],
+}
+
+impl Plausibility {
+    /// Takes the readings of one tick; why the drive must not be armed on them.
+    ///
+    /// # Errors
+    /// [`Implausible`].
+    pub fn tick(
+        &mut self,
+        readings: &Readings,
+        encoder_bits: u8,
+        force_bits: u8,
+    ) -> Result<(), Implausible> {
+        let ones = (1_u32 << (encoder_bits & 31)) - 1;
+        let count = |ticks: u16, condition: bool| {
+            if condition {
+                ticks.saturating_add(1)
+            } else {
+                0
+            }
+        };
+        let is_complete = readings.joints.iter().all(Option::is_some)
+            && readings.forces.iter().all(Option::is_some);
+        self.complete = count(self.complete, is_complete);
+        for (ticks, joint) in self.dead.iter_mut().zip(readings.joints) {
+            *ticks = count(*ticks, joint.is_none_or(|it| it.0 == 0 || it.0 == ones));
+        }
+        let [one, two] = readings.joints;
+        self.same = count(self.same, one.is_some() && one == two);
+        if self.dead.iter().any(|it| *it >= TICKS) {
+            return Err(Implausible::DeadLine);
+        }
+        if self.same >= TICKS {
+            return Err(Implausible::SameAngle);
+        }
+        if self.complete < TICKS {
+            return Err(Implausible::NotYet);
+        }
+        match readings.magnets {
+            [Some(true), Some(true)] => {}
+            [Some(false), _] | [_, Some(false)] => return Err(Implausible::Magnet),
+            _ => return Err(Implausible::NotYet),
+        }
+        let limit = (1_i32 << ((force_bits & 31).wrapping_sub(1) & 31)) - 1;
+        let at_limit = |it: &Option<ForceCounts>| it.is_some_and(|it| it.0.abs() >= limit);
+        if readings.forces.iter().any(at_limit) {
+            return Err(Implausible::ForceLimit);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn after(ticks: u16, joints: [u32; 2], force: i32, magnet: bool) -> Result<(), Implausible> {
+        let readings = Readings {
+            joints: joints.map(|it| Some(EncoderCounts(it))),
+            forces: [Some(ForceCounts(force)); 2],
+            magnets: [Some(magnet); 2],
+        };
+        let mut plausibility = Plausibility::default();
+        let mut verdict = Err(Implausible::NotYet);
+        for _ in 0..ticks {
+            verdict = plausibility.tick(&readings, 14, 13);
+        }
+        verdict
+    }
+
+    #[test]
+    fn an_arm_at_rest_is_plausible_after_a_while() {
+        assert_eq!(
+            after(TICKS - 1, [100, 200], -5, true),
+            Err(Implausible::NotYet)
+        );
+        assert_eq!(after(TICKS, [100, 200], -5, true), Ok(()));
+    }
+
+    #[test]
+    fn cut_lines_shorted_selects_and_missing_magnets_are_not() {
+        assert_eq!(after(TICKS, [0, 200], 0, true), Err(Implausible::DeadLine));
+        assert_eq!(
+            after(TICKS, [7, 16383], 0, true),
+            Err(Implausible::DeadLine)
+        );
+        assert_eq!(
+            after(TICKS, [200, 200], 0, true),
+            Err(Implausible::SameAngle)
+        );
+        assert_eq!(after(TICKS, [100, 200], 0, false), Err(Implausible::Magnet));
+        assert_eq!(
+            after(TICKS, [100, 200], 4095, true),
+            Err(Implausible::ForceLimit)
+        );
+        assert_eq!(
+            after(TICKS, [100, 200], -4096, true),
+            Err(Implausible::ForceLimit)
+        );
+    }
+}

@@ -1,0 +1,162 @@
+//! Parts behind `embedded-hal`: a bus, select pins and a delay that share one virtual clock.
+
+use std::cell::{Cell, RefCell};
+use std::convert::Infallible;
+use std::rc::Rc;
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{self, OutputPin};
+use embedded_hal::spi::{self, SpiBus};
+
+use crate::{Picoseconds, SECOND, SpiPart, Transfer};
+
+/// A virtual clock; copies of it show the same time.
+#[derive(Clone, Debug, Default)]
+pub struct Clock(Rc<Cell<Picoseconds>>);
+
+impl Clock {
+    /// Present time.
+    pub fn now(&self) -> Picoseconds {
+        self.0.get()
+    }
+
+    /// Lets time pass.
+    pub fn pass(&self, time: Picoseconds) {
+        self.0.set(self.0.get() + time);
+    }
+}
+
+impl DelayNs for Clock {
+    fn delay_ns(&mut self, nanoseconds: u32) {
+        self.pass(u64::from(nanoseconds) * 1000);
+    }
+}
+
+/// A part that its owner and its wires share.
+pub type Shared<P> = Rc<RefCell<P>>;
+
+/// A part and whether it is selected.
+struct Place<P> {
+    part: Shared<P>,
+    selected: Rc<Cell<bool>>,
+}
+
+/// A SPI bus with parts on it.
+pub struct Bus<P> {
+    clock: Clock,
+    hz: u64,
+    second_edge: bool,
+    places: Vec<Place<P>>,
+}
+
+impl<P: SpiPart> Bus<P> {
+    /// A bus that idles low, at this rate; `second_edge` for mode 1.
+    pub fn new(clock: &Clock, hz: u64, second_edge: bool) -> Self {
+        Self {
+            clock: clock.clone(),
+            hz,
+            second_edge,
+            places: Vec::new(),
+        }
+    }
+
+    /// Puts a part on the bus; its select pin, high.
+    pub fn attach(&mut self, part: &Shared<P>) -> Select<P> {
+        let selected = Rc::new(Cell::new(false));
+        self.places.push(Place {
+            part: Rc::clone(part),
+            selected: Rc::clone(&selected),
+        });
+        Select {
+            clock: self.clock.clone(),
+            part: Rc::clone(part),
+            selected,
+        }
+    }
+
+    fn exchange(&mut self, value: u8) -> u8 {
+        let transfer = Transfer {
+            value: value.into(),
+            bits: 8,
+            hz: self.hz,
+            idles_high: false,
+            second_edge: self.second_edge,
+            start: self.clock.now(),
+        };
+        self.clock.pass(8 * SECOND / self.hz);
+        let now = self.clock.now();
+        // Nobody drives the line: it is pulled up.
+        let selected = self.places.iter().filter(|it| it.selected.get());
+        selected.fold(u8::MAX, |line, place| {
+            line & place.part.borrow_mut().transfer(&transfer, now) as u8
+        })
+    }
+}
+
+impl<P> spi::ErrorType for Bus<P> {
+    type Error = Infallible;
+}
+
+impl<P: SpiPart> SpiBus for Bus<P> {
+    fn read(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
+        for word in words {
+            *word = self.exchange(0);
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, words: &[u8]) -> Result<(), Infallible> {
+        for word in words {
+            self.exchange(*word);
+        }
+        Ok(())
+    }
+
+    fn transfer(&mut self, read: &mut [u8], write: &[u8]) -> Result<(), Infallible> {
+        for at in 0..read.len().max(write.len()) {
+            let received = self.exchange(write.get(at).copied().unwrap_or(0));
+            if let Some(place) = read.get_mut(at) {
+                *place = received;
+            }
+        }
+        Ok(())
+    }
+
+    fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
+        for word in words {
+            *word = self.exchange(*word);
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+/// A part's select pin, low for selected.
+pub struct Select<P> {
+    clock: Clock,
+    part: Shared<P>,
+    selected: Rc<Cell<bool>>,
+}
+
+impl<P> digital::ErrorType for Select<P> {
+    type Error = Infallible;
+}
+
+impl<P: SpiPart> OutputPin for Select<P> {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        if !self.selected.replace(true) {
+            self.part.borrow_mut().select(self.clock.now());
+        }
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        if self.selected.replace(false) {
+            self.part.borrow_mut().deselect(self.clock.now());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,140 @@
+//! The drivers read the parts: every value, within the data sheets' limits, disturbed or not.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use embedded_hal_bus::spi::ExclusiveDevice;
+use painleve_drivers::Disturbance;
+use painleve_drivers::encoders::{self, Encoders};
+use painleve_drivers::force_cell::{self, ForceCell};
+use painleve_parts::wires::{Bus, Clock, Select, Shared};
+use painleve_parts::{As5048a, BitErrors, Mcp3304, SpiPart};
+use painleve_shared::counts::{EncoderCounts, ForceCounts};
+
+type EncoderDriver = Encoders<Bus<As5048a>, Select<As5048a>, Clock>;
+
+fn encoders() -> (EncoderDriver, [Shared<As5048a>; 2]) {
+    let clock = Clock::default();
+    let mut bus = Bus::new(&clock, encoders::FASTEST_HZ.into(), true);
+    let parts = [0, 1].map(|_| Rc::new(RefCell::new(As5048a::default())));
+    let selects = parts.each_ref().map(|part| bus.attach(part));
+    (Encoders::new(bus, selects, clock), parts)
+}
+
+type ForceDriver = ForceCell<ExclusiveDevice<Bus<Mcp3304>, Select<Mcp3304>, Clock>>;
+
+/// The board's own pause between two conversions is in its select pin; here it is the bus'.
+fn force_cell() -> (ForceDriver, Shared<Mcp3304>) {
+    let clock = Clock::default();
+    let mut bus = Bus::new(&clock, force_cell::FASTEST_HZ.into(), false);
+    let part = Rc::new(RefCell::new(Mcp3304::default()));
+    let select = bus.attach(&part);
+    let device = ExclusiveDevice::new(bus, select, clock).unwrap();
+    (ForceCell::new(device), part)
+}
+
+#[test]
+fn every_angle_is_read_within_the_encoders_limits() {
+    let (mut driver, parts) = encoders();
+    for angle in 0..1 << encoders::BITS {
+        parts[0].borrow_mut().angle = angle;
+        parts[1].borrow_mut().angle = angle ^ 0x2a5a;
+        let expected = [angle, angle ^ 0x2a5a].map(|it| Ok(EncoderCounts(it.into())));
+        assert_eq!(driver.read(encoders::BITS), expected);
+    }
+    assert!(parts.iter().all(|it| it.borrow().violations().is_empty()));
+}
+
+#[test]
+fn forces_of_either_sign_are_read() {
+    let (mut driver, part) = force_cell();
+    for force in -4096..4096 {
+        part.borrow_mut().channels = [force, 0, 0, force + 1, 0, 0, 0, 0];
+        let tangential = (-force - 1).clamp(-4096, 4095);
+        let expected = (Ok(ForceCounts(tangential)), Ok(ForceCounts(force)));
+        assert_eq!(driver.read(force_cell::BITS), expected);
+    }
+}
+
+#[test]
+fn a_disturbed_encoder_is_read_again_in_the_same_tick() {
+    let (mut driver, parts) = encoders();
+    parts[1].borrow_mut().angle = 77;
+    parts[1].borrow_mut().errors = 1;
+    assert_eq!(driver.read(encoders::BITS)[1], Ok(EncoderCounts(77)));
+    assert_eq!(parts[1].borrow().errors, 0, "the flag is cleared");
+}
+
+#[test]
+fn dead_lines_give_no_reading_or_one_that_is_known_as_dead() {
+    let (mut driver, parts) = encoders();
+    parts[0].borrow_mut().dead = Some(true);
+    parts[1].borrow_mut().dead = Some(false);
+    assert_eq!(
+        driver.read(encoders::BITS),
+        [Err(Disturbance::Flagged), Ok(EncoderCounts(0))]
+    );
+    let (mut driver, part) = force_cell();
+    part.borrow_mut().dead = Some(true);
+    assert_eq!(driver.read(13).0, Err(Disturbance::NotZero));
+}
+
+#[test]
+fn a_missing_magnet_is_noticed() {
+    let (mut driver, parts) = encoders();
+    for _ in 0..200 {
+        let _ = driver.read(encoders::BITS);
+    }
+    assert!(
+        driver
+            .diagnostics()
+            .iter()
+            .all(|it| it.unwrap().is_healthy())
+    );
+    parts[0].borrow_mut().diagnostics = 0x09ff;
+    for _ in 0..200 {
+        let _ = driver.read(encoders::BITS);
+    }
+    assert!(!driver.diagnostics()[0].unwrap().is_healthy());
+}
+
+/// One bit in ten thousand is flipped, on the way to the parts and back.
+#[test]
+fn with_bit_errors_a_reading_is_right_or_lost() {
+    let (mut driver, parts) = encoders();
+    let (mut force_driver, force_part) = force_cell();
+    for (seed, part) in parts.iter().enumerate() {
+        part.borrow_mut().bit_errors = BitErrors::new(1e-4, seed as u64);
+    }
+    force_part.borrow_mut().bit_errors = BitErrors::new(1e-4, 2);
+    let mut lost = 0;
+    const TICKS: u32 = 100_000;
+    for tick in 0..TICKS {
+        let angles = [tick * 7 % 16384, tick * 13 % 16384];
+        for (part, angle) in parts.iter().zip(angles) {
+            part.borrow_mut().angle = angle as u16;
+        }
+        let (normal, tangential) = ((tick * 11 % 8192) as i32 - 4096, (tick * 3 % 4096) as i32);
+        force_part.borrow_mut().channels = [normal, 0, tangential, 0, 0, 0, 0, 0];
+        for (reading, angle) in driver.read(encoders::BITS).into_iter().zip(angles) {
+            match reading {
+                Ok(counts) => assert_eq!(counts.0, angle, "tick {tick}"),
+                Err(_) => lost += 1,
+            }
+        }
+        let (t, n) = force_driver.read(force_cell::BITS);
+        for (reading, force) in [(t, tangential), (n, normal)] {
+            match reading {
+                Ok(counts) => assert_eq!(counts.0, force, "tick {tick}"),
+                Err(_) => lost += 1,
+            }
+        }
+    }
+    let errors: u64 = parts.iter().map(|it| it.borrow().bit_errors.count).sum();
+    assert!(errors > 1000);
+    assert!(
+        lost < TICKS / 1000,
+        "{lost} of {} readings were lost",
+        4 * TICKS
+    );
+}
