@@ -3,6 +3,7 @@
 mod build_fw;
 mod ci;
 mod command;
+mod examples;
 mod flash;
 mod setup;
 mod size;
@@ -33,6 +34,8 @@ enum Chore {
     Size,
     /// Build the image for the STM32F405 and flash it with probe-rs.
     Flash,
+    /// Build and run every example.
+    Examples,
     /// A simulated day of lockstep operation with counters that wrap; not part of CI.
     Soak(soak::SoakArguments),
     /// What continuous integration does: formatting, clippy, every test.
@@ -46,6 +49,7 @@ fn main() -> ExitCode {
         Chore::BuildFw => build_fw::run(),
         Chore::Size => size::run(),
         Chore::Flash => flash::run(),
+        Chore::Examples => examples::run(),
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Ci => ci::run(),
     };

@@ -1,10 +1,10 @@
 //! `cargo xtask test`: everything that must hold.
 
 use crate::command::{ChoreError, run_cargo};
-use crate::{setup, size};
+use crate::{examples, setup, size};
 
 /// Installs the ARM target and QEMU, builds image and program as users run them, then
-/// runs every test of the workspace.
+/// runs every test of the workspace and every example.
 ///
 /// # Errors
 /// The first command that fails.
@@ -12,5 +12,6 @@ pub fn run() -> Result<(), ChoreError> {
     setup::run()?;
     // Builds images and program: the end-to-end tests start the released ones.
     size::run()?;
-    run_cargo(&["test", "--workspace"])
+    run_cargo(&["test", "--workspace"])?;
+    examples::run()
 }

@@ -69,6 +69,25 @@ impl Monitor for () {
 }
 
 /// A simulation and a controller host, with what is counted about them.
+///
+/// ```
+/// use painleve_plant::closed_loop::ClosedLoop;
+/// use painleve_plant::controller_host::InProcess;
+/// use painleve_plant::scenario::Scenario;
+/// use painleve_plant::simulation::Simulation;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let scenario = Scenario::load("hybrid-elbow-down", &["run.duration_s=0.2".into()])?;
+/// let controller = InProcess::new(&scenario.controller_configuration())?;
+/// let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario)?, controller);
+/// for _ in 0..scenario.run.ticks() {
+///     closed_loop.tick(&mut ())?;
+/// }
+/// let (result, _) = closed_loop.finish();
+/// assert_eq!(result.statistics.lift_offs, 0);
+/// # Ok(())
+/// # }
+/// ```
 pub struct ClosedLoop<H, P = ArmOnBelt> {
     simulation: Simulation<P>,
     host: H,

@@ -20,4 +20,6 @@ pub mod scenario;
 pub mod simulation;
 pub mod statistics;
 
+/// Vectors of the plant's interface.
+pub use nalgebra;
 pub use plant::{ContactMode, Event, Plant, PlantError, Probe, Snapshot, State, Step};

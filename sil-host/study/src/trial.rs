@@ -2,16 +2,17 @@
 //! controller as in a run of two processes, without its record.
 
 use painleve_firmware::Controller;
+use painleve_plant::mechanics::ArmOnBelt;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
-use painleve_plant::{PlantError, Probe};
+use painleve_plant::{Plant, PlantError, Probe};
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::range::OutOfRange;
 use painleve_shared::status::Fault;
 
 /// A closed loop that can be stopped as soon as its outcome is known.
-pub struct Trial {
-    simulation: Simulation,
+pub struct Trial<P = ArmOnBelt> {
+    simulation: Simulation<P>,
     controller: Controller,
     answer: ActuatorFrame,
 }
@@ -22,8 +23,18 @@ impl Trial {
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
+        Self::of(Simulation::new(scenario)?, scenario)
+    }
+}
+
+impl<P: Plant> Trial<P> {
+    /// A simulation of any plant, with the scenario's controller.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    pub fn of(simulation: Simulation<P>, scenario: &Scenario) -> Result<Self, OutOfRange> {
         Ok(Self {
-            simulation: Simulation::new(scenario)?,
+            simulation,
             controller: Controller::new(&scenario.controller_configuration())?,
             answer: ActuatorFrame::default(),
         })
@@ -50,8 +61,7 @@ impl Trial {
 
     /// Where the tip is along the belt, m.
     pub fn tip_t_m(&self) -> f64 {
-        let plant = self.simulation.plant();
-        plant.motion().tip_t_m(plant.state())
+        self.simulation.plant().snapshot().tip_t_m
     }
 
     /// What the controller answered last.

@@ -16,6 +16,40 @@ pub type State = Vector4<f64>;
 
 /// A machine with two joints whose tip may touch a moving surface.
 ///
+/// ```
+/// use painleve_plant::nalgebra::Vector2;
+/// use painleve_plant::{Plant, PlantError, Probe, Snapshot};
+///
+/// /// Two flywheels.
+/// struct Flywheels(Snapshot);
+///
+/// impl Plant for Flywheels {
+///     fn snapshot(&self) -> Snapshot {
+///         self.0
+///     }
+///
+///     fn command_torque(&mut self, target_nm: Vector2<f64>, _lag_s: f64) {
+///         self.0.torque_nm = target_nm.into();
+///     }
+///
+///     fn advance(&mut self, until_s: f64, _: &mut impl Probe) -> Result<(), PlantError> {
+///         const INERTIA_KG_M2: f64 = 0.01;
+///         let step_s = until_s - self.0.time_s;
+///         for joint in 0..2 {
+///             self.0.theta_dot_rad_s[joint] += step_s * self.0.torque_nm[joint] / INERTIA_KG_M2;
+///             self.0.theta_rad[joint] += step_s * self.0.theta_dot_rad_s[joint];
+///         }
+///         self.0.time_s = until_s;
+///         Ok(())
+///     }
+/// }
+///
+/// let mut plant = Flywheels(Snapshot::default());
+/// plant.command_torque(Vector2::new(1.0, 0.0), 0.0);
+/// plant.advance(0.001, &mut ()).unwrap();
+/// assert!(plant.joint_angles_rad().x > 0.0);
+/// ```
+///
 /// Time starts at 0 s and only moves in [`advance`](Self::advance). Equal calls must give equal
 /// bits, or runs cannot be repeated.
 pub trait Plant {
