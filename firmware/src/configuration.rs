@@ -140,7 +140,7 @@ impl<L: Law> Configuration<L> {
         check_setting!(settings.contact.force_noise_n, 1e-4, force_range_n)?;
         // A governed reference may be out of reach: it is held at the edge.
         let reach_m = if settings.governor.enabled {
-            2.0 * self.arm.link_length_m
+            arm.reach_m()
         } else {
             arm.reach_on_belt_m()
         };

@@ -125,7 +125,7 @@ impl Recovery {
             -down
         };
         flight.height_m = (flight.height_m + vertical_speed * tick_s).at_least(-DEEPEST_M);
-        let height_m = flight.height_m - arm.parameters().height_m;
+        let height_m = flight.height_m - arm.height_m();
         let path_rad = arm
             .joint_angles_rad(&Vector2::new(flight.landing_m, height_m), flight.posture)
             .or(flight.path_rad)
@@ -141,7 +141,7 @@ impl Recovery {
         let scale = (settings.acceleration_rad_s2 / size.at_least(settings.acceleration_rad_s2))
             .at_most(1.0);
         LawOutput {
-            torque_nm: model.inverse_dynamics_nm(&(wanted * scale), &Vector2::zeros()),
+            torque_nm: model.inverse_dynamics_in_air_nm(&(wanted * scale)),
             contact_force_n: Vector2::zeros(),
         }
     }
@@ -162,7 +162,7 @@ mod tests {
         ) {
             let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
-            let at = Vector2::new(tip, height - arm.parameters().height_m);
+            let at = Vector2::new(tip, height - arm.height_m());
             let mut theta = arm.joint_angles_rad(&at, posture).unwrap();
             let mut theta_dot = Vector2::new(w1, w2);
             let recovery = Recovery::new(&RecoverySettings::default(), 1e-3);

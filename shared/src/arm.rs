@@ -1,31 +1,45 @@
-//! The two-link arm: its parameters, checked once, and the model made from them.
+//! A planar two-link arm: its parameters, checked once, and the model made from them.
 //!
-//! Two equal uniform rods in a vertical plane. Angles θ1, θ2 are absolute,
-//! measured from the downward vertical. The belt is the horizontal line a
-//! height H below the first joint. A torsion spring acts between the links,
-//! dashpots act in both joints.
+//! The arm moves in the vertical plane of the belt's run. Axes are those of the belt: t along
+//! it, n away from it, origin in the first joint; the belt is the line z_n = −H. The link angles
+//! θ1, θ2 are absolute, measured from the belt's inward normal −n towards t: from the
+//! downward vertical if the belt is level, as in the paper. A tilted belt tilts gravity in these axes
+//! and changes nothing else. The joint angles are q' = (θ1, θ2 − θ1).
 
 use serde::{Deserialize, Serialize};
 
 use crate::range::{self, OutOfRange};
 use crate::real::Real;
 
-/// Parameters of the arm (paper, Table I), in SI units.
+/// Parameters of an arm in SI units; a pair is of link 1 and link 2, or of joint 1 and joint 2.
+/// The default is the paper's arm: two equal uniform rods (Table I).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmParameters<T: Real> {
+    /// Length l of each link, from its joint to the next one or to the tip, m.
+    pub link_length_m: [T; 2],
     /// Mass m of each link, kg.
-    pub link_mass_kg: T,
-    /// Length l of each link, m.
-    pub link_length_m: T,
+    pub link_mass_kg: [T; 2],
+    /// Distance of each link's centre of mass from its joint, along the link, m; half the length
+    /// if absent.
+    pub link_centre_of_mass_m: Option<[T; 2]>,
+    /// Moment of inertia of each link about its centre of mass, kg·m²; that of a uniform
+    /// rod, m l²/12, if absent.
+    pub link_inertia_kg_m2: Option<[T; 2]>,
+    /// Point mass at the tip, kg.
+    pub tip_mass_kg: T,
     /// Damping σ of each joint, N·m·s/rad.
-    pub damping_nms_rad: T,
-    /// Stiffness k of the spring between the links, N·m/rad.
-    pub stiffness_nm_rad: T,
-    /// Rest angle α0 of the spring, rad.
-    pub spring_rest_rad: T,
-    /// Height H of the first joint above the belt, m.
+    pub damping_nms_rad: [T; 2],
+    /// Stiffness k of the spring in each joint, N·m/rad.
+    pub stiffness_nm_rad: [T; 2],
+    /// Joint angle at which each spring is relaxed, rad; −α0 of the paper for joint 2.
+    pub spring_rest_rad: [T; 2],
+    /// Inertia of each joint's rotor, reflected to the joint, kg·m².
+    pub rotor_inertia_kg_m2: [T; 2],
+    /// Distance H of the first joint from the belt, m.
     pub height_m: T,
+    /// Angle by which the belt rises in its direction t, rad.
+    pub belt_tilt_rad: T,
     /// Gravity g, m/s².
     pub gravity_m_s2: T,
 }
@@ -33,13 +47,19 @@ pub struct ArmParameters<T: Real> {
 impl<T: Real> Default for ArmParameters<T> {
     /// The paper's Table I, with g = 9.81 m/s².
     fn default() -> Self {
+        let pair = |one, two| [T::literal(one), T::literal(two)];
         Self {
-            link_mass_kg: T::literal(0.12),
-            link_length_m: T::literal(0.21),
-            damping_nms_rad: T::literal(0.005),
-            stiffness_nm_rad: T::literal(1.3),
-            spring_rest_rad: T::literal(13.72 * core::f64::consts::PI / 180.0),
+            link_length_m: pair(0.21, 0.21),
+            link_mass_kg: pair(0.12, 0.12),
+            link_centre_of_mass_m: None,
+            link_inertia_kg_m2: None,
+            tip_mass_kg: T::zero(),
+            damping_nms_rad: pair(0.005, 0.005),
+            stiffness_nm_rad: pair(0.0, 1.3),
+            spring_rest_rad: pair(0.0, -13.72 * core::f64::consts::PI / 180.0),
+            rotor_inertia_kg_m2: pair(0.0, 0.0),
             height_m: T::literal(0.3775),
+            belt_tilt_rad: T::zero(),
             gravity_m_s2: T::literal(9.81),
         }
     }
@@ -49,106 +69,216 @@ impl<T: Real> ArmParameters<T> {
     /// The same arm in another precision.
     pub fn cast<U: Real>(&self) -> ArmParameters<U> {
         let cast = |value: T| U::literal(value.to_f64());
+        let pair = |values: [T; 2]| values.map(cast);
         ArmParameters {
-            link_mass_kg: cast(self.link_mass_kg),
-            link_length_m: cast(self.link_length_m),
-            damping_nms_rad: cast(self.damping_nms_rad),
-            stiffness_nm_rad: cast(self.stiffness_nm_rad),
-            spring_rest_rad: cast(self.spring_rest_rad),
+            link_length_m: pair(self.link_length_m),
+            link_mass_kg: pair(self.link_mass_kg),
+            link_centre_of_mass_m: self.link_centre_of_mass_m.map(pair),
+            link_inertia_kg_m2: self.link_inertia_kg_m2.map(pair),
+            tip_mass_kg: cast(self.tip_mass_kg),
+            damping_nms_rad: pair(self.damping_nms_rad),
+            stiffness_nm_rad: pair(self.stiffness_nm_rad),
+            spring_rest_rad: pair(self.spring_rest_rad),
+            rotor_inertia_kg_m2: pair(self.rotor_inertia_kg_m2),
             height_m: cast(self.height_m),
+            belt_tilt_rad: cast(self.belt_tilt_rad),
             gravity_m_s2: cast(self.gravity_m_s2),
         }
     }
 
-    /// Checks every parameter.
+    /// Checks every parameter by itself, and that the belt is in reach all the way to where the
+    /// arm is straight.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first parameter that is not finite, not physical,
-    /// or that puts the belt out of reach (H ≥ 2l).
+    /// [`OutOfRange`] for the first parameter that is not finite, not physical, or that puts the
+    /// belt out of reach (H ≥ l1 + l2 or H ≤ |l1 − l2|).
     pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("arm.link_mass_kg", self.link_mass_kg, 1e-3, 1e3)?;
-        range::check("arm.link_length_m", self.link_length_m, 1e-2, 10.0)?;
-        range::check("arm.damping_nms_rad", self.damping_nms_rad, 0.0, 1e3)?;
-        range::check("arm.stiffness_nm_rad", self.stiffness_nm_rad, 0.0, 1e5)?;
+        let pair = |key, values: [T; 2], minimum, maximum| {
+            let mut values = values.into_iter();
+            values.try_for_each(|value| range::check(key, value, minimum, maximum))
+        };
         let pi = core::f64::consts::PI;
-        range::check("arm.spring_rest_rad", self.spring_rest_rad, -pi, pi)?;
+        pair("arm.link_length_m", self.link_length_m, 1e-2, 10.0)?;
+        pair("arm.link_mass_kg", self.link_mass_kg, 1e-3, 1e3)?;
+        if let Some(distances) = self.link_centre_of_mass_m {
+            pair("arm.link_centre_of_mass_m", distances, -10.0, 10.0)?;
+        }
+        if let Some(inertias) = self.link_inertia_kg_m2 {
+            pair("arm.link_inertia_kg_m2", inertias, 0.0, 1e4)?;
+        }
+        range::check("arm.tip_mass_kg", self.tip_mass_kg, 0.0, 1e3)?;
+        pair("arm.damping_nms_rad", self.damping_nms_rad, 0.0, 1e3)?;
+        pair("arm.stiffness_nm_rad", self.stiffness_nm_rad, 0.0, 1e5)?;
+        pair("arm.spring_rest_rad", self.spring_rest_rad, -pi, pi)?;
+        pair(
+            "arm.rotor_inertia_kg_m2",
+            self.rotor_inertia_kg_m2,
+            0.0,
+            1e4,
+        )?;
+        range::check("arm.belt_tilt_rad", self.belt_tilt_rad, -pi, pi)?;
         range::check("arm.gravity_m_s2", self.gravity_m_s2, 0.0, 100.0)?;
-        // Just short of the straight arm the tip could still touch in one
-        // point only, where the Jacobian is singular.
-        let reach_m = 2.0 * self.link_length_m.to_f64();
-        range::check(
-            "arm.height_m",
-            self.height_m,
-            0.01 * reach_m,
-            0.999 * reach_m,
-        )
+        // At full stretch, and folded over the hole that links of two lengths leave around
+        // the first joint, the Jacobian is singular: the belt keeps clear of both.
+        let [first, second] = self.link_length_m.map(T::to_f64);
+        let (reach, hole) = (first + second, (first - second).abs());
+        let least = (0.01 * reach).max(1.001 * hole);
+        range::check("arm.height_m", self.height_m, least, 0.999 * reach)
     }
 }
 
-/// The arm's model: checked parameters and the coefficients that the equations
-/// of motion share.
+/// Least determinant of the mass matrix over all postures, as a part of the product of its
+/// diagonal. Two equal uniform rods have 0.44; below this, single precision loses M⁻¹.
+const LEAST_DETERMINANT: f64 = 1e-3;
+
+/// The arm's model: checked parameters as the coefficients that the equations of motion share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm<T: Real> {
-    parameters: ArmParameters<T>,
-    /// 4/3 m l², kg·m².
+    /// l1 and l2, m.
+    pub(crate) length_1_m: T,
+    pub(crate) length_2_m: T,
+    /// l2/l1.
+    pub(crate) length_ratio: T,
+    /// H, m.
+    pub(crate) height_m: T,
+    /// M11 and M22, kg·m².
     pub(crate) inertia_1: T,
-    /// m l²/2, kg·m².
-    pub(crate) inertia_coupling: T,
-    /// m l²/3, kg·m².
     pub(crate) inertia_2: T,
-    /// 3/2 m g l, N·m.
-    pub(crate) gravity_1: T,
-    /// m g l/2, N·m.
-    pub(crate) gravity_2: T,
+    /// M12 is this times cos δ, less the second rotor's inertia; kg·m².
+    pub(crate) inertia_coupling: T,
+    /// A quarter of that for links of unit length, kg.
+    pub(crate) quarter_coupled_mass: T,
+    pub(crate) rotor_1: T,
+    pub(crate) rotor_2: T,
+    /// Torques of gravity across and along the belt on either link, N·m.
+    pub(crate) gravity_1_normal: T,
+    pub(crate) gravity_1_tangential: T,
+    pub(crate) gravity_2_normal: T,
+    pub(crate) gravity_2_tangential: T,
+    pub(crate) damping_2: T,
+    /// Damping of joint 1 beyond that of joint 2, N·m·s/rad.
+    pub(crate) damping_1_excess: T,
+    pub(crate) stiffness_1: T,
+    pub(crate) stiffness_2: T,
+    pub(crate) spring_rest_1: T,
+    pub(crate) spring_rest_2: T,
 }
 
 impl<T: Real> Arm<T> {
     /// Makes the model from checked parameters.
     ///
     /// # Errors
-    /// As [`ArmParameters::validate`].
+    /// As [`ArmParameters::validate`]; also if no kinetic energy goes with some motion of the links
+    /// (their mass matrix is singular).
     pub fn new(parameters: ArmParameters<T>) -> Result<Self, OutOfRange> {
         parameters.validate()?;
-        let ml = parameters.link_mass_kg * parameters.link_length_m;
-        let ml2 = ml * parameters.link_length_m;
-        let mgl = ml * parameters.gravity_m_s2;
-        Ok(Self {
-            parameters,
-            inertia_1: ml2 * T::literal(4.0 / 3.0),
-            inertia_coupling: ml2 * T::literal(0.5),
-            inertia_2: ml2 * T::literal(1.0 / 3.0),
-            gravity_1: mgl * T::literal(1.5),
-            gravity_2: mgl * T::literal(0.5),
-        })
+        let [length_1, length_2] = parameters.link_length_m;
+        let [mass_1, mass_2] = parameters.link_mass_kg;
+        let half = T::literal(0.5);
+        let [centre_1, centre_2] = parameters
+            .link_centre_of_mass_m
+            .unwrap_or([length_1 * half, length_2 * half]);
+        let rod = |mass: T, length: T| mass * length * length * T::literal(1.0 / 12.0);
+        let [own_1, own_2] = parameters
+            .link_inertia_kg_m2
+            .unwrap_or([rod(mass_1, length_1), rod(mass_2, length_2)]);
+        let [rotor_1, rotor_2] = parameters.rotor_inertia_kg_m2;
+        let tip = parameters.tip_mass_kg;
+        // What joint 1 carries at the end of link 1, and the moments of mass about both joints.
+        let carried = (mass_2 + tip) * length_1;
+        let moment_2 = mass_2 * centre_2 + tip * length_2;
+        let gravity = parameters.gravity_m_s2;
+        let (gravity_1, gravity_2) = (
+            mass_1 * centre_1 * gravity + carried * gravity,
+            moment_2 * gravity,
+        );
+        let (sine, cosine) = parameters.belt_tilt_rad.sine_cosine();
+        let [damping_1, damping_2] = parameters.damping_nms_rad;
+        let [stiffness_1, stiffness_2] = parameters.stiffness_nm_rad;
+        let [spring_rest_1, spring_rest_2] = parameters.spring_rest_rad;
+        let arm = Self {
+            length_1_m: length_1,
+            length_2_m: length_2,
+            length_ratio: length_2 / length_1,
+            height_m: parameters.height_m,
+            inertia_1: own_1
+                + mass_1 * centre_1 * centre_1
+                + carried * length_1
+                + rotor_1
+                + rotor_2,
+            inertia_2: own_2 + mass_2 * centre_2 * centre_2 + tip * length_2 * length_2 + rotor_2,
+            inertia_coupling: moment_2 * length_1,
+            quarter_coupled_mass: moment_2 / length_2 * T::literal(0.25),
+            rotor_1,
+            rotor_2,
+            gravity_1_normal: gravity_1 * cosine,
+            gravity_1_tangential: gravity_1 * sine,
+            gravity_2_normal: gravity_2 * cosine,
+            gravity_2_tangential: gravity_2 * sine,
+            damping_2,
+            damping_1_excess: damping_1 - damping_2,
+            stiffness_1,
+            stiffness_2,
+            spring_rest_1,
+            spring_rest_2,
+        };
+        // M12 = A cos δ − J2 is largest where both terms add.
+        let product = arm.inertia_1 * arm.inertia_2;
+        let coupling = arm.inertia_coupling.abs() + rotor_2;
+        let determinant = (product - coupling * coupling) / product;
+        range::check(
+            "arm: least det M / (M11 M22)",
+            determinant,
+            LEAST_DETERMINANT,
+            1.0,
+        )?;
+        Ok(arm)
     }
 
-    /// The parameters the model was made from.
-    pub fn parameters(&self) -> &ArmParameters<T> {
-        &self.parameters
+    /// Lengths l1 and l2 of the links, m.
+    #[inline]
+    pub fn link_length_m(&self) -> [T; 2] {
+        [self.length_1_m, self.length_2_m]
     }
 
-    /// The same arm with links of another length (m), equally heavy. The length is not checked.
-    #[must_use]
-    pub fn with_link_length(&self, link_length_m: T) -> Self {
-        let ratio = link_length_m / self.parameters.link_length_m;
+    /// Distance H of the first joint from the belt, m.
+    #[inline]
+    pub fn height_m(&self) -> T {
+        self.height_m
+    }
+
+    /// Scales all lengths of the links, at the same masses, so that link 1 is `length_1_m` long.
+    /// Rotors, springs and the belt stay as they are. The length is not checked.
+    pub fn scale_to(&mut self, length_1_m: T) {
+        let ratio = length_1_m / self.length_1_m;
         let square = ratio * ratio;
-        Self {
-            parameters: ArmParameters {
-                link_length_m,
-                ..self.parameters
-            },
-            inertia_1: self.inertia_1 * square,
-            inertia_coupling: self.inertia_coupling * square,
-            inertia_2: self.inertia_2 * square,
-            gravity_1: self.gravity_1 * ratio,
-            gravity_2: self.gravity_2 * ratio,
-        }
+        let rotors = self.rotor_1 + self.rotor_2;
+        self.length_1_m = length_1_m;
+        self.length_2_m = length_1_m * self.length_ratio;
+        self.inertia_1 = (self.inertia_1 - rotors) * square + rotors;
+        self.inertia_2 = (self.inertia_2 - self.rotor_2) * square + self.rotor_2;
+        self.inertia_coupling *= square;
+        self.gravity_1_normal *= ratio;
+        self.gravity_1_tangential *= ratio;
+        self.gravity_2_normal *= ratio;
+        self.gravity_2_tangential *= ratio;
     }
 
-    /// Largest |z_t| (m) at which the tip can touch the belt: √(4l² − H²).
+    /// Farthest that the tip can be from the first joint, m: l1 + l2.
+    #[inline]
+    pub fn reach_m(&self) -> T {
+        self.length_1_m + self.length_2_m
+    }
+
+    /// Nearest that the tip can be to the first joint, m: |l1 − l2|.
+    #[inline]
+    pub fn hole_m(&self) -> T {
+        (self.length_1_m - self.length_2_m).abs()
+    }
+
+    /// Largest |z_t| (m) at which the tip can touch the belt: √((l1 + l2)² − H²).
     pub fn reach_on_belt_m(&self) -> T {
-        let reach = self.parameters.link_length_m * T::literal(2.0);
-        let height = self.parameters.height_m;
+        let (reach, height) = (self.reach_m(), self.height_m);
         ((reach - height) * (reach + height)).square_root()
     }
 }
@@ -156,6 +286,30 @@ impl<T: Real> Arm<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kinematics::Pose;
+    use nalgebra::Vector2;
+    use std::string::ToString;
+
+    /// An arm that differs from the paper's in everything.
+    fn general() -> ArmParameters<f64> {
+        ArmParameters {
+            link_length_m: [0.25, 0.19],
+            link_mass_kg: [0.3, 0.11],
+            link_centre_of_mass_m: Some([0.1, 0.12]),
+            link_inertia_kg_m2: Some([2e-3, 5e-4]),
+            tip_mass_kg: 0.04,
+            damping_nms_rad: [0.01, 0.004],
+            stiffness_nm_rad: [0.4, 0.9],
+            spring_rest_rad: [0.2, -0.5],
+            rotor_inertia_kg_m2: [3e-4, 2e-4],
+            belt_tilt_rad: 0.1,
+            ..Default::default()
+        }
+    }
+
+    fn refused(parameters: ArmParameters<f64>) -> OutOfRange {
+        Arm::new(parameters).unwrap_err()
+    }
 
     #[test]
     fn the_papers_arm_reaches_18_cm_to_either_side() {
@@ -164,43 +318,127 @@ mod tests {
     }
 
     #[test]
-    fn a_belt_out_of_reach_is_refused_by_name() {
-        let parameters = ArmParameters::<f64> {
-            height_m: 0.42,
-            ..Default::default()
-        };
-        assert_eq!(Arm::new(parameters).unwrap_err().key, "arm.height_m");
+    fn the_papers_arm_has_the_papers_coefficients() {
+        let arm = Arm::<f64>::new(ArmParameters::default()).unwrap();
+        let (m, l, g) = (0.12, 0.21, 9.81);
+        for (ours, paper) in [
+            (arm.inertia_1, 4.0 / 3.0 * m * l * l),
+            (arm.inertia_coupling, 0.5 * m * l * l),
+            (arm.inertia_2, m * l * l / 3.0),
+            (arm.gravity_1_normal, 1.5 * m * g * l),
+            (arm.gravity_2_normal, 0.5 * m * g * l),
+        ] {
+            assert!((ours / paper - 1.0).abs() < 1e-15, "{ours} {paper}");
+        }
     }
 
     #[test]
-    fn an_arm_with_other_links_is_the_one_made_with_them() {
-        let parameters = ArmParameters::<f64>::default();
-        let link_length_m = 0.2;
+    fn a_belt_out_of_reach_is_refused_by_name() {
+        for (link_length_m, height_m) in [
+            ([0.21, 0.21], 0.42),
+            ([0.25, 0.16], 0.41),
+            // In the hole around the first joint.
+            ([0.5, 0.2], 0.3),
+            ([0.2, 0.5], 0.29),
+        ] {
+            let parameters = ArmParameters {
+                link_length_m,
+                height_m,
+                ..Default::default()
+            };
+            assert_eq!(refused(parameters).key, "arm.height_m");
+        }
+    }
+
+    #[test]
+    fn links_without_inertia_are_refused() {
+        let parameters = ArmParameters {
+            link_centre_of_mass_m: Some([0.1, 0.0]),
+            link_inertia_kg_m2: Some([0.0, 0.0]),
+            ..Default::default()
+        };
+        let error = refused(parameters);
+        assert_eq!(error.key, "arm: least det M / (M11 M22)");
+        // A mass at the tip of either link makes up for it; on a line with joint 1 alone it does not.
+        let ideal = ArmParameters {
+            tip_mass_kg: 0.1,
+            ..parameters
+        };
+        assert!(Arm::new(ideal).is_ok());
+        let negative = ArmParameters {
+            link_inertia_kg_m2: Some([1e-3, -1e-3]),
+            ..Default::default()
+        };
+        assert_eq!(
+            refused(negative).to_string(),
+            "arm.link_inertia_kg_m2 = -0.001 is outside the allowed range 0 to 10000"
+        );
+    }
+
+    #[test]
+    fn scaled_links_are_those_that_are_made_so() {
+        let parameters = general();
+        let scale = 0.95;
+        let scaled = |values: [f64; 2]| values.map(|value| value * scale);
         let made = Arm::new(ArmParameters {
-            link_length_m,
+            link_length_m: scaled(parameters.link_length_m),
+            link_centre_of_mass_m: parameters.link_centre_of_mass_m.map(scaled),
+            link_inertia_kg_m2: parameters
+                .link_inertia_kg_m2
+                .map(|inertias| inertias.map(|inertia| inertia * scale * scale)),
             ..parameters
         })
         .unwrap();
-        let changed = Arm::new(parameters)
-            .unwrap()
-            .with_link_length(link_length_m);
-        assert_eq!(made.parameters(), changed.parameters());
-        for (made, changed) in [
-            (made.inertia_1, changed.inertia_1),
-            (made.inertia_coupling, changed.inertia_coupling),
-            (made.inertia_2, changed.inertia_2),
-            (made.gravity_1, changed.gravity_1),
-            (made.gravity_2, changed.gravity_2),
-        ] {
-            assert!((made - changed).abs() < 1e-15);
-        }
+        let mut changed = Arm::new(parameters).unwrap();
+        changed.scale_to(scale * 0.25);
+        let theta = Vector2::new(0.4, -0.3);
+        let rates = Vector2::new(1.5, -2.0);
+        let pose = Pose::new(&theta);
+        let terms = |arm: &Arm<f64>| {
+            (
+                arm.mass_matrix(&pose),
+                arm.jacobian(&pose),
+                arm.passive_torque_nm(&theta, &rates, &pose),
+                arm.centrifugal_torque_nm(&rates, &pose),
+                arm.reach_on_belt_m(),
+            )
+        };
+        let (one, other) = (terms(&made), terms(&changed));
+        assert!((one.0 - other.0).amax() < 1e-15);
+        assert!((one.1 - other.1).amax() < 1e-15);
+        assert!((one.2 - other.2).amax() < 1e-15);
+        assert!((one.3 - other.3).amax() < 1e-15);
+        assert!((one.4 - other.4).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_uniform_rod_is_the_default_of_centre_and_inertia() {
+        let (mass, length) = (0.3_f64, 0.25_f64);
+        let rods = ArmParameters {
+            link_mass_kg: [mass; 2],
+            link_length_m: [length; 2],
+            ..Default::default()
+        };
+        let explicit = ArmParameters {
+            link_centre_of_mass_m: Some([0.125; 2]),
+            link_inertia_kg_m2: Some([mass * length * length / 12.0; 2]),
+            ..rods
+        };
+        let (one, other) = (
+            Arm::<f64>::new(rods).unwrap(),
+            Arm::<f64>::new(explicit).unwrap(),
+        );
+        assert!((one.inertia_1 - other.inertia_1).abs() < 1e-15);
+        assert!((one.inertia_2 - other.inertia_2).abs() < 1e-15);
+        assert_eq!(one.inertia_coupling, other.inertia_coupling);
+        assert_eq!(one.gravity_1_normal, other.gravity_1_normal);
     }
 
     #[test]
     fn non_finite_parameters_are_refused() {
         for value in [f32::NAN, f32::INFINITY] {
             let parameters = ArmParameters::<f32> {
-                damping_nms_rad: value,
+                damping_nms_rad: [0.0, value],
                 ..Default::default()
             };
             assert_eq!(Arm::new(parameters).unwrap_err().key, "arm.damping_nms_rad");

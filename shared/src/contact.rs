@@ -152,41 +152,53 @@ impl<T: Real> Arm<T> {
         p_of(&self.inverse_tip_inertia(pose), friction, slip)
     }
 
-    /// Q12/Q22 with the tip on the belt at `tip_t_m`: how strongly friction drives the tip into
-    /// the belt or off it, since p = Q22 (1 − μ s Q12/Q22). `None` out of reach or for a straight arm.
+    /// Q12 and Q22 with the tip on the belt at `tip_t_m`, both times one positive factor: all that
+    /// the sign of p = Q22 − μ s Q12 depends on. `None` out of reach or for a straight arm.
     ///
-    /// On the belt the tip's direction φ and the elbow δ = θ2 − θ1 follow from z_t without
-    /// trigonometry (sin φ = z_t/d, cos δ = d²/2l² − 1, d² = z_t² + H²), and J M⁻¹ Jᵀ of two equal
-    /// rods becomes, up to one positive factor,
+    /// On the belt the columns (x1, y1) and (x2, y2) of J follow from z_t without trigonometry.
+    /// With d² = z_t² + H², and W four times the area of the triangle of both links,
     ///
     /// ```text
-    /// Q12 = ⅔ cos δ sin 2φ + sin δ cos 2φ
-    /// Q22 = 5/3 − cos²δ − ⅔ cos δ cos 2φ + sin δ sin 2φ
+    /// W² = ((l1 + l2)² − d²) (d² − (l1 − l2)²),      h1,2 = d² ± (l1² − l2²),
+    /// 2d² x1 = H h1 + z_t W,    2d² y1 = z_t h1 − H W,
+    /// 2d² x2 = H h2 − z_t W,    2d² y2 = z_t h2 + H W,
+    /// 4 l1 l2 cos δ = (d² − (l1 − l2)²) − ((l1 + l2)² − d²),    2 l1 l2 sin δ = W
     /// ```
-    pub fn coupling_on_belt(&self, tip_t_m: T, posture: Posture) -> Option<T> {
-        let (length, height) = (self.parameters().link_length_m, self.parameters().height_m);
+    pub fn inverse_inertia_row_on_belt(&self, tip_t_m: T, posture: Posture) -> Option<(T, T)> {
+        let (height, reach) = (self.height_m, self.reach_m());
+        let difference = self.length_1_m - self.length_2_m;
         let square = tip_t_m * tip_t_m + height * height;
-        let scale = T::one() / square;
-        let sine_2phi = T::literal(2.0) * tip_t_m * height * scale;
-        let cosine_2phi = (height * height - tip_t_m * tip_t_m) * scale;
-        let cosine_elbow = square / (T::literal(2.0) * length * length) - T::one();
-        let sine_square = T::one() - cosine_elbow * cosine_elbow;
+        let (within, beyond) = (reach * reach - square, square - difference * difference);
+        let width_square = within * beyond;
         // Not `<=`: NaN is refused as well.
-        if sine_square.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
+        if width_square.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
             return None;
         }
-        let sine_elbow = match posture {
-            Posture::ElbowUp => sine_square.square_root(),
-            Posture::ElbowDown => -sine_square.square_root(),
+        let root = width_square.square_root();
+        let width = match posture {
+            Posture::ElbowUp => root,
+            Posture::ElbowDown => -root,
         };
-        let two_thirds = T::literal(2.0 / 3.0) * cosine_elbow;
-        let tangential = two_thirds * sine_2phi + sine_elbow * cosine_2phi;
-        let normal = T::literal(5.0 / 3.0) - cosine_elbow * cosine_elbow - two_thirds * cosine_2phi
-            + sine_elbow * sine_2phi;
-        Some(tangential / normal)
+        let shift = reach * difference;
+        let (along_1, along_2) = (square + shift, square - shift);
+        let (x_1, y_1) = (
+            height * along_1 + tip_t_m * width,
+            tip_t_m * along_1 - height * width,
+        );
+        let (x_2, y_2) = (
+            height * along_2 - tip_t_m * width,
+            tip_t_m * along_2 + height * width,
+        );
+        let coupling = self.quarter_coupled_mass * (beyond - within) - self.rotor_2;
+        // det M times M⁻¹ j2.
+        let (row_1, row_2) = (
+            self.inertia_2 * y_1 - coupling * y_2,
+            self.inertia_1 * y_2 - coupling * y_1,
+        );
+        Some((x_1 * row_1 + x_2 * row_2, y_1 * row_1 + y_2 * row_2))
     }
 
-    /// All contact terms at joint angles `theta` (rad), rates `theta_dot`
+    /// All contact terms at link angles `theta` (rad), rates `theta_dot`
     /// (rad/s) and generalised torque `torque_nm` (see
     /// [`generalised_torque_nm`](crate::dynamics::generalised_torque_nm)).
     #[inline]
@@ -265,12 +277,13 @@ mod tests {
         }
 
         #[test]
-        fn the_coupling_on_the_belt_is_that_of_the_matrix_q(tip in -0.184_f64..0.184, up: bool) {
+        fn the_row_on_the_belt_is_that_of_the_matrix_q(tip in -0.184_f64..0.184, up: bool) {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
             let theta = arm().joint_angles_on_belt_rad(tip, posture).unwrap();
             let q = arm().inverse_tip_inertia(&Pose::new(&theta));
-            let coupling = arm().coupling_on_belt(tip, posture).unwrap();
-            prop_assert!((coupling - q.m12 / q.m22).abs() < 1e-9);
+            let (tangential, normal) = arm().inverse_inertia_row_on_belt(tip, posture).unwrap();
+            prop_assert!(normal > 0.0);
+            prop_assert!((tangential / normal - q.m12 / q.m22).abs() < 1e-9);
         }
 
         #[test]

@@ -60,13 +60,7 @@ impl Micrometres {
 /// Rounds half away from zero; saturates, and NaN gives 0.
 #[inline]
 fn round_to_i32<T: Real>(value: T) -> i32 {
-    let half = T::literal(0.5);
-    let shifted = if value < T::zero() {
-        value - half
-    } else {
-        value + half
-    };
-    shifted.truncate_to_i32()
+    (value + T::literal(0.5).copysign(value)).truncate_to_i32()
 }
 
 /// A joint encoder: resolution and mounting offset.

@@ -23,15 +23,14 @@ impl<T: Real> Arm<T> {
     /// Mass matrix M, kg·m², symmetric and positive definite.
     #[inline]
     pub fn mass_matrix(&self, pose: &Pose<T>) -> Matrix2<T> {
-        let coupling = self.inertia_coupling * pose.cosine_elbow();
+        let coupling = self.coupled_inertia(pose);
         Matrix2::new(self.inertia_1, coupling, coupling, self.inertia_2)
     }
 
-    /// Inverse M⁻¹, 1/(kg·m²). The determinant is at least 7/36 (m l²)², so this
-    /// never divides by zero.
+    /// Inverse M⁻¹, 1/(kg·m²). [`Arm::new`] has made sure that it exists in every posture.
     #[inline]
     pub fn inverse_mass_matrix(&self, pose: &Pose<T>) -> Matrix2<T> {
-        let coupling = self.inertia_coupling * pose.cosine_elbow();
+        let coupling = self.coupled_inertia(pose);
         let scale = T::one() / (self.inertia_1 * self.inertia_2 - coupling * coupling);
         let off_diagonal = -coupling * scale;
         Matrix2::new(
@@ -42,7 +41,13 @@ impl<T: Real> Arm<T> {
         )
     }
 
-    /// Torque w of gravity, spring and dashpots, N·m, at joint angles `theta`
+    /// M12, kg·m². The second rotor turns with θ2 − θ1.
+    #[inline]
+    fn coupled_inertia(&self, pose: &Pose<T>) -> T {
+        self.inertia_coupling * pose.cosine_elbow() - self.rotor_2
+    }
+
+    /// Torque w of gravity, springs and dashpots, N·m, at link angles `theta`
     /// (rad) and rates `theta_dot` (rad/s).
     #[inline]
     pub fn passive_torque_nm(
@@ -51,13 +56,19 @@ impl<T: Real> Arm<T> {
         theta_dot: &Vector2<T>,
         pose: &Pose<T>,
     ) -> Vector2<T> {
-        let parameters = self.parameters();
-        let spring = parameters.stiffness_nm_rad * (theta.y - theta.x + parameters.spring_rest_rad);
-        let damping = parameters.damping_nms_rad;
+        let gravity_1 =
+            self.gravity_1_normal * pose.sine.x + self.gravity_1_tangential * pose.cosine.x;
+        let gravity_2 =
+            self.gravity_2_normal * pose.sine.y + self.gravity_2_tangential * pose.cosine.y;
+        let spring_1 = self.stiffness_1 * (theta.x - self.spring_rest_1);
+        let spring_2 = self.stiffness_2 * (theta.y - theta.x - self.spring_rest_2);
         let elbow_rate = theta_dot.y - theta_dot.x;
+        // σ1 θ̇1 − σ2 (θ̇2 − θ̇1); the first term is zero for equal dashpots.
+        let damping_1 =
+            self.damping_1_excess * theta_dot.x - self.damping_2 * (elbow_rate - theta_dot.x);
         Vector2::new(
-            self.gravity_1 * pose.sine.x - spring - damping * (elbow_rate - theta_dot.x),
-            self.gravity_2 * pose.sine.y + spring + damping * elbow_rate,
+            gravity_1 - spring_2 + damping_1 + spring_1,
+            gravity_2 + spring_2 + self.damping_2 * elbow_rate,
         )
     }
 
@@ -71,16 +82,22 @@ impl<T: Real> Arm<T> {
         )
     }
 
-    /// Kinetic plus potential energy, J; the potential is zero for both links
-    /// horizontal and the spring at rest.
+    /// Kinetic plus potential energy, J; the potential is zero for springs at rest and centres of
+    /// mass as high as the first joint.
     pub fn energy_j(&self, theta: &Vector2<T>, theta_dot: &Vector2<T>) -> T {
         let pose = Pose::new(theta);
-        let parameters = self.parameters();
-        let stretch = theta.y - theta.x + parameters.spring_rest_rad;
         let half = T::literal(0.5);
         let kinetic = theta_dot.dot(&(self.mass_matrix(&pose) * theta_dot)) * half;
-        let gravity = -(self.gravity_1 * pose.cosine.x + self.gravity_2 * pose.cosine.y);
-        kinetic + gravity + parameters.stiffness_nm_rad * stretch * stretch * half
+        let gravity = self.gravity_1_tangential * pose.sine.x
+            + self.gravity_2_tangential * pose.sine.y
+            - (self.gravity_1_normal * pose.cosine.x + self.gravity_2_normal * pose.cosine.y);
+        let (stretch_1, stretch_2) = (
+            theta.x - self.spring_rest_1,
+            theta.y - theta.x - self.spring_rest_2,
+        );
+        let springs =
+            self.stiffness_1 * stretch_1 * stretch_1 + self.stiffness_2 * stretch_2 * stretch_2;
+        kinetic + gravity + springs * half
     }
 }
 
@@ -134,7 +151,7 @@ mod tests {
 
         #[test]
         fn the_arm_without_spring_rest_angle_is_symmetric_about_the_vertical((theta, theta_dot) in state()) {
-            let arm = Arm::<f64>::new(ArmParameters { spring_rest_rad: 0.0, ..Default::default() }).unwrap();
+            let arm = Arm::<f64>::new(ArmParameters { spring_rest_rad: [0.0; 2], ..Default::default() }).unwrap();
             let mirrored = acceleration(&arm, &-theta, &-theta_dot);
             prop_assert!((acceleration(&arm, &theta, &theta_dot) + mirrored).norm() < 1e-9);
         }

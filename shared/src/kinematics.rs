@@ -76,74 +76,96 @@ impl<T: Real> Pose<T> {
     }
 }
 
+#[cold]
+#[inline(never)]
+fn arc_cosine_of<T: Real>(cosine: T) -> T {
+    cosine.arc_cosine()
+}
+
 impl<T: Real> Arm<T> {
     /// Tip position z = (z_t, z_n), m.
     #[inline]
     pub fn tip_m(&self, pose: &Pose<T>) -> Vector2<T> {
-        let length = self.parameters().link_length_m;
+        let (length, ratio) = (self.length_1_m, self.length_ratio);
         Vector2::new(
-            length * (pose.sine.x + pose.sine.y),
-            -length * (pose.cosine.x + pose.cosine.y),
+            length * (pose.sine.x + ratio * pose.sine.y),
+            -length * (pose.cosine.x + ratio * pose.cosine.y),
         )
     }
 
     /// Height of the tip above the belt, z_n + H, m; negative inside the belt.
     #[inline]
     pub fn gap_m(&self, pose: &Pose<T>) -> T {
-        let parameters = self.parameters();
-        parameters.height_m - parameters.link_length_m * (pose.cosine.x + pose.cosine.y)
+        self.height_m - self.length_1_m * (pose.cosine.x + self.length_ratio * pose.cosine.y)
     }
 
     /// Jacobian J with ż = J θ̇, m; its rows are the paper's j1 and j2.
     #[inline]
     pub fn jacobian(&self, pose: &Pose<T>) -> Matrix2<T> {
-        let length = self.parameters().link_length_m;
         Matrix2::new(
-            length * pose.cosine.x,
-            length * pose.cosine.y,
-            length * pose.sine.x,
-            length * pose.sine.y,
+            self.length_1_m * pose.cosine.x,
+            self.length_2_m * pose.cosine.y,
+            self.length_1_m * pose.sine.x,
+            self.length_2_m * pose.sine.y,
         )
     }
 
-    /// Centripetal acceleration s = J̇ θ̇ of the tip, m/s², for joint rates θ̇ (rad/s).
+    /// Centripetal acceleration s = J̇ θ̇ of the tip, m/s², for link rates θ̇ (rad/s).
     #[inline]
     pub fn centripetal_m_s2(&self, pose: &Pose<T>, theta_dot: &Vector2<T>) -> Vector2<T> {
-        let length = self.parameters().link_length_m;
+        let length = self.length_1_m;
         let square_1 = theta_dot.x * theta_dot.x;
-        let square_2 = theta_dot.y * theta_dot.y;
+        let square_2 = self.length_ratio * (theta_dot.y * theta_dot.y);
         Vector2::new(
             -length * (square_1 * pose.sine.x + square_2 * pose.sine.y),
             length * (square_1 * pose.cosine.x + square_2 * pose.cosine.y),
         )
     }
 
-    /// Joint angles (θ1, θ2) that put the tip at `tip_m` = (z_t, z_n) in the
-    /// given posture; `None` where the arm does not reach, or for NaN.
+    /// (l1 − l2)(l1 + l2), m²; zero for equal links.
+    #[inline]
+    fn difference_of_squares_m2(&self) -> T {
+        (self.length_1_m - self.length_2_m) * self.reach_m()
+    }
+
+    /// Link angles (θ1, θ2) that put the tip at `tip_m` = (z_t, z_n) in the
+    /// given posture; `None` where the arm does not reach, for NaN, and in the first joint itself.
     ///
-    /// With equal links the tip direction halves the elbow angle: θ = φ ∓ β,
-    /// tan φ = −z_t/z_n, cos β = |z|/2l.
+    /// The links are to either side of the tip's direction φ, θ = φ ∓ β, with
+    /// tan φ = −z_t/z_n and by the law of cosines
+    ///
+    /// ```text
+    /// cos β1 = (d + (l1² − l2²)/d) / 2 l1,   cos β2 = (d − (l1² − l2²)/d) / 2 l2,   d = |z|
+    /// ```
     pub fn joint_angles_rad(&self, tip_m: &Vector2<T>, posture: Posture) -> Option<Vector2<T>> {
         let distance = (tip_m.x * tip_m.x + tip_m.y * tip_m.y).square_root();
-        let cosine_half_elbow = distance / (self.parameters().link_length_m * T::literal(2.0));
-        if cosine_half_elbow > T::one() || cosine_half_elbow.to_f64().is_nan() {
+        let two = T::literal(2.0);
+        let shift = self.difference_of_squares_m2() / distance;
+        // NaN stays NaN through the arc cosine.
+        let angle_1 = ((distance + shift) / (self.length_1_m * two)).arc_cosine();
+        // Equal links make equal angles.
+        let angle_2 = if shift == T::zero() {
+            angle_1
+        } else {
+            arc_cosine_of((distance - shift) / (self.length_2_m * two))
+        };
+        let sum = angle_1 + angle_2;
+        if sum.to_f64().is_nan() {
             return None;
         }
         let direction = tip_m.x.arc_tangent_2(-tip_m.y);
-        let half_elbow = cosine_half_elbow.arc_cosine();
-        let (first, second) = (direction - half_elbow, direction + half_elbow);
         Some(match posture {
-            Posture::ElbowUp => Vector2::new(first, second),
-            Posture::ElbowDown => Vector2::new(second, first),
+            Posture::ElbowUp => Vector2::new(direction - angle_1, direction + angle_2),
+            Posture::ElbowDown => Vector2::new(direction + angle_1, direction - angle_2),
         })
     }
 
-    /// Joint angles with the tip on the belt at `tip_t_m`; `None` out of reach.
+    /// Link angles with the tip on the belt at `tip_t_m`; `None` out of reach.
     pub fn joint_angles_on_belt_rad(&self, tip_t_m: T, posture: Posture) -> Option<Vector2<T>> {
-        self.joint_angles_rad(&Vector2::new(tip_t_m, -self.parameters().height_m), posture)
+        self.joint_angles_rad(&Vector2::new(tip_t_m, -self.height_m), posture)
     }
 
-    /// Joint rates θ̇ (rad/s) that move the tip along the belt with
+    /// Link rates θ̇ (rad/s) that move the tip along the belt with
     /// `tip_speed_m_s` at `tip_t_m`; zero where the arm is straight or does not reach.
     ///
     /// The time derivative of θ = φ ∓ β in [`joint_angles_rad`](Self::joint_angles_rad).
@@ -153,22 +175,25 @@ impl<T: Real> Arm<T> {
         tip_speed_m_s: T,
         posture: Posture,
     ) -> Vector2<T> {
-        let height = self.parameters().height_m;
+        let height = self.height_m;
         let square = tip_t_m * tip_t_m + height * height;
         let distance = square.square_root();
-        let reach = self.parameters().link_length_m * T::literal(2.0);
-        // 2l sin β
-        let half_elbow_sine = ((reach - distance) * (reach + distance)).square_root();
-        if half_elbow_sine.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
+        let (reach, hole) = (self.reach_m(), self.hole_m());
+        // 2 l1 sin β1 = 2 l2 sin β2, by the area of the triangle of both links.
+        let twice_width =
+            ((reach - distance) * (reach + distance) * (T::one() - hole * hole / square))
+                .square_root();
+        if twice_width.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
             return Vector2::zeros();
         }
+        let shift = self.difference_of_squares_m2() / square;
         let direction_rate = tip_speed_m_s * height / square;
-        let half_elbow_rate = -tip_t_m * tip_speed_m_s / (distance * half_elbow_sine);
-        let first = direction_rate - half_elbow_rate;
-        let second = direction_rate + half_elbow_rate;
+        let angle_rate = -tip_t_m * tip_speed_m_s / (distance * twice_width);
+        let rate_1 = angle_rate * (T::one() - shift);
+        let rate_2 = angle_rate * (T::one() + shift);
         match posture {
-            Posture::ElbowUp => Vector2::new(first, second),
-            Posture::ElbowDown => Vector2::new(second, first),
+            Posture::ElbowUp => Vector2::new(direction_rate - rate_1, direction_rate + rate_2),
+            Posture::ElbowDown => Vector2::new(direction_rate + rate_1, direction_rate - rate_2),
         }
     }
 }

@@ -8,6 +8,8 @@
 //! and cosine are a polynomial, because `libm` evaluates them in `f64`, which is
 //! software on a Cortex-M4F: about 2,100 instructions against a few dozen.
 
+use core::cmp::Ordering;
+
 use nalgebra::RealField;
 
 use crate::settings::SettingValue;
@@ -174,6 +176,9 @@ impl Real for f32 {
 /// unwrapped joint angle stays far inside it.
 const REDUCTION_LIMIT_RAD: f32 = 8192.0;
 
+/// 1.5 · 2²³: the sum with a number below 2²² has no fraction.
+const ROUNDS_TO_INTEGER: f32 = 12_582_912.0;
+
 /// Sine and cosine in single precision only.
 ///
 /// Reduction to ±π/4 by Cody and Waite's three-part π/2 and the minimax
@@ -186,12 +191,15 @@ fn sine_cosine_f32(angle: f32) -> (f32, f32) {
     const HALF_PI_MIDDLE: f32 = 4.837_513e-4;
     const HALF_PI_LOW: f32 = 7.549_79e-8;
 
-    if !(-REDUCTION_LIMIT_RAD..=REDUCTION_LIMIT_RAD).contains(&angle) {
+    if angle.abs().partial_cmp(&REDUCTION_LIMIT_RAD) != Some(Ordering::Less) {
         return (f32::NAN, f32::NAN);
     }
     let turns = angle * core::f32::consts::FRAC_2_PI;
-    let quadrant = (turns + if turns < 0.0 { -0.5 } else { 0.5 }) as i32;
-    let k = quadrant as f32;
+    // Beside a number so large there is no room for a fraction: this rounds to the nearest integer,
+    // whose last bits are then those of the sum.
+    let rounded = turns + ROUNDS_TO_INTEGER;
+    let quadrant = rounded.to_bits();
+    let k = rounded - ROUNDS_TO_INTEGER;
     let x = ((angle - k * HALF_PI_HIGH) - k * HALF_PI_MIDDLE) - k * HALF_PI_LOW;
     let z = x * x;
     let sine = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z * x + x;

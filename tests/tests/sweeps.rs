@@ -306,11 +306,19 @@ fn mistakes_are_told_and_nothing_is_written() {
 fn a_scenario_that_has_changed_since_is_noticed() {
     let campaign = format!("{CAMPAIGN}scenario = 'mine.toml'\n");
     let bench = Bench::new("sweep-scenario");
-    write(&bench, "mine.toml", "[arm]\ndamping_nms_rad = 0.006\n");
+    write(
+        &bench,
+        "mine.toml",
+        "[arm]\ndamping_nms_rad = [0.006, 0.006]\n",
+    );
     write(&bench, "campaign.toml", &campaign);
     text(&bench.run(&["sweep", "plan", "campaign.toml", "--shards", "2"]));
     text(&bench.run(&["sweep", "run", "--shard", "0/2"]));
-    write(&bench, "mine.toml", "[arm]\ndamping_nms_rad = 0.007\n");
+    write(
+        &bench,
+        "mine.toml",
+        "[arm]\ndamping_nms_rad = [0.007, 0.007]\n",
+    );
     let output = bench.run(&["sweep", "run", "--shard", "1/2"]);
     assert_eq!(code(output.status), 2, "{output:?}");
     assert!(errors(&output).contains("mine.toml"), "{output:?}");

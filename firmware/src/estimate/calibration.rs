@@ -1,7 +1,7 @@
 //! The links' length from the belt.
 //!
-//! With the tip on the belt cos θ₁ + cos θ₂ = H/l in every posture. The mean of the measured sum
-//! therefore gives l, better the longer the tip slides. An arm 5 % longer than its
+//! With the tip on the belt cos θ₁ + ρ cos θ₂ = H/l₁ in every posture, ρ = l₂/l₁. The mean of the
+//! measured sum therefore gives l₁, and l₂ in proportion, better the longer the tip slides. An arm 5 % longer than its
 //! data sheet says would otherwise miss its references by a centimetre and its edges by more.
 
 use painleve_shared::{Real, settings};
@@ -37,7 +37,7 @@ pub struct LengthCalibration {
 }
 
 impl LengthCalibration {
-    /// A calibration that has seen nothing: nominal link length and height above the belt in m.
+    /// A calibration that has seen nothing: nominal length of link 1 and height above the belt in m.
     pub fn new(settings: &CalibrationSettings, nominal_m: f32, height_m: f32, tick_s: f32) -> Self {
         Self {
             settings: *settings,
@@ -51,7 +51,7 @@ impl LengthCalibration {
     }
 
     /// Takes in the gap (m) that one tick's readings give for the present length while the tip is
-    /// on the belt; returns the length, m.
+    /// on the belt; returns the length of link 1, m.
     pub fn update(&mut self, measured_gap_m: f32) -> f32 {
         if !self.settings.enabled {
             return self.length_m;
@@ -68,7 +68,7 @@ impl LengthCalibration {
     }
 
     /// Begins anew with a tip that is taken to be on the belt at this measured gap (m), because it
-    /// cannot be below; returns the length, m.
+    /// cannot be below; returns the length of link 1, m.
     pub fn restart(&mut self, measured_gap_m: f32) -> f32 {
         self.readings = 0.0;
         self.update(measured_gap_m)

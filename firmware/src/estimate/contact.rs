@@ -5,7 +5,7 @@
 //!   f_c and none: (f_c/σ²) (f − f_c/2). A noisy reading near zero does not chatter, and a
 //!   clear one decides within two or three ticks.
 //! - **Encoders**: the height of the tip over the belt is known to within half a count of either
-//!   encoder, h = ½ (|z_t| Δθ₁ + l |sin θ₂| Δθ₂₁). A gap beyond h is no contact. And joints on
+//!   encoder, h = ½ (|z_t| Δθ₁ + l₂ |sin θ₂| Δθ₂₁). A gap beyond h is no contact. And joints on
 //!   which the contact force acts no more run ahead of what the tracking loops expect under the
 //!   wanted one: their innovations weigh the wanted force against none, as the force cell's
 //!   reading does.

@@ -85,7 +85,7 @@ impl DisturbanceEstimator {
         }
         let share = balance
             .p_per_kg
-            .map_or(1.0, |p| SHARE * (p / model.q.m22).at_least(0.0));
+            .map_or(1.0, |p| SHARE * (p / model.q22_per_kg).at_least(0.0));
         let weight = (self.settings.bandwidth_rad_s * self.tick_s).at_most(share);
         state.torque_nm =
             (state.torque_nm + residual_nm * weight).map(|torque| torque.within(limit));
@@ -130,7 +130,7 @@ mod tests {
                 &Balance {
                     torque_nm: truth.inverse_dynamics_nm(&acceleration, &force_n),
                     force_n,
-                    p_per_kg: p_ratio.map(|ratio| ratio * model.q.m22),
+                    p_per_kg: p_ratio.map(|ratio| ratio * model.q22_per_kg),
                     elapsed_s: TICK_S,
                 },
             );

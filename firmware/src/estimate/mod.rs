@@ -134,7 +134,7 @@ impl Estimators {
             disturbance: DisturbanceState::default(),
             calibration: LengthCalibration::new(
                 &configuration.settings.calibration,
-                configuration.arm.link_length_m,
+                configuration.arm.link_length_m[0],
                 configuration.arm.height_m,
                 self.tick_s,
             ),
@@ -212,7 +212,7 @@ impl Estimators {
             // A reading that stays would weigh more for nothing but time.
             if certain && state.joints.has_moved() {
                 let length = state.calibration.update(gap_m);
-                state.arm = state.arm.with_link_length(length);
+                state.arm.scale_to(length);
             }
         } else if touched {
             self.explain_throw(&mut state.friction, model);
@@ -281,8 +281,8 @@ impl Estimators {
     /// that, it is taken to be the reason.
     fn explain_throw(&self, state: &mut FrictionState, model: &Model) {
         let friction = state.estimate();
-        let coupling = friction.slip.sign::<f32>() * model.q.m12;
-        let critical = model.q.m22 / coupling;
+        let coupling = friction.slip.sign::<f32>() * model.q12_per_kg;
+        let critical = model.q22_per_kg / coupling;
         if coupling > 0.0 && critical < friction.coefficient + THROWN_BY_FRICTION {
             self.friction.thrown(state, critical);
         }
@@ -295,7 +295,7 @@ fn find_belt(state: &mut EstimatesState, encoders: &mut EncoderReading) {
     let starts = state.calibration.is_open();
     if starts || encoders.is_below_belt() {
         let length = state.calibration.restart(encoders.gap_m);
-        state.arm = state.arm.with_link_length(length);
+        state.arm.scale_to(length);
     }
     if starts {
         encoders.gap_m = 0.0;

@@ -34,8 +34,12 @@ pub struct Model {
     centripetal_m_s2: Vector2<f32>,
     /// 1 / det J with the determinant bounded away from zero, 1/m².
     inverse_determinant_per_m2: f32,
-    /// Q = J M⁻¹ Jᵀ, 1/kg.
-    pub q: Matrix2<f32>,
+    /// M⁻¹ j2, 1/(kg·m): joint acceleration by a normal force.
+    normal_mobility: Vector2<f32>,
+    /// Q12 and Q22 of Q = J M⁻¹ Jᵀ, 1/kg.
+    pub q12_per_kg: f32,
+    /// Q22, 1/kg.
+    pub q22_per_kg: f32,
 }
 
 impl Model {
@@ -56,12 +60,16 @@ impl Model {
         } else {
             sine_elbow.at_least(STRAIGHT_ARM_SINE)
         };
-        let length = arm.parameters().link_length_m;
+        let [length_1, length_2] = arm.link_length_m();
+        let normal = Vector2::new(jacobian.m21, jacobian.m22);
+        let normal_mobility = mobility * normal;
+        let tangential_mobility = mobility * Vector2::new(jacobian.m11, jacobian.m12);
+        let tip_m = arm.tip_m(&pose);
         Self {
             theta_rad,
             theta_dot_rad_s,
-            tip_m: arm.tip_m(&pose),
-            gap_m: arm.gap_m(&pose),
+            tip_m,
+            gap_m: arm.height_m() + tip_m.y,
             tip_velocity_m_s: jacobian * theta_dot_rad_s,
             jacobian,
             mass: arm.mass_matrix(&pose),
@@ -70,9 +78,11 @@ impl Model {
                 + arm.centrifugal_torque_nm(&theta_dot_rad_s, &pose)
                 - disturbance_nm,
             centripetal_m_s2: arm.centripetal_m_s2(&pose, &theta_dot_rad_s),
-            // det J = l² sin(θ2 − θ1).
-            inverse_determinant_per_m2: 1.0 / (length * length * bounded),
-            q: jacobian * mobility * jacobian.transpose(),
+            // det J = l1 l2 sin(θ2 − θ1).
+            inverse_determinant_per_m2: 1.0 / (length_1 * length_2 * bounded),
+            normal_mobility,
+            q12_per_kg: tangential_mobility.dot(&normal),
+            q22_per_kg: normal_mobility.dot(&normal),
         }
     }
 
@@ -98,6 +108,11 @@ impl Model {
         joint_torque_nm(&generalised)
     }
 
+    /// The same without contact: u = w + c + M θ̈.
+    pub fn inverse_dynamics_in_air_nm(&self, acceleration_rad_s2: &Vector2<f32>) -> Vector2<f32> {
+        joint_torque_nm(&(self.bias_nm + self.mass * acceleration_rad_s2))
+    }
+
     /// Joint torques (u1, u2), N·m, that hold a contact force (f_t, f_n), N: −Jᵀ f.
     pub fn torque_against_nm(&self, force_n: &Vector2<f32>) -> Vector2<f32> {
         joint_torque_nm(&-(self.jacobian.transpose() * force_n))
@@ -117,16 +132,14 @@ impl Model {
     /// Free normal acceleration as a function of the joint torques,
     /// b = b₀ + n · (u1, u2): b₀ in m/s² and n in 1/(kg·m).
     pub fn free_normal_acceleration(&self) -> (f32, Vector2<f32>) {
-        let normal = Vector2::new(self.jacobian.m21, self.jacobian.m22);
-        // M⁻¹ is symmetric.
-        let row = self.mobility * normal;
+        let row = &self.normal_mobility;
         let offset = self.centripetal_m_s2.y - row.dot(&self.bias_nm);
         (offset, Vector2::new(row.x, row.y - row.x))
     }
 
     /// p = Q22 − μ s Q12, 1/kg.
     pub fn p_per_kg(&self, friction: f32, slip: Slip) -> f32 {
-        self.q.m22 - friction * slip.sign::<f32>() * self.q.m12
+        self.q22_per_kg - friction * slip.sign::<f32>() * self.q12_per_kg
     }
 }
 

@@ -30,7 +30,7 @@ fn every_reference_state_agrees() {
         };
 
         let arm = Arm::new(ArmParameters {
-            stiffness_nm_rad: column("k"),
+            stiffness_nm_rad: [0.0, column("k")],
             height_m: column("height"),
             ..Default::default()
         })

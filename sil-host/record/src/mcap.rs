@@ -309,9 +309,9 @@ fn add_channel<M: JsonSchema>(
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "painleve.Plant")]
 struct PlantMessage {
-    /// Angle of the first link from the downward vertical, rad.
+    /// Angle of the first link from the belt's inward normal, rad.
     theta1_rad: f64,
-    /// Angle of the second link from the downward vertical, rad.
+    /// Angle of the second link from the belt's inward normal, rad.
     theta2_rad: f64,
     /// Rate of the first angle, rad/s.
     theta1_dot_rad_s: f64,

@@ -80,13 +80,18 @@ pub fn admissible(parameters: &ArmParameters<f64>, mu: f64) -> Result<Admissible
         critical_tip_t_m,
         critical_posture,
         reach_m: arm.reach_on_belt_m(),
-        elbow_up: intervals(&arm, Posture::ElbowUp, mu),
-        elbow_down: intervals(&arm, Posture::ElbowDown, mu),
+        elbow_up: intervals(parameters, &arm, Posture::ElbowUp, mu),
+        elbow_down: intervals(parameters, &arm, Posture::ElbowDown, mu),
         arm: *parameters,
     })
 }
 
-fn intervals(arm: &Arm<f64>, posture: Posture, mu: f64) -> Intervals {
+fn intervals(
+    parameters: &ArmParameters<f64>,
+    arm: &Arm<f64>,
+    posture: Posture,
+    mu: f64,
+) -> Intervals {
     let line = BeltLine::new(arm, posture);
     let at = |mu: f64| -> Vec<[f64; 2]> {
         positive_stretches(|tau| line.p(tau, mu, Slip::Positive))
@@ -95,7 +100,7 @@ fn intervals(arm: &Arm<f64>, posture: Posture, mu: f64) -> Intervals {
             .collect()
     };
     let intervals_m = at(mu);
-    let paper_m = paper::admissible_m(arm.parameters(), mu, posture);
+    let paper_m = paper::admissible_m(parameters, mu, posture);
     let upper = paper_m.map(|[_, upper]| upper);
     let fits = |upper: f64| {
         (1..=10).find_map(|tenths| {

@@ -1,8 +1,8 @@
 //! Postures with the tip on the belt, as an analytic curve.
 //!
-//! Along z_t itself the joint angles have square roots where the arm is straight. With
-//! z_t = R sin τ, R the reach, they have none: cos β = |z|/2l and sin β = R cos τ/2l give
-//! half the elbow's angle, and p is an analytic function of τ from −π/2 to π/2.
+//! Along z_t itself the link angles have square roots where the arm is straight. With
+//! z_t = R sin τ, R the reach, they have none: the area of the triangle of both links is
+//! ¼ R cos τ √(d² − (l1 − l2)²), d = |z|, and p is an analytic function of τ from −π/2 to π/2.
 
 use nalgebra::{Matrix2, Vector2};
 use painleve_shared::{Arm, Pose, Posture, Slip};
@@ -35,17 +35,23 @@ impl<'a> BeltLine<'a> {
         (sine.abs() <= 1.0).then(|| libm::asin(sine))
     }
 
-    /// Joint angles (θ1, θ2) at τ, rad.
+    /// Link angles (θ1, θ2) at τ, rad.
     pub fn theta_rad(&self, tau: f64) -> Vector2<f64> {
-        let parameters = self.arm.parameters();
+        let (height, hole) = (self.arm.height_m(), self.arm.hole_m());
+        let [length_1, length_2] = self.arm.link_length_m();
         let tip = self.tip_t_m(tau);
-        let direction = libm::atan2(tip, parameters.height_m);
-        let distance = libm::hypot(tip, parameters.height_m);
-        let half_elbow = libm::atan2(self.arm.reach_on_belt_m() * libm::cos(tau), distance);
-        let (first, second) = (direction - half_elbow, direction + half_elbow);
+        let direction = libm::atan2(tip, height);
+        let distance = libm::hypot(tip, height);
+        // 2 l sin β and 2 l cos β of either link's angle β with the tip's direction.
+        let sine = self.arm.reach_on_belt_m()
+            * libm::cos(tau)
+            * (libm::sqrt(distance * distance - hole * hole) / distance);
+        let shift = (length_1 - length_2) * (length_1 + length_2) / distance;
+        let angle_1 = libm::atan2(sine, distance + shift);
+        let angle_2 = libm::atan2(sine, distance - shift);
         match self.posture {
-            Posture::ElbowUp => Vector2::new(first, second),
-            Posture::ElbowDown => Vector2::new(second, first),
+            Posture::ElbowUp => Vector2::new(direction - angle_1, direction + angle_2),
+            Posture::ElbowDown => Vector2::new(direction + angle_1, direction - angle_2),
         }
     }
 

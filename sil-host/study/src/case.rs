@@ -5,7 +5,6 @@ use core::fmt;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-use nalgebra::Vector2;
 use painleve_firmware::refer::reference::{Program, Segment};
 use painleve_plant::converters::ConverterSettings;
 use painleve_plant::scenario::{InitialState, RunSettings, Scenario};
@@ -184,36 +183,25 @@ impl Serialize for Reference {
     }
 }
 
-/// z_t of the paper's x0,d and x0,u, m.
-const START_M: f64 = -0.1624;
+/// z_t of the paper's x0,d and x0,u as a part of the reach: −0.1624 m of 0.1841 m.
+const START: f64 = -0.882;
 
 /// Where a closed loop starts in a posture: the paper's x0,d or x0,u; for an arm of
-/// another shape at rest on the belt at the same z_t.
+/// another shape at rest on the belt at the same part of its reach.
 ///
 /// # Errors
-/// [`StudyError::Option`] if the arm does not reach there.
+/// [`StudyError::Range`] if the arm is out of range.
 pub fn start(arm: &ArmParameters<f64>, posture: Posture) -> Result<InitialState, StudyError> {
     let of_paper = ArmParameters::<f64>::default();
+    if arm.link_length_m != of_paper.link_length_m || arm.height_m != of_paper.height_m {
+        let arm = Arm::new(*arm)?;
+        return at_rest_on_belt(&arm, START * arm.reach_on_belt_m(), posture);
+    }
     let down = InitialState::default();
-    let (theta1_deg, theta2_deg) = if arm.link_length_m == of_paper.link_length_m
-        && arm.height_m == of_paper.height_m
-    {
-        match posture {
-            Posture::ElbowDown => (down.theta1_deg, down.theta2_deg),
-            Posture::ElbowUp => (down.theta2_deg, down.theta1_deg),
-        }
-    } else {
-        let theta: Vector2<f64> = Arm::new(*arm)?
-                .joint_angles_on_belt_rad(START_M, posture)
-                .ok_or_else(|| {
-                    StudyError::Option(format!(
-                        "an arm of two links of {} m, {} m over the belt, does not reach the start at z_t = {START_M} m",
-                        arm.link_length_m, arm.height_m
-                    ))
-                })?;
-        (theta.x.to_degrees(), theta.y.to_degrees())
-    };
-    Ok(InitialState::at_rest(theta1_deg, theta2_deg))
+    Ok(match posture {
+        Posture::ElbowDown => down,
+        Posture::ElbowUp => InitialState::at_rest(down.theta2_deg, down.theta1_deg),
+    })
 }
 
 /// An arm at rest in a posture with its tip on the belt at `tip_t_m` (m).
@@ -343,26 +331,28 @@ mod tests {
 
     #[test]
     fn overrides_come_last_and_an_arm_of_another_shape_starts_on_the_belt() {
-        let overrides = ["run.tick_hz=2000".into(), "arm.height_m=0.36".into()];
-        let case = scenario(
-            &Controller::Hybrid,
-            Posture::ElbowUp,
-            Converters::Ideal,
-            &overrides,
-        )
-        .unwrap();
-        assert_eq!(case.run.tick_hz, 2000);
-        let plant = painleve_plant::mechanics::ArmOnBelt::new(
-            &case.plant_parameters(),
-            case.initial.state(),
-        )
-        .unwrap();
-        assert!((plant.motion().tip_t_m(plant.state()) - START_M).abs() < 1e-12);
-        assert!(plant.motion().gap_m(plant.state()).abs() < 1e-15);
-        let far = ["arm.height_m=0.415".into()];
-        let error =
-            scenario(&Controller::Hybrid, Posture::ElbowUp, Converters::Own, &far).unwrap_err();
-        assert!(error.to_string().contains("does not reach"), "{error}");
+        for shape in [
+            "arm.height_m=0.36",
+            "arm.height_m=0.415",
+            "arm.link_length_m=[0.3, 0.2]",
+        ] {
+            let case = scenario(
+                &Controller::Hybrid,
+                Posture::ElbowUp,
+                Converters::Ideal,
+                &["run.tick_hz=2000".into(), shape.into()],
+            )
+            .unwrap();
+            assert_eq!(case.run.tick_hz, 2000);
+            let plant = painleve_plant::mechanics::ArmOnBelt::new(
+                &case.plant_parameters(),
+                case.initial.state(),
+            )
+            .unwrap();
+            let start_m = START * plant.arm().reach_on_belt_m();
+            assert!((plant.motion().tip_t_m(plant.state()) - start_m).abs() < 1e-12);
+            assert!(plant.motion().gap_m(plant.state()).abs() < 1e-15);
+        }
     }
 
     #[test]

@@ -157,10 +157,12 @@ impl Initial {
 fn random_state(arm: &Arm<f64>, seed: u64, row: u64) -> State {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(row);
-    let parameters = arm.parameters();
-    let height_m = (parameters.height_m * 0.5).min(RANDOM_HEIGHT_M) * generator.random::<f64>();
-    let depth_m = parameters.height_m - height_m;
-    let reach_m = 2.0 * parameters.link_length_m;
+    // Not into the hole around the first joint, which links of two lengths leave.
+    let over_hole_m = RANDOM_REACH * (arm.height_m() - arm.hole_m());
+    let highest_m = (arm.height_m() * 0.5).min(over_hole_m).min(RANDOM_HEIGHT_M);
+    let height_m = highest_m * generator.random::<f64>();
+    let depth_m = arm.height_m() - height_m;
+    let reach_m = arm.reach_m();
     let widest_m = RANDOM_REACH * libm::sqrt((reach_m - depth_m) * (reach_m + depth_m));
     let mut symmetric = |limit: f64| generator.random_range(-limit..=limit);
     let tip_m = nalgebra::Vector2::new(symmetric(widest_m), -depth_m);

@@ -109,8 +109,8 @@ mod tests {
     fn rest_on_an_unstable_equilibrium_does_not_count() {
         let parameters = PlantParameters {
             arm: ArmParameters {
-                spring_rest_rad: 0.0,
-                stiffness_nm_rad: 10.0,
+                spring_rest_rad: [0.0; 2],
+                stiffness_nm_rad: [0.0, 10.0],
                 ..Default::default()
             },
             friction: 0.0,

@@ -192,7 +192,7 @@ fn links_longer_than_the_data_sheet_says_do_not_move_the_tip() {
     let mut scenario = load(
         "hybrid-elbow-down",
         &[
-            "arm.link_length_m=0.216",
+            "arm.link_length_m=[0.216, 0.216]",
             "initial.theta1_deg=-8.0",
             "initial.theta2_deg=-41.0",
             &reference,
@@ -270,7 +270,10 @@ fn with_a_wrong_spring(stiffness: f64, overrides: &[&str]) -> (LoopResult, Cours
     let mut scenario = load("hybrid-elbow-up", &all);
     scenario.arm_model = Some(scenario.arm.cast());
     scenario.arm = ArmParameters {
-        stiffness_nm_rad: stiffness * scenario.arm.stiffness_nm_rad,
+        stiffness_nm_rad: scenario
+            .arm
+            .stiffness_nm_rad
+            .map(|nominal| stiffness * nominal),
         ..scenario.arm
     };
     run_scenario(&scenario)

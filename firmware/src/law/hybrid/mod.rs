@@ -121,9 +121,7 @@ impl Law for HybridSettings {
             .model
             .joint_acceleration_rad_s2(&Vector2::new(tangential_acceleration, 0.0));
         let wanted = Vector2::new(friction_force, normal_force);
-        let motion_nm = input
-            .model
-            .inverse_dynamics_nm(&acceleration, &Vector2::zeros());
+        let motion_nm = input.model.inverse_dynamics_in_air_nm(&acceleration);
         let pressing_nm = input.model.torque_against_nm(&wanted);
         state.pressing = if self.presses_less {
             affordable(
@@ -213,7 +211,7 @@ impl HybridSettings {
                 let step = FRICTION_SLEW_PER_S * input.tick_s;
                 state.fed_ratio += (ratio - state.fed_ratio).within(step);
                 let expected = state.fed_ratio * normal_force_n;
-                let share = OBSERVER_SHARE * input.p_per_kg / input.model.q.m22;
+                let share = OBSERVER_SHARE * input.p_per_kg / input.model.q22_per_kg;
                 let weight = (input.tick_s / (time_constant_s + input.tick_s))
                     .at_most(share)
                     .at_least(0.0);

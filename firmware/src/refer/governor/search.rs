@@ -22,16 +22,15 @@ pub(super) struct Admissibility<'a> {
 impl Admissibility<'_> {
     /// Whether sliding has a solution there with p to spare.
     pub(super) fn at(&self, tip_t_m: f32) -> bool {
-        self.arm
-            .coupling_on_belt(tip_t_m, self.posture)
-            .is_some_and(|coupling| {
-                let against = match self.slip {
-                    Some(slip) => slip.sign::<f32>() * coupling,
-                    // It must do for either.
-                    None => coupling.abs(),
-                };
-                1.0 - self.friction * against >= self.minimum_p_ratio
-            })
+        let row = self.arm.inverse_inertia_row_on_belt(tip_t_m, self.posture);
+        row.is_some_and(|(tangential, normal)| {
+            let against = match self.slip {
+                Some(slip) => slip.sign::<f32>() * tangential,
+                // It must do for either.
+                None => tangential.abs(),
+            };
+            normal - self.friction * against >= self.minimum_p_ratio * normal
+        })
     }
 }
 

@@ -155,7 +155,7 @@ mod tests {
             ("initial", &["a", "d", "random:2"]),
             (
                 "set",
-                &["arm.damping_nms_rad=0.006", "impact.law=energetic"],
+                &["arm.damping_nms_rad=[0.006, 0.006]", "impact.law=energetic"],
             ),
         ];
         let understood = understand(&campaign("bifurcation", &options)).unwrap();

@@ -122,7 +122,7 @@ impl ArmOnBelt {
             "initial tip height over the belt in m",
             gap_m,
             -INSIDE_AT_START_M,
-            parameters.arm.height_m + 2.0 * parameters.arm.link_length_m,
+            plant.arm.height_m() + plant.arm.reach_m(),
         )?;
         if gap_m < CONTACT_AT_START_M {
             let on_belt = motion.lowered_onto_belt(&initial);

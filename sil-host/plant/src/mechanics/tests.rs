@@ -50,7 +50,7 @@ impl ArmProbe for ConstraintDrift {
 fn conservative() -> PlantParameters {
     PlantParameters {
         arm: ArmParameters {
-            damping_nms_rad: 0.0,
+            damping_nms_rad: [0.0; 2],
             ..Default::default()
         },
         friction: 0.0,

@@ -11,7 +11,7 @@ use nalgebra::{Vector2, Vector4};
 pub use contact_mode::ContactMode;
 pub use probe::{Event, Probe, Step};
 
-/// Both joints as one vector: θ1, θ2 (rad, from the downward vertical), θ̇1, θ̇2 (rad/s).
+/// Both joints as one vector: θ1, θ2 (rad, from the belt's inward normal), θ̇1, θ̇2 (rad/s).
 pub type State = Vector4<f64>;
 
 /// A machine with two joints whose tip may touch a moving surface.
@@ -73,7 +73,7 @@ pub trait Plant {
         self.snapshot().time_s
     }
 
-    /// Angles that the encoders read: (θ1, θ2) from the downward vertical, rad.
+    /// Angles that the encoders read: (θ1, θ2) from the belt's inward normal, rad.
     fn joint_angles_rad(&self) -> Vector2<f64> {
         self.snapshot().theta_rad.into()
     }
@@ -102,7 +102,7 @@ impl PlantError {
 pub struct Snapshot {
     /// Simulated time, s.
     pub time_s: f64,
-    /// Angles θ1, θ2 from the downward vertical, rad.
+    /// Angles θ1, θ2 from the belt's inward normal, rad.
     pub theta_rad: [f64; 2],
     /// Their rates, rad/s.
     pub theta_dot_rad_s: [f64; 2],

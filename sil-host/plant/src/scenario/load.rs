@@ -265,12 +265,15 @@ mod tests {
     fn overrides_set_keys_that_are_optional() {
         let scenario = load(&[
             "controller.belt.given_m_s=-0.4",
-            "arm_model.link_length_m=0.2",
+            "arm_model.link_length_m=[0.21, 0.2]",
         ])
         .unwrap();
         assert_eq!(scenario.controller.belt.given_m_s, Some(-0.4));
         let arm = scenario.arm_model.unwrap();
-        assert_eq!((arm.link_length_m, arm.link_mass_kg), (0.2, 0.12));
+        assert_eq!(
+            (arm.link_length_m, arm.link_mass_kg),
+            ([0.21, 0.2], [0.12; 2])
+        );
         let message = message(&["controller.belt.given_m_s=fast"]);
         assert!(message.contains("given_m_s: invalid type"), "{message}");
     }

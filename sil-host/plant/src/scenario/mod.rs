@@ -108,9 +108,9 @@ impl Default for BeltSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InitialState {
-    /// θ1, degrees from the downward vertical.
+    /// θ1, degrees from the belt's inward normal.
     pub theta1_deg: f64,
-    /// θ2, degrees from the downward vertical.
+    /// θ2, degrees from the belt's inward normal.
     pub theta2_deg: f64,
     /// θ̇1, rad/s.
     pub theta1_dot_rad_s: f64,
@@ -126,7 +126,7 @@ impl Default for InitialState {
 }
 
 impl InitialState {
-    /// An arm at rest with these angles from the downward vertical, degrees.
+    /// An arm at rest with these angles from the belt's inward normal, degrees.
     pub fn at_rest(theta1_deg: f64, theta2_deg: f64) -> Self {
         Self {
             theta1_deg,

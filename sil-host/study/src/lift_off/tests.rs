@@ -50,7 +50,7 @@ fn runs_that_cannot_be_solved_are_counted_and_none_of_the_others_is_lost() {
     let unsolvable = [
         "belt.friction=10",
         "belt.profile.speed_m_s=0.4",
-        "arm.stiffness_nm_rad=100",
+        "arm.stiffness_nm_rad=[0, 100]",
         "solver.chatter_speed_m_s=1e-8",
     ];
     let study = LiftOff {

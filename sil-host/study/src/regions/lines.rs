@@ -20,15 +20,15 @@ pub(super) struct Column<'a> {
 
 impl<'a> Column<'a> {
     pub(super) fn new(arm: &'a Arm<f64>, theta1: f64, theta2: Theta2) -> Option<Self> {
-        let parameters = arm.parameters();
-        let cosine = parameters.height_m / parameters.link_length_m - libm::cos(theta1);
+        let [length_1, length_2] = arm.link_length_m();
+        let cosine = arm.height_m() / length_2 - length_1 / length_2 * libm::cos(theta1);
         // At θ2 = 0 the tip cannot move along the belt.
         (cosine.abs() < 1.0).then(|| {
             let theta = Vector2::new(theta1, theta2.sign() * libm::acos(cosine));
             Self {
                 arm,
                 theta,
-                ratio: -libm::sin(theta.x) / libm::sin(theta.y),
+                ratio: -libm::sin(theta.x) / libm::sin(theta.y) * (length_1 / length_2),
             }
         })
     }

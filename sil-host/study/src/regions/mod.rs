@@ -1,6 +1,6 @@
 //! Fig. 3: the four solution modes over (θ1, θ̇1) with the tip on the belt and no torque.
 //!
-//! With the tip on the belt θ1 leaves two θ2, one to either side of the vertical; θ̇2 is
+//! With the tip on the belt θ1 leaves two θ2, one to either side of the belt's normal; θ̇2 is
 //! that of a tip without normal velocity. p depends on θ1 alone, so that its zeros are upright
 //! lines; b is a quadratic in θ̇1 at every θ1, so that its zeros are roots of quadratics. Both
 //! are found to rounding, whatever the grid.
@@ -62,6 +62,8 @@ pub struct Regions {
     pub maps: Vec<Map>,
     #[serde(skip)]
     arm: Arm<f64>,
+    #[serde(skip)]
+    spring_rest_deg: f64,
 }
 
 /// One map.
@@ -112,7 +114,9 @@ pub struct Cell {
 pub fn regions(settings: &Settings) -> Result<Regions, StudyError> {
     range::check("--mu", settings.mu, 0.0, 10.0)?;
     let arm = Arm::new(settings.arm)?;
-    let cosine = settings.arm.height_m / settings.arm.link_length_m - 1.0;
+    // θ2 = 0 at the end of the reach.
+    let [length_1, length_2] = settings.arm.link_length_m;
+    let cosine = settings.arm.height_m / length_1 - length_2 / length_1;
     let reach = libm::acos(cosine.clamp(-1.0, 1.0));
     let inside = |theta1: &&f64| theta1.to_radians().abs() < reach;
     let theta1: Vec<f64> = settings
@@ -142,6 +146,7 @@ pub fn regions(settings: &Settings) -> Result<Regions, StudyError> {
         reach_deg: reach.to_degrees(),
         maps,
         arm,
+        spring_rest_deg: settings.arm.spring_rest_rad[1].to_degrees().abs(),
     })
 }
 
@@ -195,9 +200,9 @@ fn map(
 }
 
 impl Regions {
-    /// Rest angle of the spring between the links, degrees.
+    /// How far from the straight arm the spring of joint 2 is relaxed, degrees.
     pub fn spring_rest_deg(&self) -> f64 {
-        self.arm.parameters().spring_rest_rad.to_degrees()
+        self.spring_rest_deg
     }
 }
 

@@ -67,11 +67,15 @@ pub fn scenario(seed: u64, index: u64) -> Result<Scenario, StudyError> {
 
     let nominal = ArmParameters::<f64>::default();
     scenario.arm_model = Some(nominal.cast());
+    let mut scaled = |values: [f64; 2], by| {
+        let factor = draw(by);
+        values.map(|value| value * factor)
+    };
     scenario.arm = ArmParameters {
-        link_mass_kg: nominal.link_mass_kg * draw(0.95..1.05),
-        link_length_m: nominal.link_length_m * draw(0.95..1.05),
-        stiffness_nm_rad: nominal.stiffness_nm_rad * draw(0.8..1.2),
-        damping_nms_rad: nominal.damping_nms_rad * draw(0.8..1.2),
+        link_mass_kg: scaled(nominal.link_mass_kg, 0.95..1.05),
+        link_length_m: scaled(nominal.link_length_m, 0.95..1.05),
+        stiffness_nm_rad: scaled(nominal.stiffness_nm_rad, 0.8..1.2),
+        damping_nms_rad: scaled(nominal.damping_nms_rad, 0.8..1.2),
         ..nominal
     };
 

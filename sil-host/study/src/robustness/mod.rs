@@ -114,7 +114,7 @@ impl Study for Robustness {
         let bits = i32::from(scenario.converters.encoder.bits);
         let count_rad = libm::ldexp(core::f64::consts::TAU, -bits);
         let tolerance_m =
-            WITHIN_M + count_rad * (scenario.arm.height_m + scenario.arm.link_length_m);
+            WITHIN_M + count_rad * (scenario.arm.height_m + scenario.arm.link_length_m[1]);
         let slip = Slip::of(-v_belt_m_s);
         let friction = scenario.belt.friction;
         let mut stretches = admissible_m(&arm, posture, friction, slip, 0.0);
@@ -184,9 +184,9 @@ impl Study for Robustness {
             delay_ticks: converters.torque.delay_ticks,
             force_noise_n: converters.force.noise_n,
             frame_loss: converters.link.frame_loss,
-            link_length_m: scenario.arm.link_length_m,
-            link_mass_kg: scenario.arm.link_mass_kg,
-            stiffness_nm_rad: scenario.arm.stiffness_nm_rad,
+            link_length_m: scenario.arm.link_length_m[0],
+            link_mass_kg: scenario.arm.link_mass_kg[0],
+            stiffness_nm_rad: scenario.arm.stiffness_nm_rad[1],
         })
     }
 }

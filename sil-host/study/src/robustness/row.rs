@@ -83,10 +83,10 @@ pub struct Row {
     pub force_noise_n: f64,
     /// Probability that a frame is lost.
     pub frame_loss: f64,
-    /// Length of the links, m.
+    /// Length of either link, m.
     pub link_length_m: f64,
-    /// Mass of the links, kg.
+    /// Mass of either link, kg.
     pub link_mass_kg: f64,
-    /// Stiffness of the spring, N·m/rad.
+    /// Stiffness of the spring between the links, N·m/rad.
     pub stiffness_nm_rad: f64,
 }

@@ -55,9 +55,9 @@ fn draws_are_in_their_ranges_and_all_different() {
         assert!((500..=5000).contains(&scenario.run.tick_hz));
         assert!((12..=18).contains(&scenario.converters.encoder.bits));
         assert!((10..=14).contains(&scenario.converters.torque.bits));
-        let ratio = scenario.arm.link_length_m / 0.21;
+        let ratio = scenario.arm.link_length_m[0] / 0.21;
         assert!((0.95..1.05).contains(&ratio));
-        assert_eq!(scenario.arm_model.unwrap().link_length_m, 0.21);
+        assert_eq!(scenario.arm_model.unwrap().link_length_m, [0.21; 2]);
         assert!(Simulation::new(scenario).is_ok());
     }
     let fast = |sign: f64| {

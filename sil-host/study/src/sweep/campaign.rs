@@ -4,7 +4,7 @@
 //! study = "bifurcation"
 //! mu = "0.1:1:0.1"
 //! initial = ["a", "d", "random:8"]
-//! set = ["arm.damping_nms_rad=0.006"]
+//! set = ["arm.damping_nms_rad.0=0.006"]
 //! ```
 
 use std::collections::BTreeMap;

@@ -160,7 +160,7 @@ fn chatter_carries_a_deviation_as_neighbours_do() {
 fn a_conservative_arm_keeps_the_volume_of_deviations() {
     let parameters = PlantParameters {
         arm: ArmParameters {
-            damping_nms_rad: 0.0,
+            damping_nms_rad: [0.0; 2],
             ..ArmParameters::default()
         },
         friction: 0.0,
