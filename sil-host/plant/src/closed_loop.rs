@@ -106,30 +106,34 @@ struct LogHash(Xxh3);
 
 impl LogHash {
     fn sensor(&mut self, frame: &SensorFrame) {
-        self.word(frame.tick);
-        self.word(frame.sequence);
-        for joint in frame.joints {
-            self.word(joint.0);
-        }
-        self.word(frame.normal_force.0.cast_unsigned());
-        self.word(frame.tangential_force.0.cast_unsigned());
-        self.word(frame.inputs.0);
+        let [joint_1, joint_2] = frame.joints.map(|joint| joint.0);
+        self.words([
+            frame.tick,
+            frame.sequence,
+            joint_1,
+            joint_2,
+            frame.normal_force.0.cast_unsigned(),
+            frame.tangential_force.0.cast_unsigned(),
+            frame.inputs.0,
+        ]);
     }
 
     fn actuator(&mut self, frame: &ActuatorFrame) {
-        self.word(frame.tick);
-        self.word(frame.sequence);
-        for torque in frame.torques {
-            self.word(torque.0.cast_unsigned());
-        }
-        self.word(frame.reference_tip.0.cast_unsigned());
-        self.word(frame.estimated_tip.0.cast_unsigned());
-        self.word(u32::from(frame.state) | u32::from(frame.fault) << 8);
-        self.word(u32::from(frame.flags.0));
+        let [torque_1, torque_2] = frame.torques.map(|torque| torque.0.cast_unsigned());
+        self.words([
+            frame.tick,
+            frame.sequence,
+            torque_1,
+            torque_2,
+            frame.reference_tip.0.cast_unsigned(),
+            frame.estimated_tip.0.cast_unsigned(),
+            u32::from(frame.state) | u32::from(frame.fault) << 8,
+            u32::from(frame.flags.0),
+        ]);
     }
 
-    fn word(&mut self, word: u32) {
-        self.0.update(&word.to_le_bytes());
+    fn words<const N: usize>(&mut self, words: [u32; N]) {
+        self.0.update(words.map(u32::to_le_bytes).as_flattened());
     }
 
     fn hex(&self) -> String {

@@ -1,19 +1,22 @@
 //! The simulated arm on its belt: its state, and how it goes from one event to the next.
 
+mod contact_change;
+
 use nalgebra::Vector2;
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Arm, Slip};
 
-use crate::plant::{ContactMode, Event, Plant, PlantError, Probe, Snapshot, State};
+use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
 
 use super::belt::BeltProfile;
+use super::cash_karp::ShortStep;
 use super::dop853::{Step, Tolerance};
-use super::impact::{self, ImpactKind, ImpactLaw};
-use super::motion::{Motion, theta};
+use super::impact::{self, ImpactLaw};
+use super::motion::{Evaluation, Motion, theta};
 use super::parameters::{PlantParameters, SolverSettings};
 use super::probe::{ArmProbe, ArmStep};
 use super::torque::TorqueSegment;
-use super::transition::{self, Next};
+use super::transition;
 
 /// Why the plant cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -42,6 +45,10 @@ pub enum MotionError {
     },
 }
 
+/// Longest step that is tried at order 5, s: at the default tolerance the estimate of a sliding
+/// arm reaches 1 at 2 ms.
+const LONGEST_SHORT_STEP_S: f64 = 4e-3;
+
 /// Corrections of an event's time that the first-order change of the state
 /// carries without loss, s.
 const FIRST_ORDER_S: f64 = 1e-8;
@@ -66,9 +73,11 @@ pub struct ArmOnBelt {
     /// The torque or the belt has changed since the mode was decided.
     unsettled: bool,
     step_size_s: f64,
-    /// Derivative at the present state, where the last step left it; not after
-    /// anything that changes the state or the equations.
-    end_slope: Option<State>,
+    /// A step up to this long is first tried at order 5, s.
+    short_size_s: f64,
+    /// The equations at the present state, where they are known; not after anything that
+    /// changes the state or the equations.
+    evaluation: Option<Evaluation>,
     step: Box<Step<4>>,
 }
 
@@ -113,7 +122,8 @@ impl ArmOnBelt {
             stick_start: (0.0, 0.0),
             unsettled: false,
             step_size_s: 1e-3,
-            end_slope: None,
+            short_size_s: LONGEST_SHORT_STEP_S,
+            evaluation: None,
             step: Box::new(Step::empty()),
         };
         let motion = plant.motion();
@@ -175,9 +185,7 @@ impl ArmOnBelt {
 
     /// Contact force (f_t, f_n) on the tip now, N; impulses are not part of it.
     pub fn contact_force_n(&self) -> Vector2<f64> {
-        let motion = self.motion();
-        let terms = motion.terms(self.time_s, &self.state);
-        motion.force_n(self.time_s, self.mode, &terms)
+        self.evaluation().force_n
     }
 
     /// Commands joint torques `target_nm` from now on, through a stage with
@@ -187,7 +195,7 @@ impl ArmOnBelt {
         if next.at(self.time_s) != self.torque.at(self.time_s) {
             self.unsettled = true;
         }
-        self.end_slope = None;
+        self.evaluation = None;
         self.torque = next;
     }
 
@@ -198,10 +206,20 @@ impl ArmOnBelt {
     /// [`MotionError`] if no mode is possible.
     pub fn settle(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
         if self.unsettled && self.mode.is_contact() {
-            self.enter_contact(probe)?;
+            let evaluation = self.evaluation();
+            if transition::slides_on(self.mode, &evaluation) {
+                self.evaluation = Some(evaluation);
+            } else {
+                self.enter_contact(probe)?;
+            }
         }
         self.unsettled = false;
         Ok(())
+    }
+
+    fn evaluation(&self) -> Evaluation {
+        self.evaluation
+            .unwrap_or_else(|| self.motion().evaluate(self.mode, self.time_s, &self.state))
     }
 
     /// Integrates to time `until_s`.
@@ -265,17 +283,38 @@ impl ArmOnBelt {
             absolute: self.solver.absolute_tolerance,
         };
         let (mode, start_s, start) = (self.mode, self.time_s, self.state);
-        let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
-        let slope = self
-            .end_slope
+        let here = self
+            .evaluation
             .take()
-            .unwrap_or_else(|| derivative(start_s, &start));
+            .unwrap_or_else(|| motion.evaluate(mode, start_s, &start));
         let remaining = until_s - start_s;
+        if remaining <= self.short_size_s {
+            let (step, longest) = self.short_step(&motion, &here, until_s, &tolerance);
+            self.short_size_s = longest;
+            if let Some((end, there)) = step {
+                probe.step(&ArmStep {
+                    motion: &motion,
+                    mode,
+                    start_s,
+                    start: &start,
+                    at_start: &here,
+                    end_s: until_s,
+                    end: &end,
+                    at_end: &there,
+                });
+                self.time_s = until_s;
+                self.state = end;
+                self.evaluation = Some(there);
+                return Ok(None);
+            }
+        }
+
+        let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
         loop {
             let wanted = self.step_size_s.min(self.solver.maximum_step_s);
             let size = wanted.min(remaining);
             self.step
-                .take(&derivative, start_s, &start, &slope, size, &tolerance);
+                .take(&derivative, start_s, &start, &here.slope, size, &tolerance);
             if self.step.error <= 1.0 {
                 // A step cut short says nothing against a longer one.
                 let proposed = self.step.proposed_size();
@@ -298,9 +337,10 @@ impl ArmOnBelt {
                 });
             }
         }
-        self.step.finish(&derivative);
+        let there = motion.evaluate(mode, start_s + self.step.h, &self.step.end);
+        self.step.finish(&there.slope);
 
-        let mut event = transition::first_event_s(&motion, mode, &mut self.step);
+        let mut event = transition::first_event_s(&motion, mode, &mut self.step, &here, &there);
         if let Some(event_s) = event.as_mut() {
             // The polynomial that located the event is less accurate than a
             // step. What a step leaves of the gap is removed by Newton's method in
@@ -309,7 +349,7 @@ impl ArmOnBelt {
             for _ in 0..3 {
                 let size = *event_s - start_s;
                 self.step
-                    .take(&derivative, start_s, &start, &slope, size, &tolerance);
+                    .take(&derivative, start_s, &start, &here.slope, size, &tolerance);
                 let correction = transition::landing_correction_s(&motion, mode, &self.step.end);
                 if *event_s + correction <= start_s {
                     break;
@@ -330,134 +370,86 @@ impl ArmOnBelt {
         } else {
             start_s + self.step.h
         });
-        let end = match mode {
-            ContactMode::Flight => self.step.end,
-            ContactMode::SlidePositive | ContactMode::SlideNegative => {
-                motion.onto_belt(&self.step.end)
-            }
-            ContactMode::Stick => {
-                let (since, anchor) = self.stick_start;
-                let tip = anchor + self.belt.displacement_m(since, end_s);
-                motion.onto_stick(end_s, tip, &self.step.end)
-            }
+        let end = self.onto_constraint(&motion, end_s, &self.step.end);
+        let there = if event.is_none() && mode == ContactMode::Flight {
+            there
+        } else {
+            motion.evaluate(mode, end_s, &end)
         };
         probe.step(&ArmStep {
             motion: &motion,
             mode,
             start_s,
             start: &start,
+            at_start: &here,
             end_s,
             end: &end,
+            at_end: &there,
         });
         self.time_s = end_s;
         self.state = end;
-        if event.is_none() && mode == ContactMode::Flight {
-            self.end_slope = Some(*self.step.end_slope());
-        }
         if event.is_some() {
             self.handle_event(probe)?;
+        } else {
+            self.evaluation = Some(there);
         }
         Ok(event)
     }
 
-    /// The tip has landed, or sliding or sticking cannot go on.
-    fn handle_event(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
-        if self.mode.is_contact() {
-            let motion = self.motion();
-            let slip = motion.relative_velocity_m_s(self.time_s, &self.state).x;
-            if self
-                .mode
-                .slip()
-                .is_some_and(|s| s.sign::<f64>() * slip <= 0.0)
-            {
-                // Slip has just died; what is left of it is the resolution of time.
-                self.state =
-                    motion.onto_stick(self.time_s, motion.tip_t_m(&self.state), &self.state);
-            }
-            return self.enter_contact(probe);
+    /// Tries to go to `until_s` in one step of order 5: the state and the equations there, if the
+    /// error is within the tolerance and no event is near, and up to which size to try again.
+    fn short_step(
+        &self,
+        motion: &Motion<'_>,
+        here: &Evaluation,
+        until_s: f64,
+        tolerance: &Tolerance,
+    ) -> (Option<(State, Evaluation)>, f64) {
+        let (mode, start_s) = (self.mode, self.time_s);
+        let size = until_s - start_s;
+        let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
+        let step = ShortStep::take(
+            derivative,
+            start_s,
+            &self.state,
+            &here.slope,
+            size,
+            tolerance,
+        );
+        if step.error.is_nan() || step.error > 1.0 {
+            return (None, 0.5 * size);
         }
-        let motion = self.motion();
-        let state = motion.lowered_onto_belt(&self.state);
-        let approach_m_s = motion.relative_velocity_m_s(self.time_s, &state).y;
-        self.state = state;
-        if approach_m_s < 0.0 {
-            self.collide(probe, Event::Impact { approach_m_s })?;
-        }
-        let motion = self.motion();
-        let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
-        if rebound < self.solver.chatter_speed_m_s {
-            self.state = motion.onto_belt(&self.state);
-            self.enter_contact(probe)?;
-        }
-        Ok(())
-    }
-
-    /// The tip is on the belt without normal velocity: decides what follows.
-    fn enter_contact(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
-        // Each throw that does not lift the tip ends its slip, which leaves
-        // only sticking and sliding from rest.
-        for _ in 0..4 {
-            let motion = self.motion();
-            let next =
-                transition::decide(&motion, self.time_s, &self.state, self.solver.indeterminate);
-            match next {
-                Next::Mode(mode) => {
-                    if mode == ContactMode::Stick && self.mode != ContactMode::Stick {
-                        let tip_t_m = motion.tip_t_m(&self.state);
-                        self.state = motion.onto_stick(self.time_s, tip_t_m, &self.state);
-                        self.stick_start = (self.time_s, tip_t_m);
-                    }
-                    self.change_mode(mode, probe);
-                    return Ok(());
-                }
-                Next::Thrown => {
-                    self.collide(probe, Event::ImpactWithoutCollision)?;
-                    let motion = self.motion();
-                    let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
-                    if rebound >= self.solver.chatter_speed_m_s {
-                        self.change_mode(ContactMode::Flight, probe);
-                        return Ok(());
-                    }
-                    self.state = motion.onto_belt(&self.state);
-                }
-            }
-        }
-        Err(MotionError::EventsWithoutEnd {
-            time_s: self.time_s,
-        })
-    }
-
-    fn collide(&mut self, probe: &mut impl ArmProbe, event: Event) -> Result<(), MotionError> {
-        let motion = self.motion();
-        let kind = if event == Event::ImpactWithoutCollision {
-            ImpactKind::WithoutCollision
+        // The estimate is of order 5 in the size.
+        let longest = if step.error <= 1.0 / 32.0 {
+            self.short_size_s
+                .max((2.0 * size).min(LONGEST_SHORT_STEP_S))
         } else {
-            ImpactKind::Collision
+            self.short_size_s
         };
-        self.state = impact::state_after(&motion, &self.impact, self.time_s, &self.state, kind)
-            .map_err(|source| MotionError::EndlessImpact {
-                time_s: self.time_s,
-                source,
-            })?;
-        probe.event(self.time_s, event, &self.state);
-        Ok(())
+        let end = self.onto_constraint(motion, until_s, &step.end);
+        let there = motion.evaluate(mode, until_s, &end);
+        let goes_on = transition::goes_on(motion, mode, size, here, &there);
+        (goes_on.then_some((end, there)), longest)
     }
 
-    fn change_mode(&mut self, mode: ContactMode, probe: &mut impl ArmProbe) {
-        if mode != self.mode {
-            let from = core::mem::replace(&mut self.mode, mode);
-            probe.event(
-                self.time_s,
-                Event::ModeChange { from, to: mode },
-                &self.state,
-            );
+    /// The nearest state that the mode's constraint admits: integration leaves it by its error.
+    fn onto_constraint(&self, motion: &Motion<'_>, t_s: f64, state: &State) -> State {
+        match self.mode {
+            ContactMode::Flight => *state,
+            ContactMode::SlidePositive | ContactMode::SlideNegative => motion.onto_belt(state),
+            ContactMode::Stick => {
+                let (since, anchor) = self.stick_start;
+                let tip = anchor + self.belt.displacement_m(since, t_s);
+                motion.onto_stick(t_s, tip, state)
+            }
         }
     }
 }
 
 impl Plant for ArmOnBelt {
     fn snapshot(&self) -> Snapshot {
-        self.motion().snapshot(self.mode, self.time_s, &self.state)
+        let (motion, here) = (self.motion(), self.evaluation());
+        motion.snapshot_of(self.mode, self.time_s, &self.state, &here)
     }
 
     fn command_torque(&mut self, target_nm: Vector2<f64>, lag_s: f64) {

@@ -202,23 +202,9 @@ impl<const N: usize> Step<N> {
         self.h * factor.clamp(0.2, 6.0)
     }
 
-    /// Derivative at the start of the step.
-    pub fn start_slope(&self) -> &SVector<f64, N> {
-        &self.stages[0]
-    }
-
-    /// Derivative at the end of the step, after [`Step::finish`].
-    pub fn end_slope(&self) -> &SVector<f64, N> {
-        &self.stages[12]
-    }
-
-    /// Evaluates and keeps the derivative at the end of the step; the next
-    /// step may start with it.
-    pub fn finish<F>(&mut self, derivative: &F)
-    where
-        F: Fn(f64, &SVector<f64, N>) -> SVector<f64, N>,
-    {
-        self.stages[12] = derivative(self.t + self.h, &self.end);
+    /// Keeps the derivative at the end of the step; the next step may start with it.
+    pub fn finish(&mut self, end_slope: &SVector<f64, N>) {
+        self.stages[12] = *end_slope;
     }
 
     /// The polynomial through the step, after [`Step::finish`]; costs three evaluations.
@@ -369,7 +355,8 @@ mod tests {
         let x = Vector2::new(0.3, 0.8);
         let mut step = Step::empty();
         step.take(&oscillator, 0.0, &x, &oscillator(0.0, &x), h, &TOLERANCE);
-        step.finish(&oscillator);
+        let end_slope = oscillator(h, &step.end);
+        step.finish(&end_slope);
         step
     }
 

@@ -1,7 +1,8 @@
 //! The plant: a two-link rigid arm whose tip meets a moving belt with Coulomb friction.
 //!
 //! A hybrid system. Between events the state follows the smooth equations of its
-//! contact mode ([`motion`]), integrated with adaptive steps ([`dop853`]). Events
+//! contact mode ([`motion`]), integrated with adaptive steps ([`dop853`]), or with shorter and
+//! cheaper ones where a new torque ends them anyway ([`cash_karp`]). Events
 //! are located inside the step ([`event`]): the tip lands, slip dies, the normal
 //! force vanishes, the friction cone is left, p reaches zero. At an event the
 //! tip collides ([`impact`]) and the mode that follows is decided anew
@@ -15,6 +16,7 @@
 
 mod arm_on_belt;
 pub mod belt;
+pub mod cash_karp;
 pub mod dop853;
 pub mod event;
 pub mod impact;

@@ -21,6 +21,30 @@ pub fn theta_dot(state: &State) -> Vector2<f64> {
     Vector2::new(state[2], state[3])
 }
 
+/// Changes of the angles whose squares are below rounding, rad.
+const FIRST_ORDER_RAD: f64 = 1e-9;
+
+/// What the equations of a mode give at one state.
+#[derive(Clone, Copy, Debug)]
+pub struct Evaluation {
+    /// Time derivative of the state.
+    pub slope: State,
+    /// Contact force (f_t, f_n), N.
+    pub force_n: Vector2<f64>,
+    /// Position of the tip along the belt, m.
+    pub tip_t_m: f64,
+    /// Height of the tip over the belt (m), its rate (m/s) and its acceleration (m/s²).
+    pub gap: [f64; 3],
+    /// Velocity of the tip along the belt relative to it (m/s), and its rate (m/s²).
+    pub slip: [f64; 2],
+    /// Free normal acceleration b, m/s².
+    pub b_m_s2: f64,
+    /// p = Q22 − μ s Q21, 1/kg, for the mode's direction of slip, or that of the motion.
+    pub p_per_kg: f64,
+    /// Q22, 1/kg.
+    pub q22_per_kg: f64,
+}
+
 /// The arm, the belt and the torque of one stretch of motion.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion<'a> {
@@ -64,24 +88,32 @@ impl Motion<'_> {
 
     /// Everything about an instant.
     pub fn snapshot(&self, mode: ContactMode, t_s: f64, state: &State) -> Snapshot {
-        let terms = self.terms(t_s, state);
-        let force_n = self.force_n(t_s, mode, &terms);
-        let relative_m_s = self.relative_velocity_m_s(t_s, state);
-        let slope = self.derivative(mode, t_s, state);
+        self.snapshot_of(mode, t_s, state, &self.evaluate(mode, t_s, state))
+    }
+
+    /// Everything about an instant at which the equations are evaluated.
+    #[inline]
+    pub fn snapshot_of(
+        &self,
+        mode: ContactMode,
+        t_s: f64,
+        state: &State,
+        here: &Evaluation,
+    ) -> Snapshot {
         Snapshot {
             time_s: t_s,
             theta_rad: [state[0], state[1]],
             theta_dot_rad_s: [state[2], state[3]],
-            theta_ddot_rad_s2: [slope[2], slope[3]],
-            tip_t_m: self.tip_t_m(state),
-            gap_m: self.gap_m(state),
-            gap_rate_m_s: relative_m_s.y,
-            slip_velocity_m_s: relative_m_s.x,
+            theta_ddot_rad_s2: [here.slope[2], here.slope[3]],
+            tip_t_m: here.tip_t_m,
+            gap_m: here.gap[0],
+            gap_rate_m_s: here.gap[1],
+            slip_velocity_m_s: here.slip[0],
             belt_speed_m_s: self.belt.speed_m_s(t_s),
-            normal_force_n: force_n.y,
-            tangential_force_n: force_n.x,
-            b_m_s2: terms.b(),
-            p_per_kg: terms.p(self.friction, Slip::of(relative_m_s.x)),
+            normal_force_n: here.force_n.y,
+            tangential_force_n: here.force_n.x,
+            b_m_s2: here.b_m_s2,
+            p_per_kg: here.p_per_kg,
             torque_nm: self.torque.at(t_s).into(),
             mode,
         }
@@ -90,24 +122,68 @@ impl Motion<'_> {
     /// Time derivative of the state in a mode.
     #[inline]
     pub fn derivative(&self, mode: ContactMode, t_s: f64, state: &State) -> State {
+        self.evaluate(mode, t_s, state).slope
+    }
+
+    /// The equations of a mode at a state.
+    ///
+    /// A sliding tip needs no Q: with the edge of the friction cone d = (−μ s, 1), f = f_n d,
+    /// p = j2 M⁻¹ Jᵀ d and θ̈ = M⁻¹ load + M⁻¹ Jᵀ d f_n, where f_n = −b/p.
+    #[inline(always)]
+    pub fn evaluate(&self, mode: ContactMode, t_s: f64, state: &State) -> Evaluation {
         let (angles, rates) = (theta(state), theta_dot(state));
         let pose = Pose::new(&angles);
         let mobility = self.arm.inverse_mass_matrix(&pose);
+        let jacobian = self.arm.jacobian(&pose);
+        let along = Vector2::new(jacobian.m11, jacobian.m12);
+        let normal = Vector2::new(jacobian.m21, jacobian.m22);
+        let centripetal = self.arm.centripetal_m_s2(&pose, &rates);
         let load = generalised_torque_nm(&self.torque.at(t_s))
             - self.arm.passive_torque_nm(&angles, &rates, &pose)
             - self.arm.centrifugal_torque_nm(&rates, &pose);
-        let mut acceleration = mobility * load;
-        if mode.is_contact() {
-            let jacobian = self.arm.jacobian(&pose);
-            let terms = ContactTerms {
-                q: jacobian * mobility * jacobian.transpose(),
-                free_acceleration_m_s2: jacobian * acceleration
-                    + self.arm.centripetal_m_s2(&pose, &rates),
-            };
-            let force = self.force_n(t_s, mode, &terms);
-            acceleration += mobility * (jacobian.transpose() * force);
+
+        let free = mobility * load;
+        let slip_m_s = along.dot(&rates) - self.belt.speed_m_s(t_s);
+        let direction = mode.slip().unwrap_or_else(|| Slip::of(slip_m_s));
+        let friction = self.friction * direction.sign::<f64>();
+        let response = mobility * (normal - along * friction);
+        let b_m_s2 = normal.dot(&free) + centripetal.y;
+        let p_per_kg = normal.dot(&response);
+        let (force_n, acceleration) = match mode {
+            ContactMode::Flight => (Vector2::zeros(), free),
+            ContactMode::SlidePositive | ContactMode::SlideNegative => {
+                let normal_n = -b_m_s2 / p_per_kg;
+                (
+                    Vector2::new(-friction * normal_n, normal_n),
+                    free + response * normal_n,
+                )
+            }
+            ContactMode::Stick => {
+                let terms = ContactTerms {
+                    q: jacobian * mobility * jacobian.transpose(),
+                    free_acceleration_m_s2: jacobian * free + centripetal,
+                };
+                let force = self.force_n(t_s, mode, &terms);
+                (force, free + mobility * (jacobian.transpose() * force))
+            }
+        };
+        Evaluation {
+            slope: State::new(rates.x, rates.y, acceleration.x, acceleration.y),
+            force_n,
+            tip_t_m: self.arm.tip_m(&pose).x,
+            gap: [
+                self.arm.gap_m(&pose),
+                normal.dot(&rates),
+                normal.dot(&acceleration) + centripetal.y,
+            ],
+            slip: [
+                slip_m_s,
+                along.dot(&acceleration) + centripetal.x - self.belt.acceleration_m_s2(t_s),
+            ],
+            b_m_s2,
+            p_per_kg,
+            q22_per_kg: normal.dot(&(mobility * normal)),
         }
-        State::new(rates.x, rates.y, acceleration.x, acceleration.y)
     }
 
     /// Tip velocity relative to the belt, (v_r, v_n), m/s.
@@ -137,13 +213,30 @@ impl Motion<'_> {
     /// The nearest state, in the metric of kinetic energy, with the tip on the
     /// belt and no normal velocity. Removes what integration errors left.
     pub fn onto_belt(&self, state: &State) -> State {
-        let state = self.lowered_onto_belt(state);
-        let pose = Pose::new(&theta(&state));
-        let normal = self.arm.jacobian(&pose).row(1).transpose();
+        let (mut angles, rates) = (theta(state), theta_dot(state));
+        let [mut along, mut normal, mut direction, mut change] = self.towards_belt(&angles);
+        if change.amax() > FIRST_ORDER_RAD {
+            angles = theta(&self.lowered_onto_belt(state));
+            [along, normal, direction, change] = self.towards_belt(&angles);
+        }
+        angles += change;
+        // ∂²z_n/∂θ² is the row along the belt.
+        normal += along.component_mul(&change);
+        let rates = rates - direction * (normal.dot(&rates) / normal.dot(&direction));
+        State::new(angles.x, angles.y, rates.x, rates.y)
+    }
+
+    /// The Jacobian's rows along and normal to the belt, the direction M⁻¹ j2, and the change of
+    /// the angles along it that takes the tip to the belt, to first order.
+    #[inline]
+    fn towards_belt(&self, angles: &Vector2<f64>) -> [Vector2<f64>; 4] {
+        let pose = Pose::new(angles);
+        let jacobian = self.arm.jacobian(&pose);
+        let along = Vector2::new(jacobian.m11, jacobian.m12);
+        let normal = Vector2::new(jacobian.m21, jacobian.m22);
         let direction = self.arm.inverse_mass_matrix(&pose) * normal;
-        let speed = normal.dot(&theta_dot(&state));
-        let change = direction * (-speed / normal.dot(&direction));
-        state + State::new(0.0, 0.0, change.x, change.y)
+        let change = direction * (-self.arm.gap_m(&pose) / normal.dot(&direction));
+        [along, normal, direction, change]
     }
 
     /// The nearest state with the tip at belt height; velocities stay.

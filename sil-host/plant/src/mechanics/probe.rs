@@ -2,7 +2,7 @@
 
 use crate::plant::{ContactMode, Event, Probe, Snapshot, State, Step};
 
-use super::motion::Motion;
+use super::motion::{Evaluation, Motion};
 
 /// One accepted step of the arm on its belt.
 #[derive(Clone, Copy, Debug)]
@@ -15,10 +15,14 @@ pub struct ArmStep<'a> {
     pub start_s: f64,
     /// State at the start.
     pub start: &'a State,
+    /// The equations there.
+    pub at_start: &'a Evaluation,
     /// End time, s.
     pub end_s: f64,
     /// State at the end.
     pub end: &'a State,
+    /// The equations there, still those of this mode.
+    pub at_end: &'a Evaluation,
 }
 
 /// Sees the motion of the arm on its belt together with its equations.
@@ -54,10 +58,12 @@ impl Step for ArmStep<'_> {
     }
 
     fn start(&self) -> Snapshot {
-        self.motion.snapshot(self.mode, self.start_s, self.start)
+        self.motion
+            .snapshot_of(self.mode, self.start_s, self.start, self.at_start)
     }
 
     fn end(&self) -> Snapshot {
-        self.motion.snapshot(self.mode, self.end_s, self.end)
+        self.motion
+            .snapshot_of(self.mode, self.end_s, self.end, self.at_end)
     }
 }

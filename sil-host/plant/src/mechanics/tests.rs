@@ -1,5 +1,6 @@
 //! Tests of the whole plant against closed forms and conservation laws.
 
+use nalgebra::Vector2;
 use painleve_shared::{Arm, ArmParameters, Pose, Posture};
 
 use crate::plant::{ContactMode, Event, State};
@@ -101,6 +102,32 @@ fn energy_is_kept_by_a_conservative_bouncing_arm() {
     }
     assert!(statistics.impacts > 50, "{} impacts", statistics.impacts);
     assert!(worst < 1e-8, "relative drift {worst:e}");
+}
+
+/// Steps of a millisecond go by a method of order 5; a tolerance of 1e-12 refuses that one.
+#[test]
+fn short_steps_keep_the_tolerance() {
+    let end = |relative_tolerance: f64| {
+        let solver = SolverSettings {
+            relative_tolerance,
+            absolute_tolerance: 0.1 * relative_tolerance,
+            ..Default::default()
+        };
+        let parameters = PlantParameters {
+            solver,
+            ..Default::default()
+        };
+        let mut plant = plant(&parameters, x0_d());
+        for tick in 1..=2000 {
+            let torque = Vector2::new(0.05 * f64::from(tick % 7), 0.02 * f64::from(tick % 5));
+            plant.command_torque(torque, 0.0);
+            plant.advance(f64::from(tick) * 1e-3, &mut ()).unwrap();
+        }
+        assert_eq!(plant.mode(), ContactMode::SlidePositive);
+        *plant.state()
+    };
+    let difference = (end(1e-9) - end(1e-12)).amax();
+    assert!(difference > 0.0 && difference < 1e-9, "{difference:e}");
 }
 
 #[test]

@@ -1,12 +1,11 @@
 //! Which contact mode follows, and when the present one ends.
 
-use nalgebra::Vector2;
 use painleve_shared::{ContactTerms, Pose, Slip, SolutionMode};
 use serde::{Deserialize, Serialize};
 
 use super::dop853::{DenseStep, Step};
 use super::event::{first_negative, stays_above};
-use super::motion::{Motion, theta, theta_dot};
+use super::motion::{Evaluation, Motion, theta, theta_dot};
 use crate::plant::{ContactMode, State};
 
 /// What follows where p < 0 and b ≥ 0, so that sliding and flight both solve
@@ -131,46 +130,77 @@ pub fn event_functions(
     ]
 }
 
+/// Whether the tip slides at a state, and goes on sliding the same way.
+pub fn slides_on(mode: ContactMode, here: &Evaluation) -> bool {
+    mode.slip().is_some_and(|slip| {
+        slip.sign::<f64>() * here.slip[0] > REST_SLIP_M_S
+            && here.b_m_s2 < 0.0
+            && here.p_per_kg > P_GUARD * here.q22_per_kg
+    })
+}
+
+/// Whether a mode goes on through a step of `h` seconds, judged by its two ends; `false` asks for
+/// a search.
+pub fn goes_on(
+    motion: &Motion<'_>,
+    mode: ContactMode,
+    h: f64,
+    start: &Evaluation,
+    end: &Evaluation,
+) -> bool {
+    let Some(slip) = mode.slip() else {
+        if mode == ContactMode::Flight {
+            return stays_above(CLEARANCE_M, h, start.gap, end.gap);
+        }
+        let inside_cone = motion.friction * end.force_n.y - end.force_n.x.abs() >= 0.0;
+        return inside_cone && end.b_m_s2 <= 0.0;
+    };
+    let guarded_p = |at: &Evaluation| at.p_per_kg - P_GUARD * at.q22_per_kg;
+    let side = side_of(guarded_p(start));
+    let holds = side * -end.b_m_s2 >= 0.0 && side * guarded_p(end) >= 0.0;
+    // Slip can die and start again within a step; a cubic through both ends tells.
+    let sign = slip.sign::<f64>();
+    let [v0, a0] = start.slip.map(|x| sign * x);
+    let [v1, a1] = end.slip.map(|x| sign * x);
+    let third = h / 3.0;
+    let slides = v0.min(v1).min(v0 + a0 * third).min(v1 - a1 * third) >= 0.0;
+    holds && slides && h <= SHORT_STEP_S
+}
+
+/// 1 in a determinate slide; −1 in an indeterminate one, where p and b are both on the other side.
+fn side_of(guarded_p: f64) -> f64 {
+    if guarded_p > 0.0 { 1.0 } else { -1.0 }
+}
+
 /// Time of the first event in a finished step, s; the event has happened there.
-pub fn first_event_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<4>) -> Option<f64> {
+pub fn first_event_s(
+    motion: &Motion<'_>,
+    mode: ContactMode,
+    step: &mut Step<4>,
+    start: &Evaluation,
+    end: &Evaluation,
+) -> Option<f64> {
+    if goes_on(motion, mode, step.h, start, end) {
+        return None;
+    }
     match mode {
-        ContactMode::Flight => first_landing_s(motion, step),
+        ContactMode::Flight => first_landing_s(motion, step, start),
         ContactMode::SlidePositive | ContactMode::SlideNegative => {
-            first_end_of_slide_s(motion, mode, step)
+            first_end_of_slide_s(motion, mode, step, start)
         }
         ContactMode::Stick => {
             let margin = |t: f64, x: &State| {
                 let [cone, pressed, _] = event_functions(motion, mode, t, x);
                 cone.min(pressed)
             };
-            if margin(step.t + step.h, &step.end) >= 0.0 {
-                return None;
-            }
             let dense = step.dense(&|t, x: &State| motion.derivative(mode, t, x));
             first_in_parts(step, &dense, &margin)
         }
     }
 }
 
-/// Height over the belt, its rate and its acceleration.
-fn gap_jet(motion: &Motion<'_>, state: &State, slope: &State) -> [f64; 3] {
-    let pose = Pose::new(&theta(state));
-    let rates = theta_dot(state);
-    let normal = motion.arm.jacobian(&pose).row(1).transpose();
-    let acceleration = Vector2::new(slope[2], slope[3]);
-    [
-        motion.arm.gap_m(&pose),
-        normal.dot(&rates),
-        normal.dot(&acceleration) + motion.arm.centripetal_m_s2(&pose, &rates).y,
-    ]
-}
-
-fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>) -> Option<f64> {
-    let start = gap_jet(motion, &step.start, step.start_slope());
-    let end = gap_jet(motion, &step.end, step.end_slope());
-    if stays_above(CLEARANCE_M, step.h, start, end) {
-        return None;
-    }
+fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>, start: &Evaluation) -> Option<f64> {
+    let start = start.gap;
     let (t, h) = (step.t, step.h);
     let dense = step.dense(&|t, x: &State| motion.derivative(ContactMode::Flight, t, x));
     // A flight that starts on the belt has a root at its start. With a normal
@@ -252,39 +282,19 @@ pub fn landing_correction_s(motion: &Motion<'_>, mode: ContactMode, state: &Stat
     }
 }
 
-fn first_end_of_slide_s(motion: &Motion<'_>, mode: ContactMode, step: &mut Step<4>) -> Option<f64> {
-    let slip = mode.slip()?;
-    let sign = slip.sign::<f64>();
-    // In an indeterminate slide p and b are both on the other side.
-    let side = if guarded_p(motion, &motion.terms(step.t, &step.start), slip) > 0.0 {
-        1.0
-    } else {
-        -1.0
-    };
+fn first_end_of_slide_s(
+    motion: &Motion<'_>,
+    mode: ContactMode,
+    step: &mut Step<4>,
+    start: &Evaluation,
+) -> Option<f64> {
+    let side = side_of(start.p_per_kg - P_GUARD * start.q22_per_kg);
     let margin = |t: f64, x: &State| {
         let [sliding, pressed, p] = event_functions(motion, mode, t, x);
         (sliding + 0.5 * REST_SLIP_M_S)
             .min(side * pressed)
             .min(side * p)
     };
-    let end_margin = margin(step.t + step.h, &step.end);
-    // Slip can die and start again within a step; a cubic through both ends tells.
-    let slip_at = |t: f64, x: &State| {
-        let terms = motion.terms(t, x);
-        [
-            sign * motion.relative_velocity_m_s(t, x).x,
-            sign * slip_acceleration(motion, t, &terms, slip),
-        ]
-    };
-    if end_margin >= 0.0 {
-        let [v0, a0] = slip_at(step.t, &step.start);
-        let [v1, a1] = slip_at(step.t + step.h, &step.end);
-        let third = step.h / 3.0;
-        let slides_on = v0.min(v1).min(v0 + a0 * third).min(v1 - a1 * third) >= 0.0;
-        if slides_on && step.h <= SHORT_STEP_S {
-            return None;
-        }
-    }
     let dense = step.dense(&|t, x: &State| motion.derivative(mode, t, x));
     first_in_parts(step, &dense, &margin)
 }

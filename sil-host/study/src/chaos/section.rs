@@ -86,7 +86,8 @@ impl Returns {
             size_s,
             &tolerance,
         );
-        self.step.finish(&derivative);
+        let end_slope = derivative(now.start_s + size_s, &self.step.end);
+        self.step.finish(&end_slope);
         let dense = self.step.dense(&derivative);
         let mut before = (now.start_s, now.start[RATE]);
         for part in 1..=SEARCH_PARTS {

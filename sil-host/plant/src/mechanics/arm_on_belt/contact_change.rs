@@ -1,0 +1,104 @@
+//! What happens to the arm at an event: it lands, is thrown off, or goes on in another mode.
+
+use super::super::impact::{self, ImpactKind};
+use super::super::probe::ArmProbe;
+use super::super::transition::{self, Next};
+use super::{ArmOnBelt, MotionError};
+use crate::plant::{ContactMode, Event};
+
+impl ArmOnBelt {
+    /// The tip has landed, or sliding or sticking cannot go on.
+    pub(super) fn handle_event(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+        if self.mode.is_contact() {
+            let motion = self.motion();
+            let slip = motion.relative_velocity_m_s(self.time_s, &self.state).x;
+            if self
+                .mode
+                .slip()
+                .is_some_and(|s| s.sign::<f64>() * slip <= 0.0)
+            {
+                // Slip has just died; what is left of it is the resolution of time.
+                self.state =
+                    motion.onto_stick(self.time_s, motion.tip_t_m(&self.state), &self.state);
+            }
+            return self.enter_contact(probe);
+        }
+        let motion = self.motion();
+        let state = motion.lowered_onto_belt(&self.state);
+        let approach_m_s = motion.relative_velocity_m_s(self.time_s, &state).y;
+        self.state = state;
+        if approach_m_s < 0.0 {
+            self.collide(probe, Event::Impact { approach_m_s })?;
+        }
+        let motion = self.motion();
+        let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
+        if rebound < self.solver.chatter_speed_m_s {
+            self.state = motion.onto_belt(&self.state);
+            self.enter_contact(probe)?;
+        }
+        Ok(())
+    }
+
+    /// The tip is on the belt without normal velocity: decides what follows.
+    pub(super) fn enter_contact(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+        // Each throw that does not lift the tip ends its slip, which leaves
+        // only sticking and sliding from rest.
+        self.evaluation = None;
+        for _ in 0..4 {
+            let motion = self.motion();
+            let next =
+                transition::decide(&motion, self.time_s, &self.state, self.solver.indeterminate);
+            match next {
+                Next::Mode(mode) => {
+                    if mode == ContactMode::Stick && self.mode != ContactMode::Stick {
+                        let tip_t_m = motion.tip_t_m(&self.state);
+                        self.state = motion.onto_stick(self.time_s, tip_t_m, &self.state);
+                        self.stick_start = (self.time_s, tip_t_m);
+                    }
+                    self.change_mode(mode, probe);
+                    return Ok(());
+                }
+                Next::Thrown => {
+                    self.collide(probe, Event::ImpactWithoutCollision)?;
+                    let motion = self.motion();
+                    let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
+                    if rebound >= self.solver.chatter_speed_m_s {
+                        self.change_mode(ContactMode::Flight, probe);
+                        return Ok(());
+                    }
+                    self.state = motion.onto_belt(&self.state);
+                }
+            }
+        }
+        Err(MotionError::EventsWithoutEnd {
+            time_s: self.time_s,
+        })
+    }
+
+    fn collide(&mut self, probe: &mut impl ArmProbe, event: Event) -> Result<(), MotionError> {
+        let motion = self.motion();
+        let kind = if event == Event::ImpactWithoutCollision {
+            ImpactKind::WithoutCollision
+        } else {
+            ImpactKind::Collision
+        };
+        self.state = impact::state_after(&motion, &self.impact, self.time_s, &self.state, kind)
+            .map_err(|source| MotionError::EndlessImpact {
+                time_s: self.time_s,
+                source,
+            })?;
+        probe.event(self.time_s, event, &self.state);
+        Ok(())
+    }
+
+    fn change_mode(&mut self, mode: ContactMode, probe: &mut impl ArmProbe) {
+        if mode != self.mode {
+            let from = core::mem::replace(&mut self.mode, mode);
+            probe.event(
+                self.time_s,
+                Event::ModeChange { from, to: mode },
+                &self.state,
+            );
+        }
+    }
+}
