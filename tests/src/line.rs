@@ -13,12 +13,13 @@ use std::time::{Duration, Instant};
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::pty::openpty;
+use nix::sys::signal::Signal;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
 use painleve_board::Serial;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::message::Plant;
-use painleve_system::lifetime::{Guarded, kill_with_parent};
+use painleve_system::lifetime::{Guarded, end_with_parent};
 
 use crate::serial_image;
 
@@ -123,7 +124,7 @@ impl Line {
             .arg(serial_image())
             .stdin(Stdio::null())
             .stdout(Stdio::null());
-        let child = kill_with_parent(&mut command).spawn();
+        let child = end_with_parent(&mut command, Signal::SIGKILL).spawn();
         let board = SerialBoard(Guarded::new(
             child.unwrap_or_else(|error| panic!("cannot start QEMU: {error}")),
         ));

@@ -194,7 +194,15 @@ fn ctrl_c_ends_a_run_tidily() {
     }
     let (output, _) = run.end(Duration::from_secs(30));
     assert_eq!(code(output.status), 130, "{output:?}");
-    assert!(bench.files().is_empty(), "{:?}", bench.files());
+    assert_eq!(bench.files(), ["out/run.partial.mcap"], "{output:?}");
+    let record = std::fs::read(bench.path("out/run.partial.mcap")).unwrap();
+    let summary = mcap::Summary::read(&record).unwrap().unwrap();
+    assert!(summary.stats.unwrap().message_count > 0);
+    assert_eq!(
+        errors(&output).matches("interrupted").count(),
+        1,
+        "{output:?}"
+    );
     assert!(!is_running(plant) && !is_running(controller));
     assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
 }

@@ -15,13 +15,14 @@ use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::signal::Signal;
 use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
 use painleve_firmware::Configuration;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{Health, MAXIMUM_LENGTH, Plant, Request, Response};
 use painleve_shared::wire;
-use painleve_system::lifetime::{Guarded, kill_with_parent};
+use painleve_system::lifetime::{Guarded, end_with_parent};
 
 use super::{Board, BoardError, SILENCE_LIMIT, TimedAnswer, log};
 use crate::timing::Unit;
@@ -116,7 +117,7 @@ impl Emulator {
             } else {
                 Stdio::null()
             });
-        let child = kill_with_parent(&mut command).spawn()?;
+        let child = end_with_parent(&mut command, Signal::SIGKILL).spawn()?;
         let mut emulator = Self {
             process: Guarded::new(child),
             requests,

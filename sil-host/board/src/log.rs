@@ -4,6 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use defmt_decoder::DecodeError;
+use painleve_system::terminal::warn;
 
 use super::BoardError;
 
@@ -36,7 +37,7 @@ impl Table {
                 decoder.received(&bytes[..length]);
                 loop {
                     match decoder.decode() {
-                        Ok(frame) => eprintln!("board: {}", frame.display(false)),
+                        Ok(frame) => warn(format_args!("board: {}", frame.display(false))),
                         // The stream finds its place again at the next frame.
                         Err(DecodeError::Malformed) => {}
                         Err(DecodeError::UnexpectedEof) => break,

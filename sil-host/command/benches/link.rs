@@ -16,6 +16,7 @@ use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_system::interrupt::Interrupt;
 
 /// Set for the second process: the bus on which it answers.
 const BUS: &str = "PAINLEVE_BENCH_BUS";
@@ -73,7 +74,7 @@ fn lockstep() -> Outcome<RoundTrips> {
         pacing: Pacing::Lockstep,
         configuration: postcard::to_stdvec(&scenario.controller_configuration())?,
     };
-    let mut plant = PlantEnd::create(&bus, &session)?;
+    let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default())?;
     let mut controller = AnsweringProcess(
         Command::new(env!("CARGO_BIN_EXE_painleve"))
             .args(["controller", "--wait-s", "5", "--bus", bus.as_str()])
@@ -102,7 +103,7 @@ impl PingPong {
             pacing: Pacing::Lockstep,
             configuration: Vec::new(),
         };
-        let mut plant = PlantEnd::create(&bus, &session)?;
+        let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default())?;
         let echo = AnsweringProcess::start(&bus)?;
         plant.wait_for_controller(Duration::from_secs(5))?;
         Ok(Self {
@@ -150,7 +151,8 @@ impl Drop for AnsweringProcess {
 }
 
 fn answer_all(bus: &str) -> Outcome<()> {
-    let (mut controller, _) = ControllerEnd::open(&bus.parse()?, Duration::from_secs(5))?;
+    let (mut controller, _) =
+        ControllerEnd::open(&bus.parse()?, Duration::from_secs(5), &Interrupt::default())?;
     controller.set_silence_limit(PATIENCE);
     while let Received::Frame(frame) = controller.receive()? {
         controller.send(&ActuatorFrame {

@@ -13,9 +13,9 @@ use painleve_link::{BusName, ControllerEnd, Pacing, Received};
 use painleve_shared::message::Plant;
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
-use painleve_system::lifetime;
+use painleve_system::terminal::warn;
 
-use super::CommandError;
+use super::{CommandError, or_interrupted};
 
 /// Options of `painleve bridge`.
 #[derive(Debug, Args)]
@@ -57,9 +57,6 @@ struct BusArguments {
     /// What the plant runs, for the report.
     #[arg(long, hide = true, default_value = "")]
     scenario_name: String,
-    /// End when the process that started this one does.
-    #[arg(long, hide = true)]
-    end_with_parent: bool,
 }
 
 /// Which image to run, and what to keep of it.
@@ -124,12 +121,18 @@ fn carry<B: Board>(
     timing: Option<&Path>,
     start: impl FnOnce(&Configuration, Pacing) -> Result<B, BoardError>,
 ) -> Result<(), CommandError> {
-    if bus.end_with_parent {
-        lifetime::end_with_parent()?;
-    }
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    or_interrupted(carry_until(bus, timing, start, &interrupt), &interrupt)
+}
+
+fn carry_until<B: Board>(
+    bus: &BusArguments,
+    timing: Option<&Path>,
+    start: impl FnOnce(&Configuration, Pacing) -> Result<B, BoardError>,
+    interrupt: &Interrupt,
+) -> Result<(), CommandError> {
     let wait = Duration::from_secs_f64(bus.wait_s);
-    let (mut end, session) = ControllerEnd::open(&bus.bus, wait)?;
+    let (mut end, session) = ControllerEnd::open(&bus.bus, wait, interrupt)?;
     let configuration: Configuration =
         postcard::from_bytes(&session.configuration).map_err(|error| {
             CommandError::Process(format!(
@@ -155,10 +158,10 @@ fn carry<B: Board>(
     if let Some(line) = board.line()
         && line != LineHealth::default()
     {
-        eprintln!(
+        warn(format_args!(
             "line: {} requests repeated, {} runs of garbage and {} wrong checksums from the board",
             line.repeated_requests, line.garbage, line.failed_checksums
-        );
+        ));
     }
     Ok(())
 }

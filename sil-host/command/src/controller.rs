@@ -6,10 +6,10 @@ use clap::Args;
 use painleve_firmware::{Configuration, Controller};
 use painleve_link::{BusName, ControllerEnd, Pacing, Received};
 use painleve_system::interrupt::Interrupt;
-use painleve_system::lifetime;
 use painleve_system::realtime::request_realtime;
+use painleve_system::terminal::warn;
 
-use super::CommandError;
+use super::{CommandError, or_interrupted};
 
 /// Options of `painleve controller`.
 #[derive(Debug, Args)]
@@ -20,19 +20,20 @@ pub struct ControllerArguments {
     /// How long to wait for the plant, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
     wait_s: f64,
-    /// End when the process that started this one does.
-    #[arg(long, hide = true)]
-    end_with_parent: bool,
 }
 
 /// Answers the plant's frames until its session ends.
 pub fn run(arguments: &ControllerArguments) -> Result<(), CommandError> {
-    if arguments.end_with_parent {
-        lifetime::end_with_parent()?;
-    }
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    or_interrupted(answer_until(arguments, &interrupt), &interrupt)
+}
+
+fn answer_until(
+    arguments: &ControllerArguments,
+    interrupt: &Interrupt,
+) -> Result<(), CommandError> {
     let wait = Duration::from_secs_f64(arguments.wait_s);
-    let (mut end, session) = ControllerEnd::open(&arguments.bus, wait)?;
+    let (mut end, session) = ControllerEnd::open(&arguments.bus, wait, interrupt)?;
     let bad_session = |reason: String| {
         CommandError::Process(format!(
             "the plant on bus {} sent a configuration that this controller refuses: {reason}",
@@ -44,7 +45,7 @@ pub fn run(arguments: &ControllerArguments) -> Result<(), CommandError> {
     let mut controller =
         Controller::new(&configuration).map_err(|error| bad_session(error.to_string()))?;
     if session.pacing == Pacing::Realtime {
-        eprintln!("controller: {}", request_realtime());
+        warn(format_args!("controller: {}", request_realtime()));
     }
     while let Received::Frame(frame) = end.receive()? {
         end.send(&controller.tick(&frame))?;

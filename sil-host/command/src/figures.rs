@@ -25,8 +25,8 @@ use painleve_study::{
 };
 use painleve_system::atomic_file::{self, AtomicFile};
 
-use super::CommandError;
 use super::study::options::{Threads, output};
+use super::{CommandError, say};
 
 /// Options of `painleve figures`.
 #[derive(Debug, Args)]
@@ -125,8 +125,7 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
         sections,
     };
     atomic_file::write(&page_path, page.html().as_bytes()).map_err(output)?;
-    println!("{}", page_path.display());
-    Ok(())
+    say(page_path.display())
 }
 
 struct Makes<'a> {

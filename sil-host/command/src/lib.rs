@@ -11,7 +11,9 @@ mod study;
 mod sweep;
 mod timing;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
@@ -20,6 +22,8 @@ use painleve_plant::closed_loop::LoopError;
 use painleve_plant::scenario::ScenarioError;
 use painleve_study::StudyError;
 use painleve_study::sweep::SweepError;
+use painleve_system::interrupt::Interrupt;
+use painleve_system::terminal::{self, warn};
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
 ///
@@ -58,6 +62,9 @@ enum Command {
 /// Exit code of a process whose peer is missing or has died.
 const PEER_FAILED: u8 = 3;
 
+/// Exit code after Ctrl-C or a request to end.
+const INTERRUPTED: u8 = 130;
+
 /// Why a command failed. Every message is one sentence for the user.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
@@ -76,6 +83,9 @@ pub enum CommandError {
     /// A file cannot be written.
     #[error("{0}")]
     Output(String),
+    /// Record and figure would replace each other.
+    #[error("--record and --plot both name `{}`: give each a file of its own", .0.display())]
+    SameFile(PathBuf),
     /// A study has no outcome.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -94,6 +104,9 @@ pub enum CommandError {
     /// Ctrl-C or a request to end.
     #[error("interrupted")]
     Interrupted,
+    /// Whoever reads standard output has had enough.
+    #[error("")]
+    Unread,
 }
 
 impl CommandError {
@@ -101,7 +114,7 @@ impl CommandError {
     /// 4: an output cannot be written; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Scenario(_) => 2,
+            Self::Scenario(_) | Self::SameFile(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Scenario(_) | StudyError::Option(_) | StudyError::Range(_) => 2,
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
@@ -111,12 +124,14 @@ impl CommandError {
             Self::Sweep(SweepError::Output(_)) => 4,
             Self::Sweep(_) => 2,
             Self::Loop(LoopError::Plant(_)) => 1,
+            Self::Link(LinkError::Interrupted) => INTERRUPTED,
             Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => {
                 PEER_FAILED
             }
             Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => 4,
-            Self::Loop(LoopError::Interrupted) | Self::Interrupted => 130,
+            Self::Loop(LoopError::Interrupted) | Self::Interrupted => INTERRUPTED,
             Self::Told { code } => *code,
+            Self::Unread => 0,
         }
     }
 }
@@ -126,6 +141,35 @@ impl From<std::io::Error> for CommandError {
     fn from(error: std::io::Error) -> Self {
         Self::Process(error.to_string())
     }
+}
+
+/// Writes a line to standard output.
+fn say(line: impl std::fmt::Display) -> Result<(), CommandError> {
+    terminal::say(line).map_err(|error| match error.kind() {
+        std::io::ErrorKind::BrokenPipe => CommandError::Unread,
+        _ => CommandError::Output(format!("cannot write to stdout: {error}")),
+    })
+}
+
+/// How long Ctrl-C may take from one process of a terminal to the next.
+const CTRL_C_SPREAD: Duration = Duration::from_millis(50);
+
+/// A failure of a process whose peer is on the same terminal: Ctrl-C may have ended the peer
+/// before it was heard here.
+fn or_interrupted<T>(
+    result: Result<T, CommandError>,
+    interrupt: &Interrupt,
+) -> Result<T, CommandError> {
+    if matches!(
+        result,
+        Err(CommandError::Link(_) | CommandError::Loop(LoopError::Host(_)))
+    ) {
+        std::thread::sleep(CTRL_C_SPREAD);
+        if interrupt.is_requested() {
+            return Err(CommandError::Interrupted);
+        }
+    }
+    result
 }
 
 /// A time in seconds on the command line.
@@ -153,8 +197,8 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            if !matches!(error, CommandError::Told { .. }) {
-                eprintln!("error: {error}");
+            if !matches!(error, CommandError::Told { .. } | CommandError::Unread) {
+                warn(format_args!("error: {error}"));
             }
             ExitCode::from(error.exit_code())
         }

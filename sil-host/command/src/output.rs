@@ -10,7 +10,9 @@ use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
 use painleve_record::RunPlot;
 use painleve_record::mcap::Recorder;
+use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
+use painleve_system::terminal::warn;
 
 use super::CommandError;
 
@@ -84,8 +86,13 @@ impl Output {
         let plot = if arguments.no_plot {
             None
         } else {
-            painleve_system::atomic_file::AtomicFile::create(&arguments.plot)
-                .map_err(|error| output(&error))?;
+            let plot = AtomicFile::create(&arguments.plot).map_err(|error| output(&error))?;
+            if recorder
+                .as_ref()
+                .is_some_and(|recorder| recorder.is_same_file(&plot))
+            {
+                return Err(CommandError::SameFile(arguments.plot.clone()));
+            }
             let subtitle = format!(
                 "law: {} · {} Hz · μ = {} · seed {}",
                 scenario.controller.law.name(),
@@ -105,6 +112,22 @@ impl Output {
             interrupt,
             tick: 0,
         })
+    }
+
+    /// Keeps what there is of the record of a run that has ended early, and says where.
+    pub fn keep_partial(self, reason: &str) {
+        self.progress.finish_and_clear();
+        if self.tick == 0 {
+            return;
+        }
+        match self
+            .recorder
+            .map(|recorder| recorder.finish_partial(reason))
+        {
+            None => {}
+            Some(Ok(path)) => warn(format_args!("the record so far is in {}", path.display())),
+            Some(Err(error)) => warn(format_args!("no record is kept: {error}")),
+        }
     }
 
     /// Completes the files; without this nothing appears under their names.

@@ -6,18 +6,18 @@ use clap::Args;
 use painleve_link::lockstep::Lockstep;
 use painleve_link::paced::Paced;
 use painleve_link::{BusName, Pacing, PlantEnd, Session};
-use painleve_plant::closed_loop::{ClosedLoop, LoopResult};
+use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult};
 use painleve_plant::controller_host::ControllerHost;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_record::report::{Percentiles, RunReport};
 use painleve_system::interrupt::Interrupt;
-use painleve_system::lifetime;
 use painleve_system::realtime::request_realtime;
+use painleve_system::terminal::warn;
 
-use super::CommandError;
 use super::output::{Output, OutputArguments};
 use super::run::ScenarioArguments;
+use super::{CommandError, or_interrupted};
 
 /// Options of `painleve plant`.
 #[derive(Debug, Args)]
@@ -41,50 +41,70 @@ pub struct PlantArguments {
     /// By the clock, but the clock is a board's: wait for its answers.
     #[arg(long, hide = true)]
     board_keeps_time: bool,
-    /// End when the process that started this one does.
-    #[arg(long, hide = true)]
-    end_with_parent: bool,
 }
 
 /// Runs a scenario against the controller on the bus.
 pub fn run(arguments: &PlantArguments) -> Result<(), CommandError> {
-    if arguments.end_with_parent {
-        lifetime::end_with_parent()?;
-    }
-    let scenario = arguments.scenario.load()?;
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
-    let mut output = Output::open(&arguments.output, &scenario, interrupt)?;
-    let simulation = Simulation::new(&scenario).map_err(|source| ScenarioError::Range {
+    run_until(arguments, &interrupt)
+}
+
+fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), CommandError> {
+    let scenario = arguments.scenario.load()?;
+    let mut output = Output::open(&arguments.output, &scenario, interrupt.clone())?;
+    match simulate(arguments, &scenario, interrupt, &mut output) {
+        Ok(report) => {
+            output.finish()?;
+            super::run::print(&report, arguments.json)
+        }
+        Err(error) => {
+            let error = or_interrupted(Err(error), interrupt);
+            match &error {
+                // What cannot be written any more cannot be kept either.
+                Ok(()) | Err(CommandError::Loop(LoopError::Monitor(_))) => {}
+                Err(reason) => output.keep_partial(&reason.to_string()),
+            }
+            error
+        }
+    }
+}
+
+/// Runs the scenario to its end.
+fn simulate(
+    arguments: &PlantArguments,
+    scenario: &Scenario,
+    interrupt: &Interrupt,
+    output: &mut Output,
+) -> Result<RunReport, CommandError> {
+    let simulation = Simulation::new(scenario).map_err(|source| ScenarioError::Range {
         origin: scenario.name.clone(),
         source,
     })?;
     let pacing = arguments.scenario.pacing;
-    let session = session(&scenario, pacing)?;
-    let mut end = PlantEnd::create(&arguments.bus, &session)?;
+    let session = session(scenario, pacing)?;
+    let mut end = PlantEnd::create(&arguments.bus, &session, interrupt)?;
     end.wait_for_controller(Duration::from_secs_f64(arguments.wait_s))?;
 
     let name = &arguments.host_name;
-    let report = match pacing {
+    match pacing {
         Pacing::Realtime if !arguments.board_keeps_time => {
-            eprintln!("plant: {}", request_realtime());
+            warn(format_args!("plant: {}", request_realtime()));
             let paced = Paced::start(end, scenario.run.tick_hz)?;
-            let (result, host, wall) = drive(&scenario, simulation, paced, &mut output)?;
+            let (result, host, wall) = drive(scenario, simulation, paced, output)?;
             let (lateness_ns, missed, end) = host.finish();
             end.end()?;
-            RunReport {
+            Ok(RunReport {
                 wake_up_us: Some(Percentiles::of_ns(&lateness_ns)),
                 missed_deadlines: Some(missed),
-                ..RunReport::new(&scenario, name, pacing.name(), &result, wall)
-            }
+                ..RunReport::new(scenario, name, pacing.name(), &result, wall)
+            })
         }
         Pacing::Lockstep | Pacing::Realtime => {
-            let (result, host, wall) = drive(&scenario, simulation, Lockstep(end), &mut output)?;
+            let (result, host, wall) = drive(scenario, simulation, Lockstep(end), output)?;
             host.0.end()?;
-            RunReport::new(&scenario, name, pacing.name(), &result, wall)
+            Ok(RunReport::new(scenario, name, pacing.name(), &result, wall))
         }
-    };
-    output.finish()?;
-    super::run::print(&report, arguments.json)
+    }
 }
 
 fn session(scenario: &Scenario, pacing: Pacing) -> Result<Session, CommandError> {

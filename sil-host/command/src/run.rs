@@ -4,6 +4,7 @@ use std::ffi::OsString;
 use std::io::Read;
 use std::path::PathBuf;
 use std::process::{Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
@@ -13,11 +14,12 @@ use painleve_plant::scenario::{Scenario, built_in};
 use painleve_record::report::RunReport;
 use painleve_study::robustness;
 use painleve_system::interrupt::Interrupt;
-use painleve_system::lifetime::Guarded;
+use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
+use painleve_system::terminal::warn;
 
 use super::bridge::ImageArguments;
 use super::output::OutputArguments;
-use super::{CommandError, PEER_FAILED};
+use super::{CommandError, PEER_FAILED, say};
 
 /// A run of the robustness campaign.
 #[derive(Clone, Copy, Debug)]
@@ -148,6 +150,9 @@ const WATCH: Duration = Duration::from_millis(10);
 /// With stopping it by force, all are gone within 2 s.
 const PLANT_NOTICE: Duration = Duration::from_millis(1000);
 
+/// How long a child may be stopped. The peer's own word, after 1.5 s, comes first.
+const STOPPED_LIMIT: Duration = Duration::from_millis(1700);
+
 /// How long the controller may take to end after the plant has.
 const CONTROLLER_END: Duration = Duration::from_millis(1700);
 
@@ -177,53 +182,34 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     if arguments.host == Host::Serial {
         plant_arguments.push("--board-keeps-time".into());
     }
-    let mut plant = start(plant_arguments, &bus, Stdio::inherit())?;
+    let mut plant = Process::start(plant_arguments, &bus, Stdio::inherit())?;
     // Its complaints matter only while the plant has none, a log at once.
     let stderr = if arguments.image.log {
         Stdio::inherit()
     } else {
         Stdio::piped()
     };
-    let mut controller = start(controller_arguments(arguments), &bus, stderr)?;
+    let mut controller = Process::start(controller_arguments(arguments), &bus, stderr)?;
 
-    let plant_status = loop {
-        if interrupt.is_requested() {
-            return Err(CommandError::Interrupted);
-        }
-        if let Some(status) = plant.ended()? {
-            break status;
-        }
-        if let Some(status) = controller.ended()?
-            && !status.success()
-        {
-            // The plant notices by itself and says so; if it does not, this does.
-            if let Some(plant_status) = wait(&mut plant, PLANT_NOTICE)? {
-                break plant_status;
-            }
-            return Err(CommandError::Process(format!(
-                "the controller process ended early ({status}){}",
-                said(&mut controller)
-            )));
-        }
-        std::thread::sleep(WATCH);
-    };
-    if !plant_status.success() {
+    let status = watch(&mut plant, &mut controller, &interrupt)?;
+    if !status.success() {
         // A plant that blames the controller does not know why a board stopped; its bridge does.
-        if plant_status.code() == Some(i32::from(PEER_FAILED))
+        if status.code() == Some(i32::from(PEER_FAILED))
             && arguments.host != Host::Native
-            && wait(&mut controller, BRIDGE_END)?.is_some_and(|status| !status.success())
+            && controller
+                .wait(BRIDGE_END)?
+                .is_some_and(|status| !status.success())
         {
-            eprintln!("error{}", said(&mut controller));
+            warn(format_args!("error{}", controller.complaint()));
         }
-        return Err(failure(plant_status));
+        return Err(failure(status));
     }
-    let controller_status = wait(&mut controller, CONTROLLER_END)?;
-    match controller_status {
+    match controller.wait(CONTROLLER_END)? {
         Some(status) if status.success() => {}
         Some(status) => {
             return Err(CommandError::Process(format!(
                 "the controller process failed ({status}){}",
-                said(&mut controller)
+                controller.complaint()
             )));
         }
         None => {
@@ -232,12 +218,59 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
             ));
         }
     }
-    eprint!("{}", read(controller.child().stderr.take()));
-    let text = read(plant.child().stdout.take());
+    let remarks = controller.stderr.text();
+    if !remarks.is_empty() {
+        warn(remarks.trim_end());
+    }
+    let text = plant.stdout.text();
     let report: RunReport = serde_json::from_str(&text).map_err(|error| {
         CommandError::Process(format!("the plant process gave no report: {error}"))
     })?;
     print(&report, arguments.json)
+}
+
+/// Waits for the plant's end, and sees to it that one comes.
+fn watch(
+    plant: &mut Process,
+    controller: &mut Process,
+    interrupt: &Interrupt,
+) -> Result<ExitStatus, CommandError> {
+    let ended_early = |status, complaint: String| {
+        CommandError::Process(format!(
+            "the controller process ended early ({status}){complaint}"
+        ))
+    };
+    loop {
+        if let Some(status) = plant.child.ended()? {
+            return Ok(status);
+        }
+        if interrupt.is_requested() {
+            // A plant that has been asked to end says so.
+            return plant.child.stop().ok_or(CommandError::Interrupted);
+        }
+        if let Some(status) = controller.child.ended()?
+            && !status.success()
+        {
+            // The plant notices by itself and says so; if it does not, this does.
+            if !plant.child.is_stopped()
+                && let Some(plant_status) = plant.wait(PLANT_NOTICE)?
+            {
+                return Ok(plant_status);
+            }
+            if !plant.child.is_stopped() {
+                return Err(ended_early(status, controller.complaint()));
+            }
+        }
+        for (name, process) in [("plant", &mut *plant), ("controller", &mut *controller)] {
+            if process.stopped_for(WATCH) >= STOPPED_LIMIT {
+                return Err(CommandError::Process(format!(
+                    "the {name} process ({}) is stopped: it has been ended",
+                    process.child.id()
+                )));
+            }
+        }
+        std::thread::sleep(WATCH);
+    }
 }
 
 fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
@@ -260,31 +293,105 @@ fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
     line
 }
 
-fn start(arguments: Vec<OsString>, bus: &BusName, stderr: Stdio) -> Result<Guarded, CommandError> {
-    let program = std::env::current_exe()?;
-    let child = Command::new(&program)
-        .args(arguments)
-        .args(["--bus", bus.as_str()])
-        .args(["--wait-s", START_WAIT_S, "--end-with-parent"])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(stderr)
-        .spawn()
-        .map_err(|error| {
-            CommandError::Process(format!("cannot start {}: {error}", program.display()))
-        })?;
-    Ok(Guarded::new(child))
+/// A child with all that it says.
+struct Process {
+    child: Guarded,
+    stdout: Reader,
+    stderr: Reader,
+    stopped: Duration,
 }
 
-fn wait(child: &mut Guarded, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
-    let start = std::time::Instant::now();
-    while start.elapsed() < limit {
-        if let Some(status) = child.ended()? {
-            return Ok(Some(status));
-        }
-        std::thread::sleep(WATCH);
+impl Process {
+    fn start(arguments: Vec<OsString>, bus: &BusName, stderr: Stdio) -> Result<Self, CommandError> {
+        let program = std::env::current_exe()?;
+        let mut command = Command::new(&program);
+        command
+            .args(arguments)
+            .args(["--bus", bus.as_str()])
+            .args(["--wait-s", START_WAIT_S])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(stderr);
+        let mut child = end_with_parent(&mut command, Signal::SIGTERM)
+            .spawn()
+            .map_err(|error| {
+                CommandError::Process(format!("cannot start {}: {error}", program.display()))
+            })?;
+        Ok(Self {
+            stdout: Reader::start(child.stdout.take())?,
+            stderr: Reader::start(child.stderr.take())?,
+            child: Guarded::new(child),
+            stopped: Duration::ZERO,
+        })
     }
-    Ok(None)
+
+    fn wait(&mut self, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
+        let start = std::time::Instant::now();
+        while start.elapsed() < limit {
+            if let Some(status) = self.child.ended()? {
+                return Ok(Some(status));
+            }
+            std::thread::sleep(WATCH);
+        }
+        Ok(None)
+    }
+
+    /// How long the process has been stopped, when it is looked at every `interval`. Looks
+    /// are counted, not the clock: this process may be stopped along with its children.
+    fn stopped_for(&mut self, interval: Duration) -> Duration {
+        self.stopped = if self.child.is_stopped() {
+            self.stopped + interval
+        } else {
+            Duration::ZERO
+        };
+        self.stopped
+    }
+
+    /// What an ended process has said, to be put behind another message.
+    fn complaint(&mut self) -> String {
+        let text = self.stderr.text();
+        let text = text.trim().trim_start_matches("error: ");
+        if text.is_empty() {
+            String::new()
+        } else {
+            format!(": {text}")
+        }
+    }
+}
+
+/// Reads a pipe while its process runs: one that is not read holds its writer up once it is
+/// full.
+struct Reader(Option<Receiver<Vec<u8>>>);
+
+impl Reader {
+    /// The most that is kept of a pipe, bytes; the rest is read and dropped.
+    const KEPT: u64 = 4 << 20;
+    /// How long a pipe may stay open after its process has ended.
+    const PATIENCE: Duration = Duration::from_millis(500);
+
+    fn start(pipe: Option<impl Read + Send + 'static>) -> std::io::Result<Self> {
+        let Some(mut pipe) = pipe else {
+            return Ok(Self(None));
+        };
+        let (sender, receiver) = channel();
+        std::thread::Builder::new().spawn(move || {
+            let mut text = Vec::new();
+            // What cannot be read is left out.
+            let _ = pipe.by_ref().take(Self::KEPT).read_to_end(&mut text);
+            let _ = std::io::copy(&mut pipe, &mut std::io::sink());
+            let _ = sender.send(text);
+        })?;
+        Ok(Self(Some(receiver)))
+    }
+
+    /// Everything that was said, once the process has ended; empty the second time.
+    fn text(&mut self) -> String {
+        let text = self
+            .0
+            .take()
+            .and_then(|text| text.recv_timeout(Self::PATIENCE).ok());
+        String::from_utf8_lossy(&text.unwrap_or_default()).into_owned()
+    }
 }
 
 /// A plant that exits with a code has said why; one that was killed has not.
@@ -295,33 +402,12 @@ fn failure(status: ExitStatus) -> CommandError {
     }
 }
 
-fn said(child: &mut Guarded) -> String {
-    let text = read(child.child().stderr.take());
-    let text = text.trim().trim_start_matches("error: ");
-    if text.is_empty() {
-        String::new()
-    } else {
-        format!(": {text}")
-    }
-}
-
-/// Everything a pipe holds once its process has ended; what cannot be read is left out.
-fn read(pipe: Option<impl Read>) -> String {
-    let mut text = String::new();
-    if let Some(mut pipe) = pipe {
-        let _ = pipe.read_to_string(&mut text);
-    }
-    text
-}
-
 /// Prints a report for programs or for people.
 pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
-    use std::io::Write;
     let text = if json {
         serde_json::to_string(report).map_err(|error| CommandError::Output(error.to_string()))?
     } else {
         report.table()
     };
-    writeln!(std::io::stdout(), "{text}")
-        .map_err(|error| CommandError::Output(format!("cannot write to stdout: {error}")))
+    say(text)
 }

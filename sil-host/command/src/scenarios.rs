@@ -5,7 +5,7 @@ use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{ContentArrangement, Table};
 use painleve_plant::scenario::{Scenario, built_in};
 
-use super::CommandError;
+use super::{CommandError, say};
 
 /// Options of `painleve scenarios`.
 #[derive(Debug, Args)]
@@ -23,8 +23,7 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
         let scenario = Scenario::load(name, &arguments.overrides)?;
         let text =
             toml::to_string(&scenario).map_err(|error| CommandError::Output(error.to_string()))?;
-        print!("{text}");
-        return Ok(());
+        return say(text.trim_end());
     }
     let mut table = Table::new();
     table
@@ -34,6 +33,5 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     for name in built_in::names() {
         table.add_row([name, &Scenario::load(name, &[])?.description]);
     }
-    println!("{table}");
-    Ok(())
+    say(table)
 }

@@ -11,10 +11,11 @@ use painleve_study::sweep::share::{self, ShardOption, Share};
 use painleve_study::sweep::slurm::Job;
 use painleve_study::sweep::{SweepError, array, folder, shard_file};
 use painleve_system::atomic_file;
+use painleve_system::terminal::warn;
 
-use super::CommandError;
 use super::study::campaign::understand;
 use super::study::options::{Threads, output};
+use super::{CommandError, say};
 
 /// Options of `painleve sweep`.
 #[derive(Debug, Args)]
@@ -194,12 +195,12 @@ fn compute_shard(
     if path.exists() {
         match shard_file::read(&path, manifest) {
             Ok(found) if found.shard == shard => return say(&format!("{name}: finished before")),
-            Ok(found) => eprintln!(
+            Ok(found) => warn(format_args!(
                 "{} holds shard {}: computed again",
                 path.display(),
                 found.shard
-            ),
-            Err(reason) => eprintln!("{} {reason}: computed again", path.display()),
+            )),
+            Err(reason) => warn(format_args!("{} {reason}: computed again", path.display())),
         }
     } else {
         // Whether it can be written is known before anything is computed.
@@ -295,11 +296,4 @@ fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
         "{0}: shards {array}; submit with: sbatch {0}",
         path.display()
     ))
-}
-
-/// One line, or a table, on stdout.
-fn say(text: &str) -> Result<(), CommandError> {
-    use std::io::Write;
-    writeln!(std::io::stdout(), "{text}")
-        .map_err(|error| CommandError::Output(format!("cannot write to stdout: {error}")))
 }

@@ -16,9 +16,10 @@ use painleve_shared::message::Plant;
 use painleve_system::atomic_file::{self, AtomicFile};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
+use painleve_system::terminal::warn;
 
-use super::CommandError;
 use super::run::Host;
+use super::{CommandError, say};
 
 /// Options of `painleve timing`.
 #[derive(Debug, Args)]
@@ -63,7 +64,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
     }
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
     if arguments.host == Host::Native {
-        eprintln!("controller: {}", request_realtime());
+        warn(format_args!("controller: {}", request_realtime()));
     }
     let reports = scenarios
         .iter()
@@ -75,11 +76,10 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
     }
     if arguments.json {
         let text = serde_json::to_string(&reports).map_err(|error| output(&error))?;
-        println!("{text}");
+        say(text)
     } else {
-        println!("{}", report::table(&reports));
+        say(report::table(&reports))
     }
-    Ok(())
 }
 
 fn measure(

@@ -1,17 +1,21 @@
 //! The controller's end of the link, the same for every host of the controller.
 
+use std::io;
 use std::time::{Duration, Instant};
 
-use iceoryx2::identifiers::UniqueNodeId;
-use iceoryx2::prelude::Config;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
-use super::patience::{DEFAULT_SILENCE_LIMIT, Next, Patience};
+use super::claim::{Bus, Claim, Role, remove_dead};
+use super::guardian::{Guardian, Mark};
+use super::patience::{DEFAULT_SILENCE_LIMIT, Next, Patience, Silence};
+use super::place::Place;
+use super::run_files::RunFiles;
 use super::services::{
-    Presence, Receiver, Sender, Services, Unavailable, default_config, receiver, sender,
+    Presence, Receiver, Sender, Services, Unavailable, receiver, sender, transport,
 };
 use super::session::{Announcement, Session, SessionMessage};
 use super::{BusName, LinkError};
+use painleve_system::interrupt::Interrupt;
 
 /// Time between two looks for a plant, short enough not to be in its way.
 const PLANT_POLL: Duration = Duration::from_millis(10);
@@ -29,23 +33,35 @@ pub enum Received {
 ///
 /// Nothing of it stays in shared memory once dropped.
 pub struct ControllerEnd {
-    // Ports before services before the node: fields drop in this order.
-    sensor: Receiver<SensorFrame>,
-    session: Receiver<SessionMessage>,
-    actuator: Sender<ActuatorFrame>,
-    services: Services,
-    presence: Presence,
+    // Fields drop in this order: the guardian watches the ports go, the claim cleans up.
+    ports: Ports,
+    guardian: Guardian,
+    claim: Claim,
     silence_limit: Duration,
+    interrupt: Interrupt,
     /// `End` has arrived.
     ended: bool,
 }
 
-/// Ports that a plant has not yet spoken to.
-struct Joined {
+/// What iceoryx2 has made for this end.
+struct Ports {
+    _leaving: Mark,
+    // Ports before services before the node.
     sensor: Receiver<SensorFrame>,
     session: Receiver<SessionMessage>,
-    services: Services,
-    plant: UniqueNodeId,
+    actuator: Sender<ActuatorFrame>,
+    _services: Services,
+    presence: Presence,
+    _left: Mark,
+}
+
+/// What becomes of an attempt to join.
+enum Attempt {
+    Joined(Box<ControllerEnd>, Session),
+    /// There is no plant.
+    NoPlant,
+    /// There is a plant that is not ready yet.
+    NotReady,
 }
 
 impl ControllerEnd {
@@ -54,41 +70,63 @@ impl ControllerEnd {
     ///
     /// # Errors
     /// [`LinkError::PlantMissing`] after `timeout`,
+    /// [`LinkError::PlantSilent`] if there is a plant that does not become ready,
     /// [`LinkError::ControllerInUse`] if a controller is alive on the bus,
-    /// [`LinkError::Incompatible`], [`LinkError::Transport`].
-    pub fn open(bus: &BusName, timeout: Duration) -> Result<(Self, Session), LinkError> {
-        Self::open_with(bus, timeout, &default_config())
-    }
-
-    pub(super) fn open_with(
+    /// [`LinkError::Interrupted`], [`LinkError::Incompatible`], [`LinkError::Folder`],
+    /// [`LinkError::Held`], [`LinkError::Transport`].
+    pub fn open(
         bus: &BusName,
         timeout: Duration,
-        config: &Config,
+        interrupt: &Interrupt,
+    ) -> Result<(Self, Session), LinkError> {
+        Self::open_in(Place::of_user()?, bus, timeout, interrupt)
+    }
+
+    pub(super) fn open_in(
+        place: Place,
+        bus: &BusName,
+        timeout: Duration,
+        interrupt: &Interrupt,
     ) -> Result<(Self, Session), LinkError> {
         let start = Instant::now();
-        let presence = Presence::new(bus, config)?;
+        remove_dead(&place);
+        let bus = Bus {
+            name: bus.clone(),
+            place,
+        };
+        let mut silence = Silence::default();
         loop {
-            if let Some(joined) = join(&presence)?
-                && let Some(session) = joined.wait_for_begin(&presence, start + timeout)?
-            {
-                let end = joined.into_end(presence)?;
-                return Ok((end, session));
+            match join(&bus, interrupt)? {
+                Attempt::Joined(end, session) => return Ok((*end, session)),
+                Attempt::NoPlant => silence = Silence::default(),
+                Attempt::NotReady => {
+                    if let Next::GiveUp(silence) = silence.grow(DEFAULT_SILENCE_LIMIT) {
+                        return Err(LinkError::PlantSilent {
+                            bus: bus.name,
+                            silence,
+                        });
+                    }
+                }
+            }
+            if interrupt.is_requested() {
+                return Err(LinkError::Interrupted);
             }
             let waited = start.elapsed();
             if waited >= timeout {
+                // The plant may have been killed while it made its bus.
+                bus.remove_if_dead();
                 return Err(LinkError::PlantMissing {
-                    bus: bus.clone(),
+                    bus: bus.name,
                     waited,
                 });
             }
-            presence.clear_dead();
             std::thread::sleep(PLANT_POLL.min(timeout - waited));
         }
     }
 
     /// The bus.
     pub fn bus(&self) -> &BusName {
-        self.presence.bus()
+        self.ports.presence.bus()
     }
 
     /// Sets how long the plant may be silent before that is an error;
@@ -104,7 +142,7 @@ impl ControllerEnd {
     ///
     /// # Errors
     /// [`LinkError::PlantGone`] if the plant left without ending the session,
-    /// [`LinkError::PlantSilent`] after the silence limit,
+    /// [`LinkError::PlantSilent`] after the silence limit, [`LinkError::Interrupted`],
     /// [`LinkError::Incompatible`], [`LinkError::Transport`].
     pub fn receive(&mut self) -> Result<Received, LinkError> {
         let mut patience = Patience::new(self.silence_limit);
@@ -117,8 +155,7 @@ impl ControllerEnd {
                 return Ok(Received::End);
             }
             // Frames sent before `End` come before it: the loop takes them first.
-            self.ended =
-                take_announcement(&self.presence, &self.session)? == Some(Announcement::End);
+            self.ended = self.announcement()? == Some(Announcement::End);
             if self.ended {
                 continue;
             }
@@ -129,14 +166,10 @@ impl ControllerEnd {
             }
             match patience.pause() {
                 Next::Poll => {}
+                Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
                 // What was sent just before leaving still counts: poll once more.
-                Next::Look => known_gone = self.services.live_plant(&self.presence).is_none(),
-                Next::GiveUp(silence) => {
-                    return Err(LinkError::PlantSilent {
-                        bus: self.bus().clone(),
-                        silence,
-                    });
-                }
+                Next::Look => known_gone = !self.claim.peer_is_alive(),
+                Next::GiveUp(silence) => return Err(self.silent_for(silence)),
             }
         }
     }
@@ -150,101 +183,126 @@ impl ControllerEnd {
     /// [`ControllerEnd::receive`].
     #[inline]
     pub fn send(&mut self, frame: &ActuatorFrame) -> Result<(), LinkError> {
-        self.actuator
-            .send_copy(*frame)
+        self.guardian
+            .during(|| self.ports.actuator.send_copy(*frame))
             .map(|_| ())
-            .map_err(|cause| self.presence.transport("send an actuator frame", cause))
+            .map_err(|cause| {
+                self.ports
+                    .presence
+                    .transport("send an actuator frame", cause)
+            })
     }
 
     #[inline]
     fn take(&self) -> Result<Option<SensorFrame>, LinkError> {
-        match self.sensor.receive() {
+        match self.guardian.during(|| self.ports.sensor.receive()) {
             Ok(frame) => Ok(frame.map(|frame| *frame)),
-            Err(cause) => Err(self.presence.transport("receive a sensor frame", cause)),
+            Err(cause) => Err(self
+                .ports
+                .presence
+                .transport("receive a sensor frame", cause)),
         }
     }
-}
 
-/// Connects to the plant's services; `None` if there is no live plant.
-fn join(presence: &Presence) -> Result<Option<Joined>, LinkError> {
-    let services = match Services::open(presence) {
-        Ok(services) => services,
-        Err(Unavailable::Never(error)) => return Err(error),
-        Err(Unavailable::NotYet) => return Ok(None),
-    };
-    // Services without a plant are about to go; holding them would keep them.
-    let Some(plant) = services.live_plant(presence) else {
-        return Ok(None);
-    };
-    let (Some(sensor), Some(session)) = (
-        receiver(presence, &services.sensor)?,
-        receiver(presence, &services.session)?,
-    ) else {
-        return Err(LinkError::ControllerInUse {
-            bus: presence.bus().clone(),
-        });
-    };
-    Ok(Some(Joined {
-        sensor,
-        session,
-        services,
-        plant,
-    }))
-}
+    fn announcement(&self) -> Result<Option<Announcement>, LinkError> {
+        match self.guardian.during(|| self.ports.session.receive()) {
+            Ok(None) => Ok(None),
+            Ok(Some(message)) => message
+                .read()
+                .map(Some)
+                .ok_or_else(|| LinkError::Incompatible {
+                    bus: self.bus().clone(),
+                }),
+            Err(cause) => Err(self.ports.presence.transport("receive the session", cause)),
+        }
+    }
 
-impl Joined {
-    /// Waits for `Begin`; `None` if the plant left or `deadline` has passed.
-    fn wait_for_begin(
-        &self,
-        presence: &Presence,
-        deadline: Instant,
-    ) -> Result<Option<Session>, LinkError> {
-        let mut patience = Patience::new(deadline.saturating_duration_since(Instant::now()));
+    /// Waits for what the plant tells about its session; `None` if it has left.
+    fn wait_for_begin(&self) -> Result<Option<Session>, LinkError> {
+        let mut patience = Patience::new(self.silence_limit);
         loop {
-            match take_announcement(presence, &self.session)? {
+            match self.announcement()? {
                 Some(Announcement::Begin(session)) => return Ok(Some(session)),
                 Some(Announcement::End) => return Ok(None),
                 None => {}
             }
             match patience.pause() {
                 Next::Poll => {}
-                Next::Look if presence.is_alive(self.plant) => {}
-                Next::Look | Next::GiveUp(_) => return Ok(None),
+                Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
+                Next::Look if self.claim.peer_is_alive() => {}
+                Next::Look => return Ok(None),
+                Next::GiveUp(silence) => return Err(self.silent_for(silence)),
             }
         }
     }
 
-    /// The publisher comes last: it tells the plant that the controller is ready.
-    fn into_end(self, presence: Presence) -> Result<ControllerEnd, LinkError> {
-        let actuator = sender(&presence, &self.services.actuator)?.ok_or_else(|| {
-            LinkError::ControllerInUse {
-                bus: presence.bus().clone(),
-            }
-        })?;
-        Ok(ControllerEnd {
-            sensor: self.sensor,
-            session: self.session,
-            actuator,
-            services: self.services,
-            presence,
-            silence_limit: DEFAULT_SILENCE_LIMIT,
-            ended: false,
-        })
+    #[cold]
+    fn silent_for(&self, silence: Duration) -> LinkError {
+        LinkError::PlantSilent {
+            bus: self.bus().clone(),
+            silence,
+        }
     }
 }
 
-fn take_announcement(
-    presence: &Presence,
-    session: &Receiver<SessionMessage>,
-) -> Result<Option<Announcement>, LinkError> {
-    match session.receive() {
-        Ok(None) => Ok(None),
-        Ok(Some(message)) => message
-            .read()
-            .map(Some)
-            .ok_or_else(|| LinkError::Incompatible {
-                bus: presence.bus().clone(),
-            }),
-        Err(cause) => Err(presence.transport("receive the session", cause)),
+/// Joins the run of the plant on the bus.
+fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
+    let Some(lock) = bus.look().filter(|lock| lock.is_held(Role::Plant)) else {
+        return Ok(Attempt::NoPlant);
+    };
+    let in_use = || LinkError::ControllerInUse {
+        bus: bus.name.clone(),
+    };
+    let Some(run) = RunFiles::ready(bus) else {
+        // Joined by another, or not ready yet.
+        return if lock.is_held(Role::Controller) {
+            Err(in_use())
+        } else {
+            Ok(Attempt::NotReady)
+        };
+    };
+    let claim = bus.claim(Role::Controller)?.map_err(|_| in_use())?;
+    let refuse = |action| move |cause: io::Error| transport(&bus.name, action, cause);
+    if !claim.peer_is_alive() || !run.join().map_err(refuse("join its run"))? {
+        return Ok(Attempt::NotReady);
+    }
+    let guardian = Guardian::start(&claim).map_err(refuse("start a thread"))?;
+    let Some(ports) = guardian.during(|| Ports::open(bus, &run, &guardian))? else {
+        return Ok(Attempt::NotReady);
+    };
+    let end = ControllerEnd {
+        ports,
+        guardian,
+        claim,
+        silence_limit: DEFAULT_SILENCE_LIMIT,
+        interrupt: interrupt.clone(),
+        ended: false,
+    };
+    let Some(session) = end.wait_for_begin()? else {
+        return Ok(Attempt::NotReady);
+    };
+    run.set_answering().map_err(refuse("join its run"))?;
+    Ok(Attempt::Joined(Box::new(end), session))
+}
+
+impl Ports {
+    /// Connects to the plant's services; `None` if the plant has just left.
+    fn open(bus: &Bus, run: &RunFiles, guardian: &Guardian) -> Result<Option<Self>, LinkError> {
+        let presence = Presence::new(&bus.name, run)?;
+        let services = match Services::open(&presence) {
+            Ok(services) => services,
+            Err(Unavailable::Never(error)) => return Err(error),
+            Err(Unavailable::NotYet) => return Ok(None),
+        };
+        let (leaving, left) = guardian.marks();
+        Ok(Some(Self {
+            _leaving: leaving,
+            sensor: receiver(&presence, &services.sensor)?,
+            session: receiver(&presence, &services.session)?,
+            actuator: sender(&presence, &services.actuator)?,
+            _services: services,
+            presence,
+            _left: left,
+        }))
     }
 }

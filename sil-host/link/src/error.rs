@@ -1,5 +1,6 @@
 //! What can go wrong on the link, said to the person at the terminal.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use thiserror::Error;
@@ -128,10 +129,51 @@ pub enum LinkError {
         bus: BusName,
     },
 
+    /// The folder of a bus cannot be used.
+    #[error(
+        "cannot keep a bus in `{folder}`: {reason}; \
+         set XDG_RUNTIME_DIR to a folder that only you can write to"
+    )]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// Why not.
+        reason: String,
+    },
+
+    /// A process keeps the folder of the bus locked.
+    #[error("bus `{bus}` is held by {}, which is stopped or stuck: end it", holder(*process))]
+    Held {
+        /// The bus.
+        bus: BusName,
+        /// The process, if it is known.
+        process: Option<u32>,
+    },
+
+    /// There is too little shared memory for a bus.
+    #[error(
+        "bus `{bus}`: {folder} has {available} bytes left, a bus needs {needed}: \
+         make it larger, or remove what `painleve doctor` names"
+    )]
+    SharedMemoryFull {
+        /// The bus.
+        bus: BusName,
+        /// Where shared memory is.
+        folder: &'static str,
+        /// Bytes that can be taken.
+        available: u64,
+        /// Bytes that are needed.
+        needed: u64,
+    },
+
+    /// Ctrl-C or a request to end, while waiting for the peer.
+    #[error("interrupted")]
+    Interrupted,
+
     /// iceoryx2 or the operating system refused.
     #[error(
         "bus `{bus}`: could not {action} ({cause}); \
-         check that /dev/shm and /tmp are writable and not full"
+         check that /dev/shm is writable and not full, and `ulimit -n`"
     )]
     Transport {
         /// The bus.
@@ -141,4 +183,11 @@ pub enum LinkError {
         /// iceoryx2's reason.
         cause: String,
     },
+}
+
+fn holder(process: Option<u32>) -> String {
+    process.map_or_else(
+        || "a process".into(),
+        |process| format!("process {process}"),
+    )
 }

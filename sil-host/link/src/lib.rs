@@ -18,8 +18,10 @@
 //! `sequence`.
 //!
 //! A peer that has ended, was killed or stays silent becomes an error within
-//! [`DEFAULT_SILENCE_LIMIT`], never a hang. A killed process leaves its shared
-//! memory behind; the next end that starts or ends on the machine removes it.
+//! [`DEFAULT_SILENCE_LIMIT`], never a hang, in every phase. Who is on a bus is told by locks
+//! that the kernel releases (`claim`). Every run has files of its own (`run_files`), so that
+//! nobody meets what a killed process has left; the last on a bus, or the next plant on the
+//! machine, removes it. A thread watches every call into iceoryx2 (`guardian`).
 //!
 //! Set `IOX2_LOG_LEVEL=debug` to see what iceoryx2 itself has to say; otherwise
 //! it is quiet and [`LinkError`] speaks.
@@ -28,12 +30,16 @@
 //! [`ActuatorFrame`]: painleve_shared::frame::ActuatorFrame
 
 mod bus;
+mod claim;
 mod controller_end;
 mod error;
+mod guardian;
 pub mod lockstep;
 pub mod paced;
 mod patience;
+mod place;
 mod plant_end;
+mod run_files;
 mod services;
 mod session;
 #[cfg(test)]

@@ -1,80 +1,129 @@
 //! The plant's end of the link.
 
+use std::io;
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::Config;
+use nix::sys::statvfs::statvfs;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
+use super::claim::{Bus, Claim, Role, Taken, remove_dead};
+use super::guardian::{Guardian, Mark};
 use super::patience::{DEFAULT_SILENCE_LIMIT, Next, Patience, Silence};
-use super::services::{
-    Presence, Receiver, Sender, Services, Unavailable, default_config, plant_is_alive,
-    publisher_node, receiver, sender,
-};
+use super::place::{Place, SHARED_MEMORY};
+use super::run_files::RunFiles;
+use super::services::{Presence, Receiver, Sender, Services, receiver, sender, transport};
 use super::session::{Session, SessionMessage};
 use super::{BusName, LinkError};
+use painleve_system::interrupt::Interrupt;
 
-/// How long the controller of a plant that was killed may take to leave the bus.
-const TAKEOVER_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long the controller of a plant that was killed may take to leave the bus. Shorter
+/// than the limit of silence: whoever waits for this plant must not call it silent.
+const TAKEOVER_TIMEOUT: Duration = Duration::from_secs(1);
 const TAKEOVER_POLL: Duration = Duration::from_millis(10);
 const CONTROLLER_POLL: Duration = Duration::from_millis(5);
+/// Free shared memory without which no bus is made: three times what one takes. A segment
+/// takes its memory only when it is written, and with none left the kernel ends the writer.
+const SHARED_MEMORY_NEEDED: u64 = 256 * 1024;
 
 /// The plant's end: sends sensor frames, receives the controller's answers.
 ///
 /// Dropping it without [`PlantEnd::end`] tells the controller that the plant
 /// has failed. Either way nothing stays in shared memory.
 pub struct PlantEnd {
-    // Ports before services before the node: fields drop in this order.
-    sensor: Sender<SensorFrame>,
-    actuator: Receiver<ActuatorFrame>,
-    session: Sender<SessionMessage>,
-    services: Services,
-    presence: Presence,
+    // Fields drop in this order: the guardian watches the ports go, the claim cleans up.
+    ports: Ports,
+    run: RunFiles,
+    guardian: Guardian,
+    claim: Claim,
+    begin: SessionMessage,
     silence_limit: Duration,
     /// Of the controller, while frames go by the clock.
     silence: Silence,
+    interrupt: Interrupt,
+}
+
+/// What iceoryx2 has made for this end.
+struct Ports {
+    _leaving: Mark,
+    // Ports before services before the node.
+    sensor: Sender<SensorFrame>,
+    actuator: Receiver<ActuatorFrame>,
+    session: Sender<SessionMessage>,
+    _services: Services,
+    presence: Presence,
+    _left: Mark,
+}
+
+impl Ports {
+    fn create(bus: &Bus, run: &RunFiles, guardian: &Guardian) -> Result<Self, LinkError> {
+        let presence = Presence::new(&bus.name, run)?;
+        let services = Services::create(&presence)?;
+        let (leaving, left) = guardian.marks();
+        Ok(Self {
+            _leaving: leaving,
+            sensor: sender(&presence, &services.sensor)?,
+            actuator: receiver(&presence, &services.actuator)?,
+            session: sender(&presence, &services.session)?,
+            _services: services,
+            presence,
+            _left: left,
+        })
+    }
 }
 
 impl PlantEnd {
     /// Makes the bus and announces `session` on it.
     ///
-    /// What killed processes have left on the bus is removed first. A controller
-    /// of a killed plant is given two seconds to leave.
+    /// What killed processes have left is removed first. A controller of a killed plant is
+    /// given a second to leave.
     ///
     /// # Errors
     /// [`LinkError::BusInUse`] if a plant is alive on the bus,
     /// [`LinkError::BusOccupied`] if a controller of an earlier plant stays,
-    /// [`LinkError::ConfigurationTooLong`], [`LinkError::Transport`].
-    pub fn create(bus: &BusName, session: &Session) -> Result<Self, LinkError> {
-        Self::create_with(bus, session, &default_config())
-    }
-
-    pub(super) fn create_with(
+    /// [`LinkError::ConfigurationTooLong`], [`LinkError::Interrupted`],
+    /// [`LinkError::SharedMemoryFull`], [`LinkError::Folder`], [`LinkError::Held`],
+    /// [`LinkError::Transport`].
+    pub fn create(
         bus: &BusName,
         session: &Session,
-        config: &Config,
+        interrupt: &Interrupt,
+    ) -> Result<Self, LinkError> {
+        Self::create_in(Place::of_user()?, bus, session, interrupt)
+    }
+
+    pub(super) fn create_in(
+        place: Place,
+        bus: &BusName,
+        session: &Session,
+        interrupt: &Interrupt,
     ) -> Result<Self, LinkError> {
         let begin = SessionMessage::begin(session)?;
-        let presence = Presence::new(bus, config)?;
-        let services = take_over(&presence)?;
-
-        let in_use = || LinkError::BusInUse { bus: bus.clone() };
-        let end = Self {
-            sensor: sender(&presence, &services.sensor)?.ok_or_else(in_use)?,
-            actuator: receiver(&presence, &services.actuator)?.ok_or_else(in_use)?,
-            session: sender(&presence, &services.session)?.ok_or_else(in_use)?,
-            services,
-            presence,
+        remove_dead(&place);
+        let bus = Bus {
+            name: bus.clone(),
+            place,
+        };
+        check_shared_memory(&bus.name)?;
+        let claim = take_over(&bus, interrupt)?;
+        let guardian = Guardian::start(&claim)
+            .map_err(|cause| transport(&bus.name, "start a thread", cause))?;
+        let (run, ports) = start_run(&bus, &guardian, &begin)?;
+        Ok(Self {
+            ports,
+            run,
+            guardian,
+            claim,
+            begin,
             silence_limit: DEFAULT_SILENCE_LIMIT,
             silence: Silence::default(),
-        };
-        end.announce(begin)?;
-        Ok(end)
+            interrupt: interrupt.clone(),
+        })
     }
 
     /// The bus.
     pub fn bus(&self) -> &BusName {
-        self.presence.bus()
+        self.ports.presence.bus()
     }
 
     /// Sets how long the controller may be silent before that is an error;
@@ -87,17 +136,26 @@ impl PlantEnd {
     ///
     /// # Errors
     /// [`LinkError::ControllerMissing`] after `timeout`; may be called again.
+    /// [`LinkError::ControllerSilent`] if a controller has come and does not become ready
+    /// within the silence limit. [`LinkError::Interrupted`], [`LinkError::Transport`].
     pub fn wait_for_controller(&mut self, timeout: Duration) -> Result<(), LinkError> {
         let start = Instant::now();
+        let mut silence = Silence::default();
         loop {
             self.deliver_session()?;
-            // Its publisher is the last thing a controller makes.
-            if let Some(controller) = publisher_node(&self.services.actuator) {
-                if self.presence.is_alive(controller) {
+            if self.run.is_joined() {
+                if !self.claim.peer_is_alive() {
+                    self.restart()?;
+                    silence = Silence::default();
+                } else if self.run.is_answering() {
                     self.silence = Silence::default();
                     return Ok(());
+                } else if let Next::GiveUp(silence) = silence.grow(self.silence_limit) {
+                    return Err(self.silent_for(silence));
                 }
-                self.presence.clear_dead();
+            }
+            if self.interrupt.is_requested() {
+                return Err(LinkError::Interrupted);
             }
             let waited = start.elapsed();
             if waited >= timeout {
@@ -110,6 +168,18 @@ impl PlantEnd {
         }
     }
 
+    /// Makes everything anew for the next controller: the last one has died in the middle of
+    /// something.
+    fn restart(&mut self) -> Result<(), LinkError> {
+        let bus = self.claim.bus();
+        RunFiles::remove_half_made(bus);
+        let (run, ports) = start_run(bus, &self.guardian, &self.begin)?;
+        self.ports = ports;
+        std::mem::replace(&mut self.run, run)
+            .remove()
+            .map_err(|cause| transport(&bus.name, "remove a dead controller's files", cause))
+    }
+
     /// Sends a frame and waits for its answer: one lockstep tick.
     ///
     /// Does not allocate unless the answer takes longer than 50 ms.
@@ -117,7 +187,7 @@ impl PlantEnd {
     /// # Errors
     /// [`LinkError::ControllerGone`] and [`LinkError::ControllerSilent`], the
     /// latter after the silence limit; [`LinkError::WrongTick`] if the answer
-    /// echoes another tick; [`LinkError::Transport`].
+    /// echoes another tick; [`LinkError::Interrupted`], [`LinkError::Transport`].
     pub fn exchange(&mut self, frame: &SensorFrame) -> Result<ActuatorFrame, LinkError> {
         if self.send_to_controller(frame)? == 0 {
             return Err(self.gone());
@@ -141,8 +211,9 @@ impl PlantEnd {
             }
             match patience.pause() {
                 Next::Poll => {}
+                Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
                 // An answer sent just before leaving still counts: poll once more.
-                Next::Look => known_gone = !self.controller_is_alive(),
+                Next::Look => known_gone = !self.claim.peer_is_alive(),
                 Next::GiveUp(silence) => return Err(self.silent_for(silence)),
             }
         }
@@ -170,7 +241,7 @@ impl PlantEnd {
         }
         match self.silence.grow(self.silence_limit) {
             Next::Poll => Ok(None),
-            Next::Look if self.controller_is_alive() => Ok(None),
+            Next::Look if self.claim.peer_is_alive() => Ok(None),
             // An answer sent just before leaving still counts: poll once more.
             Next::Look => self.take()?.map(Some).ok_or_else(|| self.gone()),
             Next::GiveUp(silence) => Err(self.silent_for(silence)),
@@ -186,40 +257,39 @@ impl PlantEnd {
     }
 
     fn announce(&self, message: SessionMessage) -> Result<(), LinkError> {
-        self.session
-            .send_copy(message)
-            .map(|_| ())
-            .map_err(|cause| self.presence.transport("announce the session", cause))
+        self.guardian.during(|| announce(&self.ports, message))
     }
 
     /// Hands `Begin` to a controller that has joined since.
     fn deliver_session(&self) -> Result<(), LinkError> {
-        self.session
-            .update_connections()
-            .map_err(|cause| self.presence.transport("announce the session", cause))
+        self.guardian
+            .during(|| self.ports.session.update_connections())
+            .map_err(|cause| self.transport("announce the session", cause))
     }
 
     #[inline]
     fn send_to_controller(&self, frame: &SensorFrame) -> Result<usize, LinkError> {
-        self.sensor
-            .send_copy(*frame)
-            .map_err(|cause| self.presence.transport("send a sensor frame", cause))
+        self.guardian
+            .during(|| self.ports.sensor.send_copy(*frame))
+            .map_err(|cause| self.transport("send a sensor frame", cause))
     }
 
     #[inline]
     fn take(&mut self) -> Result<Option<ActuatorFrame>, LinkError> {
-        match self.actuator.receive() {
+        let received = self.guardian.during(|| self.ports.actuator.receive());
+        match received {
             Ok(None) => Ok(None),
             Ok(Some(answer)) => {
                 self.silence = Silence::default();
                 Ok(Some(*answer))
             }
-            Err(cause) => Err(self.presence.transport("receive an actuator frame", cause)),
+            Err(cause) => Err(self.transport("receive an actuator frame", cause)),
         }
     }
 
-    fn controller_is_alive(&self) -> bool {
-        publisher_node(&self.services.actuator).is_some_and(|node| self.presence.is_alive(node))
+    #[cold]
+    fn transport(&self, action: &'static str, cause: impl ToString) -> LinkError {
+        self.ports.presence.transport(action, cause)
     }
 
     #[cold]
@@ -238,23 +308,60 @@ impl PlantEnd {
     }
 }
 
-/// Makes the services, once nobody of an earlier run holds them any more.
-fn take_over(presence: &Presence) -> Result<Services, LinkError> {
+/// Makes a run, announces its session and lets a controller join.
+fn start_run(
+    bus: &Bus,
+    guardian: &Guardian,
+    begin: &SessionMessage,
+) -> Result<(RunFiles, Ports), LinkError> {
+    let refuse = |cause: io::Error| transport(&bus.name, "make the files of its run", cause);
+    let run = RunFiles::create(bus).map_err(refuse)?;
+    let ports = guardian.during(|| {
+        let ports = Ports::create(bus, &run, guardian)?;
+        announce(&ports, *begin).map(|()| ports)
+    })?;
+    run.set_ready().map_err(refuse)?;
+    Ok((run, ports))
+}
+
+fn announce(ports: &Ports, message: SessionMessage) -> Result<(), LinkError> {
+    ports
+        .session
+        .send_copy(message)
+        .map(|_| ())
+        .map_err(|cause| ports.presence.transport("announce the session", cause))
+}
+
+/// Takes the bus, once nobody of an earlier run is on it any more.
+fn take_over(bus: &Bus, interrupt: &Interrupt) -> Result<Claim, LinkError> {
     let start = Instant::now();
     loop {
-        match Services::create(presence) {
-            Ok(services) => return Ok(services),
-            Err(Unavailable::Never(error)) => return Err(error),
-            Err(Unavailable::NotYet) => {}
+        let name = || bus.name.clone();
+        match bus.claim(Role::Plant)? {
+            Ok(claim) => return Ok(claim),
+            Err(Taken::ByAnother) => return Err(LinkError::BusInUse { bus: name() }),
+            Err(Taken::ByEarlierRun) if start.elapsed() >= TAKEOVER_TIMEOUT => {
+                return Err(LinkError::BusOccupied { bus: name() });
+            }
+            Err(Taken::ByEarlierRun) if interrupt.is_requested() => {
+                return Err(LinkError::Interrupted);
+            }
+            Err(Taken::ByEarlierRun) => std::thread::sleep(TAKEOVER_POLL),
         }
-        let bus = || presence.bus().clone();
-        if plant_is_alive(presence) {
-            return Err(LinkError::BusInUse { bus: bus() });
-        }
-        if start.elapsed() >= TAKEOVER_TIMEOUT {
-            return Err(LinkError::BusOccupied { bus: bus() });
-        }
-        presence.clear_dead();
-        std::thread::sleep(TAKEOVER_POLL);
     }
+}
+
+fn check_shared_memory(bus: &BusName) -> Result<(), LinkError> {
+    let state =
+        statvfs(SHARED_MEMORY).map_err(|cause| transport(bus, "look at shared memory", cause))?;
+    let available = state.blocks_available() * state.fragment_size();
+    if available >= SHARED_MEMORY_NEEDED {
+        return Ok(());
+    }
+    Err(LinkError::SharedMemoryFull {
+        bus: bus.clone(),
+        folder: SHARED_MEMORY,
+        available,
+        needed: SHARED_MEMORY_NEEDED,
+    })
 }

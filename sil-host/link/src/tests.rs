@@ -7,35 +7,36 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-use iceoryx2::prelude::{Config, FileName, SemanticString};
 use nix::sys::signal::Signal;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_system::interrupt::Interrupt;
 
+use super::place::{Place, SHARED_MEMORY};
 use super::*;
 
 /// Longer than any pause of a busy test machine.
 const PATIENT: Duration = Duration::from_secs(20);
 const SHORT: Duration = Duration::from_millis(100);
 
-/// A bus with a file prefix of its own, so that a test sees what it leaves.
+/// A bus in a place of its own, so that a test sees what it leaves.
 #[derive(Clone)]
 struct TestBus {
     name: BusName,
-    config: Config,
+    place: Place,
     files: Option<Arc<Files>>,
 }
 
 /// The files of a test, removed at its end even if it fails.
 struct Files {
+    folder: tempfile::TempDir,
     prefix: String,
 }
 
 impl Files {
     fn left(&self) -> Vec<PathBuf> {
         let mut left = Vec::new();
-        find(Path::new("/dev/shm"), &self.prefix, &mut left);
-        let folder = services::default_config().global.root_path().to_string();
-        find(Path::new(&folder), &self.prefix, &mut left);
+        find(Path::new(SHARED_MEMORY), &self.prefix, &mut left);
+        find(self.folder.path(), "", &mut left);
         left
     }
 }
@@ -50,34 +51,42 @@ impl Drop for Files {
 
 impl TestBus {
     fn new() -> Self {
-        let bus = Self::named(BusName::unique());
-        let prefix = bus.config.global.prefix.to_string();
+        let folder = tempfile::tempdir().unwrap();
+        let bus = Self::named(BusName::unique(), folder.path().to_path_buf());
+        let prefix = bus.place.prefix.clone();
         Self {
-            files: Some(Arc::new(Files { prefix })),
+            files: Some(Arc::new(Files { folder, prefix })),
             ..bus
         }
     }
 
-    fn named(name: BusName) -> Self {
-        let mut config = services::default_config();
+    fn named(name: BusName, folder: PathBuf) -> Self {
         let prefix = format!("iox2_test_{name}_");
-        config.global.prefix = FileName::new(prefix.as_bytes()).unwrap();
         Self {
             name,
-            config,
+            place: Place { folder, prefix },
             files: None,
         }
     }
 
     fn plant(&self) -> Result<PlantEnd, LinkError> {
-        let mut plant = PlantEnd::create_with(&self.name, &session(), &self.config)?;
+        let mut plant = PlantEnd::create_in(
+            self.place.clone(),
+            &self.name,
+            &session(),
+            &Interrupt::default(),
+        )?;
         plant.set_silence_limit(PATIENT);
         Ok(plant)
     }
 
     fn controller(&self, timeout: Duration) -> Result<(ControllerEnd, Session), LinkError> {
-        let (mut controller, session) =
-            ControllerEnd::open_with(&self.name, timeout, &self.config)?;
+        let (mut controller, session) = ControllerEnd::open_in(
+            self.place.clone(),
+            &self.name,
+            timeout,
+            &Interrupt::default(),
+        )?;
         controller.set_silence_limit(PATIENT);
         Ok((controller, session))
     }
@@ -95,6 +104,7 @@ impl TestBus {
             .args(["--ignored", "--nocapture"])
             .env(ROLE, role)
             .env(BUS, self.name.as_str())
+            .env(FOLDER, &self.place.folder)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -104,9 +114,7 @@ impl TestBus {
 
     #[track_caller]
     fn assert_nothing_left(&self) {
-        let mut left = self.files.as_ref().unwrap().left();
-        // The count of nodes: one page for the whole machine, kept by iceoryx2.
-        left.retain(|path| path.extension().is_none_or(|e| e != "global_mgmt"));
+        let left = self.files.as_ref().unwrap().left();
         assert!(left.is_empty(), "left behind: {left:?}");
     }
 }
@@ -127,6 +135,7 @@ fn find(folder: &Path, prefix: &str, found: &mut Vec<PathBuf>) {
 const OPEN: &str = "end is open";
 const ROLE: &str = "PAINLEVE_TEST_ROLE";
 const BUS: &str = "PAINLEVE_TEST_BUS";
+const FOLDER: &str = "PAINLEVE_TEST_FOLDER";
 
 /// Killed, as by SIGKILL, when dropped.
 struct Process(Child);
@@ -159,7 +168,10 @@ fn end_in_a_process() {
     let Ok(role) = std::env::var(ROLE) else {
         return;
     };
-    let bus = TestBus::named(std::env::var(BUS).unwrap().parse().unwrap());
+    let bus = TestBus::named(
+        std::env::var(BUS).unwrap().parse().unwrap(),
+        std::env::var_os(FOLDER).unwrap().into(),
+    );
     match role.as_str() {
         "controller" => {
             let (controller, _) = bus.controller(PATIENT).unwrap();

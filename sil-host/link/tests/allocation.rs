@@ -16,6 +16,7 @@ use painleve_plant::controller_host::InProcess;
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_system::interrupt::Interrupt;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -105,11 +106,12 @@ fn frames_cross_the_link_without_allocation_on_either_end() {
         pacing: Pacing::Lockstep,
         configuration: vec![7; 100],
     };
-    let mut plant = PlantEnd::create(&bus, &session).unwrap();
+    let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default()).unwrap();
     plant.set_silence_limit(PATIENT);
 
     let controller = std::thread::spawn(move || {
-        let (mut controller, _) = ControllerEnd::open(&bus, PATIENT).unwrap();
+        let (mut controller, _) =
+            ControllerEnd::open(&bus, PATIENT, &Interrupt::default()).unwrap();
         controller.set_silence_limit(PATIENT);
         let mut before = 0;
         let mut after = 0;

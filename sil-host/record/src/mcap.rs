@@ -72,6 +72,8 @@ pub enum RecordError {
 #[derive(Debug)]
 pub struct Recorder {
     path: PathBuf,
+    /// The file behind the path.
+    target: PathBuf,
     buffer: Vec<Sample>,
     /// `None` after the recording ended.
     writer: Option<WriterThread>,
@@ -102,7 +104,7 @@ impl Recorder {
     }
 
     fn start(file: AtomicFile, metadata: &BTreeMap<String, String>) -> Result<Self, RecordError> {
-        let path = file.path().to_path_buf();
+        let (path, target) = (file.path().to_path_buf(), file.target().to_path_buf());
         let log = LogWriter::new(file, metadata).map_err(|error| write_error(&path, error))?;
 
         let (full, full_buffers) = sync_channel(BUFFERS);
@@ -117,6 +119,7 @@ impl Recorder {
         match thread {
             Ok(thread) => Ok(Self {
                 path,
+                target,
                 buffer: Vec::with_capacity(SAMPLES_PER_BUFFER),
                 writer: Some(WriterThread {
                     full,
@@ -153,6 +156,28 @@ impl Recorder {
             .finish()
             .map_err(|error| write_error(&self.path, error))?;
         Ok(file.commit()?)
+    }
+
+    /// Whether the record and `file` would take the same name.
+    pub fn is_same_file(&self, file: &AtomicFile) -> bool {
+        self.target == file.target()
+    }
+
+    /// Writes what there is of a run that has ended early, under a name that says so, with
+    /// the reason in a metadata record `ended early`; that name is returned. A record of an
+    /// earlier run stays.
+    ///
+    /// # Errors
+    /// As [`Recorder::finish`].
+    pub fn finish_partial(mut self, reason: &str) -> Result<PathBuf, RecordError> {
+        self.hand_over()?;
+        let mut log = self.end()?;
+        let metadata = BTreeMap::from([("reason".to_owned(), reason.to_owned())]);
+        let file = log
+            .write_metadata("ended early", metadata)
+            .and_then(|()| log.finish())
+            .map_err(|error| write_error(&self.path, error))?;
+        Ok(file.commit_partial()?)
     }
 
     #[cold]
@@ -255,6 +280,17 @@ impl LogWriter {
             writer,
             sequence: 0,
             json: Vec::with_capacity(1024),
+        })
+    }
+
+    fn write_metadata(
+        &mut self,
+        name: &str,
+        metadata: BTreeMap<String, String>,
+    ) -> Result<(), McapError> {
+        self.writer.write_metadata(&Metadata {
+            name: name.to_owned(),
+            metadata,
         })
     }
 

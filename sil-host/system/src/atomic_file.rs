@@ -3,9 +3,15 @@
 //! An [`AtomicFile`] is written under a temporary name beside its target and takes
 //! the target's name in [`commit`](AtomicFile::commit), after the data is on the
 //! disk. Dropped before that, it leaves nothing; an older file stays as it was.
+//!
+//! The temporary file is locked as long as its process lives. What killed processes have
+//! left, the next file of the same name removes. A symbolic link stays: the file that it
+//! names is replaced.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, Seek, SeekFrom, Write};
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
@@ -44,7 +50,10 @@ pub enum AtomicFileError {
 /// A file that gets its name when it is complete.
 #[derive(Debug)]
 pub struct AtomicFile {
+    /// As it was given, for messages.
     path: PathBuf,
+    folder: PathBuf,
+    target: PathBuf,
     temporary: NamedTempFile,
     /// Bytes that still fit, for tests of a disk that fills up.
     #[cfg(any(test, feature = "full-disk"))]
@@ -59,33 +68,22 @@ impl AtomicFile {
     /// folder cannot be made or written.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self, AtomicFileError> {
         let path = path.into();
-        // Renaming onto a folder would fail only at the end, and onto a device
-        // would replace the device.
-        let taken = fs::metadata(&path).is_ok_and(|metadata| !metadata.is_file());
-        let (Some(name), Some(folder), false) = (path.file_name(), path.parent(), taken) else {
+        let Some((folder, name)) = place(&path) else {
             return Err(AtomicFileError::NotAFile { path });
         };
-        let folder = if folder.as_os_str().is_empty() {
-            Path::new(".")
-        } else {
-            folder
-        };
-        if let Err(source) = fs::create_dir_all(folder) {
-            let folder = folder.to_path_buf();
+        if let Err(source) = fs::create_dir_all(&folder) {
             return Err(AtomicFileError::Folder {
                 path,
                 folder,
                 source,
             });
         }
-        let prefix = format!(".{}.", name.to_string_lossy());
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(&prefix).suffix(".part");
-        // Temporary files are private by default; an output file is not.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        match builder.tempfile_in(folder) {
-            Ok(temporary) => Ok(Self {
+        let opened = temporary(&folder, &name)
+            .and_then(|temporary| Ok((fs::canonicalize(&folder)?.join(name), temporary)));
+        match opened {
+            Ok((target, temporary)) => Ok(Self {
+                target,
+                folder,
                 path,
                 temporary,
                 #[cfg(any(test, feature = "full-disk"))]
@@ -95,9 +93,14 @@ impl AtomicFile {
         }
     }
 
-    /// The name the file will have.
+    /// The name the file will have, as it was given.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The name the file will have, symbolic links followed.
+    pub fn target(&self) -> &Path {
+        &self.target
     }
 
     /// Brings the data to the disk and gives the file its name.
@@ -107,16 +110,37 @@ impl AtomicFile {
     /// nothing is left then.
     pub fn commit(self) -> Result<(), AtomicFileError> {
         let Self {
-            path, temporary, ..
+            path,
+            folder,
+            target,
+            temporary,
+            ..
         } = self;
-        let committed = match temporary.as_file().sync_all() {
-            Ok(()) => temporary.persist(&path).map_err(|error| error.error),
-            Err(error) => Err(error),
+        let write = |source| AtomicFileError::Write {
+            path: path.clone(),
+            source,
         };
-        match committed {
-            Ok(_) => Ok(()),
-            Err(source) => Err(AtomicFileError::Write { path, source }),
-        }
+        temporary.as_file().sync_all().map_err(write)?;
+        temporary
+            .persist(target)
+            .map_err(|error| write(error.error))?;
+        sync_folder(&folder).map_err(write)
+    }
+
+    /// Brings what there is of the data to the disk, under a name that says so:
+    /// `run.partial.mcap` for `run.mcap`, which stays as it was. That name is returned.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::commit`].
+    pub fn commit_partial(mut self) -> Result<PathBuf, AtomicFileError> {
+        let rename = |path: &Path| {
+            let extension = path.extension().unwrap_or_default().to_string_lossy();
+            path.with_extension(format!("partial.{extension}"))
+        };
+        self.target = rename(&self.target);
+        let path = rename(&self.path);
+        self.commit()?;
+        Ok(path)
     }
 
     // The plain file: `NamedTempFile` would put its temporary name into errors.
@@ -143,6 +167,72 @@ impl Write for AtomicFile {
 impl Seek for AtomicFile {
     fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
         self.file().seek(position)
+    }
+}
+
+/// The folder and the name of a file to be; a symbolic link is followed. `None` if something
+/// else than a regular file is there: renaming onto a folder would fail only at the end, and
+/// onto a device would replace the device.
+fn place(path: &Path) -> Option<(PathBuf, OsString)> {
+    let followed = match fs::symlink_metadata(path) {
+        Ok(metadata) if metadata.is_symlink() => fs::canonicalize(path).ok()?,
+        _ => path.to_path_buf(),
+    };
+    if fs::metadata(&followed).is_ok_and(|metadata| !metadata.is_file()) {
+        return None;
+    }
+    let name = followed.file_name()?.to_os_string();
+    let folder = followed.parent()?;
+    let folder = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    Some((folder.to_path_buf(), name))
+}
+
+/// A locked temporary file, after those of processes that have died are removed.
+fn temporary(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
+    let prefix = format!(".{}.", name.to_string_lossy());
+    remove_abandoned(folder, &prefix);
+    loop {
+        let temporary = tempfile::Builder::new()
+            .prefix(&prefix)
+            .suffix(SUFFIX)
+            // Temporary files are private by default; an output file is not.
+            .permissions(fs::Permissions::from_mode(0o666))
+            .tempfile_in(folder)?;
+        // Where files cannot be locked they are not removed either.
+        let _ = temporary.as_file().try_lock();
+        // Another process may have taken it for an abandoned one before it was locked.
+        let own = temporary.as_file().metadata()?.ino();
+        if fs::symlink_metadata(temporary.path()).is_ok_and(|there| there.ino() == own) {
+            return Ok(temporary);
+        }
+    }
+}
+
+const SUFFIX: &str = ".part";
+
+fn remove_abandoned(folder: &Path, prefix: &str) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(prefix)
+            && name.ends_with(SUFFIX)
+            && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Brings a new name to the disk, too.
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    match File::open(folder).and_then(|folder| folder.sync_all()) {
+        // Not every file system can.
+        Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
+        other => other,
     }
 }
 
@@ -192,6 +282,50 @@ mod tests {
         file.write_all(b"half").unwrap();
         drop(file);
         assert_eq!(names(folder.path()), [""; 0]);
+    }
+
+    #[test]
+    fn what_a_killed_process_has_left_is_removed_and_what_is_being_written_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.svg");
+        let writing = AtomicFile::create(&path).unwrap();
+        fs::write(folder.path().join(".run.svg.killed.part"), "half").unwrap();
+        fs::write(folder.path().join(".other.svg.killed.part"), "half").unwrap();
+        write(&path, b"next").unwrap();
+        writing.commit().unwrap();
+        let mut left = names(folder.path());
+        left.sort();
+        assert_eq!(left, [".other.svg.killed.part", "run.svg"]);
+    }
+
+    #[test]
+    fn a_symbolic_link_stays_and_what_it_names_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write(&link, b"new").unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&file).unwrap(), b"new");
+        // One that leads nowhere cannot be followed.
+        fs::remove_file(&file).unwrap();
+        assert!(matches!(
+            AtomicFile::create(&link),
+            Err(AtomicFileError::NotAFile { .. })
+        ));
+    }
+
+    #[test]
+    fn part_of_a_file_is_kept_under_a_name_that_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        fs::write(&path, "old").unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"half").unwrap();
+        let partial = file.commit_partial().unwrap();
+        assert_eq!(partial, folder.path().join("run.partial.mcap"));
+        assert_eq!(fs::read(partial).unwrap(), b"half");
+        assert_eq!(fs::read(path).unwrap(), b"old");
     }
 
     #[test]

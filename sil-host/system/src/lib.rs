@@ -4,8 +4,10 @@
 //! - [`realtime`]: absolute deadlines, real-time priority, locked memory
 //! - [`lifetime`]: child processes that never outlive whoever started them
 //! - [`interrupt`]: Ctrl-C and requests to end
+//! - [`terminal`]: standard output and error that may be closed or full
 
 pub mod atomic_file;
 pub mod interrupt;
 pub mod lifetime;
 pub mod realtime;
+pub mod terminal;

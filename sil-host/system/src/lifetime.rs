@@ -5,39 +5,40 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
+use nix::errno::Errno;
 use nix::sys::prctl::set_pdeathsig;
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::{Pid, getppid};
+pub use nix::sys::signal::Signal;
+use nix::sys::signal::kill;
+use nix::sys::wait::{Id, WaitPidFlag, WaitStatus, waitid};
+use nix::unistd::{Pid, getpid, getppid};
 
-/// Asks the kernel to end this process when its parent ends.
+/// Makes the kernel send a command's process `signal` when the thread that starts it ends,
+/// however that ends: [`Signal::SIGKILL`] for a program that ignores requests to end.
 ///
-/// # Errors
-/// If the kernel refuses, or the parent is gone already.
-pub fn end_with_parent() -> io::Result<()> {
-    set_pdeathsig(Signal::SIGTERM)?;
-    // A parent that ended before the request would never be noticed.
-    if getppid() == Pid::from_raw(1) {
-        return Err(io::Error::other(
-            "the process that started this one is gone",
-        ));
-    }
-    Ok(())
-}
-
-/// Makes the kernel kill a command's process when the thread that started it ends. For a
-/// program that is not ours and ignores requests to end.
+/// Starting the command fails if that thread is gone already. Which process inherits orphans
+/// does not matter: it is not always the first one.
 #[allow(unsafe_code)]
-pub fn kill_with_parent(command: &mut Command) -> &mut Command {
+pub fn end_with_parent(command: &mut Command, signal: Signal) -> &mut Command {
+    let parent = getpid();
+    let request = move || {
+        set_pdeathsig(signal)?;
+        // A parent that ended before the request would never be noticed.
+        if getppid() == parent {
+            Ok(())
+        } else {
+            Err(io::Error::from_raw_os_error(Errno::ESRCH as i32))
+        }
+    };
     // SAFETY: the closure runs between fork and exec, where only async-signal-safe
-    // calls are allowed; it makes one system call and does not allocate.
-    unsafe { command.pre_exec(|| Ok(set_pdeathsig(Signal::SIGKILL)?)) }
+    // calls are allowed; it makes two system calls and does not allocate.
+    unsafe { command.pre_exec(request) }
 }
 
 /// A child that is ended, by force if need be, when this value goes.
 pub struct Guarded(Child);
 
 /// Time between asking a child to end and forcing it.
-const GRACE: Duration = Duration::from_millis(300);
+const GRACE: Duration = Duration::from_millis(1000);
 
 impl Guarded {
     /// Takes charge of a child.
@@ -50,12 +51,30 @@ impl Guarded {
         &mut self.0
     }
 
+    /// Its process id.
+    pub fn id(&self) -> u32 {
+        self.0.id()
+    }
+
     /// How the child ended, if it has.
     ///
     /// # Errors
     /// If the system cannot tell.
     pub fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
         self.0.try_wait()
+    }
+
+    /// Whether the child is stopped, as by SIGSTOP.
+    pub fn is_stopped(&self) -> bool {
+        let Ok(id) = i32::try_from(self.0.id()) else {
+            return false;
+        };
+        // Only a look: how the child ends is for `ended` to find out.
+        let look = WaitPidFlag::WSTOPPED | WaitPidFlag::WNOHANG | WaitPidFlag::WNOWAIT;
+        matches!(
+            waitid(Id::Pid(Pid::from_raw(id)), look),
+            Ok(WaitStatus::Stopped(..))
+        )
     }
 
     /// Forces the child to end.
@@ -65,10 +84,10 @@ impl Guarded {
         let _ = self.0.wait();
     }
 
-    /// Asks the child to end, waits a while, then forces it.
-    pub fn stop(&mut self) {
-        if let Ok(Some(_)) = self.0.try_wait() {
-            return;
+    /// Asks the child to end, waits a while, then forces it; how it ended.
+    pub fn stop(&mut self) -> Option<ExitStatus> {
+        if let Ok(Some(status)) = self.0.try_wait() {
+            return Some(status);
         }
         if let Ok(id) = i32::try_from(self.0.id()) {
             // An error means that it has just ended.
@@ -76,12 +95,17 @@ impl Guarded {
         }
         let asked = Instant::now();
         while asked.elapsed() < GRACE {
-            if let Ok(Some(_)) = self.0.try_wait() {
-                return;
+            if let Ok(Some(status)) = self.0.try_wait() {
+                return Some(status);
+            }
+            if self.is_stopped() {
+                // It cannot hear.
+                break;
             }
             std::thread::sleep(Duration::from_millis(5));
         }
         self.kill();
+        self.0.wait().ok()
     }
 }
 

@@ -1,6 +1,5 @@
 //! Options that all studies share: what to vary from, where the outcome goes.
 
-use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -11,7 +10,7 @@ use painleve_shared::Posture;
 use painleve_study::{Outcome, Study, StudyError, outcome};
 use painleve_system::atomic_file::{self, AtomicFile};
 
-use crate::CommandError;
+use crate::{CommandError, say};
 
 /// The built-in scenario without a controller.
 const OPEN_LOOP: &str = "open-loop-bounce";
@@ -168,8 +167,7 @@ impl OutcomeOptions {
         } else {
             outcome.table().to_string()
         };
-        writeln!(std::io::stdout(), "{text}")
-            .map_err(|error| CommandError::Output(format!("cannot write to stdout: {error}")))
+        say(text)
     }
 }
 

@@ -1,0 +1,321 @@
+//! Who is on a bus: a lock that the kernel releases when its holder dies.
+//!
+//! Every bus has a folder with one file, `lock`, whose first bytes are locked:
+//!
+//! | byte | locked                                                     |
+//! |------|------------------------------------------------------------|
+//! | 0    | for a moment, by whoever changes what the folder holds     |
+//! | 1    | by the plant, as long as it is on the bus                  |
+//! | 2    | by the controller, as long as it is on the bus             |
+//!
+//! The locks belong to the open file (`F_OFD_SETLK`), so that they end with the process,
+//! however it ends, and that another process can ask who lives without taking anything.
+//! Whoever leaves a bus last removes its folder and its shared memory; what killed
+//! processes leave, the next start removes.
+
+use std::fs::{self, File, OpenOptions};
+use std::io;
+use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use nix::errno::Errno;
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::libc::{F_RDLCK, F_UNLCK, F_WRLCK, SEEK_SET, c_short, flock};
+
+use super::place::{Place, make_private};
+use super::run_files::RunFiles;
+use super::{BusName, LinkError};
+
+const LOCK: &str = "lock";
+/// Longest wait for another process that changes the folder: it takes milliseconds.
+const GATE_PATIENCE: Duration = Duration::from_millis(1000);
+const GATE_POLL: Duration = Duration::from_millis(1);
+/// Bytes for the number of a process in the lock file, with its line break.
+const NUMBER_WIDTH: usize = 11;
+
+/// What a process is on a bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    Plant,
+    Controller,
+}
+
+impl Role {
+    fn byte(self) -> i64 {
+        match self {
+            Self::Plant => 1,
+            Self::Controller => 2,
+        }
+    }
+
+    /// The other end.
+    pub(super) fn peer(self) -> Self {
+        match self {
+            Self::Plant => Self::Controller,
+            Self::Controller => Self::Plant,
+        }
+    }
+}
+
+const GATE: i64 = 0;
+
+/// The open lock file of a bus.
+#[derive(Debug)]
+pub(super) struct LockFile(File);
+
+impl LockFile {
+    fn open(path: &Path, create: bool) -> io::Result<Self> {
+        OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(create)
+            .mode(0o600)
+            .custom_flags(OFlag::O_NOFOLLOW.bits())
+            .open(path)
+            .map(Self)
+    }
+
+    /// The same open file: it shares the locks.
+    pub(super) fn share(&self) -> io::Result<Self> {
+        self.0.try_clone().map(Self)
+    }
+
+    /// Whether a process of this role is on the bus. When the system cannot tell, yes:
+    /// the limit of silence remains.
+    pub(super) fn is_held(&self, role: Role) -> bool {
+        let mut asked = byte_lock(role.byte(), F_RDLCK);
+        match fcntl(&self.0, FcntlArg::F_OFD_GETLK(&mut asked)) {
+            Ok(_) => asked.l_type != F_UNLCK as c_short,
+            Err(_) => true,
+        }
+    }
+
+    /// Takes a lock; `false` if another process holds it.
+    fn try_lock(&self, byte: i64) -> io::Result<bool> {
+        match fcntl(&self.0, FcntlArg::F_OFD_SETLK(&byte_lock(byte, F_WRLCK))) {
+            Ok(_) => Ok(true),
+            Err(Errno::EAGAIN | Errno::EACCES) => Ok(false),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn unlock(&self, byte: i64) {
+        // Closing the file would do the same; there is nothing to do about an error.
+        let _ = fcntl(&self.0, FcntlArg::F_OFD_SETLK(&byte_lock(byte, F_UNLCK)));
+    }
+
+    /// Whether the file still has its name: its folder may have been removed.
+    fn is_at(&self, path: &Path) -> bool {
+        match (self.0.metadata(), fs::symlink_metadata(path)) {
+            (Ok(own), Ok(there)) => own.ino() == there.ino() && own.dev() == there.dev(),
+            _ => false,
+        }
+    }
+
+    /// Notes this process as the holder of a byte, for messages only.
+    fn sign(&self, byte: i64) {
+        let line = format!("{:>1$}\n", std::process::id(), NUMBER_WIDTH - 1);
+        let at = byte.unsigned_abs() * NUMBER_WIDTH as u64;
+        let _ = self.0.write_at(line.as_bytes(), at);
+    }
+
+    /// The process that has last taken a byte.
+    fn signed(&self, byte: i64) -> Option<u32> {
+        let mut line = [0; NUMBER_WIDTH];
+        let at = byte.unsigned_abs() * NUMBER_WIDTH as u64;
+        self.0.read_exact_at(&mut line, at).ok()?;
+        std::str::from_utf8(&line).ok()?.trim().parse().ok()
+    }
+}
+
+fn byte_lock(byte: i64, kind: i32) -> flock {
+    flock {
+        l_type: kind as c_short,
+        l_whence: SEEK_SET as c_short,
+        l_start: byte,
+        l_len: 1,
+        l_pid: 0,
+    }
+}
+
+/// A bus, seen from the file system.
+#[derive(Clone, Debug)]
+pub(super) struct Bus {
+    pub(super) name: BusName,
+    pub(super) place: Place,
+}
+
+impl Bus {
+    pub(super) fn folder(&self) -> PathBuf {
+        self.place.folder.join(self.name.as_str())
+    }
+
+    fn lock_path(&self) -> PathBuf {
+        self.folder().join(LOCK)
+    }
+
+    fn refuse(&self, error: &io::Error) -> LinkError {
+        LinkError::Folder {
+            folder: self.folder(),
+            reason: error.to_string(),
+        }
+    }
+
+    /// The lock file, if anybody has ever been here; without taking anything.
+    pub(super) fn look(&self) -> Option<LockFile> {
+        LockFile::open(&self.lock_path(), false).ok()
+    }
+
+    /// Opens the lock file and waits for the right to change the folder.
+    fn enter(&self) -> Result<Gate, LinkError> {
+        let folder = self.folder();
+        let mut waited = Duration::ZERO;
+        loop {
+            make_private(&folder)?;
+            let file = match LockFile::open(&self.lock_path(), true) {
+                Ok(file) => file,
+                // The last of others has just left and taken the folder along.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(error) => return Err(self.refuse(&error)),
+            };
+            while !file.try_lock(GATE).map_err(|error| self.refuse(&error))? {
+                if waited >= GATE_PATIENCE {
+                    return Err(LinkError::Held {
+                        bus: self.name.clone(),
+                        process: file.signed(GATE),
+                    });
+                }
+                waited += GATE_POLL;
+                std::thread::sleep(GATE_POLL);
+            }
+            file.sign(GATE);
+            if file.is_at(&self.lock_path()) {
+                return Ok(Gate(file));
+            }
+        }
+    }
+
+    /// Takes a role on the bus; what killed processes have left there is removed.
+    ///
+    /// # Errors
+    /// [`LinkError::Folder`] and [`LinkError::Held`].
+    pub(super) fn claim(&self, role: Role) -> Result<Result<Claim, Taken>, LinkError> {
+        let gate = self.enter()?;
+        if gate.0.is_held(role) {
+            return Ok(Err(Taken::ByAnother));
+        }
+        if role == Role::Plant {
+            // Its controller must find the plant gone before another one is there.
+            if gate.0.is_held(Role::Controller) {
+                return Ok(Err(Taken::ByEarlierRun));
+            }
+            RunFiles::remove_all(self).map_err(|error| self.refuse(&error))?;
+        }
+        let refuse = |error| self.refuse(&error);
+        if !gate.0.try_lock(role.byte()).map_err(refuse)? {
+            return Ok(Err(Taken::ByAnother));
+        }
+        gate.0.sign(role.byte());
+        let file = gate.0.share().map_err(refuse)?;
+        drop(gate);
+        Ok(Ok(Claim {
+            bus: self.clone(),
+            role,
+            file,
+        }))
+    }
+
+    /// Removes everything of the bus if nobody is on it; whether nothing is left.
+    pub(super) fn remove_if_dead(&self) -> bool {
+        let Some(file) = self.look() else {
+            // Somebody was killed before the lock file was there.
+            return fs::remove_dir(self.folder()).is_ok();
+        };
+        if !matches!(file.try_lock(GATE), Ok(true)) {
+            return false;
+        }
+        file.sign(GATE);
+        Gate(file).remove_if_dead(self)
+    }
+}
+
+/// The right to change what the folder holds, until dropped.
+struct Gate(LockFile);
+
+impl Gate {
+    fn remove_if_dead(&self, bus: &Bus) -> bool {
+        let path = bus.lock_path();
+        let dead = self.0.is_at(&path)
+            && !self.0.is_held(Role::Plant)
+            && !self.0.is_held(Role::Controller);
+        // What cannot be removed now stays for the next start.
+        dead && RunFiles::remove_all(bus).is_ok()
+            && fs::remove_file(path).is_ok()
+            && fs::remove_dir(bus.folder()).is_ok()
+    }
+}
+
+impl Drop for Gate {
+    fn drop(&mut self) {
+        self.0.unlock(GATE);
+    }
+}
+
+/// Why a role cannot be had now.
+#[derive(Debug)]
+pub(super) enum Taken {
+    /// A live process has it.
+    ByAnother,
+    /// The controller of an earlier run has not left yet.
+    ByEarlierRun,
+}
+
+/// A role on a bus, held until dropped. Whoever is last removes the bus.
+#[derive(Debug)]
+pub(super) struct Claim {
+    bus: Bus,
+    role: Role,
+    file: LockFile,
+}
+
+impl Claim {
+    pub(super) fn bus(&self) -> &Bus {
+        &self.bus
+    }
+
+    pub(super) fn role(&self) -> Role {
+        self.role
+    }
+
+    /// Whether the other end's process is on the bus.
+    pub(super) fn peer_is_alive(&self) -> bool {
+        self.file.is_held(self.role.peer())
+    }
+
+    /// The lock file, for another thread of this process.
+    pub(super) fn share(&self) -> io::Result<LockFile> {
+        self.file.share()
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        self.file.unlock(self.role.byte());
+        self.bus.remove_if_dead();
+    }
+}
+
+/// Removes what killed processes have left on any bus of this place.
+pub(super) fn remove_dead(place: &Place) {
+    for entry in fs::read_dir(&place.folder).into_iter().flatten().flatten() {
+        if let Some(name) = entry
+            .file_name()
+            .to_str()
+            .and_then(|name| name.parse().ok())
+        {
+            let place = place.clone();
+            Bus { name, place }.remove_if_dead();
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The files of one run on a bus: used by one plant and one controller, once.
+//!
+//! iceoryx2 lets many processes share services, and lets the survivors put right what a
+//! killed process has left half-made. That fails at many points (see
+//! [`remove_half_made`]), so here nobody ever shares what a killed process has touched:
+//! each run has a folder and a prefix of its own for everything that iceoryx2 makes. When a
+//! controller dies while it joins, the plant makes all of it anew under another name.
+//!
+//! | file in `<bus>/<run>/` | made                                                  |
+//! |------------------------|-------------------------------------------------------|
+//! | `ready`                | by the plant, when a controller may join              |
+//! | `joined`               | by the controller, before it touches anything         |
+//! | `answering`            | by the controller, when it is ready for frames        |
+//! | `nodes/`, `services/`  | by iceoryx2, with its segments in shared memory       |
+
+use std::fs::{self, OpenOptions};
+use std::io;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use iceoryx2::prelude::{Config, FileName, Path as IceoryxPath, SemanticString};
+
+use super::LinkError;
+use super::claim::Bus;
+use super::place::SHARED_MEMORY;
+
+const READY: &str = "ready";
+const JOINED: &str = "joined";
+const ANSWERING: &str = "answering";
+/// Letters and digits of a run's random name: nobody guesses 71 bits.
+const NAME_LENGTH: usize = 12;
+
+/// Folder and prefix of one run.
+#[derive(Clone, Debug)]
+pub(super) struct RunFiles {
+    folder: PathBuf,
+    prefix: String,
+}
+
+impl RunFiles {
+    /// Makes the folder of a new run. For the plant alone.
+    pub(super) fn create(bus: &Bus) -> io::Result<Self> {
+        let folder = tempfile::Builder::new()
+            .prefix("")
+            .rand_bytes(NAME_LENGTH)
+            .tempdir_in(bus.folder())?
+            .keep();
+        Ok(Self::at(bus, folder))
+    }
+
+    /// The run that waits for a controller on the bus, if there is one.
+    pub(super) fn ready(bus: &Bus) -> Option<Self> {
+        all(bus).find(|run| run.has(READY) && !run.has(JOINED))
+    }
+
+    fn at(bus: &Bus, folder: PathBuf) -> Self {
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        let prefix = format!("{}{name}_", bus.place.prefix);
+        Self { folder, prefix }
+    }
+
+    /// The settings of iceoryx2: its defaults, whatever configuration file a user has, with
+    /// this run's folder and prefix. Its own search for dead processes is switched off.
+    pub(super) fn config(&self) -> Result<Config, LinkError> {
+        let refuse = || LinkError::Folder {
+            folder: self.folder.clone(),
+            reason: "its name is too long for shared memory".into(),
+        };
+        let mut config = Config::default();
+        config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|_| refuse())?;
+        let folder = self.folder.to_str().ok_or_else(refuse)?;
+        let folder = IceoryxPath::new(folder.as_bytes()).map_err(|_| refuse())?;
+        config.global.set_root_path(&folder);
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
+        config.global.service.cleanup_dead_nodes_on_open = false;
+        Ok(config)
+    }
+
+    /// Lets a controller join.
+    pub(super) fn set_ready(&self) -> io::Result<()> {
+        fs::write(self.folder.join(READY), "")
+    }
+
+    /// Joins; `false` if another controller has been here before.
+    pub(super) fn join(&self) -> io::Result<bool> {
+        let joined = OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .open(self.folder.join(JOINED));
+        match joined {
+            Ok(_) => Ok(true),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Tells the plant that the controller is ready for frames.
+    pub(super) fn set_answering(&self) -> io::Result<()> {
+        fs::write(self.folder.join(ANSWERING), "")
+    }
+
+    /// Whether a controller has been ready for frames.
+    pub(super) fn is_answering(&self) -> bool {
+        self.has(ANSWERING)
+    }
+
+    /// Whether a controller has ever joined.
+    pub(super) fn is_joined(&self) -> bool {
+        self.has(JOINED)
+    }
+
+    fn has(&self, name: &str) -> bool {
+        fs::exists(self.folder.join(name)).unwrap_or(false)
+    }
+
+    /// Removes the run's folder and its segments.
+    pub(super) fn remove(&self) -> io::Result<()> {
+        for (path, _) in segments(&self.prefix) {
+            tolerate_missing(fs::remove_file(path))?;
+        }
+        tolerate_missing(fs::remove_dir_all(&self.folder))
+    }
+
+    /// Removes every run of a bus on which nobody is.
+    pub(super) fn remove_all(bus: &Bus) -> io::Result<()> {
+        all(bus).try_for_each(|run| run.remove())
+    }
+
+    /// Removes segments that a dead process has left half-made, so that opening them
+    /// ends: of size zero, or still write-only.
+    ///
+    /// iceoryx2-cal 0.9.3 (and 0.10.0) opens a segment of size zero again and again without
+    /// looking at its timeout: `dynamic_storage/posix_shared_memory.rs`, `open_impl`, the arm
+    /// `MappingSizeIsZero`. A process that dies between `shm_open` and `ftruncate`
+    /// leaves such a segment. Each turn opens by name, so that removing the name ends it.
+    pub(super) fn remove_half_made(bus: &Bus) {
+        for run in all(bus) {
+            for (path, metadata) in segments(&run.prefix) {
+                let write_only = metadata.permissions().mode() & 0o777 == 0o200;
+                if metadata.len() == 0 || write_only {
+                    let _ = fs::remove_file(path);
+                }
+            }
+        }
+    }
+}
+
+fn all(bus: &Bus) -> impl Iterator<Item = RunFiles> {
+    let folders = fs::read_dir(bus.folder()).into_iter().flatten().flatten();
+    folders
+        .filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()))
+        .map(|entry| RunFiles::at(bus, entry.path()))
+}
+
+fn segments(prefix: &str) -> impl Iterator<Item = (PathBuf, fs::Metadata)> {
+    let entries = fs::read_dir(Path::new(SHARED_MEMORY));
+    entries
+        .into_iter()
+        .flatten()
+        .flatten()
+        .filter(move |entry| entry.file_name().to_string_lossy().starts_with(prefix))
+        .filter_map(|entry| Some((entry.path(), entry.metadata().ok()?)))
+}
+
+fn tolerate_missing(removed: io::Result<()>) -> io::Result<()> {
+    match removed {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        other => other,
+    }
+}
