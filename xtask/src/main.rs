@@ -1,6 +1,7 @@
 //! The workspace's chores, as `cargo xtask …`: one local command equals CI.
 
 mod build_fw;
+mod chaos;
 mod ci;
 mod command;
 mod examples;
@@ -36,6 +37,8 @@ enum Chore {
     Flash,
     /// Build and run every example.
     Examples,
+    /// Disturb plant and controller at every system call, and count what goes wrong.
+    Chaos(chaos::ChaosArguments),
     /// A simulated day of lockstep operation with counters that wrap; not part of CI.
     Soak(soak::SoakArguments),
     /// What continuous integration does: formatting, clippy, every test.
@@ -51,6 +54,7 @@ fn main() -> ExitCode {
         Chore::Flash => flash::run(),
         Chore::Examples => examples::run(),
         Chore::Soak(arguments) => soak::run(&arguments),
+        Chore::Chaos(arguments) => chaos::run(&arguments),
         Chore::Ci => ci::run(),
     };
     match result {

@@ -1,10 +1,10 @@
 //! `cargo xtask test`: everything that must hold.
 
 use crate::command::{ChoreError, run_cargo};
-use crate::{examples, setup, size};
+use crate::{chaos, examples, setup, size};
 
 /// Installs the ARM target and QEMU, builds image and program as users run them, then
-/// runs every test of the workspace and every example.
+/// runs every test of the workspace, every example, and the short part of chaos.
 ///
 /// # Errors
 /// The first command that fails.
@@ -13,5 +13,6 @@ pub fn run() -> Result<(), ChoreError> {
     // Builds images and program: the end-to-end tests start the released ones.
     size::run()?;
     run_cargo(&["test", "--workspace"])?;
-    examples::run()
+    examples::run()?;
+    chaos::short()
 }

@@ -17,7 +17,7 @@ use painleve_system::terminal::warn;
 
 use super::output::{Output, OutputArguments};
 use super::run::ScenarioArguments;
-use super::{CommandError, or_interrupted};
+use super::{CommandError, INTERRUPTED, or_interrupted};
 
 /// Options of `painleve plant`.
 #[derive(Debug, Args)]
@@ -41,12 +41,20 @@ pub struct PlantArguments {
     /// By the clock, but the clock is a board's: wait for its answers.
     #[arg(long, hide = true)]
     board_keeps_time: bool,
+    /// Leave it to `painleve run` to say that the run was interrupted.
+    #[arg(long, hide = true)]
+    started_by_run: bool,
 }
 
 /// Runs a scenario against the controller on the bus.
 pub fn run(arguments: &PlantArguments) -> Result<(), CommandError> {
     let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
-    run_until(arguments, &interrupt)
+    match run_until(arguments, &interrupt) {
+        Err(error) if arguments.started_by_run && error.exit_code() == INTERRUPTED => {
+            Err(CommandError::Told { code: INTERRUPTED })
+        }
+        other => other,
+    }
 }
 
 fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), CommandError> {

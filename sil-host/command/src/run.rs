@@ -19,7 +19,7 @@ use painleve_system::terminal::warn;
 
 use super::bridge::ImageArguments;
 use super::output::OutputArguments;
-use super::{CommandError, PEER_FAILED, say};
+use super::{CommandError, INTERRUPTED, PEER_FAILED, say};
 
 /// A run of the robustness campaign.
 #[derive(Clone, Copy, Debug)]
@@ -175,7 +175,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let mut plant_arguments: Vec<OsString> = vec!["plant".into()];
     plant_arguments.extend(arguments.scenario.to_arguments());
     plant_arguments.extend(arguments.output.to_arguments());
-    plant_arguments.push("--json".into());
+    plant_arguments.extend(["--json".into(), "--started-by-run".into()]);
     let host = arguments.host.to_possible_value();
     let host = host.as_ref().map_or("native", |host| host.get_name());
     plant_arguments.extend(["--host-name".into(), host.into()]);
@@ -245,8 +245,9 @@ fn watch(
             return Ok(status);
         }
         if interrupt.is_requested() {
-            // A plant that has been asked to end says so.
-            return plant.child.stop().ok_or(CommandError::Interrupted);
+            // It may keep a part of its record, and say where.
+            plant.child.stop();
+            return Err(CommandError::Interrupted);
         }
         if let Some(status) = controller.child.ended()?
             && !status.success()
@@ -397,6 +398,7 @@ impl Reader {
 /// A plant that exits with a code has said why; one that was killed has not.
 fn failure(status: ExitStatus) -> CommandError {
     match status.code().and_then(|code| u8::try_from(code).ok()) {
+        Some(INTERRUPTED) => CommandError::Interrupted,
         Some(code) => CommandError::Told { code },
         None => CommandError::Process(format!("the plant process ended early ({status})")),
     }

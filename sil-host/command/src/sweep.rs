@@ -147,7 +147,7 @@ fn plan(arguments: &PlanArguments) -> Result<(), CommandError> {
     let manifest = Manifest::new(campaign, &understood, arguments.shards.get())?;
     let folder = &arguments.place.folder;
     let is_new = manifest.write(folder)?;
-    say(&format!(
+    say(format!(
         "{}{}: campaign {}, {} rows in {} shards",
         Manifest::path(folder).display(),
         if is_new { "" } else { " (there already)" },
@@ -194,7 +194,7 @@ fn compute_shard(
     let name = format!("shard {shard}/{}", manifest.shards);
     if path.exists() {
         match shard_file::read(&path, manifest) {
-            Ok(found) if found.shard == shard => return say(&format!("{name}: finished before")),
+            Ok(found) if found.shard == shard => return say(format!("{name}: finished before")),
             Ok(found) => warn(format_args!(
                 "{} holds shard {}: computed again",
                 path.display(),
@@ -209,7 +209,7 @@ fn compute_shard(
     let share = Share::new(understood.table.as_ref(), shard, manifest.shards);
     let records = arguments.threads.compute(&name, &share)?;
     shard_file::write(folder, manifest, shard, share.rows(), &records)?;
-    say(&format!(
+    say(format!(
         "{name}: {} rows in {}",
         share.rows().len(),
         path.display()
@@ -244,12 +244,12 @@ fn status(arguments: &StatusArguments) -> Result<(), CommandError> {
             table.add_row([&file.display().to_string(), &reason]);
         }
     }
-    say(&table.to_string())
+    say(table)
 }
 
 fn missing(folder: &Path) -> Result<(), CommandError> {
     let manifest = Manifest::load(folder)?;
-    say(&array::syntax(&folder::missing(folder, &manifest)?))
+    say(array::syntax(&folder::missing(folder, &manifest)?))
 }
 
 fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
@@ -265,7 +265,7 @@ fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
     }
     atomic_file::write(path, &text).map_err(output)?;
     folder::tidy(folder);
-    say(&format!(
+    say(format!(
         "{}: {} rows of {} shards",
         path.display(),
         manifest.rows,
@@ -292,7 +292,7 @@ fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
     let default = folder.join("sweep.sbatch");
     let path = arguments.out.as_ref().unwrap_or(&default);
     atomic_file::write(path, script.as_bytes()).map_err(output)?;
-    say(&format!(
+    say(format!(
         "{0}: shards {array}; submit with: sbatch {0}",
         path.display()
     ))

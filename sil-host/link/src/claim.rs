@@ -210,7 +210,8 @@ impl Bus {
             if gate.0.is_held(Role::Controller) {
                 return Ok(Err(Taken::ByEarlierRun));
             }
-            RunFiles::remove_all(self).map_err(|error| self.refuse(&error))?;
+            RunFiles::remove_all(&self.folder(), &self.place)
+                .map_err(|error| self.refuse(&error))?;
         }
         let refuse = |error| self.refuse(&error);
         if !gate.0.try_lock(role.byte()).map_err(refuse)? {
@@ -226,35 +227,47 @@ impl Bus {
         }))
     }
 
-    /// Removes everything of the bus if nobody is on it; whether nothing is left.
-    pub(super) fn remove_if_dead(&self) -> bool {
+    /// Removes everything of the bus if nobody is on it. What cannot be removed now stays for
+    /// the next start.
+    pub(super) fn remove_if_dead(&self) {
         let Some(file) = self.look() else {
             // Somebody was killed before the lock file was there.
-            return fs::remove_dir(self.folder()).is_ok();
+            let _ = fs::remove_dir(self.folder());
+            return;
         };
-        if !matches!(file.try_lock(GATE), Ok(true)) {
-            return false;
+        // First without taking anything: a stopped process must not hold up a living bus.
+        let is_dead = || !file.is_held(Role::Plant) && !file.is_held(Role::Controller);
+        if !is_dead() || !matches!(file.try_lock(GATE), Ok(true)) {
+            return;
         }
         file.sign(GATE);
-        Gate(file).remove_if_dead(self)
+        if file.is_at(&self.lock_path()) && is_dead() {
+            // One step, after which the name is free and nobody is held up any more.
+            let away = self.place.folder.join(away_name());
+            if fs::rename(self.folder(), &away).is_ok() {
+                file.unlock(GATE);
+                remove_away(&away, &self.place);
+            }
+        }
+    }
+}
+
+/// First letter of the names of folders that are being removed; no bus begins so.
+const AWAY: char = '.';
+
+/// A name that is not taken.
+fn away_name() -> String {
+    format!("{AWAY}{}", BusName::unique())
+}
+
+fn remove_away(folder: &Path, place: &Place) {
+    if RunFiles::remove_all(folder, place).is_ok() {
+        let _ = fs::remove_dir_all(folder);
     }
 }
 
 /// The right to change what the folder holds, until dropped.
 struct Gate(LockFile);
-
-impl Gate {
-    fn remove_if_dead(&self, bus: &Bus) -> bool {
-        let path = bus.lock_path();
-        let dead = self.0.is_at(&path)
-            && !self.0.is_held(Role::Plant)
-            && !self.0.is_held(Role::Controller);
-        // What cannot be removed now stays for the next start.
-        dead && RunFiles::remove_all(bus).is_ok()
-            && fs::remove_file(path).is_ok()
-            && fs::remove_dir(bus.folder()).is_ok()
-    }
-}
 
 impl Drop for Gate {
     fn drop(&mut self) {
@@ -309,7 +322,10 @@ impl Drop for Claim {
 /// Removes what killed processes have left on any bus of this place.
 pub(super) fn remove_dead(place: &Place) {
     for entry in fs::read_dir(&place.folder).into_iter().flatten().flatten() {
-        if let Some(name) = entry
+        if entry.file_name().to_string_lossy().starts_with(AWAY) {
+            // Whoever began to remove it may have been killed; two at it do no harm.
+            remove_away(&entry.path(), place);
+        } else if let Some(name) = entry
             .file_name()
             .to_str()
             .and_then(|name| name.parse().ok())

@@ -21,8 +21,9 @@ const PEER_FAILED: i32 = 3;
 /// Time between two looks. Looks are counted, not the clock: when this very process is
 /// stopped, both of its threads are.
 const LOOK: Duration = Duration::from_millis(25);
-/// Looks until what a dead peer has left is removed. No call takes so long in itself.
-const LOOKS_UNTIL_REMOVAL: u32 = 4;
+/// Looks until what a dead peer has left is removed: so many that nothing this process is
+/// making itself, however busy the machine, is still half-made then.
+const LOOKS_UNTIL_REMOVAL: u32 = 40;
 /// Looks until the process ends.
 const LOOKS_UNTIL_END: u32 = 60;
 

@@ -22,7 +22,7 @@ use iceoryx2::prelude::{Config, FileName, Path as IceoryxPath, SemanticString};
 
 use super::LinkError;
 use super::claim::Bus;
-use super::place::SHARED_MEMORY;
+use super::place::{Place, SHARED_MEMORY};
 
 const READY: &str = "ready";
 const JOINED: &str = "joined";
@@ -45,17 +45,17 @@ impl RunFiles {
             .rand_bytes(NAME_LENGTH)
             .tempdir_in(bus.folder())?
             .keep();
-        Ok(Self::at(bus, folder))
+        Ok(Self::at(folder, &bus.place))
     }
 
     /// The run that waits for a controller on the bus, if there is one.
     pub(super) fn ready(bus: &Bus) -> Option<Self> {
-        all(bus).find(|run| run.has(READY) && !run.has(JOINED))
+        all(&bus.folder(), &bus.place).find(|run| run.has(READY) && !run.has(JOINED))
     }
 
-    fn at(bus: &Bus, folder: PathBuf) -> Self {
+    fn at(folder: PathBuf, place: &Place) -> Self {
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
-        let prefix = format!("{}{name}_", bus.place.prefix);
+        let prefix = format!("{}{name}_", place.prefix);
         Self { folder, prefix }
     }
 
@@ -122,9 +122,9 @@ impl RunFiles {
         tolerate_missing(fs::remove_dir_all(&self.folder))
     }
 
-    /// Removes every run of a bus on which nobody is.
-    pub(super) fn remove_all(bus: &Bus) -> io::Result<()> {
-        all(bus).try_for_each(|run| run.remove())
+    /// Removes every run in the folder of a bus on which nobody is.
+    pub(super) fn remove_all(folder: &Path, place: &Place) -> io::Result<()> {
+        all(folder, place).try_for_each(|run| run.remove())
     }
 
     /// Removes segments that a dead process has left half-made, so that opening them
@@ -135,7 +135,7 @@ impl RunFiles {
     /// `MappingSizeIsZero`. A process that dies between `shm_open` and `ftruncate`
     /// leaves such a segment. Each turn opens by name, so that removing the name ends it.
     pub(super) fn remove_half_made(bus: &Bus) {
-        for run in all(bus) {
+        for run in all(&bus.folder(), &bus.place) {
             for (path, metadata) in segments(&run.prefix) {
                 let write_only = metadata.permissions().mode() & 0o777 == 0o200;
                 if metadata.len() == 0 || write_only {
@@ -146,11 +146,11 @@ impl RunFiles {
     }
 }
 
-fn all(bus: &Bus) -> impl Iterator<Item = RunFiles> {
-    let folders = fs::read_dir(bus.folder()).into_iter().flatten().flatten();
+fn all(folder: &Path, place: &Place) -> impl Iterator<Item = RunFiles> {
+    let folders = fs::read_dir(folder).into_iter().flatten().flatten();
     folders
         .filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()))
-        .map(|entry| RunFiles::at(bus, entry.path()))
+        .map(|entry| RunFiles::at(entry.path(), place))
 }
 
 fn segments(prefix: &str) -> impl Iterator<Item = (PathBuf, fs::Metadata)> {

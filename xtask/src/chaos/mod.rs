@@ -1,0 +1,263 @@
+//! `cargo xtask chaos`: plant and controller, disturbed at every system call.
+//!
+//! A trial starts plant and controller on a bus, sends one of them a signal at the start of
+//! its n-th system call, and asserts that within 5 s all have ended with a documented exit
+//! code and one message, that no process, file or segment stays after the next start, and
+//! that the next run on the same bus gives the right log hash.
+
+mod place;
+mod tracer;
+mod trial;
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use nix::sys::prctl::set_child_subreaper;
+
+use crate::command::{ChoreError, run_cargo, say, workspace};
+use place::{Place, unused_segments};
+use trial::{Disturbance, Flaw, Plan, Role, Running};
+
+/// Options of `cargo xtask chaos`.
+#[derive(Debug, Args)]
+pub struct ChaosArguments {
+    /// First system call.
+    #[arg(long, default_value_t = 1)]
+    first: u32,
+    /// Last system call.
+    #[arg(long, default_value_t = 300)]
+    last: u32,
+    /// Only so many trials, drawn from all with --seed.
+    #[arg(long)]
+    trials: Option<usize>,
+    /// Seed of the draw.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Trials at a time.
+    #[arg(long, default_value_t = 4)]
+    jobs: usize,
+    /// All trials on one bus, so that those at a time meet each other there.
+    #[arg(long)]
+    one_bus: bool,
+}
+
+/// Segments that others make at this moment are given time to go.
+const OTHERS: Duration = Duration::from_secs(10);
+
+/// The part of `cargo xtask test`: about a minute.
+///
+/// # Errors
+/// If anything is found.
+pub fn short() -> Result<(), ChoreError> {
+    run(&ChaosArguments {
+        first: 1,
+        last: 300,
+        trials: Some(120),
+        seed: 1,
+        jobs: 4,
+        one_bus: false,
+    })
+}
+
+/// Runs the trials and prints a table of counts.
+///
+/// # Errors
+/// If anything is found.
+pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
+    run_cargo(&["build", "--release", "--package", "painleve-command"])?;
+    let system = |error: std::io::Error| ChoreError(format!("chaos: {error}"));
+    // A copy: the trials take a while, and the program may be built again meanwhile.
+    let programs = tempfile::tempdir().map_err(system)?;
+    let program = programs.path().join("painleve");
+    std::fs::copy(workspace().join("target/release/painleve"), &program).map_err(system)?;
+    // Orphans come to this process, as under systemd or in a container.
+    set_child_subreaper(true).map_err(|error| system(error.into()))?;
+    let runtime = tempfile::tempdir().map_err(system)?;
+    let segments_before = unused_segments()?;
+
+    let plans = plans(arguments);
+    let next = AtomicUsize::new(0);
+    let table = Mutex::new(Table::default());
+    let start = Instant::now();
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..arguments.jobs)
+            .map(|worker| {
+                let (plans, next, table) = (&plans, &next, &table);
+                let (program, runtime) = (&program, runtime.path());
+                scope.spawn(move || {
+                    let mark = format!("{}-{worker}", std::process::id());
+                    let bus = format!("chaos-{worker}");
+                    let place = Place::new(program, mark, runtime)?;
+                    let expected = undisturbed(&place, &bus)?;
+                    while let Some(&plan) = plans.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let outcome = trial::run(&place, &bus, plan, &expected)?;
+                        if let Ok(mut table) = table.lock() {
+                            table.add(plan, outcome);
+                        }
+                    }
+                    Ok::<(), std::io::Error>(())
+                })
+            })
+            .collect();
+        workers.into_iter().try_for_each(|worker| {
+            worker
+                .join()
+                .unwrap_or_else(|_| Err(std::io::Error::other("a worker has panicked")))
+        })
+    })
+    .map_err(system)?;
+
+    let table = table
+        .into_inner()
+        .map_err(|_| ChoreError("a worker has panicked".into()))?;
+    let left = || -> Result<Vec<String>, ChoreError> {
+        Ok(unused_segments()?
+            .difference(&segments_before)
+            .cloned()
+            .collect())
+    };
+    let ended = Instant::now();
+    let mut segments = left()?;
+    while !segments.is_empty() && ended.elapsed() < OTHERS {
+        std::thread::sleep(Duration::from_millis(100));
+        let still = left()?;
+        segments.retain(|name| still.contains(name));
+    }
+    table.print(start.elapsed(), &segments)?;
+    let found = table.findings + segments.len();
+    if found > 0 {
+        return Err(ChoreError(format!("chaos has found {found} flaws")));
+    }
+    Ok(())
+}
+
+/// The log hash of a run that nobody disturbs.
+fn undisturbed(place: &Place, bus: &str) -> std::io::Result<String> {
+    let arguments = [
+        "run",
+        "--bus",
+        bus,
+        "--set",
+        "run.duration_s=0.05",
+        "--no-record",
+        "--no-plot",
+        "--json",
+    ];
+    let mut run = Running::start(&mut place.command(&arguments))?;
+    run.wait(Instant::now() + Duration::from_secs(20))?;
+    let (_, text) = run.outcome();
+    trial::log_hash(&text.stdout)
+        .ok_or_else(|| std::io::Error::other(format!("no undisturbed run: {}", text.stderr)))
+}
+
+/// Every system call of every role with every disturbance, or a draw of them.
+fn plans(arguments: &ChaosArguments) -> Vec<Plan> {
+    let mut plans = Vec::new();
+    for call in arguments.first..=arguments.last {
+        for victim in [Role::Plant, Role::Controller, Role::Run] {
+            for disturbance in Disturbance::ALL {
+                let peer_first = (call + disturbance as u32).is_multiple_of(2);
+                plans.push(Plan {
+                    victim,
+                    disturbance,
+                    call,
+                    peer_first,
+                });
+            }
+        }
+    }
+    // Shuffled, so that long waits spread over the workers and a draw is a fair one.
+    let mut random = SplitMix(arguments.seed);
+    for last in (1..plans.len()).rev() {
+        let other = (random.next() % (last as u64 + 1)) as usize;
+        plans.swap(last, other);
+    }
+    plans.truncate(arguments.trials.unwrap_or(plans.len()));
+    plans
+}
+
+/// Steele, Lea and Flood's generator, enough to shuffle.
+struct SplitMix(u64);
+
+impl SplitMix {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+}
+
+/// Counts of trials and flaws.
+#[derive(Default)]
+struct Table {
+    rows: BTreeMap<(Role, Disturbance), Row>,
+    findings: usize,
+}
+
+#[derive(Default)]
+struct Row {
+    trials: usize,
+    injections: usize,
+    flaws: BTreeMap<Flaw, usize>,
+}
+
+const FLAWS: [(Flaw, &str); 7] = [
+    (Flaw::Hang, "hangs"),
+    (Flaw::Orphan, "orphans"),
+    (Flaw::Leak, "leaks"),
+    (Flaw::UnusableBus, "unusable"),
+    (Flaw::Panic, "panics"),
+    (Flaw::ExitCode, "codes"),
+    (Flaw::Message, "messages"),
+];
+
+impl Table {
+    fn add(&mut self, plan: Plan, outcome: trial::Outcome) {
+        let row = self
+            .rows
+            .entry((plan.victim, plan.disturbance))
+            .or_default();
+        row.trials += 1;
+        row.injections += usize::from(outcome.reached);
+        for (flaw, what) in outcome.findings {
+            *row.flaws.entry(flaw).or_default() += 1;
+            self.findings += 1;
+            eprintln!("{plan:?}: {flaw:?}: {what}");
+        }
+    }
+
+    fn print(&self, took: Duration, segments: &[String]) -> Result<(), ChoreError> {
+        let titles: String = FLAWS.map(|(_, title)| format!("{title:>10}")).concat();
+        say(&format!(
+            "{:24}{:>8}{:>12}{titles}",
+            "disturbed", "trials", "injections"
+        ))?;
+        let mut sum = 0;
+        for ((victim, disturbance), row) in &self.rows {
+            let name = format!("{victim:?} {disturbance:?}").to_lowercase();
+            let counts: String = FLAWS
+                .map(|(flaw, _)| format!("{:>10}", row.flaws.get(&flaw).unwrap_or(&0)))
+                .concat();
+            say(&format!(
+                "{name:24}{:>8}{:>12}{counts}",
+                row.trials, row.injections
+            ))?;
+            sum += row.injections;
+        }
+        say(&format!(
+            "{sum} injections in {:.0} s, {} flaws, {} segments left{}",
+            took.as_secs_f64(),
+            self.findings,
+            segments.len(),
+            segments
+                .iter()
+                .map(|name| format!("\n  {name}"))
+                .collect::<String>(),
+        ))
+    }
+}

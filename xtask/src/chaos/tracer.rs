@@ -1,0 +1,94 @@
+//! A process that is stopped at each of its system calls until the one that is asked for.
+
+use std::io;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+
+use nix::sys::ptrace;
+use nix::sys::signal::{Signal, kill};
+use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
+use nix::unistd::Pid;
+
+/// What became of a traced process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Traced {
+    /// The signal was sent at the system call.
+    Injected,
+    /// The process ended before; this was its exit code, if it had one.
+    Ended(Option<i32>),
+}
+
+/// A process whose main thread is traced. Only the thread that starts it can trace it.
+pub struct Victim {
+    pub child: Child,
+    id: Pid,
+}
+
+impl Victim {
+    /// Starts a command, stopped before its first instruction.
+    #[allow(unsafe_code)]
+    pub fn start(command: &mut Command) -> io::Result<Self> {
+        // SAFETY: between fork and exec, one system call that is async-signal-safe.
+        let child = unsafe { command.pre_exec(|| Ok(ptrace::traceme()?)) }.spawn()?;
+        let id = Pid::from_raw(i32::try_from(child.id()).map_err(io::Error::other)?);
+        let victim = Self { child, id };
+        match waitpid(id, None)? {
+            WaitStatus::Stopped(_, Signal::SIGTRAP) => {}
+            other => return Err(io::Error::other(format!("no stop after exec: {other:?}"))),
+        }
+        ptrace::setoptions(
+            id,
+            ptrace::Options::PTRACE_O_TRACESYSGOOD | ptrace::Options::PTRACE_O_EXITKILL,
+        )?;
+        Ok(victim)
+    }
+
+    /// Lets the process run up to the start of its system call `number`, counted from 1, sends
+    /// it `signal` there and lets go of it. Gives up after `limit`.
+    pub fn signal_at(
+        &mut self,
+        number: u32,
+        signal: Signal,
+        limit: Duration,
+    ) -> io::Result<Traced> {
+        let deadline = Instant::now() + limit;
+        let mut stops = 0;
+        let mut forward = None;
+        loop {
+            ptrace::syscall(self.id, forward.take())?;
+            match self.next_stop(deadline)? {
+                WaitStatus::PtraceSyscall(_) => {
+                    stops += 1;
+                    // Every call stops the process twice, where it begins and where it ends.
+                    if stops == 2 * number - 1 {
+                        kill(self.id, signal)?;
+                        if signal != Signal::SIGKILL {
+                            ptrace::detach(self.id, None)?;
+                        }
+                        return Ok(Traced::Injected);
+                    }
+                }
+                WaitStatus::Stopped(_, received) => forward = Some(received),
+                WaitStatus::Exited(_, code) => return Ok(Traced::Ended(Some(code))),
+                WaitStatus::Signaled(..) => return Ok(Traced::Ended(None)),
+                _ => {}
+            }
+        }
+    }
+
+    fn next_stop(&self, deadline: Instant) -> io::Result<WaitStatus> {
+        loop {
+            let status = waitpid(self.id, Some(WaitPidFlag::WNOHANG | WaitPidFlag::__WALL))?;
+            if status != WaitStatus::StillAlive {
+                return Ok(status);
+            }
+            if Instant::now() >= deadline {
+                kill(self.id, Signal::SIGKILL)?;
+                return Err(io::Error::other("a traced process does not go on"));
+            }
+            // Most system calls are over at once.
+            std::thread::yield_now();
+        }
+    }
+}

@@ -1,0 +1,358 @@
+//! One trial: start plant and controller, disturb one of them, and look at all that follows.
+
+use std::io::Read;
+use std::path::PathBuf;
+use std::process::{Child, Command};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::Value;
+
+use super::place::Place;
+use super::tracer::{Traced, Victim};
+
+/// After a disturbance everything must have ended within this.
+const END: Duration = Duration::from_secs(5);
+/// How long a traced process may take to get to its system call.
+const REACH: Duration = Duration::from_secs(30);
+/// How long a peer waits for the other, s: not longer than [`END`].
+const WAIT_S: &str = "2";
+/// Exit codes that the documentation knows; 130 after SIGINT and SIGTERM.
+const DOCUMENTED: [i32; 6] = [0, 1, 2, 3, 4, 130];
+const QUICK: [&str; 4] = ["--set", "run.duration_s=0.05", "--no-plot", "--json"];
+
+/// The process that is disturbed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    Plant,
+    Controller,
+    /// The parent of both.
+    Run,
+}
+
+/// What is done to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Disturbance {
+    Kill,
+    Stop,
+    /// Stopped, and continued while its peer still waits.
+    Pause,
+    Terminate,
+    Interrupt,
+}
+
+impl Disturbance {
+    pub const ALL: [Self; 5] = [
+        Self::Kill,
+        Self::Stop,
+        Self::Pause,
+        Self::Terminate,
+        Self::Interrupt,
+    ];
+
+    fn signal(self) -> Signal {
+        match self {
+            Self::Kill => Signal::SIGKILL,
+            Self::Stop | Self::Pause => Signal::SIGSTOP,
+            Self::Terminate => Signal::SIGTERM,
+            Self::Interrupt => Signal::SIGINT,
+        }
+    }
+}
+
+/// Who is disturbed, how, and at which of its system calls.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    pub victim: Role,
+    pub disturbance: Disturbance,
+    pub call: u32,
+    /// The victim's peer starts first.
+    pub peer_first: bool,
+}
+
+/// What was wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Flaw {
+    Hang,
+    Orphan,
+    Leak,
+    UnusableBus,
+    Panic,
+    ExitCode,
+    Message,
+}
+
+/// A flaw with what was seen.
+pub type Finding = (Flaw, String);
+
+/// What a trial has found.
+pub struct Outcome {
+    /// Whether the victim got as far as the system call.
+    pub reached: bool,
+    pub findings: Vec<Finding>,
+}
+
+/// Runs one trial on `bus`; `expected` is the log hash of an undisturbed run.
+pub fn run(place: &Place, bus: &str, plan: Plan, expected: &str) -> std::io::Result<Outcome> {
+    let mut findings = Vec::new();
+    let record = if plan.call.is_multiple_of(2) {
+        "out/run.mcap"
+    } else {
+        ""
+    };
+    let mut peer = None;
+    if plan.victim != Role::Run && plan.peer_first {
+        peer = Some(Running::start(&mut end(
+            place,
+            other(plan.victim),
+            bus,
+            record,
+        ))?);
+    }
+    let mut victim = Victim::start(&mut end(place, plan.victim, bus, record))?;
+    let victim_said = Said::of(&mut victim.child)?;
+    if plan.victim != Role::Run && !plan.peer_first {
+        peer = Some(Running::start(&mut end(
+            place,
+            other(plan.victim),
+            bus,
+            record,
+        ))?);
+    }
+    let traced = victim.signal_at(plan.call, plan.disturbance.signal(), REACH)?;
+    let disturbed = Instant::now();
+    let reached = traced == Traced::Injected;
+    let mut victim = Running {
+        child: victim.child,
+        said: victim_said,
+        ended: match traced {
+            Traced::Ended(code) => Some(code),
+            Traced::Injected => None,
+        },
+    };
+
+    if reached && plan.disturbance == Disturbance::Pause {
+        std::thread::sleep(Duration::from_millis(100));
+        continue_process(&victim.child);
+    }
+    if let Some(peer) = &mut peer {
+        if peer.wait(disturbed + END)? {
+            let (code, text) = peer.outcome();
+            judge("peer", code, &text, &mut findings);
+        } else {
+            findings.push((Flaw::Hang, "the peer goes on".into()));
+        }
+    }
+    if reached && plan.disturbance == Disturbance::Stop {
+        if plan.victim == Role::Run {
+            // Nobody watches over the parent: its children finish what they do.
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        continue_process(&victim.child);
+    }
+    let limit = Instant::now().max(disturbed) + END;
+    if victim.wait(limit)? {
+        let (code, text) = victim.outcome();
+        // A signal before its handler is set ends the process without a word.
+        if code.is_some() || !reached {
+            judge("victim", code, &text, &mut findings);
+        }
+    } else {
+        findings.push((Flaw::Hang, "the victim goes on".into()));
+    }
+    orphans(place, disturbed + END, &mut findings);
+    next_run(place, bus, expected, &mut findings)?;
+    Ok(Outcome { reached, findings })
+}
+
+fn other(role: Role) -> Role {
+    match role {
+        Role::Plant => Role::Controller,
+        Role::Controller | Role::Run => Role::Plant,
+    }
+}
+
+fn end(place: &Place, role: Role, bus: &str, record: &str) -> Command {
+    let recorded = ["--record", record];
+    let unrecorded = ["--no-record"];
+    let record = if record.is_empty() {
+        &unrecorded[..]
+    } else {
+        &recorded
+    };
+    match role {
+        Role::Plant => {
+            let wait = ["plant", "--bus", bus, "--wait-s", WAIT_S];
+            place.command(&[&wait, &QUICK[..], record].concat())
+        }
+        Role::Controller => place.command(&["controller", "--bus", bus, "--wait-s", WAIT_S]),
+        Role::Run => place.command(&[&["run", "--bus", bus], &QUICK[..], record].concat()),
+    }
+}
+
+/// Whatever is left: processes whose parent has gone must go, too.
+fn orphans(place: &Place, deadline: Instant, findings: &mut Vec<Finding>) {
+    loop {
+        let left = place.processes();
+        if left.is_empty() {
+            return;
+        }
+        if Instant::now() >= deadline {
+            findings.push((Flaw::Orphan, format!("processes {left:?} go on")));
+            for id in left {
+                let _ = kill(Pid::from_raw(id), Signal::SIGKILL);
+            }
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// The next run on the same bus must go as if nothing had been, and leave nothing.
+fn next_run(
+    place: &Place,
+    bus: &str,
+    expected: &str,
+    findings: &mut Vec<Finding>,
+) -> std::io::Result<()> {
+    let run = ["run", "--bus", bus, "--record", "out/run.mcap"];
+    let mut next = Running::start(&mut place.command(&[&run, &QUICK[..]].concat()))?;
+    if !next.wait(Instant::now() + END)? {
+        findings.push((Flaw::UnusableBus, "the next run does not end".into()));
+    }
+    let (code, text) = next.outcome();
+    let hash = log_hash(&text.stdout);
+    if code != Some(0) || hash.as_deref() != Some(expected) {
+        let errors = text.stderr.trim();
+        let text = format!("the next run ended with {code:?} and hash {hash:?}: {errors}");
+        findings.push((Flaw::UnusableBus, text));
+    }
+    let left: Vec<PathBuf> = place.left(bus);
+    if !left.is_empty() {
+        findings.push((Flaw::Leak, format!("{left:?} stay")));
+    }
+    Ok(())
+}
+
+/// The hash of all frames in a report.
+pub fn log_hash(report: &str) -> Option<String> {
+    let report: Value = serde_json::from_str(report).ok()?;
+    Some(report["log_hash"].as_str()?.to_owned())
+}
+
+fn judge(who: &str, code: Option<i32>, text: &Text, findings: &mut Vec<Finding>) {
+    let errors = text.stderr.trim();
+    if errors.contains("panicked") {
+        findings.push((Flaw::Panic, format!("{who}: {errors}")));
+    }
+    match code {
+        Some(code) if DOCUMENTED.contains(&code) => {}
+        other => findings.push((Flaw::ExitCode, format!("{who}: {other:?}, {errors}"))),
+    }
+    let mut lines: Vec<_> = errors.lines().collect();
+    lines.retain(|line| !line.starts_with("the record so far is in "));
+    let wanted = usize::from(code != Some(0));
+    if lines.len() != wanted || lines.iter().any(|line| !line.starts_with("error: ")) {
+        findings.push((
+            Flaw::Message,
+            format!("{who} ended with {code:?}: {errors:?}"),
+        ));
+    }
+}
+
+fn continue_process(child: &Child) {
+    if let Ok(id) = i32::try_from(child.id()) {
+        // An error means that it has ended meanwhile.
+        let _ = kill(Pid::from_raw(id), Signal::SIGCONT);
+    }
+}
+
+/// What a process has said.
+#[derive(Default)]
+pub struct Text {
+    pub stdout: String,
+    pub stderr: String,
+}
+
+/// Reads both pipes of a process while it runs.
+struct Said(Receiver<String>, Receiver<String>);
+
+impl Said {
+    fn of(child: &mut Child) -> std::io::Result<Self> {
+        Ok(Self(read(child.stdout.take())?, read(child.stderr.take())?))
+    }
+
+    fn text(&self) -> Text {
+        let text = |pipe: &Receiver<String>| {
+            pipe.recv_timeout(Duration::from_secs(1))
+                .unwrap_or_default()
+        };
+        Text {
+            stdout: text(&self.0),
+            stderr: text(&self.1),
+        }
+    }
+}
+
+fn read(pipe: Option<impl Read + Send + 'static>) -> std::io::Result<Receiver<String>> {
+    let (sender, receiver) = channel();
+    std::thread::Builder::new().spawn(move || {
+        let mut text = Vec::new();
+        if let Some(mut pipe) = pipe {
+            let _ = pipe.read_to_end(&mut text);
+        }
+        let _ = sender.send(String::from_utf8_lossy(&text).into_owned());
+    })?;
+    Ok(receiver)
+}
+
+/// A process of a trial; killed when this value goes.
+pub struct Running {
+    child: Child,
+    said: Said,
+    ended: Option<Option<i32>>,
+}
+
+impl Running {
+    /// Starts a command.
+    pub fn start(command: &mut Command) -> std::io::Result<Self> {
+        let mut child = command.spawn()?;
+        Ok(Self {
+            said: Said::of(&mut child)?,
+            child,
+            ended: None,
+        })
+    }
+
+    /// Waits for the end; `false` if it does not come, and the process is killed then.
+    pub fn wait(&mut self, deadline: Instant) -> std::io::Result<bool> {
+        while self.ended.is_none() {
+            if let Some(status) = self.child.try_wait()? {
+                self.ended = Some(status.code());
+            } else if Instant::now() >= deadline {
+                self.child.kill()?;
+                self.ended = Some(self.child.wait()?.code());
+                return Ok(false);
+            } else {
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        }
+        Ok(true)
+    }
+
+    /// Exit code, none after a signal, and what was said.
+    pub fn outcome(&self) -> (Option<i32>, Text) {
+        (self.ended.flatten(), self.said.text())
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if self.ended.is_none() {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+    }
+}
