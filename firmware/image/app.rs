@@ -18,7 +18,7 @@ use crate::board::Board;
 #[app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod tasks {
     use heapless::spsc::{Consumer, Producer, Queue};
-    use painleve_firmware::supervise::deadline_monitor::Lapse;
+    use painleve_firmware::supervise::lapses::Lapse;
     use painleve_firmware::{Configuration, Controller};
     use painleve_shared::frame::{ActuatorFrame, SensorFrame};
     use painleve_shared::message::{

@@ -1,7 +1,7 @@
 //! What is counted between two configurations, for the host and for the log.
 
 use painleve_firmware::Controller;
-use painleve_firmware::supervise::deadline_monitor::Lapse;
+use painleve_firmware::supervise::lapses::LapseCounts;
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::message::{Health, Plant};
 use painleve_shared::status::{Fault, SupervisorState};
@@ -65,20 +65,13 @@ impl Watch {
 
     /// Every counter, except the stack: looking at that takes too long to hold up the control task.
     pub fn health(&self, controller: Option<&Controller>) -> Health {
-        let total =
-            |lapse| controller.map_or(0, |controller| controller.lapse_counts().total(lapse));
         Health {
             stack_bytes: 0,
             ticks: self.ticks,
             dropped_responses: self.dropped_responses,
-            overruns: total(Lapse::Overrun),
-            missing_frames: total(Lapse::MissingFrame),
-            stale_frames: total(Lapse::StaleFrame),
-            lost_frames: total(Lapse::LostFrame),
-            out_of_range_counts: total(Lapse::EncoderOutOfRange)
-                .wrapping_add(total(Lapse::ForceOutOfRange)),
-            garbage: total(Lapse::Garbage),
-            failed_checksums: total(Lapse::FailedChecksum),
+            lapses: controller.map_or_else(LapseCounts::default, |controller| {
+                controller.lapse_counts().totals()
+            }),
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::law::{Law, LawSettings};
 use crate::recover::RecoverySettings;
 use crate::refer::governor::GovernorSettings;
 use crate::refer::reference::Program;
-use crate::supervise::deadline_monitor::DeadlineLimits;
+use crate::supervise::lapses::LapseLimits;
 use crate::supervise::supervisor::SupervisorSettings;
 
 /// The converters' scalings as the controller knows them.
@@ -70,7 +70,7 @@ settings! {
         /// When the drive is armed, and when it is shut down.
         supervisor: SupervisorSettings = SupervisorSettings::default();
         /// How many lapses in a row are survived.
-        deadlines: DeadlineLimits = DeadlineLimits::default();
+        lapses: LapseLimits = LapseLimits::default();
         /// The control law.
         law: L = L::default();
         /// How the tip is kept pressed on the belt.

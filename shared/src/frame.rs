@@ -4,6 +4,7 @@
 //! [`ActuatorFrame`] that echoes its tick. Both counters wrap; compare them by
 //! difference only.
 
+use bitflags::bitflags;
 use serde::{Deserialize, Serialize};
 
 use crate::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
@@ -23,26 +24,15 @@ use {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DigitalInputs(pub u32);
 
-impl DigitalInputs {
-    /// The drive is enabled while this is high; low means torque off.
-    pub const ENABLE: Self = Self(1);
-    /// A rising edge clears a latched fault.
-    pub const RESET: Self = Self(1 << 1);
-    /// Makes the tick last until the next one is due. Only the emulated board has this
-    /// input, for tests of the deadline monitor.
-    pub const OVERLOAD: Self = Self(1 << 31);
-
-    /// Whether all bits of `inputs` are high.
-    #[inline]
-    pub fn contains(self, inputs: Self) -> bool {
-        self.0 & inputs.0 == inputs.0
-    }
-
-    /// These inputs and `inputs` together.
-    #[inline]
-    #[must_use]
-    pub fn with(self, inputs: Self) -> Self {
-        Self(self.0 | inputs.0)
+bitflags! {
+    impl DigitalInputs: u32 {
+        /// The drive is enabled while this is high; low means torque off.
+        const ENABLE = 1;
+        /// A rising edge clears a latched fault.
+        const RESET = 1 << 1;
+        /// Makes the tick last until the next one is due. Only the emulated board has this
+        /// input, for tests of the lapse monitor.
+        const OVERLOAD = 1 << 31;
     }
 }
 
@@ -54,43 +44,24 @@ impl DigitalInputs {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StatusFlags(pub u16);
 
-impl StatusFlags {
-    /// The tip is taken to touch the belt.
-    pub const CONTACT: Self = Self(1);
-    /// The law asked for more torque than allowed.
-    pub const SATURATED: Self = Self(1 << 1);
-    /// The last segment of the reference has ended.
-    pub const REFERENCE_DONE: Self = Self(1 << 2);
-    /// The contact guard changed the torque to keep the tip pressed on the belt.
-    pub const GUARDED: Self = Self(1 << 3);
-    /// The reference is beyond the edge of the admissible stretch, and held there.
-    pub const AT_EDGE: Self = Self(1 << 4);
-    /// The tip is being brought back onto the belt.
-    pub const RECOVERING: Self = Self(1 << 5);
-    /// In contact: the tip seems to slide with ż_r < 0 (clear: ż_r > 0).
-    pub const SLIP_NEGATIVE: Self = Self(1 << 6);
-    /// In contact: the tip seems to move with the belt.
-    pub const STICKS: Self = Self(1 << 7);
-
-    /// Whether all bits of `flags` are set.
-    #[inline]
-    pub fn contains(self, flags: Self) -> bool {
-        self.0 & flags.0 == flags.0
-    }
-
-    /// These flags with the bits of `flags` cleared.
-    #[inline]
-    #[must_use]
-    pub fn without(self, flags: Self) -> Self {
-        Self(self.0 & !flags.0)
-    }
-
-    /// Sets the bits of `flags` if `condition` holds.
-    #[inline]
-    pub fn set_if(&mut self, flags: Self, condition: bool) {
-        if condition {
-            self.0 |= flags.0;
-        }
+bitflags! {
+    impl StatusFlags: u16 {
+        /// The tip is taken to touch the belt.
+        const CONTACT = 1;
+        /// The law asked for more torque than allowed.
+        const SATURATED = 1 << 1;
+        /// The last segment of the reference has ended.
+        const REFERENCE_DONE = 1 << 2;
+        /// The contact guard changed the torque to keep the tip pressed on the belt.
+        const GUARDED = 1 << 3;
+        /// The reference is beyond the edge of the admissible stretch, and held there.
+        const AT_EDGE = 1 << 4;
+        /// The tip is being brought back onto the belt.
+        const RECOVERING = 1 << 5;
+        /// In contact: the tip seems to slide with ż_r < 0 (clear: ż_r > 0).
+        const SLIP_NEGATIVE = 1 << 6;
+        /// In contact: the tip seems to move with the belt.
+        const STICKS = 1 << 7;
     }
 }
 

@@ -5,6 +5,7 @@
 //! - [`contact`]: Q, b, p and the four solution modes of the tip on the belt
 //! - [`counts`]: integers as converters give and take them, with their scaling
 //! - [`frame`], [`status`]: what crosses the link at every control tick
+//! - [`lapse`]: what may go wrong around a tick
 //! - [`wire`], [`message`]: the same frames as bytes, for links that are not shared memory,
 //!   and what is said with them
 //! - [`real`], [`range`]: scalars with host-independent functions, and range errors
@@ -31,6 +32,7 @@ pub mod counts;
 pub mod dynamics;
 pub mod frame;
 pub mod kinematics;
+pub mod lapse;
 pub mod message;
 pub mod range;
 pub mod real;

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{ActuatorFrame, SensorFrame};
+use crate::lapse::LapseCounts;
 
 /// Longest encoded message, in bytes: a configuration with a full reference.
 pub const MAXIMUM_LENGTH: usize = 768;
@@ -74,20 +75,8 @@ pub struct Health {
     pub ticks: u32,
     /// Answers that nobody took in time.
     pub dropped_responses: u32,
-    /// Ticks that ended after the next one should have begun.
-    pub overruns: u32,
-    /// Ticks without a sensor frame from a host that goes by the clock.
-    pub missing_frames: u32,
-    /// Frames with the sequence number of an earlier one.
-    pub stale_frames: u32,
-    /// Sequence numbers that never came.
-    pub lost_frames: u32,
-    /// Frames with a reading that its converter cannot give.
-    pub out_of_range_counts: u32,
-    /// Runs of bytes that were no message.
-    pub garbage: u32,
-    /// Messages whose checksum was wrong.
-    pub failed_checksums: u32,
+    /// Lapses, by kind.
+    pub lapses: LapseCounts,
 }
 
 #[cfg(test)]
@@ -114,13 +103,7 @@ mod tests {
             stack_bytes: u32::MAX,
             ticks: u32::MAX,
             dropped_responses: u32::MAX,
-            overruns: u32::MAX,
-            missing_frames: u32::MAX,
-            stale_frames: u32::MAX,
-            lost_frames: u32::MAX,
-            out_of_range_counts: u32::MAX,
-            garbage: u32::MAX,
-            failed_checksums: u32::MAX,
+            lapses: LapseCounts::from_fn(|_| u32::MAX),
         };
         let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
         for response in [

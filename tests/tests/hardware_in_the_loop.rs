@@ -62,7 +62,7 @@ fn a_run_over_the_line_is_the_native_run() {
     assert_eq!(report["host"], "serial");
     assert_eq!(course(&report), course(&native));
     assert_eq!(timing["unit"]["cycles"]["hz"], 1_000_000_000);
-    assert_eq!(count(&timing, "/board/failed_checksums"), 0);
+    assert_eq!(count(&timing, "/board/lapses/failed_checksums"), 0);
     assert_eq!(count(&timing, "/line/failed_checksums"), 0);
     // A repeated frame, on a machine that is very busy, is answered with another sequence number.
     if count(&timing, "/line/repeated_requests") == 0 {
@@ -108,8 +108,8 @@ fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
     for (direction, garbage, checksums) in [
         (
             Direction::ToBoard,
-            u64::from(health.garbage),
-            u64::from(health.failed_checksums),
+            u64::from(health.lapses.garbage),
+            u64::from(health.lapses.failed_checksums),
         ),
         (
             Direction::ToHost,
@@ -160,7 +160,7 @@ impl Pressing {
         let overrides = [
             "run.tick_hz=50",
             "controller.estimator.bandwidth_rad_s=100",
-            "controller.deadlines.missing_frames=100",
+            "controller.lapses.missing_frames=100",
         ];
         let scenario = Scenario::load("hybrid-elbow-down", &overrides.map(String::from));
         let scenario = scenario.expect("valid overrides");
@@ -212,16 +212,16 @@ fn silence_latches_a_fault_without_torque_until_it_is_armed_again() {
         }
         assert!(start.elapsed() < Duration::from_secs(20), "not a word");
     };
-    assert_eq!(told.latched_fault(), Some(Fault::FrameMissing));
+    assert_eq!(told.latched_fault(), Some(Fault::MissingFrame));
     assert_eq!(told.torques, NO_TORQUE);
     assert_eq!(
         told.tick, last.tick,
         "the answer to the last frame, withdrawn"
     );
-    assert!(arm.board.health().unwrap().missing_frames > 100);
+    assert!(arm.board.health().unwrap().lapses.missing_frames > 100);
 
     // Frames that come again change nothing, and neither does a reset alone.
-    for inputs in [ON, ON, ON.with(DigitalInputs::RESET), ON] {
+    for inputs in [ON, ON, ON | DigitalInputs::RESET, ON] {
         let answer = arm.tick(inputs);
         assert_eq!(answer.torques, NO_TORQUE);
         assert_ne!(answer.supervisor_state(), Some(SupervisorState::Armed));

@@ -56,10 +56,10 @@ impl Switches {
     pub fn tick(&mut self, enable: bool, reset: bool) -> DigitalInputs {
         let mut inputs = DigitalInputs::default();
         if self.enable.tick(enable) {
-            inputs = inputs.with(DigitalInputs::ENABLE);
+            inputs |= DigitalInputs::ENABLE;
         }
         if self.reset.tick(reset) {
-            inputs = inputs.with(DigitalInputs::RESET);
+            inputs |= DigitalInputs::RESET;
         }
         inputs
     }

@@ -224,7 +224,7 @@ impl F405Drive {
             joints: self.encoders.read(),
             normal_force,
             tangential_force,
-            inputs: level(enable, DigitalInputs::ENABLE).with(level(reset, DigitalInputs::RESET)),
+            inputs: level(enable, DigitalInputs::ENABLE) | level(reset, DigitalInputs::RESET),
         }
     }
 

@@ -4,7 +4,7 @@ use painleve_shared::frame::SensorFrame;
 
 use crate::configuration::Converters;
 use crate::drive::torque::LastCommand;
-use crate::supervise::deadline_monitor::{DeadlineMonitor, Lapse};
+use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::Supervision;
 
 /// Ticks without readings are not counted further: a fault is latched long before.
@@ -31,7 +31,7 @@ pub(super) struct ArrivalState {
 
 /// Where lapses are counted, and what too many of them stop.
 pub(super) struct Lapses<'a> {
-    pub monitor: &'a mut DeadlineMonitor,
+    pub monitor: &'a mut LapseMonitor,
     pub supervision: &'a mut Supervision,
     pub command: &'a mut LastCommand,
 }
@@ -84,7 +84,7 @@ pub(super) fn arrive(
     }
     state.last_sequence = Some(frame.sequence);
     for lapse in Lapse::OF_FRAMES {
-        lapses.note(lapse, 0);
+        lapses.note(*lapse, 0);
     }
     Arrival::After(1 + core::mem::take(&mut state.unread_ticks))
 }

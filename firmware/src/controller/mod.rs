@@ -29,7 +29,7 @@ use crate::law::LawInput;
 use crate::law::{Law, LawSettings};
 use crate::recover::{Recovery, RecoveryState};
 use crate::refer::{References, ReferencesState};
-use crate::supervise::deadline_monitor::{DeadlineMonitor, Lapse};
+use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::{Supervision, Supervisor};
 use crate::telemetry::{Telemetry, TelemetrySink, Tick};
 
@@ -58,7 +58,7 @@ struct Stages<L> {
 #[derive(Clone, Debug)]
 struct State<L: Law> {
     arrivals: ArrivalState,
-    monitor: DeadlineMonitor,
+    monitor: LapseMonitor,
     estimates: EstimatesState,
     supervision: Supervision,
     references: ReferencesState,
@@ -91,7 +91,7 @@ impl<L: Law> Controller<L> {
         };
         let state = State {
             arrivals: ArrivalState::default(),
-            monitor: DeadlineMonitor::new(settings.deadlines),
+            monitor: LapseMonitor::new(settings.lapses),
             estimates: stages.estimators.start(configuration, arm),
             supervision: Supervision::default(),
             references: stages.references.start(&arm),
@@ -143,7 +143,7 @@ impl<L: Law> Controller<L> {
     }
 
     /// How often each kind of lapse has happened.
-    pub fn lapse_counts(&self) -> &DeadlineMonitor {
+    pub fn lapse_counts(&self) -> &LapseMonitor {
         &self.state.monitor
     }
 
@@ -197,14 +197,12 @@ impl<L: Law> Controller<L> {
         let answer = &mut self.last_answer;
         answer.torques = [TorqueCounts(0); 2];
         report(answer, &self.state.supervision);
-        for flag in [
-            StatusFlags::SATURATED,
-            StatusFlags::GUARDED,
-            StatusFlags::AT_EDGE,
-            StatusFlags::RECOVERING,
-        ] {
-            answer.flags = answer.flags.without(flag);
-        }
+        answer.flags.remove(
+            StatusFlags::SATURATED
+                | StatusFlags::GUARDED
+                | StatusFlags::AT_EDGE
+                | StatusFlags::RECOVERING,
+        );
         telemetry.stop(&self.state.supervision);
     }
 }
@@ -325,16 +323,16 @@ fn flags(tick: &Tick<'_>, reference_done: bool) -> StatusFlags {
     } = tick;
     let friction = &contact.friction;
     let mut flags = StatusFlags::default();
-    flags.set_if(StatusFlags::CONTACT, contact.touches);
-    flags.set_if(StatusFlags::SATURATED, command.saturated);
-    flags.set_if(StatusFlags::REFERENCE_DONE, reference_done);
-    flags.set_if(StatusFlags::GUARDED, command.guarded);
-    flags.set_if(StatusFlags::AT_EDGE, target.at_edge);
-    flags.set_if(StatusFlags::RECOVERING, *recovering);
-    flags.set_if(
+    flags.set(StatusFlags::CONTACT, contact.touches);
+    flags.set(StatusFlags::SATURATED, command.saturated);
+    flags.set(StatusFlags::REFERENCE_DONE, reference_done);
+    flags.set(StatusFlags::GUARDED, command.guarded);
+    flags.set(StatusFlags::AT_EDGE, target.at_edge);
+    flags.set(StatusFlags::RECOVERING, *recovering);
+    flags.set(
         StatusFlags::SLIP_NEGATIVE,
         contact.touches && friction.slip == Slip::Negative,
     );
-    flags.set_if(StatusFlags::STICKS, contact.touches && friction.sticks);
+    flags.set(StatusFlags::STICKS, contact.touches && friction.sticks);
     flags
 }

@@ -4,7 +4,7 @@ use super::*;
 use crate::configuration::ControllerSettings;
 use crate::estimate::contact::Evidence;
 use crate::refer::reference::Program;
-use crate::supervise::deadline_monitor::Lapse;
+use crate::supervise::lapses::Lapse;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
 use painleve_shared::frame::DigitalInputs;
 use painleve_shared::status::SupervisorState;
@@ -197,7 +197,7 @@ fn a_lapse_around_the_tick_latches_past_its_limit_until_armed_again() {
             };
             controller.tick(&inputs)
         };
-        with(DigitalInputs::ENABLE.with(DigitalInputs::RESET));
+        with(DigitalInputs::ENABLE | DigitalInputs::RESET);
         let answer = with(DigitalInputs::ENABLE);
         assert_eq!(answer.supervisor_state(), Some(SupervisorState::Idle));
         with(DigitalInputs::default());
@@ -213,7 +213,7 @@ fn lost_frames_are_counted_and_too_many_are_a_fault() {
     let answer = controller.tick(&frame(22));
     assert_eq!(answer.latched_fault(), None);
     assert_eq!(controller.lapse_counts().total(Lapse::LostFrame), 2);
-    assert_fault(&mut controller, &frame(30), Fault::FramesLost);
+    assert_fault(&mut controller, &frame(30), Fault::LostFrames);
 }
 
 #[test]

@@ -1,4 +1,4 @@
 //! What the controller may do: the supervisor's states, and the faults that stop it.
 
-pub mod deadline_monitor;
+pub mod lapses;
 pub mod supervisor;

@@ -319,7 +319,7 @@ mod tests {
             supervisor.tick(inputs, true, true);
             assert_eq!(supervisor.fault(), Some(Fault::NotFinite));
         }
-        supervisor.tick(ON.with(DigitalInputs::RESET), true, true);
+        supervisor.tick(ON | DigitalInputs::RESET, true, true);
         assert_eq!((supervisor.state(), supervisor.fault()), (Idle, None));
         supervisor.tick(ON, true, true);
         assert_eq!(supervisor.state(), Idle);

@@ -31,7 +31,7 @@ const PATIENCE: Duration = Duration::from_millis(200);
 const LOCKSTEP_PATIENCE: Duration = Duration::from_millis(50);
 
 /// The same by the clock, in ticks: a frame can be repeated twice before the board's
-/// patience of [10 ticks](painleve_firmware::supervise::deadline_monitor::DeadlineLimits) is over.
+/// patience of [10 ticks](painleve_firmware::supervise::lapses::LapseLimits) is over.
 const REALTIME_PATIENCE_TICKS: u32 = 3;
 
 /// Checks that the port can be used, before anything is started.

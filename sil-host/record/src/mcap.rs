@@ -539,7 +539,7 @@ mod tests {
         sample.actuator.torques = [TorqueCounts(2047), TorqueCounts(-2048)];
         sample.actuator.estimated_tip = Micrometres(-148_000);
         sample.actuator.state = SupervisorState::LiftOff as u8;
-        sample.actuator.fault = Fault::FramesLost as u8;
+        sample.actuator.fault = Fault::LostFrames as u8;
         sample
     }
 
@@ -597,7 +597,7 @@ mod tests {
                     assert_eq!(json["estimated_tip_um"], -148_000);
                     assert_eq!(json["state"], "lift-off");
                     assert_eq!(json["fault_number"], 5);
-                    assert_eq!(json["fault"], Fault::FramesLost.description());
+                    assert_eq!(json["fault"], Fault::LostFrames.description());
                 }
                 other => panic!("topic {other}"),
             }

@@ -62,7 +62,7 @@ impl TimingReport {
             stack_bytes: Some(health.stack_bytes),
             board: Some(health),
             line: board.line(),
-            missed_deadlines: health.overruns.into(),
+            missed_deadlines: health.lapses.overruns.into(),
             ..Self::new(scenario, tick_hz, B::HOST, "tick", board.unit(), times)
         })
     }

@@ -1,0 +1,89 @@
+//! Counts lapses around a tick, each kind by itself, and says when there are too many.
+//!
+//! A single late tick, broken message or impossible reading is counted and
+//! survived; more than a limit in a row is a fault, which the controller latches
+//! until it is reset.
+
+pub use painleve_shared::lapse::{Lapse, LapseCounts, LapseLimits};
+
+/// Lapses of one kind.
+#[derive(Clone, Copy, Debug, Default)]
+struct Count {
+    total: u32,
+    in_a_row: u32,
+}
+
+/// Counts lapses and says when there are too many in a row.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LapseMonitor {
+    limits: LapseLimits,
+    counts: [Count; Lapse::COUNT],
+}
+
+impl LapseMonitor {
+    /// A monitor that has seen nothing.
+    pub fn new(limits: LapseLimits) -> Self {
+        Self {
+            limits,
+            ..Self::default()
+        }
+    }
+
+    /// Takes note that `lapse` did not happen this time.
+    #[inline]
+    pub fn note_good(&mut self, lapse: Lapse) {
+        self.counts[lapse as usize].in_a_row = 0;
+    }
+
+    /// Takes note of how many times `lapse` happened; says whether that is now too often in a row.
+    #[must_use]
+    pub fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
+        let count = &mut self.counts[lapse as usize];
+        count.total = count.total.wrapping_add(times);
+        count.in_a_row = count.in_a_row.saturating_add(times);
+        count.in_a_row > self.limits.of(lapse)
+    }
+
+    /// How often `lapse` has happened; wraps.
+    pub fn total(&self, lapse: Lapse) -> u32 {
+        self.counts[lapse as usize].total
+    }
+
+    /// How often each lapse has happened.
+    pub fn totals(&self) -> LapseCounts {
+        LapseCounts::from_fn(|lapse| self.total(lapse))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_kind_has_its_own_counter_and_limit_and_a_good_one_starts_over() {
+        for lapse in Lapse::ALL.iter().copied() {
+            let limits = LapseLimits::default();
+            let limit = limits.of(lapse);
+            let mut monitor = LapseMonitor::new(limits);
+            for _ in 0..limit {
+                assert!(!monitor.note_bad(lapse, 1), "{lapse:?}");
+            }
+            monitor.note_good(lapse);
+            assert!(!monitor.note_bad(lapse, limit));
+            for other in Lapse::ALL.iter().copied().filter(|other| *other != lapse) {
+                assert!(!monitor.note_bad(other, 1));
+                assert_eq!(monitor.total(other), 1);
+            }
+            assert!(monitor.note_bad(lapse, 1), "{lapse:?}");
+            assert_eq!(monitor.total(lapse), 2 * limit + 1);
+        }
+    }
+
+    #[test]
+    fn totals_wrap_without_a_fault() {
+        let mut monitor = LapseMonitor::default();
+        monitor.counts[Lapse::MissingFrame as usize].total = u32::MAX;
+        assert!(!monitor.note_bad(Lapse::MissingFrame, 1));
+        assert_eq!(monitor.total(Lapse::MissingFrame), 0);
+    }
+}
