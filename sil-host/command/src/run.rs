@@ -12,7 +12,7 @@ use painleve_board::{emulator, serial};
 use painleve_link::{BusName, Pacing};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_record::report::RunReport;
-use painleve_study::robustness;
+use painleve_study::robustness::{self, Arms};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
 use painleve_system::terminal::warn;
@@ -62,6 +62,9 @@ pub struct ScenarioArguments {
         allow_hyphen_values = true
     )]
     replay: Option<Replay>,
+    /// The arms of that study, if they were not the paper's.
+    #[arg(long, value_enum, default_value = "paper", requires = "replay")]
+    arms: Arms,
     /// Override one key, as in belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
@@ -82,7 +85,7 @@ impl ScenarioArguments {
     pub fn load(&self) -> Result<Scenario, CommandError> {
         match self.replay {
             Some(Replay { seed, index }) => {
-                let drawn = robustness::scenario(seed, index)?;
+                let drawn = robustness::scenario(self.arms, seed, index)?;
                 Ok(drawn.with_overrides("replayed run", &self.overrides)?)
             }
             None => Ok(Scenario::load(self.name(), &self.overrides)?),
@@ -92,7 +95,11 @@ impl ScenarioArguments {
     fn to_arguments(&self) -> Vec<OsString> {
         let mut arguments: Vec<OsString> = match self.replay {
             Some(Replay { seed, index }) => {
-                vec!["--replay".into(), format!("{seed}:{index}").into()]
+                let mut line = vec!["--replay".into(), format!("{seed}:{index}").into()];
+                if self.arms == Arms::General {
+                    line.extend(["--arms".into(), "general".into()]);
+                }
+                line
             }
             None => vec![self.name().into()],
         };

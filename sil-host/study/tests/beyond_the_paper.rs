@@ -12,7 +12,7 @@ use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_shared::ArmParameters;
 use painleve_shared::frame::StatusFlags;
-use painleve_study::robustness::Robustness;
+use painleve_study::robustness::{Arms, Robustness};
 use painleve_study::rows;
 
 /// 0.5 % of the force cell's range.
@@ -218,6 +218,7 @@ fn links_longer_than_the_data_sheet_says_do_not_move_the_tip() {
 fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
     let successes = |overrides: &[&str]| {
         let campaign = Robustness {
+            arms: Arms::Paper,
             seed: 2,
             runs: 60,
             overrides: overrides.iter().map(ToString::to_string).collect(),

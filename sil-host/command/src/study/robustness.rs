@@ -2,7 +2,7 @@
 
 use clap::Args;
 use painleve_study::StudyError;
-use painleve_study::robustness::{Ablation, AblationStudy, Campaign, Part, Robustness};
+use painleve_study::robustness::{Ablation, AblationStudy, Arms, Campaign, Part, Robustness};
 
 use super::options::{self, OutcomeOptions, Overrides};
 use crate::CommandError;
@@ -10,6 +10,9 @@ use crate::CommandError;
 /// Options of `painleve study robustness`.
 #[derive(Debug, Args)]
 pub struct RobustnessArguments {
+    /// The paper's arm with errors, or any arm, which the controller is told.
+    #[arg(long, value_enum, default_value = "paper")]
+    arms: Arms,
     /// Seed of all runs.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
@@ -34,6 +37,9 @@ pub struct RobustnessArguments {
 /// Options of `painleve study ablation`.
 #[derive(Debug, Args)]
 pub struct AblationArguments {
+    /// The paper's arm with errors, or any arm, which the controller is told.
+    #[arg(long, value_enum, default_value = "paper")]
+    arms: Arms,
     /// Seed of all runs.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
@@ -65,6 +71,7 @@ impl RobustnessArguments {
         let mut overrides: Vec<String> = parts.map(ToString::to_string).collect();
         overrides.extend(self.overrides.overrides.iter().cloned());
         let study = Robustness {
+            arms: self.arms,
             seed: self.seed,
             runs: self.runs,
             overrides,
@@ -80,13 +87,14 @@ pub fn run(arguments: &RobustnessArguments) -> Result<(), CommandError> {
     let rows = arguments.outcome.compute(&study)?;
     arguments
         .outcome
-        .write(&Campaign::new(arguments.seed, rows))
+        .write(&Campaign::new(arguments.arms, arguments.seed, rows))
 }
 
 /// Computes the campaign without one part after the other, and writes what each contributes.
 pub fn run_ablation(arguments: &AblationArguments) -> Result<(), CommandError> {
     let study = AblationStudy {
         campaign: Robustness {
+            arms: arguments.arms,
             seed: arguments.seed,
             runs: arguments.runs,
             overrides: arguments.overrides.overrides.clone(),

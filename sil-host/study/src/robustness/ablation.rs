@@ -81,7 +81,8 @@ impl Ablation {
         let rows = without
             .zip(rows.chunks(runs))
             .map(|(without, rows)| {
-                let campaign = Campaign::new(study.campaign.seed, rows.to_vec());
+                let campaign =
+                    Campaign::new(study.campaign.arms, study.campaign.seed, rows.to_vec());
                 let errors: f64 = rows.iter().map(|row| row.error_m).sum();
                 Ablated {
                     without,

@@ -4,10 +4,11 @@ use core::ops::Range;
 
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, ArmParameters, Posture, Slip};
+use painleve_shared::{Arm, Posture, Slip};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
+use super::Arms;
 use crate::StudyError;
 use crate::belt_line::{BeltLine, positive_stretches};
 use crate::case::{self, Reference};
@@ -19,8 +20,6 @@ const USED_REACH: f64 = 0.97;
 const START_P_RATIO: f64 = 0.2;
 /// How far beyond an edge a target may be, m.
 const BEYOND_M: f64 = 0.02;
-/// Farthest target: within the reach of the arm that the controller believes in, m.
-const FARTHEST_M: f64 = 0.183;
 /// Time after the end of the reference in which the tip comes to rest, s.
 const REST_S: f64 = 2.0;
 
@@ -45,11 +44,11 @@ pub fn admissible_m(
     stretches
 }
 
-/// The scenario of run `index` of the campaign with a seed, and nothing else.
+/// The scenario of run `index` of the campaign with such arms and a seed.
 ///
 /// # Errors
 /// [`StudyError`] if the built-in scenario cannot be had.
-pub fn scenario(seed: u64, index: u64) -> Result<Scenario, StudyError> {
+pub fn scenario(arms: Arms, seed: u64, index: u64) -> Result<Scenario, StudyError> {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(index);
     let mut draw = |range: Range<f64>| generator.random_range(range);
@@ -65,19 +64,7 @@ pub fn scenario(seed: u64, index: u64) -> Result<Scenario, StudyError> {
     scenario.belt.friction = friction;
     scenario.belt.profile = BeltProfile::Constant { speed_m_s };
 
-    let nominal = ArmParameters::<f64>::default();
-    scenario.arm_model = Some(nominal.cast());
-    let mut scaled = |values: [f64; 2], by| {
-        let factor = draw(by);
-        values.map(|value| value * factor)
-    };
-    scenario.arm = ArmParameters {
-        link_mass_kg: scaled(nominal.link_mass_kg, 0.95..1.05),
-        link_length_m: scaled(nominal.link_length_m, 0.95..1.05),
-        stiffness_nm_rad: scaled(nominal.stiffness_nm_rad, 0.8..1.2),
-        damping_nms_rad: scaled(nominal.damping_nms_rad, 0.8..1.2),
-        ..nominal
-    };
+    arms.draw(&mut scenario, &mut draw);
 
     let converters = &mut scenario.converters;
     converters.encoder.bits = draw(12.0..19.0) as u8;
@@ -122,7 +109,8 @@ pub fn scenario(seed: u64, index: u64) -> Result<Scenario, StudyError> {
     } else {
         Reference::Ramp(duration_s)
     };
-    scenario.controller.reference = reference.to(target_m.clamp(-FARTHEST_M, FARTHEST_M));
+    let farthest_m = arms.farthest_m(arm.reach_on_belt_m());
+    scenario.controller.reference = reference.to(target_m.clamp(-farthest_m, farthest_m));
     scenario.run.duration_s = reference.duration_s() + super::CAPTURE_LIMIT_S + REST_S;
     scenario.initial = case::at_rest_on_belt(&arm, start_m, posture)?;
     Ok(scenario)

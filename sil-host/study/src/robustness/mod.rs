@@ -5,6 +5,7 @@
 //! its reference or, where that is beyond the edge, at the governed edge.
 
 mod ablation;
+mod arms;
 mod draw;
 mod false_alarms;
 mod outcome;
@@ -26,6 +27,7 @@ use super::trial::Trial;
 use super::{Study, StudyError};
 
 pub use ablation::{Ablated, Ablation, AblationStudy};
+pub use arms::Arms;
 pub use draw::{admissible_m, scenario};
 pub use false_alarms::FalseAlarms;
 pub use outcome::Campaign;
@@ -49,6 +51,8 @@ const SHORT_P_RATIO: f64 = 0.1;
 /// The campaign.
 #[derive(Clone, Debug)]
 pub struct Robustness {
+    /// Which arms.
+    pub arms: Arms,
     /// Seed of all runs.
     pub seed: u64,
     /// Number of runs.
@@ -63,7 +67,7 @@ impl Robustness {
     /// # Errors
     /// [`StudyError`] if an override is wrong.
     pub fn scenario(&self, index: usize) -> Result<Scenario, StudyError> {
-        let scenario = scenario(self.seed, index as u64)?;
+        let scenario = scenario(self.arms, self.seed, index as u64)?;
         Ok(scenario.with_overrides("robustness campaign", &self.overrides)?)
     }
 
@@ -185,8 +189,12 @@ impl Study for Robustness {
             force_noise_n: converters.force.noise_n,
             frame_loss: converters.link.frame_loss,
             link_length_m: scenario.arm.link_length_m[0],
+            link_2_length_m: scenario.arm.link_length_m[1],
             link_mass_kg: scenario.arm.link_mass_kg[0],
+            link_2_mass_kg: scenario.arm.link_mass_kg[1],
             stiffness_nm_rad: scenario.arm.stiffness_nm_rad[1],
+            height_m: scenario.arm.height_m,
+            belt_tilt_rad: scenario.arm.belt_tilt_rad,
         })
     }
 }

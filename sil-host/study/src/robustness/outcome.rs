@@ -7,7 +7,7 @@ use painleve_chart::style::{BLUE_INK, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
 use serde::Serialize;
 
-use super::{Ending, Row};
+use super::{Arms, Ending, Row};
 use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
 
@@ -17,6 +17,8 @@ const WORST: usize = 20;
 /// A campaign's outcome.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Campaign {
+    /// Which arms.
+    pub arms: Arms,
     /// Its seed.
     pub seed: u64,
     /// Runs that succeeded.
@@ -35,7 +37,7 @@ pub struct Campaign {
 
 impl Campaign {
     /// Of all rows.
-    pub fn new(seed: u64, rows: Vec<Row>) -> Self {
+    pub fn new(arms: Arms, seed: u64, rows: Vec<Row>) -> Self {
         let mut endings = BTreeMap::new();
         for row in &rows {
             *endings.entry(row.ending).or_insert(0) += 1;
@@ -47,6 +49,7 @@ impl Campaign {
             other.ending.cmp(&one.ending).then(errors)
         });
         Self {
+            arms,
             seed,
             success: Proportion::new(successes, rows.len()),
             endings,
@@ -79,10 +82,14 @@ impl Outcome for Campaign {
         }
         let alarms = format!("{} in {:.2} h", self.false_alarms, self.slid_h);
         table.add_row(["false alarms", &alarms, "", "", "", ""]);
+        let arms = match self.arms {
+            Arms::Paper => "",
+            Arms::General => " --arms general",
+        };
         for row in self.worst.iter().filter_map(|&index| self.rows.get(index)) {
             table.add_row([
                 outcome::name(&row.ending),
-                format!("--replay {}:{}", self.seed, row.index),
+                format!("--replay {}:{}{arms}", self.seed, row.index),
                 format!("{:.2}", row.mu),
                 format!("{:.2}", row.v_belt_m_s),
                 row.tick_hz.to_string(),

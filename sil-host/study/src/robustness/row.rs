@@ -83,10 +83,18 @@ pub struct Row {
     pub force_noise_n: f64,
     /// Probability that a frame is lost.
     pub frame_loss: f64,
-    /// Length of either link, m.
+    /// Length of link 1, m.
     pub link_length_m: f64,
-    /// Mass of either link, kg.
+    /// Length of link 2, m.
+    pub link_2_length_m: f64,
+    /// Mass of link 1, kg.
     pub link_mass_kg: f64,
+    /// Mass of link 2, kg.
+    pub link_2_mass_kg: f64,
     /// Stiffness of the spring between the links, N·m/rad.
     pub stiffness_nm_rad: f64,
+    /// Height of the first joint above the belt, m.
+    pub height_m: f64,
+    /// Tilt of the belt, rad.
+    pub belt_tilt_rad: f64,
 }

@@ -32,8 +32,12 @@ fn row(index: usize, ending: Ending, error_m: f64) -> Row {
         force_noise_n: 0.1,
         frame_loss: 0.0,
         link_length_m: 0.21,
+        link_2_length_m: 0.21,
         link_mass_kg: 0.2,
+        link_2_mass_kg: 0.2,
         stiffness_nm_rad: 0.5,
+        height_m: 0.3775,
+        belt_tilt_rad: 0.0,
     }
 }
 
@@ -46,6 +50,7 @@ fn rows(endings: &[(Ending, f64)]) -> Vec<Row> {
 #[test]
 fn every_ending_is_counted_and_the_gravest_come_first() {
     let found = Campaign::new(
+        Arms::Paper,
         7,
         rows(&[
             (Ending::Reached, 1e-4),
@@ -67,6 +72,7 @@ fn every_ending_is_counted_and_the_gravest_come_first() {
 fn each_part_has_a_line() {
     let study = AblationStudy {
         campaign: Robustness {
+            arms: Arms::Paper,
             seed: 7,
             runs: 4,
             overrides: Vec::new(),

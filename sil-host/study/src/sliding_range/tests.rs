@@ -32,6 +32,20 @@ fn the_hybrid_law_goes_farther_than_in_the_paper_and_the_pid_lifts_off_elbow_up(
     assert_eq!(up.paper_m, None);
 }
 
+/// Unequal links, offset centres of mass, a tip mass, a tilted belt.
+#[test]
+fn an_arm_of_ones_own_slides_to_its_own_edge_in_both_postures() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/own-arm.toml");
+    for posture in [Posture::ElbowDown, Posture::ElbowUp] {
+        let mut study = study(Controller::Scenario(file.into()), posture);
+        study.converters = vec![Converters::Own];
+        let row = study.row(0).unwrap();
+        // Farther than the paper's arm reaches at all.
+        assert!(row.limit_m > 0.2, "{row:?}");
+        assert!(row.z_sliding_m.unwrap() >= 0.98 * row.limit_m, "{row:?}");
+    }
+}
+
 #[test]
 fn the_range_ends_where_the_next_target_fails() {
     let mut study = study(Controller::Pid, Posture::ElbowDown);
