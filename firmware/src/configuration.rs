@@ -23,30 +23,16 @@ use crate::refer::reference::Program;
 use crate::supervise::lapses::LapseLimits;
 use crate::supervise::supervisor::SupervisorSettings;
 
-/// The converters' scalings as the controller knows them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Converters {
-    /// Encoders of θ1 and of θ2 − θ1.
-    pub encoders: [EncoderScale; 2],
-    /// Force cell, N.
-    pub force: LinearScale<f32>,
-    /// Torque stages, N·m.
-    pub torque: LinearScale<f32>,
-}
-
-impl Converters {
-    /// Checks resolutions and ranges.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] with a key relative to the converters.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        for (index, encoder) in self.encoders.iter().enumerate() {
-            encoder
-                .validate()
-                .map_err(|error| error.at(index).inside("encoders"))?;
-        }
-        within("force", self.force.validate())?;
-        within("torque", self.torque.validate())
+settings! {
+    /// The converters' scalings as the controller knows them.
+    #[derive(Copy)]
+    pub struct Converters {
+        /// Encoders of θ1 and of θ2 − θ1.
+        encoders: [EncoderScale; 2] = [EncoderScale::default(); 2];
+        /// Force cell, N.
+        force: LinearScale<f32> = LinearScale { bits: 12, range: 20.0 };
+        /// Torque stages, N·m.
+        torque: LinearScale<f32> = LinearScale { bits: 12, range: 5.0 };
     }
 }
 
@@ -97,6 +83,18 @@ pub struct Configuration<L: Law = LawSettings> {
     pub settings: ControllerSettings<L>,
 }
 
+impl<L: Law> Default for Configuration<L> {
+    /// The paper's arm at 1 kHz with converters of common resolution.
+    fn default() -> Self {
+        Self {
+            tick_hz: 1000.0,
+            arm: ArmParameters::default(),
+            converters: Converters::default(),
+            settings: ControllerSettings::default(),
+        }
+    }
+}
+
 impl<L: Law> Configuration<L> {
     /// Time between two ticks, s.
     pub fn tick_s(&self) -> f32 {
@@ -121,9 +119,7 @@ impl<L: Law> Configuration<L> {
     pub fn validate(&self) -> Result<Arm<f32>, OutOfRange> {
         range::check("tick_hz", self.tick_hz, 10.0, 1e5)?;
         let arm = Arm::new(self.arm)?;
-        self.converters
-            .validate()
-            .map_err(|error| error.inside("converters"))?;
+        within("converters", self.converters.validate())?;
         self.settings.validate()?;
         self.relations(&arm)?;
         Ok(arm)

@@ -6,63 +6,48 @@
 //! downward vertical if the belt is level, as in the paper. A tilted belt tilts gravity in these axes
 //! and changes nothing else. The joint angles are q' = (θ1, θ2 − θ1).
 
-use serde::{Deserialize, Serialize};
+use core::f64::consts::PI;
 
 use crate::range::{self, OutOfRange};
 use crate::real::Real;
+use crate::settings::Settings;
+use crate::{check_setting, settings};
 
-/// Parameters of an arm in SI units; a pair is of link 1 and link 2, or of joint 1 and joint 2.
-/// The default is the paper's arm: two equal uniform rods (Table I).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ArmParameters<T: Real> {
-    /// Length l of each link, from its joint to the next one or to the tip, m.
-    pub link_length_m: [T; 2],
-    /// Mass m of each link, kg.
-    pub link_mass_kg: [T; 2],
-    /// Distance of each link's centre of mass from its joint, along the link, m; half the length
-    /// if absent.
-    pub link_centre_of_mass_m: Option<[T; 2]>,
-    /// Moment of inertia of each link about its centre of mass, kg·m²; that of a uniform
-    /// rod, m l²/12, if absent.
-    pub link_inertia_kg_m2: Option<[T; 2]>,
-    /// Point mass at the tip, kg.
-    pub tip_mass_kg: T,
-    /// Damping σ of each joint, N·m·s/rad.
-    pub damping_nms_rad: [T; 2],
-    /// Stiffness k of the spring in each joint, N·m/rad.
-    pub stiffness_nm_rad: [T; 2],
-    /// Joint angle at which each spring is relaxed, rad; −α0 of the paper for joint 2.
-    pub spring_rest_rad: [T; 2],
-    /// Inertia of each joint's rotor, reflected to the joint, kg·m².
-    pub rotor_inertia_kg_m2: [T; 2],
-    /// Distance H of the first joint from the belt, m.
-    pub height_m: T,
-    /// Angle by which the belt rises in its direction t, rad.
-    pub belt_tilt_rad: T,
-    /// Gravity g, m/s².
-    pub gravity_m_s2: T,
-}
-
-impl<T: Real> Default for ArmParameters<T> {
-    /// The paper's Table I, with g = 9.81 m/s².
-    fn default() -> Self {
-        let pair = |one, two| [T::literal(one), T::literal(two)];
-        Self {
-            link_length_m: pair(0.21, 0.21),
-            link_mass_kg: pair(0.12, 0.12),
-            link_centre_of_mass_m: None,
-            link_inertia_kg_m2: None,
-            tip_mass_kg: T::zero(),
-            damping_nms_rad: pair(0.005, 0.005),
-            stiffness_nm_rad: pair(0.0, 1.3),
-            spring_rest_rad: pair(0.0, -13.72 * core::f64::consts::PI / 180.0),
-            rotor_inertia_kg_m2: pair(0.0, 0.0),
-            height_m: T::literal(0.3775),
-            belt_tilt_rad: T::zero(),
-            gravity_m_s2: T::literal(9.81),
-        }
+settings! {
+    /// Parameters of an arm in SI units; a pair is of link 1 and link 2, or of joint 1 and joint 2.
+    /// The default is the paper's arm: two equal uniform rods (Table I), with g = 9.81 m/s².
+    #[derive(Copy)]
+    pub struct ArmParameters<T: Real> {
+        /// Length l of each link, from its joint to the next one or to the tip.
+        link_length_m: [T; 2] = [T::literal(0.21); 2], 1e-2..=10.0, "m";
+        /// Mass m of each link.
+        link_mass_kg: [T; 2] = [T::literal(0.12); 2], 1e-3..=1e3, "kg";
+        /// Distance of each link's centre of mass from its joint, along the link; half the length
+        /// if absent.
+        link_centre_of_mass_m: Option<[T; 2]> = None, -10.0..=10.0, "m";
+        /// Moment of inertia of each link about its centre of mass; that of a uniform rod,
+        /// m l²/12, if absent.
+        link_inertia_kg_m2: Option<[T; 2]> = None, 0.0..=1e4, "kg·m²";
+        /// Point mass at the tip.
+        tip_mass_kg: T = T::zero(), 0.0..=1e3, "kg";
+        /// Damping σ of each joint.
+        damping_nms_rad: [T; 2] = [T::literal(0.005); 2], 0.0..=1e3, "N·m·s/rad";
+        /// Stiffness k of the spring in each joint.
+        stiffness_nm_rad: [T; 2] = [T::zero(), T::literal(1.3)], 0.0..=1e5, "N·m/rad";
+        /// Joint angle at which each spring is relaxed; −α0 of the paper for joint 2.
+        spring_rest_rad: [T; 2] = [T::zero(), T::literal(-13.72 * PI / 180.0)],
+            -PI..=PI, "rad";
+        /// Inertia of each joint's rotor, reflected to the joint.
+        rotor_inertia_kg_m2: [T; 2] = [T::zero(); 2], 0.0..=1e4, "kg·m²";
+        /// Distance H of the first joint from the belt; less than the arm's length, and more than
+        /// the difference of the links' lengths.
+        height_m: T = T::literal(0.3775), 1e-4..=20.0, "m";
+        /// Angle by which the belt rises in its direction t.
+        belt_tilt_rad: T = T::zero(), -PI..=PI, "rad";
+        /// Gravity g.
+        gravity_m_s2: T = T::literal(9.81), 0.0..=100.0, "m/s²";
     }
+    check Self::relations;
 }
 
 impl<T: Real> ArmParameters<T> {
@@ -86,44 +71,14 @@ impl<T: Real> ArmParameters<T> {
         }
     }
 
-    /// Checks every parameter by itself, and that the belt is in reach all the way to where the
-    /// arm is straight.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] for the first parameter that is not finite, not physical, or that puts the
-    /// belt out of reach (H ≥ l1 + l2 or H ≤ |l1 − l2|).
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let pair = |key, values: [T; 2], minimum, maximum| {
-            let mut values = values.into_iter();
-            values.try_for_each(|value| range::check(key, value, minimum, maximum))
-        };
-        let pi = core::f64::consts::PI;
-        pair("arm.link_length_m", self.link_length_m, 1e-2, 10.0)?;
-        pair("arm.link_mass_kg", self.link_mass_kg, 1e-3, 1e3)?;
-        if let Some(distances) = self.link_centre_of_mass_m {
-            pair("arm.link_centre_of_mass_m", distances, -10.0, 10.0)?;
-        }
-        if let Some(inertias) = self.link_inertia_kg_m2 {
-            pair("arm.link_inertia_kg_m2", inertias, 0.0, 1e4)?;
-        }
-        range::check("arm.tip_mass_kg", self.tip_mass_kg, 0.0, 1e3)?;
-        pair("arm.damping_nms_rad", self.damping_nms_rad, 0.0, 1e3)?;
-        pair("arm.stiffness_nm_rad", self.stiffness_nm_rad, 0.0, 1e5)?;
-        pair("arm.spring_rest_rad", self.spring_rest_rad, -pi, pi)?;
-        pair(
-            "arm.rotor_inertia_kg_m2",
-            self.rotor_inertia_kg_m2,
-            0.0,
-            1e4,
-        )?;
-        range::check("arm.belt_tilt_rad", self.belt_tilt_rad, -pi, pi)?;
-        range::check("arm.gravity_m_s2", self.gravity_m_s2, 0.0, 100.0)?;
+    /// Checks that the belt is in reach all the way to where the arm is straight.
+    fn relations(&self) -> Result<(), OutOfRange> {
         // At full stretch, and folded over the hole that links of two lengths leave around
         // the first joint, the Jacobian is singular: the belt keeps clear of both.
         let [first, second] = self.link_length_m.map(T::to_f64);
         let (reach, hole) = (first + second, (first - second).abs());
         let least = (0.01 * reach).max(1.001 * hole);
-        range::check("arm.height_m", self.height_m, least, 0.999 * reach)
+        check_setting!(self.height_m, least, 0.999 * reach)
     }
 }
 
@@ -168,10 +123,11 @@ impl<T: Real> Arm<T> {
     /// Makes the model from checked parameters.
     ///
     /// # Errors
-    /// As [`ArmParameters::validate`]; also if no kinetic energy goes with some motion of the links
+    /// [`OutOfRange`], with a key in the group `arm`, for the first parameter that is not finite, not physical, or that puts the
+    /// belt out of reach (H ≥ l1 + l2 or H ≤ |l1 − l2|); also if no kinetic energy goes with some motion of the links
     /// (their mass matrix is singular).
     pub fn new(parameters: ArmParameters<T>) -> Result<Self, OutOfRange> {
-        parameters.validate()?;
+        parameters.validate().map_err(|error| error.inside("arm"))?;
         let [length_1, length_2] = parameters.link_length_m;
         let [mass_1, mass_2] = parameters.link_mass_kg;
         let half = T::literal(0.5);
@@ -227,11 +183,12 @@ impl<T: Real> Arm<T> {
         let coupling = arm.inertia_coupling.abs() + rotor_2;
         let determinant = (product - coupling * coupling) / product;
         range::check(
-            "arm: least det M / (M11 M22)",
+            "least det M / (M11 M22)",
             determinant,
             LEAST_DETERMINANT,
             1.0,
-        )?;
+        )
+        .map_err(|error| error.inside("arm"))?;
         Ok(arm)
     }
 
@@ -358,7 +315,7 @@ mod tests {
             ..Default::default()
         };
         let error = refused(parameters);
-        assert_eq!(error.key, "arm: least det M / (M11 M22)");
+        assert_eq!(error.key, "arm.least det M / (M11 M22)");
         // A mass at the tip of either link makes up for it; on a line with joint 1 alone it does not.
         let ideal = ArmParameters {
             tip_mass_kg: 0.1,
@@ -371,7 +328,7 @@ mod tests {
         };
         assert_eq!(
             refused(negative).to_string(),
-            "arm.link_inertia_kg_m2 = -0.001 is outside the allowed range 0 to 10000"
+            "arm.link_inertia_kg_m2.1 = -0.001 is outside the allowed range 0 to 10000"
         );
     }
 
@@ -441,7 +398,10 @@ mod tests {
                 damping_nms_rad: [0.0, value],
                 ..Default::default()
             };
-            assert_eq!(Arm::new(parameters).unwrap_err().key, "arm.damping_nms_rad");
+            assert_eq!(
+                Arm::new(parameters).unwrap_err().key,
+                "arm.damping_nms_rad.1"
+            );
         }
     }
 }

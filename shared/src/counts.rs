@@ -6,8 +6,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::range::{self, OutOfRange};
+use crate::range::OutOfRange;
 use crate::real::Real;
+use crate::settings::{Bounds, Refused, SettingValue, Shape};
+use crate::{check_setting, settings};
 
 #[cfg(feature = "zero-copy")]
 use {
@@ -26,6 +28,14 @@ macro_rules! counts {
         #[cfg_attr(feature = "zero-copy", type_name($type_name))]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub struct $name(pub $integer);
+
+        impl SettingValue for $name {
+            const SHAPE: Shape = Shape::Integer;
+
+            fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
+                self.0.check(bounds, error)
+            }
+        }
     };
 }
 
@@ -63,29 +73,22 @@ fn round_to_i32<T: Real>(value: T) -> i32 {
     (value + T::literal(0.5).copysign(value)).truncate_to_i32()
 }
 
-/// A joint encoder: resolution and mounting offset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct EncoderScale {
-    /// Resolution: 2^bits counts a turn.
-    pub bits: u8,
-    /// Reading at angle zero, counts.
-    pub offset: EncoderCounts,
+settings! {
+    /// A joint encoder: resolution and mounting offset.
+    #[derive(Copy, Eq)]
+    pub struct EncoderScale {
+        /// Resolution: 2^bits counts a turn. Beyond 24 bits a single precision angle no longer
+        /// resolves a count.
+        bits: u8 = 14, 8..=24, "bits";
+        /// Reading at angle zero; less than a turn.
+        offset: EncoderCounts = EncoderCounts(0), 0..=(1 << 24) - 1, "counts";
+    }
+    check Self::relations;
 }
 
 impl EncoderScale {
-    /// Checks the resolution.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] if `bits` is not within 8 … 24: beyond 24 bits a single
-    /// precision angle no longer resolves a count.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("bits", f64::from(self.bits), 8.0, 24.0)?;
-        range::check(
-            "offset",
-            f64::from(self.offset.0),
-            0.0,
-            f64::from(self.modulus() - 1),
-        )
+    fn relations(&self) -> Result<(), OutOfRange> {
+        check_setting!(self.offset, 0, self.modulus() - 1)
     }
 
     /// Counts a turn, 2^bits.
@@ -135,26 +138,19 @@ impl EncoderScale {
     }
 }
 
-/// A converter that is linear over ±`range`: a force cell or a torque stage.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LinearScale<T: Real> {
-    /// Resolution: 2^bits counts over the whole range.
-    pub bits: u8,
-    /// Full scale to either side, in the quantity's unit (N or N·m).
-    pub range: T,
+settings! {
+    /// A converter that is linear over ±`range`: a force cell or a torque stage.
+    #[derive(Copy)]
+    pub struct LinearScale<T: Real> {
+        /// Resolution: 2^bits counts over the whole range. Beyond 22 bits single precision no
+        /// longer tells a value's nearest count.
+        bits: u8 = 12, 4..=22, "bits";
+        /// Full scale to either side, in the quantity's unit (N or N·m).
+        range: T = T::one(), 1e-3..=1e6;
+    }
 }
 
 impl<T: Real> LinearScale<T> {
-    /// Checks resolution and range.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] if bits are not within 4 … 22 or the range is not positive: beyond 22 bits
-    /// single precision no longer tells a value's nearest count.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("bits", f64::from(self.bits), 4.0, 22.0)?;
-        range::check("range", self.range, 1e-3, 1e6)
-    }
-
     /// One count in the quantity's unit.
     #[inline]
     pub fn per_count(&self) -> T {

@@ -7,6 +7,7 @@
 use painleve_shared::ActuatorFrame;
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::range::OutOfRange;
+use painleve_shared::settings::Settings;
 use painleve_shared::status::SupervisorState;
 
 use crate::converters::encoder::Encoders;

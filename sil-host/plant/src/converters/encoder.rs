@@ -5,60 +5,33 @@
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{OutOfRange, check_setting, settings};
 
 use super::noise::{Channel, Noise};
 
 /// Longest latency, in whole ticks.
 const MAXIMUM_LATENCY_TICKS: usize = 16;
 
-/// Settings of both joint encoders.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EncoderSettings {
-    /// Resolution: 2^bits counts a turn.
-    pub bits: u8,
-    /// Reading at angle zero.
-    pub offset_counts: [u32; 2],
-    /// Standard deviation of the noise, rad.
-    pub noise_rad: f64,
-    /// Time from capture to the frame that carries it, in control ticks.
-    pub latency_ticks: f64,
-}
-
-impl Default for EncoderSettings {
-    fn default() -> Self {
-        Self {
-            bits: 14,
-            offset_counts: [0, 0],
-            noise_rad: 0.0,
-            latency_ticks: 0.0,
-        }
+settings! {
+    /// Settings of both joint encoders.
+    #[derive(Copy)]
+    pub struct EncoderSettings {
+        /// Resolution: 2^bits counts a turn.
+        bits: u8 = 14, 8..=24, "bits";
+        /// Reading at angle zero; less than a turn.
+        offset_counts: [u32; 2] = [0, 0], 0..=(1 << 24) - 1, "counts";
+        /// Standard deviation of the noise.
+        noise_rad: f64 = 0.0, 0.0..=0.1, "rad";
+        /// Time from capture to the frame that carries it, in control ticks.
+        latency_ticks: f64 = 0.0, 0.0..=MAXIMUM_LATENCY_TICKS as f64 - 1.0, "ticks";
     }
+    check Self::relations;
 }
 
 impl EncoderSettings {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        for offset in self.offset_counts {
-            EncoderScale {
-                bits: self.bits,
-                offset: EncoderCounts(offset),
-            }
-            .validate()
-            .map_err(|error| error.inside("encoder").inside("converters"))?;
-        }
-        range::check("converters.encoder.noise_rad", self.noise_rad, 0.0, 0.1)?;
-        range::check(
-            "converters.encoder.latency_ticks",
-            self.latency_ticks,
-            0.0,
-            MAXIMUM_LATENCY_TICKS as f64 - 1.0,
-        )
+    fn relations(&self) -> Result<(), OutOfRange> {
+        let [scale, _] = self.scales();
+        check_setting!(self.offset_counts, 0, scale.modulus() - 1)
     }
 }
 

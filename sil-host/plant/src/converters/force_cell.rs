@@ -5,42 +5,27 @@
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{ForceCounts, LinearScale};
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{OutOfRange, check_setting, settings};
 
 use super::noise::{Channel, Noise};
 
-/// Settings of both axes of the force cell.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ForceCellSettings {
-    /// Resolution: 2^bits counts over the whole range.
-    pub bits: u8,
-    /// Full scale to either side, N; beyond it the reading saturates.
-    pub range_n: f64,
-    /// Standard deviation of the noise, N.
-    pub noise_n: f64,
-}
-
-impl Default for ForceCellSettings {
-    fn default() -> Self {
-        Self {
-            bits: 12,
-            range_n: 20.0,
-            noise_n: 0.02,
-        }
+settings! {
+    /// Settings of both axes of the force cell.
+    #[derive(Copy)]
+    pub struct ForceCellSettings {
+        /// Resolution: 2^bits counts over the whole range.
+        bits: u8 = 12, 4..=22, "bits";
+        /// Full scale to either side; beyond it the reading saturates.
+        range_n: f64 = 20.0, 1e-3..=1e6, "N";
+        /// Standard deviation of the noise; at most `range_n`.
+        noise_n: f64 = 0.02, 0.0..=1e6, "N";
     }
+    check Self::relations;
 }
 
 impl ForceCellSettings {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("converters.force.bits", f64::from(self.bits), 4.0, 22.0)?;
-        range::check("converters.force.range_n", self.range_n, 1e-3, 1e6)?;
-        range::check("converters.force.noise_n", self.noise_n, 0.0, self.range_n)
+    fn relations(&self) -> Result<(), OutOfRange> {
+        check_setting!(self.noise_n, 0.0, self.range_n)
     }
 
     fn scale(&self) -> LinearScale<f64> {

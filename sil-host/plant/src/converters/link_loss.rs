@@ -4,29 +4,19 @@
 //! numbers at the next one; without the actuator frame it does, in vain. Either way the
 //! torque stages repeat their last command.
 
-use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::settings;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use serde::{Deserialize, Serialize};
 
 /// Seed of the losses beside those of the noise channels.
 const STREAM: u64 = 0x4c6f_7373_6573_0001;
 
-/// Settings of the link.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LinkSettings {
-    /// Probability that a frame is lost, for each frame in either direction, 0 … 1.
-    pub frame_loss: f64,
-}
-
-impl LinkSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("converters.link.frame_loss", self.frame_loss, 0.0, 1.0)
+settings! {
+    /// Settings of the link.
+    #[derive(Copy)]
+    pub struct LinkSettings {
+        /// Probability that a frame is lost, for each frame in either direction.
+        frame_loss: f64 = 0.0, 0.0..=1.0;
     }
 }
 

@@ -17,40 +17,29 @@ pub mod torque_stage;
 
 use painleve_firmware::configuration::Converters;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, LinearScale};
-use painleve_shared::range::OutOfRange;
-use serde::{Deserialize, Serialize};
+use painleve_shared::settings;
 
 use encoder::EncoderSettings;
 use force_cell::ForceCellSettings;
 use link_loss::LinkSettings;
 use torque_stage::TorqueStageSettings;
 
-/// Settings of all converters.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ConverterSettings {
-    /// Both joint encoders.
-    pub encoder: EncoderSettings,
-    /// Both axes of the force cell.
-    pub force: ForceCellSettings,
-    /// Both torque stages.
-    pub torque: TorqueStageSettings,
-    /// The link to the controller and back.
-    pub link: LinkSettings,
+settings! {
+    /// Settings of all converters.
+    #[derive(Copy)]
+    pub struct ConverterSettings {
+        /// Both joint encoders.
+        encoder: EncoderSettings = EncoderSettings::default();
+        /// Both axes of the force cell.
+        force: ForceCellSettings = ForceCellSettings::default();
+        /// Both torque stages.
+        torque: TorqueStageSettings = TorqueStageSettings::default();
+        /// The link to the controller and back.
+        link: LinkSettings = LinkSettings::default();
+    }
 }
 
 impl ConverterSettings {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        self.encoder.validate()?;
-        self.force.validate()?;
-        self.torque.validate()?;
-        self.link.validate()
-    }
-
     /// What the controller is told about the converters.
     pub fn scales(&self) -> Converters {
         Converters {

@@ -3,54 +3,27 @@
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{LinearScale, TorqueCounts};
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::settings;
 
 /// Longest delay, in whole ticks.
 const MAXIMUM_DELAY_TICKS: usize = 16;
 
-/// Settings of both torque stages.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct TorqueStageSettings {
-    /// Resolution: 2^bits counts over the whole range.
-    pub bits: u8,
-    /// Full scale to either side, N·m.
-    pub range_nm: f64,
-    /// Time constant of the stage, s; 0 for none.
-    pub lag_s: f64,
-    /// Time from the sample to the torque that answers it, in control ticks.
-    pub delay_ticks: f64,
-}
-
-impl Default for TorqueStageSettings {
-    fn default() -> Self {
-        Self {
-            bits: 12,
-            range_nm: 5.0,
-            lag_s: 0.0,
-            delay_ticks: 1.0,
-        }
+settings! {
+    /// Settings of both torque stages.
+    #[derive(Copy)]
+    pub struct TorqueStageSettings {
+        /// Resolution: 2^bits counts over the whole range.
+        bits: u8 = 12, 4..=22, "bits";
+        /// Full scale to either side.
+        range_nm: f64 = 5.0, 1e-3..=1e6, "N·m";
+        /// Time constant of the stage; 0 for none.
+        lag_s: f64 = 0.0, 0.0..=1.0, "s";
+        /// Time from the sample to the torque that answers it, in control ticks.
+        delay_ticks: f64 = 1.0, 0.0..=MAXIMUM_DELAY_TICKS as f64 - 1.0, "ticks";
     }
 }
 
 impl TorqueStageSettings {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("converters.torque.bits", f64::from(self.bits), 4.0, 22.0)?;
-        range::check("converters.torque.range_nm", self.range_nm, 1e-3, 1e6)?;
-        range::check("converters.torque.lag_s", self.lag_s, 0.0, 1.0)?;
-        range::check(
-            "converters.torque.delay_ticks",
-            self.delay_ticks,
-            0.0,
-            MAXIMUM_DELAY_TICKS as f64 - 1.0,
-        )
-    }
-
     fn scale(&self) -> LinearScale<f64> {
         LinearScale {
             bits: self.bits,

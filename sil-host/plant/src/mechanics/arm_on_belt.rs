@@ -4,6 +4,7 @@ mod contact_change;
 
 use nalgebra::Vector2;
 use painleve_shared::range::{self, OutOfRange};
+use painleve_shared::settings::Settings;
 use painleve_shared::{Arm, Slip};
 
 use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
@@ -13,7 +14,7 @@ use super::cash_karp::ShortStep;
 use super::dop853::{Step, Tolerance};
 use super::impact::{self, ImpactLaw};
 use super::motion::{Evaluation, Motion, theta};
-use super::parameters::{PlantParameters, SolverSettings};
+use super::parameters::{InitialState, PlantParameters, SolverSettings};
 use super::probe::{ArmProbe, ArmStep};
 use super::torque::TorqueSegment;
 use super::transition;
@@ -89,25 +90,10 @@ impl ArmOnBelt {
     /// [`OutOfRange`] naming the first parameter that is out of range.
     pub fn new(parameters: &PlantParameters, initial: State) -> Result<Self, OutOfRange> {
         let arm = Arm::new(parameters.arm)?;
-        range::check("belt.friction", parameters.friction, 0.0, 10.0)?;
-        parameters.belt.validate()?;
-        parameters.impact.validate()?;
-        parameters.solver.validate()?;
-        let pi = core::f64::consts::PI;
-        range::check("initial.theta1_deg", initial[0].to_degrees(), -180.0, 180.0)?;
-        range::check("initial.theta2_deg", initial[1].to_degrees(), -180.0, 180.0)?;
-        range::check(
-            "initial.theta1_dot_rad_s",
-            initial[2],
-            -100.0 * pi,
-            100.0 * pi,
-        )?;
-        range::check(
-            "initial.theta2_dot_rad_s",
-            initial[3],
-            -100.0 * pi,
-            100.0 * pi,
-        )?;
+        parameters.validate()?;
+        InitialState::from(&initial)
+            .validate()
+            .map_err(|error| error.inside("initial"))?;
 
         let mut plant = Self {
             arm,

@@ -1,49 +1,57 @@
 //! Belt speed over time.
 
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::settings;
 
-/// Fastest belt that a scenario may ask for, m/s.
-const MAXIMUM_SPEED_M_S: f64 = 100.0;
+settings! {
+    /// Friction and speed of the belt.
+    #[derive(Copy)]
+    pub struct BeltSettings {
+        /// Friction coefficient μ between tip and belt.
+        friction: f64 = 0.6, 0.0..=10.0;
+        /// Speed of the belt over time, positive along +t.
+        profile: BeltProfile = BeltProfile::default();
+    }
+}
 
-/// Speed of the belt, v_belt, as a function of time; positive along +t.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum BeltProfile {
-    /// Always the same speed.
-    Constant {
-        /// Speed, m/s.
-        speed_m_s: f64,
-    },
-    /// One speed before `at_s`, another from then on.
-    Step {
-        /// Speed before the step, m/s.
-        from_m_s: f64,
-        /// Speed from the step on, m/s.
-        to_m_s: f64,
-        /// Time of the step, s.
-        at_s: f64,
-    },
-    /// A change of speed at constant acceleration.
-    Ramp {
-        /// Speed before the ramp, m/s.
-        from_m_s: f64,
-        /// Speed after the ramp, m/s.
-        to_m_s: f64,
-        /// Time at which the ramp starts, s.
-        start_s: f64,
-        /// How long the ramp takes, s.
-        duration_s: f64,
-    },
-    /// A sine around a mean speed.
-    Sine {
-        /// Mean speed, m/s.
-        mean_m_s: f64,
-        /// Amplitude, m/s.
-        amplitude_m_s: f64,
-        /// Frequency, Hz.
-        frequency_hz: f64,
-    },
+settings! {
+    /// Speed of the belt, v_belt, as a function of time; positive along +t.
+    #[derive(Copy)]
+    pub enum BeltProfile by "kind" {
+        /// Always the same speed.
+        "constant" => Constant {
+            /// Speed.
+            speed_m_s: f64, -100.0..=100.0, "m/s";
+        },
+        /// One speed before `at_s`, another from then on.
+        "step" => Step {
+            /// Speed before the step.
+            from_m_s: f64, -100.0..=100.0, "m/s";
+            /// Speed from the step on.
+            to_m_s: f64, -100.0..=100.0, "m/s";
+            /// Time of the step.
+            at_s: f64, 0.0..=1e7, "s";
+        },
+        /// A change of speed at constant acceleration.
+        "ramp" => Ramp {
+            /// Speed before the ramp.
+            from_m_s: f64, -100.0..=100.0, "m/s";
+            /// Speed after the ramp.
+            to_m_s: f64, -100.0..=100.0, "m/s";
+            /// Time at which the ramp starts.
+            start_s: f64, 0.0..=1e7, "s";
+            /// How long the ramp takes.
+            duration_s: f64, 1e-6..=1e7, "s";
+        },
+        /// A sine around a mean speed.
+        "sine" => Sine {
+            /// Mean speed.
+            mean_m_s: f64, -100.0..=100.0, "m/s";
+            /// Amplitude.
+            amplitude_m_s: f64, -100.0..=100.0, "m/s";
+            /// Frequency.
+            frequency_hz: f64, 1e-6..=1e3, "Hz";
+        },
+    }
 }
 
 impl Default for BeltProfile {
@@ -54,46 +62,6 @@ impl Default for BeltProfile {
 }
 
 impl BeltProfile {
-    /// Checks every number.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let speed = |key, value| range::check(key, value, -MAXIMUM_SPEED_M_S, MAXIMUM_SPEED_M_S);
-        match *self {
-            Self::Constant { speed_m_s } => speed("belt.profile.speed_m_s", speed_m_s),
-            Self::Step {
-                from_m_s,
-                to_m_s,
-                at_s,
-            } => {
-                speed("belt.profile.from_m_s", from_m_s)?;
-                speed("belt.profile.to_m_s", to_m_s)?;
-                range::check("belt.profile.at_s", at_s, 0.0, 1e7)
-            }
-            Self::Ramp {
-                from_m_s,
-                to_m_s,
-                start_s,
-                duration_s,
-            } => {
-                speed("belt.profile.from_m_s", from_m_s)?;
-                speed("belt.profile.to_m_s", to_m_s)?;
-                range::check("belt.profile.start_s", start_s, 0.0, 1e7)?;
-                range::check("belt.profile.duration_s", duration_s, 1e-6, 1e7)
-            }
-            Self::Sine {
-                mean_m_s,
-                amplitude_m_s,
-                frequency_hz,
-            } => {
-                speed("belt.profile.mean_m_s", mean_m_s)?;
-                speed("belt.profile.amplitude_m_s", amplitude_m_s)?;
-                range::check("belt.profile.frequency_hz", frequency_hz, 1e-6, 1e3)
-            }
-        }
-    }
-
     /// Speed at time `t_s`, m/s.
     pub fn speed_m_s(&self, t_s: f64) -> f64 {
         match *self {
@@ -214,6 +182,7 @@ impl BeltProfile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use painleve_shared::settings::Settings;
     use proptest::prelude::*;
 
     fn profiles() -> impl Strategy<Value = BeltProfile> {
@@ -259,18 +228,19 @@ mod tests {
                 (profile.speed_m_s(t + step) - profile.speed_m_s(t - step)) / (2.0 * step);
             prop_assert!((speed - profile.speed_m_s(t)).abs() < 1e-8);
             prop_assert!((acceleration - profile.acceleration_m_s2(t)).abs() < 1e-5);
-            prop_assert!(profile.validate().is_ok());
+            let settings = BeltSettings { profile, ..Default::default() };
+            prop_assert!(settings.validate().is_ok());
         }
     }
 
     #[test]
     fn bad_numbers_are_named() {
-        let profile = BeltProfile::Constant {
-            speed_m_s: f64::NAN,
+        let settings = BeltSettings {
+            profile: BeltProfile::Constant {
+                speed_m_s: f64::NAN,
+            },
+            ..Default::default()
         };
-        assert_eq!(
-            profile.validate().unwrap_err().key,
-            "belt.profile.speed_m_s"
-        );
+        assert_eq!(settings.validate().unwrap_err().key, "profile.speed_m_s");
     }
 }

@@ -17,50 +17,31 @@
 //! Brogliato 1999) is the same process started at v_n = 0 with p < 0.
 
 use nalgebra::{Matrix2, Vector2};
-use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::{Pose, Slip};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{Pose, Slip, settings};
 
 use super::motion::{Motion, theta};
 use crate::plant::State;
 
-/// How much of the compression comes back.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ImpactLaw {
-    /// What the coefficient of restitution relates.
-    pub law: Restitution,
-    /// Coefficient of restitution e, 0 … 1.
-    pub restitution: f64,
-}
-
-/// Definition of the coefficient of restitution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Restitution {
-    /// Poisson: impulse of restitution = e · impulse of compression.
-    Poisson,
-    /// Stronge: work of restitution = e² · work of compression.
-    Energetic,
-}
-
-impl Default for ImpactLaw {
-    /// Poisson with e = 0.10 reproduces the paper's bouncing window.
-    fn default() -> Self {
-        Self {
-            law: Restitution::Poisson,
-            restitution: 0.10,
-        }
+settings! {
+    /// How much of the compression comes back. Poisson with e = 0.10 reproduces the paper's
+    /// bouncing window.
+    #[derive(Copy)]
+    pub struct ImpactLaw {
+        /// What the coefficient of restitution relates.
+        law: Restitution = Restitution::Poisson;
+        /// Coefficient of restitution e.
+        restitution: f64 = 0.10, 0.0..=1.0;
     }
 }
 
-impl ImpactLaw {
-    /// Checks the coefficient.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] if e is not within 0 … 1.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        range::check("impact.restitution", self.restitution, 0.0, 1.0)
+settings! {
+    /// Definition of the coefficient of restitution.
+    #[derive(Copy, Eq)]
+    pub enum Restitution {
+        /// Poisson: impulse of restitution = e · impulse of compression.
+        "poisson" => Poisson,
+        /// Stronge: work of restitution = e² · work of compression.
+        "energetic" => Energetic,
     }
 }
 

@@ -29,5 +29,5 @@ pub mod torque;
 pub mod transition;
 
 pub use arm_on_belt::{ArmOnBelt, MotionError};
-pub use parameters::{PlantParameters, SolverSettings};
+pub use parameters::{InitialState, PlantParameters, SolverSettings};
 pub use probe::{ArmProbe, ArmStep};

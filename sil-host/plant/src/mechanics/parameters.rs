@@ -1,12 +1,12 @@
 //! What defines the plant's equations, and how accurately they are solved.
 
-use painleve_shared::ArmParameters;
-use painleve_shared::range::{self, OutOfRange};
-use serde::{Deserialize, Serialize};
+use painleve_shared::settings::Settings;
+use painleve_shared::{ArmParameters, OutOfRange, settings};
 
-use super::belt::BeltProfile;
+use super::belt::{BeltProfile, BeltSettings};
 use super::impact::ImpactLaw;
 use super::transition::Indeterminate;
+use crate::plant::State;
 
 /// Everything that defines the plant's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,55 +36,86 @@ impl Default for PlantParameters {
     }
 }
 
-/// Accuracy of the solution and conventions where the model leaves a choice.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SolverSettings {
-    /// Error of one step relative to the state.
-    pub relative_tolerance: f64,
-    /// Error of one step, rad and rad/s.
-    pub absolute_tolerance: f64,
-    /// Largest step, s.
-    pub maximum_step_s: f64,
-    /// A rebound slower than this ends a series of bounces, m/s.
-    pub chatter_speed_m_s: f64,
-    /// What follows where both sliding and flight are solutions.
-    pub indeterminate: Indeterminate,
-}
-
-impl Default for SolverSettings {
-    fn default() -> Self {
-        Self {
-            relative_tolerance: 1e-9,
-            absolute_tolerance: 1e-10,
-            maximum_step_s: 0.05,
-            // The last bounces lower than 1e-13 m, below rounding of the gap.
-            chatter_speed_m_s: 1e-6,
-            indeterminate: Indeterminate::Flight,
-        }
+impl PlantParameters {
+    /// Checks everything except the arm, which [`Arm::new`](painleve_shared::Arm::new) checks.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] with the key that the parameter has in a scenario.
+    pub(super) fn validate(&self) -> Result<(), OutOfRange> {
+        let belt = BeltSettings {
+            friction: self.friction,
+            profile: self.belt,
+        };
+        belt.validate().map_err(|error| error.inside("belt"))?;
+        let impact = self.impact.validate();
+        impact.map_err(|error| error.inside("impact"))?;
+        let solver = self.solver.validate();
+        solver.map_err(|error| error.inside("solver"))
     }
 }
 
-impl SolverSettings {
-    pub(super) fn validate(&self) -> Result<(), OutOfRange> {
-        range::check(
-            "solver.relative_tolerance",
-            self.relative_tolerance,
-            1e-13,
-            1e-3,
-        )?;
-        range::check(
-            "solver.absolute_tolerance",
-            self.absolute_tolerance,
-            1e-14,
-            1e-3,
-        )?;
-        range::check("solver.maximum_step_s", self.maximum_step_s, 1e-5, 1.0)?;
-        range::check(
-            "solver.chatter_speed_m_s",
-            self.chatter_speed_m_s,
-            1e-8,
-            1e-2,
+settings! {
+    /// Accuracy of the solution and conventions where the model leaves a choice.
+    #[derive(Copy)]
+    pub struct SolverSettings {
+        /// Error of one step relative to the state.
+        relative_tolerance: f64 = 1e-9, 1e-13..=1e-3;
+        /// Error of one step, rad and rad/s.
+        absolute_tolerance: f64 = 1e-10, 1e-14..=1e-3;
+        /// Largest step.
+        maximum_step_s: f64 = 0.05, 1e-5..=1.0, "s";
+        /// A rebound slower than this ends a series of bounces. By default the last bounces are
+        /// lower than 1e-13 m, below rounding of the gap.
+        chatter_speed_m_s: f64 = 1e-6, 1e-8..=1e-2, "m/s";
+        /// What follows where both sliding and flight are solutions.
+        indeterminate: Indeterminate = Indeterminate::Flight;
+    }
+}
+
+settings! {
+    /// Where the arm starts; by default at the paper's x0,d.
+    #[derive(Copy)]
+    pub struct InitialState {
+        /// θ1 from the belt's inward normal.
+        theta1_deg: f64 = -11.4, -180.0..=180.0, "°";
+        /// θ2 from the belt's inward normal.
+        theta2_deg: f64 = -35.1, -180.0..=180.0, "°";
+        /// θ̇1.
+        theta1_dot_rad_s: f64 = 0.0, -314.0..=314.0, "rad/s";
+        /// θ̇2.
+        theta2_dot_rad_s: f64 = 0.0, -314.0..=314.0, "rad/s";
+    }
+}
+
+impl InitialState {
+    /// An arm at rest with these angles from the belt's inward normal, degrees.
+    pub fn at_rest(theta1_deg: f64, theta2_deg: f64) -> Self {
+        Self {
+            theta1_deg,
+            theta2_deg,
+            theta1_dot_rad_s: 0.0,
+            theta2_dot_rad_s: 0.0,
+        }
+    }
+
+    /// As the plant's state.
+    pub fn state(&self) -> State {
+        State::new(
+            self.theta1_deg.to_radians(),
+            self.theta2_deg.to_radians(),
+            self.theta1_dot_rad_s,
+            self.theta2_dot_rad_s,
         )
+    }
+}
+
+impl From<&State> for InitialState {
+    fn from(state: &State) -> Self {
+        Self {
+            theta1_deg: state[0].to_degrees(),
+            theta2_deg: state[1].to_degrees(),
+            theta1_dot_rad_s: state[2],
+            theta2_dot_rad_s: state[3],
+        }
     }
 }

@@ -1,22 +1,22 @@
 //! Which contact mode follows, and when the present one ends.
 
-use painleve_shared::{ContactTerms, Pose, Slip, SolutionMode};
-use serde::{Deserialize, Serialize};
+use painleve_shared::{ContactTerms, Pose, Slip, SolutionMode, settings};
 
 use super::dop853::{DenseStep, Step};
 use super::event::{first_negative, stays_above};
 use super::motion::{Evaluation, Motion, theta, theta_dot};
 use crate::plant::{ContactMode, State};
 
-/// What follows where p < 0 and b ≥ 0, so that sliding and flight both solve
-/// the equations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Indeterminate {
-    /// The tip leaves (the paper, after Elkaranshawy et al. 2017).
-    Flight,
-    /// The tip goes on sliding with f_n = −b/p.
-    Slide,
+settings! {
+    /// What follows where p < 0 and b ≥ 0, so that sliding and flight both solve
+    /// the equations.
+    #[derive(Copy, Eq)]
+    pub enum Indeterminate {
+        /// The tip leaves (the paper, after Elkaranshawy et al. 2017).
+        "flight" => Flight,
+        /// The tip goes on sliding with f_n = −b/p.
+        "slide" => Slide,
+    }
 }
 
 /// What follows from a tip on the belt without normal velocity.

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use painleve_shared::range::OutOfRange;
+use painleve_shared::settings::Settings;
 use toml::{Table, Value};
 
 use super::{Scenario, built_in};
