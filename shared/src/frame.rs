@@ -117,6 +117,11 @@ impl ActuatorFrame {
         SupervisorState::from_code(self.state)
     }
 
+    /// Whether this version knows both the state and the fault.
+    pub fn is_understood(&self) -> bool {
+        self.supervisor_state().is_some() && (self.fault == 0 || self.latched_fault().is_some())
+    }
+
     /// The latched fault, if any.
     pub fn latched_fault(&self) -> Option<Fault> {
         Fault::from_code(self.fault)

@@ -1,5 +1,6 @@
 //! `painleve figures`: all of the paper's studies, and one page that sets them beside it.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -95,6 +96,7 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
     let fineness = if arguments.draft { &DRAFT } else { &FULL };
     let made = Makes {
         folder,
+        files: RefCell::default(),
         threads: &arguments.threads,
         fineness,
     };
@@ -124,25 +126,34 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
         ),
         sections,
     };
+    for (path, contents) in made.files.into_inner() {
+        atomic_file::write(path, &contents).map_err(output)?;
+    }
     atomic_file::write(&page_path, page.html().as_bytes()).map_err(output)?;
     say(page_path.display())
 }
 
 struct Makes<'a> {
     folder: &'a Path,
+    /// All that goes beside the page, written when all of it is there: no old and new figures
+    /// stand side by side after Ctrl-C.
+    files: RefCell<Vec<(PathBuf, Vec<u8>)>>,
     threads: &'a Threads,
     fineness: &'a Fineness,
 }
 
 impl Makes<'_> {
-    /// Writes the data of a section's outcome beside the page.
+    /// Puts the data of a section's outcome beside the page.
     fn save(&self, section: Section, outcome: &impl Outcome) -> Result<Section, CommandError> {
         let path = |ending: &str| self.folder.join(format!("{}.{ending}", section.name));
         let csv = outcome::csv(outcome).map_err(output)?;
         let json = serde_json::to_vec(outcome).map_err(output)?;
-        atomic_file::write(path("svg"), section.svg.as_bytes()).map_err(output)?;
-        atomic_file::write(path("csv"), &csv).map_err(output)?;
-        atomic_file::write(path("json"), &json).map_err(output)?;
+        let svg = section.svg.clone().into_bytes();
+        self.files.borrow_mut().extend([
+            (path("svg"), svg),
+            (path("csv"), csv),
+            (path("json"), json),
+        ]);
         Ok(section)
     }
 
@@ -278,7 +289,9 @@ impl Makes<'_> {
         let svg = drawn(drawing.0.svg())?;
         let section = closed_loop::run(&scenario, &result, svg);
         let path = self.folder.join(format!("{}.svg", section.name));
-        atomic_file::write(path, section.svg.as_bytes()).map_err(output)?;
+        self.files
+            .borrow_mut()
+            .push((path, section.svg.clone().into_bytes()));
         Ok(section)
     }
 }

@@ -22,7 +22,7 @@ use painleve_plant::closed_loop::LoopError;
 use painleve_plant::scenario::ScenarioError;
 use painleve_study::StudyError;
 use painleve_study::sweep::SweepError;
-use painleve_system::interrupt::Interrupt;
+use painleve_system::interrupt::{Interrupt, ignore_file_size_limit};
 use painleve_system::terminal::{self, warn};
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
@@ -116,7 +116,10 @@ impl CommandError {
         match self {
             Self::Scenario(_) | Self::SameFile(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
-                StudyError::Scenario(_) | StudyError::Option(_) | StudyError::Range(_) => 2,
+                StudyError::Scenario(_)
+                | StudyError::Option(_)
+                | StudyError::Range(_)
+                | StudyError::TooManyRows(_) => 2,
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
                 StudyError::Plot(_) => 4,
             },
@@ -125,9 +128,10 @@ impl CommandError {
             Self::Sweep(_) => 2,
             Self::Loop(LoopError::Plant(_)) => 1,
             Self::Link(LinkError::Interrupted) => INTERRUPTED,
-            Self::Loop(LoopError::Host(_)) | Self::Link(_) | Self::Board(_) | Self::Process(_) => {
-                PEER_FAILED
-            }
+            Self::Loop(LoopError::Host(_) | LoopError::NotUnderstood { .. })
+            | Self::Link(_)
+            | Self::Board(_)
+            | Self::Process(_) => PEER_FAILED,
             Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => 4,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => INTERRUPTED,
             Self::Told { code } => *code,
@@ -183,7 +187,36 @@ fn seconds(text: &str) -> Result<f64, String> {
 /// Runs the command line; the exit code is the process's.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    let result = match cli.command.unwrap_or(Command::Run(cli.run)) {
+    let result = ignore_file_size_limit()
+        .map_err(CommandError::from)
+        .and_then(|()| execute(cli.command.unwrap_or(Command::Run(cli.run))));
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            if !matches!(error, CommandError::Told { .. } | CommandError::Unread) {
+                warn(format_args!("error: {error}"));
+            }
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn execute(command: Command) -> Result<(), CommandError> {
+    match &command {
+        // These have peers, files or boards to put in order.
+        Command::Run(_)
+        | Command::Plant(_)
+        | Command::Controller(_)
+        | Command::Bridge(_)
+        | Command::Timing(_) => {}
+        Command::Scenarios(_) | Command::Study(_) | Command::Sweep(_) | Command::Figures(_) => {
+            Interrupt::exit(INTERRUPTED, || {
+                warn(format_args!("error: {}", CommandError::Interrupted));
+            })
+            .map_err(|error| CommandError::Process(error.to_string()))?;
+        }
+    }
+    match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Plant(arguments) => plant::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
@@ -193,14 +226,5 @@ pub fn main() -> ExitCode {
         Command::Study(arguments) => study::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Figures(arguments) => figures::run(&arguments),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            if !matches!(error, CommandError::Told { .. } | CommandError::Unread) {
-                warn(format_args!("error: {error}"));
-            }
-            ExitCode::from(error.exit_code())
-        }
     }
 }

@@ -580,3 +580,74 @@ fn ctrl_c_is_left_alone() {
     plant.end().unwrap();
     controller.join().unwrap().unwrap();
 }
+
+/// The place of a bus, and a controller that has died there in the middle of something: it has
+/// joined, and left a segment of size zero.
+fn dead_controller(bus: &TestBus) -> PathBuf {
+    let bus = claim::Bus {
+        name: bus.name.clone(),
+        place: bus.place.clone(),
+    };
+    let run = run_files::RunFiles::ready(&bus).unwrap();
+    assert!(run.join().unwrap());
+    let prefix = run.config().unwrap().global.prefix.to_string();
+    let segment = Path::new(SHARED_MEMORY).join(format!("{prefix}half-made"));
+    std::fs::write(&segment, "").unwrap();
+    segment
+}
+
+#[test]
+fn what_a_controller_left_that_died_while_it_joined_is_in_nobodys_way() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    let segment = dead_controller(&bus);
+    let controller = bus.echo();
+    plant.wait_for_controller(PATIENT).unwrap();
+    assert!(!segment.exists());
+    plant.exchange(&sensor(0)).unwrap();
+    plant.end().unwrap();
+    controller.join().unwrap().unwrap();
+    bus.assert_nothing_left();
+}
+
+#[test]
+fn a_call_that_a_dead_peers_segment_holds_up_ends_and_a_living_ones_stays() {
+    let test = TestBus::new();
+    let bus = claim::Bus {
+        name: test.name.clone(),
+        place: test.place.clone(),
+    };
+    let claim = bus.claim(claim::Role::Plant).unwrap().unwrap();
+    let run = run_files::RunFiles::create(&bus).unwrap();
+    run.set_ready().unwrap();
+    let guardian = guardian::Guardian::start(&claim).unwrap();
+    let segment = dead_controller(&test);
+    // While a controller lives, nothing of it is touched: it may be making this right now.
+    let peer = bus.claim(claim::Role::Controller).unwrap().unwrap();
+    guardian.during(|| thread::sleep(Duration::from_millis(1200)));
+    assert!(segment.exists());
+    drop(peer);
+    // As iceoryx2 waits: for ever, unless the name goes.
+    guardian.during(|| {
+        while segment.exists() {
+            thread::sleep(Duration::from_millis(1));
+        }
+    });
+}
+
+#[test]
+fn waiting_ends_when_it_is_asked_to() {
+    let bus = TestBus::new();
+    let interrupt = Interrupt::default();
+    let mut plant =
+        PlantEnd::create_in(bus.place.clone(), &bus.name, &session(), &interrupt).unwrap();
+    interrupt.request();
+    assert!(matches!(
+        plant.wait_for_controller(PATIENT),
+        Err(LinkError::Interrupted)
+    ));
+    drop(plant);
+    let opened = ControllerEnd::open_in(bus.place.clone(), &bus.name, PATIENT, &interrupt);
+    assert!(matches!(opened, Err(LinkError::Interrupted)));
+    bus.assert_nothing_left();
+}

@@ -27,6 +27,17 @@ pub enum LoopError {
     /// The controller is gone.
     #[error(transparent)]
     Host(#[from] HostError),
+    /// The controller says something that no controller of this version says.
+    #[error(
+        "the controller answers with state {state} and fault {fault}, of which this version knows \
+         at least one not: use the same build on both sides"
+    )]
+    NotUnderstood {
+        /// Number of its supervisor's state.
+        state: u8,
+        /// Number of its fault, 0 for none.
+        fault: u8,
+    },
     /// A monitor of the run failed: its record cannot be written, for example.
     #[error(transparent)]
     Monitor(Box<dyn std::error::Error + Send + Sync>),
@@ -97,6 +108,7 @@ pub struct ClosedLoop<H, P = ArmOnBelt> {
     last_answer: ActuatorFrame,
     saturated_ticks: u64,
     stale_ticks: u64,
+    drive_watchdog_tick: Option<u64>,
 }
 
 /// Hash of every sensor and actuator frame in order. Each field enters as
@@ -156,6 +168,8 @@ pub struct LoopResult {
     pub saturated_ticks: u64,
     /// Ticks without an answer in time.
     pub stale_ticks: u64,
+    /// Tick at which the torque stages took the torque away, for want of commands.
+    pub drive_watchdog_tick: Option<u64>,
     /// Fault latched at the end.
     pub fault: Option<Fault>,
     /// Round trips, ns.
@@ -178,6 +192,7 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             last_answer: ActuatorFrame::default(),
             saturated_ticks: 0,
             stale_ticks: 0,
+            drive_watchdog_tick: None,
         }
     }
 
@@ -198,6 +213,12 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
         };
         match &frame {
             Some(answer) => {
+                if !answer.is_understood() {
+                    return Err(LoopError::NotUnderstood {
+                        state: answer.state,
+                        fault: answer.fault,
+                    });
+                }
                 self.log.actuator(answer);
                 self.last_answer = *answer;
                 let saturated = painleve_shared::frame::StatusFlags::SATURATED;
@@ -210,6 +231,9 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
         }
         self.simulation
             .advance(frame.as_ref(), &mut self.statistics)?;
+        if self.simulation.drive_watchdog_has_tripped() && self.drive_watchdog_tick.is_none() {
+            self.drive_watchdog_tick = Some(self.simulation.ticks());
+        }
         monitor.tick()
     }
 
@@ -222,10 +246,48 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             final_reference_m: self.last_answer.reference_tip.to_metres(),
             saturated_ticks: self.saturated_ticks,
             stale_ticks: self.stale_ticks,
+            drive_watchdog_tick: self.drive_watchdog_tick,
             fault: self.last_answer.latched_fault(),
             round_trips_ns: self.round_trips_ns,
             log_hash: self.log.hex(),
         };
         (result, self.host)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{Scenario, built_in};
+
+    /// Answers every frame with the same state and fault.
+    struct Fixed {
+        state: u8,
+        fault: u8,
+    }
+
+    impl ControllerHost for Fixed {
+        fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
+            Ok(Answer {
+                frame: Some(ActuatorFrame {
+                    tick: frame.tick,
+                    state: self.state,
+                    fault: self.fault,
+                    ..ActuatorFrame::default()
+                }),
+                round_trip: std::time::Duration::ZERO,
+            })
+        }
+    }
+
+    #[test]
+    fn an_answer_that_is_not_understood_ends_the_run() {
+        let scenario = Scenario::load(built_in::DEFAULT, &[]).unwrap();
+        for (state, fault, understood) in [(0, 0, true), (255, 0, false), (0, 255, false)] {
+            let simulation = Simulation::new(&scenario).unwrap();
+            let ticked = ClosedLoop::new(simulation, Fixed { state, fault }).tick(&mut ());
+            let refused = matches!(ticked, Err(LoopError::NotUnderstood { .. }));
+            assert_eq!(refused, !understood, "{state}, {fault}: {ticked:?}");
+        }
     }
 }

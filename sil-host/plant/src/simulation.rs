@@ -105,6 +105,11 @@ impl<P: Plant> Simulation<P> {
         })
     }
 
+    /// Whether the torque stages have given up, for want of commands.
+    pub fn drive_watchdog_has_tripped(&self) -> bool {
+        self.torque_stages.has_tripped()
+    }
+
     /// Whether the frame of this tick's sample is lost: the controller must not be given it.
     pub fn sensor_frame_is_lost(&self) -> bool {
         self.lost.sensor

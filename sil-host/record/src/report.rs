@@ -86,6 +86,9 @@ pub struct RunReport {
     pub seed: u64,
     /// How the run was paced.
     pub pacing: String,
+    /// When the torque stages took the torque away for want of commands, s; null if never.
+    #[serde(default)]
+    pub drive_watchdog_s: Option<f64>,
     /// Number of the fault latched at the end, null for none.
     pub fault: Option<u8>,
     /// What that fault is.
@@ -134,6 +137,9 @@ impl RunReport {
             log_hash: result.log_hash.clone(),
             seed: scenario.run.seed,
             pacing: pacing.into(),
+            drive_watchdog_s: result
+                .drive_watchdog_tick
+                .map(|tick| tick as f64 / f64::from(scenario.run.tick_hz)),
             fault: result.fault.map(|fault| fault as u8),
             fault_description: result.fault.map(|fault| fault.description().into()),
             wake_up_us: None,
@@ -207,6 +213,12 @@ impl RunReport {
                 self.sim_s, self.wall_s, self.realtime_factor
             ),
         );
+        if let Some(tripped_s) = self.drive_watchdog_s {
+            row(
+                "drive watchdog",
+                format!("no commands: no torque from {tripped_s:.3} s on"),
+            );
+        }
         if let (Some(number), Some(description)) = (self.fault, &self.fault_description) {
             row("fault", format!("{number}: {description}"));
         }

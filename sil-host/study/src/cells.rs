@@ -69,7 +69,7 @@ impl fmt::Display for Cell {
 impl Cells {
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.mu.len() * self.v_belt_m_s.len() * self.initial.len()
+        crate::combinations(&[self.mu.len(), self.v_belt_m_s.len(), self.initial.len()])
     }
 
     /// The seed, by what it is for.

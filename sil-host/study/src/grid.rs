@@ -3,7 +3,10 @@
 use std::str::FromStr;
 
 /// More values than anyone means.
-const MOST_VALUES: f64 = 1e7;
+const MOST_VALUES: f64 = 1e6;
+
+/// Larger than any number of a study, and small enough to be written out in decimals.
+const LARGEST: f64 = 1e9;
 
 /// Decimals beyond which a double cannot tell numbers near one apart.
 const MOST_DECIMALS: usize = 15;
@@ -23,8 +26,10 @@ pub enum GridError {
         /// What was given.
         text: String,
     },
-    /// One of its parts is no finite number.
-    #[error("'{part}' in '{text}' is not a finite number; give FROM:TO:STEP or a list a,b,c")]
+    /// One of its parts is no number, or too large a one.
+    #[error(
+        "'{part}' in '{text}' is not a number from -{LARGEST:e} to {LARGEST:e}; give FROM:TO:STEP or a list a,b,c"
+    )]
     NotFinite {
         /// What was given.
         text: String,
@@ -123,7 +128,7 @@ impl FromStr for Grid {
         let values = text
             .split(separator)
             .map(|part| match part.trim().parse::<f64>() {
-                Ok(value) if value.is_finite() => Ok(value + 0.0),
+                Ok(value) if value.abs() <= LARGEST => Ok(value + 0.0),
                 _ => Err(GridError::NotFinite {
                     text: text.into(),
                     part: part.into(),
@@ -191,9 +196,10 @@ mod tests {
         for (text, part) in [
             ("", "holds no values"),
             ("  ", "holds no values"),
-            ("0.1,,0.3", "'' in '0.1,,0.3' is not a finite number"),
-            ("0.4,high", "'high' in '0.4,high' is not a finite number"),
-            ("nan", "not a finite number"),
+            ("0.1,,0.3", "'' in '0.1,,0.3' is not a number"),
+            ("0.4,high", "'high' in '0.4,high' is not a number"),
+            ("nan", "not a number from -1e9 to 1e9"),
+            ("0:1e308:1e302", "'1e308' in"),
             ("0:inf:1", "'inf' in '0:inf:1'"),
             ("0:1", "has 2 parts"),
             ("0:1:2:3", "has 4 parts"),
@@ -201,7 +207,7 @@ mod tests {
             ("0:1:-0", "step 0"),
             ("0:1:-0.1", "leads away from 1; start at 0 with step 0.1"),
             ("-0.1:-1:0.005", "step 0.005 leads away from -1"),
-            ("0:1:1e-9", "at most 1e7"),
+            ("0:1:1e-9", "at most 1e6"),
         ] {
             let message = text.parse::<Grid>().unwrap_err().to_string();
             assert!(message.contains(part), "{message}");

@@ -71,6 +71,9 @@ pub enum StudyError {
     /// An option of the study is wrong.
     #[error("{0}")]
     Option(String),
+    /// The values of the options have more combinations than can be computed.
+    #[error("{0} rows: at most {MOST_ROWS} can be computed; give coarser grids or fewer runs")]
+    TooManyRows(usize),
     /// A parameter is out of range.
     #[error(transparent)]
     Range(#[from] OutOfRange),
@@ -115,12 +118,26 @@ pub trait Study: Sync {
     fn row(&self, index: usize) -> Result<Self::Row, StudyError>;
 }
 
+/// The most rows of a study: more than a machine computes in a year.
+pub const MOST_ROWS: usize = 10_000_000;
+
+/// How many combinations there are of so many values; what is too large to count is
+/// [`usize::MAX`].
+pub(crate) fn combinations(counts: &[usize]) -> usize {
+    counts
+        .iter()
+        .fold(1, |product: usize, &count| product.saturating_mul(count))
+}
+
 /// All rows in order, computed on the threads of the current rayon pool; `done` is
 /// called after each.
 ///
 /// # Errors
-/// The error of the first row that has one, whatever the number of threads.
+/// [`StudyError::TooManyRows`], or the error of the first row that has one, whatever the number of threads.
 pub fn rows<S: Study>(study: &S, done: impl Fn() + Sync) -> Result<Vec<S::Row>, StudyError> {
+    if study.len() > MOST_ROWS {
+        return Err(StudyError::TooManyRows(study.len()));
+    }
     let rows: Vec<Result<S::Row, StudyError>> = (0..study.len())
         .into_par_iter()
         // Rows differ much in cost.

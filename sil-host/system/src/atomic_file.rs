@@ -37,6 +37,12 @@ pub enum AtomicFileError {
         /// The operating system's reason.
         source: io::Error,
     },
+    /// There is such a file already, and it was to be a new one.
+    #[error("`{path}` is there already")]
+    Exists {
+        /// The path asked for.
+        path: PathBuf,
+    },
     /// The folder, or the disk under it, does not take the file.
     #[error("cannot write `{path}`: {source}; choose a path that can be written and has space")]
     Write {
@@ -55,6 +61,8 @@ pub struct AtomicFile {
     folder: PathBuf,
     target: PathBuf,
     temporary: NamedTempFile,
+    /// No file may be replaced.
+    is_new: bool,
     /// Bytes that still fit, for tests of a disk that fills up.
     #[cfg(any(test, feature = "full-disk"))]
     pub room: usize,
@@ -86,6 +94,7 @@ impl AtomicFile {
                 folder,
                 path,
                 temporary,
+                is_new: false,
                 #[cfg(any(test, feature = "full-disk"))]
                 room: usize::MAX,
             }),
@@ -114,6 +123,7 @@ impl AtomicFile {
             folder,
             target,
             temporary,
+            is_new,
             ..
         } = self;
         let write = |source| AtomicFileError::Write {
@@ -121,9 +131,17 @@ impl AtomicFile {
             source,
         };
         temporary.as_file().sync_all().map_err(write)?;
-        temporary
-            .persist(target)
-            .map_err(|error| write(error.error))?;
+        let named = if is_new {
+            temporary.persist_noclobber(target)
+        } else {
+            temporary.persist(target)
+        };
+        named.map_err(|error| match error.error.kind() {
+            io::ErrorKind::AlreadyExists if is_new => {
+                AtomicFileError::Exists { path: path.clone() }
+            }
+            _ => write(error.error),
+        })?;
         sync_folder(&folder).map_err(write)
     }
 
@@ -236,12 +254,26 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
+/// Writes a whole file in one go, unless there is one of this name. Of several writers at
+/// once one succeeds.
+///
+/// # Errors
+/// [`AtomicFileError::Exists`], and those of [`AtomicFile`].
+pub fn write_new(path: impl Into<PathBuf>, contents: &[u8]) -> Result<(), AtomicFileError> {
+    let mut file = AtomicFile::create(path)?;
+    file.is_new = true;
+    finish(file, contents)
+}
+
 /// Writes a whole file in one go.
 ///
 /// # Errors
 /// Those of [`AtomicFile`]; nothing is left then.
 pub fn write(path: impl Into<PathBuf>, contents: &[u8]) -> Result<(), AtomicFileError> {
-    let mut file = AtomicFile::create(path)?;
+    finish(AtomicFile::create(path)?, contents)
+}
+
+fn finish(mut file: AtomicFile, contents: &[u8]) -> Result<(), AtomicFileError> {
     match file.write_all(contents) {
         Ok(()) => file.commit(),
         Err(source) => Err(AtomicFileError::Write {

@@ -1,5 +1,5 @@
 //! Torque stages of both joints: counts to torque, saturation, first-order lag,
-//! and the transport delay from sample to torque.
+//! the transport delay from sample to torque, and a watchdog over the commands.
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{LinearScale, TorqueCounts};
@@ -20,6 +20,9 @@ settings! {
         lag_s: f64 = 0.0, 0.0..=1.0, "s";
         /// Time from the sample to the torque that answers it, in control ticks.
         delay_ticks: f64 = 1.0, 0.0..=MAXIMUM_DELAY_TICKS as f64 - 1.0, "ticks";
+        /// After so long without a command the stage gives no torque any more, for the rest of
+        /// the run. The first command arms this watchdog.
+        watchdog_ticks: u32 = 50, 1..=1_000_000, "ticks";
     }
 }
 
@@ -42,6 +45,28 @@ pub struct TorqueStages {
     /// Ring of commanded torques, N·m.
     commands: [Vector2<f64>; MAXIMUM_DELAY_TICKS],
     next: usize,
+    watchdog: Watchdog,
+}
+
+/// Takes the torque away when commands stop coming; latched.
+#[derive(Clone, Debug)]
+struct Watchdog {
+    limit_ticks: u32,
+    /// Ticks since the last command; `None` before the first.
+    silent_ticks: Option<u32>,
+    tripped: bool,
+}
+
+impl Watchdog {
+    fn tick(&mut self, is_command: bool) {
+        self.silent_ticks = if is_command {
+            Some(0)
+        } else {
+            self.silent_ticks.map(|ticks| ticks.saturating_add(1))
+        };
+        let silent = self.silent_ticks.unwrap_or(0);
+        self.tripped = self.tripped || silent >= self.limit_ticks;
+    }
 }
 
 impl TorqueStages {
@@ -54,6 +79,11 @@ impl TorqueStages {
             fraction: settings.delay_ticks.fract(),
             commands: [Vector2::zeros(); MAXIMUM_DELAY_TICKS],
             next: 0,
+            watchdog: Watchdog {
+                limit_ticks: settings.watchdog_ticks,
+                silent_ticks: None,
+                tripped: false,
+            },
         }
     }
 
@@ -83,6 +113,15 @@ impl TorqueStages {
             None => self.commands[last],
         };
         self.next = (self.next + 1) % MAXIMUM_DELAY_TICKS;
+        self.watchdog.tick(counts.is_some());
+        if self.watchdog.tripped {
+            self.commands = [Vector2::zeros(); MAXIMUM_DELAY_TICKS];
+        }
+    }
+
+    /// Whether commands have stayed away for so long that there is no torque any more.
+    pub fn has_tripped(&self) -> bool {
+        self.watchdog.tripped
     }
 
     /// The torque commanded for the change within this tick, N·m.
@@ -113,6 +152,34 @@ mod tests {
         assert_eq!(stages.target_nm(), Vector2::new(2.5, -5.0));
         stages.command(None);
         assert_eq!(stages.target_nm(), Vector2::new(2.5, -5.0));
+    }
+
+    #[test]
+    fn without_commands_the_torque_goes_and_stays_away() {
+        let mut stages = TorqueStages::new(&TorqueStageSettings {
+            delay_ticks: 0.0,
+            watchdog_ticks: 3,
+            ..Default::default()
+        });
+        let full = Some([TorqueCounts(2047), TorqueCounts(2047)]);
+        // Nobody has commanded anything yet.
+        (0..10).for_each(|_| stages.command(None));
+        assert!(!stages.has_tripped());
+        stages.command(full);
+        stages.command(None);
+        stages.command(None);
+        assert!(stages.target_nm().x > 4.9 && !stages.has_tripped());
+        // A command in time begins a new wait.
+        stages.command(full);
+        stages.command(None);
+        stages.command(None);
+        assert!(!stages.has_tripped());
+        stages.command(None);
+        assert!(stages.has_tripped());
+        assert_eq!(stages.target_nm(), Vector2::zeros());
+        stages.command(full);
+        assert_eq!(stages.target_nm(), Vector2::zeros());
+        assert!(stages.has_tripped());
     }
 
     #[test]

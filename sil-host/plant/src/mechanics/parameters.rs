@@ -65,8 +65,9 @@ settings! {
         /// Largest step.
         maximum_step_s: f64 = 0.05, 1e-5..=1.0, "s";
         /// A rebound slower than this ends a series of bounces. By default the last bounces are
-        /// lower than 1e-13 m, below rounding of the gap.
-        chatter_speed_m_s: f64 = 1e-6, 1e-8..=1e-2, "m/s";
+        /// lower than 1e-13 m, below rounding of the gap. Bounces slower than the smallest speed
+        /// that is allowed end within that rounding and never settle.
+        chatter_speed_m_s: f64 = 1e-6, 1e-7..=1e-2, "m/s";
         /// What follows where both sliding and flight are solutions.
         indeterminate: Indeterminate = Indeterminate::Flight;
     }

@@ -1,14 +1,17 @@
 //! Scenarios from names, files and overrides.
 
-use std::fs;
 use std::path::PathBuf;
 
 use painleve_shared::range::OutOfRange;
 use painleve_shared::settings::Settings;
+use painleve_system::input_file;
 use toml::{Table, Value};
 
 use super::{Scenario, built_in};
 use crate::mechanics::ArmOnBelt;
+
+/// More levels than the keys of any scenario have.
+const MOST_LEVELS: usize = 16;
 
 /// Why there is no scenario to run.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +62,9 @@ pub enum ScenarioError {
         /// What was given.
         text: String,
     },
+    /// An override's key has more levels than any scenario.
+    #[error("--set: a key has at most {MOST_LEVELS} levels, as belt.friction has two")]
+    TooDeep,
     /// A value is out of range.
     #[error("{origin}: {source}")]
     Range {
@@ -135,7 +141,7 @@ fn read(name: &str) -> Result<Table, ScenarioError> {
             known: built_in::names().collect::<Vec<_>>().join(", "),
         });
     }
-    let text = fs::read_to_string(&path).map_err(|source| ScenarioError::Unreadable {
+    let text = input_file::read(&path).map_err(|source| ScenarioError::Unreadable {
         path: path.clone(),
         source,
     })?;
@@ -178,8 +184,13 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
     let wrong = || ScenarioError::Override { text: text.into() };
     let (key, value) = text.split_once('=').ok_or_else(wrong)?;
     let (key, value) = (key.trim(), value.trim());
-    if key.is_empty() || value.is_empty() {
+    // A line break would begin another key, which nobody looks at.
+    if key.is_empty() || value.is_empty() || value.contains(['\n', '\r']) {
         return Err(wrong());
+    }
+    // Each level is a call or more in everything that goes through the values.
+    if key.split('.').count() > MOST_LEVELS {
+        return Err(ScenarioError::TooDeep);
     }
     // A bare word is a string, so that names need no quotes inside quotes.
     let value = format!("value = {value}")
@@ -332,7 +343,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("slow.toml");
         let load = |text: &str| {
-            fs::write(&path, text).unwrap();
+            std::fs::write(&path, text).unwrap();
             Scenario::load(path.to_str().unwrap(), &[])
         };
         let scenario = load("[belt]\nfriction = 0.5\n").unwrap();

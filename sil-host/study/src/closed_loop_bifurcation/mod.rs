@@ -166,11 +166,13 @@ impl Study for ClosedLoopBifurcation {
     type Row = Row;
 
     fn len(&self) -> usize {
-        self.controllers.len()
-            * self.converters.len()
-            * self.mu.len()
-            * self.v_belt_m_s.len()
-            * self.initial.len()
+        crate::combinations(&[
+            self.controllers.len(),
+            self.converters.len(),
+            self.mu.len(),
+            self.v_belt_m_s.len(),
+            self.initial.len(),
+        ])
     }
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {

@@ -160,7 +160,7 @@ impl Study for LiftOff {
     type Row = Row;
 
     fn len(&self) -> usize {
-        2 * self.runs
+        crate::combinations(&[2, self.runs])
     }
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {

@@ -23,7 +23,7 @@ impl Study for AblationStudy {
     type Row = Row;
 
     fn len(&self) -> usize {
-        (self.parts.len() + 1) * self.campaign.runs
+        crate::combinations(&[self.parts.len() + 1, self.campaign.runs])
     }
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {

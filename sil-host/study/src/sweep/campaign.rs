@@ -8,12 +8,13 @@
 //! ```
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 use xxhash_rust::xxh3::xxh3_128;
+
+use painleve_system::input_file;
 
 use super::SweepError;
 
@@ -41,7 +42,7 @@ impl Campaign {
     /// # Errors
     /// [`SweepError`] if there is no such file or it is no campaign.
     pub fn load(path: &Path) -> Result<Self, SweepError> {
-        let text = fs::read_to_string(path)
+        let text = input_file::read(path)
             .map_err(|source| SweepError::unreadable("campaign file", path, source))?;
         Self::parse(&text).map_err(|message| SweepError::Campaign {
             path: path.into(),

@@ -1,13 +1,16 @@
 //! The manifest of a sweep: what exactly is computed, and by which program.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use painleve_system::atomic_file;
+use painleve_system::atomic_file::{self, AtomicFileError};
+use painleve_system::input_file;
+
 use serde::{Deserialize, Serialize};
 use toml::Table;
 use xxhash_rust::xxh3::xxh3_128;
+
+use crate::{MOST_ROWS, StudyError};
 
 use super::SweepError;
 use super::campaign::{Campaign, Understood};
@@ -61,6 +64,9 @@ impl Manifest {
         shards: usize,
     ) -> Result<Self, SweepError> {
         let rows = understood.table.len();
+        if rows > MOST_ROWS {
+            return Err(StudyError::TooManyRows(rows).into());
+        }
         if !(1..=rows.min(MOST_SHARDS)).contains(&shards) {
             let most = rows.min(MOST_SHARDS);
             return Err(SweepError::Shard(format!(
@@ -97,19 +103,19 @@ impl Manifest {
     /// [`SweepError`] if another one is there, or it cannot be written.
     pub fn write(&self, folder: &Path) -> Result<bool, SweepError> {
         let path = Self::path(folder);
-        if path.exists() {
-            if fs::read_to_string(&path).is_ok_and(|text| text == self.text()) {
-                return Ok(false);
-            }
-            return Err(SweepError::Manifest {
-                path,
-                message:
-                    "another sweep is planned here; choose another --folder or remove this one"
-                        .into(),
-            });
+        // Of several that are planned at once, one is there first.
+        match atomic_file::write_new(&path, self.text().as_bytes()) {
+            Err(AtomicFileError::Exists { .. }) => {}
+            written => return Ok(written.map(|()| true)?),
         }
-        atomic_file::write(path, self.text().as_bytes())?;
-        Ok(true)
+        if input_file::read(&path).is_ok_and(|text| text == self.text()) {
+            return Ok(false);
+        }
+        Err(SweepError::Manifest {
+            path,
+            message: "another sweep is planned here; choose another --folder or remove this one"
+                .into(),
+        })
     }
 
     fn text(&self) -> String {
@@ -122,7 +128,7 @@ impl Manifest {
     /// [`SweepError`] if there is none, or another program's.
     pub fn load(folder: &Path) -> Result<Self, SweepError> {
         let path = Self::path(folder);
-        let text = match fs::read_to_string(&path) {
+        let text = match input_file::read(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Err(SweepError::Manifest {

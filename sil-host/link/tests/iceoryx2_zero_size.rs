@@ -1,0 +1,65 @@
+//! The fault of iceoryx2-cal 0.9.3 (and 0.10.0) that the link contains, as small as it can be
+//! shown: opening a segment of size zero never ends, whatever the timeout. A process that dies
+//! between `shm_open` and `ftruncate` leaves such a segment.
+//!
+//! When this test fails after an upgrade, the fault is gone: `open_impl` in
+//! `dynamic_storage/posix_shared_memory.rs` looks at its timeout in the arm `MappingSizeIsZero`,
+//! and the removal of half-made segments in `run_files` and `guardian` can go.
+
+use std::fs::{self, OpenOptions};
+use std::time::Duration;
+
+use iceoryx2::prelude::{
+    Config, FileName, NodeBuilder, Path, SemanticString, SignalHandlingMode, ipc,
+};
+
+#[test]
+fn opening_a_segment_of_size_zero_ends_only_when_it_is_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    let prefix = format!("iox2_zero_{}_", std::process::id());
+    let mut config = Config::default();
+    config.global.prefix = FileName::new(prefix.as_bytes()).unwrap();
+    let root = folder.path().to_str().unwrap();
+    config
+        .global
+        .set_root_path(&Path::new(root.as_bytes()).unwrap());
+    config.global.creation_timeout = Duration::from_millis(50);
+    let node = || {
+        NodeBuilder::new()
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .unwrap()
+    };
+    let name = "service".try_into().unwrap();
+    let owner = node();
+    let service = owner.service_builder(&name).publish_subscribe::<u64>();
+    let _service = service.create().unwrap();
+    let segment = fs::read_dir("/dev/shm")
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .find(|path| {
+            let name = path.file_name().unwrap().to_string_lossy();
+            name.starts_with(&prefix) && name.ends_with(".dynamic")
+        })
+        .unwrap();
+    // As after shm_open and before ftruncate.
+    fs::remove_file(&segment).unwrap();
+    OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(&segment)
+        .unwrap();
+
+    std::thread::scope(|scope| {
+        let opening = scope.spawn(|| {
+            let other = node();
+            let service = other.service_builder(&name).publish_subscribe::<u64>();
+            service.open().is_err()
+        });
+        std::thread::sleep(20 * config.global.creation_timeout);
+        assert!(!opening.is_finished(), "it has looked at its timeout");
+        fs::remove_file(&segment).unwrap();
+        assert!(opening.join().unwrap());
+    });
+}

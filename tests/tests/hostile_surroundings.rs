@@ -1,0 +1,252 @@
+//! Closed pipes, full disks, foreign folders, signals at the wrong time, files that are none:
+//! one message, the right exit code, and nothing left.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+use nix::sys::stat::Mode;
+use nix::unistd::mkfifo;
+use painleve_tests::{Bench, child_of, code, errors, program, signal};
+use serde_json::Value;
+
+const SOON: Duration = Duration::from_secs(5);
+const SHORT: [&str; 5] = [
+    "--set",
+    "run.duration_s=0.05",
+    "--no-record",
+    "--no-plot",
+    "--json",
+];
+
+/// The output of a shell line in which `$P` is the program.
+#[allow(clippy::unwrap_used)]
+fn shell(bench: &Bench, line: &str) -> std::process::Output {
+    Command::new("bash")
+        .args(["-c", line])
+        .env("P", program())
+        .current_dir(bench.path(""))
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn nobody_reading_is_no_error_and_a_full_disk_is_one() {
+    let bench = Bench::new("stdout");
+    for arguments in ["scenarios", "run --set run.duration_s=0.05 --json"] {
+        let unread = shell(
+            &bench,
+            &format!("$P {arguments} | true; exit ${{PIPESTATUS[0]}}"),
+        );
+        assert_eq!(code(unread.status), 0, "{arguments}: {unread:?}");
+        assert_eq!(errors(&unread), "", "{arguments}");
+        let full = shell(&bench, &format!("$P {arguments} > /dev/full"));
+        assert_eq!(code(full.status), 4, "{arguments}: {full:?}");
+        assert!(errors(&full).contains("stdout"), "{full:?}");
+    }
+    // A log that cannot be written must not end a run.
+    let line = format!("$P run --pacing realtime {} 2>/dev/full", SHORT.join(" "));
+    let unlogged = shell(&bench, &line);
+    assert_eq!(code(unlogged.status), 0, "{unlogged:?}");
+}
+
+#[test]
+fn a_limit_on_file_sizes_is_told_like_a_full_disk() {
+    let bench = Bench::new("fsize");
+    let output = shell(&bench, "ulimit -f 64; $P run --no-plot");
+    assert_eq!(code(output.status), 4, "{output:?}");
+    assert_eq!(errors(&output).trim().lines().count(), 1, "{output:?}");
+    assert!(errors(&output).contains("run.mcap"), "{output:?}");
+    assert_eq!(bench.files(), [""; 0]);
+}
+
+#[test]
+fn signals_are_heard_while_a_process_waits_for_its_peer() {
+    for role in ["plant", "controller"] {
+        for sent in [Signal::SIGINT, Signal::SIGTERM] {
+            let bench = Bench::new("waiting");
+            let running = bench.start(&[role, "--bus", &bench.bus, "--wait-s", "60"]);
+            std::thread::sleep(Duration::from_millis(300));
+            signal(running.id(), sent);
+            let (output, took) = running.end(SOON);
+            assert_eq!(code(output.status), 130, "{output:?}");
+            assert_eq!(errors(&output), "error: interrupted\n");
+            assert!(took < Duration::from_secs(2), "{took:?}");
+            assert_eq!(bench.files(), [""; 0]);
+        }
+    }
+}
+
+#[test]
+fn a_process_stopped_while_it_starts_is_noticed() {
+    for (role, option) in [("controller", ""), ("plant", "")] {
+        let bench = Bench::new("stopped");
+        let long = ["run", "--bus", &bench.bus, "--set", "run.duration_s=100000"];
+        let running = bench.start(&long);
+        let id = child_of(running.id(), role);
+        signal(id, Signal::SIGSTOP);
+        let start = Instant::now();
+        let (output, _) = running.end(SOON);
+        assert_eq!(code(output.status), 3, "{output:?}{option}");
+        // 2 s to notice, one to put things in order.
+        assert!(
+            start.elapsed() < Duration::from_secs(4),
+            "{:?}",
+            start.elapsed()
+        );
+        assert_eq!(errors(&output).matches("error: ").count(), 1, "{output:?}");
+    }
+}
+
+#[test]
+fn children_may_say_more_than_a_pipe_holds() {
+    let bench = Bench::new("pipe");
+    let name = "x".repeat(70_000);
+    let report = bench.report(&[&["--set", &format!("name={name}")], &SHORT[..]].concat());
+    assert_eq!(report["scenario"], Value::from(name));
+
+    let mut chatty = bench.command(&[&["run"], &SHORT[..]].concat());
+    let output = chatty.env("IOX2_LOG_LEVEL", "trace").output().unwrap();
+    assert_eq!(code(output.status), 0, "{}", errors(&output));
+}
+
+#[test]
+fn settings_beyond_all_bounds_are_refused_at_once() {
+    let bench = Bench::new("bounds");
+    let deep = format!("{}=1", vec!["a"; 60_000].join("."));
+    fs::write(bench.path("deep.toml"), &deep).unwrap();
+    fs::write(
+        bench.path("nested.toml"),
+        format!("a={}", "[".repeat(60_000)),
+    )
+    .unwrap();
+    mkfifo(&bench.path("pipe.toml"), Mode::S_IRWXU).unwrap();
+    let cells = [
+        "study",
+        "bifurcation",
+        "--mu",
+        "0:1:1e-6",
+        "--v-belt",
+        "-1:0:1e-6",
+    ];
+    for (arguments, part) in [
+        (&["run", "--set", &deep][..], "levels"),
+        (&["run", "deep.toml"], "deep.toml"),
+        (&["run", "nested.toml"], "nested.toml"),
+        (&["run", "pipe.toml"], "not a regular file"),
+        (&["run", "/dev/zero"], "not a regular file"),
+        (
+            &["run", "--set", "belt.friction=0.4\nrun.seed=7"],
+            "key=value",
+        ),
+        (
+            &["run", "--set", "solver.chatter_speed_m_s=1e-8"],
+            "chatter_speed",
+        ),
+        (&["run", "--record", "same", "--plot", "./same"], "same"),
+        (&cells, "at most"),
+        (&["study", "bifurcation", "--mu", "0:1e308:1e302"], "1e302"),
+    ] {
+        let start = Instant::now();
+        let (output, took) = bench.start(arguments).end(Duration::from_secs(20));
+        assert_eq!(code(output.status), 2, "{part}: {}", errors(&output));
+        let message = errors(&output);
+        assert!(message.contains(part), "'{part}' is not in: {message:.200}");
+        assert!(took < SOON, "{part}: {:?}", start.elapsed());
+    }
+}
+
+#[test]
+fn of_two_sweeps_planned_at_once_one_is_refused() {
+    let bench = Bench::new("plans");
+    for mu in ["0.4", "0.6"] {
+        let campaign = format!("study = \"bifurcation\"\nmu = \"{mu}\"\nv-belt = \"-0.4\"\n");
+        fs::write(bench.path(&format!("{mu}.toml")), campaign).unwrap();
+    }
+    for round in 0..10 {
+        let folder = format!("sweep-{round}");
+        let plan = |mu: &str| {
+            let campaign = format!("{mu}.toml");
+            bench.start(&[
+                "sweep", "plan", &campaign, "--shards", "1", "--folder", &folder,
+            ])
+        };
+        let both = [plan("0.4"), plan("0.6")];
+        let mut codes = both.map(|running| code(running.end(SOON).0.status));
+        codes.sort_unstable();
+        assert_eq!(codes, [0, 2], "round {round}");
+    }
+}
+
+#[test]
+fn studies_and_figures_end_with_their_own_code_and_leave_nothing() {
+    let bench = Bench::new("batch");
+    for arguments in [
+        &[
+            "study",
+            "robustness",
+            "--runs",
+            "100000",
+            "--csv",
+            "rows.csv",
+        ][..],
+        &["figures", "--out", "figures"],
+    ] {
+        let running = bench.start(arguments);
+        std::thread::sleep(Duration::from_millis(700));
+        signal(running.id(), Signal::SIGTERM);
+        let (output, _) = running.end(SOON);
+        assert_eq!(code(output.status), 130, "{output:?}");
+        assert_eq!(errors(&output), "error: interrupted\n");
+        assert_eq!(bench.files(), [""; 0]);
+    }
+}
+
+#[test]
+fn a_runtime_folder_of_somebody_else_is_not_used() {
+    let bench = Bench::new("foreign");
+    // Everybody may write there: it is passed over.
+    let open = bench.path("open");
+    fs::create_dir(&open).unwrap();
+    fs::set_permissions(&open, fs::Permissions::from_mode(0o777)).unwrap();
+    let mut run = bench.command(&[&["run"], &SHORT[..]].concat());
+    let output = run.env("XDG_RUNTIME_DIR", &open).output().unwrap();
+    assert_eq!(code(output.status), 0, "{output:?}");
+    assert_eq!(fs::read_dir(&open).unwrap().count(), 0);
+
+    // What should be the program's own folder is a file.
+    let blocked = bench.path("blocked");
+    fs::create_dir(&blocked).unwrap();
+    fs::set_permissions(&blocked, fs::Permissions::from_mode(0o700)).unwrap();
+    File::create(blocked.join("painleve"))
+        .unwrap()
+        .write_all(b"x")
+        .unwrap();
+    let mut plant = bench.command(&["controller", "--bus", &bench.bus]);
+    plant
+        .env("XDG_RUNTIME_DIR", &blocked)
+        .stderr(Stdio::piped());
+    let output = plant.output().unwrap();
+    assert_eq!(code(output.status), 3, "{output:?}");
+    assert!(errors(&output).contains("blocked/painleve"), "{output:?}");
+}
+
+#[test]
+fn a_watchdog_takes_the_torque_of_a_plant_without_commands() {
+    let bench = Bench::new("watchdog");
+    // So many frames are lost that 10 ticks soon pass without a command.
+    let report = bench.report(&[
+        "run",
+        "--json",
+        "--no-record",
+        "--no-plot",
+        "--set",
+        "converters.link.frame_loss=0.7",
+        "--set",
+        "converters.torque.watchdog_ticks=10",
+    ]);
+    assert!(report["drive_watchdog_s"].is_number(), "{report}");
+}
