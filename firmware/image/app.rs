@@ -114,7 +114,13 @@ mod tasks {
         } = cx.shared;
         (controller, drive, from_host, watch).lock(|controller, drive, from_host, watch| {
             drive.begin_tick();
+            drive.end_tick();
+            if !<Hardware as Board>::Port::HALF_DUPLEX {
+                // Bytes may have come without a pause that would have woken `link`.
+                rtic::pend(LINK);
+            }
             let Some(controller) = controller else {
+                drive.actuate(&ActuatorFrame::default());
                 return;
             };
             let frame = drive.sample(from_host.take());

@@ -12,13 +12,13 @@ mod configure;
 #[path = "board/f405.rs"]
 mod f405;
 #[cfg(target_os = "none")]
-#[path = "board/sensors.rs"]
-mod sensors;
+#[path = "board/safety.rs"]
+mod safety;
 #[cfg(target_os = "none")]
 mod stack;
 #[cfg(target_os = "none")]
-#[path = "board/uart.rs"]
-mod uart;
+#[path = "board/uart_dma.rs"]
+mod uart_dma;
 #[cfg(target_os = "none")]
 mod watch;
 

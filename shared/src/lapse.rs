@@ -100,9 +100,9 @@ lapses! {
         /// Sequence numbers that never came.
         LostFrame => lost_frames = 5, LostFrames;
         /// Frames with an encoder reading that the resolution does not allow.
-        EncoderOutOfRange => encoder_out_of_range = 2, EncoderOutOfRange;
+        EncoderOutOfRange => encoder_out_of_range = 1, EncoderOutOfRange;
         /// Frames with a force reading that the resolution does not allow.
-        ForceOutOfRange => force_out_of_range = 2, ForceOutOfRange;
+        ForceOutOfRange => force_out_of_range = 1, ForceOutOfRange;
     }
     /// Lapses of the link that carries messages as bytes.
     OF_MESSAGES: {

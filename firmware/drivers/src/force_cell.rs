@@ -5,6 +5,8 @@
 //! force of either sign is read. Single-ended the converter has no sign. It needs 4.5 to 5.5 V: its
 //! inputs take a level shifter (74AHCT125), its output goes to a pin that stands 5 V.
 
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::SpiDevice;
 use painleve_shared::counts::ForceCounts;
 
@@ -17,10 +19,10 @@ pub const BITS: u8 = 13;
 pub const FASTEST_HZ: u32 = 2_100_000;
 
 /// Select high between two conversions, ns (t_CSH).
-pub const PAUSE_NS: u32 = 475;
+const PAUSE_NS: u32 = 475;
 
 /// From select to the first edge, ns (t_SUCS).
-pub const SETUP_NS: u32 = 100;
+const SETUP_NS: u32 = 100;
 
 /// Two conversions of one force differ by no more, counts: the converter's noise.
 const AGREEMENT: i32 = 2;
@@ -31,14 +33,44 @@ const CONVERT: u8 = 0b0000_1000;
 /// The bit before the sign is always 0.
 const NULL_BIT: u8 = 0b0010_0000;
 
-/// A force cell. The device holds the select pin low for [`SETUP_NS`] before it clocks, and high for
-/// [`PAUSE_NS`] after.
+/// The converter's select pin: it keeps the pauses that the data sheet asks for.
+pub struct Select<S, D> {
+    pin: S,
+    delay: D,
+}
+
+impl<S: OutputPin, D: DelayNs> Select<S, D> {
+    /// A pin that is high by now.
+    pub fn new(pin: S, delay: D) -> Self {
+        Self { pin, delay }
+    }
+}
+
+impl<S: OutputPin, D> digital::ErrorType for Select<S, D> {
+    type Error = S::Error;
+}
+
+impl<S: OutputPin, D: DelayNs> OutputPin for Select<S, D> {
+    fn set_low(&mut self) -> Result<(), S::Error> {
+        self.pin.set_low()?;
+        self.delay.delay_ns(SETUP_NS);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), S::Error> {
+        self.pin.set_high()?;
+        self.delay.delay_ns(PAUSE_NS);
+        Ok(())
+    }
+}
+
+/// A force cell.
 pub struct ForceCell<D> {
     device: D,
 }
 
 impl<D: SpiDevice> ForceCell<D> {
-    /// The force cell on this device, in mode 0 and no faster than [`FASTEST_HZ`].
+    /// The force cell on this device, in mode 0, no faster than [`FASTEST_HZ`], selected through [`Select`].
     pub fn new(device: D) -> Self {
         Self { device }
     }

@@ -2,41 +2,39 @@
 
 use painleve_shared::frame::DigitalInputs;
 
-/// Ticks for which a contact must be closed before it counts as closed.
+/// Ticks for which a contact must be open, and then closed, before it counts as closed.
 pub const DEBOUNCE_TICKS: u8 = 5;
 
-/// One contact: opens at once, closes after [`DEBOUNCE_TICKS`], and counts as open until it has been seen
-/// open as long.
-#[derive(Clone, Copy, Debug, Default)]
-struct Contact {
-    /// Ticks in a row at the present level, while that level is not yet believed.
-    ticks: u8,
-    was_open: bool,
-    is_closed: bool,
+/// One contact, as far as it is believed.
+#[derive(Clone, Copy, Debug)]
+enum Contact {
+    /// To be seen open first, so many ticks so far.
+    Opening(u8),
+    /// Open; closed for so many ticks.
+    Open(u8),
+    Closed,
 }
 
 impl Contact {
+    /// Whether it counts as closed.
     fn tick(&mut self, level: bool) -> bool {
-        let believed = if self.was_open { self.is_closed } else { true };
-        if level == believed {
-            self.ticks = 0;
-        } else {
-            self.ticks += 1;
-        }
-        let lasts = self.ticks >= DEBOUNCE_TICKS;
-        if !self.was_open {
-            if lasts {
-                self.was_open = true;
-                self.ticks = 0;
-            }
-        } else if !level {
-            self.is_closed = false;
-            self.ticks = 0;
-        } else if lasts {
-            self.is_closed = true;
-            self.ticks = 0;
-        }
-        self.is_closed
+        *self = match (*self, level) {
+            (Self::Opening(ticks), false) if ticks + 1 >= DEBOUNCE_TICKS => Self::Open(0),
+            (Self::Opening(ticks), false) => Self::Opening(ticks + 1),
+            (Self::Opening(_), true) => Self::Opening(0),
+            (Self::Open(ticks), true) if ticks + 1 >= DEBOUNCE_TICKS => Self::Closed,
+            (Self::Open(ticks), true) => Self::Open(ticks + 1),
+            (Self::Open(_), false) => Self::Open(0),
+            (Self::Closed, true) => Self::Closed,
+            (Self::Closed, false) => Self::Opening(1),
+        };
+        matches!(self, Self::Closed)
+    }
+}
+
+impl Default for Contact {
+    fn default() -> Self {
+        Self::Opening(0)
     }
 }
 
@@ -50,9 +48,9 @@ pub struct Switches {
 impl Switches {
     /// Takes the pins' levels of one tick.
     ///
-    /// ENABLE goes low with its pin, in the same tick. It goes high after its pin was seen low for
-    /// [`DEBOUNCE_TICKS`] since the start and then high as long: a switch that is already closed when the
-    /// board starts, or a line that is torn and high, arms nothing, and a bouncing contact arms once.
+    /// ENABLE goes low with its pin, in the same tick. It goes high again after its pin was low for
+    /// [`DEBOUNCE_TICKS`] without a pause and then high as long. A switch that is already closed when the
+    /// board starts arms nothing, nor does a contact that bounces or a line that was disturbed.
     pub fn tick(&mut self, enable: bool, reset: bool) -> DigitalInputs {
         let mut inputs = DigitalInputs::default();
         if self.enable.tick(enable) {
@@ -86,12 +84,12 @@ mod tests {
     }
 
     #[test]
-    fn it_opens_at_once_and_a_bounce_does_not_close_it_again() {
+    fn it_opens_at_once_and_a_short_break_does_not_close_it_again() {
         let mut switches = Switches::default();
         assert!(enabled(&mut switches, "0000011111"));
         assert!(!enabled(&mut switches, "0"));
-        assert!(!enabled(&mut switches, "1101101"));
-        assert!(enabled(&mut switches, "1111"));
+        assert!(!enabled(&mut switches, "1101101111111111"));
+        assert!(enabled(&mut switches, "0000011111"));
     }
 
     #[test]

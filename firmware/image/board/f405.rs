@@ -11,30 +11,35 @@
 //! | PB12       | select force cell (low)                                  |
 //! | PC0, PC1   | enable, reset (high; pulled down)                        |
 //!
-//! The control timer is TIM2, the stopwatch the cycle counter. The watchdog is fed by
-//! the control timer's interrupt only. This module compiles, but has not yet run on a board:
-//! its serial port and control timer are those that run under QEMU.
+//! The control timer is TIM2, the stopwatch the cycle counter. It runs from the start at
+//! [`IDLE_HZ`], so that the watchdogs are fed by finished control ticks and by nothing else.
+//!
+//! The torque stages are on only while the plant is the real one: with frames from the host nothing
+//! drives the arm.
 
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
+use embedded_hal::delay::DelayNs;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+use painleve_drivers::encoders::Encoders;
+use painleve_drivers::force_cell::{self, ForceCell};
+use painleve_drivers::plausibility::{Plausibility, Readings};
+use painleve_drivers::switches::Switches;
 use painleve_firmware::Configuration;
-use painleve_shared::counts::TorqueCounts;
+use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::Plant;
 use painleve_shared::status::SupervisorState;
-use stm32f4xx_hal::dac::{C1, C2, DacOut, DacPin};
 use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PinState};
 use stm32f4xx_hal::pac::{self, SPI1, SPI2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable};
 use stm32f4xx_hal::serial::{Serial, config};
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
-use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 use crate::board::{Board, Drive, Parts, StartFault, timer};
-use crate::sensors::{Encoders, ForceCell};
-use crate::uart::{self, UartBytes, UartPort};
+use crate::safety::{self, Watchdogs};
+use crate::uart_dma::{self, DmaBytes, DmaPort};
 
 /// Crystal, MHz.
 const CRYSTAL_MHZ: u32 = 8;
@@ -43,24 +48,32 @@ const CRYSTAL_MHZ: u32 = 8;
 const CRYSTAL_PATIENCE: u32 = 20_000;
 
 /// Watchdog while starting: also bounds the wait for the phase-locked loop.
-const START_LIMIT_MS: u32 = 1000;
+const START_LIMIT_S: f32 = 0.5;
 
-/// Watchdog once the control timer runs, whose period is at most 100 ms (10 Hz).
-const TICK_LIMIT_MS: u32 = 250;
+/// Control rate while there is no configuration.
+const IDLE_HZ: f32 = 1000.0;
 
 /// DAC code without torque; the converter has 12 bits.
-const NO_TORQUE: u16 = 1 << 11;
+pub const NO_TORQUE: u16 = 1 << 11;
 
 /// Bits of the DAC.
 const DAC_BITS: u8 = 12;
+
+/// Slower than the encoders' 10 MHz and the force cell's 2.1 MHz: what the buses' clocks can be divided to.
+const ENCODER_BUS_HZ: u32 = 5_250_000;
+const FORCE_BUS_HZ: u32 = 1_312_500;
+
+/// What a sensor without a reading counts: out of every range, which the controller counts as a lapse.
+const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
+const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
 
 /// See the module's page.
 pub struct F405;
 
 impl Board for F405 {
     type Drive = F405Drive;
-    type Bytes = UartBytes;
-    type Port = UartPort;
+    type Bytes = DmaBytes;
+    type Port = DmaPort;
 
     const NAME: &'static str = "STM32F405";
 
@@ -68,30 +81,29 @@ impl Board for F405 {
         device: pac::Peripherals,
         mut core: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
-        let mut watchdog = IndependentWatchdog::new(device.IWDG);
-        watchdog.start(START_LIMIT_MS.millis());
-
+        Watchdogs::start_independent(&device.IWDG, START_LIMIT_S);
         start_crystal(&device.RCC)?;
         let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(168.MHz());
         let mut rcc = device.RCC.freeze(clocks);
+        safety::watch_crystal(&rcc);
+        pac::PWR::enable(&mut rcc);
+        safety::watch_supply(&device.PWR, &device.EXTI, &device.FLASH, &mut core.NVIC);
 
         let a = device.GPIOA.split(&mut rcc);
         let b = device.GPIOB.split(&mut rcc);
         let c = device.GPIOC.split(&mut rcc);
 
-        let enable = b.pb0.into_push_pull_output().erase();
-        let (mut torque_1, mut torque_2) = device
-            .DAC
-            .constrain((a.pa4.into_analog(), a.pa5.into_analog()), &mut rcc);
-        torque_1.set_value(NO_TORQUE);
-        torque_2.set_value(NO_TORQUE);
-        torque_1.enable();
-        torque_2.enable();
+        let enable = b.pb0.into_push_pull_output_in_state(PinState::Low).erase();
+        let _ = (a.pa4.into_analog(), a.pa5.into_analog());
+        pac::DAC::enable(&mut rcc);
+        start_converter(&device.DAC);
 
-        let line = config::Config::default().baudrate(uart::BAUD.bps());
+        let line = config::Config::default().baudrate(uart_dma::BAUD.bps());
         let serial = Serial::new(device.USART1, (a.pa9, a.pa10), line, &mut rcc);
-        let serial = serial.map_err(|_| StartFault::Link)?;
-        let (bytes, port) = uart::split(serial).ok_or(StartFault::Link)?;
+        let serial: Serial<pac::USART1> = serial.map_err(|_| StartFault::Link)?;
+        let (usart, _) = serial.release();
+        pac::DMA2::enable(&mut rcc);
+        let (bytes, port) = uart_dma::split(usart, &device.DMA2).ok_or(StartFault::Link)?;
 
         let mode_0 = Mode {
             polarity: Polarity::IdleLow,
@@ -107,59 +119,57 @@ impl Board for F405 {
             Some(b.pb4.into_alternate::<5>()),
             Some(b.pb5.into_alternate::<5>()),
         );
-        let encoders = Encoders {
-            bus: Spi::new(device.SPI1, pins, mode_1, 8.MHz(), &mut rcc),
-            selects: [
+        let pause = Pause {
+            cycles_per_us: rcc.clocks.sysclk().to_MHz(),
+        };
+        let encoders = Encoders::new(
+            Spi::new(device.SPI1, pins, mode_1, ENCODER_BUS_HZ.Hz(), &mut rcc),
+            [
                 b.pb6.into_push_pull_output_in_state(PinState::High).erase(),
                 b.pb7.into_push_pull_output_in_state(PinState::High).erase(),
             ],
-        };
+            pause,
+        );
         let pins = (Some(b.pb13), Some(b.pb14), Some(b.pb15));
-        let bus = Spi::new(device.SPI2, pins, mode_0, 2.MHz(), &mut rcc);
+        let bus = Spi::new(device.SPI2, pins, mode_0, FORCE_BUS_HZ.Hz(), &mut rcc);
         let select = b
             .pb12
             .into_push_pull_output_in_state(PinState::High)
             .erase();
+        let select = force_cell::Select::new(select, pause);
         let force_cell =
             ExclusiveDevice::new_no_delay(bus, select).map_err(|_| StartFault::Link)?;
 
         pac::TIM2::enable(&mut rcc);
+        rcc.apb1enr().modify(|_, w| w.wwdgen().set_bit());
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
-        Ok(Parts {
-            drive: F405Drive {
-                timer_hz: rcc.clocks.timclk1().raw(),
-                core_hz: rcc.clocks.sysclk().raw(),
-                timer: device.TIM2,
-                watchdog,
-                torque_1,
-                torque_2,
-                torque_bits: DAC_BITS,
-                enable,
-                encoders,
-                force_cell: ForceCell(force_cell),
-                inputs: [
-                    c.pc0.into_pull_down_input().erase(),
-                    c.pc1.into_pull_down_input().erase(),
-                ],
-                plant: Plant::Lockstep,
-                sequence: 0,
-            },
-            bytes,
-            port,
-        })
+        let slow_bus_hz = rcc.clocks.pclk1().raw();
+        let mut drive = F405Drive {
+            timer_hz: rcc.clocks.timclk1().raw() as f32,
+            core_hz: rcc.clocks.sysclk().raw(),
+            timer: device.TIM2,
+            watchdogs: Watchdogs::new(device.IWDG, device.WWDG, slow_bus_hz),
+            converter: device.DAC,
+            enable,
+            encoders,
+            force_cell: ForceCell::new(force_cell),
+            enable_switch: c.pc0.into_pull_down_input().erase(),
+            reset_button: c.pc1.into_pull_down_input().erase(),
+            switches: Switches::default(),
+            plausibility: Plausibility::default(),
+            torque_bits: DAC_BITS,
+            encoder_bits: 14,
+            force_bits: 13,
+            plant: Plant::Lockstep,
+            sequence: 0,
+        };
+        drive.start_timer(IDLE_HZ);
+        Ok(Parts { drive, bytes, port })
     }
 
-    #[allow(unsafe_code)]
     fn take_torque_off() {
-        // SAFETY: called with interrupts off by a program that is at its end; both
-        // writes are single stores, and nobody is left to disagree with them.
-        unsafe {
-            (*pac::GPIOB::ptr()).bsrr().write(|w| w.br0().set_bit());
-            (*pac::DAC::ptr())
-                .dhr12rd()
-                .write(|w| w.bits(u32::from(NO_TORQUE) << 16 | u32::from(NO_TORQUE)));
-        }
+        safety::take_torque_off();
     }
 
     /// Until the watchdog resets the chip, which then waits for a configuration with
@@ -187,45 +197,100 @@ fn start_crystal(rcc: &pac::RCC) -> Result<(), StartFault> {
     }
 }
 
+/// Both channels without torque and without the buffer, which would cut the range by 0.2 V at either end.
+fn start_converter(converter: &pac::DAC) {
+    put_out(converter, [NO_TORQUE; 2]);
+    converter.cr().modify(|_, w| {
+        w.boff1().set_bit().boff2().set_bit();
+        w.en1().set_bit().en2().set_bit()
+    });
+}
+
+/// Both codes in one store: the stages change together.
+fn put_out(converter: &pac::DAC, [code_1, code_2]: [u16; 2]) {
+    converter
+        .dhr12rd()
+        .write(|w| w.dacc1dhr().set(code_1).dacc2dhr().set(code_2));
+}
+
+/// Pauses of at least so many nanoseconds.
+#[derive(Clone, Copy)]
+struct Pause {
+    cycles_per_us: u32,
+}
+
+impl DelayNs for Pause {
+    fn delay_ns(&mut self, nanoseconds: u32) {
+        cortex_m::asm::delay(nanoseconds * self.cycles_per_us / 1000 + 1);
+    }
+}
+
+type Force = ExclusiveDevice<Spi<SPI2>, force_cell::Select<ErasedPin<Output>, Pause>, NoDelay>;
+
 /// What the control task uses.
 pub struct F405Drive {
     timer: pac::TIM2,
-    timer_hz: u32,
+    timer_hz: f32,
     core_hz: u32,
-    watchdog: IndependentWatchdog,
-    torque_1: C1,
-    torque_2: C2,
-    /// Bits of the torque counts that the controller gives.
-    torque_bits: u8,
+    watchdogs: Watchdogs,
+    converter: pac::DAC,
     enable: ErasedPin<Output>,
-    encoders: Encoders<Spi<SPI1>, ErasedPin<Output>>,
-    force_cell: ForceCell<ExclusiveDevice<Spi<SPI2>, ErasedPin<Output>, NoDelay>>,
-    /// Enable and reset.
-    inputs: [ErasedPin<Input>; 2],
+    encoders: Encoders<Spi<SPI1>, ErasedPin<Output>, Pause>,
+    force_cell: ForceCell<Force>,
+    enable_switch: ErasedPin<Input>,
+    reset_button: ErasedPin<Input>,
+    switches: Switches,
+    plausibility: Plausibility,
+    /// Bits of the counts that the controller gives and takes.
+    torque_bits: u8,
+    encoder_bits: u8,
+    force_bits: u8,
     plant: Plant,
     sequence: u32,
 }
 
 impl F405Drive {
+    fn start_timer(&mut self, tick_hz: f32) {
+        timer::set_back(&self.timer);
+        timer::start(&self.timer, self.timer_hz / tick_hz);
+        self.watchdogs.set_period(1.0 / tick_hz);
+    }
+
     fn read_sensors(&mut self) -> SensorFrame {
-        let (tangential_force, normal_force) = self.force_cell.read();
-        let [enable, reset] = &self.inputs;
-        let level = |pin: &ErasedPin<Input>, input| {
-            if pin.is_high() {
-                input
-            } else {
-                DigitalInputs::default()
-            }
+        let joints = self.encoders.read(self.encoder_bits).map(Result::ok);
+        let (tangential, normal) = self.force_cell.read(self.force_bits);
+        let forces = [tangential.ok(), normal.ok()];
+        let readings = Readings {
+            joints,
+            forces,
+            magnets: self
+                .encoders
+                .diagnostics()
+                .map(|it| it.map(|it| it.is_healthy())),
         };
+        let mut inputs = self
+            .switches
+            .tick(self.enable_switch.is_high(), self.reset_button.is_high());
+        let plausible = self
+            .plausibility
+            .tick(&readings, self.encoder_bits, self.force_bits);
+        if plausible.is_err() && !self.drives() {
+            // Nothing arms on readings that no arm gives.
+            inputs.remove(DigitalInputs::ENABLE);
+        }
         self.sequence = self.sequence.wrapping_add(1);
         SensorFrame {
             tick: self.sequence,
             sequence: self.sequence,
-            joints: self.encoders.read(),
-            normal_force,
-            tangential_force,
-            inputs: level(enable, DigitalInputs::ENABLE) | level(reset, DigitalInputs::RESET),
+            joints: joints.map(|it| it.unwrap_or(NO_ENCODER)),
+            normal_force: forces[1].unwrap_or(NO_FORCE),
+            tangential_force: forces[0].unwrap_or(NO_FORCE),
+            inputs,
         }
+    }
+
+    fn drives(&self) -> bool {
+        self.enable.is_set_high()
     }
 
     /// The DAC's code for a torque: offset binary of 12 bits.
@@ -241,16 +306,23 @@ impl F405Drive {
 
 impl Drive for F405Drive {
     fn start(&mut self, configuration: &Configuration, plant: Plant) {
+        let [encoder, _] = &configuration.converters.encoders;
+        self.encoder_bits = encoder.bits;
+        self.force_bits = configuration.converters.force.bits;
         self.torque_bits = configuration.converters.torque.bits;
         self.plant = plant;
-        timer::set_back(&self.timer);
-        timer::start(&self.timer, self.timer_hz as f32 / configuration.tick_hz);
-        self.watchdog.start(TICK_LIMIT_MS.millis());
+        // The switch has to be opened and closed anew, and the sensors looked at.
+        self.switches = Switches::default();
+        self.plausibility = Plausibility::default();
+        self.start_timer(configuration.tick_hz);
     }
 
     fn begin_tick(&mut self) {
         timer::acknowledge(&self.timer);
-        self.watchdog.feed();
+    }
+
+    fn end_tick(&mut self) {
+        self.watchdogs.feed();
     }
 
     fn next_tick_is_due(&self) -> bool {
@@ -265,19 +337,18 @@ impl Drive for F405Drive {
     }
 
     fn actuate(&mut self, answer: &ActuatorFrame) {
-        let [torque_1, torque_2] = answer.torques;
-        let (code_1, code_2) = (self.code(torque_1), self.code(torque_2));
-        self.torque_1.set_value(code_1);
-        self.torque_2.set_value(code_2);
-        let drives = answer
-            .supervisor_state()
-            .is_some_and(|state| !matches!(state, SupervisorState::Idle | SupervisorState::Fault));
-        let level = if drives {
-            PinState::High
+        let drives = self.plant == Plant::Real
+            && answer.supervisor_state().is_some_and(|state| {
+                !matches!(state, SupervisorState::Idle | SupervisorState::Fault)
+            });
+        if drives {
+            let codes = answer.torques.map(|torque| self.code(torque));
+            put_out(&self.converter, codes);
+            self.enable.set_high();
         } else {
-            PinState::Low
-        };
-        self.enable.set_state(level);
+            self.enable.set_low();
+            put_out(&self.converter, [NO_TORQUE; 2]);
+        }
     }
 
     fn stopwatch(&self) -> u32 {

@@ -65,6 +65,9 @@ pub trait Drive {
     /// Takes note of the timer's interrupt.
     fn begin_tick(&mut self);
 
+    /// The tick is finished: feeds the watchdogs.
+    fn end_tick(&mut self) {}
+
     /// Whether the timer's interrupt has come again since [`Drive::begin_tick`].
     fn next_tick_is_due(&self) -> bool;
 

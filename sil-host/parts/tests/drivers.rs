@@ -21,14 +21,14 @@ fn encoders() -> (EncoderDriver, [Shared<As5048a>; 2]) {
     (Encoders::new(bus, selects, clock), parts)
 }
 
-type ForceDriver = ForceCell<ExclusiveDevice<Bus<Mcp3304>, Select<Mcp3304>, Clock>>;
+type ForceSelect = force_cell::Select<Select<Mcp3304>, Clock>;
+type ForceDriver = ForceCell<ExclusiveDevice<Bus<Mcp3304>, ForceSelect, Clock>>;
 
-/// The board's own pause between two conversions is in its select pin; here it is the bus'.
 fn force_cell() -> (ForceDriver, Shared<Mcp3304>) {
     let clock = Clock::default();
     let mut bus = Bus::new(&clock, force_cell::FASTEST_HZ.into(), false);
     let part = Rc::new(RefCell::new(Mcp3304::default()));
-    let select = bus.attach(&part);
+    let select = force_cell::Select::new(bus.attach(&part), clock.clone());
     let device = ExclusiveDevice::new(bus, select, clock).unwrap();
     (ForceCell::new(device), part)
 }
@@ -54,6 +54,7 @@ fn forces_of_either_sign_are_read() {
         let expected = (Ok(ForceCounts(tangential)), Ok(ForceCounts(force)));
         assert_eq!(driver.read(force_cell::BITS), expected);
     }
+    assert!(part.borrow().violations().is_empty());
 }
 
 #[test]

@@ -7,15 +7,15 @@ use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{Plant, Response};
 
-use crate::board::Board;
+use crate::board::{self, Board};
 use crate::stm32f4::Pin;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 /// Bits of the force cell's converter.
 pub const FORCE_BITS: u8 = 13;
 
-/// Ticks before the switch is closed; the arm is held meanwhile.
-const BEFORE_ENABLE: u32 = 20;
+/// Ticks before the switch is closed.
+const BEFORE_ENABLE: u32 = 100;
 
 /// A board that controls a simulated arm by its own sensors.
 pub struct Bench {
@@ -27,7 +27,16 @@ pub struct Bench {
     /// What the sensors were last given.
     pub frame: SensorFrame,
     period: Picoseconds,
-    held: u32,
+    ticks: u32,
+    /// The arm is held until it is first driven.
+    is_held: bool,
+}
+
+/// A bench at one instant.
+pub struct Snapshot {
+    board: board::Snapshot,
+    simulation: Simulation,
+    frame: SensorFrame,
 }
 
 /// A built-in scenario for this board's converters.
@@ -50,23 +59,14 @@ pub fn encoded(scenario: &Scenario) -> Vec<u8> {
 
 impl Bench {
     /// Booted and configured for the arm on the board's own sensors, not enabled.
-    ///
-    /// # Panics
-    /// If the image refuses the configuration.
     pub fn new(scenario: &Scenario) -> Self {
-        let mut board = Board::booted();
-        let response = board.configure(Plant::Real, &encoded(scenario));
-        assert!(
-            matches!(response, Some(Response::Ready { .. })),
-            "{response:?}"
-        );
-        Self::with_board(scenario, board)
+        Self::with_board(scenario, Board::booted())
     }
 
-    /// With a board that is configured.
+    /// The same with a board that has booted.
     ///
     /// # Panics
-    /// If the scenario is out of range.
+    /// If the scenario is out of range, or the image refuses it.
     pub fn with_board(scenario: &Scenario, board: Board) -> Self {
         let simulation = Simulation::new(scenario).unwrap_or_else(|error| panic!("{error}"));
         let mut bench = Self {
@@ -75,9 +75,15 @@ impl Bench {
             statistics: Statistics::new(0.05),
             frame: SensorFrame::default(),
             period: 1_000_000 * MICROSECOND / u64::from(scenario.run.tick_hz),
-            held: 0,
+            ticks: 0,
+            is_held: true,
         };
         bench.present();
+        let response = bench.board.configure(Plant::Real, &encoded(scenario));
+        assert!(
+            matches!(response, Some(Response::Ready { .. })),
+            "{response:?}"
+        );
         bench
     }
 
@@ -95,12 +101,16 @@ impl Bench {
         wiring.force.channels[3] = middle;
     }
 
-    /// Lets the image control one tick; the arm moves once the switch has been closed.
+    /// Lets the image control one tick. The switch is closed after a while; the arm is held until it is
+    /// first driven.
     pub fn tick(&mut self) {
         self.wait_for_tick();
-        if self.held < BEFORE_ENABLE {
-            self.held += 1;
-            self.board.enable(self.held == BEFORE_ENABLE);
+        self.ticks += 1;
+        if self.ticks == BEFORE_ENABLE {
+            self.board.enable(true);
+        }
+        self.is_held &= self.board.torque().enabled != Some(true);
+        if self.is_held {
             return;
         }
         let torque = self.board.torque();
@@ -122,24 +132,20 @@ impl Bench {
     /// Runs until half a period after the next interrupt of the control timer, or two periods.
     pub fn wait_for_tick(&mut self) {
         let machine = &mut self.board.machine;
-        let before = machine.chip().timer.updates;
-        let end = machine.now() + 2 * self.period;
-        while machine.chip().timer.updates == before && machine.now() < end {
-            machine.run_for(self.period / 100);
-        }
-        machine.run_for(self.period / 2);
+        let latest = machine.now() + 2 * self.period;
+        let next = machine.chip().next_tick().min(latest);
+        machine.run_for(next + self.period / 2 - machine.now());
     }
 
     /// Runs ticks until the arm is driven and the torque is not zero.
     ///
     /// # Panics
-    /// If that does not happen within 100 ticks.
+    /// If that does not happen within 200 ticks.
     pub fn drive(&mut self) {
-        for _ in 0..100 {
+        for _ in 0..2 * BEFORE_ENABLE {
             self.tick();
             let torque = self.board.torque();
-            if torque.enabled == Some(true) && torque.counts != [0; 2] && self.held >= BEFORE_ENABLE
-            {
+            if torque.enabled == Some(true) && torque.counts != [0; 2] {
                 for _ in 0..20 {
                     self.tick();
                 }
@@ -149,11 +155,13 @@ impl Bench {
         panic!("the arm is not driven: {:?}", self.board.torque());
     }
 
-    /// Time until the torque is off, if that is within `limit`.
-    pub fn time_until_off(&mut self, limit: Picoseconds) -> Option<Picoseconds> {
+    /// Time until the torque is off, if it is by the end of the second tick that begins from now on.
+    pub fn time_until_off(&mut self) -> Option<Picoseconds> {
         let start = self.board.machine.now();
+        let next = self.board.machine.chip().next_tick();
+        let limit = next.min(start + self.period) + self.period + self.period / 2;
         while !self.board.torque().is_off() {
-            if self.board.machine.now() - start >= limit {
+            if self.board.machine.now() >= limit {
                 return None;
             }
             self.board.machine.run_for(10 * MICROSECOND);
@@ -161,9 +169,36 @@ impl Bench {
         Some(self.board.machine.now() - start)
     }
 
-    /// Two ticks.
-    pub fn two_ticks(&self) -> Picoseconds {
-        2 * self.period
+    /// Whether the torque stays off for so many ticks.
+    pub fn stays_off(&mut self, ticks: u32) -> bool {
+        (0..ticks).all(|_| {
+            self.wait_for_tick();
+            self.board.torque().is_off()
+        })
+    }
+
+    /// Checks that the torque stays off for so many ticks.
+    ///
+    /// # Panics
+    /// If it does not.
+    pub fn assert_stays_off(&mut self, ticks: u32) {
+        assert!(self.stays_off(ticks), "{:?}", self.board.torque());
+    }
+
+    /// Everything, to come back to.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            board: self.board.snapshot(),
+            simulation: self.simulation.clone(),
+            frame: self.frame,
+        }
+    }
+
+    /// Comes back to a snapshot.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        self.board.restore(&snapshot.board);
+        self.simulation = snapshot.simulation.clone();
+        self.frame = snapshot.frame;
     }
 
     /// Drives a pin from outside.

@@ -7,7 +7,7 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{MAXIMUM_LENGTH, Plant, Request, Response};
 use painleve_shared::wire::{self, Inbox};
 
-use crate::machine::{Machine, Reset};
+use crate::machine::{self, Machine, Reset};
 use crate::stm32f4::{Outside, Pin, PinMode, Stm32f4};
 use crate::{MILLISECOND, Picoseconds, SECOND};
 
@@ -96,10 +96,18 @@ pub struct Torque {
 }
 
 impl Torque {
-    /// Whether the stages cannot drive the arm.
+    /// Whether the image holds the stages off.
     pub fn is_off(&self) -> bool {
         self.enabled == Some(false)
     }
+}
+
+/// A board at one instant.
+pub struct Snapshot {
+    machine: machine::Snapshot<Stm32f4<Wiring>>,
+    inbox: Inbox,
+    heard: usize,
+    line_free: Picoseconds,
 }
 
 /// A board with the image in its flash, powered, on a bench.
@@ -190,6 +198,24 @@ impl Board {
             enabled,
             counts: chip.dac_codes().map(|code| code as i32 - 2048),
         }
+    }
+
+    /// Everything, to come back to.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            machine: self.machine.snapshot(),
+            inbox: self.inbox.clone(),
+            heard: self.heard,
+            line_free: self.line_free,
+        }
+    }
+
+    /// Comes back to a snapshot.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        self.machine.restore(&snapshot.machine);
+        self.inbox = snapshot.inbox.clone();
+        self.heard = snapshot.heard;
+        self.line_free = snapshot.line_free;
     }
 
     /// Opens or closes the switch of the safety chain.

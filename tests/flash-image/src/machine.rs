@@ -206,6 +206,7 @@ pub struct Snapshot<C> {
     core: Core<C>,
     registers: Vec<u32>,
     ram: Vec<u8>,
+    resets: Vec<(Picoseconds, Reset)>,
 }
 
 impl<C> Snapshot<C> {
@@ -373,12 +374,14 @@ impl<C: Chip> Machine<C> {
             core: self.unicorn.surroundings().clone(),
             registers: registers().map(|it| self.unicorn.get(it)).collect(),
             ram,
+            resets: self.resets.clone(),
         }
     }
 
     /// Comes back to a snapshot.
     pub fn restore(&mut self, snapshot: &Snapshot<C>) {
         *self.unicorn.surroundings_mut() = snapshot.core.clone();
+        self.resets.clone_from(&snapshot.resets);
         self.unicorn
             .processor()
             .write_memory(C::RAM.0, &snapshot.ram);
@@ -426,6 +429,16 @@ impl<C: Chip> Machine<C> {
     pub fn raise(&mut self, exception: Exception) {
         let address = self.program_counter();
         self.enter(exception, address);
+    }
+
+    /// Leaves the program in an endless loop without interrupts.
+    pub fn hang(&mut self) {
+        // A branch to itself, in memory that nobody uses.
+        let place = C::RAM.0 + C::RAM.1 as u32 / 2;
+        self.unicorn.processor().write_memory(place, &[0xfe, 0xe7]);
+        self.unicorn.surroundings_mut().conditional = 0;
+        self.unicorn.set(Register::PRIMASK, 1);
+        self.unicorn.set(Register::PC, place);
     }
 
     /// Address of a symbol.

@@ -18,7 +18,7 @@ use self::gpio::Gpio;
 use self::rcc::Rcc;
 use self::spi::Spi;
 use self::timer::Timer;
-use self::watchdog::Watchdog;
+use self::watchdog::{Watchdog, WindowWatchdog};
 use crate::Picoseconds;
 use crate::machine::{Chip, Reset};
 use crate::unicorn::Processor;
@@ -81,6 +81,8 @@ pub struct Stm32f4<O> {
     pub timer: Timer,
     /// The watchdog.
     pub watchdog: Watchdog,
+    /// The window watchdog.
+    pub window_watchdog: WindowWatchdog,
     dac: Dac,
     dma: [Dma; 2],
     power: [u32; 2],
@@ -103,6 +105,7 @@ impl<O: Outside> Stm32f4<O> {
             usart: Usart::default(),
             timer: Timer::default(),
             watchdog: Watchdog::new(oscillator_hz),
+            window_watchdog: WindowWatchdog::default(),
             dac: Dac::default(),
             dma: Default::default(),
             power: [0x4000, 0],
@@ -167,8 +170,14 @@ impl<O: Outside> Stm32f4<O> {
 
     /// What the supply supervisor says.
     fn supply_is_low(&self) -> bool {
-        let threshold = 2000 + 100 * (self.power[0] >> 5 & 7);
+        let thresholds = [2000, 2100, 2300, 2500, 2600, 2700, 2800, 2900];
+        let threshold = thresholds[(self.power[0] >> 5 & 7) as usize];
         self.power[0] & 1 << 4 != 0 && self.supply_mv < threshold
+    }
+
+    /// When the control timer's next interrupt is due.
+    pub fn next_tick(&self) -> Picoseconds {
+        self.timer.next_event(self.rcc.slow_timer_hz())
     }
 
     /// Pulls the reset pin down for a moment.
@@ -182,6 +191,7 @@ impl<O: Outside> Stm32f4<O> {
             0x4000_0000 if self.rcc.is_on(0x40, 0) => {
                 self.timer.read(offset, self.rcc.slow_timer_hz(), now)
             }
+            0x4000_2c00 if self.rcc.is_on(0x40, 11) => self.window_watchdog.read(offset),
             0x4000_3000 => self.watchdog.read(offset),
             0x4000_3800 if self.rcc.is_on(0x40, 14) => self.spis[1].read(offset),
             0x4000_7000 if self.rcc.is_on(0x40, 28) => match offset {
@@ -213,8 +223,8 @@ impl<O: Outside> Stm32f4<O> {
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].read(offset),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].read(offset),
             // A peripheral without its clock.
-            0x4000_0000 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000 | 0x4001_3000
-            | 0x4002_6000 | 0x4002_6400 => 0,
+            0x4000_0000 | 0x4000_2c00 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000
+            | 0x4001_3000 | 0x4002_6000 | 0x4002_6400 => 0,
             // Unique number and size of flash.
             0x1fff_7800 => 0x1234_5678,
             _ => panic!("load from {address:#010x}, which is not modelled"),
@@ -228,6 +238,9 @@ impl<O: Outside> Stm32f4<O> {
             0x4000_0000 if self.rcc.is_on(0x40, 0) => {
                 let hz = self.rcc.slow_timer_hz();
                 self.timer.write(offset, value, hz, now);
+            }
+            0x4000_2c00 if self.rcc.is_on(0x40, 11) => {
+                self.window_watchdog.write(offset, value, slow, now);
             }
             0x4000_3000 => self.watchdog.write(offset, value, now),
             0x4000_3800 if self.rcc.is_on(0x40, 14) => {
@@ -255,8 +268,8 @@ impl<O: Outside> Stm32f4<O> {
             0x4002_3c00 => self.store_flash(offset, value),
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].write(offset, value),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].write(offset, value),
-            0x4000_0000 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000 | 0x4001_3000
-            | 0x4002_6000 | 0x4002_6400 => {}
+            0x4000_0000 | 0x4000_2c00 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000
+            | 0x4001_3000 | 0x4002_6000 | 0x4002_6400 => {}
             // Debug control.
             0xe004_2000 => {}
             _ => panic!("store of {value:#x} to {address:#010x}, which is not modelled"),
@@ -323,6 +336,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.usart.reset();
         self.timer = Timer::default();
         self.watchdog = Watchdog::new(self.watchdog.oscillator_hz);
+        self.window_watchdog = WindowWatchdog::default();
         self.dac = Dac {
             writes: self.dac.writes,
             ..Dac::default()
@@ -384,7 +398,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
                 break;
             }
         }
-        if self.watchdog.expires() <= now {
+        if self.watchdog.expires().min(self.window_watchdog.expires()) <= now {
             self.reset = Some(Reset::Watchdog);
         }
     }
@@ -397,6 +411,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
             .min(spis)
             .min(self.usart.next_event())
             .min(self.watchdog.expires())
+            .min(self.window_watchdog.expires())
             .min(if dma { 0 } else { Picoseconds::MAX })
     }
 

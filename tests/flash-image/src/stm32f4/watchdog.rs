@@ -1,4 +1,5 @@
-//! The independent watchdog (RM0090, section 21): it runs from an oscillator between 17 and 47 kHz.
+//! The watchdogs: the independent one (RM0090, section 21) runs from an oscillator between 17 and 47 kHz,
+//! the window watchdog (section 22) from the slow peripherals' clock.
 
 use crate::{Picoseconds, SECOND};
 
@@ -67,5 +68,46 @@ impl Watchdog {
     /// When it resets the microcontroller.
     pub fn expires(&self) -> Picoseconds {
         self.expires
+    }
+}
+
+/// Registers of the window watchdog; no window is modelled.
+#[derive(Clone, Debug, Default)]
+pub struct WindowWatchdog {
+    control: u32,
+    configuration: u32,
+    expires: Option<Picoseconds>,
+}
+
+impl WindowWatchdog {
+    /// A load.
+    pub fn read(&self, offset: u32) -> u32 {
+        match offset {
+            0x00 => self.control,
+            0x04 => self.configuration,
+            _ => 0,
+        }
+    }
+
+    /// A store.
+    pub fn write(&mut self, offset: u32, value: u32, clock_hz: u64, now: Picoseconds) {
+        match offset {
+            0x00 => {
+                // Once on, it stays on.
+                self.control = value & 0x7f | (self.control | value) & 0x80;
+                if self.control & 0x80 != 0 {
+                    let counts = u64::from(self.control & 0x3f) + 1;
+                    let cycles = counts << (12 + (self.configuration >> 7 & 3));
+                    self.expires = Some(now + cycles * SECOND / clock_hz.max(1));
+                }
+            }
+            0x04 => self.configuration = value,
+            _ => {}
+        }
+    }
+
+    /// When it resets the microcontroller.
+    pub fn expires(&self) -> Picoseconds {
+        self.expires.unwrap_or(Picoseconds::MAX)
     }
 }

@@ -1,0 +1,229 @@
+//! What takes the torque off when the program cannot: the first act after a reset, faults of the processor,
+//! clock and supply, and two watchdogs.
+//!
+//! The torque stages are enabled by PB0, high. From a reset until the first act the pin floats, and a
+//! pull-down resistor on the board holds it low.
+
+#![allow(unsafe_code)] // registers, whatever the program was doing
+
+use cortex_m::peripheral::SCB;
+use cortex_m_rt::{ExceptionFrame, exception};
+use stm32f4xx_hal::pac;
+
+/// Keys that open the option bytes (RM0090, section 3.6.2).
+const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
+
+/// Looks at a flag that should change within microseconds.
+const PATIENCE: u32 = 100_000;
+
+/// Fastest rate of the independent watchdog's oscillator, Hz (its slowest is 17 kHz).
+const FASTEST_OSCILLATOR_HZ: f32 = 47_000.0;
+
+/// Cycles of the slow peripherals' clock that the window watchdog counts as one.
+const WINDOW_CYCLES: f32 = 4096.0;
+
+// The first instructions after a reset, before memory is initialised, so that it cannot be Rust: the
+// clock of port B on, PB0 low, then an output.
+core::arch::global_asm!(
+    ".section .text.__pre_init, \"ax\", %progbits",
+    ".global __pre_init",
+    ".type __pre_init, %function",
+    ".thumb_func",
+    "__pre_init:",
+    "ldr r0, ={rcc_ahb1enr}",
+    "ldr r1, [r0]",
+    "orr r1, r1, #2",
+    "str r1, [r0]",
+    "ldr r1, [r0]",
+    "ldr r0, ={gpiob}",
+    "mov r1, #0x10000",
+    "str r1, [r0, #0x18]",
+    "ldr r1, [r0]",
+    "bic r1, r1, #3",
+    "orr r1, r1, #1",
+    "str r1, [r0]",
+    "bx lr",
+    ".ltorg",
+    ".size __pre_init, . - __pre_init",
+    rcc_ahb1enr = const 0x4002_3830_u32,
+    gpiob = const 0x4002_0400_u32,
+);
+
+/// Takes the torque off from wherever the program is: the stages' pin low, and no torque from the converter.
+pub fn take_torque_off() {
+    // SAFETY: single stores to registers that nobody else sets differently when the torque is to be off.
+    unsafe {
+        let rcc = &*pac::RCC::ptr();
+        rcc.ahb1enr().modify(|_, w| w.gpioben().set_bit());
+        let port = &*pac::GPIOB::ptr();
+        port.bsrr().write(|w| w.br0().set_bit());
+        port.moder().modify(|_, w| w.moder0().output());
+        if rcc.apb1enr().read().dacen().bit_is_set() {
+            let code = u32::from(crate::f405::NO_TORQUE);
+            (*pac::DAC::ptr())
+                .dhr12rd()
+                .write(|w| w.bits(code << 16 | code));
+        }
+    }
+}
+
+/// Takes the torque off and resets the chip.
+pub fn reset() -> ! {
+    take_torque_off();
+    SCB::sys_reset()
+}
+
+/// An instruction that cannot be executed, a bus that does not answer, a stack that has run over.
+#[exception]
+unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+    reset()
+}
+
+/// The crystal has stopped; the chip goes on from its internal oscillator.
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    reset()
+}
+
+/// The supply is low, or an interrupt that no peripheral in use can have raised.
+#[exception]
+unsafe fn DefaultHandler(_: i16) -> ! {
+    reset()
+}
+
+/// Watches the crystal from now on: if it stops, [`NonMaskableInt`] comes at once.
+pub fn watch_crystal(rcc: &pac::rcc::RegisterBlock) {
+    rcc.cr().modify(|_, w| w.csson().set_bit());
+}
+
+/// Watches the supply from now on: below 2.9 V the interrupt PVD comes, whose handler is
+/// [`DefaultHandler`], and below 2.7 V the chip is held in reset.
+pub fn watch_supply(
+    power: &pac::PWR,
+    lines: &pac::EXTI,
+    flash: &pac::FLASH,
+    interrupts: &mut cortex_m::peripheral::NVIC,
+) {
+    power
+        .cr()
+        .modify(|_, w| unsafe { w.pls().bits(7) }.pvde().set_bit());
+    lines.rtsr().modify(|_, w| w.tr16().set_bit());
+    lines.imr().modify(|_, w| w.mr16().set_bit());
+    // SAFETY: the handler takes the torque off and shares nothing; its priority is the highest, which
+    // no critical section masks.
+    unsafe {
+        interrupts.set_priority(pac::Interrupt::PVD, 0);
+        cortex_m::peripheral::NVIC::unmask(pac::Interrupt::PVD);
+    }
+    raise_brown_out_level(flash);
+}
+
+/// Once in a chip's life: the level survives in the option bytes.
+fn raise_brown_out_level(flash: &pac::FLASH) {
+    const HIGHEST: u8 = 0;
+    if flash.optcr().read().bor_lev().bits() == HIGHEST {
+        return;
+    }
+    // SAFETY: the keys of the manual, in its order, with nothing being programmed.
+    unsafe {
+        for key in OPTION_KEYS {
+            flash.optkeyr().write(|w| w.bits(key));
+        }
+        flash.optcr().modify(|_, w| w.bor_lev().bits(HIGHEST));
+        flash.optcr().modify(|_, w| w.optstrt().set_bit());
+    }
+    let _ = (0..PATIENCE).any(|_| flash.sr().read().bsy().bit_is_clear());
+    flash.optcr().modify(|_, w| w.optlock().set_bit());
+}
+
+/// Keys of the independent watchdog.
+const START: u16 = 0xcccc;
+const OPEN: u16 = 0x5555;
+const FEED: u16 = 0xaaaa;
+
+fn write_key(watchdog: &pac::IWDG, key: u16) {
+    // SAFETY: one of the three keys.
+    watchdog.kr().write(|w| unsafe { w.key().bits(key) });
+}
+
+/// The two watchdogs, fed at the end of every control tick.
+///
+/// The window watchdog goes by the processor's clock and resets the chip one and a half periods after the
+/// last finished tick. The independent one goes by an oscillator of its own, anywhere from 17 to 47 kHz,
+/// and is there for the case that the clock itself stops: 2 to 6 periods.
+pub struct Watchdogs {
+    independent: pac::IWDG,
+    window: pac::WWDG,
+    slow_bus_hz: f32,
+    /// Counter of the window watchdog after feeding; `None` for rates too low for it.
+    counter: Option<u8>,
+}
+
+impl Watchdogs {
+    /// The independent watchdog runs from now on; it allows for `limit_s` at least. Call it before
+    /// anything that may hang.
+    pub fn start_independent(independent: &pac::IWDG, limit_s: f32) {
+        // Counts of four cycles, doubled until they fit into twelve bits.
+        let mut counts = limit_s * FASTEST_OSCILLATOR_HZ / 4.0;
+        let mut prescaler = 0;
+        while counts > 4096.0 && prescaler < 6 {
+            counts /= 2.0;
+            prescaler += 1;
+        }
+        let reload = (counts as u16).clamp(1, 4095);
+        write_key(independent, START);
+        write_key(independent, OPEN);
+        // SAFETY: every value of three bits up to 6 is a prescaler, and of twelve bits a reload.
+        unsafe {
+            independent.pr().write(|w| w.bits(prescaler));
+            independent.rlr().write(|w| w.bits(reload.into()));
+        }
+        // Both registers are taken over in the oscillator's time, some 200 µs.
+        let _ = (0..PATIENCE).any(|_| independent.sr().read().bits() == 0);
+        write_key(independent, FEED);
+    }
+
+    /// Takes charge of both; `slow_bus_hz` is the clock of APB1, and the window watchdog's own clock is on.
+    pub fn new(independent: pac::IWDG, window: pac::WWDG, slow_bus_hz: u32) -> Self {
+        Self {
+            independent,
+            window,
+            slow_bus_hz: slow_bus_hz as f32,
+            counter: None,
+        }
+    }
+
+    /// Allows one and a half of these periods from now on.
+    pub fn set_period(&mut self, period_s: f32) {
+        Self::start_independent(&self.independent, 2.0 * period_s);
+        let mut counts = 1.5 * period_s * self.slow_bus_hz / WINDOW_CYCLES;
+        let mut prescaler = 0;
+        while counts > 63.0 && prescaler < 3 {
+            counts /= 2.0;
+            prescaler += 1;
+        }
+        if counts > 63.0 {
+            // It cannot be stopped, and would come too early.
+            return;
+        }
+        // It resets when bit 6 falls.
+        let counter = 0x40 | counts as u8;
+        self.counter = Some(counter);
+        // SAFETY: prescalers have two bits; a window of 0x7f is none.
+        self.window
+            .cfr()
+            .write(|w| unsafe { w.wdgtb().bits(prescaler).w().bits(0x7f) });
+        self.feed();
+    }
+
+    /// A tick is finished.
+    pub fn feed(&mut self) {
+        write_key(&self.independent, FEED);
+        if let Some(counter) = self.counter {
+            // SAFETY: seven bits.
+            self.window
+                .cr()
+                .write(|w| unsafe { w.t().bits(counter).wdga().set_bit() });
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! What can fail on the board, and what takes the torque off: every row of the table of hazards in
+//! docs/flashing.md, executed on the image that is flashed.
+
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+
+use painleve_flash_image::bench::{Bench, encoded, scenario};
+use painleve_flash_image::board::Board;
+use painleve_flash_image::machine::Reset;
+use painleve_flash_image::{MICROSECOND, MILLISECOND};
+use painleve_plant::simulation::Simulation;
+use painleve_plant::statistics::Statistics;
+use painleve_shared::message::{Plant, Request, Response};
+use painleve_shared::wire;
+
+const DEFAULT: &str = "hybrid-elbow-down";
+
+/// Number of the control timer's interrupt.
+const CONTROL_TIMER: usize = 28;
+
+fn driven() -> Bench {
+    let mut bench = Bench::new(&scenario(DEFAULT));
+    bench.drive();
+    bench
+}
+
+/// The torque is off by the end of the second tick from now, and stays off, although the switch stays closed.
+fn assert_off_in_time(mut bench: Bench) {
+    let off = bench.time_until_off();
+    assert!(off.is_some(), "{:?}", bench.board.torque());
+    bench.assert_stays_off(100);
+}
+
+fn in_lockstep() -> (Board, Simulation) {
+    let scenario = scenario(DEFAULT);
+    let mut board = Board::booted();
+    let response = board.configure(Plant::Lockstep, &encoded(&scenario));
+    assert!(matches!(response, Some(Response::Ready { .. })));
+    (board, Simulation::new(&scenario).unwrap())
+}
+
+#[test]
+fn a_simulated_plant_never_switches_the_stages_on() {
+    let (mut board, mut simulation) = in_lockstep();
+    let mut statistics = Statistics::new(0.05);
+    for _ in 0..400 {
+        let frame = simulation.sample(&mut statistics).unwrap();
+        let answer = board.exchange(&frame).expect("an answer");
+        simulation.advance(Some(&answer), &mut statistics).unwrap();
+        assert!(board.torque().is_off());
+        assert_eq!(board.torque().counts, [0; 2]);
+    }
+    // Frames stop.
+    board.machine.run_for(5000 * MILLISECOND);
+    assert!(board.torque().is_off());
+    assert_eq!(board.torque().counts, [0; 2]);
+}
+
+/// A tick of the control timer at every instruction of the reconfiguration at which it can come.
+#[test]
+fn a_refused_configuration_leaves_the_torque_off_wherever_a_tick_comes() {
+    const THREADS: usize = 4;
+    let results = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..THREADS)
+            .map(|share| scope.spawn(move || torque_on_after_ticks(share, THREADS)))
+            .collect();
+        let join = |thread: std::thread::ScopedJoinHandle<'_, _>| thread.join().unwrap();
+        threads.into_iter().map(join).collect::<Vec<_>>()
+    });
+    let instants: usize = results.iter().map(|(instants, _)| instants).sum();
+    assert!(instants > 1000, "{instants}");
+    let on: BTreeSet<_> = results.into_iter().flat_map(|(_, on)| on).collect();
+    assert!(on.is_empty(), "{on:?}");
+}
+
+/// Tries every `of`-th instant from `share` on; how many these are, and the functions in which a tick left
+/// the torque on.
+fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
+    let mut bench = driven();
+    let mut bytes = encoded(&scenario(DEFAULT));
+    // The control rate is the first of the configuration.
+    bytes[..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    let board = &mut bench.board;
+    while board.response(0).is_some() {}
+    let mut buffer = [0; 1024];
+    let request = Request::Configure {
+        plant: Plant::Real,
+        configuration: &bytes,
+    };
+    let message = wire::encode(&request, &mut buffer).unwrap().to_vec();
+    board.send_slowly(&message, 150 * MICROSECOND);
+    while !board.machine.chip().usart.incoming.is_empty() {
+        board.machine.run_for(5 * MICROSECOND);
+    }
+    let received = board.machine.snapshot();
+    assert_eq!(board.reply(20 * MILLISECOND), Some(Response::Refused));
+    let end = board.machine.now();
+    board.machine.restore(&received);
+    let (mut instant, mut tried, mut on) = (0, 0, BTreeSet::new());
+    while board.machine.now() < end {
+        board.machine.run_instructions(1, MICROSECOND);
+        if !board.machine.would_take(CONTROL_TIMER) {
+            continue;
+        }
+        instant += 1;
+        if instant % of != share {
+            continue;
+        }
+        tried += 1;
+        let here = board.machine.snapshot();
+        board.machine.pend(CONTROL_TIMER);
+        board.machine.run_for(1200 * MICROSECOND);
+        if !board.torque().is_off() {
+            let place = board.machine.symbol_at(here.program_counter());
+            on.insert(place.to_owned());
+        }
+        board.machine.restore(&here);
+    }
+    (tried, on)
+}
+
+#[test]
+fn the_first_act_is_to_switch_the_stages_off() {
+    let mut board = Board::default();
+    board.machine.run_instructions(40, MILLISECOND);
+    assert!(board.torque().is_off(), "{:?}", board.torque());
+    // From then on the pin is never high, and never floats for long.
+    let mut floating = 0;
+    for _ in 0..100_000 {
+        board.machine.run_instructions(1, MILLISECOND);
+        let enabled = board.torque().enabled;
+        assert_ne!(enabled, Some(true));
+        floating += u32::from(enabled.is_none());
+    }
+    assert!(floating < 300, "{floating} instructions");
+}
+
+#[test]
+fn a_dead_crystal_leaves_the_stages_off() {
+    let mut board = Board::default();
+    board.machine.chip_mut().rcc.crystal_works = false;
+    for _ in 0..200 {
+        board.machine.run_for(10 * MILLISECOND);
+        assert!(board.torque().is_off(), "{:?}", board.torque());
+    }
+}
+
+#[test]
+fn a_hard_fault_takes_the_torque_off() {
+    let mut bench = driven();
+    bench.board.machine.hard_fault();
+    assert_off_in_time(bench);
+}
+
+#[test]
+fn an_unexpected_interrupt_takes_the_torque_off() {
+    let mut bench = driven();
+    bench.board.machine.raise(16 + 40);
+    assert_off_in_time(bench);
+}
+
+/// Over the whole range of the independent watchdog's oscillator.
+#[test]
+fn a_control_timer_that_stops_takes_the_torque_off() {
+    for oscillator_hz in [17_000, 32_000, 47_000] {
+        let mut board = Board::with_oscillator(oscillator_hz);
+        board.machine.run_for(20 * MILLISECOND);
+        let mut bench = Bench::with_board(&scenario(DEFAULT), board);
+        bench.drive();
+        for _ in 0..500 {
+            bench.tick();
+        }
+        assert_eq!(bench.board.resets(), [], "fed in time");
+        bench.board.machine.chip_mut().timer = Default::default();
+        assert_off_in_time(bench);
+    }
+}
+
+#[test]
+fn a_program_that_hangs_takes_the_torque_off() {
+    let mut bench = driven();
+    bench.board.machine.hang();
+    assert_off_in_time(bench);
+}
+
+#[test]
+fn a_crystal_that_stops_takes_the_torque_off() {
+    let mut bench = driven();
+    bench.board.machine.chip_mut().rcc.stop_crystal();
+    assert_off_in_time(bench);
+}
+
+#[test]
+fn a_low_supply_takes_the_torque_off() {
+    for millivolts in [2850, 2600] {
+        let mut bench = driven();
+        bench.board.machine.chip_mut().set_supply(millivolts);
+        assert_off_in_time(bench);
+    }
+}
+
+#[test]
+fn a_reset_takes_the_torque_off() {
+    let mut bench = driven();
+    bench.board.machine.chip_mut().reset_pin();
+    bench.run_ms(1);
+    assert_eq!(bench.board.resets(), [Reset::Pin]);
+    assert_off_in_time(bench);
+}
+
+#[test]
+fn the_switch_takes_the_torque_off_and_a_bounce_does_not_put_it_on() {
+    let mut bench = driven();
+    bench.board.enable(false);
+    assert!(bench.time_until_off().is_some());
+    for n in 0..40 {
+        // It is open for four ticks at a time.
+        bench.board.enable(n % 10 > 3);
+        bench.wait_for_tick();
+        assert!(bench.board.torque().is_off());
+    }
+}
+
+#[test]
+fn sensors_that_die_take_the_torque_off() {
+    for level in [false, true] {
+        for encoder in 0..2 {
+            let mut bench = driven();
+            bench.board.wiring().encoders[encoder].dead = Some(level);
+            assert_off_in_time(bench);
+        }
+    }
+    let mut bench = driven();
+    bench.board.wiring().force.dead = Some(true);
+    assert_off_in_time(bench);
+}
+
+#[test]
+fn the_image_keeps_the_sensors_data_sheets() {
+    let mut bench = driven();
+    for _ in 0..200 {
+        bench.tick();
+    }
+    assert_eq!(bench.board.wiring().violations(), [""; 0]);
+}
+
+#[test]
+fn forces_of_either_sign_are_converted() {
+    let mut bench = driven();
+    let conversions = &bench.board.wiring().force.conversions;
+    assert!(conversions.iter().any(|it| *it < 0), "{conversions:?}");
+}
+
+#[test]
+fn one_disturbed_transfer_is_no_fault() {
+    let mut bench = driven();
+    bench.board.wiring().encoders[0].errors |= 4;
+    for _ in 0..50 {
+        bench.tick();
+    }
+    assert_eq!(bench.board.torque().enabled, Some(true));
+}
+
+#[test]
+fn nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before() {
+    for level in [false, true] {
+        let mut board = Board::default();
+        board.enable(true);
+        for encoder in &mut board.wiring().encoders {
+            encoder.dead = Some(level);
+        }
+        board.wiring().force.dead = Some(level);
+        board.machine.run_for(20 * MILLISECOND);
+        let response = board.configure(Plant::Real, &encoded(&scenario(DEFAULT)));
+        assert!(matches!(response, Some(Response::Ready { .. })));
+        for n in 0..600 {
+            // It is opened and closed, too.
+            board.enable(n % 100 > 20);
+            board.machine.run_for(MILLISECOND);
+            assert!(board.torque().is_off());
+        }
+    }
+    // Healthy sensors, but the switch was closed all the time.
+    let mut board = Board::default();
+    board.enable(true);
+    board.machine.run_for(20 * MILLISECOND);
+    let mut bench = Bench::with_board(&scenario(DEFAULT), board);
+    for _ in 0..300 {
+        bench.board.enable(true);
+        bench.wait_for_tick();
+        assert!(bench.board.torque().is_off());
+    }
+}
+
+#[test]
+fn a_configuration_gets_through_while_the_arm_is_driven() {
+    let mut bench = driven();
+    let response = bench
+        .board
+        .configure(Plant::Real, &encoded(&scenario(DEFAULT)));
+    assert_eq!(bench.board.machine.chip().usart.overruns, 0);
+    assert!(
+        matches!(response, Some(Response::Ready { .. })),
+        "{response:?}"
+    );
+    assert_off_in_time(bench);
+}
+
+/// A debugger has attached to the log, and is gone.
+#[test]
+fn a_log_that_nobody_reads_holds_nothing_up() {
+    let mut bench = driven();
+    let control_block = bench.board.machine.symbol("_SEGGER_RTT").unwrap();
+    // Flags of the first channel: block when full.
+    bench.board.machine.write_word(control_block + 44, 2);
+    for n in 0..3000_u32 {
+        if n % 10 == 0 {
+            bench.board.enable(n % 20 == 0);
+        }
+        bench.wait_for_tick();
+        assert_eq!(bench.board.resets(), [], "tick {n}");
+    }
+}
+
+#[test]
+fn a_board_without_a_configuration_waits() {
+    let mut board = Board::booted();
+    board.machine.run_for(5000 * MILLISECOND);
+    assert_eq!(board.resets(), []);
+}
+
+#[test]
+fn both_torques_change_at_once_over_the_whole_range() {
+    let mut bench = driven();
+    assert!(!bench.board.machine.chip().dac_is_buffered());
+    let before = bench.board.machine.chip().dac_writes();
+    for _ in 0..10 {
+        bench.tick();
+    }
+    assert_eq!(bench.board.machine.chip().dac_writes() - before, 10);
+}

@@ -1,0 +1,132 @@
+//! A thousand random faults at random instructions.
+
+use painleve_flash_image::bench::{Bench, scenario};
+use painleve_parts::BitErrors;
+
+/// Faults drawn.
+const FAULTS: u32 = 1000;
+
+/// Marsaglia's xorshift.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % limit
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fault {
+    BitErrors,
+    SerialNoise,
+    ResetPin,
+    EnableGlitch,
+    BadInstruction,
+    Hang,
+    ControlTimer,
+    Crystal,
+    Supply,
+    EncoderDies,
+    ForceCellDies,
+}
+
+impl Fault {
+    const ALL: [Self; 11] = [
+        Self::BitErrors,
+        Self::SerialNoise,
+        Self::ResetPin,
+        Self::EnableGlitch,
+        Self::BadInstruction,
+        Self::Hang,
+        Self::ControlTimer,
+        Self::Crystal,
+        Self::Supply,
+        Self::EncoderDies,
+        Self::ForceCellDies,
+    ];
+
+    /// Whether the arm has to go on.
+    fn is_survived(self) -> bool {
+        matches!(self, Self::BitErrors | Self::SerialNoise)
+    }
+
+    fn strike(self, bench: &mut Bench, random: &mut Random) {
+        let board = &mut bench.board;
+        match self {
+            Self::BitErrors => {
+                let seed = random.below(u64::MAX);
+                let wiring = board.wiring();
+                for encoder in &mut wiring.encoders {
+                    encoder.bit_errors = BitErrors::new(1e-4, seed);
+                }
+                wiring.force.bit_errors = BitErrors::new(1e-4, seed);
+            }
+            Self::SerialNoise => {
+                let bytes: Vec<u8> = (0..random.below(60))
+                    .map(|_| random.below(256) as u8)
+                    .collect();
+                board.send_bytes(&bytes);
+            }
+            Self::ResetPin => board.machine.chip_mut().reset_pin(),
+            Self::EnableGlitch => {
+                // Long enough that the switch is looked at.
+                board.enable(false);
+                board.machine.run_for(1_100_000_000);
+                board.enable(true);
+            }
+            Self::BadInstruction => board.machine.hard_fault(),
+            Self::Hang => board.machine.hang(),
+            Self::ControlTimer => board.machine.chip_mut().timer = Default::default(),
+            Self::Crystal => board.machine.chip_mut().rcc.stop_crystal(),
+            Self::Supply => {
+                let millivolts = 1500 + random.below(1350) as u32;
+                board.machine.chip_mut().set_supply(millivolts);
+            }
+            Self::EncoderDies => {
+                let encoder = random.below(2) as usize;
+                let level = random.below(2) == 0;
+                board.wiring().encoders[encoder].dead = Some(level);
+            }
+            Self::ForceCellDies => board.wiring().force.dead = Some(true),
+        }
+    }
+}
+
+/// Off by the end of the second tick for what ends the drive, and off for good; on for what does not.
+#[test]
+fn a_thousand_random_faults_take_the_torque_off_or_are_survived() {
+    let mut bench = Bench::new(&scenario("hybrid-elbow-down"));
+    bench.drive();
+    let healthy = bench.snapshot();
+    let mut random = Random(1);
+    let mut exceptions = Vec::new();
+    for number in 0..FAULTS {
+        bench.restore(&healthy);
+        let fault = Fault::ALL[random.below(Fault::ALL.len() as u64) as usize];
+        for _ in 0..random.below(5) {
+            bench.tick();
+        }
+        let count = random.below(15_000);
+        bench.board.machine.run_instructions(count, 1_000_000_000);
+        fault.strike(&mut bench, &mut random);
+        let kept = if fault.is_survived() {
+            for _ in 0..10 {
+                bench.tick();
+            }
+            bench.board.torque().enabled == Some(true) && bench.board.resets().is_empty()
+        } else {
+            bench.time_until_off().is_some() && bench.stays_off(20)
+        };
+        if !kept {
+            exceptions.push((number, fault));
+        }
+    }
+    assert!(
+        exceptions.is_empty(),
+        "{} exceptions: {exceptions:?}",
+        exceptions.len()
+    );
+}
