@@ -253,7 +253,7 @@ fn mistakes_are_told_and_nothing_is_written() {
     for (campaign, part) in [
         ("", "no study"),
         ("study = 'bifurcation'\nmoo = 1", "'moo'"),
-        ("study = 'regions'", "no study with rows"),
+        ("study = 'regions'", "cannot be computed in shards"),
         ("study = 'bifurcation'\nmu = '1:0:0.1'", "leads away"),
         ("study = 'bifurcation'\nmu = '0.4:0.6:-0.1'", "leads away"),
         ("study = 'sliding-range'\nposture = 'up'", "'up'"),

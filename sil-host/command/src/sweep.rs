@@ -14,7 +14,7 @@ use painleve_system::atomic_file;
 use painleve_system::terminal::warn;
 
 use super::study::campaign::understand;
-use super::study::options::{Threads, output};
+use super::study::outcome::{Threads, output};
 use super::{CommandError, say};
 
 /// Options of `painleve sweep`.

@@ -7,38 +7,44 @@
 //! - [`regions`]: Fig. 3, the solution modes over (θ1, θ̇1)
 //! - [`sliding_range`]: Z_t,sliding, how far a controller slides
 //! - [`closed_loop_bifurcation`]: Fig. 12, the belt's speed with the controller in the loop
-//! - [`robustness`]: random arms, belts and converters, and what each part of the controller contributes
+//! - [`robustness`]: random arms, belts and converters; [`ablation`]: what each part of the controller contributes
 //! - [`capture`]: a bouncing arm is caught; [`lift_off`]: how soon a lift-off is noticed
 //! - [`contact_watch`], [`distribution`], [`proportion`]: contact, values and success of many runs
 //! - [`case`], [`trial`]: closed loops to study, and running them in this process
-//! - [`bifurcation`]: where over μ × v_belt the arm keeps bouncing, drawn by [`figure_4`]
+//! - [`bifurcation`]: where over μ × v_belt the arm keeps bouncing
 //! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: what one does
-//! - [`poincare`]: how it bounces, drawn by [`figure_5`]
+//! - [`poincare`]: how it bounces
 //! - [`tabular`]: rows as lines of a table, one at a time
 //! - [`chaos`]: periodic or chaotic, by the largest Lyapunov exponent
 //! - [`figures`]: the page that sets the studies beside the paper
 //! - [`sweep`]: studies in shards, on many machines
 //!
+//! Each study is a folder: its settings and rows in `mod.rs`, `options.rs` reads the settings from
+//! the command line, `outcome.rs` puts the rows together, `figure.rs` draws them, and `page.rs`
+//! sets them beside the paper. The [`catalogue`] lists them all.
+//!
 //! A study is a list of rows that know nothing of each other ([`Study`]), so that they
 //! can be computed in any order, on any number of threads, or in shards.
 
+pub mod ablation;
 pub mod admissible;
 pub mod attractor;
 pub mod belt_line;
 pub mod bifurcation;
 pub mod capture;
 pub mod case;
+pub mod catalogue;
+mod cell_options;
 pub mod cells;
 pub mod chaos;
 pub mod closed_loop_bifurcation;
 pub mod contact_watch;
 pub mod distribution;
-mod figure_4;
-mod figure_5;
 pub mod figures;
 pub mod grid;
 pub mod initial;
 pub mod lift_off;
+pub mod options;
 pub mod outcome;
 pub mod paper;
 mod places;
@@ -96,6 +102,12 @@ pub enum StudyError {
     /// There is no figure.
     #[error(transparent)]
     Plot(#[from] PlotError),
+}
+
+impl From<GridError> for StudyError {
+    fn from(error: GridError) -> Self {
+        Self::Option(error.to_string())
+    }
 }
 
 /// A numbered list of rows, each of which depends on nothing but its number.

@@ -16,8 +16,11 @@ pub trait Outcome: Serialize {
 
     /// The outcome as a table, with the paper's values beside.
     fn table(&self) -> Table;
+}
 
-    /// The outcome as a figure, as SVG text.
+/// An outcome that can be drawn.
+pub trait Figure {
+    /// The figure as SVG text.
     ///
     /// # Errors
     /// [`PlotError`] if it cannot be drawn.

@@ -2,27 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use clap::{ArgAction, Command, FromArgMatches, Subcommand};
+use clap::{ArgAction, Command};
 use painleve_plant::scenario::Scenario;
+use painleve_study::catalogue::{Entry, STUDIES};
 use painleve_study::sweep::campaign::{Campaign, Understood};
-use painleve_study::tabular::Table;
-use painleve_study::{StudyError, tabular::Tabular};
-
-use super::StudyCommand;
-
-/// Studies whose rows can be computed apart.
-const STUDIES: [&str; 7] = [
-    "bifurcation",
-    "poincare",
-    "closed-loop-bifurcation",
-    "sliding-range",
-    "robustness",
-    "capture",
-    "lift-off",
-];
-
-/// Options that say where an outcome goes and who computes it, which a sweep says itself.
-const NOT_OF_A_CAMPAIGN: [&str; 5] = ["json", "csv", "svg", "threads", "help"];
 
 /// The study of a campaign.
 ///
@@ -30,46 +13,44 @@ const NOT_OF_A_CAMPAIGN: [&str; 5] = ["json", "csv", "svg", "threads", "help"];
 /// What is wrong with it and what is allowed, in one sentence.
 pub fn understand(campaign: &Campaign) -> Result<Understood, String> {
     let name = campaign.study.as_str();
-    if !STUDIES.contains(&name) {
-        let all = STUDIES.join(", ");
-        return Err(format!(
-            "study = \"{name}\" is no study with rows to deal out; there are: {all}"
-        ));
-    }
-    let arguments = arguments(campaign)?;
-    let matches = all_studies().try_get_matches_from(arguments);
-    let study = matches.and_then(|matches| StudyCommand::from_arg_matches(&matches));
-    match study.map_err(|error| first_sentence(&error))? {
-        StudyCommand::Bifurcation(study) => understood(study.study(), study.scenarios()),
-        StudyCommand::Poincare(study) => understood(study.study(), study.scenarios()),
-        StudyCommand::ClosedLoopBifurcation(study) => understood(study.study(), study.scenarios()),
-        StudyCommand::SlidingRange(study) => understood(study.study(), study.scenarios()),
-        StudyCommand::Robustness(study) => understood(study.study(), Vec::new()),
-        StudyCommand::Capture(study) => understood(study.study(), Vec::new()),
-        StudyCommand::LiftOff(study) => understood(study.study(), Vec::new()),
-        // Not among the names above.
-        StudyCommand::Admissible(_) | StudyCommand::Regions(_) | StudyCommand::Ablation(_) => {
-            Err(format!("{name} has no rows to deal out"))
-        }
-    }
+    let entry = Entry::find(name)
+        .filter(|entry| entry.has_shards)
+        .ok_or_else(|| {
+            let all = STUDIES.iter().filter(|entry| entry.has_shards);
+            let all: Vec<&str> = all.map(|entry| entry.name).collect();
+            format!(
+                "study = \"{name}\" cannot be computed in shards; these can: {}",
+                all.join(", ")
+            )
+        })?;
+    let command = entry.command().no_binary_name(true);
+    let arguments = arguments(campaign, command.clone())?;
+    let matches = command.try_get_matches_from(arguments);
+    let options = matches.and_then(|matches| (entry.read)(&matches));
+    let options = options.map_err(|error| first_sentence(&error))?;
+    let table = options.table().map_err(|error| error.to_string())?;
+    let table = table.ok_or_else(|| format!("{name} cannot be computed in shards"))?;
+    let text = |name: String| {
+        let scenario = Scenario::load_unplaced(&name, &[]).map_err(|error| error.to_string())?;
+        let text = toml::to_string(&scenario).map_err(|error| error.to_string())?;
+        Ok((name, text))
+    };
+    let scenarios = options.scenarios().into_iter().map(text);
+    Ok(Understood {
+        table,
+        scenarios: scenarios.collect::<Result<_, String>>()?,
+    })
 }
 
-fn all_studies() -> Command {
-    StudyCommand::augment_subcommands(Command::new("study").no_binary_name(true))
-}
-
-/// The command line, the study first.
-fn arguments(campaign: &Campaign) -> Result<Vec<String>, String> {
-    let mut studies = all_studies();
-    studies.build();
-    let study = studies.find_subcommand(&campaign.study);
+/// The campaign's options as a command line.
+fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, String> {
+    study.build();
     let options: BTreeMap<&str, &clap::Arg> = study
-        .into_iter()
-        .flat_map(Command::get_arguments)
+        .get_arguments()
         .filter_map(|option| Some((option.get_long()?, option)))
-        .filter(|(name, _)| !NOT_OF_A_CAMPAIGN.contains(name))
+        .filter(|(name, _)| *name != "help")
         .collect();
-    let mut line = vec![campaign.study.clone()];
+    let mut line = Vec::new();
     for (key, values) in &campaign.options {
         let Some(option) = options.get(key.as_str()) else {
             let known: Vec<&str> = options.keys().copied().collect();
@@ -96,23 +77,6 @@ fn first_sentence(error: &clap::Error) -> String {
     let text = error.to_string();
     let sentence = text.lines().next().unwrap_or_default();
     sentence.trim_start_matches("error: ").to_owned()
-}
-
-fn understood<S: Tabular + 'static>(
-    study: Result<S, StudyError>,
-    scenarios: Vec<&str>,
-) -> Result<Understood, String> {
-    let table: Box<dyn Table> = Box::new(study.map_err(|error| error.to_string())?);
-    let text = |name: &str| {
-        let scenario = Scenario::load_unplaced(name, &[]).map_err(|error| error.to_string())?;
-        let text = toml::to_string(&scenario).map_err(|error| error.to_string())?;
-        Ok((name.to_owned(), text))
-    };
-    let scenarios = scenarios.into_iter().map(text);
-    Ok(Understood {
-        table,
-        scenarios: scenarios.collect::<Result<_, String>>()?,
-    })
 }
 
 #[cfg(test)]
@@ -169,7 +133,7 @@ mod tests {
     fn mistakes_are_told_in_one_line() {
         let seed: (&str, &[&str]) = ("seed", &["-1"]);
         for (campaign, part) in [
-            (campaign("regions", &[]), "no study with rows"),
+            (campaign("regions", &[]), "cannot be computed in shards"),
             (campaign("x", &[]), "bifurcation, poincare"),
             (campaign("bifurcation", &[("v_belt", &["1"])]), "'v_belt'"),
             (campaign("bifurcation", &[("json", &["1"])]), "'json'"),

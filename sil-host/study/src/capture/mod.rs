@@ -1,5 +1,7 @@
 //! Capture: the arm bounces without control, and the controller is switched on at a random phase.
 
+mod figure;
+mod options;
 mod outcome;
 
 use std::collections::BTreeMap;
@@ -14,6 +16,7 @@ use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
 
+pub use options::Options;
 pub use outcome::Captures;
 
 /// Time for which the arm bounces at least before it is caught, s.

@@ -1,12 +1,10 @@
 //! Captures as a table and as a histogram, the limit beside.
 
 use comfy_table::Table;
-use painleve_chart::style::BLUE_INK;
-use painleve_chart::{Chart, PlotError};
 use serde::Serialize;
 
-use super::{LIMIT_S, Row};
-use crate::distribution::{Percentiles, histogram};
+use super::Row;
+use crate::distribution::Percentiles;
 use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
 
@@ -80,19 +78,5 @@ impl Outcome for Captures {
             ]);
         }
         table
-    }
-
-    fn svg(&self) -> Result<String, PlotError> {
-        let solved = self.rows.iter().filter(|row| row.solved);
-        let times: Vec<f64> = solved.map(|row| row.capture_s).collect();
-        let note = "last bar: that long or longer".to_string();
-        Chart {
-            title: "Capture of the bouncing arm".into(),
-            subtitle: format!("caught within {LIMIT_S} s and held: {}", self.success),
-            x_title: "Time from enabling to the last landing (s)".into(),
-            x: Some(0.0..0.6),
-            panels: vec![histogram("Runs", note, BLUE_INK, 0.6, LIMIT_S, &times)],
-        }
-        .svg()
     }
 }

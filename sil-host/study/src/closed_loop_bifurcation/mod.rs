@@ -5,7 +5,10 @@
 //! resolution keep the joints trembling, so that the largest θ̇1 is never quite zero: the
 //! arm bounces if its tip leaves the belt while it is watched.
 
-mod diagram;
+mod figure;
+mod options;
+mod outcome;
+mod page;
 
 use std::collections::BTreeMap;
 
@@ -23,7 +26,8 @@ use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
 
-pub use diagram::{Diagram, Section};
+pub use options::Options;
+pub use outcome::{Diagram, Section};
 
 /// What to study: all combinations, the last varying fastest.
 #[derive(Clone, Debug)]

@@ -4,7 +4,9 @@
 //! negative under a tip that slides. Before that the tip slides inside for a while, in which every
 //! loss of contact that the controller reports is a false alarm.
 
+mod figure;
 mod first_flight;
+mod options;
 mod outcome;
 
 use std::collections::BTreeMap;
@@ -27,6 +29,7 @@ use super::trial::Trial;
 use super::{Study, StudyError};
 use first_flight::FirstFlight;
 
+pub use options::Options;
 pub use outcome::{LiftOffs, OfEvidence};
 
 /// Time at the start that does not count as sliding, s.

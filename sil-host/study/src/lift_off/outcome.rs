@@ -1,17 +1,12 @@
 //! Lift-offs as a table and as histograms, the bars beside.
 
 use comfy_table::Table;
-use painleve_chart::style::{BLUE_INK, ORANGE};
-use painleve_chart::{Chart, PlotError};
 use painleve_firmware::estimate::contact::Evidence;
 use serde::Serialize;
 
 use super::{LiftOff, Row, bar_s};
-use crate::distribution::{Percentiles, histogram};
+use crate::distribution::Percentiles;
 use crate::outcome::{self, Outcome};
-
-/// End of the figure's axis, ms.
-const FARTHEST_MS: f64 = 20.0;
 
 /// What came of one kind of evidence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -50,7 +45,7 @@ pub struct LiftOffs {
 }
 
 impl Row {
-    fn is_long(&self, bar_s: f64) -> bool {
+    pub(super) fn is_long(&self, bar_s: f64) -> bool {
         self.solved
             && self.lift_off_s.is_some()
             && self.flight_s.is_none_or(|flight_s| flight_s > bar_s)
@@ -124,33 +119,5 @@ impl Outcome for LiftOffs {
             ]);
         }
         table
-    }
-
-    fn svg(&self) -> Result<String, PlotError> {
-        let panel = |title: &str, evidence, colour| {
-            let bar_s = bar_s(evidence);
-            let is_long = |row: &&Row| row.evidence == evidence && row.is_long(bar_s);
-            let long = self.rows.iter().filter(is_long);
-            let times = long.clone().filter_map(|row| Some(1e3 * row.noticed_s?));
-            let times: Vec<f64> = times.collect();
-            let limit_ms = 1e3 * bar_s;
-            let note = format!(
-                "{} of {} flights of more than {limit_ms} ms noticed; last bar: that long or longer",
-                times.len(),
-                long.count(),
-            );
-            histogram(title, note, colour, FARTHEST_MS, limit_ms, &times)
-        };
-        Chart {
-            title: "How soon a lift-off is noticed".into(),
-            subtitle: "tips led over the edge p = 0 without the governor".into(),
-            x_title: "Time from lift-off to the sample that shows it (ms)".into(),
-            x: Some(0.0..FARTHEST_MS),
-            panels: vec![
-                panel("With the force cell (runs)", Evidence::ForceCell, BLUE_INK),
-                panel("From the encoders (runs)", Evidence::Encoders, ORANGE),
-            ],
-        }
-        .svg()
     }
 }

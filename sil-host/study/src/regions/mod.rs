@@ -5,15 +5,19 @@
 //! lines; b is a quadratic in θ̇1 at every θ1, so that its zeros are roots of quadratics. Both
 //! are found to rounding, whatever the grid.
 
+mod figure;
 mod lines;
+mod options;
 mod outcome;
+mod page;
 
 use painleve_shared::{Arm, ArmParameters, Slip, SolutionMode, range};
-use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Grid, StudyError};
+use super::{Grid, Study, StudyError};
 use lines::{Column, zeros_of_b, zeros_of_p};
+
+pub use options::Options;
 
 /// Which of the two θ2 that a θ1 leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
@@ -61,7 +65,7 @@ pub struct Regions {
     /// One per side and slip direction.
     pub maps: Vec<Map>,
     #[serde(skip)]
-    arm: Arm<f64>,
+    arm: ArmParameters<f64>,
     #[serde(skip)]
     spring_rest_deg: f64,
 }
@@ -106,48 +110,85 @@ pub struct Cell {
     mode: SolutionMode,
 }
 
-/// Maps the modes.
-///
-/// # Errors
-/// [`StudyError::Range`] if the arm or the friction coefficient is out of range,
-/// [`StudyError::Option`] if no θ1 of the grid reaches the belt.
-pub fn regions(settings: &Settings) -> Result<Regions, StudyError> {
-    range::check("--mu", settings.mu, 0.0, 10.0)?;
-    let arm = Arm::new(settings.arm)?;
-    // θ2 = 0 at the end of the reach.
-    let [length_1, length_2] = settings.arm.link_length_m;
-    let cosine = settings.arm.height_m / length_1 - length_2 / length_1;
-    let reach = libm::acos(cosine.clamp(-1.0, 1.0));
-    let inside = |theta1: &&f64| theta1.to_radians().abs() < reach;
-    let theta1: Vec<f64> = settings
-        .theta1_deg
-        .values()
-        .iter()
-        .filter(inside)
-        .copied()
-        .collect();
-    if theta1.is_empty() {
-        return Err(StudyError::Option(format!(
-            "no θ1 of the grid puts the tip on the belt; |θ1| must be below {:.2} degrees",
-            reach.to_degrees()
-        )));
+/// The columns of a map.
+struct Columns {
+    arm: Arm<f64>,
+    /// Largest |θ1| with the tip on the belt, rad.
+    reach_rad: f64,
+    /// Middles of the cells within reach, degrees.
+    theta1_deg: Vec<f64>,
+}
+
+impl Settings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`StudyError::Range`] if the arm or the friction coefficient is out of range,
+    /// [`StudyError::Option`] if no θ1 of the grid reaches the belt.
+    pub fn check(&self) -> Result<(), StudyError> {
+        range::check("--mu", self.mu, 0.0, 10.0)?;
+        self.columns().map(|_| ())
     }
-    let kinds: Vec<(Theta2, Slip)> = settings
-        .theta2
-        .iter()
-        .flat_map(|&theta2| settings.slips.iter().map(move |&slip| (theta2, slip)))
-        .collect();
-    let maps = kinds
-        .into_par_iter()
-        .map(|(theta2, slip)| map(&arm, settings, &theta1, reach, theta2, slip))
-        .collect();
-    Ok(Regions {
-        mu: settings.mu,
-        reach_deg: reach.to_degrees(),
-        maps,
-        arm,
-        spring_rest_deg: settings.arm.spring_rest_rad[1].to_degrees().abs(),
-    })
+
+    fn reach_rad(&self) -> f64 {
+        // θ2 = 0 at the end of the reach.
+        let [length_1, length_2] = self.arm.link_length_m;
+        let cosine = self.arm.height_m / length_1 - length_2 / length_1;
+        libm::acos(cosine.clamp(-1.0, 1.0))
+    }
+
+    fn columns(&self) -> Result<Columns, StudyError> {
+        let reach_rad = self.reach_rad();
+        let all = self.theta1_deg.values().iter().copied();
+        let theta1_deg: Vec<f64> = all
+            .filter(|theta1| theta1.to_radians().abs() < reach_rad)
+            .collect();
+        if theta1_deg.is_empty() {
+            return Err(StudyError::Option(format!(
+                "no θ1 of the grid puts the tip on the belt; |θ1| must be below {:.2} degrees",
+                reach_rad.to_degrees()
+            )));
+        }
+        Ok(Columns {
+            arm: Arm::new(self.arm)?,
+            reach_rad,
+            theta1_deg,
+        })
+    }
+}
+
+/// One row per map.
+impl Study for Settings {
+    type Row = Map;
+
+    fn len(&self) -> usize {
+        crate::combinations(&[self.theta2.len(), self.slips.len()])
+    }
+
+    fn row(&self, index: usize) -> Result<Map, StudyError> {
+        let theta2 = self.theta2[index / self.slips.len()];
+        let slip = self.slips[index % self.slips.len()];
+        let columns = self.columns()?;
+        let Columns {
+            arm,
+            reach_rad,
+            theta1_deg,
+        } = &columns;
+        Ok(map(arm, self, theta1_deg, *reach_rad, theta2, slip))
+    }
+}
+
+impl Regions {
+    /// Puts the maps of a study together.
+    pub fn new(settings: &Settings, maps: Vec<Map>) -> Self {
+        Self {
+            mu: settings.mu,
+            reach_deg: settings.reach_rad().to_degrees(),
+            maps,
+            arm: settings.arm,
+            spring_rest_deg: settings.arm.spring_rest_rad[1].to_degrees().abs(),
+        }
+    }
 }
 
 fn map(

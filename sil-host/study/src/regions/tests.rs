@@ -4,6 +4,11 @@ use painleve_shared::Posture;
 
 use super::*;
 
+fn maps_of(settings: &Settings) -> Result<Regions, StudyError> {
+    settings.check()?;
+    Ok(Regions::new(settings, crate::rows(settings, || ())?))
+}
+
 fn settings() -> Settings {
     Settings {
         arm: ArmParameters::default(),
@@ -17,7 +22,7 @@ fn settings() -> Settings {
 
 #[test]
 fn the_paradox_is_where_the_paper_has_it() {
-    let regions = regions(&settings()).unwrap();
+    let regions = maps_of(&settings()).unwrap();
     let [map, other_slip, _, mirrored] = &regions.maps[..] else {
         panic!("four maps");
     };
@@ -63,7 +68,7 @@ fn the_paradox_is_where_the_paper_has_it() {
 #[test]
 fn b_is_zero_on_its_line_and_changes_sign_across() {
     let arm = Arm::new(ArmParameters::default()).unwrap();
-    let regions = regions(&settings()).unwrap();
+    let regions = maps_of(&settings()).unwrap();
     let mut points = 0;
     for map in &regions.maps {
         for &[theta1, rate] in map.b_zero.iter().flatten() {
@@ -86,6 +91,6 @@ fn what_never_touches_the_belt_is_refused() {
         theta1_deg: "40,50".parse().unwrap(),
         ..settings()
     };
-    let error = regions(&settings).unwrap_err().to_string();
+    let error = maps_of(&settings).unwrap_err().to_string();
     assert!(error.contains("below 37.10"), "{error}");
 }

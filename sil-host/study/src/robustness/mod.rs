@@ -4,10 +4,11 @@
 //! A run succeeds if the tip is captured in time, never leaves the belt again, and ends at
 //! its reference or, where that is beyond the edge, at the governed edge.
 
-mod ablation;
 mod arms;
 mod draw;
 mod false_alarms;
+mod figure;
+mod options;
 mod outcome;
 mod part;
 mod row;
@@ -26,10 +27,10 @@ use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
 
-pub use ablation::{Ablated, Ablation, AblationStudy};
 pub use arms::Arms;
 pub use draw::{admissible_m, scenario};
 pub use false_alarms::FalseAlarms;
+pub use options::Options;
 pub use outcome::Campaign;
 pub use part::Part;
 pub use row::{Ending, Row};

@@ -1,6 +1,7 @@
 //! The tables of runs made by hand, so that no change of the controller changes them.
 
 use super::*;
+use crate::ablation::{Ablation, AblationStudy};
 use crate::outcome::plain;
 
 fn row(index: usize, ending: Ending, error_m: f64) -> Row {

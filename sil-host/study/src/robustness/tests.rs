@@ -1,5 +1,6 @@
 //! A small campaign, its repeatability and its replay.
 
+use crate::ablation::{Ablation, AblationStudy};
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::simulation::Simulation;

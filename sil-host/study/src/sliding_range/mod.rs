@@ -7,7 +7,10 @@
 //! beyond the first failure are not part of the range: they are told apart, as
 //! [`Row::reached_beyond_m`].
 
+mod figure;
+mod options;
 mod outcome;
+mod page;
 
 use std::collections::BTreeMap;
 
@@ -22,6 +25,8 @@ use super::case::{self, Controller, Converters, Reference};
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
+
+pub use options::Options;
 
 /// When a reference counts as reached, and how finely the range is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,17 +1,20 @@
-//! `painleve study closed-loop-bifurcation`: Fig. 12.
+//! Options of the study: Fig. 12.
 
 use clap::Args;
-use painleve_study::case::{self, Controller, Converters, Reference};
-use painleve_study::closed_loop_bifurcation::{ClosedLoopBifurcation, Diagram};
-use painleve_study::initial::Initials;
-use painleve_study::{Grid, StudyError};
 
-use super::options::{OutcomeOptions, Overrides, seconds};
-use crate::CommandError;
+use super::{ClosedLoopBifurcation, Diagram, Row, page};
+use crate::case::{self, Controller, Converters, Reference};
+use crate::catalogue::{PageSection, StudyOptions, in_shards};
+use crate::figures::page_maker::PageMaker;
+use crate::initial::Initials;
+use crate::tabular::Table;
+use crate::{Grid, StudyError};
 
-/// Options of `painleve study closed-loop-bifurcation`.
+use crate::options::{Overrides, seconds};
+
+/// Fig. 12: over the belt's speed with the controller in the loop.
 #[derive(Debug, Args)]
-pub struct ClosedLoopBifurcationArguments {
+pub struct Options {
     /// pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same with known
     /// friction), hybrid (as built in), or any scenario or file.
     #[arg(
@@ -78,16 +81,15 @@ pub struct ClosedLoopBifurcationArguments {
     record_s: f64,
     #[command(flatten)]
     overrides: Overrides,
-    #[command(flatten)]
-    outcome: OutcomeOptions,
 }
 
-impl ClosedLoopBifurcationArguments {
-    /// The study that is asked for, checked.
-    ///
-    /// # Errors
-    /// [`StudyError`] naming the option or key that is wrong.
-    pub fn study(&self) -> Result<ClosedLoopBifurcation, StudyError> {
+impl StudyOptions for Options {
+    const NAME: &'static str = "closed-loop-bifurcation";
+    const HAS_SHARDS: bool = true;
+    type Study = ClosedLoopBifurcation;
+    type Outcome = Diagram;
+
+    fn study(&self) -> Result<ClosedLoopBifurcation, StudyError> {
         self.overrides.refuse(&[
             ("belt.friction", "--mu"),
             ("belt.profile", "--v-belt"),
@@ -112,15 +114,20 @@ impl ClosedLoopBifurcationArguments {
         Ok(study)
     }
 
-    /// The scenarios of its own that it starts from.
-    pub fn scenarios(&self) -> Vec<&str> {
-        case::own_scenarios(&self.controller)
+    fn scenarios(&self) -> Vec<String> {
+        let own = case::own_scenarios(&self.controller);
+        own.into_iter().map(str::to_owned).collect()
     }
-}
 
-/// Computes the diagram and writes it.
-pub fn run(arguments: &ClosedLoopBifurcationArguments) -> Result<(), CommandError> {
-    let study = arguments.study()?;
-    let rows = arguments.outcome.compute(&study)?;
-    arguments.outcome.write(&Diagram::new(rows))
+    fn outcome(_: &ClosedLoopBifurcation, rows: Vec<Row>) -> Diagram {
+        Diagram::new(rows)
+    }
+
+    fn table(study: ClosedLoopBifurcation) -> Option<Box<dyn Table>> {
+        in_shards(study)
+    }
+
+    fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+        page::sections(page)
+    }
 }

@@ -1,41 +1,12 @@
-//! The campaign once more without one part of the controller after the other, as a table and bars.
+//! What each part contributes, as a table.
 
 use comfy_table::Table;
-use painleve_chart::style::{BLACK_INK, GREEN};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
 use serde::Serialize;
 
-use super::{Campaign, Ending, Part, Robustness, Row};
+use super::AblationStudy;
 use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
-use crate::{Study, StudyError};
-
-/// The same campaign with one part of the controller after the other switched off.
-#[derive(Clone, Debug)]
-pub struct AblationStudy {
-    /// The campaign.
-    pub campaign: Robustness,
-    /// The parts; the whole controller comes first.
-    pub parts: Vec<Part>,
-}
-
-impl Study for AblationStudy {
-    type Row = Row;
-
-    fn len(&self) -> usize {
-        crate::combinations(&[self.parts.len() + 1, self.campaign.runs])
-    }
-
-    fn row(&self, index: usize) -> Result<Row, StudyError> {
-        let mut campaign = self.campaign.clone();
-        let part = index / campaign.runs;
-        if let Some(part) = part.checked_sub(1).and_then(|part| self.parts.get(part)) {
-            let keys = part.without().iter().map(ToString::to_string);
-            campaign.overrides.extend(keys);
-        }
-        campaign.row(index % campaign.runs)
-    }
-}
+use crate::robustness::{Campaign, Ending, Part, Row};
 
 /// What the campaign comes to without a part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -106,7 +77,7 @@ impl Ablation {
 }
 
 impl Ablated {
-    fn name(&self) -> String {
+    pub(super) fn name(&self) -> String {
         let part = |part: &Part| format!("without {}", outcome::name(part));
         self.without.as_ref().map_or("everything".into(), part)
     }
@@ -141,49 +112,5 @@ impl Outcome for Ablation {
             ]);
         }
         table
-    }
-
-    fn svg(&self) -> Result<String, PlotError> {
-        let count = self.rows.len();
-        let runs = self.rows.first().map_or(0, |row| row.runs);
-        let mut marks = Vec::new();
-        for (index, row) in self.rows.iter().enumerate() {
-            let top = (count - index) as f64;
-            marks.push(Mark::Label {
-                at: (1.0, top - 0.3),
-                centred: false,
-                text: format!("{}: {:.1} %", row.name(), 100.0 * row.rate),
-            });
-            let mut bar = |name: &str, colour, width, from: f64, to: f64| {
-                marks.push(Mark::Line {
-                    name: if index == 0 {
-                        name.into()
-                    } else {
-                        String::new()
-                    },
-                    colour,
-                    width,
-                    dashed: false,
-                    points: vec![(100.0 * from, top - 0.7), (100.0 * to, top - 0.7)],
-                });
-            };
-            bar("success", GREEN, 16, 0.0, row.rate);
-            bar("95 % interval", BLACK_INK, 4, row.lower, row.upper);
-        }
-        Chart {
-            title: "What each part contributes".into(),
-            subtitle: format!("the same {runs} runs of the robustness campaign each time"),
-            x_title: "Success (%)".into(),
-            x: Some(0.0..101.0),
-            panels: vec![Panel {
-                title: "With one part of the controller switched off".into(),
-                y: Some(0.0..count.max(1) as f64),
-                y_ticks: 0,
-                height: 80 * count.max(1) as i32,
-                marks,
-                ..Panel::default()
-            }],
-        }
-        .svg()
     }
 }

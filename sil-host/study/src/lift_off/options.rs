@@ -1,15 +1,17 @@
-//! `painleve study lift-off`: how soon a lift-off is noticed.
+//! Options of the study: how soon a lift-off is noticed.
 
 use clap::Args;
-use painleve_study::StudyError;
-use painleve_study::lift_off::{LiftOff, LiftOffs};
 
-use super::options::{self, OutcomeOptions, Overrides};
-use crate::CommandError;
+use super::{LiftOff, LiftOffs, Row};
+use crate::StudyError;
+use crate::catalogue::{StudyOptions, in_shards};
+use crate::tabular::Table;
 
-/// Options of `painleve study lift-off`.
+use crate::options::{self, Overrides};
+
+/// How soon a lift-off is noticed, with the force cell and without.
 #[derive(Debug, Args)]
-pub struct LiftOffArguments {
+pub struct Options {
     /// Seed of all runs.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
@@ -33,16 +35,15 @@ pub struct LiftOffArguments {
     slide_s: f64,
     #[command(flatten)]
     overrides: Overrides,
-    #[command(flatten)]
-    outcome: OutcomeOptions,
 }
 
-impl LiftOffArguments {
-    /// The study that is asked for, checked.
-    ///
-    /// # Errors
-    /// [`StudyError`] naming the key that is wrong.
-    pub fn study(&self) -> Result<LiftOff, StudyError> {
+impl StudyOptions for Options {
+    const NAME: &'static str = "lift-off";
+    const HAS_SHARDS: bool = true;
+    type Study = LiftOff;
+    type Outcome = LiftOffs;
+
+    fn study(&self) -> Result<LiftOff, StudyError> {
         let study = LiftOff {
             seed: self.seed,
             runs: self.runs,
@@ -52,11 +53,12 @@ impl LiftOffArguments {
         study.check()?;
         Ok(study)
     }
-}
 
-/// Computes the study and writes it.
-pub fn run(arguments: &LiftOffArguments) -> Result<(), CommandError> {
-    let study = arguments.study()?;
-    let rows = arguments.outcome.compute(&study)?;
-    arguments.outcome.write(&LiftOffs::new(rows))
+    fn outcome(_: &LiftOff, rows: Vec<Row>) -> LiftOffs {
+        LiftOffs::new(rows)
+    }
+
+    fn table(study: LiftOff) -> Option<Box<dyn Table>> {
+        in_shards(study)
+    }
 }

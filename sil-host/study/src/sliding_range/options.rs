@@ -1,16 +1,19 @@
-//! `painleve study sliding-range`: how far each controller slides.
+//! Options of the study: how far each controller slides.
 
 use clap::Args;
-use painleve_study::case::{self, Controller, Converters, Reference};
-use painleve_study::sliding_range::{Criterion, SlidingRange, SlidingRanges};
-use painleve_study::{Grid, StudyError};
 
-use super::options::{OutcomeOptions, Overrides, PostureOption, metres, seconds};
-use crate::CommandError;
+use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
+use crate::case::{self, Controller, Converters, Reference};
+use crate::catalogue::{PageSection, StudyOptions, in_shards};
+use crate::figures::page_maker::PageMaker;
+use crate::tabular::Table;
+use crate::{Grid, StudyError};
 
-/// Options of `painleve study sliding-range`.
+use crate::options::{Overrides, PostureOption, metres, seconds};
+
+/// How far each controller slides before it leaves the belt.
 #[derive(Debug, Args)]
-pub struct SlidingRangeArguments {
+pub struct Options {
     /// pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same with known
     /// friction), hybrid (as built in), or any scenario or file.
     #[arg(
@@ -92,16 +95,15 @@ pub struct SlidingRangeArguments {
     resolution_m: f64,
     #[command(flatten)]
     overrides: Overrides,
-    #[command(flatten)]
-    outcome: OutcomeOptions,
 }
 
-impl SlidingRangeArguments {
-    /// The study that is asked for, checked.
-    ///
-    /// # Errors
-    /// [`StudyError`] naming the option or key that is wrong.
-    pub fn study(&self) -> Result<SlidingRange, StudyError> {
+impl StudyOptions for Options {
+    const NAME: &'static str = "sliding-range";
+    const HAS_SHARDS: bool = true;
+    type Study = SlidingRange;
+    type Outcome = SlidingRanges;
+
+    fn study(&self) -> Result<SlidingRange, StudyError> {
         self.overrides.refuse(&[
             ("belt.friction", "--mu"),
             ("initial", "--posture"),
@@ -127,15 +129,20 @@ impl SlidingRangeArguments {
         Ok(study)
     }
 
-    /// The scenarios of its own that it starts from.
-    pub fn scenarios(&self) -> Vec<&str> {
-        case::own_scenarios(&self.controller)
+    fn scenarios(&self) -> Vec<String> {
+        let own = case::own_scenarios(&self.controller);
+        own.into_iter().map(str::to_owned).collect()
     }
-}
 
-/// Searches the ranges and writes them.
-pub fn run(arguments: &SlidingRangeArguments) -> Result<(), CommandError> {
-    let study = arguments.study()?;
-    let rows = arguments.outcome.compute(&study)?;
-    arguments.outcome.write(&SlidingRanges { rows })
+    fn outcome(_: &SlidingRange, rows: Vec<Row>) -> SlidingRanges {
+        SlidingRanges { rows }
+    }
+
+    fn table(study: SlidingRange) -> Option<Box<dyn Table>> {
+        in_shards(study)
+    }
+
+    fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+        page::sections(page)
+    }
 }

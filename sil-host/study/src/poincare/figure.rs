@@ -3,13 +3,15 @@
 use core::ops::Range;
 
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREY, ORANGE};
-use painleve_chart::{Chart, Mark, Panel};
+use painleve_chart::{Chart, Mark, Panel, PlotError};
 use plotters::style::RGBColor;
 
-use super::cells::Cells;
-use super::chaos::Regime;
-use super::places::Places;
-use super::poincare::{Diagram, Row};
+use super::Row;
+use super::outcome::Diagram;
+use crate::cells::Cells;
+use crate::chaos::Regime;
+use crate::outcome::Figure;
+use crate::places::Places;
 
 /// Chaotic, as red as in the paper.
 const RED: RGBColor = RGBColor(0xC6, 0x1A, 0x1A);
@@ -22,8 +24,14 @@ const STRIP: [(Regime, RGBColor); 4] = [
     (Regime::Quiet, RGBColor(0xF2, 0xF2, 0xF2)),
 ];
 
+impl Figure for Diagram {
+    fn svg(&self) -> Result<String, PlotError> {
+        chart(self).svg()
+    }
+}
+
 /// The figure, for the first friction coefficient and initial condition.
-pub fn chart(diagram: &Diagram) -> Chart {
+fn chart(diagram: &Diagram) -> Chart {
     let Cells {
         mu,
         v_belt_m_s,

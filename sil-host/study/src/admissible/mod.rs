@@ -1,19 +1,19 @@
 //! Table II: the tip positions at which p > 0, so that neither an indeterminate nor an
 //! inconsistent solution is near, and the least friction with which the paradox is possible.
 
-use comfy_table::Table;
-use painleve_chart::style::{BLUE_INK, GREY, VERMILLION};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
+mod figure;
+mod options;
+mod outcome;
+mod page;
+
 use painleve_shared::range;
 use painleve_shared::{Arm, ArmParameters, Posture, Slip};
 use serde::Serialize;
 
 use super::belt_line::{BeltLine, least, positive_stretches};
-use super::outcome::{self, Outcome};
-use super::{StudyError, paper};
+use super::{Study, StudyError, paper};
 
-/// Points of a curve in the figure.
-const CURVE_POINTS: usize = 400;
+pub use options::Options;
 
 /// Where p > 0 at one friction coefficient, while the tip slips with ż_r > 0.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -57,6 +57,28 @@ pub struct PaperFits {
     pub mu: f64,
     /// Upper end there, m.
     pub to_m: f64,
+}
+
+/// What to compute.
+#[derive(Clone, Debug)]
+pub struct AdmissibleStudy {
+    /// The arm.
+    pub arm: ArmParameters<f64>,
+    /// Friction coefficient μ.
+    pub mu: f64,
+}
+
+/// One row: everything.
+impl Study for AdmissibleStudy {
+    type Row = Admissible;
+
+    fn len(&self) -> usize {
+        1
+    }
+
+    fn row(&self, _: usize) -> Result<Admissible, StudyError> {
+        admissible(&self.arm, self.mu)
+    }
 }
 
 /// Computes the admissible intervals of an arm at one friction coefficient.
@@ -116,137 +138,6 @@ fn intervals(
         paper_fits: upper.and_then(fits),
         intervals_m,
         paper_m,
-    }
-}
-
-/// One interval.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
-    mu: f64,
-    posture: Posture,
-    from_m: f64,
-    to_m: f64,
-    paper_from_m: Option<f64>,
-    paper_to_m: Option<f64>,
-    difference_m: Option<f64>,
-    critical_friction: f64,
-}
-
-impl Admissible {
-    fn postures(&self) -> [(Posture, &'static str, &Intervals); 2] {
-        [
-            (Posture::ElbowUp, "elbow up", &self.elbow_up),
-            (Posture::ElbowDown, "elbow down", &self.elbow_down),
-        ]
-    }
-}
-
-impl Outcome for Admissible {
-    type Line = Line;
-
-    fn lines(&self) -> Vec<Line> {
-        let mut lines = Vec::new();
-        for (posture, _, intervals) in self.postures() {
-            for &[from_m, to_m] in &intervals.intervals_m {
-                lines.push(Line {
-                    mu: self.mu,
-                    posture,
-                    from_m,
-                    to_m,
-                    paper_from_m: intervals.paper_m.map(|paper| paper[0]),
-                    paper_to_m: intervals.paper_m.map(|paper| paper[1]),
-                    difference_m: intervals.difference_m,
-                    critical_friction: self.critical_friction,
-                });
-            }
-        }
-        lines
-    }
-
-    fn table(&self) -> Table {
-        let mut table = outcome::table([
-            format!("μ = {}", self.mu),
-            "p > 0 for zₜ (m)".into(),
-            "the paper".into(),
-            "upper end, ours − paper".into(),
-            "the paper's upper end fits".into(),
-        ]);
-        let dash = || "–".to_owned();
-        for (_, name, intervals) in self.postures() {
-            let ours: Vec<String> = intervals
-                .intervals_m
-                .iter()
-                .map(|[from, to]| format!("{from:.5} … {to:.5}"))
-                .collect();
-            table.add_row([
-                name.into(),
-                if ours.is_empty() {
-                    "nowhere".into()
-                } else {
-                    ours.join(", ")
-                },
-                intervals
-                    .paper_m
-                    .map_or_else(dash, |[from, to]| format!("{from} … {to}")),
-                intervals
-                    .difference_m
-                    .map_or_else(dash, |metres| format!("{:+.2} mm", 1e3 * metres)),
-                intervals
-                    .paper_fits
-                    .map_or_else(dash, |fits| format!("μ = {}: {:.5}", fits.mu, fits.to_m)),
-            ]);
-        }
-        let posture = match self.critical_posture {
-            Posture::ElbowUp => "elbow up",
-            Posture::ElbowDown => "elbow down",
-        };
-        table.add_row([
-            "critical friction".into(),
-            format!(
-                "{:.6}, {posture} at zₜ = {:.4} m",
-                self.critical_friction, self.critical_tip_t_m
-            ),
-            paper::critical_friction(&self.arm)
-                .map_or_else(dash, |mu| format!("{mu} (steps of 0.1)")),
-            dash(),
-            dash(),
-        ]);
-        table
-    }
-
-    fn svg(&self) -> Result<String, PlotError> {
-        let mut marks = Vec::new();
-        // The arm has been checked before.
-        if let Ok(arm) = Arm::new(self.arm) {
-            for ((posture, name, _), colour) in
-                self.postures().into_iter().zip([BLUE_INK, VERMILLION])
-            {
-                let line = BeltLine::new(&arm, posture);
-                let points = (0..=CURVE_POINTS).map(|index| {
-                    let tau = core::f64::consts::PI * (index as f64 / CURVE_POINTS as f64 - 0.5);
-                    (line.tip_t_m(tau), line.p(tau, self.mu, Slip::Positive))
-                });
-                marks.push(Mark::line(name, colour, points.collect()));
-            }
-        }
-        let (low, high) = (-self.reach_m, self.reach_m);
-        marks.push(Mark::line("p = 0", GREY, vec![(low, 0.0), (high, 0.0)]));
-        Chart {
-            title: "Admissible configurations (Table II)".into(),
-            subtitle: format!(
-                "μ = {} · slip żᵣ > 0 · critical friction {:.5}",
-                self.mu, self.critical_friction
-            ),
-            x_title: "Tip position zₜ (m)".into(),
-            x: Some(low..high),
-            panels: vec![Panel {
-                title: "Contact coefficient p (1/kg)".into(),
-                note: "paradox where p ≤ 0".into(),
-                marks,
-                ..Panel::default()
-            }],
-        }
-        .svg()
     }
 }
 

@@ -1,11 +1,11 @@
 //! Options of the studies that run the arm without control over a grid of cells.
 
+use crate::cells::{Cells, RELATIVE_TOLERANCE};
+use crate::initial::Initials;
+use crate::{Grid, StudyError};
 use clap::Args;
-use painleve_study::cells::{Cells, RELATIVE_TOLERANCE};
-use painleve_study::initial::Initials;
-use painleve_study::{Grid, StudyError};
 
-use super::options::BaseOptions;
+use crate::options::BaseOptions;
 
 /// Options that such studies share.
 #[derive(Debug, Args)]

@@ -1,12 +1,13 @@
-//! `painleve study regions`: Fig. 3.
+//! Options of the study.
 
 use clap::{Args, ValueEnum};
 use painleve_shared::Slip;
-use painleve_study::regions::{Settings, Theta2, regions};
-use painleve_study::{Grid, paper};
 
-use super::options::{BaseOptions, OutcomeOptions};
-use crate::CommandError;
+use super::{Map, Regions, Settings, Theta2, page};
+use crate::catalogue::{PageSection, StudyOptions};
+use crate::figures::page_maker::PageMaker;
+use crate::options::BaseOptions;
+use crate::{Grid, StudyError, paper};
 
 /// A slip direction on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -17,9 +18,9 @@ enum SlipOption {
     Negative,
 }
 
-/// Options of `painleve study regions`.
+/// Fig. 3: the solution modes over θ1 and its rate, with the tip on the belt.
 #[derive(Debug, Args)]
-pub struct RegionsArguments {
+pub struct Options {
     /// Friction coefficient μ.
     #[arg(long, default_value_t = paper::FRICTION, allow_negative_numbers = true)]
     mu: f64,
@@ -59,26 +60,36 @@ pub struct RegionsArguments {
     slip: Vec<SlipOption>,
     #[command(flatten)]
     base: BaseOptions,
-    #[command(flatten)]
-    outcome: OutcomeOptions,
 }
 
-/// Maps the modes and writes the maps.
-pub fn run(arguments: &RegionsArguments) -> Result<(), CommandError> {
-    let scenario = arguments.base.load(&[("belt.friction", "--mu")])?;
-    arguments.outcome.check()?;
-    let slips = arguments.slip.iter().map(|slip| match slip {
-        SlipOption::Positive => Slip::Positive,
-        SlipOption::Negative => Slip::Negative,
-    });
-    let settings = Settings {
-        arm: scenario.arm,
-        mu: arguments.mu,
-        theta1_deg: arguments.theta1_deg.clone(),
-        theta1_dot_rad_s: arguments.theta1_dot_rad_s.clone(),
-        theta2: arguments.theta2.clone(),
-        slips: slips.collect(),
-    };
-    let outcome = arguments.outcome.threads.in_pool(|| regions(&settings))??;
-    arguments.outcome.write(&outcome)
+impl StudyOptions for Options {
+    const NAME: &'static str = "regions";
+    type Study = Settings;
+    type Outcome = Regions;
+
+    fn study(&self) -> Result<Settings, StudyError> {
+        let scenario = self.base.load(&[("belt.friction", "--mu")])?;
+        let slips = self.slip.iter().map(|slip| match slip {
+            SlipOption::Positive => Slip::Positive,
+            SlipOption::Negative => Slip::Negative,
+        });
+        let settings = Settings {
+            arm: scenario.arm,
+            mu: self.mu,
+            theta1_deg: self.theta1_deg.clone(),
+            theta1_dot_rad_s: self.theta1_dot_rad_s.clone(),
+            theta2: self.theta2.clone(),
+            slips: slips.collect(),
+        };
+        settings.check()?;
+        Ok(settings)
+    }
+
+    fn outcome(settings: &Settings, maps: Vec<Map>) -> Regions {
+        Regions::new(settings, maps)
+    }
+
+    fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+        page::sections(page)
+    }
 }

@@ -1,13 +1,15 @@
 //! Fig. 4 drawn: a section at one friction coefficient as curves, a whole diagram as maps.
 
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, GREY, SKY, VERMILLION};
-use painleve_chart::{Chart, Mark, Panel};
+use painleve_chart::{Chart, Mark, Panel, PlotError};
 use plotters::style::RGBColor;
 
-use super::bifurcation::{Diagram, Row};
-use super::cells::Cells;
-use super::initial::Initial;
-use super::places::Places;
+use super::Row;
+use super::outcome::Diagram;
+use crate::cells::Cells;
+use crate::initial::Initial;
+use crate::outcome::Figure;
+use crate::places::Places;
 
 /// Colours of a map from little to much, after the quiet one: told apart in grey as well.
 const RISING: [RGBColor; 6] = [
@@ -22,8 +24,14 @@ const RISING: [RGBColor; 6] = [
 /// Where the arm is quiet.
 const QUIET: RGBColor = RGBColor(0xF2, 0xF2, 0xF2);
 
+impl Figure for Diagram {
+    fn svg(&self) -> Result<String, PlotError> {
+        chart(self).svg()
+    }
+}
+
 /// The figure.
-pub fn chart(diagram: &Diagram) -> Chart {
+fn chart(diagram: &Diagram) -> Chart {
     let Cells {
         mu,
         transient_s,

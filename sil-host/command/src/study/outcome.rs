@@ -1,0 +1,119 @@
+//! Where the outcome of a study goes, and how many threads compute it.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
+use painleve_study::Study;
+use painleve_study::catalogue::{AnyOutcome, AnyStudy};
+use painleve_system::atomic_file::{self, AtomicFile};
+
+use crate::{CommandError, say};
+
+/// Where the outcome of a study goes, and how many threads compute it.
+#[derive(Clone, Debug, Args)]
+pub struct OutcomeOptions {
+    /// Print one JSON object on stdout instead of the table.
+    #[arg(long)]
+    json: bool,
+    /// Write the rows as a CSV file.
+    #[arg(long, value_name = "PATH")]
+    csv: Option<PathBuf>,
+    /// Write the figure.
+    #[arg(long, value_name = "PATH")]
+    svg: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// How many threads compute.
+#[derive(Clone, Debug, Args)]
+pub struct Threads {
+    /// Threads that compute; all cores by default. The outcome does not depend on it.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+impl Threads {
+    /// Computes the rows of a study with a progress bar.
+    ///
+    /// # Errors
+    /// [`CommandError`] if one cannot be computed.
+    pub fn compute<S: Study>(&self, name: &str, study: &S) -> Result<Vec<S::Row>, CommandError> {
+        let bar = progress_bar(name, study.len());
+        let rows = self.in_pool(|| painleve_study::rows(study, || bar.inc(1)))?;
+        bar.finish_and_clear();
+        Ok(rows?)
+    }
+
+    /// Runs something on the threads that were asked for.
+    ///
+    /// # Errors
+    /// [`CommandError::Process`] if they cannot be started.
+    pub fn in_pool<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, CommandError> {
+        let threads = self.threads.map_or(0, NonZeroUsize::get);
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|error| CommandError::Process(format!("cannot start threads: {error}")))?;
+        Ok(pool.install(work))
+    }
+}
+
+impl OutcomeOptions {
+    /// Computes a study with a progress bar, writes the files and prints the outcome.
+    ///
+    /// # Errors
+    /// [`CommandError`] if an output cannot be written, which is found out first, or the study
+    /// has no outcome.
+    pub fn make(&self, study: &dyn AnyStudy) -> Result<(), CommandError> {
+        self.check()?;
+        let bar = progress_bar("", study.row_count());
+        let outcome = self.threads.in_pool(|| study.compute(&|| bar.inc(1)))??;
+        bar.finish_and_clear();
+        self.write(&*outcome)
+    }
+
+    /// Finds out whether the files can be written.
+    fn check(&self) -> Result<(), CommandError> {
+        for path in [&self.csv, &self.svg].into_iter().flatten() {
+            AtomicFile::create(path).map_err(output)?;
+        }
+        Ok(())
+    }
+
+    fn write(&self, outcome: &dyn AnyOutcome) -> Result<(), CommandError> {
+        if let Some(path) = &self.csv {
+            atomic_file::write(path, &outcome.csv().map_err(output)?).map_err(output)?;
+        }
+        if let Some(path) = &self.svg {
+            atomic_file::write(path, outcome.svg()?.as_bytes()).map_err(output)?;
+        }
+        if self.json {
+            say(outcome.json().map_err(output)?)
+        } else {
+            say(outcome.table())
+        }
+    }
+}
+
+/// An output that cannot be written.
+pub fn output(error: impl std::fmt::Display) -> CommandError {
+    CommandError::Output(error.to_string())
+}
+
+/// A bar on stderr, where it is a terminal; nothing elsewhere.
+pub fn progress_bar(name: &str, rows: usize) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(rows as u64), ProgressDrawTarget::stderr())
+        .with_finish(ProgressFinish::AndClear);
+    let template = "{prefix}{bar:40} {percent:>3} %  {pos}/{len} rows  {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    if !name.is_empty() {
+        bar.set_prefix(format!("{name}  "));
+    }
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    bar
+}

@@ -1,0 +1,38 @@
+//! The robustness campaign once more, without one part of the controller after the other.
+
+mod figure;
+mod options;
+mod outcome;
+
+use crate::robustness::{Part, Robustness, Row};
+use crate::{Study, StudyError};
+
+pub use options::Options;
+pub use outcome::{Ablated, Ablation};
+
+/// The same campaign with one part of the controller after the other switched off.
+#[derive(Clone, Debug)]
+pub struct AblationStudy {
+    /// The campaign.
+    pub campaign: Robustness,
+    /// The parts; the whole controller comes first.
+    pub parts: Vec<Part>,
+}
+
+impl Study for AblationStudy {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        crate::combinations(&[self.parts.len() + 1, self.campaign.runs])
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let mut campaign = self.campaign.clone();
+        let part = index / campaign.runs;
+        if let Some(part) = part.checked_sub(1).and_then(|part| self.parts.get(part)) {
+            let keys = part.without().iter().map(ToString::to_string);
+            campaign.overrides.extend(keys);
+        }
+        campaign.row(index % campaign.runs)
+    }
+}

@@ -1,0 +1,109 @@
+//! Fig. 4: where in friction and belt speed the arm keeps bouncing, by brute force.
+//!
+//! Every cell is run through a transient and then watched. The arm bounces if its tip leaves the belt
+//! while it is watched; the paper's measure, the largest θ̇1, is above zero there
+//! and zero up to rounding elsewhere.
+
+mod figure;
+mod options;
+mod outcome;
+mod page;
+
+use std::collections::BTreeMap;
+
+use painleve_plant::PlantError;
+use serde::Serialize;
+
+use super::attractor::Attractor;
+use super::cells::Cells;
+use super::tabular::Tabular;
+use super::{Study, StudyError};
+
+pub use options::Options;
+pub use outcome::{Diagram, Window};
+
+/// The diagram, cell by cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bifurcation {
+    /// Its cells.
+    pub cells: Cells,
+}
+
+/// What the arm does in one cell.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Belt speed, m/s.
+    pub v_belt_m_s: f64,
+    /// Initial condition: `a`, `d`, `u` or `random:K`.
+    pub initial: String,
+    /// Largest θ̇1, rad/s.
+    pub max_theta1_dot_rad_s: f64,
+    /// Whether the tip keeps leaving the belt.
+    pub bouncing: bool,
+    /// Part of the time in contact.
+    pub contact_fraction: f64,
+    /// Highest point of the tip over the belt, m.
+    pub apex_m: f64,
+    /// Impacts with the belt per second.
+    pub impacts_per_s: f64,
+    /// Where it started: θ1, degrees.
+    pub start_theta1_deg: f64,
+    /// θ2, degrees.
+    pub start_theta2_deg: f64,
+    /// θ̇1, rad/s.
+    pub start_theta1_dot_rad_s: f64,
+    /// θ̇2, rad/s.
+    pub start_theta2_dot_rad_s: f64,
+}
+
+impl Study for Bifurcation {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let Cells {
+            transient_s,
+            record_s,
+            ..
+        } = self.cells;
+        let cell = self.cells.cell(index)?;
+        let mut plant = self.cells.plant_of(&cell)?;
+        let attractor = Attractor::of(&mut plant, transient_s, record_s).map_err(|source| {
+            StudyError::Plant {
+                row: cell.to_string(),
+                source: PlantError::new(source),
+            }
+        })?;
+        Ok(Row {
+            mu: cell.mu,
+            v_belt_m_s: cell.v_belt_m_s,
+            initial: cell.initial.to_string(),
+            max_theta1_dot_rad_s: attractor.max_theta1_dot_rad_s,
+            bouncing: attractor.is_bouncing(),
+            contact_fraction: attractor.contact_fraction(),
+            apex_m: attractor.apex_m,
+            impacts_per_s: attractor.impacts as f64 / record_s,
+            start_theta1_deg: cell.start[0].to_degrees(),
+            start_theta2_deg: cell.start[1].to_degrees(),
+            start_theta1_dot_rad_s: cell.start[2],
+            start_theta2_dot_rad_s: cell.start[3],
+        })
+    }
+}
+
+impl Tabular for Bifurcation {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(self.cells.seeds())
+    }
+}

@@ -1,0 +1,87 @@
+//! Fig. 12 on the page of figures.
+
+use painleve_chart::PlotError;
+
+use super::{ClosedLoopBifurcation, Diagram};
+use crate::case::{Controller, Converters, Reference};
+use crate::catalogue::PageSection;
+use crate::figures::page::{Comparison, Section};
+use crate::figures::page_maker::{PageMaker, SAMPLED_FRICTION, section};
+use crate::initial::Initial;
+use crate::{StudyError, outcome, paper};
+
+/// The hybrid laws over belt speed, behind both sets of converters.
+///
+/// # Errors
+/// [`StudyError`] if it cannot be computed.
+pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+    let fineness = page.fineness;
+    let [transient_s, record_s] = fineness.closed_loop_s;
+    let hardware = ClosedLoopBifurcation {
+        controllers: vec![
+            Controller::HybridPaper,
+            Controller::HybridPaperModel,
+            Controller::Hybrid,
+        ],
+        converters: vec![Converters::Hardware],
+        mu: vec![paper::FRICTION],
+        v_belt_m_s: page.values(fineness.closed_loop_v_belt)?,
+        initial: vec![Initial::D, Initial::U],
+        seed: 1,
+        reference: Reference::MinimumJerk(3.0),
+        target_m: None,
+        transient_s,
+        record_s,
+        overrides: Vec::new(),
+    };
+    // As near to the paper as sampling goes; ten times the ticks, so fewer speeds.
+    let ideal = ClosedLoopBifurcation {
+        controllers: vec![Controller::HybridPaper],
+        converters: vec![Converters::Ideal],
+        v_belt_m_s: page.values(fineness.ideal_v_belt)?,
+        initial: vec![Initial::D],
+        ..hardware.clone()
+    };
+    let mut rows = page.rows("Fig. 12: ideal", &ideal)?;
+    rows.extend(page.rows("Fig. 12: hardware", &hardware)?);
+    let outcome = Diagram::new(rows);
+    Ok(vec![(figure_12(&outcome)?, Box::new(outcome))])
+}
+
+/// Fig. 12.
+///
+/// # Errors
+/// [`PlotError`] if the figure cannot be drawn.
+fn figure_12(outcome: &Diagram) -> Result<Section, PlotError> {
+    let command = "painleve study closed-loop-bifurcation \
+                   --controller hybrid-paper,hybrid-paper-model,hybrid --initial d,u"
+        .to_owned();
+    let mut section = section(
+        "closed-loop-bifurcation",
+        "Fig. 12: belt speed with the controller in the loop",
+        command,
+        outcome,
+    )?;
+    for cells in &outcome.sections {
+        let what = format!(
+            "{}, {} converters, from x₀,{}",
+            cells.controller,
+            outcome::name(&cells.converters),
+            cells.initial
+        );
+        let here = format!(
+            "bounces at {} of {} belt speeds, has left the belt at {}",
+            cells.bouncing_m_s.len(),
+            cells.cells,
+            cells.lifted_m_s.len()
+        );
+        section.comparisons.push(
+            match paper::closed_loop_bounces(&cells.controller, &cells.initial) {
+                Some(paper) => Comparison::new(&what, paper, here, cells.bouncing_m_s.is_empty()),
+                None => Comparison::beyond(&what, here),
+            },
+        );
+    }
+    section.reasons.push(SAMPLED_FRICTION.into());
+    Ok(section)
+}

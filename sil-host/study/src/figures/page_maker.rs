@@ -1,0 +1,144 @@
+//! What the sections of the page share: how fine everything is, and computing with progress.
+
+use painleve_chart::PlotError;
+use painleve_plant::mechanics::PlantParameters;
+
+use super::page::Section;
+use crate::cells::{Cells, RELATIVE_TOLERANCE};
+use crate::initial::Initial;
+use crate::outcome::{Figure, Outcome};
+use crate::{Grid, Study, StudyError, rows};
+
+/// How fine everything is: grids of friction and of belt speed, transients and records.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fineness {
+    /// Friction coefficients of the map.
+    pub map_mu: &'static str,
+    /// Belt speeds of the map, m/s.
+    pub map_v_belt: &'static str,
+    /// Belt speeds of the section, m/s.
+    pub section_v_belt: &'static str,
+    /// Belt speeds of the returns, m/s.
+    pub poincare_v_belt: &'static str,
+    /// Belt speeds with the controller in the loop, m/s.
+    pub closed_loop_v_belt: &'static str,
+    /// The same behind ideal converters, m/s.
+    pub ideal_v_belt: &'static str,
+    /// Transient and record without control, s.
+    pub open_loop_s: [f64; 2],
+    /// Transient and record with control, s.
+    pub closed_loop_s: [f64; 2],
+    /// Distance of the targets that are tried first, m.
+    pub scan_step_m: f64,
+}
+
+impl Fineness {
+    /// The paper's steps, and its times in the open loop.
+    pub const FULL: Self = Self {
+        map_mu: "0.1:1:0.1",
+        map_v_belt: "-1:-0.1:0.005",
+        section_v_belt: "-1:-0.1:0.005",
+        poincare_v_belt: "-0.6:-0.28:0.001",
+        closed_loop_v_belt: "-1:-0.1:0.005",
+        ideal_v_belt: "-1:-0.1:0.025",
+        open_loop_s: [250.0, 50.0],
+        closed_loop_s: [20.0, 10.0],
+        scan_step_m: 5e-3,
+    };
+
+    /// Coarse grids and short runs, for a first look.
+    pub const DRAFT: Self = Self {
+        map_mu: "0.2:1:0.2",
+        map_v_belt: "-1:-0.1:0.1",
+        section_v_belt: "-1:-0.1:0.05",
+        poincare_v_belt: "-0.6:-0.28:0.04",
+        closed_loop_v_belt: "-1:-0.1:0.3",
+        ideal_v_belt: "-0.4",
+        open_loop_s: [60.0, 10.0],
+        closed_loop_s: [5.0, 1.0],
+        scan_step_m: 5e-2,
+    };
+}
+
+/// Called after every row.
+pub type RowDone = Box<dyn Fn() + Sync>;
+
+/// Makes the rows of the page's sections.
+pub struct PageMaker<'a> {
+    /// How fine everything is.
+    pub fineness: &'a Fineness,
+    /// Starts showing the progress of a study: its title, and its number of rows.
+    pub progress: &'a (dyn Fn(&str, usize) -> RowDone + Sync),
+}
+
+impl PageMaker<'_> {
+    /// All rows of a study, computed on the threads of the current rayon pool.
+    ///
+    /// # Errors
+    /// The error of the first row that has one.
+    pub fn rows<S: Study>(&self, title: &str, study: &S) -> Result<Vec<S::Row>, StudyError> {
+        rows(study, (self.progress)(title, study.len()))
+    }
+
+    /// Cells of the paper's arm over grids of friction and belt speed.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a grid is none.
+    pub fn cells(&self, mu: &str, v_belt: &str, initial: &[Initial]) -> Result<Cells, StudyError> {
+        let [transient_s, record_s] = self.fineness.open_loop_s;
+        Ok(Cells {
+            plant: PlantParameters::default(),
+            relative_tolerance: RELATIVE_TOLERANCE,
+            mu: self.values(mu)?,
+            v_belt_m_s: self.values(v_belt)?,
+            initial: initial.to_vec(),
+            seed: 1,
+            transient_s,
+            record_s,
+        })
+    }
+
+    /// The values of a grid.
+    ///
+    /// # Errors
+    /// [`StudyError`] if it is none.
+    pub fn values(&self, grid: &str) -> Result<Vec<f64>, StudyError> {
+        Ok(grid.parse::<Grid>()?.values().to_vec())
+    }
+}
+
+/// What all sections have in common.
+///
+/// # Errors
+/// [`PlotError`] if the figure cannot be drawn.
+pub fn section<O: Outcome + Figure>(
+    name: &str,
+    title: &str,
+    command: String,
+    outcome: &O,
+) -> Result<Section, PlotError> {
+    Ok(Section {
+        name: name.into(),
+        title: title.into(),
+        command,
+        svg: outcome.svg()?,
+        table: Some(outcome.table()),
+        files: ["svg", "csv", "json"]
+            .map(|ending| format!("{name}.{ending}"))
+            .to_vec(),
+        ..Section::default()
+    })
+}
+
+/// Values as a list on the command line.
+pub fn list(values: &[f64]) -> String {
+    let words: Vec<String> = values.iter().map(ToString::to_string).collect();
+    words.join(",")
+}
+
+/// Why the sampled law of the paper differs from the continuous one.
+pub const SAMPLED_FRICTION: &str = "hybrid-paper is the paper's law as it is written, sampled: the friction \
+    that it feeds forward is the last sample's, which makes a loop of gain −μ Q₁₂/p per sample. It \
+    diverges at any rate of sampling where |μ Q₁₂| > p: elbow down near the edge, elbow up over much of the \
+    way. hybrid-paper-model takes the friction of a known belt instead, which is what the continuous law is \
+    where its algebraic loop is solved at every instant; hybrid is the law as built in here.";

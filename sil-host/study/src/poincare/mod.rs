@@ -1,0 +1,123 @@
+//! Fig. 5: how the arm bounces. θ1 at each upward zero of θ̇1, and whether that goes on
+//! periodically or chaotically, by the criterion of [`verdict`](super::chaos::verdict).
+
+mod figure;
+mod options;
+mod outcome;
+mod page;
+
+use std::collections::BTreeMap;
+
+use painleve_plant::PlantError;
+use painleve_plant::mechanics::MotionError;
+use serde::Serialize;
+
+use super::attractor::advance_or_settle;
+use super::cells::Cells;
+use super::chaos::section::Returns;
+use super::chaos::{Regime, Verdict};
+use super::tabular::Tabular;
+use super::{Study, StudyError};
+
+pub use options::Options;
+pub use outcome::{Diagram, Stretch};
+
+/// The diagram, cell by cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Poincare {
+    /// Its cells.
+    pub cells: Cells,
+}
+
+/// What the arm does in one cell.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Belt speed, m/s.
+    pub v_belt_m_s: f64,
+    /// Initial condition: `a`, `d`, `u` or `random:K`.
+    pub initial: String,
+    /// Quiet, periodic, chaotic or undecided.
+    pub regime: Regime,
+    /// Returns per period, of a periodic motion whose period was found.
+    pub period: Option<usize>,
+    /// Largest Lyapunov exponent across the flow, 1/s: null where there are too few
+    /// returns, and with a periodic motion that forgets deviations altogether (minus infinity).
+    pub exponent_per_s: Option<f64>,
+    /// Its standard error, 1/s.
+    pub standard_error_per_s: Option<f64>,
+    /// θ1 at each return, rad.
+    pub theta1_rad: Vec<f64>,
+}
+
+/// One return in the CSV file; a cell without returns has one line without θ1.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Line {
+    mu: f64,
+    v_belt_m_s: f64,
+    initial: String,
+    regime: Regime,
+    period: Option<usize>,
+    exponent_per_s: Option<f64>,
+    standard_error_per_s: Option<f64>,
+    theta1_rad: Option<f64>,
+}
+
+impl Study for Poincare {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let cell = self.cells.cell(index)?;
+        let mut plant = self.cells.plant_of(&cell)?;
+        let failed = |source: MotionError| StudyError::Plant {
+            row: cell.to_string(),
+            source: PlantError::new(source),
+        };
+        let mut returns = Returns::new(self.cells.plant.impact);
+        if !advance_or_settle(&mut plant, self.cells.transient_s).map_err(failed)? {
+            let until_s = plant.time_s() + self.cells.record_s;
+            plant.advance(until_s, &mut returns).map_err(failed)?;
+        }
+        let verdict = Verdict::of(returns.returns());
+        Ok(Row {
+            mu: cell.mu,
+            v_belt_m_s: cell.v_belt_m_s,
+            initial: cell.initial.to_string(),
+            regime: verdict.regime,
+            period: verdict.period,
+            exponent_per_s: verdict.exponent_per_s.filter(|value| value.is_finite()),
+            standard_error_per_s: verdict.standard_error_per_s,
+            theta1_rad: returns.returns().iter().map(|one| one.state[0]).collect(),
+        })
+    }
+}
+
+impl Tabular for Poincare {
+    type Line = Line;
+
+    fn lines(row: &Row) -> Vec<Line> {
+        let line = |theta1_rad| Line {
+            mu: row.mu,
+            v_belt_m_s: row.v_belt_m_s,
+            initial: row.initial.clone(),
+            regime: row.regime,
+            period: row.period,
+            exponent_per_s: row.exponent_per_s,
+            standard_error_per_s: row.standard_error_per_s,
+            theta1_rad,
+        };
+        if row.theta1_rad.is_empty() {
+            return vec![line(None)];
+        }
+        row.theta1_rad.iter().copied().map(Some).map(line).collect()
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(self.cells.seeds())
+    }
+}

@@ -1,0 +1,130 @@
+//! The cells put together: stretches of belt speed with the same kind of motion.
+
+use comfy_table::Table;
+use serde::Serialize;
+
+use super::{Line, Poincare, Row};
+use crate::cells::Cells;
+use crate::chaos::Regime;
+use crate::outcome::{self, Outcome};
+use crate::tabular::Tabular;
+
+/// The whole diagram.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagram {
+    /// All cells, in the order of their numbers.
+    pub rows: Vec<Row>,
+    /// Neighbouring belt speeds with the same kind of motion.
+    pub stretches: Vec<Stretch>,
+    #[serde(skip)]
+    settings: Cells,
+}
+
+/// Neighbouring belt speeds with the same kind of motion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stretch {
+    /// Friction coefficient μ.
+    pub mu: f64,
+    /// Initial condition.
+    pub initial: String,
+    /// Belt speeds from … to, m/s.
+    pub v_belt_m_s: [f64; 2],
+    /// Kind of motion.
+    pub regime: Regime,
+    /// Returns per period.
+    pub period: Option<usize>,
+    /// How many belt speeds.
+    pub cells: usize,
+    /// Least exponent, 1/s.
+    pub least_exponent_per_s: Option<f64>,
+    /// Greatest exponent, 1/s.
+    pub greatest_exponent_per_s: Option<f64>,
+}
+
+impl Diagram {
+    /// Puts the rows of a study together.
+    pub fn new(study: &Poincare, rows: Vec<Row>) -> Self {
+        let settings = study.cells.clone();
+        let mut stretches: Vec<Stretch> = Vec::new();
+        for mu in 0..settings.mu.len() {
+            for initial in 0..settings.initial.len() {
+                let place = |v_belt: usize| {
+                    (mu * settings.v_belt_m_s.len() + v_belt) * settings.initial.len() + initial
+                };
+                let mut line: Vec<&Row> = (0..settings.v_belt_m_s.len())
+                    .map(|v_belt| &rows[place(v_belt)])
+                    .collect();
+                line.sort_by(|one, other| one.v_belt_m_s.total_cmp(&other.v_belt_m_s));
+                let alike = |one: &&Row, other: &&Row| {
+                    (one.regime, one.period) == (other.regime, other.period)
+                };
+                stretches.extend(line.chunk_by(alike).filter_map(Stretch::of));
+            }
+        }
+        Self {
+            rows,
+            stretches,
+            settings,
+        }
+    }
+
+    /// What was varied.
+    pub fn settings(&self) -> &Cells {
+        &self.settings
+    }
+}
+
+impl Stretch {
+    fn of(rows: &[&Row]) -> Option<Self> {
+        let (first, last) = (rows.first()?, rows.last()?);
+        let exponents = || rows.iter().filter_map(|row| row.exponent_per_s);
+        Some(Self {
+            mu: first.mu,
+            initial: first.initial.clone(),
+            v_belt_m_s: [first.v_belt_m_s, last.v_belt_m_s],
+            regime: first.regime,
+            period: first.period,
+            cells: rows.len(),
+            least_exponent_per_s: exponents().reduce(f64::min),
+            greatest_exponent_per_s: exponents().reduce(f64::max),
+        })
+    }
+}
+
+impl Outcome for Diagram {
+    type Line = Line;
+
+    fn lines(&self) -> Vec<Line> {
+        self.rows.iter().flat_map(Poincare::lines).collect()
+    }
+
+    fn table(&self) -> Table {
+        let mut table = outcome::table([
+            "μ",
+            "from",
+            "v_belt in m/s",
+            "motion",
+            "returns per period",
+            "exponent in 1/s",
+        ]);
+        for stretch in &self.stretches {
+            let [from, to] = stretch.v_belt_m_s;
+            let exponents = stretch
+                .least_exponent_per_s
+                .zip(stretch.greatest_exponent_per_s);
+            table.add_row([
+                stretch.mu.to_string(),
+                stretch.initial.clone(),
+                format!("{from} … {to}"),
+                stretch.regime.name().to_owned(),
+                stretch
+                    .period
+                    .map_or("–".into(), |period| period.to_string()),
+                exponents.map_or("–".into(), |(least, greatest)| {
+                    format!("{least:.2} … {greatest:.2}")
+                }),
+            ]);
+        }
+        table
+    }
+}

@@ -1,0 +1,65 @@
+//! Fig. 5 on the page of figures.
+
+use painleve_chart::PlotError;
+
+use super::{Diagram, Poincare};
+use crate::catalogue::PageSection;
+use crate::figures::page::{Comparison, Section};
+use crate::figures::page_maker::{PageMaker, list, section};
+use crate::initial::Initial;
+use crate::{StudyError, outcome};
+
+/// Fig. 5 at the paper's friction.
+///
+/// # Errors
+/// [`StudyError`] if it cannot be computed.
+pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+    let cells = page.cells("0.6", page.fineness.poincare_v_belt, &[Initial::A])?;
+    let study = Poincare { cells };
+    let outcome = Diagram::new(&study, page.rows("Fig. 5: Poincaré", &study)?);
+    Ok(vec![(figure_5(&outcome)?, Box::new(outcome))])
+}
+
+/// Fig. 5.
+///
+/// # Errors
+/// [`PlotError`] if the figure cannot be drawn.
+fn figure_5(outcome: &Diagram) -> Result<Section, PlotError> {
+    let settings = outcome.settings();
+    let command = format!("painleve study poincare --mu {}", list(&settings.mu));
+    let mut section = section(
+        "poincare",
+        "Fig. 5: periodic and chaotic bouncing",
+        command,
+        outcome,
+    )?;
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    for stretch in &outcome.stretches {
+        let name = outcome::name(&stretch.regime);
+        match counts.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += stretch.cells,
+            None => counts.push((name, stretch.cells)),
+        }
+    }
+    let words: Vec<String> = counts
+        .iter()
+        .map(|(name, count)| format!("{name} at {count}"))
+        .collect();
+    let has = |name: &str| {
+        counts
+            .iter()
+            .any(|(known, count)| known == name && *count > 0)
+    };
+    section.comparisons.push(Comparison::new(
+        "motion within the window",
+        "periodic at some belt speeds, chaotic at others",
+        format!("{} belt speeds", words.join(", ")),
+        has("periodic") && has("chaotic"),
+    ));
+    section.reasons.push(
+        "The paper does not say how it tells chaos; here it is the sign of the largest Lyapunov exponent \
+         across the flow, through the saltation matrices of the impacts."
+            .into(),
+    );
+    Ok(section)
+}

@@ -1,0 +1,162 @@
+//! The maps drawn, with the lines p = 0 and b = 0.
+
+use std::ops::Range;
+
+use painleve_chart::style::{BLACK_INK, BLUE_INK, GREY, ORANGE, SKY, VERMILLION, over_white};
+use painleve_chart::{Chart, Mark, Panel, PlotError};
+use painleve_plant::scenario::InitialState;
+use painleve_shared::{Arm, Slip, SolutionMode};
+use plotters::style::RGBColor;
+
+use super::lines::Column;
+use super::{Map, Regions, Theta2};
+use crate::outcome::Figure;
+
+/// The paper's colour of p = 0.
+const RED: RGBColor = RGBColor(0xB0, 0x00, 0x20);
+
+/// Cells of a map in the figure.
+const FINE_COLUMNS: usize = 445;
+const FINE_ROWS: usize = 260;
+
+impl Figure for Regions {
+    fn svg(&self) -> Result<String, PlotError> {
+        let columns = self.maps.first().map_or(&[][..], |map| &map.grid.0);
+        // The arm has been checked before.
+        let arm = Arm::new(self.arm).ok();
+        let maps = self.maps.iter();
+        Chart {
+            title: "Solution modes with the tip on the belt (Fig. 3)".into(),
+            subtitle: format!(
+                "μ = {} · u = 0 · θ₂ and its rate keep the tip on the belt",
+                self.mu
+            ),
+            x_title: "θ₁ (°)".into(),
+            x: Some(ends_of_cells(columns)),
+            panels: arm.map_or_else(Vec::new, |arm| {
+                maps.map(|map| map.panel(&arm, self.mu)).collect()
+            }),
+        }
+        .svg()
+    }
+}
+
+impl Map {
+    fn title(&self) -> String {
+        let side = match self.theta2 {
+            Theta2::Positive => "θ₂ > 0",
+            Theta2::Negative => "θ₂ < 0",
+        };
+        let slip = match self.slip {
+            Slip::Positive => "slip żᵣ > 0",
+            Slip::Negative => "slip żᵣ < 0",
+        };
+        format!("θ̇₁ (rad/s): {side}, {slip}")
+    }
+
+    /// The paper's initial conditions on this side of the vertical.
+    fn initial_conditions(&self) -> Vec<(&'static str, f64)> {
+        let down = InitialState::default();
+        [
+            ("x₀,a", 32.0, 18.27),
+            ("x₀,d", down.theta1_deg, down.theta2_deg),
+            ("x₀,u", down.theta2_deg, down.theta1_deg),
+        ]
+        .into_iter()
+        .filter(|(_, _, theta2)| theta2 * self.theta2.sign() > 0.0)
+        .map(|(name, theta1, _)| (name, theta1))
+        .collect()
+    }
+
+    fn panel(&self, arm: &Arm<f64>, mu: f64) -> Panel {
+        let (columns, rates) = (&self.grid.0, &self.grid.1);
+        let palette = [
+            ("sliding", over_white(SKY, 0.45)),
+            ("flight", over_white(GREY, 0.15)),
+            ("indeterminate", over_white(ORANGE, 0.6)),
+            ("inconsistent", over_white(VERMILLION, 0.75)),
+        ];
+        let place = |mode| match mode {
+            SolutionMode::Sliding => 0,
+            SolutionMode::Flight => 1,
+            SolutionMode::Indeterminate => 2,
+            SolutionMode::Inconsistent => 3,
+        };
+        let (theta1_range, rate_range) = (ends_of_cells(columns), ends_of_cells(rates));
+        let middles = |range: &Range<f64>, count: usize| -> Vec<f64> {
+            let step = (range.end - range.start) / count as f64;
+            let start = range.start;
+            (0..count)
+                .map(|index| start + (index as f64 + 0.5) * step)
+                .collect()
+        };
+        // A map of its own, fine enough for the eye, whatever the grid of the numbers.
+        let fine: Vec<Option<Column<'_>>> = middles(&theta1_range, FINE_COLUMNS)
+            .into_iter()
+            .map(|theta1| Column::new(arm, theta1.to_radians(), self.theta2))
+            .collect();
+        let p: Vec<f64> = fine
+            .iter()
+            .map(|column| column.as_ref().map_or(f64::NAN, |c| c.p(mu, self.slip)))
+            .collect();
+        let mut cells = Vec::with_capacity(FINE_COLUMNS * FINE_ROWS);
+        for rate in middles(&rate_range, FINE_ROWS) {
+            cells.extend(fine.iter().zip(&p).map(|(column, &p)| match column {
+                Some(column) => place(SolutionMode::classify(p, column.b(rate))),
+                None => u8::MAX,
+            }));
+        }
+        let mut marks = vec![Mark::Cells {
+            x: theta1_range,
+            y: rate_range.clone(),
+            columns: FINE_COLUMNS,
+            palette: palette.map(|(name, colour)| (name.into(), colour)).to_vec(),
+            cells,
+        }];
+        for (index, curve) in self.b_zero.iter().enumerate() {
+            let inside = |rate: f64| rate_range.contains(&rate);
+            let points = curve
+                .iter()
+                .map(|&[theta1, rate]| (theta1, if inside(rate) { rate } else { f64::NAN }));
+            let name = if index == 0 { "b = 0" } else { "" };
+            marks.push(Mark::line(name, BLACK_INK, points.collect()));
+        }
+        for (index, &theta1) in self.p_zero_theta1_deg.iter().enumerate() {
+            let name = if index == 0 { "p = 0" } else { "" };
+            let points = vec![(theta1, rate_range.start), (theta1, rate_range.end)];
+            marks.push(Mark::dashed(name, RED, points));
+        }
+        for (name, theta1) in self.initial_conditions() {
+            marks.push(Mark::Dots {
+                name: String::new(),
+                colour: BLUE_INK,
+                size: 14,
+                points: vec![(theta1, 0.0)],
+            });
+            marks.push(Mark::Label {
+                at: (theta1 + 0.5, 0.0),
+                centred: false,
+                text: name.into(),
+            });
+        }
+        Panel {
+            title: self.title(),
+            y: Some(rate_range),
+            height: 520,
+            marks,
+            ..Panel::default()
+        }
+    }
+}
+
+/// Half a step beyond the first and the last value.
+fn ends_of_cells(middles: &[f64]) -> Range<f64> {
+    match middles {
+        [first, .., last] => {
+            let half = 0.5 * (last - first) / (middles.len() - 1) as f64;
+            (first - half).min(last + half)..(first - half).max(last + half)
+        }
+        [only] => only - 0.5..only + 0.5,
+        [] => 0.0..1.0,
+    }
+}

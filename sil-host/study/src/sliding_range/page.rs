@@ -1,0 +1,97 @@
+//! How far each controller slides, on the page of figures.
+
+use painleve_chart::PlotError;
+use painleve_shared::Posture;
+
+use super::{Criterion, Row, SlidingRange, SlidingRanges};
+use crate::case::{Controller, Converters, Reference};
+use crate::catalogue::PageSection;
+use crate::figures::page::{Comparison, Section, Verdict};
+use crate::figures::page_maker::{PageMaker, SAMPLED_FRICTION, section};
+use crate::{StudyError, outcome, paper};
+
+/// Every controller, and what a ramp as reference is worth.
+///
+/// # Errors
+/// [`StudyError`] if it cannot be computed.
+pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+    let study = SlidingRange {
+        controllers: Controller::ALL.to_vec(),
+        converters: vec![Converters::Ideal, Converters::Hardware],
+        postures: vec![Posture::ElbowDown, Posture::ElbowUp],
+        mu: vec![paper::FRICTION],
+        references: vec![Reference::MinimumJerk(3.0)],
+        overrides: Vec::new(),
+        criterion: Criterion {
+            scan_step_m: page.fineness.scan_step_m,
+            ..Criterion::default()
+        },
+    };
+    let ramps = SlidingRange {
+        controllers: vec![Controller::Pid, Controller::Hybrid],
+        converters: vec![Converters::Ideal],
+        postures: vec![Posture::ElbowDown],
+        references: vec![Reference::Ramp(2.0), Reference::Ramp(3.0)],
+        ..study.clone()
+    };
+    let mut rows = page.rows("Sliding range", &study)?;
+    rows.extend(page.rows("Sliding range, ramps", &ramps)?);
+    let outcome = SlidingRanges { rows };
+    Ok(vec![(ranges(&outcome)?, Box::new(outcome))])
+}
+
+/// Z_t,sliding.
+///
+/// # Errors
+/// [`PlotError`] if the figure cannot be drawn.
+fn ranges(outcome: &SlidingRanges) -> Result<Section, PlotError> {
+    let mut section = section(
+        "sliding-range",
+        "Section III: how far each controller slides",
+        "painleve study sliding-range".into(),
+        outcome,
+    )?;
+    for row in &outcome.rows {
+        section.comparisons.push(compared(row));
+    }
+    section.reasons.push(
+        "What a controller reaches depends on the reference, which the paper does not give for these numbers: \
+         a ramp throws the tip off by the jump of speed at its start, a minimum jerk does not; \
+         here it is the one of each row, and a target counts as reached when the tip stays within 1 mm of it \
+         for 2 s without ever having left the belt."
+            .into(),
+    );
+    section.reasons.push(SAMPLED_FRICTION.into());
+    Ok(section)
+}
+
+fn compared(row: &Row) -> Comparison {
+    let what = format!(
+        "{}, {} converters, {}, {}",
+        row.controller,
+        outcome::name(&row.converters),
+        outcome::name(&row.posture),
+        row.reference
+    );
+    let here = row.z_sliding_m.map_or("none".into(), |metres| {
+        format!("{metres:.4} m of {:.4} m", row.limit_m)
+    });
+    let pid_elbow_up = row.controller == Controller::Pid && row.paper_m.is_none();
+    match row.paper_m {
+        Some(paper) => Comparison {
+            verdict: row.z_sliding_m.map_or(Verdict::FallsShort, |metres| {
+                // To the digits that the paper prints.
+                match metres - paper {
+                    difference if difference.abs() <= 5e-4 => Verdict::Agrees,
+                    difference if difference > 0.0 => Verdict::Farther,
+                    _ => Verdict::FallsShort,
+                }
+            }),
+            paper: format!("{paper} m"),
+            what,
+            here,
+        },
+        None if pid_elbow_up => Comparison::new(&what, "none", here, row.z_sliding_m.is_none()),
+        None => Comparison::beyond(&what, here),
+    }
+}
