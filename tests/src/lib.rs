@@ -57,6 +57,15 @@ pub fn serial_image() -> &'static Path {
     IMAGE.get_or_init(|| built_image("painleve-qemu-serial"))
 }
 
+/// The image that is flashed.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn flash_image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    IMAGE.get_or_init(|| built_image("painleve-f405"))
+}
+
 fn built_image(name: &str) -> PathBuf {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -31,7 +31,7 @@ use crate::timing::Unit;
 const PROGRAM: &str = "qemu-system-arm";
 
 /// Where the workspace builds the image, below its target folder.
-const IMAGE: &str = "thumbv7em-none-eabihf/firmware/painleve-qemu";
+const IMAGES: &str = "thumbv7em-none-eabihf/firmware";
 
 /// Time between two looks at whether the emulator is alive.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
@@ -42,14 +42,21 @@ const INSTRUCTIONS_PER_TICK: f32 = 6000.0;
 
 /// The image that the workspace this program was built in has made.
 pub fn default_image() -> PathBuf {
+    built_image("painleve-qemu")
+}
+
+/// The workspace's own build of an image, found from where this program lies; where it would be if
+/// there is none.
+pub fn built_image(name: &str) -> PathBuf {
+    let image = Path::new(IMAGES).join(name);
     let program = std::env::current_exe().unwrap_or_default();
     let mut folders = program.ancestors().skip(1);
-    let built = folders.clone().map(|folder| folder.join(IMAGE));
+    let built = folders.clone().map(|folder| folder.join(&image));
     built
         .into_iter()
         .find(|image| image.exists())
-        .or_else(|| folders.nth(1).map(|target| target.join(IMAGE)))
-        .unwrap_or_else(|| IMAGE.into())
+        .or_else(|| folders.nth(1).map(|target| target.join(&image)))
+        .unwrap_or(image)
 }
 
 /// Checks that image and emulator are there, before anything is started.

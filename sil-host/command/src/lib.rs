@@ -17,6 +17,7 @@ use std::time::Duration;
 
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
+use painleve_bound::BoundError;
 use painleve_link::LinkError;
 use painleve_plant::closed_loop::LoopError;
 use painleve_plant::scenario::ScenarioError;
@@ -80,6 +81,9 @@ pub enum CommandError {
     /// The board that runs the controller is missing, gone or wrong.
     #[error(transparent)]
     Board(#[from] BoardError),
+    /// An image that has no bound.
+    #[error(transparent)]
+    Bound(#[from] BoundError),
     /// A file cannot be written.
     #[error("{0}")]
     Output(String),
@@ -114,7 +118,7 @@ impl CommandError {
     /// 4: an output cannot be written; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Scenario(_) | Self::SameFile(_) => 2,
+            Self::Scenario(_) | Self::SameFile(_) | Self::Bound(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Scenario(_)
                 | StudyError::Option(_)

@@ -7,6 +7,7 @@ use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
 use painleve_board::timing::{Metronome, TimingReport, Unit, report};
 use painleve_board::{Board, OnBoard, Serial};
+use painleve_bound::report::Bound;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
 use painleve_plant::sample::Sample;
@@ -36,10 +37,14 @@ pub struct TimingArguments {
     /// Serial port of the board, as in /dev/ttyUSB0.
     #[arg(long, value_name = "PATH", required_if_eq("host", "serial"))]
     port: Option<PathBuf>,
-    /// The controller's image for QEMU; the workspace's own build by default.
+    /// The controller's image; the workspace's own build by default.
     #[arg(long, value_name = "PATH")]
     elf: Option<PathBuf>,
-    /// Print a JSON array on stdout instead of the table.
+    /// Bound the cycles of the flash image's control interrupt from its machine code, with the
+    /// path that attains it, instead of running anything; --elf takes another image.
+    #[arg(long, conflicts_with_all = ["names", "overrides", "host", "port", "svg"])]
+    bound: bool,
+    /// Print JSON on stdout instead of the table.
     #[arg(long)]
     json: bool,
     /// Write histograms as a figure.
@@ -50,6 +55,16 @@ pub struct TimingArguments {
 /// Runs every scenario and reports what its ticks cost.
 pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
     let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
+    if arguments.bound {
+        let image = arguments.elf.clone();
+        let image = image.unwrap_or_else(|| emulator::built_image("painleve-f405"));
+        let bound = Bound::of(&image)?;
+        return if arguments.json {
+            say(serde_json::to_string(&bound).map_err(|error| output(&error))?)
+        } else {
+            say(bound.text())
+        };
+    }
     let names: Vec<&str> = match arguments.names.as_slice() {
         [] => built_in::names().collect(),
         names => names.iter().map(String::as_str).collect(),

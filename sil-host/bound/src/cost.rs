@@ -1,0 +1,156 @@
+//! What a block costs: its instructions, the flash lines they lie in, and what they wait for.
+
+use std::collections::BTreeMap;
+
+use crate::cycles::{
+    FLASH_DATA_WAIT, FLASH_LINE_BYTES, FLASH_READ, FLASH_WAIT_STATES, Kind, PERIPHERAL_WAIT,
+    PIPELINE_REFILL,
+};
+use crate::graph::{Block, Graph};
+use crate::instruction::{Effect, Instruction, PROGRAM_COUNTER};
+
+/// Registers whose values are constants.
+pub type Constants = BTreeMap<u16, u32>;
+
+/// Constants at the start of every block, by data flow from the entry.
+pub fn constants(graph: &Graph) -> BTreeMap<u32, Constants> {
+    let mut at: BTreeMap<u32, Constants> = BTreeMap::from([(graph.entry, Constants::new())]);
+    let mut open = vec![graph.entry];
+    while let Some(address) = open.pop() {
+        let Some(block) = graph.blocks.get(&address) else {
+            continue;
+        };
+        let mut now = at[&address].clone();
+        for instruction in &block.instructions {
+            follow(&mut now, instruction);
+        }
+        if block.call.is_some() {
+            // The callee may change what the calling convention gives it; here, everything.
+            now.clear();
+        }
+        for (to, _) in &block.successors {
+            let changed = match at.get_mut(to) {
+                None => {
+                    at.insert(*to, now.clone());
+                    true
+                }
+                Some(before) => {
+                    let size = before.len();
+                    before.retain(|register, value| now.get(register) == Some(value));
+                    before.len() != size
+                }
+            };
+            if changed {
+                open.push(*to);
+            }
+        }
+    }
+    at
+}
+
+fn follow(now: &mut Constants, instruction: &Instruction) {
+    let old = |register: &u16| now.get(register).copied();
+    let value = match &instruction.effect {
+        Some(Effect::Set(to, value)) => Some((*to, *value)),
+        Some(Effect::SetUpper(to, value)) => {
+            old(to).map(|lower| (*to, lower & 0xffff | value << 16))
+        }
+        Some(Effect::Add(to, from, value)) => {
+            old(from).map(|base| (*to, base.wrapping_add_signed(*value)))
+        }
+        None => None,
+    };
+    for register in &instruction.writes {
+        now.remove(register);
+    }
+    if let Some((register, value)) = value {
+        now.insert(register, value);
+    }
+}
+
+/// What one pass through a block costs.
+#[derive(Clone, Copy, Debug)]
+pub struct BlockCost {
+    /// Cycles, without the functions it calls.
+    pub cycles: u32,
+    /// Cycles at its end since the flash began to read the line that follows.
+    pub reading: u32,
+}
+
+/// What one pass through a block costs once its first line is there, without the functions it calls.
+///
+/// While a line is executed the accelerator reads the next one (RM0090, section 3.5.2, prefetch). A
+/// line therefore takes as long as its instructions or as the read, whichever is longer. Both
+/// grow with what the instructions cost, so that upper bounds of these give an upper bound.
+pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
+    let mut now = constants.clone();
+    let mut total = 0;
+    let mut line = None;
+    // Cycles since the flash began to read the line after this one.
+    let mut reading = 0;
+    for (place, instruction) in block.instructions.iter().enumerate() {
+        let last_byte = instruction.address + instruction.size - 1;
+        for touched in [instruction.address, last_byte].map(|at| at / FLASH_LINE_BYTES) {
+            if line.is_none_or(|line| line < touched) {
+                if line.is_some() {
+                    total += FLASH_READ.saturating_sub(reading);
+                    reading = 0;
+                }
+                line = Some(touched);
+            }
+        }
+        let mut cycles = instruction.kind.cycles();
+        if matches!(instruction.kind, Kind::Float | Kind::FloatMultiplyAdd) {
+            let next = block.instructions.get(place + 1);
+            let uses = |next: &Instruction| {
+                instruction
+                    .writes
+                    .iter()
+                    .any(|register| next.reads.contains(register))
+            };
+            cycles += u32::from(next.is_none_or(uses));
+        }
+        reading += cycles;
+        total += cycles;
+        match wait(instruction, &now) {
+            Some(FLASH_DATA_WAIT) => {
+                total += FLASH_DATA_WAIT;
+                // The flash reads data first and begins with the next line afterwards.
+                reading = 0;
+            }
+            Some(cycles) => total += cycles,
+            None => {}
+        }
+        follow(&mut now, instruction);
+    }
+    BlockCost {
+        cycles: total,
+        reading,
+    }
+}
+
+/// What the memory of a load or store adds.
+fn wait(instruction: &Instruction, now: &Constants) -> Option<u32> {
+    if instruction.kind == Kind::TableBranch {
+        return Some(FLASH_DATA_WAIT);
+    }
+    let (base, offset) = instruction.memory?;
+    if base == PROGRAM_COUNTER {
+        return Some(FLASH_DATA_WAIT);
+    }
+    match now.get(&base)?.wrapping_add_signed(offset) {
+        0x0800_0000..0x1000_0000 => Some(FLASH_DATA_WAIT),
+        0x4000_0000..0xa000_0000 => Some(PERIPHERAL_WAIT),
+        _ => None,
+    }
+}
+
+/// What it costs to arrive at a block: by a taken branch the pipeline is refilled from a line that
+/// is read anew; from above a line may end just there, which is being read meanwhile.
+pub fn of_edge(from: &BlockCost, to: &Block, taken: bool) -> u32 {
+    if taken {
+        return PIPELINE_REFILL + FLASH_WAIT_STATES;
+    }
+    let starts_line = to.instructions[0].address.is_multiple_of(FLASH_LINE_BYTES);
+    u32::from(starts_line) * FLASH_READ.saturating_sub(from.reading)
+}

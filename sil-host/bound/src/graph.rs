@@ -1,0 +1,179 @@
+//! The control-flow graph of one function: what follows the instructions from its entry.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::BoundError;
+use crate::image::Image;
+use crate::instruction::{Decoder, Flow, Instruction};
+
+/// Instructions that are executed one after the other.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// The instructions; at least one.
+    pub instructions: Vec<Instruction>,
+    /// Where it goes, and whether by a taken branch.
+    pub successors: Vec<(u32, bool)>,
+    /// Whether the function may end here.
+    pub returns: bool,
+    /// The function that the last instruction calls.
+    pub call: Option<u32>,
+}
+
+/// A function's blocks by address.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    /// Address of the first instruction.
+    pub entry: u32,
+    /// The blocks.
+    pub blocks: BTreeMap<u32, Block>,
+}
+
+impl Graph {
+    /// The graph of the function at `entry`. A branch into another function, which then returns to
+    /// this one's caller, is followed.
+    ///
+    /// # Errors
+    /// [`BoundError`] at what cannot be decoded.
+    pub fn of(image: &Image, decoder: &Decoder, entry: u32) -> Result<Self, BoundError> {
+        let mut instructions: BTreeMap<u32, Instruction> = BTreeMap::new();
+        let mut leaders = BTreeSet::from([entry]);
+        let mut tables: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        let mut open = vec![(entry, 0_u32)];
+        while let Some((mut at, mut conditional)) = open.pop() {
+            while !instructions.contains_key(&at) {
+                let instruction = decoder.at(image, at, conditional > 0)?;
+                conditional = conditional.saturating_sub(1);
+                if instruction.text.starts_with("it") {
+                    let name = instruction.text.split(' ').next().unwrap_or_default();
+                    conditional = name.len() as u32 - 1;
+                }
+                let next = at + instruction.size;
+                let flow = instruction.flow.clone();
+                instructions.insert(at, instruction);
+                match flow {
+                    Flow::Next => {}
+                    Flow::Branch {
+                        target,
+                        conditional: goes_on,
+                    } => {
+                        leaders.insert(target);
+                        open.push((target, 0));
+                        if !goes_on {
+                            break;
+                        }
+                        leaders.insert(next);
+                    }
+                    Flow::Call(_) => {
+                        leaders.insert(next);
+                    }
+                    Flow::Return { conditional: false } | Flow::Trap => break,
+                    Flow::Return { conditional: true } => {
+                        leaders.insert(next);
+                    }
+                    Flow::Table => {
+                        let targets = table(image, &instructions[&at])?;
+                        leaders.extend(&targets);
+                        open.extend(targets.iter().map(|target| (*target, 0)));
+                        tables.insert(at, targets);
+                        break;
+                    }
+                }
+                at = next;
+            }
+        }
+        Ok(Self {
+            entry,
+            blocks: blocks(&instructions, &leaders, &tables),
+        })
+    }
+}
+
+fn table(image: &Image, branch: &Instruction) -> Result<Vec<u32>, BoundError> {
+    let start = branch.address + branch.size;
+    let unknown = || BoundError::UnknownInstruction {
+        address: branch.address,
+        text: branch.text.clone(),
+    };
+    let width = if branch.text.starts_with("tbh") { 2 } else { 1 };
+    let end = image.end_of_data(start).ok_or_else(unknown)?;
+    let bytes = image.bytes(start).ok_or_else(unknown)?;
+    let bytes = bytes.get(..(end - start) as usize).ok_or_else(unknown)?;
+    let mut targets = Vec::new();
+    let mut first = u32::MAX;
+    for (place, entry) in bytes.chunks_exact(width).enumerate() {
+        // A table may be padded; the code it leads to does not start within it.
+        if start + (place * width) as u32 >= first {
+            break;
+        }
+        let half_words = entry
+            .iter()
+            .rev()
+            .fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
+        let padding = half_words == 0 && place + 1 == bytes.len() / width;
+        if !padding {
+            let target = start + 2 * half_words;
+            first = first.min(target);
+            targets.push(target);
+        }
+    }
+    targets.sort_unstable();
+    targets.dedup();
+    Ok(targets)
+}
+
+fn blocks(
+    instructions: &BTreeMap<u32, Instruction>,
+    leaders: &BTreeSet<u32>,
+    tables: &BTreeMap<u32, Vec<u32>>,
+) -> BTreeMap<u32, Block> {
+    let mut blocks = BTreeMap::new();
+    for leader in leaders {
+        let mut block = Block {
+            instructions: Vec::new(),
+            successors: Vec::new(),
+            returns: false,
+            call: None,
+        };
+        let mut at = *leader;
+        while let Some(instruction) = instructions.get(&at) {
+            block.instructions.push(instruction.clone());
+            let next = at + instruction.size;
+            match &instruction.flow {
+                Flow::Next if leaders.contains(&next) => block.successors.push((next, false)),
+                Flow::Next => {
+                    at = next;
+                    continue;
+                }
+                Flow::Branch {
+                    target,
+                    conditional,
+                } => {
+                    block.successors.push((*target, true));
+                    if *conditional {
+                        block.successors.push((next, false));
+                    }
+                }
+                Flow::Call(target) => {
+                    block.call = Some(*target);
+                    block.successors.push((next, true));
+                }
+                Flow::Return { conditional } => {
+                    block.returns = true;
+                    if *conditional {
+                        block.successors.push((next, false));
+                    }
+                }
+                Flow::Table => {
+                    let targets = tables.get(&at).into_iter().flatten();
+                    block.successors.extend(targets.map(|to| (*to, true)));
+                }
+                Flow::Trap => {}
+            }
+            break;
+        }
+        if !block.instructions.is_empty() {
+            blocks.insert(*leader, block);
+        }
+    }
+    blocks
+}

@@ -1,0 +1,158 @@
+//! The image's code and where it comes from.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
+
+use crate::BoundError;
+
+/// The code of an ELF file.
+pub struct Image {
+    sections: Vec<(u32, Vec<u8>)>,
+    functions: BTreeMap<u32, String>,
+    /// Where code and data alternate: true for code.
+    marks: BTreeMap<u32, bool>,
+    /// None for code without an ELF file.
+    lines: Option<addr2line::Loader>,
+}
+
+/// A function of the source that an instruction comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Its name.
+    pub function: String,
+    /// Its file.
+    pub file: String,
+    /// The line in it, from 1; 0 where the compiler merged several.
+    pub line: u32,
+}
+
+impl Image {
+    /// Reads an ELF file.
+    ///
+    /// # Errors
+    /// [`BoundError::Image`] naming the file.
+    pub fn read(path: &Path) -> Result<Self, BoundError> {
+        let refused = |error: &dyn std::fmt::Display| BoundError::Image {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        };
+        let bytes = std::fs::read(path).map_err(|error| refused(&error))?;
+        let file = object::File::parse(&*bytes).map_err(|error| refused(&error))?;
+        let mut sections = Vec::new();
+        for section in file.sections().filter(|section| {
+            matches!(
+                section.kind(),
+                SectionKind::Text | SectionKind::ReadOnlyData
+            ) && section.address() != 0
+        }) {
+            let data = section.data().map_err(|error| refused(&error))?;
+            sections.push((section.address() as u32, data.to_vec()));
+        }
+        let (mut functions, mut marks) = (BTreeMap::new(), BTreeMap::new());
+        for symbol in file.symbols() {
+            let name = symbol.name().unwrap_or_default();
+            let address = symbol.address() as u32;
+            match name.get(..2) {
+                Some("$t") => drop(marks.insert(address, true)),
+                Some("$d") => drop(marks.insert(address, false)),
+                _ if symbol.kind() == object::SymbolKind::Text => {
+                    let name = format!("{:#}", rustc_demangle::demangle(name));
+                    functions.insert(address & !1, name);
+                }
+                _ => {}
+            }
+        }
+        let lines = addr2line::Loader::new(path).map_err(|error| refused(&error))?;
+        Ok(Self {
+            sections,
+            functions,
+            marks,
+            lines: Some(lines),
+        })
+    }
+
+    /// Code of one function, without an ELF file.
+    pub fn of_code(address: u32, code: &[u8], function: &str) -> Self {
+        Self {
+            sections: vec![(address, code.to_vec())],
+            functions: BTreeMap::from([(address, function.to_owned())]),
+            marks: BTreeMap::new(),
+            lines: None,
+        }
+    }
+
+    /// The bytes from an address on, if it is code or constant data.
+    pub fn bytes(&self, address: u32) -> Option<&[u8]> {
+        self.sections.iter().find_map(|(start, bytes)| {
+            let offset = address.checked_sub(*start)? as usize;
+            bytes.get(offset..).filter(|rest| !rest.is_empty())
+        })
+    }
+
+    /// Where the data that starts at `address` ends.
+    pub fn end_of_data(&self, address: u32) -> Option<u32> {
+        let is_data = self.marks.range(..=address).next_back()?.1;
+        if *is_data {
+            return None;
+        }
+        let mut later = self.marks.range(address + 1..);
+        later.find(|(_, is_code)| **is_code).map(|(at, _)| *at)
+    }
+
+    /// The address of a function.
+    pub fn function(&self, name: &str) -> Option<u32> {
+        let mut all = self.functions.iter();
+        all.find(|(_, found)| *found == name).map(|(at, _)| *at)
+    }
+
+    /// The name of the function that holds an address.
+    pub fn name(&self, address: u32) -> &str {
+        let before = self.functions.range(..=address).next_back();
+        before.map_or("?", |(_, name)| name)
+    }
+
+    /// Where an instruction comes from, the innermost inlined function first; without lines, the
+    /// function that holds it.
+    pub fn frames(&self, address: u32) -> Vec<Frame> {
+        let mut all = Vec::new();
+        let Some(lines) = &self.lines else {
+            return vec![Frame {
+                function: self.name(address).to_owned(),
+                file: String::new(),
+                line: 0,
+            }];
+        };
+        let Ok(mut frames) = lines.find_frames(u64::from(address)) else {
+            return all;
+        };
+        while let Ok(Some(frame)) = frames.next() {
+            let function = frame.function.and_then(|name| {
+                let name = name.demangle().ok()?;
+                Some(name.into_owned())
+            });
+            let (file, line) = frame
+                .location
+                .map_or((None, None), |location| (location.file, location.line));
+            all.push(Frame {
+                function: function.unwrap_or_default(),
+                file: short(file.unwrap_or_default()),
+                line: line.unwrap_or_default(),
+            });
+        }
+        all
+    }
+}
+
+/// A path without the folders of the machine that built the image.
+fn short(path: &str) -> String {
+    for (marker, keep) in [("/firmware/", 1), ("/shared/", 1), ("/library/", 1)] {
+        if let Some(at) = path.rfind(marker) {
+            return path[at + keep..].to_owned();
+        }
+    }
+    let mut parts: Vec<&str> = path.rsplit('/').take(4).collect();
+    parts.reverse();
+    parts.join("/")
+}

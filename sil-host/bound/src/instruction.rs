@@ -1,0 +1,314 @@
+//! Instructions of the image, decoded for their cost and for where they go.
+//!
+//! The decoder is capstone: it knows all of Thumb-2 and the floating-point unit's instructions, and
+//! its operands say what is read and written. `yaxpeax-arm` is lighter and has no floating point;
+//! LLVM's tools would have to be installed and their text parsed.
+
+use capstone::RegId;
+use capstone::arch::arm::{ArmCC, ArmInsn, ArmOperand, ArmOperandType, ArmReg};
+use capstone::prelude::*;
+
+use crate::BoundError;
+use crate::cycles::Kind;
+use crate::image::Image;
+
+/// Where an instruction goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// To the next one.
+    Next,
+    /// To an address; to the next one as well if it has a condition.
+    Branch {
+        /// Where to.
+        target: u32,
+        /// Whether it may also go on.
+        conditional: bool,
+    },
+    /// To a function, then to the next one.
+    Call(u32),
+    /// Back to the caller; to the next one as well if it has a condition.
+    Return {
+        /// Whether it may also go on.
+        conditional: bool,
+    },
+    /// To one of the entries of the table that follows it.
+    Table,
+    /// Nowhere: an undefined instruction, on purpose.
+    Trap,
+}
+
+/// What an instruction does to one register that matters to addresses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// The register holds this constant from now on.
+    Set(u16, u32),
+    /// Its upper half does.
+    SetUpper(u16, u32),
+    /// It holds the sum of another register and a constant.
+    Add(u16, u16, i32),
+}
+
+/// One decoded instruction.
+#[derive(Clone, Debug)]
+pub struct Instruction {
+    /// Its address.
+    pub address: u32,
+    /// Bytes: 2 or 4.
+    pub size: u32,
+    /// What it costs.
+    pub kind: Kind,
+    /// Where it goes.
+    pub flow: Flow,
+    /// Base register and offset of the memory that it reads or writes.
+    pub memory: Option<(u16, i32)>,
+    /// What is known of a register after it.
+    pub effect: Option<Effect>,
+    /// Registers it reads.
+    pub reads: Vec<u16>,
+    /// Registers it writes.
+    pub writes: Vec<u16>,
+    /// As text.
+    pub text: String,
+}
+
+/// Decodes the instructions of an image.
+pub struct Decoder(Capstone);
+
+/// The program counter's number.
+pub const PROGRAM_COUNTER: u16 = ArmReg::ARM_REG_PC as u16;
+
+impl Decoder {
+    /// A decoder for the Cortex-M4F.
+    ///
+    /// # Errors
+    /// [`BoundError::Decoder`] if the library refuses.
+    pub fn new() -> Result<Self, BoundError> {
+        let decoder = Capstone::new()
+            .arm()
+            .mode(capstone::arch::arm::ArchMode::Thumb)
+            .extra_mode([capstone::arch::arm::ArchExtraMode::MClass].into_iter())
+            .detail(true)
+            .build();
+        decoder.map(Self).map_err(BoundError::Decoder)
+    }
+
+    /// The instruction at an address. `conditional` says whether an IT instruction before it makes
+    /// it so.
+    ///
+    /// # Errors
+    /// [`BoundError`] if there is none, or none whose cost is known.
+    pub fn at(
+        &self,
+        image: &Image,
+        address: u32,
+        conditional: bool,
+    ) -> Result<Instruction, BoundError> {
+        let unknown = |text: &str| BoundError::UnknownInstruction {
+            address,
+            text: text.to_owned(),
+        };
+        let bytes = image.bytes(address).ok_or_else(|| unknown("no code"))?;
+        let found = self
+            .0
+            .disasm_count(&bytes[..bytes.len().min(4)], u64::from(address), 1)
+            .map_err(BoundError::Decoder)?;
+        let instruction = found
+            .iter()
+            .next()
+            .ok_or_else(|| unknown("no instruction"))?;
+        let detail = self
+            .0
+            .insn_detail(instruction)
+            .map_err(BoundError::Decoder)?;
+        let name = instruction.mnemonic().unwrap_or_default();
+        let text = format!("{name} {}", instruction.op_str().unwrap_or_default());
+        let arch = detail.arch_detail();
+        let arm = arch.arm().ok_or_else(|| unknown(&text))?;
+        let operands: Vec<ArmOperand> = arm.operands().collect();
+        let conditional =
+            conditional || !matches!(arm.cc(), ArmCC::ARM_CC_AL | ArmCC::ARM_CC_INVALID);
+
+        let mut reads: Vec<u16> = detail.regs_read().iter().map(|r| r.0).collect();
+        let mut writes: Vec<u16> = detail.regs_write().iter().map(|r| r.0).collect();
+        let mut memory = None;
+        for operand in &operands {
+            match operand.op_type {
+                ArmOperandType::Reg(RegId(register)) => {
+                    let access = operand.access;
+                    if access.is_none_or(|access| access.is_readable()) {
+                        reads.push(register);
+                    }
+                    if access.is_none_or(|access| access.is_writable()) {
+                        writes.push(register);
+                    }
+                }
+                ArmOperandType::Mem(at) => {
+                    reads.extend([at.base().0, at.index().0]);
+                    if arm.writeback() {
+                        writes.push(at.base().0);
+                    }
+                    memory = Some((at.base().0, at.disp()));
+                }
+                _ => {}
+            }
+        }
+        let registers = |skip: usize| {
+            operands
+                .iter()
+                .skip(skip)
+                .filter(|operand| matches!(operand.op_type, ArmOperandType::Reg(_)))
+                .count() as u32
+        };
+        let doubles = |skip: usize| {
+            operands
+                .iter()
+                .skip(skip)
+                .map(|operand| match operand.op_type {
+                    ArmOperandType::Reg(register) if is_double(register.0) => 2,
+                    ArmOperandType::Reg(_) => 1,
+                    _ => 0,
+                })
+                .sum::<u32>()
+        };
+        let immediate = operands.iter().find_map(|operand| match operand.op_type {
+            ArmOperandType::Imm(value) => Some(value),
+            _ => None,
+        });
+        let to_counter = writes.contains(&PROGRAM_COUNTER);
+        let base = name.split('.').next().unwrap_or_default();
+        let id = instruction.id().0;
+        let is = |one: ArmInsn| id == one as u32;
+        let any = |several: &[ArmInsn]| several.iter().any(|one| is(*one));
+
+        use ArmInsn::*;
+        let mut flow = Flow::Next;
+        let kind = if is(ARM_INS_BL) {
+            flow = Flow::Call(immediate.ok_or_else(|| unknown(&text))? as u32);
+            Kind::Branch
+        } else if any(&[ARM_INS_B, ARM_INS_CBZ, ARM_INS_CBNZ]) {
+            let target = immediate.ok_or_else(|| unknown(&text))? as u32;
+            let conditional = conditional || !is(ARM_INS_B);
+            flow = Flow::Branch {
+                target,
+                conditional,
+            };
+            Kind::Branch
+        } else if is(ARM_INS_BX) && base.starts_with("bx") {
+            if !reads.contains(&(ArmReg::ARM_REG_LR as u16)) {
+                return Err(unknown(&text));
+            }
+            flow = Flow::Return { conditional };
+            Kind::Branch
+        } else if any(&[ARM_INS_TBB, ARM_INS_TBH]) {
+            flow = Flow::Table;
+            Kind::TableBranch
+        } else if any(&[ARM_INS_UDF, ARM_INS_BKPT]) {
+            flow = Flow::Trap;
+            Kind::Simple
+        } else if any(&[ARM_INS_SDIV, ARM_INS_UDIV]) {
+            Kind::Divide
+        } else if any(&[ARM_INS_ISB, ARM_INS_DSB, ARM_INS_DMB]) {
+            Kind::Barrier
+        } else if any(&[ARM_INS_MRS, ARM_INS_MSR, ARM_INS_CPS]) {
+            Kind::Special
+        } else if any(&[ARM_INS_VDIV, ARM_INS_VSQRT]) {
+            Kind::FloatDivide
+        } else if any(&[
+            ARM_INS_VMLA,
+            ARM_INS_VMLS,
+            ARM_INS_VNMLA,
+            ARM_INS_VNMLS,
+            ARM_INS_VFMA,
+            ARM_INS_VFMS,
+            ARM_INS_VFNMA,
+            ARM_INS_VFNMS,
+        ]) {
+            Kind::FloatMultiplyAdd
+        } else if any(&[ARM_INS_VLDR, ARM_INS_VPOP]) {
+            Kind::Load(doubles(0))
+        } else if any(&[ARM_INS_VSTR, ARM_INS_VPUSH]) {
+            Kind::Store(doubles(0))
+        } else if any(&[ARM_INS_VLDMIA, ARM_INS_VLDMDB]) {
+            Kind::Load(doubles(1))
+        } else if any(&[ARM_INS_VSTMIA, ARM_INS_VSTMDB]) {
+            Kind::Store(doubles(1))
+        } else if base.starts_with('v') {
+            Kind::Float
+        } else if is(ARM_INS_POP) {
+            Kind::Load(registers(0))
+        } else if is(ARM_INS_PUSH) {
+            Kind::Store(registers(0))
+        } else if base.starts_with("ldm") {
+            Kind::Load(registers(1))
+        } else if base.starts_with("stm") {
+            Kind::Store(registers(1))
+        } else if base.starts_with("ldrd") {
+            Kind::Load(2)
+        } else if base.starts_with("strd") {
+            Kind::Store(2)
+        } else if base.starts_with("ldr") {
+            Kind::Load(1)
+        } else if base.starts_with("str") {
+            Kind::Store(1)
+        } else if SIMPLE.iter().any(|simple| base.starts_with(simple)) {
+            Kind::Simple
+        } else {
+            return Err(unknown(&text));
+        };
+        if to_counter && matches!(flow, Flow::Next) {
+            if !matches!(kind, Kind::Load(_)) || operands.iter().any(|o| matches!(o.op_type, ArmOperandType::Mem(m) if m.base().0 != ArmReg::ARM_REG_SP as u16)) {
+                return Err(unknown(&text));
+            }
+            flow = Flow::Return { conditional };
+        }
+        let effect = effect(base, &operands, immediate, conditional);
+        Ok(Instruction {
+            address,
+            size: instruction.bytes().len() as u32,
+            kind,
+            flow,
+            memory,
+            effect,
+            reads,
+            writes,
+            text,
+        })
+    }
+}
+
+/// Mnemonics of one cycle, by how they begin.
+const SIMPLE: [&str; 43] = [
+    "add", "adc", "sub", "sbc", "rsb", "mov", "mvn", "and", "orr", "orn", "eor", "bic", "cmp",
+    "cmn", "tst", "teq", "lsl", "lsr", "asr", "ror", "rrx", "mul", "mla", "mls", "smul", "umul",
+    "smla", "umla", "ubf", "sbf", "bf", "it", "nop", "uxt", "sxt", "rev", "rbit", "clz", "usat",
+    "ssat", "adr", "neg", "sel",
+];
+
+fn is_double(register: u16) -> bool {
+    (ArmReg::ARM_REG_D0 as u16..=ArmReg::ARM_REG_D31 as u16).contains(&register)
+}
+
+/// What is known of a register after an instruction, of those that make addresses.
+fn effect(
+    name: &str,
+    operands: &[ArmOperand],
+    immediate: Option<i32>,
+    conditional: bool,
+) -> Option<Effect> {
+    let register = |place: usize| match operands.get(place).map(|operand| &operand.op_type) {
+        Some(ArmOperandType::Reg(register)) => Some(register.0),
+        _ => None,
+    };
+    let to = register(0)?;
+    let value = immediate?;
+    match (name, operands.len()) {
+        _ if conditional => None,
+        ("mov" | "movs" | "movw", 2) => Some(Effect::Set(to, value as u32)),
+        ("movt", 2) => Some(Effect::SetUpper(to, value as u32)),
+        ("add" | "adds" | "addw", 3) => Some(Effect::Add(to, register(1)?, value)),
+        ("add" | "adds", 2) => Some(Effect::Add(to, to, value)),
+        ("sub" | "subs" | "subw", 3) => Some(Effect::Add(to, register(1)?, -value)),
+        ("sub" | "subs", 2) => Some(Effect::Add(to, to, -value)),
+        _ => None,
+    }
+}

@@ -1,0 +1,139 @@
+//! The bound of the control interrupt with the path that attains it.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::BoundError;
+use crate::cycles::{EXCEPTION_ENTRY, EXCEPTION_EXIT, LAZY_FLOAT_STACKING};
+use crate::image::Image;
+use crate::loops::Limits;
+use crate::worst::{Analysis, Visit};
+
+/// The handler of the control timer.
+pub const CONTROL_INTERRUPT: &str = "TIM2";
+
+/// The core's clock, Hz.
+pub const CORE_HZ: f64 = 168e6;
+
+/// A bound on the control interrupt.
+#[derive(Clone, Debug, Serialize)]
+pub struct Bound {
+    /// Cycles from the request of the interrupt to the return from it.
+    pub cycles: u32,
+    /// The same at the core's clock, µs.
+    pub microseconds: f64,
+    /// The highest control rate at which the interrupt ends before the next, Hz.
+    pub proves_hz: u32,
+    /// Instructions on the worst path.
+    pub instructions: u32,
+    /// The path, in order of execution.
+    pub path: Vec<Stretch>,
+}
+
+/// A stretch of the path that comes from one function of the source.
+#[derive(Clone, Debug, Serialize)]
+pub struct Stretch {
+    /// The innermost function of the project.
+    pub function: String,
+    /// Its file.
+    pub file: String,
+    /// Lines that the compiler names.
+    pub lines: BTreeSet<u32>,
+    /// Cycles, with the functions called.
+    pub cycles: u32,
+}
+
+impl Bound {
+    /// The bound of an image.
+    ///
+    /// # Errors
+    /// [`BoundError`] naming the file or the code that has no bound.
+    pub fn of(path: &Path) -> Result<Self, BoundError> {
+        let image = Image::read(path)?;
+        let limits = Limits::of_control();
+        let entry = image.function(CONTROL_INTERRUPT);
+        let entry = entry.ok_or_else(|| BoundError::Image {
+            path: path.to_owned(),
+            reason: format!("there is no function {CONTROL_INTERRUPT}"),
+        })?;
+        let worst = Analysis::new(&image, &limits)?.of(entry)?;
+        let worst = worst.ok_or(BoundError::NeverReturns { address: entry })?;
+        let cycles = EXCEPTION_ENTRY + LAZY_FLOAT_STACKING + worst.cycles + EXCEPTION_EXIT;
+        Ok(Self {
+            cycles,
+            microseconds: f64::from(cycles) / CORE_HZ * 1e6,
+            proves_hz: (CORE_HZ / f64::from(cycles)) as u32,
+            instructions: worst.instructions,
+            path: stretches(&image, &worst.path),
+        })
+    }
+
+    /// As text.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{:>7}  function  file and lines", "cycles");
+        for stretch in &self.path {
+            let (cycles, function) = (stretch.cycles, &stretch.function);
+            let _ = write!(text, "{cycles:>7}  {function}  {}", stretch.file);
+            let _ = match (stretch.lines.first(), stretch.lines.last()) {
+                (Some(first), Some(last)) if first < last => writeln!(text, ":{first}-{last}"),
+                (Some(line), _) => writeln!(text, ":{line}"),
+                (None, _) => writeln!(text),
+            };
+        }
+        let around = EXCEPTION_ENTRY + LAZY_FLOAT_STACKING + EXCEPTION_EXIT;
+        let _ = writeln!(text, "{around:>7}  into the interrupt and out of it");
+        let _ = write!(
+            text,
+            "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz; proves control rates up to {} Hz.\n\
+             Not a measurement: cycles by the documents of ARM and ST, every flash line a miss. Tasks of lower \
+             priority that mask the interrupt come on top.",
+            self.cycles,
+            self.microseconds,
+            CORE_HZ / 1e6,
+            self.proves_hz,
+        );
+        text
+    }
+}
+
+fn stretches(image: &Image, path: &[Visit]) -> Vec<Stretch> {
+    let mut all: Vec<Stretch> = Vec::new();
+    let mut rest = 0.0;
+    for visit in path {
+        let frames = image.frames(visit.block);
+        let ours = frames
+            .iter()
+            .find(|frame| frame.function.contains("painleve"));
+        let function = plain(ours.map_or(CONTROL_INTERRUPT, |frame| &frame.function));
+        let (file, line) = ours.map_or(("", 0), |frame| (frame.file.as_str(), frame.line));
+        // Whole cycles that add up to the sum.
+        let exact = visit.cycles + rest;
+        let cycles = exact.round();
+        rest = exact - cycles;
+        let cycles = cycles as u32;
+        match all.last_mut() {
+            Some(last) if last.function == function => {
+                last.cycles += cycles;
+                last.lines.extend((line > 0).then_some(line));
+            }
+            _ => all.push(Stretch {
+                function,
+                file: file.to_owned(),
+                lines: BTreeSet::from_iter((line > 0).then_some(line)),
+                cycles,
+            }),
+        }
+    }
+    all
+}
+
+/// A function's name without crate and type parameters of the project.
+fn plain(name: &str) -> String {
+    name.replace("painleve_firmware::", "")
+        .replace("painleve_shared::", "")
+}

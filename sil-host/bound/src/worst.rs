@@ -1,0 +1,416 @@
+//! The worst path: how often every edge of the graph can be taken so that the cost is greatest.
+//!
+//! Implicit path enumeration (Li and Malik, *Performance analysis of embedded software using
+//! implicit path enumeration*, DAC 1995): what enters a block leaves it, a loop goes round no more
+//! often than is declared, and a linear programme finds the most expensive counts. Its relaxation to
+//! real numbers can only be larger than the true maximum, so that it is a bound.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use microlp::{
+    ComparisonOp, LinearExpr, OptimizationDirection, Problem, SolutionStatus, SolveOutcome,
+};
+
+use crate::BoundError;
+use crate::cost;
+use crate::cycles::{FLASH_WAIT_STATES, PIPELINE_REFILL};
+use crate::graph::Graph;
+use crate::image::Image;
+use crate::instruction::Decoder;
+use crate::loops::{Limit, Limits};
+
+/// Smaller counts are rounding of the linear programme.
+const LEAST_FLOW: f64 = 1e-6;
+
+/// The worst case of a function.
+#[derive(Clone, Debug)]
+pub struct Worst {
+    /// Where it starts.
+    pub entry: u32,
+    /// Cycles from its first instruction to its return, calls included.
+    pub cycles: u32,
+    /// The worst path in the order of execution.
+    pub path: Vec<Visit>,
+    /// Instructions on that path, calls included.
+    pub instructions: u32,
+    /// Loops in it.
+    pub loops: Vec<Loop>,
+}
+
+/// A block of the worst path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Visit {
+    /// Where it starts.
+    pub block: u32,
+    /// How often it is executed.
+    pub times: f64,
+    /// Cycles of all times, with the functions it calls and the ways in.
+    pub cycles: f64,
+}
+
+/// A loop of the machine code.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Loop {
+    /// Its first instruction.
+    pub header: u32,
+    /// The blocks it consists of.
+    pub blocks: BTreeSet<u32>,
+    /// How long it goes on.
+    pub limit: Limit,
+}
+
+/// Finds the worst case of functions, once each.
+pub struct Analysis<'a> {
+    image: &'a Image,
+    decoder: Decoder,
+    limits: &'a Limits,
+    known: BTreeMap<u32, Option<Worst>>,
+    /// Blocks that are never executed together, by pairs.
+    excluded: Vec<(u32, u32)>,
+}
+
+impl<'a> Analysis<'a> {
+    /// An analysis of an image.
+    ///
+    /// # Errors
+    /// [`BoundError::Decoder`].
+    pub fn new(image: &'a Image, limits: &'a Limits) -> Result<Self, BoundError> {
+        Ok(Self {
+            image,
+            decoder: Decoder::new()?,
+            limits,
+            known: BTreeMap::new(),
+            excluded: Vec::new(),
+        })
+    }
+
+    /// The functions that have been looked at.
+    pub fn functions(&self) -> impl Iterator<Item = &Worst> {
+        self.known.values().flatten()
+    }
+
+    /// The worst case of the function at `entry`; `None` if it never returns.
+    ///
+    /// # Errors
+    /// [`BoundError`] at code that has no bound.
+    pub fn of(&mut self, entry: u32) -> Result<Option<Worst>, BoundError> {
+        match self.known.get(&entry) {
+            Some(worst) => return Ok(worst.clone()),
+            None => self.known.insert(entry, None),
+        };
+        let graph = Graph::of(self.image, &self.decoder, entry)?;
+        let mut calls = BTreeMap::new();
+        for block in graph.blocks.values() {
+            if let Some(callee) = block.call {
+                if callee == entry {
+                    return Err(BoundError::Recursion { address: callee });
+                }
+                let worst = self.of(callee)?;
+                calls.insert(
+                    callee,
+                    worst.map(|worst| (worst.cycles, worst.instructions)),
+                );
+            }
+        }
+        let worst = self.solve(&graph, &calls)?;
+        self.known.insert(entry, worst.clone());
+        Ok(worst)
+    }
+
+    fn solve(
+        &self,
+        graph: &Graph,
+        calls: &BTreeMap<u32, Option<(u32, u32)>>,
+    ) -> Result<Option<Worst>, BoundError> {
+        let constants = cost::constants(graph);
+        let loops = self.loops(graph)?;
+        let mut costs: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut ends_at = BTreeMap::new();
+        for (address, block) in &graph.blocks {
+            let known = constants.get(address).cloned().unwrap_or_default();
+            let call = block.call.and_then(|callee| calls[&callee]);
+            let call = call.map_or(0, |(cycles, _)| {
+                // Into the function and back, each time to a line that is read anew.
+                cycles + 2 * (PIPELINE_REFILL + FLASH_WAIT_STATES)
+            });
+            let own = cost::of_block(block, &known);
+            costs.insert(*address, own.cycles + call);
+            ends_at.insert(*address, own);
+        }
+        // A wait for the hardware costs its time and two more rounds, however often it goes round.
+        let mut entered: BTreeMap<u32, u32> = BTreeMap::new();
+        for one in &loops {
+            if let Limit::Cycles(cycles) = one.limit {
+                let round: u32 = one.blocks.iter().map(|block| costs[block]).sum();
+                let edges = one.blocks.len() as u32 * (PIPELINE_REFILL + FLASH_WAIT_STATES);
+                entered.insert(one.header, cycles + 2 * (round + edges));
+                for block in &one.blocks {
+                    costs.insert(*block, 0);
+                }
+            }
+        }
+        let waits: BTreeSet<u32> = loops
+            .iter()
+            .filter(|one| matches!(one.limit, Limit::Cycles(_)))
+            .flat_map(|one| one.blocks.iter().copied())
+            .collect();
+
+        let mut problem = Problem::new(OptimizationDirection::Maximize);
+        let mut incoming: BTreeMap<u32, Vec<_>> = BTreeMap::new();
+        let mut outgoing: BTreeMap<u32, Vec<_>> = BTreeMap::new();
+        let mut edges = Vec::new();
+        let start = problem.add_var(f64::from(costs[&graph.entry]), (1.0, 1.0));
+        incoming.entry(graph.entry).or_default().push(start);
+        let mut ends = Vec::new();
+        for (from, block) in &graph.blocks {
+            let never_returns = block.call.is_some_and(|callee| calls[&callee].is_none());
+            if block.returns {
+                let end = problem.add_var(0.0, (0.0, 1.0));
+                outgoing.entry(*from).or_default().push(end);
+                ends.push(end);
+            }
+            if never_returns {
+                continue;
+            }
+            for (to, taken) in &block.successors {
+                let inside = loops
+                    .iter()
+                    .any(|one| one.header == *to && one.blocks.contains(from));
+                let mut cycles = costs[to];
+                if !(waits.contains(from) && waits.contains(to)) {
+                    // Into a function and back is counted with the call.
+                    let taken = *taken && block.call.is_none();
+                    cycles += cost::of_edge(&ends_at[from], &graph.blocks[to], taken);
+                }
+                if !inside {
+                    cycles += entered.get(to).copied().unwrap_or(0);
+                }
+                let edge = problem.add_var(f64::from(cycles), (0.0, f64::INFINITY));
+                outgoing.entry(*from).or_default().push(edge);
+                incoming.entry(*to).or_default().push(edge);
+                edges.push((*from, *to, edge, cycles));
+            }
+        }
+        if ends.is_empty() {
+            return Ok(None);
+        }
+        for address in graph.blocks.keys() {
+            let mut balance = LinearExpr::empty();
+            let into: Vec<_> = incoming.get(address).into_iter().flatten().collect();
+            let out: Vec<_> = outgoing.get(address).into_iter().flatten().collect();
+            // A block that follows itself enters and leaves by the same edge.
+            for edge in into.iter().filter(|edge| !out.contains(edge)) {
+                balance.add(**edge, 1.0);
+            }
+            for edge in out.iter().filter(|edge| !into.contains(edge)) {
+                balance.add(**edge, -1.0);
+            }
+            problem.add_constraint(balance, ComparisonOp::Eq, 0.0);
+        }
+        for one in &loops {
+            // Rounds after the first for each entry.
+            let again = match one.limit {
+                Limit::Times(times) => f64::from(times.saturating_sub(1)),
+                Limit::Cycles(_) => 1.0,
+            };
+            let mut rounds = LinearExpr::empty();
+            for (from, to, edge, _) in &edges {
+                if *to == one.header {
+                    let back = one.blocks.contains(from);
+                    rounds.add(*edge, if back { 1.0 } else { -again });
+                }
+            }
+            if graph.entry == one.header {
+                rounds.add(start, -again);
+            }
+            problem.add_constraint(rounds, ComparisonOp::Le, 0.0);
+        }
+        for (one, other) in &self.excluded {
+            let (Some(one), Some(other)) = (incoming.get(one), incoming.get(other)) else {
+                continue;
+            };
+            let mut both = LinearExpr::empty();
+            for edge in one.iter().chain(other) {
+                both.add(*edge, 1.0);
+            }
+            problem.add_constraint(both, ComparisonOp::Le, 1.0);
+        }
+        let outcome = problem
+            .solve()
+            .map_err(|error| BoundError::Programme(error.to_string()))?;
+        let SolveOutcome::Solution(solution) = outcome else {
+            return Err(BoundError::Programme("no optimum".to_owned()));
+        };
+        if solution.status() != SolutionStatus::Optimal {
+            return Err(BoundError::Programme("no optimum".to_owned()));
+        }
+
+        let mut worst = Worst {
+            entry: graph.entry,
+            cycles: solution.objective().ceil() as u32,
+            path: Vec::new(),
+            instructions: 0,
+            loops,
+        };
+        let mut visits: BTreeMap<u32, Visit> = BTreeMap::new();
+        let first = f64::from(costs[&graph.entry]);
+        let flows = [(graph.entry, graph.entry, start, first)]
+            .into_iter()
+            .chain(
+                edges
+                    .iter()
+                    .map(|(from, to, edge, cycles)| (*from, *to, *edge, f64::from(*cycles))),
+            );
+        let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for (from, to, edge, cycles) in flows {
+            let times = solution[edge];
+            if times < LEAST_FLOW {
+                continue;
+            }
+            if edge != start {
+                next.entry(from).or_default().push(to);
+            }
+            let visit = visits.entry(to).or_insert(Visit {
+                block: to,
+                times: 0.0,
+                cycles: 0.0,
+            });
+            visit.times += times;
+            visit.cycles += times * cycles;
+        }
+        let mut instructions = 0.0_f64;
+        for (address, visit) in &visits {
+            let block = &graph.blocks[address];
+            let call = block.call.and_then(|callee| calls[&callee]);
+            let inside = call.map_or(0, |(_, instructions)| instructions);
+            instructions += visit.times * (block.instructions.len() as f64 + f64::from(inside));
+        }
+        worst.path = in_order(graph.entry, &next, &visits);
+        worst.instructions = instructions.ceil() as u32;
+        Ok(Some(worst))
+    }
+
+    /// The loops of a function with their limits: for each header of a strongly connected part.
+    fn loops(&self, graph: &Graph) -> Result<Vec<Loop>, BoundError> {
+        let mut loops = Vec::new();
+        let mut parts = vec![graph.blocks.keys().copied().collect::<BTreeSet<u32>>()];
+        while let Some(part) = parts.pop() {
+            for connected in strongly_connected(graph, &part) {
+                let inside = |address: &u32| connected.contains(address);
+                let headers: Vec<u32> = connected
+                    .iter()
+                    .copied()
+                    .filter(|to| {
+                        *to == graph.entry
+                            || graph.blocks.iter().any(|(from, block)| {
+                                !inside(from) && block.successors.iter().any(|(at, _)| at == to)
+                            })
+                    })
+                    .collect();
+                let [header] = headers[..] else {
+                    return Err(BoundError::Irreducible {
+                        address: connected.first().copied().unwrap_or_default(),
+                    });
+                };
+                let limit = self
+                    .limits
+                    .of(self.image, graph, &connected)
+                    .ok_or_else(|| {
+                        let frames = self.image.frames(header);
+                        let places: Vec<String> = frames
+                            .iter()
+                            .take(3)
+                            .map(|frame| {
+                                format!("{} ({}:{})", frame.function, frame.file, frame.line)
+                            })
+                            .collect();
+                        BoundError::Unbounded {
+                            address: header,
+                            place: places.join(" in "),
+                        }
+                    })?;
+                let mut inner = connected.clone();
+                inner.remove(&header);
+                parts.push(inner);
+                loops.push(Loop {
+                    header,
+                    blocks: connected,
+                    limit,
+                });
+            }
+        }
+        Ok(loops)
+    }
+}
+
+/// Blocks in the order in which a path first comes to them.
+fn in_order(
+    entry: u32,
+    next: &BTreeMap<u32, Vec<u32>>,
+    visits: &BTreeMap<u32, Visit>,
+) -> Vec<Visit> {
+    // The reverse of the order in which a depth-first search leaves them.
+    let (mut seen, mut left) = (BTreeSet::new(), Vec::new());
+    let mut stack = vec![(entry, false)];
+    while let Some((at, done)) = stack.pop() {
+        if done {
+            left.extend(visits.get(&at).copied());
+        } else if seen.insert(at) {
+            stack.push((at, true));
+            let after = next.get(&at).into_iter().flatten();
+            stack.extend(after.map(|to| (*to, false)));
+        }
+    }
+    left.reverse();
+    left
+}
+
+/// Strongly connected parts of more than one block, or of one that follows itself, within `part`.
+fn strongly_connected(graph: &Graph, part: &BTreeSet<u32>) -> Vec<BTreeSet<u32>> {
+    let successors = |from: u32| {
+        let block = graph.blocks.get(&from);
+        let all = block.into_iter().flat_map(|block| &block.successors);
+        all.map(|(to, _)| *to).filter(|to| part.contains(to))
+    };
+    // Kosaraju: the order in which a search ends, then searches against the arrows.
+    let (mut seen, mut order) = (BTreeSet::new(), Vec::new());
+    for root in part {
+        let mut stack = vec![(*root, false)];
+        while let Some((at, done)) = stack.pop() {
+            if done {
+                order.push(at);
+            } else if seen.insert(at) {
+                stack.push((at, true));
+                stack.extend(successors(at).map(|to| (to, false)));
+            }
+        }
+    }
+    let mut before: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for from in part {
+        for to in successors(*from) {
+            before.entry(to).or_default().push(*from);
+        }
+    }
+    let (mut taken, mut found) = (BTreeSet::new(), Vec::new());
+    for root in order.into_iter().rev() {
+        let mut connected = BTreeSet::new();
+        let mut stack = vec![root];
+        while let Some(at) = stack.pop() {
+            if taken.insert(at) {
+                connected.insert(at);
+                stack.extend(before.get(&at).into_iter().flatten());
+            }
+        }
+        let again = connected.len() > 1
+            || connected
+                .iter()
+                .any(|at| successors(*at).any(|to| to == *at));
+        if again && !connected.is_empty() {
+            found.push(connected);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests;

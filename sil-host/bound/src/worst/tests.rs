@@ -1,0 +1,99 @@
+//! Worst cases of code that is short enough to count by hand.
+
+use super::*;
+use crate::loops::Declared;
+
+const AT: u32 = 0x0800_1000;
+
+fn worst(code: &[u16], limits: &[(&'static str, Limit)]) -> Result<Option<Worst>, BoundError> {
+    let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
+    let image = Image::of_code(AT, &bytes, "kernel");
+    let declared = limits.iter().map(|(function, limit)| Declared {
+        function,
+        limit: *limit,
+        because: "",
+    });
+    let limits = Limits(declared.collect());
+    Analysis::new(&image, &limits)?.of(AT)
+}
+
+/// movs r0, #3; again: subs r0, #1; bne again; bx lr
+const COUNT_DOWN: [u16; 4] = [0x2003, 0x3801, 0xd1fd, 0x4770];
+
+#[test]
+fn a_loop_costs_its_rounds() {
+    let cycles = |times| {
+        let worst = worst(&COUNT_DOWN, &[("kernel", Limit::Times(times))]);
+        let worst = worst.unwrap().unwrap();
+        assert_eq!(worst.instructions, 2 + 2 * times);
+        worst.cycles
+    };
+    // Subtract, branch, refill, line read anew.
+    assert_eq!(
+        cycles(3) - cycles(2),
+        1 + 1 + PIPELINE_REFILL + FLASH_WAIT_STATES
+    );
+    assert_eq!(cycles(1), 4);
+}
+
+#[test]
+fn a_loop_that_waits_costs_its_time_and_two_rounds() {
+    let worst = worst(&COUNT_DOWN, &[("kernel", Limit::Cycles(1000))]);
+    let cycles = worst.unwrap().unwrap().cycles;
+    assert!((1002..1060).contains(&cycles), "{cycles}");
+}
+
+#[test]
+fn a_loop_without_a_limit_is_refused_by_name() {
+    let error = worst(&COUNT_DOWN, &[("other", Limit::Times(1))]).unwrap_err();
+    assert!(error.to_string().contains("in kernel"), "{error}");
+}
+
+#[test]
+fn the_more_expensive_way_is_taken() {
+    // cmp r0, #0; beq end; vdiv.f32 s0, s0, s1; end: bx lr
+    let code = [0x2800, 0xd001, 0xee80, 0x0a20, 0x4770];
+    let worst = worst(&code, &[]).unwrap().unwrap();
+    assert_eq!(worst.cycles, 1 + 1 + 14 + 1);
+    assert_eq!(worst.path.len(), 3);
+}
+
+#[test]
+fn what_is_used_at_once_and_what_lies_in_a_peripheral_waits() {
+    // vadd.f32 s0, s0, s1; vadd.f32 s0, s0, s1 (then s2, s2); bx lr
+    let used = worst(&[0xee30, 0x0a20, 0xee30, 0x0a20, 0x4770], &[]);
+    let free = worst(&[0xee30, 0x0a20, 0xee31, 0x1a21, 0x4770], &[]);
+    let [used, free] = [used, free].map(|worst| worst.unwrap().unwrap().cycles);
+    assert_eq!(used, free + 1);
+    // movw r0, #0; movt r0, #0x4001 or #0x2000; ldr r1, [r0]; bx lr
+    let load = |upper: u16| {
+        worst(
+            &[
+                0xf240,
+                0x0000,
+                0xf2c0 | upper >> 12,
+                upper & 0xff,
+                0x6801,
+                0x4770,
+            ],
+            &[],
+        )
+    };
+    let peripheral = load(0x4001).unwrap().unwrap().cycles;
+    let memory = load(0x2000).unwrap().unwrap().cycles;
+    assert_eq!(peripheral, memory + crate::cycles::PERIPHERAL_WAIT);
+}
+
+#[test]
+fn a_function_that_calls_itself_is_refused() {
+    // bl here; bx lr
+    let error = worst(&[0xf7ff, 0xfffe, 0x4770], &[]).unwrap_err();
+    assert!(matches!(error, BoundError::Recursion { .. }), "{error}");
+}
+
+#[test]
+fn an_instruction_of_unknown_cost_is_refused() {
+    // wfi
+    let error = worst(&[0xbf30, 0x4770], &[]).unwrap_err();
+    assert!(error.to_string().contains("wfi"), "{error}");
+}

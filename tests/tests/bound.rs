@@ -1,0 +1,35 @@
+//! The bound on the cycles of the control interrupt, from the machine code of the image that is
+//! flashed: it exists, and lies within the budget.
+
+use painleve_bound::report::Bound;
+use painleve_tests::flash_image;
+
+#[test]
+fn the_control_interrupt_has_a_bound_within_the_budget() {
+    let budget: serde_json::Value = serde_json::from_str(include_str!("../budget.json")).unwrap();
+    let most = budget["bound_cycles_of_control_interrupt"]
+        .as_u64()
+        .unwrap();
+    let bound = Bound::of(flash_image()).unwrap_or_else(|error| panic!("{error}"));
+    assert!(
+        u64::from(bound.cycles) <= most,
+        "more than the {most} cycles of budget.json:\n{}",
+        bound.text(),
+    );
+    let sum: u32 = bound.path.iter().map(|stretch| stretch.cycles).sum();
+    assert!(
+        bound.cycles.abs_diff(sum) < 200,
+        "the path explains {sum} cycles"
+    );
+    let functions: Vec<&str> = bound
+        .path
+        .iter()
+        .map(|stretch| &*stretch.function)
+        .collect();
+    for part in ["estimate::", "refer::", "law::", "drive::"] {
+        assert!(
+            functions.iter().any(|name| name.contains(part)),
+            "{functions:?}"
+        );
+    }
+}
