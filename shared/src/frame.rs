@@ -4,7 +4,8 @@
 //! [`ActuatorFrame`] that echoes its tick. Both counters wrap; compare them by
 //! difference only.
 
-use bitflags::bitflags;
+pub use ::bitflags;
+use ::bitflags::bitflags;
 use serde::{Deserialize, Serialize};
 
 use crate::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};

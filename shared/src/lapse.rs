@@ -34,6 +34,13 @@ macro_rules! lapses {
                 pub const $origin: &[Self] = &[$(Self::$lapse),+];
             )+
 
+            /// Name of the limit and of the counter.
+            pub const fn key(self) -> &'static str {
+                match self {
+                    $($(Self::$lapse => stringify!($key)),+),+
+                }
+            }
+
             /// The fault that too many in a row become.
             pub const fn fault(self) -> Fault {
                 match self {

@@ -180,6 +180,8 @@ pub struct Variant {
     pub meaning: &'static str,
     /// Settings that come with it: a group or another choice.
     pub content: Option<Shape>,
+    /// Whether all of these must be given: they have no defaults.
+    pub complete: bool,
 }
 
 /// A type that a setting may have.
@@ -335,6 +337,8 @@ macro_rules! settings {
             $error,
         )?
     };
+    (@complete) => { false };
+    (@complete { $($field:ident)* }) => { true };
     (@content) => { ::core::option::Option::None };
     (@content ($content:ty)) => {
         ::core::option::Option::Some(<$content as $crate::settings::SettingValue>::SHAPE)
@@ -481,6 +485,7 @@ macro_rules! settings {
                     $crate::settings::Variant {
                         key: $key,
                         meaning: concat!($($meaning),+).trim_ascii(),
+                        complete: $crate::settings!(@complete $({ $($field)* })?),
                         content: $crate::settings!(@content
                             $(($content))?
                             $({$(

@@ -3,27 +3,31 @@
 use clap::Args;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{ContentArrangement, Table};
-use painleve_plant::scenario::{Scenario, built_in};
+use painleve_plant::scenario::{Scenario, built_in, describe};
 
 use super::{CommandError, say};
 
 /// Options of `painleve scenarios`.
 #[derive(Debug, Args)]
 pub struct ScenariosArguments {
-    /// Print this scenario (a name or a file) as TOML with every key.
+    /// Print this scenario (a name or a file) as TOML with every key, its range, unit and meaning.
     scenario: Option<String>,
+    /// Print a JSON Schema of scenario files, by which editors complete and check them.
+    #[arg(long, conflicts_with = "scenario")]
+    schema: bool,
     /// Override one key of it, as in belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "scenario")]
     overrides: Vec<String>,
 }
 
-/// Lists the built-in scenarios or prints one.
+/// Lists the built-in scenarios, or prints one or what one may hold.
 pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     if let Some(name) = &arguments.scenario {
         let scenario = Scenario::load(name, &arguments.overrides)?;
-        let text =
-            toml::to_string(&scenario).map_err(|error| CommandError::Output(error.to_string()))?;
-        return say(text.trim_end());
+        return say(scenario.to_commented_toml().trim_end());
+    }
+    if arguments.schema {
+        return say(format!("{:#}", describe::json_schema()));
     }
     let mut table = Table::new();
     table

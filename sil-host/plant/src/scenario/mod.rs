@@ -5,6 +5,7 @@
 //! refused, and every number is checked before anything starts.
 
 pub mod built_in;
+pub mod describe;
 mod load;
 
 use painleve_firmware::Configuration;

@@ -1,0 +1,101 @@
+//! What can be set, told from the declarations of the settings.
+//!
+//! - [`Scenario::to_commented_toml`]: a scenario with every key, its meaning, unit and range
+//! - [`json_schema`]: the same for editors
+//! - [`settings_table`]: tables for the documentation
+
+mod commented;
+mod markdown;
+mod schema;
+
+use std::f64::consts::PI;
+
+use painleve_shared::settings::{Field, Range, Shape};
+use serde::Serialize;
+use toml::{Table, Value};
+
+use super::Scenario;
+
+pub use markdown::settings_table;
+pub use schema::json_schema;
+
+/// Any settings as a TOML table; single precision keeps the digits that it was written with.
+fn table<T: Serialize>(settings: &T) -> Table {
+    let text = toml::to_string(settings).unwrap_or_default();
+    text.parse().unwrap_or_default()
+}
+
+/// The allowed values of a setting in words; empty where its type says it all.
+fn allowed(field: &Field) -> String {
+    let mut text = match (field.range, choice(&field.shape)) {
+        (Some(range), _) => interval(&range),
+        (None, Some(names)) => names,
+        (None, None) => match field.shape {
+            Shape::Switch => "true or false".into(),
+            _ => String::new(),
+        },
+    };
+    match field.shape {
+        Shape::Array { .. } => text = format!("each {text}"),
+        Shape::List { maximum_length, .. } => text = format!("up to {maximum_length} of {text}"),
+        _ => {}
+    }
+    if !field.unit.is_empty() {
+        text = format!("{text} {}", field.unit);
+    }
+    if matches!(field.shape, Shape::Optional(_)) {
+        text = format!("{text}, or absent");
+    }
+    text.trim_start_matches(", ").into()
+}
+
+fn interval(range: &Range) -> String {
+    format!("{} to {}", bound(range.minimum), bound(range.maximum))
+}
+
+fn bound(value: f64) -> String {
+    let size = value.abs();
+    if size == PI {
+        value.to_string().replace("3.141592653589793", "π")
+    } else if size != 0.0 && !(1e-3..1e6).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
+/// The names of a choice's variants.
+fn choice(shape: &Shape) -> Option<String> {
+    match shape {
+        Shape::Choice { variants, .. } => {
+            let names: Vec<_> = variants.iter().map(|it| it.key).collect();
+            let (last, others) = names.split_last()?;
+            Some(format!("{} or {last}", others.join(", ")))
+        }
+        Shape::Optional(item) | Shape::Array { item, .. } | Shape::List { item, .. } => {
+            choice(item)
+        }
+        _ => None,
+    }
+}
+
+/// The settings of a group, or of the group in an optional value.
+fn group(shape: &Shape) -> Option<&'static [Field]> {
+    match shape {
+        Shape::Group(fields) => Some(fields),
+        Shape::Optional(inner) => group(inner),
+        _ => None,
+    }
+}
+
+/// The default value at `path`, where a variant's name in the path chooses it.
+fn default_at(path: &[&str]) -> Option<Value> {
+    let chosen = path.iter().rev().skip(1).fold(Table::new(), |inner, key| {
+        Table::from_iter([((*key).to_string(), Value::Table(inner))])
+    });
+    let scenario: Scenario = Value::Table(chosen).try_into().unwrap_or_default();
+    path.iter()
+        .try_fold(Value::Table(table(&scenario)), |value, key| {
+            value.get(key).cloned()
+        })
+}
