@@ -78,54 +78,82 @@ pub struct BlockCost {
 }
 
 /// What one pass through a block costs once its first line is there, without the functions it calls.
+pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
+    let mut walk = Walk::from(constants.clone());
+    for (place, instruction) in block.instructions.iter().enumerate() {
+        walk.step(instruction, block.instructions.get(place + 1));
+    }
+    BlockCost {
+        cycles: walk.cycles,
+        reading: walk.reading,
+    }
+}
+
+/// Instructions one after the other.
 ///
 /// While a line is executed the accelerator reads the next one (RM0090, section 3.5.2, prefetch). A
 /// line therefore takes as long as its instructions or as the read, whichever is longer. Both
 /// grow with what the instructions cost, so that upper bounds of these give an upper bound.
-pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
-    let mut now = constants.clone();
-    let mut total = 0;
-    let mut line = None;
-    // Cycles since the flash began to read the line after this one.
-    let mut reading = 0;
-    for (place, instruction) in block.instructions.iter().enumerate() {
+#[derive(Clone, Debug, Default)]
+pub struct Walk {
+    /// Cycles so far.
+    pub cycles: u32,
+    constants: Constants,
+    line: Option<u32>,
+    /// Cycles since the flash began to read the line after this one.
+    reading: u32,
+}
+
+impl Walk {
+    /// A walk that starts in a line that is there.
+    pub fn from(constants: Constants) -> Self {
+        Self {
+            constants,
+            ..Self::default()
+        }
+    }
+
+    /// Executes an instruction; `next` is the one that is executed after it, if that is known.
+    pub fn step(&mut self, instruction: &Instruction, next: Option<&Instruction>) {
         let last_byte = instruction.address + instruction.size - 1;
         for touched in [instruction.address, last_byte].map(|at| at / FLASH_LINE_BYTES) {
-            if line.is_none_or(|line| line < touched) {
-                if line.is_some() {
-                    total += FLASH_READ.saturating_sub(reading);
-                    reading = 0;
+            match self.line {
+                Some(line) if line >= touched => {}
+                Some(_) => {
+                    self.cycles += FLASH_READ.saturating_sub(self.reading);
+                    self.reading = 0;
+                    self.line = Some(touched);
                 }
-                line = Some(touched);
+                None => self.line = Some(touched),
             }
         }
         let mut cycles = instruction.kind.cycles();
         if matches!(instruction.kind, Kind::Float | Kind::FloatMultiplyAdd) {
-            let next = block.instructions.get(place + 1);
             let uses = |next: &Instruction| {
-                instruction
-                    .writes
-                    .iter()
-                    .any(|register| next.reads.contains(register))
+                let mut written = instruction.writes.iter();
+                written.any(|register| next.reads.contains(register))
             };
             cycles += u32::from(next.is_none_or(uses));
         }
-        reading += cycles;
-        total += cycles;
-        match wait(instruction, &now) {
+        self.reading += cycles;
+        self.cycles += cycles;
+        match wait(instruction, &self.constants) {
             Some(FLASH_DATA_WAIT) => {
-                total += FLASH_DATA_WAIT;
+                self.cycles += FLASH_DATA_WAIT;
                 // The flash reads data first and begins with the next line afterwards.
-                reading = 0;
+                self.reading = 0;
             }
-            Some(cycles) => total += cycles,
+            Some(cycles) => self.cycles += cycles,
             None => {}
         }
-        follow(&mut now, instruction);
+        follow(&mut self.constants, instruction);
     }
-    BlockCost {
-        cycles: total,
-        reading,
+
+    /// Takes a branch: the pipeline is refilled from a line that is read anew.
+    pub fn branch(&mut self) {
+        self.cycles += PIPELINE_REFILL + FLASH_WAIT_STATES;
+        self.line = None;
+        self.reading = 0;
     }
 }
 

@@ -14,6 +14,7 @@ pub mod image;
 pub mod instruction;
 pub mod loops;
 pub mod report;
+pub mod trace;
 pub mod worst;
 
 use std::path::PathBuf;

@@ -10,7 +10,7 @@ use crate::BoundError;
 use crate::cycles::{EXCEPTION_ENTRY, EXCEPTION_EXIT, LAZY_FLOAT_STACKING};
 use crate::image::Image;
 use crate::loops::Limits;
-use crate::worst::{Analysis, Visit};
+use crate::worst::{Analysis, Loop, Visit};
 
 /// The handler of the control timer.
 pub const CONTROL_INTERRUPT: &str = "TIM2";
@@ -31,6 +31,9 @@ pub struct Bound {
     pub instructions: u32,
     /// The path, in order of execution.
     pub path: Vec<Stretch>,
+    /// Loops of the interrupt and of what it calls.
+    #[serde(skip)]
+    pub loops: Vec<Loop>,
 }
 
 /// A stretch of the path that comes from one function of the source.
@@ -59,7 +62,8 @@ impl Bound {
             path: path.to_owned(),
             reason: format!("there is no function {CONTROL_INTERRUPT}"),
         })?;
-        let worst = Analysis::new(&image, &limits)?.of(entry)?;
+        let mut analysis = Analysis::new(&image, &limits)?;
+        let worst = analysis.of(entry)?;
         let worst = worst.ok_or(BoundError::NeverReturns { address: entry })?;
         let cycles = EXCEPTION_ENTRY + LAZY_FLOAT_STACKING + worst.cycles + EXCEPTION_EXIT;
         Ok(Self {
@@ -68,6 +72,10 @@ impl Bound {
             proves_hz: (CORE_HZ / f64::from(cycles)) as u32,
             instructions: worst.instructions,
             path: stretches(&image, &worst.path),
+            loops: analysis
+                .functions()
+                .flat_map(|function| function.loops.iter().cloned())
+                .collect(),
         })
     }
 

@@ -55,8 +55,18 @@ pub struct Loop {
     pub header: u32,
     /// The blocks it consists of.
     pub blocks: BTreeSet<u32>,
+    /// First and last instruction of each.
+    pub addresses: Vec<(u32, u32)>,
     /// How long it goes on.
     pub limit: Limit,
+}
+
+impl Loop {
+    /// Whether an instruction is part of it; those of functions that it calls are not.
+    pub fn contains(&self, address: u32) -> bool {
+        let mut all = self.addresses.iter();
+        all.any(|(first, last)| (*first..=*last).contains(&address))
+    }
 }
 
 /// Finds the worst case of functions, once each.
@@ -334,6 +344,13 @@ impl<'a> Analysis<'a> {
                 parts.push(inner);
                 loops.push(Loop {
                     header,
+                    addresses: connected
+                        .iter()
+                        .filter_map(|block| {
+                            let last = graph.blocks[block].instructions.last()?;
+                            Some((*block, last.address))
+                        })
+                        .collect(),
                     blocks: connected,
                     limit,
                 });

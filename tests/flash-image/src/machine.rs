@@ -103,9 +103,37 @@ struct Core<C> {
     /// block's state.
     conditional: u32,
     stop: Option<Stop>,
+    /// Addresses of the instructions of a handler, from its first one on, while somebody asks.
+    trace: Option<Trace>,
     /// Something may have changed which exception comes next.
     is_dirty: bool,
     candidate: bool,
+}
+
+/// The executed instructions of one handler.
+#[derive(Clone, Debug)]
+struct Trace {
+    handler: u32,
+    /// The stack pointer before the handler's first instruction, while it runs.
+    stack: Option<u32>,
+    now: Vec<u32>,
+    done: Vec<Vec<u32>>,
+}
+
+impl Trace {
+    fn step(&mut self, address: u32, processor: &Processor) {
+        let stack = processor.get(Register::SP);
+        if address == self.handler {
+            self.stack = Some(stack);
+        } else if self.stack.is_some_and(|before| stack >= before) {
+            // The handler has unwound its frame: what was interrupted, or a handler after it.
+            self.stack = None;
+            self.done.push(std::mem::take(&mut self.now));
+        }
+        if self.stack.is_some() {
+            self.now.push(address);
+        }
+    }
 }
 
 impl<C: Chip> Core<C> {
@@ -171,6 +199,9 @@ impl<C: Chip> Surroundings for Core<C> {
             self.conditional = 4 - (opcode & 0xf).trailing_zeros();
         } else {
             self.conditional = self.conditional.saturating_sub(1);
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.step(address, processor);
         }
         self.instructions += 1;
         self.cycles += CYCLES_PER_INSTRUCTION;
@@ -281,6 +312,7 @@ impl<C: Chip> Machine<C> {
             instruction_limit: u64::MAX,
             conditional: 0,
             stop: None,
+            trace: None,
             is_dirty: true,
             candidate: false,
         };
@@ -326,6 +358,22 @@ impl<C: Chip> Machine<C> {
     /// Instructions executed since power came up.
     pub fn instructions(&self) -> u64 {
         self.unicorn.surroundings().instructions
+    }
+
+    /// Keeps the addresses of the instructions of a handler from now on.
+    pub fn trace(&mut self, handler: u32) {
+        self.unicorn.surroundings_mut().trace = Some(Trace {
+            handler: handler & !1,
+            stack: None,
+            now: Vec::new(),
+            done: Vec::new(),
+        });
+    }
+
+    /// The executions of the traced handler since the last call.
+    pub fn take_traces(&mut self) -> Vec<Vec<u32>> {
+        let trace = self.unicorn.surroundings_mut().trace.as_mut();
+        trace.map_or_else(Vec::new, |trace| std::mem::take(&mut trace.done))
     }
 
     /// The program counter.

@@ -1,0 +1,81 @@
+//! The cycle model over ticks that were executed: the bound must lie above every one of them, and
+//! no loop may go round more often than is declared.
+
+use std::collections::BTreeMap;
+
+use crate::BoundError;
+use crate::cost::Walk;
+use crate::cycles::{EXCEPTION_ENTRY, EXCEPTION_EXIT, LAZY_FLOAT_STACKING};
+use crate::image::Image;
+use crate::instruction::{Decoder, Instruction};
+use crate::worst::Loop;
+
+/// What an executed interrupt cost.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Executed {
+    /// Cycles by the model, every line a miss, with entry and exit.
+    pub cycles: u32,
+    /// Instructions.
+    pub instructions: u32,
+}
+
+/// Follows executed instructions of one image.
+pub struct Tracer<'a> {
+    image: &'a Image,
+    decoder: Decoder,
+    decoded: BTreeMap<u32, Instruction>,
+}
+
+impl<'a> Tracer<'a> {
+    /// For an image.
+    ///
+    /// # Errors
+    /// [`BoundError::Decoder`].
+    pub fn new(image: &'a Image) -> Result<Self, BoundError> {
+        Ok(Self {
+            image,
+            decoder: Decoder::new()?,
+            decoded: BTreeMap::new(),
+        })
+    }
+
+    /// What an interrupt cost whose instructions were at these addresses, in order.
+    ///
+    /// # Errors
+    /// [`BoundError`] at an instruction of unknown cost.
+    pub fn cost(&mut self, addresses: &[u32]) -> Result<Executed, BoundError> {
+        for address in addresses {
+            if !self.decoded.contains_key(address) {
+                let instruction = self.decoder.at(self.image, *address, false)?;
+                self.decoded.insert(*address, instruction);
+            }
+        }
+        let mut walk = Walk::default();
+        for (place, address) in addresses.iter().enumerate() {
+            let instruction = &self.decoded[address];
+            let next = addresses.get(place + 1).map(|next| &self.decoded[next]);
+            walk.step(instruction, next);
+            if next.is_some_and(|next| next.address != address + instruction.size) {
+                walk.branch();
+            }
+        }
+        Ok(Executed {
+            cycles: EXCEPTION_ENTRY + LAZY_FLOAT_STACKING + walk.cycles + EXCEPTION_EXIT,
+            instructions: addresses.len() as u32,
+        })
+    }
+}
+
+/// Most rounds that a loop went in executed instructions, of all the times it was entered.
+pub fn rounds(one: &Loop, addresses: &[u32]) -> u32 {
+    let (mut most, mut now, mut before) = (0, 0, None);
+    for address in addresses {
+        if *address == one.header {
+            let again = before.is_some_and(|before| one.contains(before));
+            now = if again { now + 1 } else { 1 };
+            most = most.max(now);
+        }
+        before = Some(*address);
+    }
+    most
+}

@@ -1,0 +1,253 @@
+#![allow(clippy::unwrap_used)]
+//! No tick that is executed costs more than the bound on the control interrupt, by the same model:
+//! closed loops, random frames, and frames searched for the worst tick.
+//!
+//! `PAINLEVE_TICKS` sets how many random frames and how many tries of the search there are.
+
+use painleve_bound::image::Image;
+use painleve_bound::loops::Limit;
+use painleve_bound::report::{Bound, CONTROL_INTERRUPT};
+use painleve_bound::trace::{Executed, Tracer, rounds};
+use painleve_flash_image::bench::{Bench, encoded, scenario};
+use painleve_flash_image::board::{self, Board};
+use painleve_plant::scenario::{Scenario, built_in};
+use painleve_plant::simulation::Simulation;
+use painleve_plant::statistics::Statistics;
+use painleve_shared::counts::{EncoderCounts, ForceCounts};
+use painleve_shared::frame::{DigitalInputs, SensorFrame};
+use painleve_shared::message::Plant;
+
+/// A generator of numbers that are random enough: SplitMix64 (Steele, Lea, Flood 2014).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, limit: u64) -> u64 {
+        self.next() % limit
+    }
+}
+
+fn tries(otherwise: u64) -> u64 {
+    let asked = std::env::var("PAINLEVE_TICKS").ok();
+    asked.and_then(|it| it.parse().ok()).unwrap_or(otherwise)
+}
+
+/// Executed interrupts against their bound.
+struct Watch<'a> {
+    bound: &'a Bound,
+    tracer: Tracer<'a>,
+    worst: Executed,
+    ticks: u64,
+}
+
+impl<'a> Watch<'a> {
+    fn new(image: &'a Image, bound: &'a Bound) -> Self {
+        Self {
+            bound,
+            tracer: Tracer::new(image).unwrap(),
+            worst: Executed::default(),
+            ticks: 0,
+        }
+    }
+
+    /// The worst of the interrupts that were executed since the last call.
+    fn look(&mut self, board: &mut Board) -> Executed {
+        let mut worst = Executed::default();
+        for addresses in board.machine.take_traces() {
+            let cost = self.tracer.cost(&addresses).unwrap();
+            assert!(cost.cycles <= self.bound.cycles, "{cost:?}");
+            for one in &self.bound.loops {
+                if let Limit::Times(times) = one.limit {
+                    let gone = rounds(one, &addresses);
+                    assert!(gone <= times, "{gone} rounds of {one:?}");
+                }
+            }
+            if cost.cycles > worst.cycles {
+                worst = cost;
+            }
+            self.ticks += 1;
+        }
+        if worst.cycles > self.worst.cycles {
+            self.worst = worst.clone();
+        }
+        worst
+    }
+}
+
+fn with_bound(run: impl FnOnce(&mut Watch<'_>)) {
+    let image = Image::read(&board::image()).unwrap();
+    let bound = Bound::of(&board::image()).unwrap_or_else(|error| panic!("{error}"));
+    let mut watch = Watch::new(&image, &bound);
+    run(&mut watch);
+    println!(
+        "{} interrupts, worst {} instructions, {} cycles by the model; bound {} cycles, {:.2} times as much",
+        watch.ticks,
+        watch.worst.instructions,
+        watch.worst.cycles,
+        bound.cycles,
+        f64::from(bound.cycles) / f64::from(watch.worst.cycles),
+    );
+    assert!(watch.ticks > 0);
+}
+
+fn traced(mut board: Board) -> Board {
+    let handler = board.machine.symbol(CONTROL_INTERRUPT).unwrap();
+    board.machine.trace(handler);
+    board
+}
+
+fn configured(scenario: &Scenario) -> Board {
+    let mut board = Board::booted();
+    board
+        .configure(Plant::Lockstep, &encoded(scenario))
+        .unwrap();
+    traced(board)
+}
+
+/// Built-in scenarios, the arm simulated, frames over the line.
+#[test]
+fn scenarios_stay_below_the_bound() {
+    with_bound(|watch| {
+        for name in built_in::names() {
+            let scenario = scenario(name);
+            let mut simulation = Simulation::new(&scenario).unwrap();
+            let mut statistics = Statistics::new(0.05);
+            let mut board = configured(&scenario);
+            let ticks = tries(300).min(scenario.run.ticks());
+            for _ in 0..ticks {
+                let frame = simulation.sample(&mut statistics).unwrap();
+                let answer = board.exchange(&frame).expect("an answer in time");
+                simulation.advance(Some(&answer), &mut statistics).unwrap();
+                watch.look(&mut board);
+            }
+        }
+    });
+}
+
+/// The arm on the board's own sensors.
+#[test]
+fn ticks_with_sensors_stay_below_the_bound() {
+    with_bound(|watch| {
+        let mut bench = Bench::new(&scenario("hybrid-elbow-down"));
+        let handler = bench.board.machine.symbol(CONTROL_INTERRUPT).unwrap();
+        bench.board.machine.trace(handler);
+        bench.drive();
+        for _ in 0..50 {
+            bench.tick();
+            watch.look(&mut bench.board);
+        }
+    });
+}
+
+fn mutated(frame: &SensorFrame, random: &mut Random) -> SensorFrame {
+    let mut frame = *frame;
+    for _ in 0..1 + random.below(3) {
+        let value = random.next();
+        let small = value as i32 % 64;
+        match random.below(9) {
+            0 => {
+                frame.joints[0] =
+                    EncoderCounts(frame.joints[0].0.wrapping_add_signed(small) & 0x3fff)
+            }
+            1 => {
+                frame.joints[1] =
+                    EncoderCounts(frame.joints[1].0.wrapping_add_signed(small) & 0x3fff)
+            }
+            2 => frame.joints[(value & 1) as usize] = EncoderCounts(random.next() as u32 & 0x3fff),
+            3 => frame.normal_force = ForceCounts(frame.normal_force.0 + small),
+            4 => frame.tangential_force = ForceCounts(frame.tangential_force.0 + small),
+            5 => frame.normal_force = ForceCounts(random.next() as i32 % 4096),
+            6 => frame.tangential_force = ForceCounts(random.next() as i32 % 4096),
+            7 => frame.inputs = DigitalInputs(value as u32 & 3),
+            _ => frame.sequence = frame.sequence.wrapping_add(random.below(4) as u32),
+        }
+    }
+    frame
+}
+
+/// Frames of a closed loop, disturbed at random.
+#[test]
+fn random_frames_stay_below_the_bound() {
+    with_bound(|watch| {
+        let names: Vec<&str> = built_in::names().collect();
+        let all = tries(400);
+        let mut random = Random(1);
+        for (place, name) in names.iter().enumerate() {
+            let scenario = scenario(name);
+            let mut simulation = Simulation::new(&scenario).unwrap();
+            let mut statistics = Statistics::new(0.05);
+            let mut board = configured(&scenario);
+            for tick in 0..all / names.len() as u64 {
+                let mut frame = simulation.sample(&mut statistics).unwrap();
+                if random.below(4) == 0 {
+                    frame = mutated(&frame, &mut random);
+                }
+                if place % 2 == 1 && tick % 50 == 49 {
+                    board
+                        .configure(Plant::Lockstep, &encoded(&scenario))
+                        .unwrap();
+                }
+                let answer = board.exchange(&frame);
+                simulation
+                    .advance(answer.as_ref(), &mut statistics)
+                    .unwrap();
+                watch.look(&mut board);
+            }
+        }
+    });
+}
+
+/// Hill climbing: from the state before the worst tick of a closed loop, frames that cost more.
+#[test]
+fn the_worst_frames_that_a_search_finds_stay_below_the_bound() {
+    with_bound(|watch| {
+        let mut random = Random(2);
+        for name in ["edge", "pid-elbow-down", "capture"] {
+            let scenario = scenario(name);
+            let mut simulation = Simulation::new(&scenario).unwrap();
+            let mut statistics = Statistics::new(0.05);
+            let mut board = configured(&scenario);
+            let mut start = (board.snapshot(), SensorFrame::default(), 0);
+            for _ in 0..150 {
+                let frame = simulation.sample(&mut statistics).unwrap();
+                let before = board.snapshot();
+                let answer = board.exchange(&frame);
+                simulation
+                    .advance(answer.as_ref(), &mut statistics)
+                    .unwrap();
+                let cycles = watch.look(&mut board).cycles;
+                if cycles > start.2 {
+                    start = (before, frame, cycles);
+                }
+            }
+            // A sequence of frames from there: each try disturbs one of them.
+            let mut best = vec![start.1; 6];
+            for (place, frame) in best.iter_mut().enumerate() {
+                frame.tick = frame.tick.wrapping_add(place as u32);
+                frame.sequence = frame.sequence.wrapping_add(place as u32);
+            }
+            let mut most = 0;
+            for _ in 0..tries(60) / 3 {
+                let mut tried = best.clone();
+                let place = random.below(tried.len() as u64) as usize;
+                tried[place] = mutated(&tried[place], &mut random);
+                board.restore(&start.0);
+                let mut cycles = 0;
+                for frame in &tried {
+                    board.exchange(frame);
+                    cycles = cycles.max(watch.look(&mut board).cycles);
+                }
+                if cycles >= most {
+                    (most, best) = (cycles, tried);
+                }
+            }
+        }
+    });
+}
