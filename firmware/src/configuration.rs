@@ -70,7 +70,16 @@ settings! {
     }
 }
 
-/// Configuration of the controller: what it is connected to, and its settings.
+/// Configuration of the controller: what it is connected to, and its settings. The default is the
+/// paper's arm at 1 kHz; another rate is
+///
+/// ```
+/// use painleve_firmware::{Configuration, Controller};
+///
+/// let configuration: Configuration = Configuration { tick_hz: 2000.0, ..Default::default() };
+/// let controller = Controller::new(&configuration)?;
+/// # Ok::<(), painleve_shared::range::OutOfRange>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Configuration<L: Law = LawSettings> {
     /// Control rate, Hz.

@@ -31,8 +31,8 @@ bitflags! {
         const ENABLE = 1;
         /// A rising edge clears a latched fault.
         const RESET = 1 << 1;
-        /// Makes the tick last until the next one is due. Only the emulated board has this
-        /// input, for tests of the lapse monitor.
+        /// Makes the tick last until the next one is due. Only an emulated board and a
+        /// process that goes by the clock have this input, for tests of the lapse monitor.
         const OVERLOAD = 1 << 31;
     }
 }

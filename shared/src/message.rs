@@ -20,7 +20,7 @@ pub enum Request<'a> {
     /// Start afresh; [`Response::Ready`] or [`Response::Refused`].
     Configure {
         /// Where its sensor frames come from.
-        plant: Plant,
+        source: FrameSource,
         /// Configuration of the controller, whose type is the controller's, by postcard.
         configuration: &'a [u8],
     },
@@ -32,13 +32,13 @@ pub enum Request<'a> {
 
 /// Where a controller's sensor frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Plant {
+pub enum FrameSource {
     /// From the host, in [`Request::Sensor`], who waits for every answer.
     Lockstep,
     /// From the host in time: a tick of the board's timer without a frame is a lapse.
     Realtime,
     /// From the board's own sensors, at every tick of its timer.
-    Real,
+    Sensors,
 }
 
 /// What the board answers.

@@ -18,7 +18,7 @@ use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
 use painleve_board::Serial;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::message::Plant;
+use painleve_shared::message::FrameSource;
 use painleve_system::lifetime::{Guarded, end_with_parent};
 
 use crate::serial_image;
@@ -129,7 +129,8 @@ impl Line {
             child.unwrap_or_else(|error| panic!("cannot start QEMU: {error}")),
         ));
         let configuration = Scenario::default().controller_configuration();
-        let answers = || Serial::open(&self.host_port, &configuration, Plant::Lockstep).is_ok();
+        let answers =
+            || Serial::open(&self.host_port, &configuration, FrameSource::Lockstep).is_ok();
         assert!((0..20).any(|_| answers()), "the board says nothing");
         board
     }

@@ -10,7 +10,7 @@ use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_shared::counts::{ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
-use painleve_shared::message::{Plant, Response};
+use painleve_shared::message::{FrameSource, Response};
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_tests::Bench;
 use painleve_tests::line::{Direction, Line, Noise};
@@ -85,7 +85,7 @@ fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
     let line = Line::new(Noise::Steady);
     let _board = line.start_board();
     let configuration = Scenario::default().controller_configuration();
-    let mut serial = Serial::open(&line.host_port, &configuration, Plant::Lockstep).unwrap();
+    let mut serial = Serial::open(&line.host_port, &configuration, FrameSource::Lockstep).unwrap();
     // Every byte wakes several threads, which takes a while on a busy machine.
     serial.set_silence_limit(Duration::from_secs(20));
     let (noisy, host) = first_ticks(OnBoard::new(serial));
@@ -175,7 +175,7 @@ impl Pressing {
             tangential_force: ForceCounts(-614),
             ..Default::default()
         };
-        let board = Serial::open(&line.host_port, &configuration, Plant::Realtime);
+        let board = Serial::open(&line.host_port, &configuration, FrameSource::Realtime);
         let mut board = board.expect("a board on the line");
         board.set_silence_limit(Duration::from_secs(20));
         Self { board, frame }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::boards;
 use crate::command::{ChoreError, cargo, run_with, workspace};
 
 /// The microcontroller's target.
@@ -27,18 +28,11 @@ enum Toolchain {
 /// # Errors
 /// If the target is not installed, or the build fails.
 pub fn run() -> Result<(), ChoreError> {
-    let build = [
-        "build",
-        "--profile",
-        PROFILE,
-        "--package",
-        "painleve-firmware",
-        "--features",
-        "image",
-        "--bins",
-        "--target",
-        TARGET,
-    ];
+    let boards = boards::all()?;
+    let mut build = vec!["build", "--profile", PROFILE, "--bins", "--target", TARGET];
+    for board in &boards {
+        build.extend(["--package", &board.package]);
+    }
     match toolchain()? {
         Toolchain::Installed => run_with(&cargo(), &build, &[]),
         Toolchain::Debian => {
@@ -53,7 +47,7 @@ pub fn run() -> Result<(), ChoreError> {
                 ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld"),
             ];
             run_with("/usr/bin/cargo", &build, &environment)?;
-            for name in ["painleve-qemu", "painleve-qemu-serial", "painleve-f405"] {
+            for name in boards.iter().flat_map(|board| &board.images) {
                 let built = workspace().join(format!("target/debian/{TARGET}/{PROFILE}/{name}"));
                 copy(&built, &image(name))?;
             }

@@ -1,11 +1,9 @@
 //! `cargo xtask flash`: builds the image for the STM32F405 and flashes it.
 
+use crate::boards;
 use crate::build_fw;
 use crate::command::{ChoreError, run_with};
 use crate::setup::starts;
-
-/// The chip, as probe-rs names it.
-const CHIP: &str = "STM32F405RGTx";
 
 /// Builds, flashes and starts the image, and shows its log.
 ///
@@ -19,11 +17,17 @@ pub fn run() -> Result<(), ChoreError> {
                 .into(),
         ));
     }
+    let boards = boards::all()?;
+    let flashable = boards
+        .iter()
+        .find_map(|board| Some((board.chip.as_ref()?, board.images.first()?)));
+    let (chip, image) =
+        flashable.ok_or_else(|| ChoreError("no board in firmware/boards has a chip".into()))?;
     build_fw::run()?;
-    let image = build_fw::image("painleve-f405");
+    let image = build_fw::image(image);
     run_with(
         "probe-rs",
-        &["run", "--chip", CHIP, &image.to_string_lossy()],
+        &["run", "--chip", chip, &image.to_string_lossy()],
         &[],
     )
 }

@@ -1,5 +1,6 @@
 //! The workspace's chores, as `cargo xtask …`: one local command equals CI.
 
+mod boards;
 mod build_fw;
 mod chaos;
 mod ci;

@@ -6,23 +6,15 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+use crate::boards;
 use crate::build_fw;
 use crate::command::{ChoreError, run_cargo, say, workspace};
 
-/// Most flash for code and constants, bytes.
-const FLASH_LIMIT: u64 = 64 * 1024;
-
-/// Most static RAM, bytes.
-const RAM_LIMIT: u64 = 16 * 1024;
-
-/// Most stack, bytes.
-const STACK_LIMIT: u64 = 4 * 1024;
+/// What the images may take besides, which the end-to-end tests hold them to as well.
+const BUDGET: &str = include_str!("../../tests/budget.json");
 
 /// How many of the largest symbols to show.
 const LARGEST: usize = 12;
-
-/// The images.
-const IMAGES: [&str; 2] = ["painleve-f405", "painleve-qemu"];
 
 /// Builds the images, prints their sizes, and runs one to measure its stack.
 ///
@@ -32,15 +24,19 @@ pub fn run() -> Result<(), ChoreError> {
     build_fw::run()?;
     run_cargo(&["build", "--release", "--package", "painleve-command"])?;
     let mut over = Vec::new();
-    for name in IMAGES {
+    let boards = boards::all()?;
+    let images = boards
+        .iter()
+        .flat_map(|board| board.images.iter().map(move |name| (board, name)));
+    for (board, name) in images {
         let path = build_fw::image(name);
         let error = |reason: String| ChoreError(format!("{}: {reason}", path.display()));
         let bytes = std::fs::read(&path).map_err(|cause| error(cause.to_string()))?;
         let image = object::File::parse(&*bytes).map_err(|cause| error(cause.to_string()))?;
         say(name)?;
         for (what, size, limit) in [
-            ("flash", flash_bytes(&image), FLASH_LIMIT),
-            ("static RAM", ram_bytes(&image), RAM_LIMIT),
+            ("flash", flash_bytes(&image), board.flash_bytes),
+            ("static RAM", ram_bytes(&image), board.ram_bytes),
         ] {
             over.extend(check(name, what, size, limit)?);
         }
@@ -53,11 +49,16 @@ pub fn run() -> Result<(), ChoreError> {
         }
     }
     say("painleve-qemu, most of every built-in scenario")?;
+    let budget: Value = serde_json::from_str(BUDGET)
+        .map_err(|cause| ChoreError(format!("tests/budget.json: {cause}")))?;
+    let stack_limit = budget["stack_bytes"]
+        .as_u64()
+        .ok_or_else(|| ChoreError("tests/budget.json says nothing of the stack".into()))?;
     over.extend(check(
         "painleve-qemu",
         "stack",
         stack_bytes()?,
-        STACK_LIMIT,
+        stack_limit,
     )?);
     if over.is_empty() {
         Ok(())

@@ -5,33 +5,17 @@ use crate::configuration::ControllerSettings;
 use crate::estimate::contact::Evidence;
 use crate::refer::reference::Program;
 use crate::supervise::lapses::Lapse;
-use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
+use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::DigitalInputs;
 use painleve_shared::status::SupervisorState;
 
 fn configuration() -> Configuration {
-    let encoder = EncoderScale {
-        bits: 14,
-        offset: EncoderCounts(0),
-    };
     Configuration {
-        tick_hz: 1000.0,
-        arm: Default::default(),
-        converters: Converters {
-            encoders: [encoder; 2],
-            force: LinearScale {
-                bits: 12,
-                range: 20.0,
-            },
-            torque: LinearScale {
-                bits: 12,
-                range: 5.0,
-            },
-        },
         settings: ControllerSettings {
             reference: Program::default(),
             ..Default::default()
         },
+        ..Default::default()
     }
 }
 

@@ -20,7 +20,7 @@ use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
 use painleve_firmware::Configuration;
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::message::{Health, MAXIMUM_LENGTH, Plant, Request, Response};
+use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire;
 use painleve_system::lifetime::{Guarded, end_with_parent};
 
@@ -135,7 +135,7 @@ impl Emulator {
             table.print_from(output);
         }
         match emulator.request(&Request::Configure {
-            plant: Plant::Lockstep,
+            source: FrameSource::Lockstep,
             configuration: &super::encode(configuration)?,
         })? {
             Response::Ready { .. } => Ok(emulator),

@@ -18,7 +18,7 @@ use nix::sys::termios::{
 };
 use painleve_firmware::Configuration;
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::message::{Health, MAXIMUM_LENGTH, Plant, Request, Response};
+use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox, WireError};
 
 use super::{Board, BoardError, LineHealth, SILENCE_LIMIT, TimedAnswer};
@@ -59,7 +59,7 @@ pub struct Serial {
 }
 
 impl Serial {
-    /// Opens the port and gives the board its configuration. With [`Plant::Realtime`] the
+    /// Opens the port and gives the board its configuration. With [`FrameSource::Realtime`] the
     /// board counts its ticks without a frame, and stops after too many.
     ///
     /// # Errors
@@ -68,7 +68,7 @@ impl Serial {
     pub fn open(
         path: &Path,
         configuration: &Configuration,
-        plant: Plant,
+        source: FrameSource,
     ) -> Result<Self, BoardError> {
         let port = open(path)?;
         let period = Duration::from_secs_f32(1.0 / configuration.tick_hz);
@@ -77,9 +77,9 @@ impl Serial {
             inbox: Inbox::new(),
             pending: Vec::new(),
             line: LineHealth::default(),
-            frame_patience: match plant {
-                Plant::Lockstep => LOCKSTEP_PATIENCE.max(REALTIME_PATIENCE_TICKS * period),
-                Plant::Realtime | Plant::Real => REALTIME_PATIENCE_TICKS * period,
+            frame_patience: match source {
+                FrameSource::Lockstep => LOCKSTEP_PATIENCE.max(REALTIME_PATIENCE_TICKS * period),
+                FrameSource::Realtime | FrameSource::Sensors => REALTIME_PATIENCE_TICKS * period,
             },
             silence_limit: SILENCE_LIMIT,
             stopwatch_hz: 0,
@@ -88,7 +88,7 @@ impl Serial {
         serial.port.write_all(&[0])?;
         let configuration = super::encode(configuration)?;
         let request = Request::Configure {
-            plant,
+            source,
             configuration: &configuration,
         };
         let is_wanted =

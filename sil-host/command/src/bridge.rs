@@ -10,7 +10,7 @@ use painleve_board::timing::{TickTimes, TimingReport};
 use painleve_board::{Board, BoardError, LineHealth, Serial};
 use painleve_firmware::Configuration;
 use painleve_link::{BusName, ControllerEnd, Pacing, Received};
-use painleve_shared::message::Plant;
+use painleve_shared::message::FrameSource;
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
@@ -102,17 +102,17 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
         }),
         Target::Serial { bus, port, timing } => {
             carry(bus, timing.as_deref(), |configuration, pacing| {
-                Serial::open(port, configuration, plant(pacing))
+                Serial::open(port, configuration, frame_source(pacing))
             })
         }
     }
 }
 
 /// A board that is to keep time counts the ticks without a frame.
-fn plant(pacing: Pacing) -> Plant {
+fn frame_source(pacing: Pacing) -> FrameSource {
     match pacing {
-        Pacing::Lockstep => Plant::Lockstep,
-        Pacing::Realtime => Plant::Realtime,
+        Pacing::Lockstep => FrameSource::Lockstep,
+        Pacing::Realtime => FrameSource::Realtime,
     }
 }
 

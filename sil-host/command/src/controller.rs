@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use clap::Args;
-use painleve_firmware::{Configuration, Controller};
-use painleve_link::{BusName, ControllerEnd, Pacing, Received};
+use painleve_firmware::Configuration;
+use painleve_firmware::drive::ControlTask;
+use painleve_link::{BusDrive, BusName, ControllerEnd, Pacing};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
@@ -33,7 +34,7 @@ fn answer_until(
     interrupt: &Interrupt,
 ) -> Result<(), CommandError> {
     let wait = Duration::from_secs_f64(arguments.wait_s);
-    let (mut end, session) = ControllerEnd::open(&arguments.bus, wait, interrupt)?;
+    let (end, session) = ControllerEnd::open(&arguments.bus, wait, interrupt)?;
     let bad_session = |reason: String| {
         CommandError::Process(format!(
             "the plant on bus {} sent a configuration that this controller refuses: {reason}",
@@ -42,16 +43,21 @@ fn answer_until(
     };
     let configuration: Configuration = postcard::from_bytes(&session.configuration)
         .map_err(|error| bad_session(error.to_string()))?;
-    let mut controller =
-        Controller::new(&configuration).map_err(|error| bad_session(error.to_string()))?;
     if session.pacing == Pacing::Realtime {
         warn(format_args!("controller: {}", request_realtime()));
     }
-    while let Received::Frame(frame) = end.receive()? {
-        end.send(&controller.tick(&frame))?;
+    let drive = BusDrive::new(end, &session);
+    let source = drive.source();
+    let mut task: ControlTask<BusDrive> = ControlTask::new(drive);
+    task.configure(&configuration, source)
+        .map_err(|error| bad_session(error.to_string()))?;
+    loop {
+        task.tick();
+        if let Some(outcome) = task.drive_mut().take_outcome() {
+            return Ok(outcome?);
+        }
         if interrupt.is_requested() {
             return Err(CommandError::Interrupted);
         }
     }
-    Ok(())
 }

@@ -15,6 +15,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use painleve_shared::status::Fault;
+
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
 use painleve_bound::BoundError;
@@ -65,6 +67,8 @@ const PEER_FAILED: u8 = 3;
 
 /// Exit code after Ctrl-C or a request to end.
 const INTERRUPTED: u8 = 130;
+/// Exit code of a run by the clock whose controller was too late too often.
+const DEADLINES_MISSED: u8 = 5;
 
 /// Why a command failed. Every message is one sentence for the user.
 #[derive(Debug, thiserror::Error)]
@@ -105,6 +109,9 @@ pub enum CommandError {
         /// Its exit code.
         code: u8,
     },
+    /// By the clock, ticks were late or lost too often in a row.
+    #[error("the controller missed its deadlines and took the torque off: {}", .0.description())]
+    DeadlinesMissed(Fault),
     /// Ctrl-C or a request to end.
     #[error("interrupted")]
     Interrupted,
@@ -115,7 +122,7 @@ pub enum CommandError {
 
 impl CommandError {
     /// 1: the plant failed, or a sweep is incomplete; 2: bad input; 3: a peer is missing or has died;
-    /// 4: an output cannot be written; 130: interrupted.
+    /// 4: an output cannot be written; 5: deadlines missed; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
             Self::Scenario(_) | Self::SameFile(_) | Self::Bound(_) => 2,
@@ -138,6 +145,7 @@ impl CommandError {
             | Self::Process(_) => PEER_FAILED,
             Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => 4,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => INTERRUPTED,
+            Self::DeadlinesMissed(_) => DEADLINES_MISSED,
             Self::Told { code } => *code,
             Self::Unread => 0,
         }

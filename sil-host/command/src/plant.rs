@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use painleve_firmware::supervise::lapses::Lapse;
 use painleve_link::lockstep::Lockstep;
 use painleve_link::paced::Paced;
 use painleve_link::{BusName, Pacing, PlantEnd, Session};
@@ -11,6 +12,7 @@ use painleve_plant::controller_host::ControllerHost;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_record::report::{Percentiles, RunReport};
+use painleve_shared::status::Fault;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
@@ -63,7 +65,15 @@ fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), Co
     match simulate(arguments, &scenario, interrupt, &mut output) {
         Ok(report) => {
             output.finish()?;
-            super::run::print(&report, arguments.json)
+            super::run::print(&report, arguments.json)?;
+            match report.fault.and_then(Fault::from_code) {
+                Some(fault)
+                    if arguments.scenario.pacing == Pacing::Realtime && is_of_deadlines(fault) =>
+                {
+                    Err(CommandError::DeadlinesMissed(fault))
+                }
+                _ => Ok(()),
+            }
         }
         Err(error) => {
             let error = or_interrupted(Err(error), interrupt);
@@ -75,6 +85,13 @@ fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), Co
             error
         }
     }
+}
+
+/// Whether a fault says that ticks were late or lost, and nothing about the arm.
+fn is_of_deadlines(fault: Fault) -> bool {
+    [Lapse::Overrun, Lapse::MissingFrame, Lapse::LostFrame]
+        .into_iter()
+        .any(|lapse| lapse.fault() == fault)
 }
 
 /// Runs the scenario to its end.

@@ -19,7 +19,7 @@ use painleve_system::terminal::warn;
 
 use super::bridge::ImageArguments;
 use super::output::OutputArguments;
-use super::{CommandError, INTERRUPTED, PEER_FAILED, say};
+use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
 
 /// A run of the robustness campaign.
 #[derive(Clone, Copy, Debug)]
@@ -199,7 +199,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let mut controller = Process::start(controller_arguments(arguments), &bus, stderr)?;
 
     let status = watch(&mut plant, &mut controller, &interrupt)?;
-    if !status.success() {
+    let deadlines_missed = status.code() == Some(i32::from(DEADLINES_MISSED));
+    if !status.success() && !deadlines_missed {
         // A plant that blames the controller does not know why a board stopped; its bridge does.
         if status.code() == Some(i32::from(PEER_FAILED))
             && arguments.host != Host::Native
@@ -233,7 +234,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let report: RunReport = serde_json::from_str(&text).map_err(|error| {
         CommandError::Process(format!("the plant process gave no report: {error}"))
     })?;
-    print(&report, arguments.json)
+    print(&report, arguments.json)?;
+    if deadlines_missed {
+        return Err(failure(status));
+    }
+    Ok(())
 }
 
 /// Waits for the plant's end, and sees to it that one comes.

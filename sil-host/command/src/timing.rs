@@ -13,7 +13,7 @@ use painleve_plant::controller_host::{ControllerHost, InProcess};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_plant::simulation::Simulation;
-use painleve_shared::message::Plant;
+use painleve_shared::message::FrameSource;
 use painleve_system::atomic_file::{self, AtomicFile};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
@@ -105,7 +105,7 @@ fn measure(
     let configuration = scenario.controller_configuration();
     match (arguments.host, &arguments.port) {
         (Host::Serial, Some(port)) => {
-            let board = Serial::open(port, &configuration, Plant::Realtime)?;
+            let board = Serial::open(port, &configuration, FrameSource::Realtime)?;
             on_board(scenario, board, interrupt)
         }
         (Host::Native, _) => by_the_clock(scenario, interrupt),

@@ -39,6 +39,8 @@ pub struct ControllerEnd {
     claim: Claim,
     silence_limit: Duration,
     interrupt: Interrupt,
+    /// With the plant, since its last frame.
+    patience: Patience,
     /// `End` has arrived.
     ended: bool,
 }
@@ -134,6 +136,7 @@ impl ControllerEnd {
     /// long to stop the plant at breakpoints.
     pub fn set_silence_limit(&mut self, limit: Duration) {
         self.silence_limit = limit;
+        self.patience = Patience::new(limit);
     }
 
     /// Waits for the next sensor frame or the end of the session.
@@ -145,14 +148,35 @@ impl ControllerEnd {
     /// [`LinkError::PlantSilent`] after the silence limit, [`LinkError::Interrupted`],
     /// [`LinkError::Incompatible`], [`LinkError::Transport`].
     pub fn receive(&mut self) -> Result<Received, LinkError> {
-        let mut patience = Patience::new(self.silence_limit);
+        loop {
+            if let Some(received) = self.receive_before(None)? {
+                return Ok(received);
+            }
+        }
+    }
+
+    /// The same until `deadline`; `None` if nothing has come by then. If several frames have, the
+    /// newest one: the others are lost, which its `sequence` shows.
+    ///
+    /// # Errors
+    /// As [`ControllerEnd::receive`]; the silence limit counts on from call to call.
+    pub fn receive_newest(&mut self, deadline: Instant) -> Result<Option<Received>, LinkError> {
+        let mut newest = self.receive_before(Some(deadline))?;
+        while let (Some(Received::Frame(_)), Some(newer)) = (newest, self.take()?) {
+            newest = Some(Received::Frame(newer));
+        }
+        Ok(newest)
+    }
+
+    fn receive_before(&mut self, deadline: Option<Instant>) -> Result<Option<Received>, LinkError> {
         let mut known_gone = false;
         loop {
             if let Some(frame) = self.take()? {
-                return Ok(Received::Frame(frame));
+                self.patience = Patience::new(self.silence_limit);
+                return Ok(Some(Received::Frame(frame)));
             }
             if self.ended {
-                return Ok(Received::End);
+                return Ok(Some(Received::End));
             }
             // Frames sent before `End` come before it: the loop takes them first.
             self.ended = self.announcement()? == Some(Announcement::End);
@@ -164,12 +188,15 @@ impl ControllerEnd {
                     bus: self.bus().clone(),
                 });
             }
-            match patience.pause() {
+            match self.patience.pause() {
                 Next::Poll => {}
                 Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
                 // What was sent just before leaving still counts: poll once more.
                 Next::Look => known_gone = !self.claim.peer_is_alive(),
                 Next::GiveUp(silence) => return Err(self.silent_for(silence)),
+            }
+            if !known_gone && deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+                return Ok(None);
             }
         }
     }
@@ -275,6 +302,7 @@ fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
         guardian,
         claim,
         silence_limit: DEFAULT_SILENCE_LIMIT,
+        patience: Patience::new(DEFAULT_SILENCE_LIMIT),
         interrupt: interrupt.clone(),
         ended: false,
     };

@@ -30,6 +30,7 @@
 //! [`ActuatorFrame`]: painleve_shared::frame::ActuatorFrame
 
 mod bus;
+mod bus_drive;
 mod claim;
 mod controller_end;
 mod error;
@@ -46,6 +47,7 @@ mod session;
 mod tests;
 
 pub use bus::BusName;
+pub use bus_drive::BusDrive;
 pub use controller_end::{ControllerEnd, Received};
 pub use error::LinkError;
 pub use patience::DEFAULT_SILENCE_LIMIT;

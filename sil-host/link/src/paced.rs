@@ -1,5 +1,6 @@
 //! A controller in another process, by the clock: a tick lasts as long as its
-//! simulated time, and an answer that is not there at its end is missed.
+//! simulated time, and an answer that is not there at its end is missed. A late answer is obeyed
+//! only if it tells of a fault: the controller has taken the torque off.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -56,6 +57,7 @@ impl ControllerHost for Paced {
         let start = Instant::now();
         self.end.send(frame).map_err(HostError::new)?;
         let mut answer = None;
+        let mut late_fault = None;
         let mut round_trip = self.period;
         while start.elapsed() < self.patience {
             match self.end.try_receive().map_err(HostError::new)? {
@@ -65,7 +67,7 @@ impl ControllerHost for Paced {
                     break;
                 }
                 // The late answer to a tick that has been given up.
-                Some(_) => {}
+                Some(late) => late_fault = late.latched_fault().map(|_| late),
                 None if start.elapsed() < BUSY => std::thread::yield_now(),
                 None => std::thread::sleep(NAP),
             }
@@ -75,7 +77,7 @@ impl ControllerHost for Paced {
         self.lateness_ns.saturating_record(nanoseconds);
         self.missed_deadlines += u64::from(late >= self.period);
         Ok(Answer {
-            frame: answer,
+            frame: answer.or(late_fault),
             round_trip,
         })
     }

@@ -5,7 +5,7 @@ use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_shared::message::{Plant, Response};
+use painleve_shared::message::{FrameSource, Response};
 
 use crate::board::{self, Board};
 use crate::stm32f4::Pin;
@@ -79,7 +79,9 @@ impl Bench {
             is_held: true,
         };
         bench.present();
-        let response = bench.board.configure(Plant::Real, &encoded(scenario));
+        let response = bench
+            .board
+            .configure(FrameSource::Sensors, &encoded(scenario));
         assert!(
             matches!(response, Some(Response::Ready { .. })),
             "{response:?}"

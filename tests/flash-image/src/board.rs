@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use painleve_parts::{As5048a, Mcp3304, SpiPart, Transfer};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_shared::message::{MAXIMUM_LENGTH, Plant, Request, Response};
+use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox};
 
 use crate::machine::{self, Machine, Reset};
@@ -267,9 +267,9 @@ impl Board {
     }
 
     /// Sends a configuration; the bytes come from postcard.
-    pub fn configure(&mut self, plant: Plant, configuration: &[u8]) -> Option<Response> {
+    pub fn configure(&mut self, source: FrameSource, configuration: &[u8]) -> Option<Response> {
         self.send(&Request::Configure {
-            plant,
+            source,
             configuration,
         });
         self.reply(20 * MILLISECOND)

@@ -6,7 +6,7 @@ use painleve_flash_image::bench::{encoded, scenario};
 use painleve_flash_image::board::Board;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
-use painleve_shared::message::{Plant, Response};
+use painleve_shared::message::{FrameSource, Response};
 
 #[test]
 fn the_image_boots_and_waits_with_the_stages_off() {
@@ -22,7 +22,7 @@ fn frames_over_the_serial_line_are_answered_as_on_a_pc() {
     let mut simulation = Simulation::new(&scenario).unwrap();
     let mut statistics = Statistics::new(0.05);
     let mut board = Board::booted();
-    let ready = board.configure(Plant::Lockstep, &encoded(&scenario));
+    let ready = board.configure(FrameSource::Lockstep, &encoded(&scenario));
     assert!(matches!(ready, Some(Response::Ready { .. })), "{ready:?}");
     for _ in 0..200 {
         let frame = simulation.sample(&mut statistics).unwrap();

@@ -11,7 +11,7 @@ use painleve_flash_image::machine::Reset;
 use painleve_flash_image::{MICROSECOND, MILLISECOND};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
-use painleve_shared::message::{Plant, Request, Response};
+use painleve_shared::message::{FrameSource, Request, Response};
 use painleve_shared::wire;
 
 const DEFAULT: &str = "hybrid-elbow-down";
@@ -35,7 +35,7 @@ fn assert_off_in_time(mut bench: Bench) {
 fn in_lockstep() -> (Board, Simulation) {
     let scenario = scenario(DEFAULT);
     let mut board = Board::booted();
-    let response = board.configure(Plant::Lockstep, &encoded(&scenario));
+    let response = board.configure(FrameSource::Lockstep, &encoded(&scenario));
     assert!(matches!(response, Some(Response::Ready { .. })));
     (board, Simulation::new(&scenario).unwrap())
 }
@@ -85,7 +85,7 @@ fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
     while board.response(0).is_some() {}
     let mut buffer = [0; 1024];
     let request = Request::Configure {
-        plant: Plant::Real,
+        source: FrameSource::Sensors,
         configuration: &bytes,
     };
     let message = wire::encode(&request, &mut buffer).unwrap().to_vec();
@@ -272,7 +272,7 @@ fn nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before() {
         }
         board.wiring().force.dead = Some(level);
         board.machine.run_for(20 * MILLISECOND);
-        let response = board.configure(Plant::Real, &encoded(&scenario(DEFAULT)));
+        let response = board.configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
         assert!(matches!(response, Some(Response::Ready { .. })));
         for n in 0..600 {
             // It is opened and closed, too.
@@ -298,7 +298,7 @@ fn a_configuration_gets_through_while_the_arm_is_driven() {
     let mut bench = driven();
     let response = bench
         .board
-        .configure(Plant::Real, &encoded(&scenario(DEFAULT)));
+        .configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
     assert_eq!(bench.board.machine.chip().usart.overruns, 0);
     assert!(
         matches!(response, Some(Response::Ready { .. })),

@@ -1,15 +1,13 @@
 //! What the tasks need of a board. Nothing else differs between boards.
 
 use painleve_firmware::Configuration;
-use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_shared::message::Plant;
-use stm32f4xx_hal::pac;
-
-pub mod timer;
+use painleve_firmware::drive::Drive;
+use painleve_firmware::law::Law;
+use painleve_shared::frame::SensorFrame;
+use painleve_shared::message::FrameSource;
 
 /// Why a board does not start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-#[allow(dead_code, reason = "no board has all of them")]
 pub enum StartFault {
     /// The crystal oscillator or the phase-locked loop did not settle in time.
     Clock,
@@ -29,8 +27,10 @@ pub struct Parts<B: Board> {
 
 /// A microcontroller board with the arm, or a stand-in for it, on its pins.
 pub trait Board {
+    /// The chip's peripherals.
+    type Device;
     /// What the control task uses.
-    type Drive: Drive;
+    type Drive: BoardDrive;
     /// What the serial port's interrupt uses.
     type Bytes: Bytes;
     /// What the link task uses.
@@ -40,10 +40,7 @@ pub trait Board {
     const NAME: &'static str;
 
     /// Starts clocks, pins and peripherals in bounded time.
-    fn start(
-        device: pac::Peripherals,
-        core: cortex_m::Peripherals,
-    ) -> Result<Parts<Self>, StartFault>
+    fn start(device: Self::Device, core: cortex_m::Peripherals) -> Result<Parts<Self>, StartFault>
     where
         Self: Sized;
 
@@ -57,29 +54,15 @@ pub trait Board {
     fn idle();
 }
 
-/// The side of the control task; all of it in bounded time.
-pub trait Drive {
-    /// Starts the control timer's interrupt at the configuration's rate.
-    fn start(&mut self, configuration: &Configuration, plant: Plant);
+/// The side of the control task: a [`Drive`] whose timer can be started, and which may be given
+/// frames from the host instead of its own sensors'.
+pub trait BoardDrive: Drive {
+    /// Starts the control timer's interrupt at the configuration's rate, with frames from
+    /// `source`; a frame that was offered before is forgotten.
+    fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource);
 
-    /// Takes note of the timer's interrupt.
-    fn begin_tick(&mut self);
-
-    /// The tick is finished: feeds the watchdogs.
-    fn end_tick(&mut self) {}
-
-    /// Whether the timer's interrupt has come again since [`Drive::begin_tick`].
-    fn next_tick_is_due(&self) -> bool;
-
-    /// What the sensors read. `from_host` is the newest frame from the link, for
-    /// a plant that is simulated on the other side of it.
-    fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame>;
-
-    /// Puts out the torques.
-    fn actuate(&mut self, answer: &ActuatorFrame);
-
-    /// A running count for [`Response::Actuator`](painleve_shared::message::Response).
-    fn stopwatch(&self) -> u32;
+    /// Takes the newest frame from the link, for a plant that is simulated on the other side of it.
+    fn offer(&mut self, frame: SensorFrame);
 
     /// How fast [`Drive::stopwatch`] counts, Hz.
     fn stopwatch_hz(&self) -> u32;

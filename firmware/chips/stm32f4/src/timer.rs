@@ -15,7 +15,6 @@ pub fn start(timer: &TIM2, counts: f32) {
 
 /// Sets the count to zero. Not under QEMU 7.2, whose timer has no count of its own but
 /// tells the time since its start, and where whatever was set back is added to every period.
-#[allow(dead_code, reason = "for boards with a timer of silicon")]
 pub fn set_back(timer: &TIM2) {
     timer.egr().write(|w| w.ug().set_bit());
 }

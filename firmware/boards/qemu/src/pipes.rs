@@ -11,13 +11,16 @@
 
 use defmt_semihosting as _;
 use painleve_firmware::Configuration;
+use painleve_firmware::drive::Drive;
+use painleve_firmware::law::Law;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
-use painleve_shared::message::Plant;
+use painleve_shared::message::FrameSource;
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use stm32f4xx_hal::pac;
 
-use crate::board::{Board, Bytes, Drive, Parts, Port, StartFault, timer};
+use painleve_image::board::{Board, BoardDrive, Bytes, Parts, Port, StartFault};
+use painleve_stm32f4::timer;
 
 /// QEMU's timers count nanoseconds of virtual time, whatever the clock tree says.
 const TIMER_HZ: f32 = 1e9;
@@ -26,6 +29,7 @@ const TIMER_HZ: f32 = 1e9;
 pub struct Qemu;
 
 impl Board for Qemu {
+    type Device = pac::Peripherals;
     type Drive = Timers;
     type Bytes = NoBytes;
     type Port = Pipes;
@@ -67,6 +71,8 @@ impl Board for Qemu {
 pub struct Timers {
     control: pac::TIM2,
     stopwatch: pac::TIM5,
+    /// Newest frame from the host: there is no other plant than a simulated one.
+    from_host: Option<SensorFrame>,
 }
 
 impl Timers {
@@ -74,37 +80,48 @@ impl Timers {
     pub fn start(control: pac::TIM2, stopwatch: pac::TIM5) -> Self {
         stopwatch.arr().write(|w| w.arr().set(u32::MAX));
         stopwatch.cr1().write(|w| w.cen().set_bit());
-        Self { control, stopwatch }
+        Self {
+            control,
+            stopwatch,
+            from_host: None,
+        }
     }
 }
 
 impl Drive for Timers {
-    fn start(&mut self, configuration: &Configuration, _: Plant) {
-        timer::start(&self.control, TIMER_HZ / configuration.tick_hz);
-    }
-
     fn begin_tick(&mut self) {
         timer::acknowledge(&self.control);
     }
 
-    fn next_tick_is_due(&self) -> bool {
-        timer::is_due(&self.control)
-    }
-
-    /// There is no other plant than a simulated one.
-    fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame> {
+    fn sample(&mut self) -> Option<SensorFrame> {
+        let frame = self.from_host.take();
         let overload = |frame: SensorFrame| frame.inputs.contains(DigitalInputs::OVERLOAD);
-        if from_host.is_some_and(overload) {
+        if frame.is_some_and(overload) {
             while !self.next_tick_is_due() {}
         }
-        from_host
+        frame
     }
 
     /// The answer on the link is the output.
     fn actuate(&mut self, _: &ActuatorFrame) {}
 
+    fn next_tick_is_due(&self) -> bool {
+        timer::is_due(&self.control)
+    }
+
     fn stopwatch(&self) -> u32 {
         self.stopwatch.cnt().read().bits()
+    }
+}
+
+impl BoardDrive for Timers {
+    fn start<L: Law>(&mut self, configuration: &Configuration<L>, _: FrameSource) {
+        self.from_host = None;
+        timer::start(&self.control, TIMER_HZ / configuration.tick_hz);
+    }
+
+    fn offer(&mut self, frame: SensorFrame) {
+        self.from_host = Some(frame);
     }
 
     fn stopwatch_hz(&self) -> u32 {

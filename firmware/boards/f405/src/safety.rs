@@ -59,7 +59,7 @@ pub fn take_torque_off() {
         port.bsrr().write(|w| w.br0().set_bit());
         port.moder().modify(|_, w| w.moder0().output());
         if rcc.apb1enr().read().dacen().bit_is_set() {
-            let code = u32::from(crate::f405::NO_TORQUE);
+            let code = u32::from(crate::NO_TORQUE);
             (*pac::DAC::ptr())
                 .dhr12rd()
                 .write(|w| w.bits(code << 16 | code));

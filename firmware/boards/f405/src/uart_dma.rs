@@ -8,7 +8,7 @@
 use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::pac::{self, DMA2, USART1};
 
-use crate::board::{Bytes, Port};
+use painleve_image::board::{Bytes, Port};
 
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 921_600;

@@ -17,6 +17,12 @@
 //! The torque stages are on only while the plant is the real one: with frames from the host nothing
 //! drives the arm.
 
+#![no_std]
+#![cfg(target_os = "none")]
+
+pub mod safety;
+pub mod uart_dma;
+
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use embedded_hal::delay::DelayNs;
@@ -26,20 +32,24 @@ use painleve_drivers::force_cell::{self, ForceCell};
 use painleve_drivers::plausibility::{Plausibility, Readings};
 use painleve_drivers::switches::Switches;
 use painleve_firmware::Configuration;
+use painleve_firmware::drive::Drive;
+use painleve_firmware::law::Law;
+use painleve_image::board::{Board, BoardDrive, Parts, StartFault};
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
-use painleve_shared::message::Plant;
+use painleve_shared::message::FrameSource;
 use painleve_shared::status::SupervisorState;
+use painleve_stm32f4::timer;
 use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PinState};
-use stm32f4xx_hal::pac::{self, SPI1, SPI2};
+pub use stm32f4xx_hal::pac;
+use stm32f4xx_hal::pac::{SPI1, SPI2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable};
 use stm32f4xx_hal::serial::{Serial, config};
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
 
-use crate::board::{Board, Drive, Parts, StartFault, timer};
-use crate::safety::{self, Watchdogs};
-use crate::uart_dma::{self, DmaBytes, DmaPort};
+use crate::safety::Watchdogs;
+use crate::uart_dma::{DmaBytes, DmaPort};
 
 /// Crystal, MHz.
 const CRYSTAL_MHZ: u32 = 8;
@@ -67,10 +77,22 @@ const FORCE_BUS_HZ: u32 = 1_312_500;
 const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
 const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
 
-/// See the module's page.
+/// The image for this board, with these laws.
+#[macro_export]
+macro_rules! image {
+    ($laws:ty) => {
+        ::painleve_image::tasks! {
+            board = $crate::F405, laws = $laws, device = $crate::pac,
+            control = TIM2, serial = USART1, link = SPI3
+        }
+    };
+}
+
+/// See the crate's page.
 pub struct F405;
 
 impl Board for F405 {
+    type Device = pac::Peripherals;
     type Drive = F405Drive;
     type Bytes = DmaBytes;
     type Port = DmaPort;
@@ -161,7 +183,8 @@ impl Board for F405 {
             torque_bits: DAC_BITS,
             encoder_bits: 14,
             force_bits: 13,
-            plant: Plant::Lockstep,
+            source: FrameSource::Lockstep,
+            from_host: None,
             sequence: 0,
         };
         drive.start_timer(IDLE_HZ);
@@ -245,7 +268,9 @@ pub struct F405Drive {
     torque_bits: u8,
     encoder_bits: u8,
     force_bits: u8,
-    plant: Plant,
+    source: FrameSource,
+    /// Newest frame from the host, if frames come from there.
+    from_host: Option<SensorFrame>,
     sequence: u32,
 }
 
@@ -305,23 +330,9 @@ impl F405Drive {
 }
 
 impl Drive for F405Drive {
-    fn start(&mut self, configuration: &Configuration, plant: Plant) {
-        let [encoder, _] = &configuration.converters.encoders;
-        self.encoder_bits = encoder.bits;
-        self.force_bits = configuration.converters.force.bits;
-        self.torque_bits = configuration.converters.torque.bits;
-        self.plant = plant;
-        // The switch has to be opened and closed anew, and the sensors looked at.
-        self.switches = Switches::default();
-        self.plausibility = Plausibility::default();
-        self.start_timer(configuration.tick_hz);
-    }
-
     fn begin_tick(&mut self) {
         timer::acknowledge(&self.timer);
-    }
-
-    fn end_tick(&mut self) {
+        // The tick before is finished, and this one is not too early.
         self.watchdogs.feed();
     }
 
@@ -329,15 +340,15 @@ impl Drive for F405Drive {
         timer::is_due(&self.timer)
     }
 
-    fn sample(&mut self, from_host: Option<SensorFrame>) -> Option<SensorFrame> {
-        match self.plant {
-            Plant::Lockstep | Plant::Realtime => from_host,
-            Plant::Real => Some(self.read_sensors()),
+    fn sample(&mut self) -> Option<SensorFrame> {
+        match self.source {
+            FrameSource::Lockstep | FrameSource::Realtime => self.from_host.take(),
+            FrameSource::Sensors => Some(self.read_sensors()),
         }
     }
 
     fn actuate(&mut self, answer: &ActuatorFrame) {
-        let drives = self.plant == Plant::Real
+        let drives = self.source == FrameSource::Sensors
             && answer.supervisor_state().is_some_and(|state| {
                 !matches!(state, SupervisorState::Idle | SupervisorState::Fault)
             });
@@ -353,6 +364,25 @@ impl Drive for F405Drive {
 
     fn stopwatch(&self) -> u32 {
         DWT::cycle_count()
+    }
+}
+
+impl BoardDrive for F405Drive {
+    fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource) {
+        let [encoder, _] = &configuration.converters.encoders;
+        self.encoder_bits = encoder.bits;
+        self.force_bits = configuration.converters.force.bits;
+        self.torque_bits = configuration.converters.torque.bits;
+        self.source = source;
+        self.from_host = None;
+        // The switch has to be opened and closed anew, and the sensors looked at.
+        self.switches = Switches::default();
+        self.plausibility = Plausibility::default();
+        self.start_timer(configuration.tick_hz);
+    }
+
+    fn offer(&mut self, frame: SensorFrame) {
+        self.from_host = Some(frame);
     }
 
     fn stopwatch_hz(&self) -> u32 {

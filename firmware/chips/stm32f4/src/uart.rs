@@ -3,13 +3,14 @@
 //! Its interrupt moves single bytes, 11 µs apart; the link task takes and gives them in bulk and
 //! may be late by a whole buffer: 5.5 ms.
 
+use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::nb;
 use stm32f4xx_hal::pac::{Interrupt, USART1};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::{Rx, RxListen, Serial, Tx, TxISR, TxListen};
 
-use crate::board::{Bytes, Port};
+use painleve_image::board::{Bytes, Port};
 
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 921_600;
@@ -101,7 +102,7 @@ impl Port for UartPort {
             let _ = self.to_send.enqueue(*byte);
         }
         // The interrupt takes the first byte and asks for itself from then on.
-        rtic::pend(Interrupt::USART1);
+        NVIC::pend(Interrupt::USART1);
         true
     }
 }

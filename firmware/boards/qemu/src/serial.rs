@@ -7,14 +7,15 @@ use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::{Serial, config};
 
-use crate::board::{Board, Parts, StartFault};
-use crate::qemu::{Qemu, Timers};
-use crate::uart::{self, UartBytes, UartPort};
+use crate::pipes::{Qemu, Timers};
+use painleve_image::board::{Board, Parts, StartFault};
+use painleve_stm32f4::uart::{self, UartBytes, UartPort};
 
 /// See the module's page.
 pub struct QemuSerial;
 
 impl Board for QemuSerial {
+    type Device = pac::Peripherals;
     type Drive = Timers;
     type Bytes = UartBytes;
     type Port = UartPort;

@@ -1,0 +1,36 @@
+//! QEMU's `netduinoplus2`, a board with an STM32F405, the chip that is flashed.
+//!
+//! - [`pipes`]: in lockstep with its host, deterministic to the instruction
+//! - [`serial`]: by a clock of its own, over the flash target's serial port
+
+#![no_std]
+#![cfg(target_os = "none")]
+
+pub mod pipes;
+pub mod serial;
+
+pub use pipes::Qemu;
+pub use serial::QemuSerial;
+pub use stm32f4xx_hal::pac;
+
+/// The image for the board in lockstep, with these laws.
+#[macro_export]
+macro_rules! image {
+    ($laws:ty) => {
+        ::painleve_image::tasks! {
+            board = $crate::Qemu, laws = $laws, device = $crate::pac,
+            control = TIM2, serial = USART1, link = SPI3
+        }
+    };
+}
+
+/// The image for the board over its serial port, with these laws.
+#[macro_export]
+macro_rules! serial_image {
+    ($laws:ty) => {
+        ::painleve_image::tasks! {
+            board = $crate::QemuSerial, laws = $laws, device = $crate::pac,
+            control = TIM2, serial = USART1, link = SPI3
+        }
+    };
+}

@@ -1,0 +1,363 @@
+//! The image's tasks, from the highest priority down:
+//!
+//! - `control`, the timer's interrupt at the control rate: sample → tick → actuate
+//! - `serial`, the serial port's interrupt: bytes from and to the host
+//! - `link`: requests from the host, responses to it
+//! - `idle`: the log
+//!
+//! `control` never waits: for `link` it leaves its answers in a bounded queue,
+//! for `idle` its events, and drops what does not fit.
+
+use core::panic::PanicInfo;
+
+use heapless::spsc::{Consumer, Producer};
+use painleve_firmware::Configuration;
+use painleve_firmware::drive::{Answered, ControlTask, TaskCounts};
+use painleve_firmware::law::Law;
+use painleve_firmware::supervise::lapses::Lapse;
+use painleve_shared::message::{MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, Request, Response};
+use painleve_shared::wire::{self, Inbox, WireError};
+use rtic::Mutex;
+use serde::de::DeserializeOwned;
+
+use crate::board::{Board, BoardDrive, Parts, Port};
+use crate::stack;
+pub use crate::watch::Change;
+use crate::watch::health;
+
+/// Answers that may wait for the link.
+pub const ANSWERS: usize = 4;
+
+/// Changes that may wait for the log.
+pub const EVENTS: usize = 8;
+
+/// What the tasks share.
+pub struct Control<D, L: Law> {
+    /// The control task.
+    pub task: ControlTask<D, L>,
+    /// Answers for which the link had no room.
+    pub dropped_responses: u32,
+    /// Ticks a second; 0 until there is a configuration.
+    pub tick_hz: u32,
+}
+
+/// What the link task keeps from one call to the next.
+pub struct Link<L: Law> {
+    inbox: Inbox,
+    decoded: Option<Configuration<L>>,
+    received: [u8; MAXIMUM_LENGTH],
+}
+
+impl<L: Law> Link<L> {
+    /// Nothing has been received.
+    pub const fn new() -> Self {
+        Self {
+            inbox: Inbox::new(),
+            decoded: None,
+            received: [0; MAXIMUM_LENGTH],
+        }
+    }
+}
+
+impl<L: Law> Default for Link<L> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Starts the board, or stops where it is.
+pub fn start<B: Board>(device: B::Device, core: cortex_m::Peripherals) -> Parts<B> {
+    stack::paint();
+    match B::start(device, core) {
+        Ok(parts) => parts,
+        Err(fault) => {
+            defmt::error!("{=str} does not start: {}", B::NAME, fault);
+            B::halt()
+        }
+    }
+}
+
+/// One control tick. Returns whether there is something for the link.
+pub fn control<D: BoardDrive, L: Law>(
+    control: &mut Control<D, L>,
+    answers: &mut Producer<'static, Response>,
+    events: &mut Producer<'static, Change>,
+    reported: &mut Change,
+) -> bool {
+    let Some(Answered { frame, elapsed }) = control.task.tick() else {
+        return false;
+    };
+    let response = Response::Actuator { frame, elapsed };
+    if answers.enqueue(response).is_err() {
+        control.dropped_responses = control.dropped_responses.wrapping_add(1);
+    }
+    let change = Change::of(&frame);
+    // What the queue has no room for is not said.
+    if change != *reported && events.enqueue(change).is_ok() {
+        *reported = change;
+    }
+    true
+}
+
+/// Sends answers, then serves requests until there are no more bytes.
+pub fn link<D, L, P>(
+    mut control: impl Mutex<T = Control<D, L>>,
+    port: &mut P,
+    answers: &mut Consumer<'static, Response>,
+    state: &mut Link<L>,
+) where
+    D: BoardDrive,
+    L: Law + DeserializeOwned,
+    P: Port,
+{
+    let Link {
+        inbox,
+        decoded,
+        received,
+    } = state;
+    while let Some(answer) = answers.dequeue() {
+        send(port, &answer);
+    }
+    loop {
+        let length = port.receive(received);
+        if length == 0 {
+            return;
+        }
+        let mut awaits_control = false;
+        for byte in received.iter().take(length) {
+            let Some(message) = inbox.push(*byte) else {
+                continue;
+            };
+            let request = wire::decode(message);
+            control.lock(|control| note_message(&mut control.task, &request));
+            let response = match request {
+                Ok(Request::Sensor(frame)) => {
+                    control.lock(|control| control.task.drive_mut().offer(frame));
+                    awaits_control = true;
+                    continue;
+                }
+                Ok(Request::Configure {
+                    source,
+                    configuration,
+                }) => {
+                    control.lock(|control| control.task.stop());
+                    decode(decoded, configuration);
+                    decoded
+                        .as_ref()
+                        .and_then(|configuration| {
+                            control.lock(|control| {
+                                control.dropped_responses = 0;
+                                control.tick_hz = configuration.tick_hz as u32;
+                                control.task.configure(configuration, source).ok()?;
+                                let drive = control.task.drive_mut();
+                                drive.start(configuration, source);
+                                Some(drive.stopwatch_hz())
+                            })
+                        })
+                        .map_or(Response::Refused, |stopwatch_hz| Response::Ready {
+                            stopwatch_hz,
+                        })
+                }
+                Ok(Request::Health) => {
+                    let mut health = control.lock(|control| health(control));
+                    // Looking at the stack takes too long to hold up the control task.
+                    health.stack_bytes = stack::high_water_bytes();
+                    Response::Health(health)
+                }
+                Err(_) => continue,
+            };
+            send(port, &response);
+        }
+        if awaits_control && P::HALF_DUPLEX {
+            // `control` calls again when it has an answer.
+            return;
+        }
+    }
+}
+
+/// Decodes a configuration; stores `None` if decoding fails.
+// Out of line: decoding takes more stack than anything else but making the controller, and the
+// two do not add up.
+#[inline(never)]
+fn decode<L: Law + DeserializeOwned>(configuration: &mut Option<Configuration<L>>, bytes: &[u8]) {
+    *configuration = None;
+    if let Ok(decoded) = postcard::from_bytes(bytes) {
+        *configuration = Some(decoded);
+    }
+}
+
+/// Counts broken messages; a good one starts the count over.
+fn note_message<D: BoardDrive, L: Law, M>(
+    task: &mut ControlTask<D, L>,
+    request: &Result<M, WireError>,
+) {
+    let broken = |kinds: &[WireError]| request.as_ref().is_err_and(|it| kinds.contains(it));
+    let checksum = broken(&[WireError::Checksum]);
+    let garbage = broken(&[WireError::Garbage, WireError::Content]);
+    task.note(Lapse::FailedChecksum, u32::from(checksum));
+    task.note(Lapse::Garbage, u32::from(garbage));
+}
+
+/// A response that the host does not take is lost; the host asks again or gives up.
+#[inline(never)]
+fn send(port: &mut impl Port, response: &Response) {
+    let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
+    if let Ok(bytes) = wire::encode(response, &mut buffer) {
+        let _ = port.send(bytes);
+    }
+}
+
+/// Logs events, and once a second what was counted.
+pub fn idle<B: Board, L: Law>(
+    mut control: impl Mutex<T = Control<B::Drive, L>>,
+    events: &mut Consumer<'static, Change>,
+) -> ! {
+    defmt::info!(
+        "painleve {=str} on {=str}",
+        env!("CARGO_PKG_VERSION"),
+        B::NAME
+    );
+    let mut second = 0;
+    loop {
+        while let Some(change) = events.dequeue() {
+            match change.fault {
+                None => defmt::info!("{}", change.state),
+                Some(fault) => defmt::error!("{}", fault),
+            }
+        }
+        let (counts, tick_hz) = control.lock(|control| (control.task.counts(), control.tick_hz));
+        let TaskCounts {
+            ticks,
+            worst_elapsed,
+        } = counts;
+        if let Some(now) = ticks.checked_div(tick_hz)
+            && now != second
+        {
+            second = now;
+            defmt::info!(
+                "{=u32} ticks, the longest took {=u32}",
+                ticks,
+                worst_elapsed
+            );
+        }
+        B::idle();
+    }
+}
+
+/// A defect in the program: torque off, and nothing more until a reset.
+pub fn panicked<B: Board>(info: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    B::take_torque_off();
+    // The place alone: formatting the message would link 20 KiB of text formatting.
+    if let Some(place) = info.location() {
+        defmt::error!("panic at {=str}:{=u32}", place.file(), place.line());
+    }
+    B::halt()
+}
+
+/// The tasks of an image: a board's, with a set of laws. Board crates call it with their chip's
+/// `device` and three interrupts: the `control` timer's, the `serial` port's, and one that no
+/// peripheral in use raises, which runs the `link`.
+#[macro_export]
+macro_rules! tasks {
+    (
+        board = $board:ty, laws = $laws:ty, device = $($device:ident)::+,
+        control = $control:ident, serial = $serial:ident, link = $link:ident
+    ) => {
+        #[::rtic::app(device = $($device)::+, peripherals = true)]
+        mod tasks {
+            use $crate::board::{Board, Bytes, Parts, Port};
+            use $crate::heapless::spsc::{Consumer, Producer, Queue};
+            use $crate::painleve_firmware::drive::ControlTask;
+            use $crate::painleve_shared::message::Response;
+            use $crate::tasks::{ANSWERS, Change, Control, EVENTS, Link};
+
+            use super::*;
+
+            type Hardware = $board;
+            type Laws = $laws;
+
+            const LINK: $($device)::+::Interrupt = $($device)::+::Interrupt::$link;
+
+            #[shared]
+            struct Shared {
+                control: Control<<Hardware as Board>::Drive, Laws>,
+            }
+
+            #[local]
+            struct Local {
+                bytes: <Hardware as Board>::Bytes,
+                port: <Hardware as Board>::Port,
+                answers_in: Producer<'static, Response>,
+                answers_out: Consumer<'static, Response>,
+                events_in: Producer<'static, Change>,
+                events_out: Consumer<'static, Change>,
+                reported: Change,
+            }
+
+            #[init(local = [
+                answers: Queue<Response, ANSWERS> = Queue::new(),
+                events: Queue<Change, EVENTS> = Queue::new(),
+            ])]
+            fn init(cx: init::Context) -> (Shared, Local) {
+                let Parts { drive, bytes, port } =
+                    $crate::tasks::start::<Hardware>(cx.device, cx.core);
+                let (answers_in, answers_out) = cx.local.answers.split();
+                let (events_in, events_out) = cx.local.events.split();
+                rtic::pend(LINK);
+                let control = Control {
+                    task: ControlTask::new(drive),
+                    dropped_responses: 0,
+                    tick_hz: 0,
+                };
+                let local = Local {
+                    bytes,
+                    port,
+                    answers_in,
+                    answers_out,
+                    events_in,
+                    events_out,
+                    reported: Change::NONE,
+                };
+                (Shared { control }, local)
+            }
+
+            #[task(binds = $control, priority = 3, shared = [control],
+                   local = [answers_in, events_in, reported])]
+            fn control(mut cx: control::Context) {
+                let local = cx.local;
+                let answered = cx.shared.control.lock(|control| {
+                    let (answers, events) = (local.answers_in, local.events_in);
+                    $crate::tasks::control(control, answers, events, local.reported)
+                });
+                // Bytes may have come without a pause that would have woken `link`.
+                if answered || !<<Hardware as Board>::Port as Port>::HALF_DUPLEX {
+                    rtic::pend(LINK);
+                }
+            }
+
+            #[task(binds = $serial, priority = 2, local = [bytes])]
+            fn serial(cx: serial::Context) {
+                cx.local.bytes.serve();
+                rtic::pend(LINK);
+            }
+
+            #[task(binds = $link, priority = 1, shared = [control],
+                   local = [port, answers_out, state: Link<Laws> = Link::new()])]
+            fn link(cx: link::Context) {
+                let local = cx.local;
+                $crate::tasks::link(cx.shared.control, local.port, local.answers_out, local.state);
+            }
+
+            #[idle(shared = [control], local = [events_out])]
+            fn idle(cx: idle::Context) -> ! {
+                $crate::tasks::idle::<Hardware, Laws>(cx.shared.control, cx.local.events_out)
+            }
+        }
+
+        #[panic_handler]
+        fn panic(info: &::core::panic::PanicInfo<'_>) -> ! {
+            $crate::tasks::panicked::<$board>(info)
+        }
+    };
+}

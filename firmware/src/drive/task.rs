@@ -1,0 +1,364 @@
+//! The control task: one tick with everything around it.
+
+use painleve_shared::frame::ActuatorFrame;
+use painleve_shared::message::FrameSource;
+use painleve_shared::range::OutOfRange;
+
+use super::Drive;
+use crate::configuration::Configuration;
+use crate::controller::Controller;
+use crate::law::{Law, LawSettings};
+use crate::supervise::lapses::{Lapse, LapseMonitor};
+
+/// The answer to one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answered {
+    /// The answer that counts.
+    pub frame: ActuatorFrame,
+    /// What the controller's tick took, in counts of [`Drive::stopwatch`]; 0 for an answer that
+    /// no frame asked for, because a fault has taken the torque off.
+    pub elapsed: u32,
+}
+
+/// What is counted since the controller was configured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TaskCounts {
+    /// Ticks with an answer to a frame; wraps.
+    pub ticks: u32,
+    /// Longest of them, in counts of [`Drive::stopwatch`].
+    pub worst_elapsed: u32,
+}
+
+/// Drives an arm, tick by tick: notes a missing frame, samples, ticks, actuates, notes an overrun,
+/// reports. The same on a PC, under an emulator and on a board.
+///
+/// ```
+/// use painleve_firmware::drive::{ControlTask, Drive};
+/// use painleve_firmware::Configuration;
+/// use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
+/// use painleve_shared::message::FrameSource;
+///
+/// /// A drive without an arm: its sensors read zero, its stages only remember what they are told.
+/// #[derive(Default)]
+/// struct Desk {
+///     frames: u32,
+///     answer: ActuatorFrame,
+/// }
+///
+/// impl Drive for Desk {
+///     fn begin_tick(&mut self) {}
+///
+///     fn sample(&mut self) -> Option<SensorFrame> {
+///         self.frames += 1;
+///         let (tick, sequence) = (self.frames, self.frames);
+///         Some(SensorFrame { tick, sequence, inputs: DigitalInputs::ENABLE, ..Default::default() })
+///     }
+///
+///     fn actuate(&mut self, answer: &ActuatorFrame) {
+///         self.answer = *answer;
+///     }
+///
+///     fn next_tick_is_due(&self) -> bool {
+///         false
+///     }
+///
+///     fn stopwatch(&self) -> u32 {
+///         0
+///     }
+/// }
+///
+/// let mut task: ControlTask<Desk> = ControlTask::new(Desk::default());
+/// task.configure(&Configuration::default(), FrameSource::Sensors)?;
+/// let answered = task.tick().expect("a frame has come");
+/// assert_eq!(task.drive().answer, answered.frame);
+/// # Ok::<(), painleve_shared::range::OutOfRange>(())
+/// ```
+#[derive(Debug)]
+pub struct ControlTask<D, L: Law = LawSettings> {
+    drive: D,
+    /// `None` until there is a configuration.
+    controller: Option<Controller<L>>,
+    source: FrameSource,
+    counts: TaskCounts,
+}
+
+impl<D: Drive, L: Law> ControlTask<D, L> {
+    /// A task that does nothing yet.
+    pub const fn new(drive: D) -> Self {
+        Self {
+            drive,
+            controller: None,
+            source: FrameSource::Lockstep,
+            counts: TaskCounts {
+                ticks: 0,
+                worst_elapsed: 0,
+            },
+        }
+    }
+
+    /// Starts afresh with this configuration and frames from `source`. The torque goes off before.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range. The task then does nothing.
+    // Out of line: what it takes to make a controller does not share the stack with its ticks.
+    #[inline(never)]
+    pub fn configure(
+        &mut self,
+        configuration: &Configuration<L>,
+        source: FrameSource,
+    ) -> Result<(), OutOfRange> {
+        self.stop();
+        self.source = source;
+        self.counts = TaskCounts::default();
+        self.controller = Some(Controller::new(configuration)?);
+        Ok(())
+    }
+
+    /// Takes the torque off and does nothing from now on.
+    pub fn stop(&mut self) {
+        self.drive.actuate(&ActuatorFrame::default());
+        self.controller = None;
+    }
+
+    /// One tick; `None` if there is nothing to say.
+    pub fn tick(&mut self) -> Option<Answered> {
+        self.drive.begin_tick();
+        let Some(controller) = &mut self.controller else {
+            self.drive.actuate(&ActuatorFrame::default());
+            return None;
+        };
+        let frame = self.drive.sample();
+        let missing = frame.is_none() && self.source == FrameSource::Realtime;
+        let stopped = controller.note(Lapse::MissingFrame, u32::from(missing));
+        let Some(frame) = frame else {
+            let frame = stopped?;
+            self.drive.actuate(&frame);
+            return Some(Answered { frame, elapsed: 0 });
+        };
+        let start = self.drive.stopwatch();
+        let mut answer = controller.tick(&frame);
+        let elapsed = self.drive.stopwatch().wrapping_sub(start);
+        self.drive.actuate(&answer);
+        self.counts.ticks = self.counts.ticks.wrapping_add(1);
+        self.counts.worst_elapsed = self.counts.worst_elapsed.max(elapsed);
+        let overrun = self.drive.next_tick_is_due();
+        if let Some(stopped) = controller.note(Lapse::Overrun, u32::from(overrun)) {
+            self.drive.actuate(&stopped);
+            answer = stopped;
+        }
+        Some(Answered {
+            frame: answer,
+            elapsed,
+        })
+    }
+
+    /// Takes note of how many times something went wrong between two ticks, 0 for a good one. The
+    /// torque is off on return if that is now too often in a row.
+    pub fn note(&mut self, lapse: Lapse, times: u32) {
+        if let Some(controller) = &mut self.controller
+            && let Some(stopped) = controller.note(lapse, times)
+        {
+            self.drive.actuate(&stopped);
+        }
+    }
+
+    /// How often each kind of lapse has happened; `None` without a configuration.
+    pub fn lapse_counts(&self) -> Option<&LapseMonitor> {
+        self.controller.as_ref().map(Controller::lapse_counts)
+    }
+
+    /// What is counted besides.
+    pub fn counts(&self) -> TaskCounts {
+        self.counts
+    }
+
+    /// The drive.
+    pub fn drive(&self) -> &D {
+        &self.drive
+    }
+
+    /// The drive, to give it what comes from elsewhere.
+    pub fn drive_mut(&mut self) -> &mut D {
+        &mut self.drive
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_shared::counts::{ForceCounts, TorqueCounts};
+    use painleve_shared::frame::{DigitalInputs, SensorFrame};
+    use painleve_shared::status::{Fault, SupervisorState};
+    use std::cell::Cell;
+    use std::vec::Vec;
+
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    enum Call {
+        BeginTick,
+        Sample,
+        Actuate(ActuatorFrame),
+    }
+
+    /// A drive that writes down how it is called.
+    #[derive(Default)]
+    struct Mock {
+        calls: Vec<Call>,
+        frame: Option<SensorFrame>,
+        is_due: bool,
+        stopwatch: Cell<u32>,
+    }
+
+    impl Drive for Mock {
+        fn begin_tick(&mut self) {
+            self.calls.push(Call::BeginTick);
+        }
+
+        fn sample(&mut self) -> Option<SensorFrame> {
+            self.calls.push(Call::Sample);
+            self.frame.take()
+        }
+
+        fn actuate(&mut self, answer: &ActuatorFrame) {
+            self.calls.push(Call::Actuate(*answer));
+        }
+
+        fn next_tick_is_due(&self) -> bool {
+            self.is_due
+        }
+
+        fn stopwatch(&self) -> u32 {
+            let before = self.stopwatch.get();
+            self.stopwatch.set(before.wrapping_add(7));
+            before
+        }
+    }
+
+    impl Mock {
+        fn calls(&mut self) -> Vec<Call> {
+            core::mem::take(&mut self.calls)
+        }
+    }
+
+    /// The arm at rest at x0,d, pressing with 10 N.
+    fn frame(tick: u32) -> SensorFrame {
+        let [encoder, _] = Configuration::<LawSettings>::default().converters.encoders;
+        SensorFrame {
+            tick,
+            sequence: tick,
+            joints: [
+                encoder.reading((-11.4_f64).to_radians()),
+                encoder.reading((-35.1_f64 + 11.4).to_radians()),
+            ],
+            normal_force: ForceCounts(1024),
+            tangential_force: ForceCounts(-614),
+            inputs: DigitalInputs::ENABLE,
+        }
+    }
+
+    /// A task that tracks after 20 ticks.
+    fn tracking(source: FrameSource) -> ControlTask<Mock> {
+        let mut task = ControlTask::new(Mock::default());
+        task.configure(&Configuration::default(), source).unwrap();
+        let answered = (0..20).map(|tick| {
+            task.drive.frame = Some(frame(tick));
+            task.tick().unwrap().frame
+        });
+        let last = answered.last().unwrap();
+        assert_eq!(last.supervisor_state(), Some(SupervisorState::Tracking));
+        assert_ne!(last.torques, [TorqueCounts(0); 2]);
+        task.drive.calls();
+        task
+    }
+
+    fn assert_off(frame: &ActuatorFrame, fault: Fault) {
+        assert_eq!(frame.latched_fault(), Some(fault));
+        assert_eq!(frame.torques, [TorqueCounts(0); 2]);
+    }
+
+    #[test]
+    fn a_tick_begins_samples_and_actuates_in_this_order() {
+        let mut task = tracking(FrameSource::Realtime);
+        task.drive.frame = Some(frame(20));
+        let answered = task.tick().unwrap();
+        assert_eq!(answered.elapsed, 7);
+        let actuated = Call::Actuate(answered.frame);
+        assert_eq!(
+            task.drive.calls(),
+            [Call::BeginTick, Call::Sample, actuated]
+        );
+        assert_eq!((task.counts().ticks, task.counts().worst_elapsed), (21, 7));
+    }
+
+    #[test]
+    fn missing_frames_stop_a_drive_that_goes_by_the_clock_and_no_other() {
+        let mut task = tracking(FrameSource::Realtime);
+        let limit = 10;
+        for _ in 0..limit {
+            assert_eq!(task.tick(), None);
+        }
+        task.drive.calls();
+        let stopped = task.tick().unwrap();
+        assert_off(&stopped.frame, Fault::MissingFrame);
+        assert_eq!(stopped.elapsed, 0);
+        let actuated = Call::Actuate(stopped.frame);
+        assert_eq!(
+            task.drive.calls(),
+            [Call::BeginTick, Call::Sample, actuated]
+        );
+        assert_eq!(task.tick(), None, "told once");
+        for source in [FrameSource::Lockstep, FrameSource::Sensors] {
+            let mut task = tracking(source);
+            assert!((0..100).all(|_| task.tick().is_none()));
+            assert_eq!(task.lapse_counts().unwrap().total(Lapse::MissingFrame), 0);
+        }
+    }
+
+    #[test]
+    fn an_overrun_too_many_replaces_the_answer_that_is_out_already() {
+        let mut task = tracking(FrameSource::Realtime);
+        task.drive.is_due = true;
+        task.drive.frame = Some(frame(20));
+        assert_eq!(task.tick().unwrap().frame.latched_fault(), None);
+        task.drive.calls();
+        task.drive.frame = Some(frame(21));
+        let stopped = task.tick().unwrap().frame;
+        assert_off(&stopped, Fault::Overrun);
+        let calls = task.drive.calls();
+        assert!(matches!(calls[2], Call::Actuate(answer) if answer.latched_fault().is_none()));
+        assert_eq!(calls[3], Call::Actuate(stopped));
+        assert_eq!(calls.len(), 4);
+    }
+
+    #[test]
+    fn a_message_too_many_stops_the_drive_between_ticks() {
+        let mut task = tracking(FrameSource::Lockstep);
+        for _ in 0..=10 {
+            task.note(Lapse::FailedChecksum, 1);
+        }
+        let [Call::Actuate(stopped)] = task.drive.calls()[..] else {
+            panic!("the torque goes off once");
+        };
+        assert_off(&stopped, Fault::CorruptMessages);
+    }
+
+    #[test]
+    fn a_new_configuration_takes_the_torque_off_and_starts_afresh() {
+        let mut task = tracking(FrameSource::Realtime);
+        let configuration = Configuration::default();
+        task.configure(&configuration, FrameSource::Lockstep)
+            .unwrap();
+        assert_eq!(
+            task.drive.calls(),
+            [Call::Actuate(ActuatorFrame::default())]
+        );
+        assert_eq!(task.counts(), TaskCounts::default());
+        let bad = Configuration {
+            tick_hz: 0.0,
+            ..configuration
+        };
+        assert!(task.configure(&bad, FrameSource::Lockstep).is_err());
+        task.drive.frame = Some(frame(0));
+        assert_eq!(task.tick(), None, "without a configuration nothing is done");
+        assert_eq!(task.lapse_counts().map(|_| ()), None);
+    }
+}

@@ -1,0 +1,140 @@
+//! A native controller that goes by the clock latches what a board does: overruns, frames that do
+//! not come and frames that are lost.
+
+#![allow(clippy::unwrap_used)]
+
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+use painleve_link::{BusName, Pacing, PlantEnd, Session};
+use painleve_plant::scenario::Scenario;
+use painleve_shared::counts::{ForceCounts, TorqueCounts};
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
+use painleve_shared::status::{Fault, SupervisorState};
+use painleve_system::interrupt::Interrupt;
+use painleve_tests::{Bench, child_of, code, errors, signal};
+use serde_json::Value;
+
+const ON: DigitalInputs = DigitalInputs::ENABLE;
+const NO_TORQUE: [TorqueCounts; 2] = [TorqueCounts(0); 2];
+
+/// A rate that a busy machine keeps.
+const SLOW: [&str; 2] = ["run.tick_hz=50", "controller.estimator.bandwidth_rad_s=100"];
+
+#[test]
+fn a_controller_that_is_held_up_ends_the_run_with_a_fault_and_its_exit_code() {
+    let bench = Bench::new("held-up");
+    let mut arguments = vec!["run", "--pacing", "realtime", "--bus", &bench.bus];
+    arguments.extend(["--json", "--no-record", "--no-plot"]);
+    arguments.extend(["--set", "run.duration_s=2"]);
+    arguments.extend(SLOW.iter().flat_map(|key| ["--set", key]));
+    let run = bench.start(&arguments);
+    let controller = child_of(run.id(), "controller");
+    std::thread::sleep(Duration::from_millis(800));
+    // Some twenty ticks of the plant.
+    signal(controller, Signal::SIGSTOP);
+    std::thread::sleep(Duration::from_millis(400));
+    signal(controller, Signal::SIGCONT);
+    let (output, _) = run.end(Duration::from_secs(30));
+    assert_eq!(code(output.status), 5, "{output:?}");
+    let message = errors(&output);
+    assert!(message.contains("missed its deadlines"), "{message}");
+    let report: Value = serde_json::from_slice(&output.stdout).expect("a whole report");
+    assert_eq!(report["ticks"], 100);
+    assert_eq!(report["fault"], Fault::LostFrames as u8);
+    assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
+}
+
+/// The arm at rest, pressing with 10 N, as the plant of a native controller.
+struct Pressing {
+    end: PlantEnd,
+    frame: SensorFrame,
+}
+
+impl Pressing {
+    fn new(bus: &str) -> Self {
+        let scenario = Scenario::load("hybrid-elbow-down", &SLOW.map(String::from));
+        let scenario = scenario.expect("valid overrides");
+        let configuration = scenario.controller_configuration();
+        let [encoder, _] = configuration.converters.encoders;
+        let session = Session {
+            tick_hz: scenario.run.tick_hz,
+            pacing: Pacing::Realtime,
+            configuration: postcard::to_stdvec(&configuration).unwrap(),
+        };
+        let bus: BusName = bus.parse().unwrap();
+        Self {
+            end: PlantEnd::create(&bus, &session, &Interrupt::default()).unwrap(),
+            frame: SensorFrame {
+                joints: [
+                    encoder.reading((-11.4_f64).to_radians()),
+                    encoder.reading((-35.1_f64 + 11.4).to_radians()),
+                ],
+                normal_force: ForceCounts(1024),
+                tangential_force: ForceCounts(-614),
+                ..Default::default()
+            },
+        }
+    }
+
+    /// The answer to the next frame. It is sent at once: the controller begins a tick when a frame
+    /// comes, early or not.
+    fn tick(&mut self, inputs: DigitalInputs) -> ActuatorFrame {
+        self.frame.tick += 1;
+        self.frame.sequence += 1;
+        self.frame.inputs = inputs;
+        self.end.send(&self.frame).unwrap();
+        self.answer(self.frame.tick)
+    }
+
+    /// Waits for an answer to this tick.
+    fn answer(&mut self, tick: u32) -> ActuatorFrame {
+        let start = Instant::now();
+        loop {
+            match self.end.try_receive().unwrap() {
+                Some(answer) if answer.tick == tick => return answer,
+                _ => assert!(start.elapsed() < Duration::from_secs(20), "no answer"),
+            }
+            std::thread::sleep(Duration::from_micros(100));
+        }
+    }
+}
+
+#[test]
+fn ticks_that_last_too_long_and_frames_that_do_not_come_latch_as_on_a_board() {
+    let bench = Bench::new("too-long");
+    let mut arm = Pressing::new(&bench.bus);
+    let controller = bench.start(&["controller", "--bus", &bench.bus, "--wait-s", "20"]);
+    arm.end
+        .wait_for_controller(Duration::from_secs(20))
+        .unwrap();
+    let answers: Vec<_> = (0..15).map(|_| arm.tick(ON)).collect();
+    assert_eq!(
+        answers[14].supervisor_state(),
+        Some(SupervisorState::Tracking)
+    );
+    assert_ne!(answers[14].torques, NO_TORQUE);
+
+    // One tick that lasts until the next one is due is survived, two in a row are not.
+    let overload = ON | DigitalInputs::OVERLOAD;
+    assert_eq!(arm.tick(overload).latched_fault(), None);
+    assert_eq!(arm.tick(ON).latched_fault(), None);
+    assert_eq!(arm.tick(overload).latched_fault(), None);
+    // The answer that went out in time is withdrawn.
+    arm.tick(overload);
+    let withdrawn = arm.answer(arm.frame.tick);
+    assert_eq!(withdrawn.latched_fault(), Some(Fault::Overrun));
+    assert_eq!(withdrawn.torques, NO_TORQUE);
+
+    // Armed again, and then silent.
+    let start_again = [ON | DigitalInputs::RESET, DigitalInputs::default(), ON];
+    let armed = start_again.map(|inputs| arm.tick(inputs))[2];
+    assert_eq!(armed.supervisor_state(), Some(SupervisorState::Armed));
+    let told = arm.answer(armed.tick);
+    assert_eq!(told.latched_fault(), Some(Fault::MissingFrame));
+    assert_eq!(told.torques, NO_TORQUE);
+
+    arm.end.end().unwrap();
+    let (output, _) = controller.end(Duration::from_secs(20));
+    assert!(output.status.success(), "{output:?}");
+}

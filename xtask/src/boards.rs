@@ -1,0 +1,71 @@
+//! The boards that images are built for: one folder each in `firmware/boards`, whose `Cargo.toml`
+//! says in `[package.metadata.board]` what is to be known about the board.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::command::{ChoreError, cargo, workspace};
+
+/// A board, as its `Cargo.toml` describes it.
+pub struct Board {
+    /// Its crate.
+    pub package: String,
+    /// Its images: the crate's programs.
+    pub images: Vec<String>,
+    /// The chip, as probe-rs names it; `None` for a board that cannot be flashed.
+    pub chip: Option<String>,
+    /// Most flash that an image may take for code and constants, bytes.
+    pub flash_bytes: u64,
+    /// Most static RAM that an image may take, bytes.
+    pub ram_bytes: u64,
+}
+
+/// All boards, by the names of their folders.
+///
+/// # Errors
+/// If cargo cannot read the workspace, or a board does not say what it must.
+pub fn all() -> Result<Vec<Board>, ChoreError> {
+    let output = Command::new(cargo())
+        .args(["metadata", "--no-deps", "--format-version", "1"])
+        .current_dir(workspace())
+        .output()
+        .map_err(|cause| ChoreError(format!("cannot start `cargo metadata`: {cause}")))?;
+    let metadata: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
+        let reason = String::from_utf8_lossy(&output.stderr);
+        ChoreError(format!("`cargo metadata` failed: {}", reason.trim()))
+    })?;
+    let mut boards: Vec<_> = metadata["packages"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter(|package| package["metadata"]["board"].is_object())
+        .collect();
+    boards.sort_by_key(|package| package["manifest_path"].as_str());
+    boards.into_iter().map(board).collect()
+}
+
+fn board(package: &Value) -> Result<Board, ChoreError> {
+    let described = &package["metadata"]["board"];
+    let bytes = |key: &str| {
+        described[key].as_u64().ok_or_else(|| {
+            let path = &package["manifest_path"];
+            ChoreError(format!("{path}: [package.metadata.board] lacks {key}"))
+        })
+    };
+    let is_image = |target: &&Value| target["kind"] == serde_json::json!(["bin"]);
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    Ok(Board {
+        package: text(&package["name"]),
+        images: package["targets"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter(is_image)
+            .map(|target| text(&target["name"]))
+            .collect(),
+        chip: described["chip"].as_str().map(str::to_owned),
+        flash_bytes: bytes("flash_bytes")?,
+        ram_bytes: bytes("ram_bytes")?,
+    })
+}
