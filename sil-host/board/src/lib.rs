@@ -1,11 +1,13 @@
 //! The controller's image on a microcontroller, as the host talks to it.
 //!
+//! - [`drivers`]: no board, but its sensor drivers on this PC, over models of the chips
 //! - [`emulator`]: the image under QEMU, in deterministic lockstep
 //! - [`serial`]: a flashed board behind a serial port
 //! - [`log`]: what the image says, decoded with its own table
 //! - [`on_board`]: a board of this process in a closed loop
 //! - [`timing`]: what control ticks cost, on a board or on this machine
 
+pub mod drivers;
 pub mod emulator;
 pub mod log;
 pub mod on_board;
@@ -23,6 +25,7 @@ use painleve_shared::message::{Health, Response};
 use painleve_shared::wire::WireError;
 use serde::{Deserialize, Serialize};
 
+pub use drivers::Drivers;
 pub use emulator::Emulator;
 pub use on_board::OnBoard;
 pub use serial::Serial;
@@ -61,6 +64,11 @@ pub trait Board {
     /// # Errors
     /// As [`Board::exchange`].
     fn health(&mut self) -> Result<Health, BoardError>;
+
+    /// One sentence about what disturbed the run, if anything did.
+    fn remark(&self) -> Option<String> {
+        None
+    }
 
     /// What the host's end of a line has counted; `None` for a link that loses nothing.
     fn line(&self) -> Option<LineHealth> {
@@ -127,6 +135,16 @@ pub enum BoardError {
         "the image refuses the configuration: it may be older than this program, see `cargo xtask build-fw`"
     )]
     Refused,
+    /// The board's parts cannot give the counts that are asked for.
+    #[error("{key} = {wanted}: the board's part has {has} bits")]
+    Parts {
+        /// The setting.
+        key: &'static str,
+        /// Its value.
+        wanted: u8,
+        /// What the part has.
+        has: u8,
+    },
     /// A message that does not answer what was asked.
     #[error("the board answered out of turn with {0:?}")]
     OutOfTurn(Response),

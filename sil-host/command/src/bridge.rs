@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::{Args, Subcommand};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::{TickTimes, TimingReport};
-use painleve_board::{Board, BoardError, LineHealth, Serial};
+use painleve_board::{Board, BoardError, Drivers, LineHealth, Serial};
 use painleve_firmware::Configuration;
 use painleve_link::{BusName, ControllerEnd, Pacing, Received};
 use painleve_shared::message::FrameSource;
@@ -33,6 +33,16 @@ enum Target {
         #[command(flatten)]
         image: ImageArguments,
     },
+    /// The board's sensor drivers in this process, over models of the sensors' chips.
+    Drivers {
+        #[command(flatten)]
+        bus: BusArguments,
+        #[command(flatten)]
+        lines: SensorLineArguments,
+        /// Write what every tick cost as JSON.
+        #[arg(long, value_name = "PATH")]
+        timing: Option<PathBuf>,
+    },
     /// A flashed board behind a serial port.
     Serial {
         #[command(flatten)]
@@ -57,6 +67,21 @@ struct BusArguments {
     /// What the plant runs, for the report.
     #[arg(long, hide = true, default_value = "")]
     scenario_name: String,
+}
+
+/// How the sensors' lines disturb what they carry.
+#[derive(Clone, Debug, Default, Args)]
+pub struct SensorLineArguments {
+    /// With --host drivers: probability that a bit on a sensor line is flipped.
+    #[arg(long, value_name = "PROBABILITY", default_value_t = 0.0, value_parser = probability)]
+    pub bit_errors: f64,
+}
+
+fn probability(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (0.0..=0.1).contains(&value) => Ok(value),
+        _ => Err("give a probability from 0 to 0.1".into()),
+    }
 }
 
 /// Which image to run, and what to keep of it.
@@ -100,6 +125,11 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
         Target::Qemu { bus, image } => carry(bus, image.timing.as_deref(), |configuration, _| {
             Emulator::start(&image.path(), configuration, image.log)
         }),
+        Target::Drivers { bus, lines, timing } => {
+            carry(bus, timing.as_deref(), |configuration, _| {
+                Drivers::new(configuration, lines.bit_errors)
+            })
+        }
         Target::Serial { bus, port, timing } => {
             carry(bus, timing.as_deref(), |configuration, pacing| {
                 Serial::open(port, configuration, frame_source(pacing))
@@ -154,6 +184,9 @@ fn carry_until<B: Board>(
         let scenario = &bus.scenario_name;
         let report = TimingReport::of_board(scenario, session.tick_hz, &times, &mut board)?;
         write(path, &report)?;
+    }
+    if let Some(remark) = board.remark() {
+        warn(remark);
     }
     if let Some(line) = board.line()
         && line != LineHealth::default()

@@ -17,7 +17,7 @@ use painleve_system::interrupt::Interrupt;
 use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
 use painleve_system::terminal::warn;
 
-use super::bridge::ImageArguments;
+use super::bridge::{ImageArguments, SensorLineArguments};
 use super::output::OutputArguments;
 use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
 
@@ -117,6 +117,8 @@ pub enum Host {
     /// The firmware's controller in a process of its own.
     #[default]
     Native,
+    /// The controller behind the board's sensor drivers, over models of the sensors' chips.
+    Drivers,
     /// The image of the flash target under QEMU.
     Qemu,
     /// A flashed board behind the serial port --port.
@@ -139,6 +141,8 @@ pub struct RunArguments {
     port: Option<PathBuf>,
     #[command(flatten)]
     image: ImageArguments,
+    #[command(flatten)]
+    lines: SensorLineArguments,
     #[command(flatten)]
     output: OutputArguments,
     /// Print one JSON object on stdout instead of the table.
@@ -290,17 +294,26 @@ fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
     let image = &arguments.image;
     let mut line: Vec<OsString> = match arguments.host {
         Host::Native => return vec!["controller".into()],
+        Host::Drivers => vec!["bridge".into(), "drivers".into()],
         Host::Qemu => vec!["bridge".into(), "qemu".into()],
         Host::Serial => vec!["bridge".into(), "serial".into()],
     };
     line.extend(["--scenario-name".into(), arguments.scenario.name().into()]);
-    if arguments.host == Host::Serial {
-        for (option, path) in [("--port", &arguments.port), ("--timing", &image.timing)] {
-            if let Some(path) = path {
-                line.extend([option.into(), path.into()]);
-            }
+    let paths: &[(&str, &Option<PathBuf>)] = match arguments.host {
+        Host::Serial => &[("--port", &arguments.port), ("--timing", &image.timing)],
+        Host::Drivers => &[("--timing", &image.timing)],
+        Host::Native | Host::Qemu => &[],
+    };
+    for (option, path) in paths {
+        if let Some(path) = path {
+            line.extend([option.into(), path.into()]);
         }
-    } else {
+    }
+    if arguments.host == Host::Drivers {
+        let probability = arguments.lines.bit_errors.to_string();
+        line.extend(["--bit-errors".into(), probability.into()]);
+    }
+    if arguments.host == Host::Qemu {
         line.extend(image.to_arguments());
     }
     line

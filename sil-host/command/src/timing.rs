@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
 use painleve_board::timing::{Metronome, TimingReport, Unit, report};
-use painleve_board::{Board, OnBoard, Serial};
+use painleve_board::{Board, Drivers, OnBoard, Serial};
 use painleve_bound::report::Bound;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
@@ -106,6 +106,10 @@ fn measure(
     match (arguments.host, &arguments.port) {
         (Host::Serial, Some(port)) => {
             let board = Serial::open(port, &configuration, FrameSource::Realtime)?;
+            on_board(scenario, board, interrupt)
+        }
+        (Host::Drivers, _) => {
+            let board = Drivers::new(&configuration, 0.0)?;
             on_board(scenario, board, interrupt)
         }
         (Host::Native, _) => by_the_clock(scenario, interrupt),

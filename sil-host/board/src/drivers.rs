@@ -1,0 +1,167 @@
+//! The board's sensor drivers on this PC, over models of the sensors' chips: the driver in the loop.
+//!
+//! Counts of the simulated converters are put into the parts and read back through the very drivers that
+//! the board runs, bit by bit, before the controller sees them. Without bit errors the controller sees what
+//! it would have seen natively, and gives the same answers.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Instant;
+
+use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+use painleve_drivers::encoders::{self, Encoders};
+use painleve_drivers::force_cell::{self, ForceCell};
+use painleve_firmware::supervise::lapses::Lapse;
+use painleve_firmware::{Configuration, Controller};
+use painleve_parts::wires::{Bus, Clock, Select, Shared};
+use painleve_parts::{As5048a, BitErrors, Mcp3304};
+use painleve_shared::counts::{EncoderCounts, ForceCounts};
+use painleve_shared::frame::SensorFrame;
+use painleve_shared::message::Health;
+
+use super::{Board, BoardError, TimedAnswer};
+use crate::timing::Unit;
+
+/// What a sensor without a reading counts: out of every range, which the controller counts as a lapse.
+const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
+const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
+
+/// Clocks of the board's buses, Hz.
+const ENCODER_BUS_HZ: u64 = 5_250_000;
+const FORCE_BUS_HZ: u64 = 1_312_500;
+
+/// Output of a bridge amplifier without force, and its reference, counts.
+const BRIDGE_MIDDLE: i32 = 2048;
+
+type Force =
+    ForceCell<ExclusiveDevice<Bus<Mcp3304>, force_cell::Select<Select<Mcp3304>, Clock>, NoDelay>>;
+
+/// Drivers, parts and the controller, in this process.
+pub struct Drivers {
+    controller: Controller,
+    encoders: Encoders<Bus<As5048a>, Select<As5048a>, Clock>,
+    force_cell: Force,
+    encoder_parts: [Shared<As5048a>; 2],
+    force_part: Shared<Mcp3304>,
+    encoder_bits: u8,
+    force_bits: u8,
+    ticks: u32,
+}
+
+impl Drivers {
+    /// Configured, with this probability of a bit error on every sensor line.
+    ///
+    /// # Errors
+    /// [`BoardError::Parts`] if the scenario's converters resolve more than the parts, and
+    /// [`BoardError::Refused`] if the configuration is out of range.
+    pub fn new(configuration: &Configuration, bit_errors: f64) -> Result<Self, BoardError> {
+        let [encoder, _] = configuration.converters.encoders;
+        let force = configuration.converters.force;
+        for (key, wanted, has) in [
+            ("converters.encoder.bits", encoder.bits, encoders::BITS),
+            ("converters.force.bits", force.bits, force_cell::BITS),
+        ] {
+            if wanted > has {
+                return Err(BoardError::Parts { key, wanted, has });
+            }
+        }
+        let clock = Clock::default();
+        let mut encoder_bus = Bus::new(&clock, ENCODER_BUS_HZ, true);
+        let encoder_parts = [1, 2].map(|seed| {
+            let mut part = As5048a::default();
+            part.bit_errors = BitErrors::new(bit_errors, seed);
+            Rc::new(RefCell::new(part))
+        });
+        let selects = encoder_parts
+            .each_ref()
+            .map(|part| encoder_bus.attach(part));
+        let mut force_bus = Bus::new(&clock, FORCE_BUS_HZ, false);
+        let mut force_part = Mcp3304::default();
+        force_part.bit_errors = BitErrors::new(bit_errors, 3);
+        let force_part = Rc::new(RefCell::new(force_part));
+        let select = force_cell::Select::new(force_bus.attach(&force_part), clock.clone());
+        let device = ExclusiveDevice::new_no_delay(force_bus, select);
+        // Pins of a PC do not fail.
+        let Ok(device) = device;
+        Ok(Self {
+            controller: Controller::new(configuration).map_err(|_| BoardError::Refused)?,
+            encoders: Encoders::new(encoder_bus, selects, clock),
+            force_cell: ForceCell::new(device),
+            encoder_parts,
+            force_part,
+            encoder_bits: encoder.bits,
+            force_bits: force.bits,
+            ticks: 0,
+        })
+    }
+
+    /// Bits flipped on the sensor lines so far.
+    fn bit_errors(&self) -> u64 {
+        let encoders = self.encoder_parts.iter();
+        let encoders: u64 = encoders.map(|it| it.borrow().bit_errors.count).sum();
+        encoders + self.force_part.borrow().bit_errors.count
+    }
+
+    /// Gives the parts what the simulated converters have.
+    fn present(&self, frame: &SensorFrame) {
+        let up = encoders::BITS - self.encoder_bits;
+        for (part, joint) in self.encoder_parts.iter().zip(frame.joints) {
+            part.borrow_mut().angle = (joint.0 << up) as u16;
+        }
+        let up = force_cell::BITS - self.force_bits;
+        let [normal, tangential] = [frame.normal_force, frame.tangential_force]
+            .map(|force| BRIDGE_MIDDLE + (force.0 << up));
+        self.force_part.borrow_mut().channels =
+            [normal, BRIDGE_MIDDLE, tangential, BRIDGE_MIDDLE, 0, 0, 0, 0];
+    }
+
+    /// The frame as the drivers read it.
+    fn read(&mut self, frame: &SensorFrame) -> SensorFrame {
+        self.present(frame);
+        let joints = self.encoders.read(self.encoder_bits);
+        let (tangential, normal) = self.force_cell.read(self.force_bits);
+        SensorFrame {
+            joints: joints.map(|it| it.unwrap_or(NO_ENCODER)),
+            normal_force: normal.unwrap_or(NO_FORCE),
+            tangential_force: tangential.unwrap_or(NO_FORCE),
+            ..*frame
+        }
+    }
+}
+
+impl Board for Drivers {
+    const HOST: &'static str = "drivers";
+
+    fn unit(&self) -> Unit {
+        Unit::Nanoseconds
+    }
+
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<TimedAnswer, BoardError> {
+        let start = Instant::now();
+        let read = self.read(frame);
+        let frame = self.controller.tick(&read);
+        self.ticks = self.ticks.wrapping_add(1);
+        let cost = u32::try_from(start.elapsed().as_nanos()).unwrap_or(u32::MAX);
+        Ok(TimedAnswer { frame, cost })
+    }
+
+    fn health(&mut self) -> Result<Health, BoardError> {
+        Ok(Health {
+            ticks: self.ticks,
+            lapses: self.controller.lapse_counts().totals(),
+            ..Health::default()
+        })
+    }
+
+    fn remark(&self) -> Option<String> {
+        let flipped = self.bit_errors();
+        let lapses = self.controller.lapse_counts();
+        let lost = lapses.total(Lapse::EncoderOutOfRange) + lapses.total(Lapse::ForceOutOfRange);
+        (flipped > 0).then(|| {
+            format!(
+                "sensor lines: {flipped} bits flipped, {lost} of {} ticks without a reading",
+                self.ticks
+            )
+        })
+    }
+}
