@@ -5,7 +5,7 @@
 //! box around it: the nearest point has a closed form.
 
 use nalgebra::Vector2;
-use painleve_shared::{Real, settings};
+use painleve_shared::{JointTorque, Real, settings};
 
 settings! {
     /// Settings of the contact guard.
@@ -31,32 +31,33 @@ pub struct HalfPlane {
 /// half-plane moved it. Where box and half-plane do not meet, the corner of the box deepest
 /// on the half-plane's side.
 pub fn nearest_torque_nm(
-    wanted_nm: &Vector2<f32>,
+    wanted_nm: &JointTorque<f32>,
     plane: &HalfPlane,
     limit_nm: f32,
-) -> (Vector2<f32>, bool) {
+) -> (JointTorque<f32>, bool) {
     let limited = wanted_nm.map(|torque| torque.within(limit_nm));
     let normal = &plane.normal;
     let square = normal.norm_squared();
-    if normal.dot(&limited) <= plane.bound || square <= 0.0 {
+    if normal.dot(limited.vector()) <= plane.bound || square <= 0.0 {
         return (limited, false);
     }
     // On the line, as near as can be to the wanted torque.
-    let step = (plane.bound - normal.dot(wanted_nm)) / square;
-    let foot = wanted_nm + normal * step;
+    let step = (plane.bound - normal.dot(wanted_nm.vector())) / square;
+    let foot = wanted_nm.vector() + normal * step;
     // Where the foot is outside the box, the nearest point of the line inside it
     // has one torque at its limit and the other from the line.
     let first = foot.x.within(limit_nm);
     let second = along(plane.bound - normal.x * first, normal.y, foot.y);
     if second.abs() <= limit_nm {
-        return (Vector2::new(first, second), true);
+        return (JointTorque::new(first, second), true);
     }
     let second = second.within(limit_nm);
     let first = along(plane.bound - normal.y * second, normal.x, first);
     if first.abs() <= limit_nm {
-        (Vector2::new(first, second), true)
+        (JointTorque::new(first, second), true)
     } else {
-        (normal.map(|component| -limit_nm.copysign(component)), true)
+        let corner = normal.map(|component| -limit_nm.copysign(component));
+        (JointTorque::from_vector(corner), true)
     }
 }
 
@@ -73,9 +74,9 @@ mod tests {
 
     const LIMIT_NM: f32 = 5.0;
 
-    fn inside(torque: &Vector2<f32>, plane: &HalfPlane) -> bool {
+    fn inside(torque: &JointTorque<f32>, plane: &HalfPlane) -> bool {
         let slack = 1e-3 * (1.0 + plane.bound.abs() + plane.normal.norm() * LIMIT_NM);
-        plane.normal.dot(torque) <= plane.bound + slack
+        plane.normal.dot(torque.vector()) <= plane.bound + slack
     }
 
     #[test]
@@ -84,7 +85,7 @@ mod tests {
             normal: Vector2::new(3.0, -1.0),
             bound: 1.0,
         };
-        let wanted = Vector2::new(0.1, 0.2);
+        let wanted = JointTorque::new(0.1, 0.2);
         assert_eq!(
             nearest_torque_nm(&wanted, &plane, LIMIT_NM),
             (wanted, false)
@@ -98,7 +99,7 @@ mod tests {
             w1 in -8.0_f32..8.0, w2 in -8.0_f32..8.0, n1 in -50.0_f32..50.0, n2 in -50.0_f32..50.0,
             bound in -200.0_f32..200.0,
         ) {
-            let wanted = Vector2::new(w1, w2);
+            let wanted = JointTorque::new(w1, w2);
             let plane = HalfPlane { normal: Vector2::new(n1, n2), bound };
             let (found, _) = nearest_torque_nm(&wanted, &plane, LIMIT_NM);
             prop_assert!(found.amax() <= LIMIT_NM);
@@ -109,10 +110,11 @@ mod tests {
             let mut any = false;
             for other in admissible {
                 any = true;
-                prop_assert!((found - wanted).norm() <= (other - wanted).norm() + 1e-3);
+                let apart = (found - wanted).vector().norm();
+                prop_assert!(apart <= (other - wanted.vector()).norm() + 1e-3);
             }
             if any {
-                prop_assert!(inside(&found, &plane), "{} {:?}", found, plane);
+                prop_assert!(inside(&found, &plane), "{:?} {:?}", found, plane);
             }
         }
     }

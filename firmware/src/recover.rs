@@ -7,7 +7,7 @@
 //! rest lands with the belt's full slip, in the direction in which the stretch is admissible.
 
 use nalgebra::Vector2;
-use painleve_shared::{Arm, Posture, Real, settings};
+use painleve_shared::{Arm, LinkMotion, Posture, Real, settings};
 
 use crate::estimate::model::Model;
 use crate::law::LawOutput;
@@ -69,8 +69,8 @@ struct Flight {
     /// if the first touch drags it along.
     lands: bool,
     posture: Posture,
-    /// Joint angles of the path at the tick before, rad.
-    path_rad: Option<Vector2<f32>>,
+    /// Link angles of the path at the tick before, rad.
+    path_rad: Option<LinkMotion<f32>>,
 }
 
 impl Recovery {
@@ -127,7 +127,7 @@ impl Recovery {
         flight.height_m = (flight.height_m + vertical_speed * tick_s).at_least(-DEEPEST_M);
         let height_m = flight.height_m - arm.height_m();
         let path_rad = arm
-            .joint_angles_rad(&Vector2::new(flight.landing_m, height_m), flight.posture)
+            .link_angles_rad(&Vector2::new(flight.landing_m, height_m), flight.posture)
             .or(flight.path_rad)
             .unwrap_or(model.theta_rad);
         let path_rate_rad_s = (path_rad - flight.path_rad.unwrap_or(path_rad)) / tick_s;
@@ -137,7 +137,7 @@ impl Recovery {
         let bandwidth = settings.bandwidth_rad_s;
         let wanted = (path_rad - model.theta_rad) * (bandwidth * bandwidth)
             + (path_rate_rad_s - model.theta_dot_rad_s) * (2.0 * bandwidth);
-        let size = wanted.norm_squared().square_root();
+        let size = wanted.vector().norm_squared().square_root();
         let scale = (settings.acceleration_rad_s2 / size.at_least(settings.acceleration_rad_s2))
             .at_most(1.0);
         LawOutput {
@@ -150,7 +150,7 @@ impl Recovery {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_shared::ArmParameters;
+    use painleve_shared::{ArmParameters, GeneralisedTorque};
     use proptest::prelude::*;
 
     proptest! {
@@ -163,20 +163,20 @@ mod tests {
             let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
             let at = Vector2::new(tip, height - arm.height_m());
-            let mut theta = arm.joint_angles_rad(&at, posture).unwrap();
-            let mut theta_dot = Vector2::new(w1, w2);
+            let mut theta = arm.link_angles_rad(&at, posture).unwrap();
+            let mut theta_dot = LinkMotion::new(w1, w2);
             let recovery = Recovery::new(&RecoverySettings::default(), 1e-3);
             let mut state = RecoveryState::default();
             let edges = (-0.18, 0.155);
             let landing = (0..1000).find_map(|_| {
-                let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
+                let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
                 let torque = recovery.tick(&mut state, &arm, &model, Some(edges)).torque_nm;
                 for _ in 0..10 {
-                    let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
+                    let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
                     theta_dot += model.free_acceleration_rad_s2(&torque) * 1e-4;
                     theta += theta_dot * 1e-4;
                 }
-                let model = Model::new(&arm, theta, theta_dot, &Vector2::zeros());
+                let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
                 let down = model.gap_m < 0.0 && state.flight.is_some_and(|flight| flight.lands);
                 down.then_some(model)
             });

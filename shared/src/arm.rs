@@ -243,8 +243,8 @@ impl<T: Real> Arm<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coordinates::LinkMotion;
     use crate::kinematics::Pose;
-    use nalgebra::Vector2;
     use std::string::ToString;
 
     /// An arm that differs from the paper's in everything.
@@ -348,8 +348,8 @@ mod tests {
         .unwrap();
         let mut changed = Arm::new(parameters).unwrap();
         changed.scale_to(scale * 0.25);
-        let theta = Vector2::new(0.4, -0.3);
-        let rates = Vector2::new(1.5, -2.0);
+        let theta = LinkMotion::new(0.4, -0.3);
+        let rates = LinkMotion::new(1.5, -2.0);
         let pose = Pose::new(&theta);
         let terms = |arm: &Arm<f64>| {
             (

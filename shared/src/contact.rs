@@ -9,6 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
+use crate::coordinates::{GeneralisedTorque, LinkMotion};
 use crate::kinematics::{Pose, Posture};
 use crate::real::Real;
 
@@ -199,24 +200,23 @@ impl<T: Real> Arm<T> {
     }
 
     /// All contact terms at link angles `theta` (rad), rates `theta_dot`
-    /// (rad/s) and generalised torque `torque_nm` (see
-    /// [`generalised_torque_nm`](crate::dynamics::generalised_torque_nm)).
+    /// (rad/s) and generalised torque `torque_nm`.
     #[inline]
     pub fn contact_terms(
         &self,
-        theta: &Vector2<T>,
-        theta_dot: &Vector2<T>,
+        theta: &LinkMotion<T>,
+        theta_dot: &LinkMotion<T>,
         pose: &Pose<T>,
-        torque_nm: &Vector2<T>,
+        torque_nm: &GeneralisedTorque<T>,
     ) -> ContactTerms<T> {
         let jacobian = self.jacobian(pose);
         let mobility = self.inverse_mass_matrix(pose);
-        let load = torque_nm
+        let load = *torque_nm
             - self.passive_torque_nm(theta, theta_dot, pose)
             - self.centrifugal_torque_nm(theta_dot, pose);
         ContactTerms {
             q: jacobian * mobility * jacobian.transpose(),
-            free_acceleration_m_s2: jacobian * (mobility * load)
+            free_acceleration_m_s2: jacobian * (mobility * load.vector())
                 + self.centripetal_m_s2(pose, theta_dot),
         }
     }
@@ -233,7 +233,7 @@ mod tests {
     }
 
     fn p_on_belt(tip_t_m: f64, posture: Posture, friction: f64, slip: Slip) -> f64 {
-        let theta = arm().joint_angles_on_belt_rad(tip_t_m, posture).unwrap();
+        let theta = arm().link_angles_on_belt_rad(tip_t_m, posture).unwrap();
         arm().p(&Pose::new(&theta), friction, slip)
     }
 
@@ -279,7 +279,7 @@ mod tests {
         #[test]
         fn the_row_on_the_belt_is_that_of_the_matrix_q(tip in -0.184_f64..0.184, up: bool) {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
-            let theta = arm().joint_angles_on_belt_rad(tip, posture).unwrap();
+            let theta = arm().link_angles_on_belt_rad(tip, posture).unwrap();
             let q = arm().inverse_tip_inertia(&Pose::new(&theta));
             let (tangential, normal) = arm().inverse_inertia_row_on_belt(tip, posture).unwrap();
             prop_assert!(normal > 0.0);
@@ -291,9 +291,9 @@ mod tests {
             tip in -0.17_f64..0.17, w1 in -3.0_f64..3.0, w2 in -3.0_f64..3.0,
             a_t in -20.0_f64..20.0, a_n in -20.0_f64..20.0,
         ) {
-            let theta = arm().joint_angles_on_belt_rad(tip, Posture::ElbowDown).unwrap();
+            let theta = arm().link_angles_on_belt_rad(tip, Posture::ElbowDown).unwrap();
             let terms = arm().contact_terms(
-                &theta, &Vector2::new(w1, w2), &Pose::new(&theta), &Vector2::zeros());
+                &theta, &LinkMotion::new(w1, w2), &Pose::new(&theta), &GeneralisedTorque::zeros());
             let wanted = Vector2::new(a_t, a_n);
             let force = terms.force_for_acceleration_n(&wanted).unwrap();
             prop_assert!((terms.free_acceleration_m_s2 + terms.q * force - wanted).norm() < 1e-9);

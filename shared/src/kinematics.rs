@@ -9,6 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
+use crate::coordinates::LinkMotion;
 use crate::real::Real;
 
 /// Which way the elbow bends.
@@ -23,10 +24,9 @@ pub enum Posture {
 }
 
 impl Posture {
-    /// The posture of the joint angles `theta` = (θ1, θ2); the straight arm
-    /// counts as elbow down.
-    pub fn of<T: Real>(theta: &Vector2<T>) -> Self {
-        if theta.y > theta.x {
+    /// The posture of link angles (rad); the straight arm counts as elbow down.
+    pub fn of<T: Real>(theta: &LinkMotion<T>) -> Self {
+        if theta.second() > theta.first() {
             Posture::ElbowUp
         } else {
             Posture::ElbowDown
@@ -42,7 +42,7 @@ impl Posture {
     }
 }
 
-/// Sines and cosines of the joint angles: evaluated once, used everywhere.
+/// Sines and cosines of the link angles: evaluated once, used everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose<T: Real> {
     /// sin θ1, sin θ2.
@@ -52,11 +52,11 @@ pub struct Pose<T: Real> {
 }
 
 impl<T: Real> Pose<T> {
-    /// The pose of joint angles (θ1, θ2) in rad.
+    /// The pose of link angles in rad.
     #[inline]
-    pub fn new(theta: &Vector2<T>) -> Self {
-        let (sine_1, cosine_1) = theta.x.sine_cosine();
-        let (sine_2, cosine_2) = theta.y.sine_cosine();
+    pub fn new(theta: &LinkMotion<T>) -> Self {
+        let (sine_1, cosine_1) = theta.first().sine_cosine();
+        let (sine_2, cosine_2) = theta.second().sine_cosine();
         Self {
             sine: Vector2::new(sine_1, sine_2),
             cosine: Vector2::new(cosine_1, cosine_2),
@@ -112,10 +112,10 @@ impl<T: Real> Arm<T> {
 
     /// Centripetal acceleration s = J̇ θ̇ of the tip, m/s², for link rates θ̇ (rad/s).
     #[inline]
-    pub fn centripetal_m_s2(&self, pose: &Pose<T>, theta_dot: &Vector2<T>) -> Vector2<T> {
+    pub fn centripetal_m_s2(&self, pose: &Pose<T>, theta_dot: &LinkMotion<T>) -> Vector2<T> {
         let length = self.length_1_m;
-        let square_1 = theta_dot.x * theta_dot.x;
-        let square_2 = self.length_ratio * (theta_dot.y * theta_dot.y);
+        let square_1 = theta_dot.first() * theta_dot.first();
+        let square_2 = self.length_ratio * (theta_dot.second() * theta_dot.second());
         Vector2::new(
             -length * (square_1 * pose.sine.x + square_2 * pose.sine.y),
             length * (square_1 * pose.cosine.x + square_2 * pose.cosine.y),
@@ -137,7 +137,7 @@ impl<T: Real> Arm<T> {
     /// ```text
     /// cos β1 = (d + (l1² − l2²)/d) / 2 l1,   cos β2 = (d − (l1² − l2²)/d) / 2 l2,   d = |z|
     /// ```
-    pub fn joint_angles_rad(&self, tip_m: &Vector2<T>, posture: Posture) -> Option<Vector2<T>> {
+    pub fn link_angles_rad(&self, tip_m: &Vector2<T>, posture: Posture) -> Option<LinkMotion<T>> {
         let distance = (tip_m.x * tip_m.x + tip_m.y * tip_m.y).square_root();
         let two = T::literal(2.0);
         let shift = self.difference_of_squares_m2() / distance;
@@ -155,26 +155,26 @@ impl<T: Real> Arm<T> {
         }
         let direction = tip_m.x.arc_tangent_2(-tip_m.y);
         Some(match posture {
-            Posture::ElbowUp => Vector2::new(direction - angle_1, direction + angle_2),
-            Posture::ElbowDown => Vector2::new(direction + angle_1, direction - angle_2),
+            Posture::ElbowUp => LinkMotion::new(direction - angle_1, direction + angle_2),
+            Posture::ElbowDown => LinkMotion::new(direction + angle_1, direction - angle_2),
         })
     }
 
     /// Link angles with the tip on the belt at `tip_t_m`; `None` out of reach.
-    pub fn joint_angles_on_belt_rad(&self, tip_t_m: T, posture: Posture) -> Option<Vector2<T>> {
-        self.joint_angles_rad(&Vector2::new(tip_t_m, -self.height_m), posture)
+    pub fn link_angles_on_belt_rad(&self, tip_t_m: T, posture: Posture) -> Option<LinkMotion<T>> {
+        self.link_angles_rad(&Vector2::new(tip_t_m, -self.height_m), posture)
     }
 
     /// Link rates θ̇ (rad/s) that move the tip along the belt with
     /// `tip_speed_m_s` at `tip_t_m`; zero where the arm is straight or does not reach.
     ///
-    /// The time derivative of θ = φ ∓ β in [`joint_angles_rad`](Self::joint_angles_rad).
-    pub fn joint_rates_on_belt_rad_s(
+    /// The time derivative of θ = φ ∓ β in [`link_angles_rad`](Self::link_angles_rad).
+    pub fn link_rates_on_belt_rad_s(
         &self,
         tip_t_m: T,
         tip_speed_m_s: T,
         posture: Posture,
-    ) -> Vector2<T> {
+    ) -> LinkMotion<T> {
         let height = self.height_m;
         let square = tip_t_m * tip_t_m + height * height;
         let distance = square.square_root();
@@ -184,7 +184,7 @@ impl<T: Real> Arm<T> {
             ((reach - distance) * (reach + distance) * (T::one() - hole * hole / square))
                 .square_root();
         if twice_width.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
-            return Vector2::zeros();
+            return LinkMotion::zeros();
         }
         let shift = self.difference_of_squares_m2() / square;
         let direction_rate = tip_speed_m_s * height / square;
@@ -192,8 +192,8 @@ impl<T: Real> Arm<T> {
         let rate_1 = angle_rate * (T::one() - shift);
         let rate_2 = angle_rate * (T::one() + shift);
         match posture {
-            Posture::ElbowUp => Vector2::new(direction_rate - rate_1, direction_rate + rate_2),
-            Posture::ElbowDown => Vector2::new(direction_rate + rate_1, direction_rate - rate_2),
+            Posture::ElbowUp => LinkMotion::new(direction_rate - rate_1, direction_rate + rate_2),
+            Posture::ElbowDown => LinkMotion::new(direction_rate + rate_1, direction_rate - rate_2),
         }
     }
 }
@@ -210,8 +210,8 @@ mod tests {
 
     #[test]
     fn the_papers_start_postures_are_mirror_solutions_of_one_tip_position() {
-        let down = Vector2::new((-11.4_f64).to_radians(), (-35.1_f64).to_radians());
-        let up = Vector2::new(down.y, down.x);
+        let down = LinkMotion::new((-11.4_f64).to_radians(), (-35.1_f64).to_radians());
+        let up = LinkMotion::new(down.second(), down.first());
         assert_eq!(Posture::of(&down), Posture::ElbowDown);
         assert_eq!(Posture::of(&up), Posture::ElbowUp);
         for theta in [down, up] {
@@ -222,15 +222,15 @@ mod tests {
     }
 
     #[test]
-    fn out_of_reach_and_nan_have_no_joint_angles() {
+    fn out_of_reach_and_nan_have_no_link_angles() {
         assert!(
             arm()
-                .joint_angles_on_belt_rad(0.1842, Posture::ElbowUp)
+                .link_angles_on_belt_rad(0.1842, Posture::ElbowUp)
                 .is_none()
         );
         assert!(
             arm()
-                .joint_angles_on_belt_rad(f64::NAN, Posture::ElbowUp)
+                .link_angles_on_belt_rad(f64::NAN, Posture::ElbowUp)
                 .is_none()
         );
     }
@@ -242,19 +242,19 @@ mod tests {
         ) {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
             let tip = Vector2::new(distance * direction.sin(), -distance * direction.cos());
-            let theta = arm().joint_angles_rad(&tip, posture).unwrap();
+            let theta = arm().link_angles_rad(&tip, posture).unwrap();
             prop_assert!((arm().tip_m(&Pose::new(&theta)) - tip).norm() < 1e-12);
             prop_assert_eq!(Posture::of(&theta), posture);
         }
 
         #[test]
-        fn joint_rates_move_the_tip_along_the_belt(
+        fn link_rates_move_the_tip_along_the_belt(
             tip in -0.18_f64..0.18, speed in -1.0_f64..1.0, up: bool,
         ) {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
-            let theta = arm().joint_angles_on_belt_rad(tip, posture).unwrap();
-            let rates = arm().joint_rates_on_belt_rad_s(tip, speed, posture);
-            let velocity = arm().jacobian(&Pose::new(&theta)) * rates;
+            let theta = arm().link_angles_on_belt_rad(tip, posture).unwrap();
+            let rates = arm().link_rates_on_belt_rad_s(tip, speed, posture);
+            let velocity = arm().jacobian(&Pose::new(&theta)) * rates.vector();
             prop_assert!((velocity - Vector2::new(speed, 0.0)).norm() < 1e-9);
         }
 
@@ -262,12 +262,12 @@ mod tests {
         fn jacobian_and_centripetal_term_are_derivatives_of_the_tip(
             t1 in -3.0_f64..3.0, t2 in -3.0_f64..3.0, w1 in -5.0_f64..5.0, w2 in -5.0_f64..5.0,
         ) {
-            let (theta, rate, step) = (Vector2::new(t1, t2), Vector2::new(w1, w2), 1e-4);
+            let (theta, rate, step) = (LinkMotion::new(t1, t2), LinkMotion::new(w1, w2), 1e-4);
             let tip = |s: f64| arm().tip_m(&Pose::new(&(theta + rate * s)));
             let velocity = (tip(step) - tip(-step)) / (2.0 * step);
             let acceleration = (tip(step) - tip(0.0) * 2.0 + tip(-step)) / (step * step);
             let pose = Pose::new(&theta);
-            prop_assert!((arm().jacobian(&pose) * rate - velocity).norm() < 1e-6);
+            prop_assert!((arm().jacobian(&pose) * rate.vector() - velocity).norm() < 1e-6);
             prop_assert!((arm().centripetal_m_s2(&pose, &rate) - acceleration).norm() < 1e-5);
         }
     }

@@ -3,6 +3,7 @@
 //! - [`arm`]: the arm's parameters, checked once, and the model made from them
 //! - [`kinematics`], [`dynamics`]: tip, Jacobian, inverse kinematics; M, w, c and energy
 //! - [`contact`]: Q, b, p and the four solution modes of the tip on the belt
+//! - [`coordinates`]: of links and of joints, told apart by types
 //! - [`counts`]: integers as converters give and take them, with their scaling
 //! - [`frame`], [`status`]: what crosses the link at every control tick
 //! - [`lapse`]: what may go wrong around a tick
@@ -28,6 +29,7 @@ extern crate self as painleve_shared;
 
 pub mod arm;
 pub mod contact;
+pub mod coordinates;
 pub mod counts;
 pub mod dynamics;
 pub mod frame;
@@ -43,6 +45,7 @@ pub mod wire;
 
 pub use arm::{Arm, ArmParameters};
 pub use contact::{ContactTerms, Slip, SolutionMode};
+pub use coordinates::{GeneralisedTorque, JointMotion, JointTorque, LinkMotion};
 pub use frame::{ActuatorFrame, SensorFrame};
 pub use kinematics::{Pose, Posture};
 pub use range::OutOfRange;

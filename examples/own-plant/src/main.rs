@@ -6,12 +6,10 @@ use std::io;
 
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
-use painleve_plant::nalgebra::Vector2;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{ContactMode, Plant, PlantError, Probe, Snapshot};
-use painleve_shared::dynamics::generalised_torque_nm;
-use painleve_shared::{Arm, Pose, Posture};
+use painleve_shared::{Arm, JointTorque, Pose, Posture};
 
 const MASS_KG: f64 = 0.5;
 const STIFFNESS_N_M: f64 = 20.0;
@@ -33,7 +31,7 @@ impl MassOnBelt {
             ..Snapshot::default()
         };
         now.theta_rad = arm
-            .joint_angles_on_belt_rad(tip_t_m, Posture::ElbowDown)
+            .link_angles_on_belt_rad(tip_t_m, Posture::ElbowDown)
             .map_or([0.0; 2], Into::into);
         Self { arm, now }
     }
@@ -44,7 +42,7 @@ impl Plant for MassOnBelt {
         self.now
     }
 
-    fn command_torque(&mut self, target_nm: Vector2<f64>, _lag_s: f64) {
+    fn command_torque(&mut self, target_nm: JointTorque<f64>, _lag_s: f64) {
         self.now.torque_nm = target_nm.into();
     }
 
@@ -54,8 +52,8 @@ impl Plant for MassOnBelt {
         while now.time_s < until_s {
             let step_s = STEP_S.min(until_s - now.time_s);
             let jacobian = arm.jacobian(&Pose::new(&now.theta_rad.into()));
-            let torque_nm = generalised_torque_nm(&now.torque_nm.into());
-            let push_n = jacobian.transpose().lu().solve(&torque_nm);
+            let torque_nm = JointTorque::from(now.torque_nm).to_links();
+            let push_n = jacobian.transpose().lu().solve(torque_nm.vector());
             let push_n = push_n.ok_or_else(stretched)?;
             now.normal_force_n = (MASS_KG * 9.81 - push_n.y).max(0.0);
             now.tangential_force_n =
@@ -63,7 +61,7 @@ impl Plant for MassOnBelt {
             let force_n = push_n.x + now.tangential_force_n - STIFFNESS_N_M * now.tip_t_m;
             now.slip_velocity_m_s += step_s * force_n / MASS_KG;
             now.tip_t_m += step_s * (now.slip_velocity_m_s + now.belt_speed_m_s);
-            let theta_rad = arm.joint_angles_on_belt_rad(now.tip_t_m, Posture::ElbowDown);
+            let theta_rad = arm.link_angles_on_belt_rad(now.tip_t_m, Posture::ElbowDown);
             now.theta_rad = theta_rad.ok_or_else(stretched)?.into();
             now.time_s += step_s;
         }

@@ -1,8 +1,7 @@
 //! From a law's answer to torque counts: kept on the belt, limited, rounded, checked.
 
-use nalgebra::Vector2;
-use painleve_shared::Real;
 use painleve_shared::counts::{LinearScale, TorqueCounts};
+use painleve_shared::{JointMotion, JointTorque, Real};
 
 use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
@@ -15,18 +14,18 @@ use crate::law::LawOutput;
 pub struct LastCommand {
     /// Counts for the torque stages.
     pub counts: [TorqueCounts; 2],
-    /// Joint torques (u1, u2) that these counts are worth, N·m.
-    pub torque_nm: Vector2<f32>,
+    /// Joint torques that these counts are worth, N·m.
+    pub torque_nm: JointTorque<f32>,
     /// Whether a torque was limited.
     pub saturated: bool,
     /// Whether the contact guard changed the torques.
     pub guarded: bool,
-    /// θ̈ of q' expected until the next tick, rad/s².
-    pub expected_acceleration_rad_s2: Vector2<f32>,
+    /// Acceleration of the joints expected until the next tick, rad/s².
+    pub expected_acceleration_rad_s2: JointMotion<f32>,
     /// What of it the contact force is expected to cause, rad/s².
-    pub contact_acceleration_rad_s2: Vector2<f32>,
+    pub contact_acceleration_rad_s2: JointMotion<f32>,
     /// Torque that rounding to counts still owes, N·m.
-    rounding_nm: Vector2<f32>,
+    rounding_nm: JointTorque<f32>,
 }
 
 impl LastCommand {
@@ -78,12 +77,13 @@ impl TorqueStages {
         let (wanted_nm, guarded) = self.pressed(&output.torque_nm, model, contact);
         self.limit(command, &wanted_nm)?;
         command.guarded = guarded;
-        let of_encoders = |theta: Vector2<f32>| Vector2::new(theta.x, theta.y - theta.x);
-        command.contact_acceleration_rad_s2 =
-            of_encoders(model.contact_acceleration_rad_s2(&output.contact_force_n));
-        command.expected_acceleration_rad_s2 =
-            of_encoders(model.free_acceleration_rad_s2(&command.torque_nm))
-                + command.contact_acceleration_rad_s2;
+        command.contact_acceleration_rad_s2 = model
+            .contact_acceleration_rad_s2(&output.contact_force_n)
+            .to_joints();
+        command.expected_acceleration_rad_s2 = model
+            .free_acceleration_rad_s2(&command.torque_nm)
+            .to_joints()
+            + command.contact_acceleration_rad_s2;
         Ok(())
     }
 
@@ -91,10 +91,10 @@ impl TorqueStages {
     /// whether that is another one.
     fn pressed(
         &self,
-        wanted_nm: &Vector2<f32>,
+        wanted_nm: &JointTorque<f32>,
         model: &Model,
         contact: &ContactEstimate,
-    ) -> (Vector2<f32>, bool) {
+    ) -> (JointTorque<f32>, bool) {
         let slides = contact.touches && contact.friction.slip_seen && contact.p_per_kg > 0.0;
         if !(self.guard.enabled && slides) {
             return (*wanted_nm, false);
@@ -112,17 +112,21 @@ impl TorqueStages {
     }
 
     /// Limits the wanted torques and turns them into counts.
-    fn limit(&self, command: &mut LastCommand, wanted_nm: &Vector2<f32>) -> Result<(), NotFinite> {
+    fn limit(
+        &self,
+        command: &mut LastCommand,
+        wanted_nm: &JointTorque<f32>,
+    ) -> Result<(), NotFinite> {
         // Before clamping, which would turn an infinity into a limit.
-        if !(wanted_nm.x.is_finite() && wanted_nm.y.is_finite()) {
+        if !(wanted_nm.first().is_finite() && wanted_nm.second().is_finite()) {
             return Err(NotFinite);
         }
         // What rounding took away is given with the next tick: near the edge, where p is
         // small, half a count of constant torque would be a newton of force.
-        let owed = (wanted_nm + command.rounding_nm).map(|torque| torque.within(self.limit_nm));
-        let (counts_1, over_1) = self.scale.counts(owed.x);
-        let (counts_2, over_2) = self.scale.counts(owed.y);
-        let given = Vector2::new(self.scale.value(counts_1), self.scale.value(counts_2));
+        let owed = (*wanted_nm + command.rounding_nm).map(|torque| torque.within(self.limit_nm));
+        let (counts_1, over_1) = self.scale.counts(owed.first());
+        let (counts_2, over_2) = self.scale.counts(owed.second());
+        let given = JointTorque::new(self.scale.value(counts_1), self.scale.value(counts_2));
         let half = 0.5 * self.scale.per_count();
         command.counts = [TorqueCounts(counts_1), TorqueCounts(counts_2)];
         command.torque_nm = given;
@@ -147,8 +151,8 @@ mod tests {
     #[test]
     fn a_torque_that_is_not_a_number_is_refused() {
         for wanted in [
-            Vector2::new(f32::NAN, 0.0),
-            Vector2::new(0.0, f32::INFINITY),
+            JointTorque::new(f32::NAN, 0.0),
+            JointTorque::new(0.0, f32::INFINITY),
         ] {
             let mut command = LastCommand::default();
             assert_eq!(stages().limit(&mut command, &wanted), Err(NotFinite));
@@ -159,26 +163,26 @@ mod tests {
     #[test]
     fn what_rounding_takes_away_is_given_later() {
         let count = stages().scale.per_count();
-        let wanted = Vector2::new(0.3 * count, -0.3 * count);
+        let wanted = JointTorque::new(0.3 * count, -0.3 * count);
         let mut command = LastCommand::default();
-        let mut sum = Vector2::zeros();
+        let mut sum = JointTorque::zeros();
         for _ in 0..100 {
             stages().limit(&mut command, &wanted).unwrap();
             sum += command.torque_nm;
         }
-        assert!((sum - wanted * 100.0).amax() <= count, "{sum}");
+        assert!((sum - wanted * 100.0).amax() <= count, "{sum:?}");
     }
 
     #[test]
     fn a_torque_beyond_the_limit_is_limited_and_flagged() {
         let mut command = LastCommand::default();
         stages()
-            .limit(&mut command, &Vector2::new(7.0, -1.0))
+            .limit(&mut command, &JointTorque::new(7.0, -1.0))
             .unwrap();
         assert!(command.saturated && command.is_constrained());
-        assert!(command.torque_nm.x <= 5.0);
+        assert!(command.torque_nm.first() <= 5.0);
         stages()
-            .limit(&mut command, &Vector2::new(4.0, -1.0))
+            .limit(&mut command, &JointTorque::new(4.0, -1.0))
             .unwrap();
         assert!(!command.is_constrained());
     }

@@ -10,6 +10,7 @@
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
+use painleve_shared::{JointMotion, LinkMotion};
 use painleve_shared::{Real, settings};
 
 settings! {
@@ -97,7 +98,7 @@ impl JointEstimator {
         state: &mut JointState,
         readings: &[EncoderCounts; 2],
         elapsed_ticks: u32,
-        acceleration_rad_s2: &Vector2<f32>,
+        acceleration_rad_s2: &JointMotion<f32>,
     ) -> Result<(), EncoderJump> {
         if !state.started {
             self.start(state, readings);
@@ -130,8 +131,20 @@ impl JointEstimator {
                 joint.innovation_rad = innovation;
             };
         let [lsb_1, lsb_2] = self.rad_per_count;
-        follow(joint_1, reading_1, moved_1, lsb_1, acceleration_rad_s2.x);
-        follow(joint_2, reading_2, moved_2, lsb_2, acceleration_rad_s2.y);
+        follow(
+            joint_1,
+            reading_1,
+            moved_1,
+            lsb_1,
+            acceleration_rad_s2.first(),
+        );
+        follow(
+            joint_2,
+            reading_2,
+            moved_2,
+            lsb_2,
+            acceleration_rad_s2.second(),
+        );
         Ok(())
     }
 
@@ -163,8 +176,10 @@ impl JointEstimator {
 
     /// Innovation, counts, that an acceleration of q' (rad/s²) leaves in the end if the loops
     /// are not told of it: θ̈ T²/(1 − z)².
-    pub fn lag_counts(&self, acceleration_rad_s2: &Vector2<f32>) -> Vector2<f32> {
-        acceleration_rad_s2.component_mul(&self.lag_counts_s2)
+    pub fn lag_counts(&self, acceleration_rad_s2: &JointMotion<f32>) -> Vector2<f32> {
+        acceleration_rad_s2
+            .vector()
+            .component_mul(&self.lag_counts_s2)
     }
 
     /// Part of the innovation that a tick leaves: measured less estimated angles.
@@ -179,16 +194,16 @@ impl JointEstimator {
 }
 
 impl JointState {
-    /// Absolute joint angles θ = (θ1, θ2), rad; zero before the first readings.
-    pub fn theta_rad(&self) -> Vector2<f32> {
+    /// Link angles θ = (θ1, θ2), rad; zero before the first readings.
+    pub fn theta_rad(&self) -> LinkMotion<f32> {
         let [one, two] = &self.joints;
-        Vector2::new(one.angle_rad, one.angle_rad + two.angle_rad)
+        JointMotion::new(one.angle_rad, two.angle_rad).to_links()
     }
 
-    /// Measured less expected absolute joint angles at the last tick, rad.
-    pub fn innovation_rad(&self) -> Vector2<f32> {
+    /// Measured less expected link angles at the last tick, rad.
+    pub fn innovation_rad(&self) -> LinkMotion<f32> {
         let [one, two] = &self.joints;
-        Vector2::new(one.innovation_rad, one.innovation_rad + two.innovation_rad)
+        JointMotion::new(one.innovation_rad, two.innovation_rad).to_links()
     }
 
     /// Whether the last readings differed from the ones before.
@@ -196,10 +211,10 @@ impl JointState {
         self.moved
     }
 
-    /// Absolute joint rates θ̇, rad/s; zero before the second readings.
-    pub fn theta_dot_rad_s(&self) -> Vector2<f32> {
+    /// Link rates θ̇, rad/s; zero before the second readings.
+    pub fn theta_dot_rad_s(&self) -> LinkMotion<f32> {
         let [one, two] = &self.joints;
-        Vector2::new(one.rate_rad_s, one.rate_rad_s + two.rate_rad_s)
+        JointMotion::new(one.rate_rad_s, two.rate_rad_s).to_links()
     }
 }
 
@@ -223,7 +238,12 @@ mod tests {
             let (one, two) = motion(f64::from(tick) * 1e-3);
             let readings = [SCALE.reading(one), SCALE.reading(two)];
             estimator
-                .update(&mut state, &readings, 1, &Vector2::new(acceleration, 0.0))
+                .update(
+                    &mut state,
+                    &readings,
+                    1,
+                    &JointMotion::new(acceleration, 0.0),
+                )
                 .unwrap();
         }
         state
@@ -234,16 +254,23 @@ mod tests {
         // θ1 passes the encoder's wrap; the elbow turns the other way.
         let state = track(|t| (0.1 + 1.7 * t, -0.3 - 0.4 * t), 0.0, 400);
         let rate = state.theta_dot_rad_s();
-        assert!((rate.x - 1.7).abs() < 0.1, "{rate}");
-        assert!((rate.y - 1.3).abs() < 0.2, "{rate}");
+        assert!((rate.first() - 1.7).abs() < 0.1, "{rate:?}");
+        assert!((rate.second() - 1.3).abs() < 0.2, "{rate:?}");
         let theta = state.theta_rad();
-        assert!((theta.x - (0.1 + 1.7 * 0.399)).abs() < 6e-4, "{theta}");
+        assert!(
+            (theta.first() - (0.1 + 1.7 * 0.399)).abs() < 6e-4,
+            "{theta:?}"
+        );
     }
 
     #[test]
     fn a_known_acceleration_leaves_no_lag() {
-        let with = track(|t| (5.0 * t * t, 0.0), 10.0, 200).theta_dot_rad_s().x;
-        let without = track(|t| (5.0 * t * t, 0.0), 0.0, 200).theta_dot_rad_s().x;
+        let with = track(|t| (5.0 * t * t, 0.0), 10.0, 200)
+            .theta_dot_rad_s()
+            .first();
+        let without = track(|t| (5.0 * t * t, 0.0), 0.0, 200)
+            .theta_dot_rad_s()
+            .first();
         let truth = 10.0 * 0.199;
         assert!((with - truth).abs() < 0.05, "{with}");
         assert!((without - truth).abs() > (with - truth).abs());
@@ -253,13 +280,13 @@ mod tests {
     fn a_jump_is_told_and_the_loops_start_again_from_there() {
         let jumped = [SCALE.reading(0.5), SCALE.reading(0.1)];
         let mut state = track(|t| (0.2 + t, 0.1), 0.0, 10);
-        let jump = estimator().update(&mut state, &jumped, 1, &Vector2::zeros());
+        let jump = estimator().update(&mut state, &jumped, 1, &JointMotion::zeros());
         assert_eq!(jump, Err(EncoderJump));
-        assert!((state.theta_rad() - Vector2::new(0.5, 0.6)).norm() < 6e-4);
-        assert_eq!(state.theta_dot_rad_s(), Vector2::zeros());
+        assert!((state.theta_rad() - LinkMotion::new(0.5, 0.6)).amax() < 6e-4);
+        assert_eq!(state.theta_dot_rad_s(), LinkMotion::zeros());
         // Over a longer time the same difference is a motion.
         let mut state = track(|_| (0.2, 0.1), 0.0, 10);
-        let moved = estimator().update(&mut state, &jumped, 10, &Vector2::zeros());
+        let moved = estimator().update(&mut state, &jumped, 10, &JointMotion::zeros());
         assert!(moved.is_ok());
     }
 }

@@ -251,7 +251,7 @@ impl Estimators {
     fn gap_m(&self, joints: &JointState, model: &Model) -> f32 {
         let residual = joints.innovation_rad() * self.joints.residual_share();
         let jacobian = &model.jacobian;
-        model.gap_m + jacobian.m21 * residual.x + jacobian.m22 * residual.y
+        model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
     }
 
     /// What the encoders show of the contact.

@@ -44,7 +44,11 @@ use pid::PidSettings;
 ///
 ///     fn tick(&self, _: &mut (), input: &LawInput<'_>) -> LawOutput {
 ///         LawOutput {
-///             torque_nm: -input.model.theta_dot_rad_s * self.damping_nms_rad,
+///             torque_nm: input
+///                 .model
+///                 .theta_dot_rad_s
+///                 .to_joints()
+///                 .torque_by([-self.damping_nms_rad; 2]),
 ///             contact_force_n: input.force_n,
 ///         }
 ///     }

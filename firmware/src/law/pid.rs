@@ -3,8 +3,7 @@
 //! u_i = K_P,i e_i + K_I,i ∫ e_i dt + K_D,i ė_i with e = q'* − q', where q'* puts
 //! the tip on the belt at z_t* in the posture in which the drive was armed.
 
-use nalgebra::Vector2;
-use painleve_shared::{Real, settings};
+use painleve_shared::{JointTorque, LinkMotion, Real, settings};
 
 use super::{Law, LawInput, LawOutput};
 
@@ -27,9 +26,9 @@ settings! {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PidState {
     /// Torque of the integral action, N·m.
-    integral_nm: Vector2<f32>,
-    /// Joint angles of the last reference within reach, rad.
-    wanted_rad: Option<Vector2<f32>>,
+    integral_nm: JointTorque<f32>,
+    /// Link angles of the last reference within reach, rad.
+    wanted_rad: Option<LinkMotion<f32>>,
 }
 
 impl Law for PidSettings {
@@ -38,38 +37,29 @@ impl Law for PidSettings {
     fn tick(&self, state: &mut PidState, input: &LawInput<'_>) -> LawOutput {
         let theta_wanted = input
             .arm
-            .joint_angles_on_belt_rad(input.reference.position_m, input.posture)
+            .link_angles_on_belt_rad(input.reference.position_m, input.posture)
             .or(state.wanted_rad)
             .unwrap_or(input.model.theta_rad);
         state.wanted_rad = Some(theta_wanted);
-        let rate_wanted = input.arm.joint_rates_on_belt_rad_s(
+        let rate_wanted = input.arm.link_rates_on_belt_rad_s(
             input.reference.position_m,
             input.reference.velocity_m_s,
             input.posture,
         );
-        let error = elbow_relative(&(theta_wanted - input.model.theta_rad));
-        let error_rate = elbow_relative(&(rate_wanted - input.model.theta_dot_rad_s));
-        let [kp_1, kp_2] = self.proportional_nm_rad;
-        let [ki_1, ki_2] = self.integral_nm_rad_s;
-        let [kd_1, kd_2] = self.derivative_nms_rad;
+        let error = (theta_wanted - input.model.theta_rad).to_joints();
+        let error_rate = (rate_wanted - input.model.theta_dot_rad_s).to_joints();
         // Anti-windup: the integrals stand still while the torque is limited,
         // and never exceed their own limit.
         if !input.saturated {
             let limit = self.integral_limit_nm;
-            let step = Vector2::new(ki_1 * error.x, ki_2 * error.y) * input.tick_s;
+            let step = error.torque_by(self.integral_nm_rad_s) * input.tick_s;
             state.integral_nm = (state.integral_nm + step).map(|torque| torque.within(limit));
         }
         LawOutput {
-            torque_nm: Vector2::new(
-                kp_1 * error.x + state.integral_nm.x + kd_1 * error_rate.x,
-                kp_2 * error.y + state.integral_nm.y + kd_2 * error_rate.y,
-            ),
+            torque_nm: error.torque_by(self.proportional_nm_rad)
+                + state.integral_nm
+                + error_rate.torque_by(self.derivative_nms_rad),
             contact_force_n: input.force_n,
         }
     }
-}
-
-/// (θ1, θ2) to q' = (θ1, θ2 − θ1).
-fn elbow_relative(theta: &Vector2<f32>) -> Vector2<f32> {
-    Vector2::new(theta.x, theta.y - theta.x)
 }

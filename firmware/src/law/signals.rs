@@ -1,7 +1,7 @@
 //! The control laws' common ground: what they are given and what they answer.
 
 use nalgebra::Vector2;
-use painleve_shared::{Arm, Posture};
+use painleve_shared::{Arm, JointTorque, Posture};
 
 use crate::estimate::friction::FrictionEstimate;
 use crate::estimate::model::Model;
@@ -37,8 +37,8 @@ pub struct LawInput<'a> {
 /// A law's answer; the default is no torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LawOutput {
-    /// Wanted joint torques (u1, u2), N·m, before limits.
-    pub torque_nm: Vector2<f32>,
+    /// Wanted joint torques, N·m, before limits.
+    pub torque_nm: JointTorque<f32>,
     /// Contact force (f_t, f_n) that the law expects with them, N.
     pub contact_force_n: Vector2<f32>,
 }

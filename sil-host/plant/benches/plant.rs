@@ -5,10 +5,11 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use nalgebra::Vector2;
+
 use painleve_plant::State;
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::mechanics::{ArmOnBelt, PlantParameters};
+use painleve_shared::JointTorque;
 
 fn plant(theta1_deg: f64, theta2_deg: f64) -> ArmOnBelt {
     let parameters = PlantParameters {
@@ -47,7 +48,7 @@ fn simulated_seconds(criterion: &mut Criterion) {
         bencher.iter(|| {
             let start_s = held.time_s();
             for tick in 1..=1000 {
-                let torque = Vector2::new(0.01 * f64::from(tick % 7), 0.0);
+                let torque = JointTorque::new(0.01 * f64::from(tick % 7), 0.0);
                 held.command_torque(torque, 0.0);
                 held.advance(start_s + f64::from(tick) * 1e-3, &mut ())
                     .expect("slides");

@@ -56,7 +56,7 @@ impl<P: Plant> Simulation<P> {
         let converters = &scenario.converters;
         let seed = scenario.run.seed;
         Ok(Self {
-            encoders: Encoders::new(&converters.encoder, seed, &plant.joint_angles_rad()),
+            encoders: Encoders::new(&converters.encoder, seed, &plant.link_angles_rad()),
             force_cell: ForceCell::new(&converters.force, seed),
             torque_stages: TorqueStages::new(&converters.torque),
             link: LossyLink::new(&converters.link, seed),
@@ -147,7 +147,7 @@ impl<P: Plant> Simulation<P> {
         let mut captured = false;
         if capture < change {
             self.plant.advance(at(capture), probe)?;
-            self.encoders.capture(&self.plant.joint_angles_rad());
+            self.encoders.capture(&self.plant.link_angles_rad());
             captured = true;
         }
         if change > 0.0 {
@@ -157,7 +157,7 @@ impl<P: Plant> Simulation<P> {
             .command_torque(self.torque_stages.target_nm(), self.torque_stages.lag_s());
         if !captured {
             self.plant.advance(at(capture), probe)?;
-            self.encoders.capture(&self.plant.joint_angles_rad());
+            self.encoders.capture(&self.plant.link_angles_rad());
         }
         self.tick += 1;
         self.plant.advance(at(1.0), probe)

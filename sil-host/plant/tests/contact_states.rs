@@ -3,8 +3,7 @@
 
 use nalgebra::Vector2;
 use painleve_plant::mechanics::impact::{ImpactLaw, Restitution, collide};
-use painleve_shared::dynamics::generalised_torque_nm;
-use painleve_shared::{Arm, ArmParameters, Pose, Slip};
+use painleve_shared::{Arm, ArmParameters, JointTorque, LinkMotion, Pose, Slip};
 
 const STATES: &str = include_str!("data/contact_states.csv");
 const RELATIVE: f64 = 1e-9;
@@ -35,11 +34,11 @@ fn every_reference_state_agrees() {
             ..Default::default()
         })
         .unwrap();
-        let theta = Vector2::new(column("th1"), column("th2"));
-        let theta_dot = Vector2::new(column("w1"), column("w2"));
+        let theta = LinkMotion::new(column("th1"), column("th2"));
+        let theta_dot = LinkMotion::new(column("w1"), column("w2"));
         let friction = column("mu");
         let pose = Pose::new(&theta);
-        let torque = generalised_torque_nm(&Vector2::new(column("u1"), column("u2")));
+        let torque = JointTorque::new(column("u1"), column("u2")).to_links();
         let terms = arm.contact_terms(&theta, &theta_dot, &pose, &torque);
         // The reference has 12 decimals; Q and b are of order 1 to 100, so that
         // values that cancel to nearly zero are compared on that scale.
@@ -51,7 +50,7 @@ fn every_reference_state_agrees() {
         close("p_minus", terms.p(friction, Slip::Negative), 1e-1);
 
         let jacobian = arm.jacobian(&pose);
-        let velocity = jacobian * theta_dot;
+        let velocity = jacobian * theta_dot.vector();
         close("vt", velocity.x, 1e-2);
         close("vn", velocity.y, 1e-2);
 
@@ -68,8 +67,8 @@ fn every_reference_state_agrees() {
             relative
         };
         let impact = collide(&terms.q, friction, &law, relative).unwrap();
-        let after =
-            theta_dot + arm.inverse_mass_matrix(&pose) * (jacobian.transpose() * impact.impulse_ns);
+        let after = theta_dot.vector()
+            + arm.inverse_mass_matrix(&pose) * (jacobian.transpose() * impact.impulse_ns);
         close("w1_after", after.x, 1e-1);
         close("w2_after", after.y, 1e-1);
         close("p_normal", impact.impulse_ns.y, 1e-3);

@@ -1,9 +1,8 @@
 //! Mass matrix, bias torque and Jacobian of 1,000 random arms in random states against MuJoCo
 //! (`data/mujoco_arms.csv`; `data/mujoco_arms.py` made it and says how).
 
-use nalgebra::{Matrix2, Vector2};
-use painleve_shared::dynamics::joint_torque_nm;
-use painleve_shared::{Arm, ArmParameters, Pose};
+use nalgebra::Matrix2;
+use painleve_shared::{Arm, ArmParameters, JointMotion, Pose};
 
 const ARMS: &str = include_str!("data/mujoco_arms.csv");
 const RELATIVE: f64 = 1e-9;
@@ -34,19 +33,16 @@ fn every_arm_moves_as_mujocos_does() {
             gravity_m_s2: column("gravity"),
         })
         .unwrap();
-        let [q_1, q_2] = pair("q");
-        let [rate_1, rate_2] = pair("qd");
-        let theta = Vector2::new(q_1, q_1 + q_2);
-        let theta_dot = Vector2::new(rate_1, rate_1 + rate_2);
+        let theta = JointMotion::from(pair("q")).to_links();
+        let theta_dot = JointMotion::from(pair("qd")).to_links();
         let pose = Pose::new(&theta);
 
         // θ = T q' and θ̇ = T q̇' with this T.
         let links_of_joints = Matrix2::new(1.0, 0.0, 1.0, 1.0);
         let mass = links_of_joints.transpose() * arm.mass_matrix(&pose) * links_of_joints;
-        let bias = joint_torque_nm(
-            &(arm.passive_torque_nm(&theta, &theta_dot, &pose)
-                + arm.centrifugal_torque_nm(&theta_dot, &pose)),
-        );
+        let bias = (arm.passive_torque_nm(&theta, &theta_dot, &pose)
+            + arm.centrifugal_torque_nm(&theta_dot, &pose))
+        .to_joints();
         let jacobian = arm.jacobian(&pose) * links_of_joints;
 
         let close = |name: &str, ours: f64, scale: f64| {
@@ -62,8 +58,8 @@ fn every_arm_moves_as_mujocos_does() {
         close("m11", mass.m11, mass.amax());
         close("m12", mass.m12, mass.amax());
         close("m22", mass.m22, mass.amax());
-        close("h1", bias.x, bias.amax());
-        close("h2", bias.y, bias.amax());
+        close("h1", bias.first(), bias.amax());
+        close("h2", bias.second(), bias.amax());
         close("jt1", jacobian.m11, jacobian.amax());
         close("jt2", jacobian.m12, jacobian.amax());
         close("jn1", jacobian.m21, jacobian.amax());

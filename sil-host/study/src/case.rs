@@ -214,11 +214,11 @@ pub fn at_rest_on_belt(
     posture: Posture,
 ) -> Result<InitialState, StudyError> {
     let theta = arm
-        .joint_angles_on_belt_rad(tip_t_m, posture)
+        .link_angles_on_belt_rad(tip_t_m, posture)
         .ok_or_else(|| StudyError::Option(format!("z_t = {tip_t_m} m is out of reach")))?;
     Ok(InitialState::at_rest(
-        theta.x.to_degrees(),
-        theta.y.to_degrees(),
+        theta.first().to_degrees(),
+        theta.second().to_degrees(),
     ))
 }
 

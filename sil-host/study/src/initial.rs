@@ -174,9 +174,9 @@ fn random_state(arm: &Arm<f64>, seed: u64, row: u64) -> State {
     };
     // Within reach by construction; straight down is too.
     let theta = arm
-        .joint_angles_rad(&tip_m, posture)
-        .unwrap_or_else(nalgebra::Vector2::zeros);
-    State::new(theta.x, theta.y, rates[0], rates[1])
+        .link_angles_rad(&tip_m, posture)
+        .unwrap_or_else(painleve_shared::LinkMotion::zeros);
+    State::new(theta.first(), theta.second(), rates[0], rates[1])
 }
 
 #[cfg(test)]

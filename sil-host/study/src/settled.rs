@@ -53,7 +53,7 @@ pub fn has_settled(plant: &ArmOnBelt) -> bool {
         let change = along(state, &direction, |x| {
             motion.derivative(mode, time_s, &motion.onto_belt(x))
         });
-        tangent.dot(&theta_dot(&change))
+        tangent.dot(theta_dot(&change).vector())
     };
     let linear = Matrix2::new(
         0.0,
@@ -118,9 +118,9 @@ mod tests {
         };
         let at = |tip_t_m: f64| {
             let arm = Arm::new(parameters.arm).unwrap();
-            let theta = arm.joint_angles_on_belt_rad(tip_t_m, Posture::ElbowUp);
+            let theta = arm.link_angles_on_belt_rad(tip_t_m, Posture::ElbowUp);
             let theta = theta.unwrap();
-            let initial = State::new(theta.x, theta.y, 0.0, 0.0);
+            let initial = State::new(theta.first(), theta.second(), 0.0, 0.0);
             let mut plant = ArmOnBelt::new(&parameters, initial).unwrap();
             plant.settle(&mut ()).unwrap();
             assert_eq!(plant.mode(), ContactMode::SlidePositive);
@@ -131,17 +131,17 @@ mod tests {
             theta_dot(&motion.derivative(plant.mode(), 0.0, plant.state()))
         };
         let (mut lower, mut upper) = (-0.1, 0.1);
-        assert!(slope(&at(lower)).x < 0.0 && slope(&at(upper)).x > 0.0);
+        assert!(slope(&at(lower)).first() < 0.0 && slope(&at(upper)).first() > 0.0);
         for _ in 0..60 {
             let middle = 0.5 * (lower + upper);
-            if slope(&at(middle)).x < 0.0 {
+            if slope(&at(middle)).first() < 0.0 {
                 lower = middle;
             } else {
                 upper = middle;
             }
         }
         let plant = at(lower);
-        assert!(slope(&plant).amax() < AT_REST, "{}", slope(&plant));
+        assert!(slope(&plant).amax() < AT_REST, "{:?}", slope(&plant));
         assert!(!has_settled(&plant));
     }
 }

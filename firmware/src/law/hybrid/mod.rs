@@ -17,7 +17,7 @@
 mod settings;
 
 use nalgebra::Vector2;
-use painleve_shared::{Real, Slip};
+use painleve_shared::{JointTorque, Real, Slip};
 
 pub use self::settings::{FrictionFeedForward, HybridSettings};
 use super::{Law, LawInput, LawOutput};
@@ -35,8 +35,8 @@ const TORQUE_USED: f32 = 0.95;
 const LEAST_PRESSING: f32 = 0.1;
 
 /// The part of `pressing_nm` that leaves both joints within ±`limit_nm` together with `motion_nm`.
-fn affordable(motion_nm: &Vector2<f32>, pressing_nm: &Vector2<f32>, limit_nm: f32) -> f32 {
-    if (motion_nm + pressing_nm).amax() <= limit_nm {
+fn affordable(motion_nm: &JointTorque<f32>, pressing_nm: &JointTorque<f32>, limit_nm: f32) -> f32 {
+    if (*motion_nm + *pressing_nm).amax() <= limit_nm {
         1.0
     } else {
         affordable_part(motion_nm, pressing_nm, limit_nm)
@@ -47,7 +47,11 @@ fn affordable(motion_nm: &Vector2<f32>, pressing_nm: &Vector2<f32>, limit_nm: f3
 /// every time rather than jump.
 #[cold]
 #[inline(never)]
-fn affordable_part(motion_nm: &Vector2<f32>, pressing_nm: &Vector2<f32>, limit_nm: f32) -> f32 {
+fn affordable_part(
+    motion_nm: &JointTorque<f32>,
+    pressing_nm: &JointTorque<f32>,
+    limit_nm: f32,
+) -> f32 {
     let of_joint = |motion: f32, pressing: f32| {
         if (motion + pressing).abs() <= limit_nm {
             1.0
@@ -56,8 +60,8 @@ fn affordable_part(motion_nm: &Vector2<f32>, pressing_nm: &Vector2<f32>, limit_n
             (limit_nm.copysign(pressing) - motion) / pressing
         }
     };
-    of_joint(motion_nm.x, pressing_nm.x)
-        .at_most(of_joint(motion_nm.y, pressing_nm.y))
+    of_joint(motion_nm.first(), pressing_nm.first())
+        .at_most(of_joint(motion_nm.second(), pressing_nm.second()))
         .limited(LEAST_PRESSING, 1.0)
 }
 
@@ -119,7 +123,7 @@ impl Law for HybridSettings {
             self.compensated_friction_n(state, input, normal_force, tangential_acceleration);
         let acceleration = input
             .model
-            .joint_acceleration_rad_s2(&Vector2::new(tangential_acceleration, 0.0));
+            .link_acceleration_rad_s2(&Vector2::new(tangential_acceleration, 0.0));
         let wanted = Vector2::new(friction_force, normal_force);
         let motion_nm = input.model.inverse_dynamics_in_air_nm(&acceleration);
         let pressing_nm = input.model.torque_against_nm(&wanted);
@@ -236,8 +240,7 @@ mod tests {
     use crate::estimate::friction::FrictionEstimate;
     use crate::estimate::model::Model;
     use crate::refer::reference::TipReference;
-    use painleve_shared::dynamics::generalised_torque_nm;
-    use painleve_shared::{Arm, ArmParameters, Pose, Posture};
+    use painleve_shared::{Arm, ArmParameters, GeneralisedTorque, Pose, Posture};
     use proptest::prelude::*;
 
     proptest! {
@@ -249,10 +252,10 @@ mod tests {
         ) {
             let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
-            let theta_rad = arm.joint_angles_on_belt_rad(tip, posture).unwrap();
-            let theta_dot_rad_s = arm.joint_rates_on_belt_rad_s(tip, speed, posture);
+            let theta_rad = arm.link_angles_on_belt_rad(tip, posture).unwrap();
+            let theta_dot_rad_s = arm.link_rates_on_belt_rad_s(tip, speed, posture);
             let pose = Pose::new(&theta_rad);
-            let model = Model::new(&arm, theta_rad, theta_dot_rad_s, &Vector2::zeros());
+            let model = Model::new(&arm, theta_rad, theta_dot_rad_s, &GeneralisedTorque::zeros());
             let settings = HybridSettings {
                 force_integral_gain_per_s: 0.0,
                 force_time_constant_s: 0.0,
@@ -274,7 +277,7 @@ mod tests {
             settings.reset(&mut state, &input);
             let output = settings.tick(&mut state, &input);
             let terms = arm.contact_terms(
-                &theta_rad, &theta_dot_rad_s, &pose, &generalised_torque_nm(&output.torque_nm));
+                &theta_rad, &theta_dot_rad_s, &pose, &output.torque_nm.to_links());
             let normal = terms.sliding_normal_force_n(friction, Slip::Positive);
             let force = Vector2::new(-friction * normal, normal);
             let acceleration = terms.free_acceleration_m_s2 + terms.q * force;

@@ -3,9 +3,8 @@
 //! Latency is exact: the plant is stopped at the instant of capture (the part of
 //! the latency below one tick), and whole ticks wait in a ring.
 
-use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
-use painleve_shared::{OutOfRange, check_setting, settings};
+use painleve_shared::{LinkMotion, OutOfRange, check_setting, settings};
 
 use super::noise::{Channel, Noise};
 
@@ -48,8 +47,8 @@ pub struct Encoders {
 }
 
 impl Encoders {
-    /// Encoders that have seen the arm at rest at `theta_rad` = (θ1, θ2) for ever.
-    pub fn new(settings: &EncoderSettings, seed: u64, theta_rad: &Vector2<f64>) -> Self {
+    /// Encoders that have seen the arm at rest at link angles `theta_rad` for ever.
+    pub fn new(settings: &EncoderSettings, seed: u64, theta_rad: &LinkMotion<f64>) -> Self {
         let mut encoders = Self {
             scales: settings.scales(),
             noise: [Channel::Encoder1, Channel::Encoder2]
@@ -70,9 +69,9 @@ impl Encoders {
         self.fraction
     }
 
-    /// Captures the joint angles (θ1, θ2), rad; called once per tick.
-    pub fn capture(&mut self, theta_rad: &Vector2<f64>) {
-        let joints = [theta_rad.x, theta_rad.y - theta_rad.x];
+    /// Captures the link angles, rad; called once per tick.
+    pub fn capture(&mut self, theta_rad: &LinkMotion<f64>) {
+        let joints: [f64; 2] = theta_rad.to_joints().into();
         let mut readings = [EncoderCounts(0); 2];
         for (joint, reading) in readings.iter_mut().enumerate() {
             let angle = joints[joint] + self.noise[joint].draw();
@@ -100,10 +99,10 @@ mod tests {
             latency_ticks: 2.25,
             ..Default::default()
         };
-        let mut encoders = Encoders::new(&settings, 1, &Vector2::new(0.0, 0.0));
+        let mut encoders = Encoders::new(&settings, 1, &LinkMotion::zeros());
         assert_eq!(encoders.capture_before_tick(), 0.25);
         for tick in 1..=5 {
-            encoders.capture(&Vector2::new(0.1 * f64::from(tick), 0.5));
+            encoders.capture(&LinkMotion::new(0.1 * f64::from(tick), 0.5));
         }
         let scale = encoders.scales[0];
         let expected = [scale.reading(0.3), scale.reading(0.5 - 0.3)];

@@ -1,9 +1,8 @@
 //! Torque stages of both joints: counts to torque, saturation, first-order lag,
 //! the transport delay from sample to torque, and a watchdog over the commands.
 
-use nalgebra::Vector2;
 use painleve_shared::counts::{LinearScale, TorqueCounts};
-use painleve_shared::settings;
+use painleve_shared::{JointTorque, settings};
 
 /// Longest delay, in whole ticks.
 const MAXIMUM_DELAY_TICKS: usize = 16;
@@ -43,7 +42,7 @@ pub struct TorqueStages {
     whole_ticks: usize,
     fraction: f64,
     /// Ring of commanded torques, N·m.
-    commands: [Vector2<f64>; MAXIMUM_DELAY_TICKS],
+    commands: [JointTorque<f64>; MAXIMUM_DELAY_TICKS],
     next: usize,
     watchdog: Watchdog,
 }
@@ -77,7 +76,7 @@ impl TorqueStages {
             lag_s: settings.lag_s,
             whole_ticks: settings.delay_ticks as usize,
             fraction: settings.delay_ticks.fract(),
-            commands: [Vector2::zeros(); MAXIMUM_DELAY_TICKS],
+            commands: [JointTorque::zeros(); MAXIMUM_DELAY_TICKS],
             next: 0,
             watchdog: Watchdog {
                 limit_ticks: settings.watchdog_ticks,
@@ -108,14 +107,14 @@ impl TorqueStages {
                     let limited = count.0.clamp(-maximum - 1, maximum);
                     self.scale.value(limited)
                 });
-                Vector2::new(one, two)
+                JointTorque::new(one, two)
             }
             None => self.commands[last],
         };
         self.next = (self.next + 1) % MAXIMUM_DELAY_TICKS;
         self.watchdog.tick(counts.is_some());
         if self.watchdog.tripped {
-            self.commands = [Vector2::zeros(); MAXIMUM_DELAY_TICKS];
+            self.commands = [JointTorque::zeros(); MAXIMUM_DELAY_TICKS];
         }
     }
 
@@ -125,7 +124,7 @@ impl TorqueStages {
     }
 
     /// The torque commanded for the change within this tick, N·m.
-    pub fn target_nm(&self) -> Vector2<f64> {
+    pub fn target_nm(&self) -> JointTorque<f64> {
         let behind = self.whole_ticks + 1;
         self.commands[(self.next + MAXIMUM_DELAY_TICKS - behind) % MAXIMUM_DELAY_TICKS]
     }
@@ -147,11 +146,11 @@ mod tests {
         let mut stages = stages(1.5);
         assert_eq!(stages.change_after_tick(), 0.5);
         stages.command(Some([TorqueCounts(1024), TorqueCounts(-2048)]));
-        assert_eq!(stages.target_nm(), Vector2::zeros());
+        assert_eq!(stages.target_nm(), JointTorque::zeros());
         stages.command(None);
-        assert_eq!(stages.target_nm(), Vector2::new(2.5, -5.0));
+        assert_eq!(stages.target_nm(), JointTorque::new(2.5, -5.0));
         stages.command(None);
-        assert_eq!(stages.target_nm(), Vector2::new(2.5, -5.0));
+        assert_eq!(stages.target_nm(), JointTorque::new(2.5, -5.0));
     }
 
     #[test]
@@ -168,7 +167,7 @@ mod tests {
         stages.command(full);
         stages.command(None);
         stages.command(None);
-        assert!(stages.target_nm().x > 4.9 && !stages.has_tripped());
+        assert!(stages.target_nm().first() > 4.9 && !stages.has_tripped());
         // A command in time begins a new wait.
         stages.command(full);
         stages.command(None);
@@ -176,9 +175,9 @@ mod tests {
         assert!(!stages.has_tripped());
         stages.command(None);
         assert!(stages.has_tripped());
-        assert_eq!(stages.target_nm(), Vector2::zeros());
+        assert_eq!(stages.target_nm(), JointTorque::zeros());
         stages.command(full);
-        assert_eq!(stages.target_nm(), Vector2::zeros());
+        assert_eq!(stages.target_nm(), JointTorque::zeros());
         assert!(stages.has_tripped());
     }
 
@@ -187,6 +186,6 @@ mod tests {
         let mut stages = stages(0.0);
         stages.command(Some([TorqueCounts(100_000), TorqueCounts(-100_000)]));
         let lsb = 5.0 / 2048.0;
-        assert_eq!(stages.target_nm(), Vector2::new(2047.0 * lsb, -5.0));
+        assert_eq!(stages.target_nm(), JointTorque::new(2047.0 * lsb, -5.0));
     }
 }

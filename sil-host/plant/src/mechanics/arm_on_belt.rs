@@ -5,7 +5,7 @@ mod contact_change;
 use nalgebra::Vector2;
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::settings::Settings;
-use painleve_shared::{Arm, Slip};
+use painleve_shared::{Arm, JointTorque, LinkMotion, Slip};
 
 use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
 
@@ -101,7 +101,7 @@ impl ArmOnBelt {
             belt: parameters.belt,
             impact: parameters.impact,
             solver: parameters.solver,
-            torque: TorqueSegment::constant(Vector2::zeros()),
+            torque: TorqueSegment::constant(JointTorque::zeros()),
             time_s: 0.0,
             state: initial,
             mode: ContactMode::Flight,
@@ -154,8 +154,8 @@ impl ArmOnBelt {
         self.mode
     }
 
-    /// Joint torques applied now, (u1, u2), N·m.
-    pub fn torque_nm(&self) -> Vector2<f64> {
+    /// Joint torques applied now, N·m.
+    pub fn torque_nm(&self) -> JointTorque<f64> {
         self.torque.at(self.time_s)
     }
 
@@ -176,7 +176,7 @@ impl ArmOnBelt {
 
     /// Commands joint torques `target_nm` from now on, through a stage with
     /// time constant `lag_s` (0 for none).
-    pub fn command_torque(&mut self, target_nm: Vector2<f64>, lag_s: f64) {
+    pub fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64) {
         let next = self.torque.followed_by(self.time_s, target_nm, lag_s);
         if next.at(self.time_s) != self.torque.at(self.time_s) {
             self.unsettled = true;
@@ -438,7 +438,7 @@ impl Plant for ArmOnBelt {
         motion.snapshot_of(self.mode, self.time_s, &self.state, &here)
     }
 
-    fn command_torque(&mut self, target_nm: Vector2<f64>, lag_s: f64) {
+    fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64) {
         Self::command_torque(self, target_nm, lag_s);
     }
 
@@ -450,7 +450,7 @@ impl Plant for ArmOnBelt {
         self.time_s
     }
 
-    fn joint_angles_rad(&self) -> Vector2<f64> {
+    fn link_angles_rad(&self) -> LinkMotion<f64> {
         theta(&self.state)
     }
 

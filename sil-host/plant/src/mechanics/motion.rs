@@ -1,24 +1,23 @@
 //! Equations of motion in each contact mode, and the contact force that goes with them.
 
 use nalgebra::Vector2;
-use painleve_shared::dynamics::generalised_torque_nm;
-use painleve_shared::{Arm, ContactTerms, Pose, Slip};
+use painleve_shared::{Arm, ContactTerms, LinkMotion, Pose, Slip};
 
 use crate::plant::{ContactMode, Snapshot, State};
 
 use super::belt::BeltProfile;
 use super::torque::TorqueSegment;
 
-/// Joint angles of a state, rad.
+/// Link angles of a state, rad.
 #[inline]
-pub fn theta(state: &State) -> Vector2<f64> {
-    Vector2::new(state[0], state[1])
+pub fn theta(state: &State) -> LinkMotion<f64> {
+    LinkMotion::new(state[0], state[1])
 }
 
-/// Joint rates of a state, rad/s.
+/// Link rates of a state, rad/s.
 #[inline]
-pub fn theta_dot(state: &State) -> Vector2<f64> {
-    Vector2::new(state[2], state[3])
+pub fn theta_dot(state: &State) -> LinkMotion<f64> {
+    LinkMotion::new(state[2], state[3])
 }
 
 /// Changes of the angles whose squares are below rounding, rad.
@@ -62,7 +61,7 @@ impl Motion<'_> {
     /// Contact terms at a state.
     pub fn terms(&self, t_s: f64, state: &State) -> ContactTerms<f64> {
         let angles = theta(state);
-        let torque = generalised_torque_nm(&self.torque.at(t_s));
+        let torque = self.torque.at(t_s).to_links();
         self.arm
             .contact_terms(&angles, &theta_dot(state), &Pose::new(&angles), &torque)
     }
@@ -138,12 +137,13 @@ impl Motion<'_> {
         let along = Vector2::new(jacobian.m11, jacobian.m12);
         let normal = Vector2::new(jacobian.m21, jacobian.m22);
         let centripetal = self.arm.centripetal_m_s2(&pose, &rates);
-        let load = generalised_torque_nm(&self.torque.at(t_s))
+        let load = self.torque.at(t_s).to_links()
             - self.arm.passive_torque_nm(&angles, &rates, &pose)
             - self.arm.centrifugal_torque_nm(&rates, &pose);
 
-        let free = mobility * load;
-        let slip_m_s = along.dot(&rates) - self.belt.speed_m_s(t_s);
+        let free = mobility * load.vector();
+        let rates = rates.vector();
+        let slip_m_s = along.dot(rates) - self.belt.speed_m_s(t_s);
         let direction = mode.slip().unwrap_or_else(|| Slip::of(slip_m_s));
         let friction = self.friction * direction.sign::<f64>();
         let response = mobility * (normal - along * friction);
@@ -173,7 +173,7 @@ impl Motion<'_> {
             tip_t_m: self.arm.tip_m(&pose).x,
             gap: [
                 self.arm.gap_m(&pose),
-                normal.dot(&rates),
+                normal.dot(rates),
                 normal.dot(&acceleration) + centripetal.y,
             ],
             slip: [
@@ -188,7 +188,7 @@ impl Motion<'_> {
 
     /// Tip velocity relative to the belt, (v_r, v_n), m/s.
     pub fn relative_velocity_m_s(&self, t_s: f64, state: &State) -> Vector2<f64> {
-        let velocity = self.arm.jacobian(&Pose::new(&theta(state))) * theta_dot(state);
+        let velocity = self.arm.jacobian(&Pose::new(&theta(state))) * theta_dot(state).vector();
         Vector2::new(velocity.x - self.belt.speed_m_s(t_s), velocity.y)
     }
 
@@ -202,7 +202,7 @@ impl Motion<'_> {
         self.arm.tip_m(&Pose::new(&theta(state))).x
     }
 
-    /// Changes the joint rates by a tip impulse (P_t, P_n), N·s.
+    /// Changes the link rates by a tip impulse (P_t, P_n), N·s.
     pub fn apply_impulse(&self, state: &State, impulse_ns: &Vector2<f64>) -> State {
         let pose = Pose::new(&theta(state));
         let change = self.arm.inverse_mass_matrix(&pose)
@@ -213,23 +213,23 @@ impl Motion<'_> {
     /// The nearest state, in the metric of kinetic energy, with the tip on the
     /// belt and no normal velocity. Removes what integration errors left.
     pub fn onto_belt(&self, state: &State) -> State {
-        let (mut angles, rates) = (theta(state), theta_dot(state));
+        let (mut angles, rates) = (theta(state), *theta_dot(state).vector());
         let [mut along, mut normal, mut direction, mut change] = self.towards_belt(&angles);
         if change.amax() > FIRST_ORDER_RAD {
             angles = theta(&self.lowered_onto_belt(state));
             [along, normal, direction, change] = self.towards_belt(&angles);
         }
-        angles += change;
+        angles += LinkMotion::from_vector(change);
         // ∂²z_n/∂θ² is the row along the belt.
         normal += along.component_mul(&change);
         let rates = rates - direction * (normal.dot(&rates) / normal.dot(&direction));
-        State::new(angles.x, angles.y, rates.x, rates.y)
+        State::new(angles.first(), angles.second(), rates.x, rates.y)
     }
 
     /// The Jacobian's rows along and normal to the belt, the direction M⁻¹ j2, and the change of
     /// the angles along it that takes the tip to the belt, to first order.
     #[inline]
-    fn towards_belt(&self, angles: &Vector2<f64>) -> [Vector2<f64>; 4] {
+    fn towards_belt(&self, angles: &LinkMotion<f64>) -> [Vector2<f64>; 4] {
         let pose = Pose::new(angles);
         let jacobian = self.arm.jacobian(&pose);
         let along = Vector2::new(jacobian.m11, jacobian.m12);

@@ -1,20 +1,20 @@
 //! Torque on the joints between two commands.
 
-use nalgebra::Vector2;
+use painleve_shared::JointTorque;
 
 /// Joint torques (u1, u2) of a first-order stage after one command:
 /// u(t) = target + (start − target) exp(−(t − t0)/lag). Without lag the command holds at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueSegment {
     start_s: f64,
-    start_nm: Vector2<f64>,
-    target_nm: Vector2<f64>,
+    start_nm: JointTorque<f64>,
+    target_nm: JointTorque<f64>,
     lag_s: f64,
 }
 
 impl TorqueSegment {
     /// A constant torque.
-    pub fn constant(torque_nm: Vector2<f64>) -> Self {
+    pub fn constant(torque_nm: JointTorque<f64>) -> Self {
         Self {
             start_s: 0.0,
             start_nm: torque_nm,
@@ -25,7 +25,7 @@ impl TorqueSegment {
 
     /// What follows at `t_s` when `target_nm` is commanded to a stage with time
     /// constant `lag_s`.
-    pub fn followed_by(&self, t_s: f64, target_nm: Vector2<f64>, lag_s: f64) -> Self {
+    pub fn followed_by(&self, t_s: f64, target_nm: JointTorque<f64>, lag_s: f64) -> Self {
         Self {
             start_s: t_s,
             start_nm: self.at(t_s),
@@ -36,7 +36,7 @@ impl TorqueSegment {
 
     /// Joint torques at time `t_s`, N·m.
     #[inline]
-    pub fn at(&self, t_s: f64) -> Vector2<f64> {
+    pub fn at(&self, t_s: f64) -> JointTorque<f64> {
         if self.lag_s == 0.0 || self.start_nm == self.target_nm {
             return self.target_nm;
         }
@@ -51,19 +51,22 @@ mod tests {
 
     #[test]
     fn the_lag_is_first_order_and_continuous() {
-        let before = TorqueSegment::constant(Vector2::new(1.0, -1.0));
-        let after = before.followed_by(2.0, Vector2::new(3.0, 0.0), 0.01);
-        assert_eq!(after.at(2.0), Vector2::new(1.0, -1.0));
+        let before = TorqueSegment::constant(JointTorque::new(1.0, -1.0));
+        let after = before.followed_by(2.0, JointTorque::new(3.0, 0.0), 0.01);
+        assert_eq!(after.at(2.0), JointTorque::new(1.0, -1.0));
         let one_constant = after.at(2.01);
-        assert!((one_constant.x - (3.0 - 2.0 * (-1.0_f64).exp())).abs() < 1e-12);
-        let next = after.followed_by(2.01, Vector2::zeros(), 0.01);
+        assert!((one_constant.first() - (3.0 - 2.0 * (-1.0_f64).exp())).abs() < 1e-12);
+        let next = after.followed_by(2.01, JointTorque::zeros(), 0.01);
         assert_eq!(next.at(2.01), one_constant);
     }
 
     #[test]
     fn without_lag_the_command_holds_at_once() {
-        let segment =
-            TorqueSegment::constant(Vector2::zeros()).followed_by(1.0, Vector2::new(2.0, 1.0), 0.0);
-        assert_eq!(segment.at(1.0), Vector2::new(2.0, 1.0));
+        let segment = TorqueSegment::constant(JointTorque::zeros()).followed_by(
+            1.0,
+            JointTorque::new(2.0, 1.0),
+            0.0,
+        );
+        assert_eq!(segment.at(1.0), JointTorque::new(2.0, 1.0));
     }
 }

@@ -215,7 +215,7 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>, start: &Evaluation) 
         let normal = motion.arm.jacobian(&pose).row(1).transpose();
         (
             motion.arm.gap_m(&pose) + slack,
-            normal.dot(&theta_dot(&state)),
+            normal.dot(theta_dot(&state).vector()),
         )
     };
     let gap = |at: f64| motion.gap_m(&dense.at(at)) + slack;
@@ -273,7 +273,7 @@ pub fn landing_correction_s(motion: &Motion<'_>, mode: ContactMode, state: &Stat
         .jacobian(&pose)
         .row(1)
         .transpose()
-        .dot(&theta_dot(state));
+        .dot(theta_dot(state).vector());
     // A landing at grazing speed has no corrections worth making.
     if speed < -1e-6 && gap.abs() > 1e-16 {
         -gap / speed

@@ -7,6 +7,7 @@ mod contact_mode;
 mod probe;
 
 use nalgebra::{Vector2, Vector4};
+use painleve_shared::{JointTorque, LinkMotion};
 
 pub use contact_mode::ContactMode;
 pub use probe::{Event, Probe, Step};
@@ -17,8 +18,8 @@ pub type State = Vector4<f64>;
 /// A machine with two joints whose tip may touch a moving surface.
 ///
 /// ```
-/// use painleve_plant::nalgebra::Vector2;
 /// use painleve_plant::{Plant, PlantError, Probe, Snapshot};
+/// use painleve_shared::JointTorque;
 ///
 /// /// Two flywheels.
 /// struct Flywheels(Snapshot);
@@ -28,7 +29,7 @@ pub type State = Vector4<f64>;
 ///         self.0
 ///     }
 ///
-///     fn command_torque(&mut self, target_nm: Vector2<f64>, _lag_s: f64) {
+///     fn command_torque(&mut self, target_nm: JointTorque<f64>, _lag_s: f64) {
 ///         self.0.torque_nm = target_nm.into();
 ///     }
 ///
@@ -45,9 +46,9 @@ pub type State = Vector4<f64>;
 /// }
 ///
 /// let mut plant = Flywheels(Snapshot::default());
-/// plant.command_torque(Vector2::new(1.0, 0.0), 0.0);
+/// plant.command_torque(JointTorque::new(1.0, 0.0), 0.0);
 /// plant.advance(0.001, &mut ()).unwrap();
-/// assert!(plant.joint_angles_rad().x > 0.0);
+/// assert!(plant.link_angles_rad().first() > 0.0);
 /// ```
 ///
 /// Time starts at 0 s and only moves in [`advance`](Self::advance). Equal calls must give equal
@@ -56,10 +57,10 @@ pub trait Plant {
     /// Everything that can be known about the present, after the last torque command.
     fn snapshot(&self) -> Snapshot;
 
-    /// Commands joint torques (u1, u2) in N·m from now on. The torque reaches them as a
+    /// Commands joint torques in N·m from now on. The torque reaches them as a
     /// first-order lag with time constant `lag_s`, at once if that is zero. A plant without
     /// such a lag may ignore it if its scenarios leave `converters.torque.lag_s` at zero.
-    fn command_torque(&mut self, target_nm: Vector2<f64>, lag_s: f64);
+    fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64);
 
     /// Moves on to time `until_s`, showing every step and every discontinuity to `probe`. To
     /// advance to the present is to decide what the last command makes of the contact.
@@ -73,8 +74,8 @@ pub trait Plant {
         self.snapshot().time_s
     }
 
-    /// Angles that the encoders read: (θ1, θ2) from the belt's inward normal, rad.
-    fn joint_angles_rad(&self) -> Vector2<f64> {
+    /// Angles of the links, rad, from which the encoders read those of the joints.
+    fn link_angles_rad(&self) -> LinkMotion<f64> {
         self.snapshot().theta_rad.into()
     }
 

@@ -75,7 +75,7 @@ impl ArmTangent {
         let guard = |number: usize, direction: &State| {
             if mode == ContactMode::Flight {
                 // In a series of bounces that dies out differences would drown in rounding.
-                normal.dot(&theta(direction))
+                normal.dot(theta(direction).vector())
             } else {
                 slope_along(state, direction, |x| functions(x)[number])
             }

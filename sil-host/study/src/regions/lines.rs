@@ -1,7 +1,6 @@
 //! The lines p = 0 and b = 0, to rounding.
 
-use nalgebra::Vector2;
-use painleve_shared::{Arm, Pose, Posture, Slip};
+use painleve_shared::{Arm, GeneralisedTorque, LinkMotion, Pose, Posture, Slip};
 
 use super::Theta2;
 use crate::belt_line::{BeltLine, bisected, positive_stretches};
@@ -12,8 +11,8 @@ const CURVE_POINTS: usize = 2000;
 /// One θ1 with the tip on the belt.
 pub(super) struct Column<'a> {
     arm: &'a Arm<f64>,
-    /// Joint angles, rad.
-    pub(super) theta: Vector2<f64>,
+    /// Link angles, rad.
+    pub(super) theta: LinkMotion<f64>,
     /// θ̇2/θ̇1 without normal velocity.
     pub(super) ratio: f64,
 }
@@ -24,21 +23,22 @@ impl<'a> Column<'a> {
         let cosine = arm.height_m() / length_2 - length_1 / length_2 * libm::cos(theta1);
         // At θ2 = 0 the tip cannot move along the belt.
         (cosine.abs() < 1.0).then(|| {
-            let theta = Vector2::new(theta1, theta2.sign() * libm::acos(cosine));
+            let theta = LinkMotion::new(theta1, theta2.sign() * libm::acos(cosine));
             Self {
                 arm,
                 theta,
-                ratio: -libm::sin(theta.x) / libm::sin(theta.y) * (length_1 / length_2),
+                ratio: -libm::sin(theta.first()) / libm::sin(theta.second())
+                    * (length_1 / length_2),
             }
         })
     }
 
     /// b at a rate θ̇1.
     pub(super) fn b(&self, rate: f64) -> f64 {
-        let rates = Vector2::new(rate, self.ratio * rate);
+        let rates = LinkMotion::new(rate, self.ratio * rate);
         let pose = Pose::new(&self.theta);
         self.arm
-            .contact_terms(&self.theta, &rates, &pose, &Vector2::zeros())
+            .contact_terms(&self.theta, &rates, &pose, &GeneralisedTorque::zeros())
             .b()
     }
 
@@ -73,8 +73,8 @@ pub(super) fn zeros_of_p(arm: &Arm<f64>, mu: f64, theta2: Theta2, slip: Slip) ->
         let thetas = ends.filter(inside).map(|tau| line.theta_rad(tau));
         zeros.extend(
             thetas
-                .filter(|theta| theta.y * theta2.sign() > 0.0)
-                .map(|theta| theta.x.to_degrees()),
+                .filter(|theta| theta.second() * theta2.sign() > 0.0)
+                .map(|theta| theta.first().to_degrees()),
         );
     }
     zeros.sort_unstable_by(f64::total_cmp);

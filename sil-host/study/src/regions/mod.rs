@@ -214,7 +214,7 @@ fn map(
                 slip,
                 theta1_deg: degrees,
                 theta1_dot_rad_s: rate,
-                theta2_deg: column.theta.y.to_degrees(),
+                theta2_deg: column.theta.second().to_degrees(),
                 theta2_dot_rad_s: column.ratio * rate,
                 b_m_s2: b,
                 p_per_kg: p,

@@ -29,9 +29,9 @@ fn the_paradox_is_where_the_paper_has_it() {
     // Elbow up at z_t = 0.18269 m and elbow down at 0.16470 m, see Table II.
     let arm = Arm::new(ArmParameters::default()).unwrap();
     let theta1 = |tip: f64, posture| {
-        arm.joint_angles_on_belt_rad(tip, posture)
+        arm.link_angles_on_belt_rad(tip, posture)
             .unwrap()
-            .x
+            .first()
             .to_degrees()
     };
     let expected = [

@@ -108,10 +108,10 @@ fn bounces_carry_a_deviation_as_neighbours_do() {
 /// States with the tip sliding along the belt from `tip_t_m` at `tip_speed_m_s`.
 fn on_belt(parameters: &PlantParameters, tip_t_m: f64, tip_speed_m_s: f64) -> State {
     let arm = Arm::new(parameters.arm).unwrap();
-    let theta = arm.joint_angles_on_belt_rad(tip_t_m, Posture::ElbowDown);
-    let rates = arm.joint_rates_on_belt_rad_s(tip_t_m, tip_speed_m_s, Posture::ElbowDown);
+    let theta = arm.link_angles_on_belt_rad(tip_t_m, Posture::ElbowDown);
+    let rates = arm.link_rates_on_belt_rad_s(tip_t_m, tip_speed_m_s, Posture::ElbowDown);
     let theta = theta.unwrap();
-    State::new(theta.x, theta.y, rates.x, rates.y)
+    State::new(theta.first(), theta.second(), rates.first(), rates.second())
 }
 
 /// Slip dies, the tip moves with the belt until friction holds it no more, and slides back.
