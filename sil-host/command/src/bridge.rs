@@ -151,7 +151,7 @@ fn carry<B: Board>(
     timing: Option<&Path>,
     start: impl FnOnce(&Configuration, Pacing) -> Result<B, BoardError>,
 ) -> Result<(), CommandError> {
-    let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    let interrupt = Interrupt::catch()?;
     or_interrupted(carry_until(bus, timing, start, &interrupt), &interrupt)
 }
 

@@ -25,7 +25,7 @@ pub struct ControllerArguments {
 
 /// Answers the plant's frames until its session ends.
 pub fn run(arguments: &ControllerArguments) -> Result<(), CommandError> {
-    let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    let interrupt = Interrupt::catch()?;
     or_interrupted(answer_until(arguments, &interrupt), &interrupt)
 }
 

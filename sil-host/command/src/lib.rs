@@ -11,8 +11,10 @@ mod study;
 mod sweep;
 mod timing;
 
+use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use painleve_shared::status::Fault;
@@ -25,7 +27,7 @@ use painleve_plant::closed_loop::LoopError;
 use painleve_plant::scenario::ScenarioError;
 use painleve_study::StudyError;
 use painleve_study::sweep::SweepError;
-use painleve_system::interrupt::{Interrupt, ignore_file_size_limit};
+use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_size_limit};
 use painleve_system::terminal::{self, warn};
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
@@ -64,6 +66,9 @@ enum Command {
 
 /// Exit code of a process whose peer is missing or has died.
 const PEER_FAILED: u8 = 3;
+
+/// Exit code after a panic that is our own.
+const INTERNAL_ERROR: u8 = 70;
 
 /// Exit code after Ctrl-C or a request to end.
 const INTERRUPTED: u8 = 130;
@@ -199,9 +204,20 @@ fn seconds(text: &str) -> Result<f64, String> {
 /// Runs the command line; the exit code is the process's.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    let result = ignore_file_size_limit()
-        .map_err(CommandError::from)
-        .and_then(|()| execute(cli.command.unwrap_or(Command::Run(cli.run))));
+    panic::set_hook(Box::new(tell_panic));
+    // Nothing of what a panic may leave half-done is used afterwards.
+    let result = panic::catch_unwind(AssertUnwindSafe(|| {
+        ignore_file_size_limit()?;
+        execute(cli.command.unwrap_or(Command::Run(cli.run)))
+    }));
+    // A panic has been told where it happened.
+    let result = result.unwrap_or(Err(CommandError::Told {
+        code: if PANIC_IN_ICEORYX2.load(Ordering::Relaxed) {
+            PEER_FAILED
+        } else {
+            INTERNAL_ERROR
+        },
+    }));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -210,6 +226,31 @@ pub fn main() -> ExitCode {
             }
             ExitCode::from(error.exit_code())
         }
+    }
+}
+
+/// A panic has come from iceoryx2: 0.9.3 does so when the system refuses what it does not expect
+/// to be refused, a file descriptor, say.
+static PANIC_IN_ICEORYX2: AtomicBool = AtomicBool::new(false);
+
+/// One line instead of a trace of calls.
+fn tell_panic(panic: &PanicHookInfo) {
+    let place = panic.location().map_or("", |location| location.file());
+    let payload = panic.payload();
+    let message = payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no reason given");
+    let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    if place.contains("iceoryx2") {
+        PANIC_IN_ICEORYX2.store(true, Ordering::Relaxed);
+        warn(format_args!("error: iceoryx2 cannot go on: {message}"));
+    } else {
+        let line = panic.location().map_or(0, |location| location.line());
+        warn(format_args!(
+            "error: this is a fault of painleve, please report it: {message} ({place}:{line})"
+        ));
     }
 }
 
@@ -222,10 +263,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Bridge(_)
         | Command::Timing(_) => {}
         Command::Scenarios(_) | Command::Study(_) | Command::Sweep(_) | Command::Figures(_) => {
-            Interrupt::exit(INTERRUPTED, || {
-                warn(format_args!("error: {}", CommandError::Interrupted));
-            })
-            .map_err(|error| CommandError::Process(error.to_string()))?;
+            exit_when_requested(INTERRUPTED)?;
         }
     }
     match command {

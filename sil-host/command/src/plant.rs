@@ -50,7 +50,7 @@ pub struct PlantArguments {
 
 /// Runs a scenario against the controller on the bus.
 pub fn run(arguments: &PlantArguments) -> Result<(), CommandError> {
-    let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    let interrupt = Interrupt::catch()?;
     match run_until(arguments, &interrupt) {
         Err(error) if arguments.started_by_run && error.exit_code() == INTERRUPTED => {
             Err(CommandError::Told { code: INTERRUPTED })

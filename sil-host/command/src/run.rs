@@ -180,7 +180,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     if let (Host::Serial, Some(port)) = (arguments.host, &arguments.port) {
         serial::check(port)?;
     }
-    let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    let interrupt = Interrupt::catch()?;
     let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
 
     let mut plant_arguments: Vec<OsString> = vec!["plant".into()];

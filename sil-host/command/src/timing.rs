@@ -77,7 +77,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
     if let Some(path) = &arguments.svg {
         AtomicFile::create(path).map_err(|error| output(&error))?;
     }
-    let interrupt = Interrupt::catch().map_err(|error| CommandError::Process(error.to_string()))?;
+    let interrupt = Interrupt::catch()?;
     if arguments.host == Host::Native {
         warn(format_args!("controller: {}", request_realtime()));
     }

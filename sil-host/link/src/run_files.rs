@@ -50,7 +50,9 @@ impl RunFiles {
 
     /// The run that waits for a controller on the bus, if there is one.
     pub(super) fn ready(bus: &Bus) -> Option<Self> {
-        all(&bus.folder(), &bus.place).find(|run| run.has(READY) && !run.has(JOINED))
+        let runs = all(&bus.folder(), &bus.place).unwrap_or_default();
+        runs.into_iter()
+            .find(|run| run.has(READY) && !run.has(JOINED))
     }
 
     fn at(folder: PathBuf, place: &Place) -> Self {
@@ -116,7 +118,8 @@ impl RunFiles {
 
     /// Removes the run's folder and its segments.
     pub(super) fn remove(&self) -> io::Result<()> {
-        for (path, _) in segments(&self.prefix) {
+        // The folder last: without it nobody would know the segments' names any more.
+        for (path, _) in segments(&self.prefix)? {
             tolerate_missing(fs::remove_file(path))?;
         }
         tolerate_missing(fs::remove_dir_all(&self.folder))
@@ -124,7 +127,7 @@ impl RunFiles {
 
     /// Removes every run in the folder of a bus on which nobody is.
     pub(super) fn remove_all(folder: &Path, place: &Place) -> io::Result<()> {
-        all(folder, place).try_for_each(|run| run.remove())
+        all(folder, place)?.iter().try_for_each(Self::remove)
     }
 
     /// Removes segments that a dead process has left half-made, so that opening them
@@ -135,8 +138,8 @@ impl RunFiles {
     /// `MappingSizeIsZero`. A process that dies between `shm_open` and `ftruncate`
     /// leaves such a segment. Each turn opens by name, so that removing the name ends it.
     pub(super) fn remove_half_made(bus: &Bus) {
-        for run in all(&bus.folder(), &bus.place) {
-            for (path, metadata) in segments(&run.prefix) {
+        for run in all(&bus.folder(), &bus.place).unwrap_or_default() {
+            for (path, metadata) in segments(&run.prefix).unwrap_or_default() {
                 let write_only = metadata.permissions().mode() & 0o777 == 0o200;
                 if metadata.len() == 0 || write_only {
                     let _ = fs::remove_file(path);
@@ -146,21 +149,31 @@ impl RunFiles {
     }
 }
 
-fn all(folder: &Path, place: &Place) -> impl Iterator<Item = RunFiles> {
-    let folders = fs::read_dir(folder).into_iter().flatten().flatten();
-    folders
-        .filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()))
-        .map(|entry| RunFiles::at(entry.path(), place))
+fn all(folder: &Path, place: &Place) -> io::Result<Vec<RunFiles>> {
+    let mut runs = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            runs.push(RunFiles::at(entry.path(), place));
+        }
+    }
+    Ok(runs)
 }
 
-fn segments(prefix: &str) -> impl Iterator<Item = (PathBuf, fs::Metadata)> {
-    let entries = fs::read_dir(Path::new(SHARED_MEMORY));
-    entries
-        .into_iter()
-        .flatten()
-        .flatten()
-        .filter(move |entry| entry.file_name().to_string_lossy().starts_with(prefix))
-        .filter_map(|entry| Some((entry.path(), entry.metadata().ok()?)))
+fn segments(prefix: &str) -> io::Result<Vec<(PathBuf, fs::Metadata)>> {
+    let mut segments = Vec::new();
+    for entry in fs::read_dir(SHARED_MEMORY)? {
+        let entry = entry?;
+        if entry.file_name().to_string_lossy().starts_with(prefix) {
+            match entry.metadata() {
+                Ok(metadata) => segments.push((entry.path(), metadata)),
+                // Removed since it was listed.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+    Ok(segments)
 }
 
 fn tolerate_missing(removed: io::Result<()>) -> io::Result<()> {

@@ -3,11 +3,12 @@
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
-    LogLevel, Node, NodeBuilder, ServiceName, SignalHandlingMode, ZeroCopySend, ipc,
-    set_log_level_from_env_or,
+    Node, NodeBuilder, ServiceName, SignalHandlingMode, ZeroCopySend, ipc,
+    set_log_level_from_env_or, set_logger,
 };
 use iceoryx2::service::builder::publish_subscribe::{Builder, PublishSubscribeOpenError};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use iceoryx2_log_types::{Log, LogLevel};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
 use super::run_files::RunFiles;
@@ -47,7 +48,7 @@ pub(super) struct Presence {
 impl Presence {
     /// Joins a run.
     pub(super) fn new(bus: &BusName, run: &RunFiles) -> Result<Self, LinkError> {
-        set_log_level_from_env_or(LogLevel::Fatal);
+        quieten();
         let node = NodeBuilder::new()
             .config(&run.config()?)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -80,6 +81,23 @@ impl Presence {
             .max_nodes(MAX_NODES)
             .enable_safe_overflow(true)
             .subscriber_max_borrowed_samples(1))
+    }
+}
+
+/// Says nothing: what matters becomes a [`LinkError`], and a panic is told by the program.
+struct Silent;
+
+impl Log for Silent {
+    fn log(&self, _: LogLevel, _: std::fmt::Arguments, _: std::fmt::Arguments) {}
+}
+
+/// Keeps iceoryx2 quiet unless somebody asks it to speak.
+fn quieten() {
+    if std::env::var_os("IOX2_LOG_LEVEL").is_some() {
+        set_log_level_from_env_or(LogLevel::Fatal);
+    } else {
+        // Refused from the second time on, when it is there already.
+        let _ = set_logger(&Silent);
     }
 }
 

@@ -5,6 +5,7 @@
 //! code and one message, that no process, file or segment stays after the next start, and
 //! that the next run on the same bus gives the right log hash.
 
+mod fault;
 mod place;
 mod tracer;
 mod trial;
@@ -18,8 +19,9 @@ use clap::Args;
 use nix::sys::prctl::set_child_subreaper;
 
 use crate::command::{ChoreError, run_cargo, say, workspace};
+use fault::{FAULTS, Fault};
 use place::{Place, unused_segments};
-use trial::{Disturbance, Flaw, Plan, Role, Running};
+use trial::{Disturbance, Expected, Flaw, Plan, Role, Running};
 
 /// Options of `cargo xtask chaos`.
 #[derive(Debug, Args)]
@@ -36,12 +38,20 @@ pub struct ChaosArguments {
     /// Seed of the draw.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Instead of signals, make the first so many calls of each kind fail: no space, a bad
+    /// disk, no descriptors, no memory, an interruption. Needs strace.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    faults: u32,
+    /// After a disturbance all must have ended within so many seconds. Longer than the 5 s that
+    /// are promised only where other work keeps the machine from running them.
+    #[arg(long, default_value_t = 5)]
+    end_s: u64,
     /// Trials at a time.
     #[arg(long, default_value_t = 4)]
     jobs: usize,
-    /// All trials on one bus, so that those at a time meet each other there.
-    #[arg(long)]
-    one_bus: bool,
+    /// So many more plants and controllers on the bus of every trial.
+    #[arg(long, default_value_t = 0)]
+    crowd: u32,
 }
 
 /// Segments that others make at this moment are given time to go.
@@ -58,7 +68,10 @@ pub fn short() -> Result<(), ChoreError> {
         trials: Some(120),
         seed: 1,
         jobs: 4,
-        one_bus: false,
+        crowd: 0,
+        faults: 0,
+        // Tests share their machine.
+        end_s: 20,
     })
 }
 
@@ -91,9 +104,17 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                     let mark = format!("{}-{worker}", std::process::id());
                     let bus = format!("chaos-{worker}");
                     let place = Place::new(program, mark, runtime)?;
-                    let expected = undisturbed(&place, &bus)?;
+                    let expected = Expected {
+                        log_hash: undisturbed(&place, &bus)?,
+                        end: Duration::from_secs(arguments.end_s),
+                    };
                     while let Some(&plan) = plans.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let outcome = trial::run(&place, &bus, plan, &expected)?;
+                        let outcome = match plan {
+                            Trial::Signal(plan) => trial::run(&place, &bus, plan, &expected)?,
+                            Trial::Fault(victim, fault, number) => {
+                                fault::run(&place, &bus, (victim, fault, number), &expected)?
+                            }
+                        };
                         if let Ok(mut table) = table.lock() {
                             table.add(plan, outcome);
                         }
@@ -153,20 +174,49 @@ fn undisturbed(place: &Place, bus: &str) -> std::io::Result<String> {
         .ok_or_else(|| std::io::Error::other(format!("no undisturbed run: {}", text.stderr)))
 }
 
+/// One trial.
+#[derive(Clone, Copy, Debug)]
+enum Trial {
+    Signal(Plan),
+    Fault(Role, Fault, u32),
+}
+
+impl Trial {
+    /// Its line in the table.
+    fn kind(&self) -> String {
+        match self {
+            Self::Signal(plan) => format!("{:?} {:?}", plan.victim, plan.disturbance),
+            Self::Fault(victim, fault, _) => {
+                format!("{victim:?} {} {}", fault.error, fault.call)
+            }
+        }
+        .to_lowercase()
+    }
+}
+
 /// Every system call of every role with every disturbance, or a draw of them.
-fn plans(arguments: &ChaosArguments) -> Vec<Plan> {
+fn plans(arguments: &ChaosArguments) -> Vec<Trial> {
     let mut plans = Vec::new();
     for call in arguments.first..=arguments.last {
         for victim in [Role::Plant, Role::Controller, Role::Run] {
             for disturbance in Disturbance::ALL {
                 let peer_first = (call + disturbance as u32).is_multiple_of(2);
-                plans.push(Plan {
+                plans.push(Trial::Signal(Plan {
                     victim,
                     disturbance,
                     call,
                     peer_first,
-                });
+                    crowd: arguments.crowd,
+                }));
             }
+        }
+    }
+    if arguments.faults > 0 {
+        plans.clear();
+    }
+    for fault in FAULTS {
+        for victim in [Role::Plant, Role::Controller] {
+            plans.extend((1..=arguments.faults).map(|n| Trial::Fault(victim, fault, n)));
         }
     }
     // Shuffled, so that long waits spread over the workers and a draw is a fair one.
@@ -195,7 +245,7 @@ impl SplitMix {
 /// Counts of trials and flaws.
 #[derive(Default)]
 struct Table {
-    rows: BTreeMap<(Role, Disturbance), Row>,
+    rows: BTreeMap<String, Row>,
     findings: usize,
 }
 
@@ -217,17 +267,14 @@ const FLAWS: [(Flaw, &str); 7] = [
 ];
 
 impl Table {
-    fn add(&mut self, plan: Plan, outcome: trial::Outcome) {
-        let row = self
-            .rows
-            .entry((plan.victim, plan.disturbance))
-            .or_default();
+    fn add(&mut self, trial: Trial, outcome: trial::Outcome) {
+        let row = self.rows.entry(trial.kind()).or_default();
         row.trials += 1;
         row.injections += usize::from(outcome.reached);
         for (flaw, what) in outcome.findings {
             *row.flaws.entry(flaw).or_default() += 1;
             self.findings += 1;
-            eprintln!("{plan:?}: {flaw:?}: {what}");
+            eprintln!("{trial:?}: {flaw:?}: {what}");
         }
     }
 
@@ -238,8 +285,7 @@ impl Table {
             "disturbed", "trials", "injections"
         ))?;
         let mut sum = 0;
-        for ((victim, disturbance), row) in &self.rows {
-            let name = format!("{victim:?} {disturbance:?}").to_lowercase();
+        for (name, row) in &self.rows {
             let counts: String = FLAWS
                 .map(|(flaw, _)| format!("{:>10}", row.flaws.get(&flaw).unwrap_or(&0)))
                 .concat();

@@ -33,15 +33,25 @@ impl Place {
     /// The program with arguments.
     pub fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(&self.program);
+        command.args(arguments);
+        self.equip(&mut command);
         command
-            .args(arguments)
+    }
+
+    /// Makes any command run here.
+    pub fn equip<'a>(&self, command: &'a mut Command) -> &'a mut Command {
+        command
             .current_dir(self.work.path())
             .env("XDG_RUNTIME_DIR", &self.runtime)
             .env(MARK, &self.mark)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        command
+            .stderr(Stdio::piped())
+    }
+
+    /// A path in the working folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.work.path().join(name)
     }
 
     /// The processes of this place that still run.

@@ -13,8 +13,6 @@ use serde_json::Value;
 use super::place::Place;
 use super::tracer::{Traced, Victim};
 
-/// After a disturbance everything must have ended within this.
-const END: Duration = Duration::from_secs(5);
 /// How long a traced process may take to get to its system call.
 const REACH: Duration = Duration::from_secs(30);
 /// How long a peer waits for the other, s: not longer than [`END`].
@@ -70,6 +68,16 @@ pub struct Plan {
     pub call: u32,
     /// The victim's peer starts first.
     pub peer_first: bool,
+    /// So many more plants and controllers are on the bus at the same time.
+    pub crowd: u32,
+}
+
+/// What must follow.
+pub struct Expected {
+    /// Log hash of an undisturbed run.
+    pub log_hash: String,
+    /// After a disturbance everything must have ended within this.
+    pub end: Duration,
 }
 
 /// What was wrong.
@@ -94,27 +102,34 @@ pub struct Outcome {
     pub findings: Vec<Finding>,
 }
 
-/// Runs one trial on `bus`; `expected` is the log hash of an undisturbed run.
-pub fn run(place: &Place, bus: &str, plan: Plan, expected: &str) -> std::io::Result<Outcome> {
+/// Runs one trial on `bus`; `expected` says what must follow.
+pub fn run(place: &Place, bus: &str, plan: Plan, expected: &Expected) -> std::io::Result<Outcome> {
+    let end = expected.end;
     let mut findings = Vec::new();
     let record = if plan.call.is_multiple_of(2) {
         "out/run.mcap"
     } else {
         ""
     };
+    let mut crowd = Vec::new();
+    for _ in 0..plan.crowd {
+        for role in [Role::Plant, Role::Controller] {
+            crowd.push(Running::start(&mut command(place, role, bus, ""))?);
+        }
+    }
     let mut peer = None;
     if plan.victim != Role::Run && plan.peer_first {
-        peer = Some(Running::start(&mut end(
+        peer = Some(Running::start(&mut command(
             place,
             other(plan.victim),
             bus,
             record,
         ))?);
     }
-    let mut victim = Victim::start(&mut end(place, plan.victim, bus, record))?;
+    let mut victim = Victim::start(&mut command(place, plan.victim, bus, record))?;
     let victim_said = Said::of(&mut victim.child)?;
     if plan.victim != Role::Run && !plan.peer_first {
-        peer = Some(Running::start(&mut end(
+        peer = Some(Running::start(&mut command(
             place,
             other(plan.victim),
             bus,
@@ -138,7 +153,7 @@ pub fn run(place: &Place, bus: &str, plan: Plan, expected: &str) -> std::io::Res
         continue_process(&victim.child);
     }
     if let Some(peer) = &mut peer {
-        if peer.wait(disturbed + END)? {
+        if peer.wait(disturbed + end)? {
             let (code, text) = peer.outcome();
             judge("peer", code, &text, &mut findings);
         } else {
@@ -152,7 +167,7 @@ pub fn run(place: &Place, bus: &str, plan: Plan, expected: &str) -> std::io::Res
         }
         continue_process(&victim.child);
     }
-    let limit = Instant::now().max(disturbed) + END;
+    let limit = Instant::now().max(disturbed) + end;
     if victim.wait(limit)? {
         let (code, text) = victim.outcome();
         // A signal before its handler is set ends the process without a word.
@@ -162,19 +177,29 @@ pub fn run(place: &Place, bus: &str, plan: Plan, expected: &str) -> std::io::Res
     } else {
         findings.push((Flaw::Hang, "the victim goes on".into()));
     }
-    orphans(place, disturbed + END, &mut findings);
+    for other in &mut crowd {
+        if other.wait(Instant::now().max(disturbed) + end)? {
+            let (code, text) = other.outcome();
+            judge("another", code, &text, &mut findings);
+        } else {
+            findings.push((Flaw::Hang, "another on the bus goes on".into()));
+        }
+    }
+    orphans(place, disturbed + end, &mut findings);
     next_run(place, bus, expected, &mut findings)?;
     Ok(Outcome { reached, findings })
 }
 
-fn other(role: Role) -> Role {
+/// Whom a role meets.
+pub fn other(role: Role) -> Role {
     match role {
         Role::Plant => Role::Controller,
         Role::Controller | Role::Run => Role::Plant,
     }
 }
 
-fn end(place: &Place, role: Role, bus: &str, record: &str) -> Command {
+/// The command of a role.
+pub fn command(place: &Place, role: Role, bus: &str, record: &str) -> Command {
     let recorded = ["--record", record];
     let unrecorded = ["--no-record"];
     let record = if record.is_empty() {
@@ -193,7 +218,7 @@ fn end(place: &Place, role: Role, bus: &str, record: &str) -> Command {
 }
 
 /// Whatever is left: processes whose parent has gone must go, too.
-fn orphans(place: &Place, deadline: Instant, findings: &mut Vec<Finding>) {
+pub fn orphans(place: &Place, deadline: Instant, findings: &mut Vec<Finding>) {
     loop {
         let left = place.processes();
         if left.is_empty() {
@@ -211,20 +236,20 @@ fn orphans(place: &Place, deadline: Instant, findings: &mut Vec<Finding>) {
 }
 
 /// The next run on the same bus must go as if nothing had been, and leave nothing.
-fn next_run(
+pub fn next_run(
     place: &Place,
     bus: &str,
-    expected: &str,
+    expected: &Expected,
     findings: &mut Vec<Finding>,
 ) -> std::io::Result<()> {
     let run = ["run", "--bus", bus, "--record", "out/run.mcap"];
     let mut next = Running::start(&mut place.command(&[&run, &QUICK[..]].concat()))?;
-    if !next.wait(Instant::now() + END)? {
+    if !next.wait(Instant::now() + expected.end)? {
         findings.push((Flaw::UnusableBus, "the next run does not end".into()));
     }
     let (code, text) = next.outcome();
     let hash = log_hash(&text.stdout);
-    if code != Some(0) || hash.as_deref() != Some(expected) {
+    if code != Some(0) || hash.as_ref() != Some(&expected.log_hash) {
         let errors = text.stderr.trim();
         let text = format!("the next run ended with {code:?} and hash {hash:?}: {errors}");
         findings.push((Flaw::UnusableBus, text));
@@ -242,7 +267,8 @@ pub fn log_hash(report: &str) -> Option<String> {
     Some(report["log_hash"].as_str()?.to_owned())
 }
 
-fn judge(who: &str, code: Option<i32>, text: &Text, findings: &mut Vec<Finding>) {
+/// Exit code and messages of an ended process.
+pub fn judge(who: &str, code: Option<i32>, text: &Text, findings: &mut Vec<Finding>) {
     let errors = text.stderr.trim();
     if errors.contains("panicked") {
         findings.push((Flaw::Panic, format!("{who}: {errors}")));

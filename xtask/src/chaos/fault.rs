@@ -1,0 +1,101 @@
+//! One trial with a system call that fails: no space, no memory, no descriptors, a bad disk,
+//! or an interruption. `strace` makes it fail.
+
+use std::fs;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use super::place::Place;
+use super::trial::{
+    Expected, Flaw, Outcome, Role, Running, command, judge, next_run, orphans, other,
+};
+
+/// A traced start, and two seconds of waiting for a peer that may have failed.
+const START: Duration = Duration::from_secs(5);
+/// Exit code of a program that the dynamic loader cannot load.
+const NOT_LOADED: i32 = 127;
+
+/// A system call, and the error it fails with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fault {
+    pub call: &'static str,
+    pub error: &'static str,
+}
+
+const fn fault(error: &'static str, call: &'static str) -> Fault {
+    Fault { call, error }
+}
+
+/// What disks, memory and signals do to the calls that plant and controller make.
+pub const FAULTS: [Fault; 22] = [
+    fault("ENOSPC", "write"),
+    fault("ENOSPC", "openat"),
+    fault("ENOSPC", "mkdir"),
+    fault("ENOSPC", "ftruncate"),
+    fault("ENOSPC", "fsync"),
+    fault("EROFS", "openat"),
+    fault("EROFS", "mkdir"),
+    fault("EROFS", "rename"),
+    fault("EIO", "write"),
+    fault("EIO", "read"),
+    fault("EIO", "fsync"),
+    fault("EIO", "getdents64"),
+    fault("EMFILE", "openat"),
+    fault("EMFILE", "pipe2"),
+    fault("ENOMEM", "mmap"),
+    fault("ENOMEM", "clone3"),
+    fault("EINTR", "write"),
+    fault("EINTR", "read"),
+    fault("EINTR", "openat"),
+    fault("EINTR", "fcntl"),
+    fault("EACCES", "openat"),
+    fault("EACCES", "unlink"),
+];
+
+/// Runs one trial in which the victim's call `number` of its kind fails.
+pub fn run(
+    place: &Place,
+    bus: &str,
+    (victim, fault, number): (Role, Fault, u32),
+    expected: &Expected,
+) -> std::io::Result<Outcome> {
+    let mut findings = Vec::new();
+    let log = place.path("strace.log");
+    let _ = fs::remove_file(&log);
+    let peer_first = number.is_multiple_of(2);
+    let start_peer = || Running::start(&mut command(place, other(victim), bus, "out/run.mcap"));
+    let mut peer = None;
+    if peer_first {
+        peer = Some(start_peer()?);
+    }
+    let plain = command(place, victim, bus, "out/run.mcap");
+    let Fault { call, error } = fault;
+    let mut traced = Command::new("strace");
+    traced
+        .args(["-f", "-qq", "-o"])
+        .arg(&log)
+        .args(["-e", &format!("trace={call}")])
+        .args(["-e", &format!("inject={call}:error={error}:when={number}")])
+        .arg(plain.get_program())
+        .args(plain.get_args());
+    let mut victim = Running::start(place.equip(&mut traced))?;
+    let mut peer = match peer {
+        Some(peer) => peer,
+        None => start_peer()?,
+    };
+    let deadline = Instant::now() + START + expected.end;
+    for (name, process) in [("victim", &mut victim), ("peer", &mut peer)] {
+        if !process.wait(deadline)? {
+            findings.push((Flaw::Hang, format!("the {name} goes on")));
+            continue;
+        }
+        let (code, text) = process.outcome();
+        if code != Some(NOT_LOADED) {
+            judge(name, code, &text, &mut findings);
+        }
+    }
+    let reached = fs::read_to_string(&log).is_ok_and(|log| log.contains("(INJECTED)"));
+    orphans(place, deadline, &mut findings);
+    next_run(place, bus, expected, &mut findings)?;
+    Ok(Outcome { reached, findings })
+}
