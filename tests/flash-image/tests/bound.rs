@@ -15,7 +15,7 @@ use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
-use painleve_shared::message::Plant;
+use painleve_shared::message::FrameSource;
 
 /// A generator of numbers that are random enough: SplitMix64 (Steele, Lea, Flood 2014).
 struct Random(u64);
@@ -106,7 +106,7 @@ fn traced(mut board: Board) -> Board {
 fn configured(scenario: &Scenario) -> Board {
     let mut board = Board::booted();
     board
-        .configure(Plant::Lockstep, &encoded(scenario))
+        .configure(FrameSource::Lockstep, &encoded(scenario))
         .unwrap();
     traced(board)
 }
@@ -191,7 +191,7 @@ fn random_frames_stay_below_the_bound() {
                 }
                 if place % 2 == 1 && tick % 50 == 49 {
                     board
-                        .configure(Plant::Lockstep, &encoded(&scenario))
+                        .configure(FrameSource::Lockstep, &encoded(&scenario))
                         .unwrap();
                 }
                 let answer = board.exchange(&frame);
