@@ -100,6 +100,15 @@ impl Scenario {
         from_table(&origin(name), read(name)?)?.with_overrides(&origin(name), overrides)
     }
 
+    /// The scenario of a TOML text, checked as a whole but for the start of the arm.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user.
+    pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
+        let origin = "scenario";
+        from_table(origin, parse(origin, text)?)?.with_overrides(origin, &[])
+    }
+
     /// This scenario with overrides `key=value` applied in order, its numbers checked.
     /// `origin` says in messages what they were applied to.
     ///

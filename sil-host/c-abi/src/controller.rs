@@ -1,0 +1,69 @@
+//! The firmware's controller.
+
+use std::ffi::c_char;
+
+use painleve_firmware::Controller;
+
+use crate::frames::{PainleveActuatorFrame, PainleveSensorFrame};
+use crate::status::{CallError, PainleveStatus, call, give, put, scenario, take_back};
+
+/// A controller with its state.
+pub struct PainleveController(Controller);
+
+/// Makes the controller of a scenario.
+///
+/// # Safety
+/// `scenario_toml` is a string that ends with a zero byte; `controller` can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn painleve_controller_new(
+    scenario_toml: *const c_char,
+    controller: *mut *mut PainleveController,
+) -> PainleveStatus {
+    call(|| {
+        // SAFETY: by this function's contract.
+        let scenario = unsafe { scenario(scenario_toml) }?;
+        let configuration = scenario.controller_configuration();
+        // SAFETY: by this function's contract.
+        unsafe {
+            give(controller, || {
+                Ok(PainleveController(Controller::new(&configuration)?))
+            })
+        }
+    })
+}
+
+/// Runs one tick: takes a sensor frame, and writes the answer.
+///
+/// # Safety
+/// `controller` is from [`painleve_controller_new`] and not freed, `sensor` can be read and
+/// `actuator` written, and no other thread uses the controller meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn painleve_controller_tick(
+    controller: *mut PainleveController,
+    sensor: *const PainleveSensorFrame,
+    actuator: *mut PainleveActuatorFrame,
+) -> PainleveStatus {
+    call(|| {
+        // SAFETY: null or valid and not shared, by this function's contract.
+        let controller = unsafe { controller.as_mut() };
+        let controller = controller.ok_or(CallError::Null("controller"))?;
+        // SAFETY: null or readable, by this function's contract.
+        let sensor = unsafe { sensor.as_ref() }.ok_or(CallError::Null("sensor"))?;
+        if actuator.is_null() {
+            return Err(CallError::Null("actuator"));
+        }
+        let answer = controller.0.tick(&(*sensor).into());
+        // SAFETY: writable, by this function's contract.
+        unsafe { put(actuator, "actuator", answer.into()) }
+    })
+}
+
+/// Frees a controller; does nothing with null.
+///
+/// # Safety
+/// `controller` is null or from [`painleve_controller_new`], and is not used again.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn painleve_controller_free(controller: *mut PainleveController) {
+    // SAFETY: by this function's contract.
+    unsafe { take_back(controller) }
+}

@@ -1,0 +1,147 @@
+//! What plant and controller exchange, as structs of C. Counts are those of the converters.
+
+use painleve_plant::Snapshot;
+use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
+
+/// What the controller is told at a tick.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PainleveSensorFrame {
+    /// Tick; wraps at 2^32.
+    pub tick: u32,
+    /// Number of the frame; wraps at 2^32.
+    pub sequence: u32,
+    /// Encoders of the first joint and of the elbow, counts.
+    pub joints: [u32; 2],
+    /// Normal force, counts.
+    pub normal_force: i32,
+    /// Tangential force, counts.
+    pub tangential_force: i32,
+    /// Digital inputs; bit 0 enables the drive.
+    pub inputs: u32,
+}
+
+/// What the controller answers.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PainleveActuatorFrame {
+    /// Tick of the sensor frame that is answered.
+    pub tick: u32,
+    /// Number of the sensor frame that is answered.
+    pub sequence: u32,
+    /// Torques of both joints, counts.
+    pub torques: [i32; 2],
+    /// Reference of the tip along the belt, micrometres.
+    pub reference_tip_um: i32,
+    /// Estimated position of the tip along the belt, micrometres.
+    pub estimated_tip_um: i32,
+    /// Number of the supervisor's state.
+    pub state: u8,
+    /// Number of the latched fault; 0 for none.
+    pub fault: u8,
+    /// Status flags.
+    pub flags: u16,
+}
+
+/// The plant at an instant.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PainleveSnapshot {
+    /// Simulated time, s.
+    pub time_s: f64,
+    /// Angles from the downward vertical, rad.
+    pub theta_rad: [f64; 2],
+    /// Their rates, rad/s.
+    pub theta_dot_rad_s: [f64; 2],
+    /// Position of the tip along the belt, m.
+    pub tip_t_m: f64,
+    /// Height of the tip over the belt, m.
+    pub gap_m: f64,
+    /// Velocity of the tip relative to the belt, m/s.
+    pub slip_velocity_m_s: f64,
+    /// Velocity of the belt, m/s.
+    pub belt_speed_m_s: f64,
+    /// Normal force on the tip, N.
+    pub normal_force_n: f64,
+    /// Tangential force on the tip, N.
+    pub tangential_force_n: f64,
+    /// Torques that act on the joints, N m.
+    pub torque_nm: [f64; 2],
+    /// What holds the tip: 0 nothing, 1 and 2 it slides forwards and backwards, 3 it sticks.
+    pub contact_mode: u8,
+}
+
+impl From<SensorFrame> for PainleveSensorFrame {
+    fn from(frame: SensorFrame) -> Self {
+        Self {
+            tick: frame.tick,
+            sequence: frame.sequence,
+            joints: frame.joints.map(|counts| counts.0),
+            normal_force: frame.normal_force.0,
+            tangential_force: frame.tangential_force.0,
+            inputs: frame.inputs.0,
+        }
+    }
+}
+
+impl From<PainleveSensorFrame> for SensorFrame {
+    fn from(frame: PainleveSensorFrame) -> Self {
+        Self {
+            tick: frame.tick,
+            sequence: frame.sequence,
+            joints: frame.joints.map(EncoderCounts),
+            normal_force: ForceCounts(frame.normal_force),
+            tangential_force: ForceCounts(frame.tangential_force),
+            inputs: DigitalInputs(frame.inputs),
+        }
+    }
+}
+
+impl From<ActuatorFrame> for PainleveActuatorFrame {
+    fn from(frame: ActuatorFrame) -> Self {
+        Self {
+            tick: frame.tick,
+            sequence: frame.sequence,
+            torques: frame.torques.map(|counts| counts.0),
+            reference_tip_um: frame.reference_tip.0,
+            estimated_tip_um: frame.estimated_tip.0,
+            state: frame.state,
+            fault: frame.fault,
+            flags: frame.flags.0,
+        }
+    }
+}
+
+impl From<PainleveActuatorFrame> for ActuatorFrame {
+    fn from(frame: PainleveActuatorFrame) -> Self {
+        Self {
+            tick: frame.tick,
+            sequence: frame.sequence,
+            torques: frame.torques.map(TorqueCounts),
+            reference_tip: Micrometres(frame.reference_tip_um),
+            estimated_tip: Micrometres(frame.estimated_tip_um),
+            state: frame.state,
+            fault: frame.fault,
+            flags: StatusFlags(frame.flags),
+        }
+    }
+}
+
+impl From<Snapshot> for PainleveSnapshot {
+    fn from(plant: Snapshot) -> Self {
+        Self {
+            time_s: plant.time_s,
+            theta_rad: plant.theta_rad,
+            theta_dot_rad_s: plant.theta_dot_rad_s,
+            tip_t_m: plant.tip_t_m,
+            gap_m: plant.gap_m,
+            slip_velocity_m_s: plant.slip_velocity_m_s,
+            belt_speed_m_s: plant.belt_speed_m_s,
+            normal_force_n: plant.normal_force_n,
+            tangential_force_n: plant.tangential_force_n,
+            torque_nm: plant.torque_nm,
+            contact_mode: plant.mode as u8,
+        }
+    }
+}
