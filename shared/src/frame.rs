@@ -128,3 +128,16 @@ impl ActuatorFrame {
         Fault::from_code(self.fault)
     }
 }
+
+#[cfg(test)]
+impl SensorFrame {
+    /// The frame that is longest on a wire.
+    pub(crate) const LONGEST: Self = Self {
+        tick: u32::MAX,
+        sequence: u32::MAX,
+        joints: [EncoderCounts(u32::MAX); 2],
+        normal_force: ForceCounts(i32::MIN),
+        tangential_force: ForceCounts(i32::MIN),
+        inputs: DigitalInputs(u32::MAX),
+    };
+}

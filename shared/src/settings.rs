@@ -237,7 +237,7 @@ macro_rules! numbers {
 }
 
 numbers!(Number: f32 as f32, f64 as f64);
-numbers!(Integer: u8 as f32, u16 as f32, u32 as f64, u64 as f64, i32 as f64);
+numbers!(Integer: u8 as f32, u16 as f32, u32 as f64, u64 as f64, i16 as f32, i32 as f64);
 
 macro_rules! without_a_range {
     ($($type:ty: $shape:ident),*) => {$(

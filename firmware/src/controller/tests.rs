@@ -22,7 +22,7 @@ fn configuration() -> Configuration {
 /// The arm at rest at x0,d, pressing with 10 N.
 fn frame(tick: u32) -> SensorFrame {
     let encoder = configuration().converters.encoders[0];
-    SensorFrame {
+    let pressing = SensorFrame {
         tick,
         sequence: tick,
         joints: [
@@ -31,7 +31,11 @@ fn frame(tick: u32) -> SensorFrame {
         ],
         normal_force: ForceCounts(1024),
         tangential_force: ForceCounts(-614),
+        ..Default::default()
+    };
+    SensorFrame {
         inputs: DigitalInputs::ENABLE,
+        ..pressing
     }
 }
 
