@@ -4,7 +4,7 @@ use super::*;
 use crate::configuration::ControllerSettings;
 use crate::estimate::contact::Evidence;
 use crate::refer::reference::Program;
-use crate::supervise::lapses::Lapse;
+use crate::supervise::lapses::{Lapse, LapseLimits};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::DigitalInputs;
 use painleve_shared::status::SupervisorState;
@@ -104,21 +104,24 @@ fn impossible(tick: u32, lapse: Lapse) -> SensorFrame {
 #[test]
 fn impossible_readings_keep_the_torque_and_too_many_in_a_row_are_a_fault() {
     for lapse in [Lapse::EncoderOutOfRange, Lapse::ForceOutOfRange] {
+        let limit = LapseLimits::default().of(lapse);
         let mut controller = tracking();
         let before = controller.tick(&frame(20));
-        for tick in [21, 22] {
+        for tick in (21..).take(limit as usize) {
             let answer = controller.tick(&impossible(tick, lapse));
             assert_eq!(answer.torques, before.torques);
             assert_eq!(answer.latched_fault(), None);
         }
         // The estimator bridges what it has not seen, and the count starts over.
-        assert_eq!(controller.tick(&frame(23)).latched_fault(), None);
-        for tick in [24, 25] {
+        let good = 21 + limit;
+        assert_eq!(controller.tick(&frame(good)).latched_fault(), None);
+        for tick in (good + 1..).take(limit as usize) {
             controller.tick(&impossible(tick, lapse));
         }
-        assert_eq!(controller.lapse_counts().total(lapse), 4);
+        assert_eq!(controller.lapse_counts().total(lapse), 2 * limit);
         assert_eq!(controller.lapse_counts().total(Lapse::LostFrame), 0);
-        assert_fault(&mut controller, &impossible(26, lapse), lapse.fault());
+        let one_more = impossible(good + limit + 1, lapse);
+        assert_fault(&mut controller, &one_more, lapse.fault());
     }
 }
 
