@@ -28,6 +28,13 @@ pub mod refer;
 pub mod supervise;
 pub mod telemetry;
 
+/// Tells a build of controller and messages from another: a hash of the sources of both. The host and the
+/// board compare it before a configuration is taken.
+pub const BUILD: u64 = match u64::from_str_radix(env!("PAINLEVE_BUILD"), 16) {
+    Ok(build) => build,
+    Err(_) => panic!("the build script writes sixteen hexadecimal digits"),
+};
+
 pub use configuration::Configuration;
 pub use controller::Controller;
 pub use telemetry::Telemetry;

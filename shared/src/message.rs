@@ -17,8 +17,10 @@ pub const MAXIMUM_RESPONSE_LENGTH: usize = 80;
 /// What the host asks of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Request<'a> {
-    /// Start afresh; [`Response::Ready`] or [`Response::Refused`].
+    /// Start afresh; [`Response::Ready`], [`Response::Refused`] or [`Response::OtherBuild`].
     Configure {
+        /// What tells the host's build from another.
+        build: u64,
         /// Where its sensor frames come from.
         source: FrameSource,
         /// Configuration of the controller, whose type is the controller's, by postcard.
@@ -28,6 +30,10 @@ pub enum Request<'a> {
     Sensor(SensorFrame),
     /// Tell what was counted since the configuration; [`Response::Health`].
     Health,
+    /// Take the torque off and forget the configuration; [`Response::Stopped`].
+    Stop,
+    /// The host is still there; no response. With [`FrameSource::Sensors`] the board stops without.
+    Alive,
 }
 
 /// Where a controller's sensor frames come from.
@@ -53,6 +59,13 @@ pub enum Response {
     },
     /// The configuration has a number that is out of range.
     Refused,
+    /// The configuration comes from another build: its bytes may mean something else.
+    OtherBuild {
+        /// What tells the board's build from another.
+        build: u64,
+    },
+    /// The torque is off, and there is no configuration any more.
+    Stopped,
     /// The answer to a sensor frame.
     Actuator {
         /// The frame.

@@ -11,11 +11,13 @@
 use core::panic::PanicInfo;
 
 use heapless::spsc::{Consumer, Producer};
-use painleve_firmware::Configuration;
 use painleve_firmware::drive::{Answered, ControlTask, TaskCounts};
 use painleve_firmware::law::Law;
 use painleve_firmware::supervise::lapses::Lapse;
-use painleve_shared::message::{MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, Request, Response};
+use painleve_firmware::{BUILD, Configuration};
+use painleve_shared::message::{
+    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, Request, Response,
+};
 use painleve_shared::wire::{self, Inbox, WireError};
 use rtic::Mutex;
 use serde::de::DeserializeOwned;
@@ -31,6 +33,12 @@ pub const ANSWERS: usize = 4;
 /// Changes that may wait for the log.
 pub const EVENTS: usize = 8;
 
+/// How long a host that watches an arm may be silent, ms. It sends [`Request::Alive`] more often.
+pub const SENSORS_SILENCE_MS: u32 = 200;
+
+/// How long a host whose frames are awaited may be silent, ms. No torque depends on it.
+pub const FRAMES_SILENCE_MS: u32 = 5000;
+
 /// What the tasks share.
 pub struct Control<D, L: Law> {
     /// The control task.
@@ -39,6 +47,34 @@ pub struct Control<D, L: Law> {
     pub dropped_responses: u32,
     /// Ticks a second; 0 until there is a configuration.
     pub tick_hz: u32,
+    /// Ticks since the host's last message.
+    pub silent_ticks: u32,
+}
+
+impl<D: BoardDrive, L: Law> Control<D, L> {
+    /// Nothing is configured yet.
+    pub const fn new(drive: D) -> Self {
+        Self {
+            task: ControlTask::new(drive),
+            dropped_responses: 0,
+            tick_hz: 0,
+            silent_ticks: 0,
+        }
+    }
+
+    /// Stops when the host has been silent for too long, whatever the frames' source.
+    fn note_silence(&mut self) {
+        self.silent_ticks = self.silent_ticks.saturating_add(1);
+        let limit_ms = match self.task.source() {
+            FrameSource::Sensors => SENSORS_SILENCE_MS,
+            FrameSource::Lockstep | FrameSource::Realtime => FRAMES_SILENCE_MS,
+        };
+        let limit = u64::from(limit_ms) * u64::from(self.tick_hz) / 1000;
+        if self.tick_hz > 0 && u64::from(self.silent_ticks) > limit {
+            self.task.stop();
+            self.tick_hz = 0;
+        }
+    }
 }
 
 /// What the link task keeps from one call to the next.
@@ -84,6 +120,7 @@ pub fn control<D: BoardDrive, L: Law>(
     events: &mut Producer<'static, Change>,
     reported: &mut Change,
 ) -> bool {
+    control.note_silence();
     let Some(Answered { frame, elapsed }) = control.task.tick() else {
         return false;
     };
@@ -129,16 +166,26 @@ pub fn link<D, L, P>(
                 continue;
             };
             let request = wire::decode(message);
-            control.lock(|control| note_message(&mut control.task, &request));
+            control.lock(|control| {
+                note_message(&mut control.task, &request);
+                if request.is_ok() {
+                    control.silent_ticks = 0;
+                }
+            });
             let response = match request {
                 Ok(Request::Sensor(frame)) => {
                     control.lock(|control| control.task.drive_mut().offer(frame));
                     awaits_control = true;
                     continue;
                 }
+                Ok(Request::Configure { build, .. }) if build != BUILD => {
+                    control.lock(|control| control.task.stop());
+                    Response::OtherBuild { build: BUILD }
+                }
                 Ok(Request::Configure {
                     source,
                     configuration,
+                    ..
                 }) => {
                     control.lock(|control| control.task.stop());
                     decode(decoded, configuration);
@@ -163,6 +210,11 @@ pub fn link<D, L, P>(
                     // Looking at the stack takes too long to hold up the control task.
                     health.stack_bytes = stack::high_water_bytes();
                     Response::Health(health)
+                }
+                Ok(Request::Alive) => continue,
+                Ok(Request::Stop) => {
+                    control.lock(|control| control.task.stop());
+                    Response::Stopped
                 }
                 Err(_) => continue,
             };
@@ -268,7 +320,6 @@ macro_rules! tasks {
         mod tasks {
             use $crate::board::{Board, Bytes, Parts, Port};
             use $crate::heapless::spsc::{Consumer, Producer, Queue};
-            use $crate::painleve_firmware::drive::ControlTask;
             use $crate::painleve_shared::message::Response;
             use $crate::tasks::{ANSWERS, Change, Control, EVENTS, Link};
 
@@ -305,11 +356,7 @@ macro_rules! tasks {
                 let (answers_in, answers_out) = cx.local.answers.split();
                 let (events_in, events_out) = cx.local.events.split();
                 rtic::pend(LINK);
-                let control = Control {
-                    task: ControlTask::new(drive),
-                    dropped_responses: 0,
-                    tick_hz: 0,
-                };
+                let control = Control::new(drive);
                 let local = Local {
                     bytes,
                     port,

@@ -167,6 +167,11 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         self.controller.as_ref().map(Controller::lapse_counts)
     }
 
+    /// Where frames come from.
+    pub fn source(&self) -> FrameSource {
+        self.source
+    }
+
     /// What is counted besides.
     pub fn counts(&self) -> TaskCounts {
         self.counts

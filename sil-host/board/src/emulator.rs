@@ -18,7 +18,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::Signal;
 use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
-use painleve_firmware::Configuration;
+use painleve_firmware::{BUILD, Configuration};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire;
@@ -135,11 +135,13 @@ impl Emulator {
             table.print_from(output);
         }
         match emulator.request(&Request::Configure {
+            build: BUILD,
             source: FrameSource::Lockstep,
             configuration: &super::encode(configuration)?,
         })? {
             Response::Ready { .. } => Ok(emulator),
             Response::Refused => Err(BoardError::Refused),
+            Response::OtherBuild { build } => Err(BoardError::other_build(build)),
             other => Err(BoardError::OutOfTurn(other)),
         }
         // The folder goes here: both sides have their pipes open.

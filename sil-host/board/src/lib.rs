@@ -135,6 +135,16 @@ pub enum BoardError {
         "the image refuses the configuration: it may be older than this program, see `cargo xtask build-fw`"
     )]
     Refused,
+    /// Image and program come from different sources.
+    #[error(
+        "the image is of build {board:016x} and this program of build {host:016x}: build both from the same sources, see `cargo xtask build-fw`, and flash again"
+    )]
+    OtherBuild {
+        /// The image's build.
+        board: u64,
+        /// This program's build.
+        host: u64,
+    },
     /// The board's parts cannot give the counts that are asked for.
     #[error("{key} = {wanted}: the board's part has {has} bits")]
     Parts {
@@ -151,4 +161,14 @@ pub enum BoardError {
     /// Pipes or processes fail.
     #[error("cannot talk to the board: {0}")]
     System(#[from] io::Error),
+}
+
+impl BoardError {
+    /// The image is of this build.
+    fn other_build(board: u64) -> Self {
+        Self::OtherBuild {
+            board,
+            host: painleve_firmware::BUILD,
+        }
+    }
 }

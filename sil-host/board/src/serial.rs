@@ -16,7 +16,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{
     BaudRate, FlushArg, SetArg, cfmakeraw, cfsetspeed, tcflush, tcgetattr, tcsetattr,
 };
-use painleve_firmware::Configuration;
+use painleve_firmware::{BUILD, Configuration};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox, WireError};
@@ -88,13 +88,19 @@ impl Serial {
         serial.port.write_all(&[0])?;
         let configuration = super::encode(configuration)?;
         let request = Request::Configure {
+            build: BUILD,
             source,
             configuration: &configuration,
         };
-        let is_wanted =
-            |response: &Response| matches!(response, Response::Ready { .. } | Response::Refused);
+        let is_wanted = |response: &Response| {
+            matches!(
+                response,
+                Response::Ready { .. } | Response::Refused | Response::OtherBuild { .. }
+            )
+        };
         match serial.ask(&request, PATIENCE, is_wanted)? {
             Response::Ready { stopwatch_hz } => serial.stopwatch_hz = stopwatch_hz,
+            Response::OtherBuild { build } => return Err(BoardError::other_build(build)),
             _ => return Err(BoardError::Refused),
         }
         Ok(serial)
@@ -191,6 +197,16 @@ impl Serial {
         }
         self.pending.drain(..looked_at);
         found
+    }
+}
+
+/// The board forgets its configuration, if the line still carries the request.
+impl Drop for Serial {
+    fn drop(&mut self) {
+        let mut buffer = [0; MAXIMUM_LENGTH];
+        if let Ok(bytes) = wire::encode(&Request::Stop, &mut buffer) {
+            let _ = self.port.write_all(bytes);
+        }
     }
 }
 

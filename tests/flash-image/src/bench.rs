@@ -5,7 +5,7 @@ use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_shared::message::{FrameSource, Response};
+use painleve_shared::message::{FrameSource, Request, Response};
 
 use crate::board::{self, Board};
 use crate::stm32f4::Pin;
@@ -16,6 +16,9 @@ pub const FORCE_BITS: u8 = 13;
 
 /// Ticks before the switch is closed.
 const BEFORE_ENABLE: u32 = 100;
+
+/// Ticks from one sign of the host to the next.
+const ALIVE_TICKS: u32 = 50;
 
 /// A board that controls a simulated arm by its own sensors.
 pub struct Bench {
@@ -28,6 +31,9 @@ pub struct Bench {
     pub frame: SensorFrame,
     period: Picoseconds,
     ticks: u32,
+    /// Whether the host says that it is there.
+    pub host_is_there: bool,
+    waits: u32,
     /// The arm is held until it is first driven.
     is_held: bool,
 }
@@ -76,6 +82,8 @@ impl Bench {
             frame: SensorFrame::default(),
             period: 1_000_000 * MICROSECOND / u64::from(scenario.run.tick_hz),
             ticks: 0,
+            host_is_there: true,
+            waits: 0,
             is_held: true,
         };
         bench.present();
@@ -131,8 +139,32 @@ impl Bench {
         self.present();
     }
 
-    /// Runs until half a period after the next interrupt of the control timer, or two periods.
+    /// Number of the last tick that the image has answered; waits for the next one.
+    pub fn ticks_answered(&mut self) -> u32 {
+        self.wait_for_tick();
+        // Long enough for its answer on the line.
+        self.board.machine.run_for(self.period / 5 * 2);
+        let mut answered = 0;
+        while let Some(response) = self.board.response(0) {
+            if let Response::Actuator { frame, .. } = response {
+                answered = frame.tick;
+            }
+        }
+        answered
+    }
+
+    /// Whether the switch of the safety chain was closed by [`Bench::tick`].
+    pub fn switch_is_closed(&self) -> bool {
+        self.ticks >= BEFORE_ENABLE
+    }
+
+    /// Runs until half a period after the next interrupt of the control timer, or two periods. The host
+    /// says now and then that it is there.
     pub fn wait_for_tick(&mut self) {
+        self.waits += 1;
+        if self.host_is_there && self.waits.is_multiple_of(ALIVE_TICKS) {
+            self.board.send(&Request::Alive);
+        }
         let machine = &mut self.board.machine;
         let latest = machine.now() + 2 * self.period;
         let next = machine.chip().next_tick().min(latest);

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use painleve_firmware::BUILD;
 use painleve_parts::{As5048a, Mcp3304, SpiPart, Transfer};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
@@ -269,6 +270,7 @@ impl Board {
     /// Sends a configuration; the bytes come from postcard.
     pub fn configure(&mut self, source: FrameSource, configuration: &[u8]) -> Option<Response> {
         self.send(&Request::Configure {
+            build: BUILD,
             source,
             configuration,
         });

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeSet;
 
+use painleve_firmware::BUILD;
 use painleve_flash_image::bench::{Bench, encoded, scenario};
 use painleve_flash_image::board::Board;
 use painleve_flash_image::machine::Reset;
@@ -85,6 +86,7 @@ fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
     while board.response(0).is_some() {}
     let mut buffer = [0; 1024];
     let request = Request::Configure {
+        build: BUILD,
         source: FrameSource::Sensors,
         configuration: &bytes,
     };
@@ -200,6 +202,44 @@ fn a_low_supply_takes_the_torque_off() {
     }
 }
 
+/// The host's process has ended, its cable is out.
+#[test]
+fn a_host_that_is_gone_takes_the_torque_off() {
+    let mut bench = driven();
+    for _ in 0..600 {
+        bench.tick();
+    }
+    assert_eq!(bench.board.torque().enabled, Some(true), "it is there");
+    bench.host_is_there = false;
+    for _ in 0..210 {
+        bench.wait_for_tick();
+    }
+    assert!(bench.board.torque().is_off());
+    bench.assert_stays_off(100);
+}
+
+#[test]
+fn a_request_to_stop_takes_the_torque_off() {
+    let mut bench = driven();
+    bench.board.send(&Request::Stop);
+    assert_eq!(bench.board.reply(5 * MILLISECOND), Some(Response::Stopped));
+    assert!(bench.board.torque().is_off());
+    bench.assert_stays_off(100);
+}
+
+#[test]
+fn a_configuration_of_another_build_is_refused() {
+    let mut bench = driven();
+    bench.board.send(&Request::Configure {
+        build: BUILD ^ 1,
+        source: FrameSource::Sensors,
+        configuration: &encoded(&scenario(DEFAULT)),
+    });
+    let reply = bench.board.reply(20 * MILLISECOND);
+    assert_eq!(reply, Some(Response::OtherBuild { build: BUILD }));
+    assert_off_in_time(bench);
+}
+
 #[test]
 fn a_reset_takes_the_torque_off() {
     let mut bench = driven();
@@ -215,8 +255,8 @@ fn the_switch_takes_the_torque_off_and_a_bounce_does_not_put_it_on() {
     bench.board.enable(false);
     assert!(bench.time_until_off().is_some());
     for n in 0..40 {
-        // It is open for four ticks at a time.
-        bench.board.enable(n % 10 > 3);
+        // It opens for two ticks at a time.
+        bench.board.enable(n % 10 > 1);
         bench.wait_for_tick();
         assert!(bench.board.torque().is_off());
     }

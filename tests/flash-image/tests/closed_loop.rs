@@ -1,0 +1,48 @@
+//! The image controls the simulated arm by its own sensors and stages: the same torques as the controller on
+//! a PC that is given the same counts.
+
+#![allow(clippy::unwrap_used)]
+
+use painleve_drivers::switches::Switches;
+use painleve_firmware::Controller;
+use painleve_flash_image::bench::{Bench, scenario};
+use painleve_shared::frame::SensorFrame;
+use painleve_shared::status::SupervisorState;
+
+#[test]
+fn torques_by_the_boards_own_sensors_are_those_of_a_pc() {
+    for name in ["hybrid-elbow-down", "edge"] {
+        let scenario = scenario(name);
+        let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
+        let mut switches = Switches::default();
+        let mut bench = Bench::new(&scenario);
+        let mut answer = |tick, closed, sampled| {
+            controller.tick(&SensorFrame {
+                tick,
+                sequence: tick,
+                inputs: switches.tick(closed, false),
+                ..sampled
+            })
+        };
+        let before = bench.ticks_answered();
+        for tick in 1..=before {
+            answer(tick, false, bench.frame);
+        }
+        let mut driven = 0;
+        for tick in before + 1..=before + 1000 {
+            let (sampled, closed) = (bench.frame, bench.switch_is_closed());
+            bench.tick();
+            let answer = answer(tick, closed, sampled);
+            let drives = !matches!(
+                answer.supervisor_state(),
+                Some(SupervisorState::Idle | SupervisorState::Fault)
+            );
+            let torque = bench.board.torque();
+            assert_eq!(torque.enabled, Some(drives), "{name}, tick {tick}");
+            let expected = answer.torques.map(|it| it.0);
+            assert_eq!(torque.counts, expected, "{name}, tick {tick}");
+            driven += u32::from(drives);
+        }
+        assert!(driven > 800, "{name}: {driven} ticks");
+    }
+}
