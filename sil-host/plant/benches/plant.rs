@@ -5,9 +5,11 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-
+use painleve_plant::Plant;
 use painleve_plant::State;
 use painleve_plant::mechanics::belt::BeltProfile;
+use painleve_plant::mechanics::compliant::{CompliantArmOnBelt, ContactKind, TipContact};
+use painleve_plant::mechanics::effects::Effects;
 use painleve_plant::mechanics::{ArmOnBelt, PlantParameters};
 use painleve_shared::JointTorque;
 
@@ -51,6 +53,29 @@ fn simulated_seconds(criterion: &mut Criterion) {
                 let torque = JointTorque::new(0.01 * f64::from(tick % 7), 0.0);
                 held.command_torque(torque, 0.0);
                 held.advance(start_s + f64::from(tick) * 1e-3, &mut ())
+                    .expect("slides");
+            }
+        });
+    });
+
+    let contact = TipContact {
+        kind: ContactKind::Compliant,
+        ..Default::default()
+    };
+    let mut soft = CompliantArmOnBelt::new(
+        &PlantParameters::default(),
+        &contact,
+        &Effects::default(),
+        *sliding.state(),
+    )
+    .expect("the contact's defaults are valid");
+    group.bench_function("on 1e5 N/m with a torque every 1 ms, 1 s", |bencher| {
+        bencher.iter(|| {
+            let start_s = Plant::time_s(&soft);
+            for tick in 1..=1000 {
+                let torque = JointTorque::new(0.001 * f64::from(tick % 7), 0.0);
+                soft.command_torque(torque, 0.0);
+                soft.advance(start_s + f64::from(tick) * 1e-3, &mut ())
                     .expect("slides");
             }
         });

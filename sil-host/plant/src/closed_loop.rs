@@ -6,7 +6,7 @@ use painleve_shared::status::Fault;
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::controller_host::{Answer, ControllerHost, HostError};
-use crate::mechanics::ArmOnBelt;
+use crate::mechanics::BuiltInPlant;
 use crate::plant::{Plant, PlantError};
 use crate::sample::Sample;
 use crate::simulation::Simulation;
@@ -99,7 +99,7 @@ impl Monitor for () {
 /// # Ok(())
 /// # }
 /// ```
-pub struct ClosedLoop<H, P = ArmOnBelt> {
+pub struct ClosedLoop<H, P = BuiltInPlant> {
     simulation: Simulation<P>,
     host: H,
     statistics: Statistics,

@@ -14,14 +14,14 @@ use crate::converters::encoder::Encoders;
 use crate::converters::force_cell::ForceCell;
 use crate::converters::link_loss::{LossyLink, Lost};
 use crate::converters::torque_stage::TorqueStages;
-use crate::mechanics::ArmOnBelt;
+use crate::mechanics::BuiltInPlant;
 use crate::plant::{Plant, PlantError, Probe};
 use crate::sample::Sample;
 use crate::scenario::Scenario;
 
 /// A plant with its converters at a control rate.
 #[derive(Clone, Debug)]
-pub struct Simulation<P = ArmOnBelt> {
+pub struct Simulation<P = BuiltInPlant> {
     plant: P,
     encoders: Encoders,
     force_cell: ForceCell,
@@ -41,8 +41,7 @@ impl Simulation {
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
         scenario.validate()?;
-        let plant = ArmOnBelt::new(&scenario.plant_parameters(), scenario.initial.state())?;
-        Self::of(plant, scenario)
+        Self::of(BuiltInPlant::new(scenario)?, scenario)
     }
 }
 

@@ -13,12 +13,14 @@ use painleve_shared::lapse::Lapse;
 use painleve_shared::status::Fault;
 
 /// The sections of a scenario that are not the controller's.
-const SECTIONS: [&str; 8] = [
+const SECTIONS: [&str; 10] = [
     "run",
     "arm",
     "arm_model",
     "belt",
     "impact",
+    "contact",
+    "effects",
     "solver",
     "initial",
     "converters",

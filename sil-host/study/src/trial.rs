@@ -2,7 +2,7 @@
 //! controller as in a run of two processes, without its record.
 
 use painleve_firmware::Controller;
-use painleve_plant::mechanics::ArmOnBelt;
+use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Plant, PlantError, Probe};
@@ -11,7 +11,7 @@ use painleve_shared::range::OutOfRange;
 use painleve_shared::status::Fault;
 
 /// A closed loop that can be stopped as soon as its outcome is known.
-pub struct Trial<P = ArmOnBelt> {
+pub struct Trial<P = BuiltInPlant> {
     simulation: Simulation<P>,
     controller: Controller,
     answer: ActuatorFrame,

@@ -461,7 +461,7 @@ impl Plant for ArmOnBelt {
 
 /// A tip closer to the belt than this at the start is taken to touch it, m: the
 /// paper gives its initial conditions to three digits.
-const CONTACT_AT_START_M: f64 = 1e-4;
+pub(super) const CONTACT_AT_START_M: f64 = 1e-4;
 
 /// Deepest start inside the belt that still counts as rounding of a start on it, m.
-const INSIDE_AT_START_M: f64 = 1e-3;
+pub(super) const INSIDE_AT_START_M: f64 = 1e-3;

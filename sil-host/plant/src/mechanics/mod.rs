@@ -16,18 +16,23 @@
 
 mod arm_on_belt;
 pub mod belt;
+pub mod built_in;
 pub mod cash_karp;
+pub mod compliant;
 pub mod dop853;
+pub mod effects;
 pub mod event;
 pub mod impact;
 pub mod motion;
 mod parameters;
 mod probe;
+pub mod rosenbrock;
 #[cfg(test)]
 mod tests;
 pub mod torque;
 pub mod transition;
 
 pub use arm_on_belt::{ArmOnBelt, MotionError};
+pub use built_in::BuiltInPlant;
 pub use parameters::{InitialState, PlantParameters, SolverSettings};
 pub use probe::{ArmProbe, ArmStep};

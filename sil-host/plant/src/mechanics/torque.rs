@@ -34,10 +34,15 @@ impl TorqueSegment {
         }
     }
 
+    /// Whether the torque does not change until the next command.
+    pub fn is_constant(&self) -> bool {
+        self.lag_s == 0.0 || self.start_nm == self.target_nm
+    }
+
     /// Joint torques at time `t_s`, N·m.
     #[inline]
     pub fn at(&self, t_s: f64) -> JointTorque<f64> {
-        if self.lag_s == 0.0 || self.start_nm == self.target_nm {
+        if self.is_constant() {
             return self.target_nm;
         }
         let remaining = libm::exp(-(t_s - self.start_s) / self.lag_s);

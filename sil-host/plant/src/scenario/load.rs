@@ -8,7 +8,7 @@ use painleve_system::input_file;
 use toml::{Table, Value};
 
 use super::{Scenario, built_in};
-use crate::mechanics::ArmOnBelt;
+use crate::mechanics::BuiltInPlant;
 
 /// More levels than the keys of any scenario have.
 const MOST_LEVELS: usize = 16;
@@ -83,7 +83,7 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
         let scenario = Self::load_unplaced(name, overrides)?;
-        let plant = ArmOnBelt::new(&scenario.plant_parameters(), scenario.initial.state());
+        let plant = BuiltInPlant::new(&scenario);
         plant.map_err(|source| ScenarioError::Range {
             origin: origin(name),
             source,

@@ -13,6 +13,8 @@ use painleve_firmware::configuration::ControllerSettings;
 use painleve_shared::{ArmParameters, OutOfRange, settings};
 
 use crate::converters::ConverterSettings;
+use crate::mechanics::compliant::TipContact;
+use crate::mechanics::effects::Effects;
 use crate::mechanics::impact::ImpactLaw;
 use crate::mechanics::{PlantParameters, SolverSettings};
 
@@ -38,6 +40,10 @@ settings! {
         belt: BeltSettings = BeltSettings::default();
         /// How the tip bounces.
         impact: ImpactLaw = ImpactLaw::default();
+        /// Rigid or compliant contact.
+        contact: TipContact = TipContact::default();
+        /// What a rig has and the paper's arm has not.
+        effects: Effects = Effects::default();
         /// Accuracy of the plant.
         solver: SolverSettings = SolverSettings::default();
         /// Where the arm starts.

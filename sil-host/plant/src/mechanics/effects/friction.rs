@@ -1,0 +1,124 @@
+//! Friction that changes along the belt and over time.
+
+use painleve_shared::settings;
+
+/// Length over which one patch goes over into the next, m.
+const SEAM_M: f64 = 1e-3;
+
+settings! {
+    /// What is added to the friction coefficient μ of the belt. μ itself never falls below zero.
+    #[derive(Copy)]
+    pub enum FrictionChange by "kind" {
+        /// Nothing.
+        "none" => None,
+        /// A change at once.
+        "step" => Step {
+            /// Change of μ.
+            change: f64, -2.0..=2.0;
+            /// Time of the step.
+            at_s: f64, 0.0..=1e7, "s";
+        },
+        /// A change at a constant rate.
+        "ramp" => Ramp {
+            /// Change of μ in the end.
+            change: f64, -2.0..=2.0;
+            /// Time at which the ramp starts.
+            start_s: f64, 0.0..=1e7, "s";
+            /// How long the ramp takes.
+            duration_s: f64, 1e-6..=1e7, "s";
+        },
+        /// A sine over time.
+        "sine" => Sine {
+            /// Amplitude of μ.
+            amplitude: f64, -2.0..=2.0;
+            /// Frequency.
+            frequency_hz: f64, 1e-6..=1e3, "Hz";
+        },
+        /// Patches of the belt, all of one length, each with more friction or less by the same
+        /// amount.
+        "patches" => Patches {
+            /// Amount of μ.
+            amplitude: f64, -2.0..=2.0;
+            /// Length of a patch.
+            length_m: f64, 2e-3..=1e3, "m";
+            /// Decides which patches have more.
+            seed: u64;
+        },
+    }
+}
+
+impl FrictionChange {
+    /// Change of μ at time `t_s` and at the place `along_belt_m` of the belt, which moves with it.
+    pub fn at(&self, t_s: f64, along_belt_m: f64) -> f64 {
+        match *self {
+            Self::None => 0.0,
+            Self::Step { change, at_s } => {
+                if t_s < at_s {
+                    0.0
+                } else {
+                    change
+                }
+            }
+            Self::Ramp {
+                change,
+                start_s,
+                duration_s,
+            } => change * ((t_s - start_s) / duration_s).clamp(0.0, 1.0),
+            Self::Sine {
+                amplitude,
+                frequency_hz,
+            } => amplitude * libm::sin(core::f64::consts::TAU * frequency_hz * t_s),
+            Self::Patches {
+                amplitude,
+                length_m,
+                seed,
+            } => {
+                let patch = libm::floor(along_belt_m / length_m);
+                let inside_m = along_belt_m - patch * length_m;
+                let here = sign(seed, patch);
+                let share = inside_m / SEAM_M;
+                if share < 1.0 {
+                    let before = sign(seed, patch - 1.0);
+                    amplitude * (before + (here - before) * share)
+                } else {
+                    amplitude * here
+                }
+            }
+        }
+    }
+}
+
+/// +1 or −1 for a patch, from the bits of its number.
+fn sign(seed: u64, patch: f64) -> f64 {
+    let mut bits = seed ^ (patch as i64).cast_unsigned();
+    // The mixing steps of SplitMix64.
+    bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    if (bits ^ (bits >> 31)) & 1 == 0 {
+        1.0
+    } else {
+        -1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patches_are_as_many_up_as_down_and_the_same_again() {
+        let patches = FrictionChange::Patches {
+            amplitude: 0.1,
+            length_m: 0.05,
+            seed: 7,
+        };
+        let values: Vec<f64> = (-1000..1000)
+            .map(|patch| patches.at(0.0, (f64::from(patch) + 0.5) * 0.05))
+            .collect();
+        let up = values.iter().filter(|value| **value > 0.0).count();
+        assert!((900..1100).contains(&up), "{up}");
+        assert!(values.iter().all(|value| value.abs() == 0.1));
+        assert_eq!(patches.at(3.0, 0.02), patches.at(5.0, 0.02));
+    }
+}

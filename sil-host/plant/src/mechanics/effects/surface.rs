@@ -1,0 +1,84 @@
+//! A belt that is not flat: waves along it, a seam, vibration. Slopes are small: the contact's normal
+//! stays upright.
+
+use core::f64::consts::TAU;
+
+use painleve_shared::settings;
+
+settings! {
+    /// The belt's surface: heights over the flat belt that does not move up and down.
+    #[derive(Copy)]
+    pub struct Surface {
+        /// Amplitude of waves along the belt.
+        waviness_m: f64 = 0.0, 0.0..=0.01, "m";
+        /// Length of these waves.
+        wave_length_m: f64 = 0.1, 1e-3..=1e3, "m";
+        /// Height of the bump where the belt is joined.
+        seam_height_m: f64 = 0.0, -0.01..=0.01, "m";
+        /// Length of that bump.
+        seam_length_m: f64 = 0.02, 1e-3..=1.0, "m";
+        /// Length of the whole belt, in which the seam comes once.
+        belt_length_m: f64 = 1.0, 0.1..=1e3, "m";
+        /// Amplitude of a vibration of the whole belt.
+        vibration_m: f64 = 0.0, 0.0..=0.01, "m";
+        /// Frequency of the vibration.
+        vibration_hz: f64 = 50.0, 0.0..=1e3, "Hz";
+    }
+}
+
+impl Surface {
+    /// Whether the belt is flat and does not vibrate.
+    pub fn is_flat(&self) -> bool {
+        self.waviness_m == 0.0 && self.seam_height_m == 0.0 && self.vibration_m == 0.0
+    }
+
+    /// Height (m), slope along the belt, and speed of its own (m/s) at time `t_s` and at the place
+    /// `along_belt_m` of the belt.
+    pub fn at(&self, t_s: f64, along_belt_m: f64) -> (f64, f64, f64) {
+        let (mut height, mut slope, mut speed) = (0.0, 0.0, 0.0);
+        if self.waviness_m != 0.0 {
+            let number = TAU / self.wave_length_m;
+            let phase = number * along_belt_m;
+            height += self.waviness_m * libm::sin(phase);
+            slope += self.waviness_m * number * libm::cos(phase);
+        }
+        if self.seam_height_m != 0.0 {
+            // In the middle of the belt's length, so that no run starts on it.
+            let turns = along_belt_m / self.belt_length_m;
+            let place = (turns - libm::floor(turns) - 0.5) * self.belt_length_m;
+            if place.abs() < 0.5 * self.seam_length_m {
+                let number = TAU / self.seam_length_m;
+                height += 0.5 * self.seam_height_m * (1.0 + libm::cos(number * place));
+                slope -= 0.5 * self.seam_height_m * number * libm::sin(number * place);
+            }
+        }
+        if self.vibration_m != 0.0 {
+            let rate = TAU * self.vibration_hz;
+            height += self.vibration_m * libm::sin(rate * t_s);
+            speed += self.vibration_m * rate * libm::cos(rate * t_s);
+        }
+        (height, slope, speed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slope_and_speed_are_the_heights_derivatives() {
+        let surface = Surface {
+            waviness_m: 1e-4,
+            seam_height_m: 5e-4,
+            vibration_m: 2e-4,
+            ..Default::default()
+        };
+        for (t, x) in [(0.1, 0.02), (0.33, 0.497), (1.7, 0.505), (2.0, -0.5)] {
+            let (_, slope, speed) = surface.at(t, x);
+            let height = |t: f64, x: f64| surface.at(t, x).0;
+            let by_place = (height(t, x + 1e-7) - height(t, x - 1e-7)) / 2e-7;
+            let by_time = (height(t + 1e-7, x) - height(t - 1e-7, x)) / 2e-7;
+            assert!((slope - by_place).abs() < 1e-6 && (speed - by_time).abs() < 1e-6);
+        }
+    }
+}
