@@ -276,12 +276,14 @@ impl Decoder {
     }
 }
 
-/// Mnemonics of one cycle, by how they begin.
-const SIMPLE: [&str; 43] = [
+/// Mnemonics of one cycle, by how they begin (TRM, tables 3-1 and 3-2).
+const SIMPLE: [&str; 65] = [
     "add", "adc", "sub", "sbc", "rsb", "mov", "mvn", "and", "orr", "orn", "eor", "bic", "cmp",
     "cmn", "tst", "teq", "lsl", "lsr", "asr", "ror", "rrx", "mul", "mla", "mls", "smul", "umul",
     "smla", "umla", "ubf", "sbf", "bf", "it", "nop", "uxt", "sxt", "rev", "rbit", "clz", "usat",
-    "ssat", "adr", "neg", "sel",
+    "ssat", "adr", "neg", "sel", "uqadd", "uqsub", "uqasx", "uqsax", "uadd", "usub", "uhadd",
+    "uhsub", "usad", "sadd", "ssub", "shadd", "shsub", "qadd", "qsub", "qdadd", "qdsub", "pkh",
+    "smm", "smlsd", "smusd", "smuad",
 ];
 
 fn is_double(register: u16) -> bool {

@@ -60,15 +60,21 @@ impl Limits {
                 "the byte before has been read, so that there is room for the next",
             ),
             declare(
+                "asm::delay",
+                Limit::Cycles(5 * (475 * 168 / 1000 + 2)),
+                "475 ns, the longest pause of the sensors' drivers, in rounds of at most five cycles",
+            ),
+            declare(
                 "ForceCell",
-                Limit::Cycles(8 * 64),
-                "eight bits at 2.625 MHz: APB1's 42 MHz over 16",
+                Limit::Cycles(8 * 128),
+                "eight bits at 1.3125 MHz: APB1's 42 MHz over 32",
             ),
             declare(
                 "check_read",
-                Limit::Cycles(8 * 16),
-                "eight bits at 10.5 MHz: APB2's 84 MHz over 8",
+                Limit::Cycles(8 * 32),
+                "eight bits at 5.25 MHz: APB2's 84 MHz over 16",
             ),
+            declare("plausibility::", Limit::Times(2), "two joints"),
             declare("set_bytes", Limit::Times(4), "a word's bytes at either end"),
             declare(
                 "__aeabi_mem",

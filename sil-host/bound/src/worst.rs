@@ -15,7 +15,7 @@ use crate::BoundError;
 use crate::cost;
 use crate::cycles::{FLASH_WAIT_STATES, PIPELINE_REFILL};
 use crate::graph::Graph;
-use crate::image::Image;
+use crate::image::{Frame, Image};
 use crate::instruction::Decoder;
 use crate::loops::{Limit, Limits};
 
@@ -327,9 +327,11 @@ impl<'a> Analysis<'a> {
                     .of(self.image, graph, &connected)
                     .ok_or_else(|| {
                         let frames = self.image.frames(header);
-                        let places: Vec<String> = frames
-                            .iter()
-                            .take(3)
+                        let ours = |frame: &&Frame| frame.function.contains("painleve");
+                        let innermost = frames.first().filter(|frame| !ours(frame));
+                        let places: Vec<String> = innermost
+                            .into_iter()
+                            .chain(frames.iter().filter(ours).take(2))
                             .map(|frame| {
                                 format!("{} ({}:{})", frame.function, frame.file, frame.line)
                             })
