@@ -53,6 +53,21 @@ impl Statistics {
     }
 }
 
+/// The smaller force, NaN if either is. What rounding leaves at the instant of a lift-off is zero;
+/// a belt that pulls is told as it is.
+fn smaller(least_n: f64, force_n: f64) -> f64 {
+    const ROUNDING_N: f64 = 1e-6;
+    let force_n = if (-ROUNDING_N..=0.0).contains(&force_n) {
+        0.0
+    } else {
+        force_n
+    };
+    if least_n.is_nan() || force_n.is_nan() {
+        return f64::NAN;
+    }
+    least_n.min(force_n)
+}
+
 impl Probe for Statistics {
     fn step(&mut self, step: &impl Step) {
         let duration = step.end_s() - step.start_s();
@@ -65,8 +80,7 @@ impl Probe for Statistics {
             self.max_tip_t_m = self.max_tip_t_m.max(at.tip_t_m);
             self.peak_torque_nm = self.peak_torque_nm.max(u1.abs()).max(u2.abs());
             if at.time_s >= self.settling_s {
-                // At the instant of a lift-off rounding may leave a negative zero.
-                self.min_normal_force_n = self.min_normal_force_n.min(at.normal_force_n.max(0.0));
+                self.min_normal_force_n = smaller(self.min_normal_force_n, at.normal_force_n);
             }
         }
     }
@@ -84,5 +98,19 @@ impl Probe for Statistics {
             }
             Event::ModeChange { .. } => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::smaller;
+
+    #[test]
+    fn a_force_that_pulls_or_is_none_is_not_taken_for_zero() {
+        assert_eq!(smaller(10.0, -1e-9).to_bits(), 0.0_f64.to_bits());
+        assert_eq!(smaller(10.0, -0.1), -0.1);
+        assert!(smaller(10.0, f64::NAN).is_nan());
+        assert!(smaller(f64::NAN, 10.0).is_nan());
+        assert_eq!(smaller(f64::INFINITY, 9.0), 9.0);
     }
 }

@@ -8,6 +8,9 @@ use painleve_plant::simulation::Simulation;
 use super::*;
 use crate::{Outcome, rows};
 
+/// Nothing is tuned on the runs of this one.
+const HELD_OUT_SEED: u64 = 987_654_321;
+
 fn campaign(runs: usize) -> Robustness {
     Robustness {
         arms: Arms::Paper,
@@ -18,7 +21,7 @@ fn campaign(runs: usize) -> Robustness {
 }
 
 #[test]
-fn rows_do_not_depend_on_threads_and_most_succeed() {
+fn rows_do_not_depend_on_threads() {
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.unwrap()
@@ -27,10 +30,20 @@ fn rows_do_not_depend_on_threads_and_most_succeed() {
     let found = on(1);
     assert_eq!(found, on(3));
     let outcome = Campaign::new(Arms::Paper, 1, found);
-    assert!(outcome.success.rate > 0.7, "{}", outcome.table());
     assert_eq!(outcome.endings.values().sum::<usize>(), 12);
     let failed = 12 - outcome.success.successes;
     assert_eq!(outcome.worst.len(), failed);
+}
+
+/// Of a seed on which nothing has been tuned.
+#[test]
+fn most_runs_of_a_held_out_seed_succeed() {
+    let study = Robustness {
+        seed: HELD_OUT_SEED,
+        ..campaign(300)
+    };
+    let outcome = Campaign::new(Arms::Paper, study.seed, rows(&study, || ()).unwrap());
+    assert!(outcome.success.lower > 0.93, "{}", outcome.table());
 }
 
 #[test]
