@@ -59,6 +59,11 @@ pub trait Law: Clone + Debug + Default + SettingValue {
     /// run yet.
     type State: Clone + Debug + Default;
 
+    /// Name for reports: of a set, the chosen law's; otherwise the settings' type.
+    fn name(&self) -> &'static str {
+        core::any::type_name::<Self>()
+    }
+
     /// Whether there is a law at all: without one the drive never arms.
     fn is_on(&self) -> bool {
         true
@@ -129,6 +134,11 @@ macro_rules! law_set {
 
         impl $crate::law::Law for $name {
             type State = $states;
+
+            fn name(&self) -> &'static str {
+                // The choice's own, which names the variant as files do.
+                Self::name(self)
+            }
 
             fn is_on(&self) -> bool {
                 match self {

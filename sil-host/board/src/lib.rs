@@ -19,7 +19,7 @@ use std::path::PathBuf;
 use std::process::ExitStatus;
 use std::time::Duration;
 
-use painleve_firmware::Configuration;
+use painleve_plant::Configuration;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{Health, Response};
 use painleve_shared::wire::WireError;

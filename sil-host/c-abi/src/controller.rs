@@ -2,7 +2,7 @@
 
 use std::ffi::c_char;
 
-use painleve_firmware::Controller;
+use painleve_plant::Controller;
 
 use crate::frames::{PainleveActuatorFrame, PainleveSensorFrame};
 use crate::status::{CallError, PainleveStatus, call, give, put, scenario, take_back};

@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use clap::Args;
-use painleve_firmware::Configuration;
 use painleve_firmware::drive::ControlTask;
 use painleve_link::{BusDrive, BusName, ControllerEnd, Pacing};
+use painleve_plant::Configuration;
+use painleve_plant::law_choice::LawChoice;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
@@ -48,7 +49,7 @@ fn answer_until(
     }
     let drive = BusDrive::new(end, &session);
     let source = drive.source();
-    let mut task: ControlTask<BusDrive> = ControlTask::new(drive);
+    let mut task: ControlTask<BusDrive, LawChoice> = ControlTask::new(drive);
     task.configure(&configuration, source)
         .map_err(|error| bad_session(error.to_string()))?;
     loop {

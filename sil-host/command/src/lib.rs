@@ -24,6 +24,7 @@ use painleve_board::BoardError;
 use painleve_bound::BoundError;
 use painleve_link::LinkError;
 use painleve_plant::closed_loop::LoopError;
+use painleve_plant::law_choice::{self, ScenarioLaws};
 use painleve_plant::scenario::ScenarioError;
 use painleve_study::StudyError;
 use painleve_study::sweep::SweepError;
@@ -199,6 +200,12 @@ fn seconds(text: &str) -> Result<f64, String> {
         Ok(seconds) if (0.0..=86_400.0).contains(&seconds) => Ok(seconds),
         _ => Err("give a number of seconds from 0 to 86400".into()),
     }
+}
+
+/// Runs the command line with laws of one's own; see [`main`].
+pub fn main_with<L: ScenarioLaws>() -> ExitCode {
+    law_choice::install::<L>();
+    main()
 }
 
 /// Runs the command line; the exit code is the process's.

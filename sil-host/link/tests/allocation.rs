@@ -9,8 +9,8 @@ use std::cell::Cell;
 use std::hint::black_box;
 use std::time::Duration;
 
-use painleve_firmware::Controller;
 use painleve_link::{BusName, ControllerEnd, Pacing, PlantEnd, Received, Session};
+use painleve_plant::Controller;
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::scenario::{Scenario, built_in};

@@ -5,9 +5,10 @@
 
 use std::time::{Duration, Instant};
 
-use painleve_firmware::{Configuration, Controller};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::range::OutOfRange;
+
+use crate::{Configuration, Controller};
 
 /// The answer to one sensor frame.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@
 //!
 //! `PAINLEVE_FUZZ_TICKS` sets how many ticks each scenario gets.
 
-use painleve_firmware::Controller;
+use painleve_plant::Controller;
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};

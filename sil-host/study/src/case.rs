@@ -321,8 +321,8 @@ mod tests {
         }
         let own =
             |posture| scenario(&Controller::HybridPaper, posture, Converters::Own, &[]).unwrap();
-        let integral = |scenario: Scenario| match scenario.controller.law {
-            LawSettings::Hybrid(law) => law.force_integral_gain_per_s,
+        let integral = |scenario: Scenario| match scenario.controller.law.of_set() {
+            Some(LawSettings::Hybrid(law)) => law.force_integral_gain_per_s,
             _ => panic!("not the hybrid law"),
         };
         assert_eq!(integral(own(Posture::ElbowDown)), 650.0);

@@ -1,7 +1,7 @@
 //! One closed loop in this process, tick by tick: the same simulation and the same
 //! controller as in a run of two processes, without its record.
 
-use painleve_firmware::Controller;
+use painleve_plant::Controller;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;

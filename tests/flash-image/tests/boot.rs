@@ -1,9 +1,9 @@
 #![allow(clippy::unwrap_used)]
 //! The image starts on the modelled board and controls a simulated arm as a PC does.
 
-use painleve_firmware::Controller;
 use painleve_flash_image::bench::{encoded, scenario};
 use painleve_flash_image::board::Board;
+use painleve_plant::Controller;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::message::{FrameSource, Response};

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::{Duration, Instant};
 
-use painleve_firmware::Configuration;
+use painleve_plant::Configuration;
 use painleve_plant::controller_host::{Answer, ControllerHost, HostError, InProcess};
 use painleve_shared::frame::SensorFrame;
 use painleve_system::realtime::Pacer;

@@ -8,11 +8,12 @@ pub mod built_in;
 pub mod describe;
 mod load;
 
-use painleve_firmware::Configuration;
 use painleve_firmware::configuration::ControllerSettings;
 use painleve_shared::{ArmParameters, OutOfRange, settings};
 
+use crate::Configuration;
 use crate::converters::ConverterSettings;
+use crate::law_choice::LawChoice;
 use crate::mechanics::compliant::TipContact;
 use crate::mechanics::effects::Effects;
 use crate::mechanics::impact::ImpactLaw;
@@ -51,7 +52,7 @@ settings! {
         /// Encoders, force cell and torque stages.
         converters: ConverterSettings = ConverterSettings::default();
         /// The controller.
-        controller: ControllerSettings = ControllerSettings::default();
+        controller: ControllerSettings<LawChoice> = ControllerSettings::default();
     }
     check Self::relations;
 }
