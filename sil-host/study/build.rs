@@ -1,7 +1,8 @@
-//! Tells the program from which revision it is built, so that a sweep can refuse to mix two.
+//! Passes the Git revision of the build to the program, so that a sweep can refuse to mix two revisions.
 //!
-//! Told again whenever a source changes, but not when a commit changes nothing: a program built
-//! before its commit stays `…-changed`, and is not built again for every commit.
+//! The revision is updated whenever a source changes, but not when a commit changes no source: a
+//! program built
+//! before its commit stays `…-changed`, and is not rebuilt for every commit.
 
 use std::process::Command;
 

@@ -171,7 +171,7 @@ fn finished_shards_are_skipped_and_broken_ones_computed_again() {
         "out/sweep/shard-2 (copy).csv",
         &String::from_utf8_lossy(&whole),
     );
-    refused("shard 2 is there twice");
+    refused("shard 2 is present twice");
     std::fs::remove_file(bench.path("out/sweep/shard-2 (copy).csv")).unwrap_or_default();
     assert!(!merged(&bench).is_empty());
 }

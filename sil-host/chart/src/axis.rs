@@ -1,33 +1,33 @@
-//! Axis ranges that outliers cannot spoil, and labels for them.
+//! Axis ranges that are robust to outliers, and their labels.
 
 use std::ops::Range;
 
 use super::decimate::Extent;
 
-/// Part of the bins that may lie off scale at either end.
+/// Fraction of the bins that may lie off scale at either end.
 const OUTLIERS: f64 = 0.01;
-/// Everything is shown unless that makes the axis this many times longer.
+/// All values are shown unless they make the axis this many times longer.
 const WORTH_CLIPPING: f64 = 2.5;
-/// Free space above and below the curve, as a part of its height.
+/// Margin above and below the curve, as a fraction of its height.
 const MARGIN: f64 = 0.08;
 
-/// The range of a value axis, and what it leaves out.
+/// The range of a value axis, and the values beyond it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ValueAxis {
     /// From bottom to top; never empty, always finite.
     pub range: Range<f64>,
-    /// Least value, if it is below the range.
+    /// Smallest value, if it is below the range.
     pub off_scale_min: Option<f64>,
-    /// Greatest value, if it is above the range.
+    /// Largest value, if it is above the range.
     pub off_scale_max: Option<f64>,
 }
 
 impl ValueAxis {
-    /// The range for some curves.
+    /// Chooses the range for a set of curves.
     ///
-    /// All values are shown if that leaves the ordinary ones readable; otherwise the
-    /// axis ends a little beyond the range of all but the most extreme percent.
-    /// `include` is always within, and the range is at least `minimum_span` long, so
+    /// All values are shown if the ordinary ones stay readable; otherwise the
+    /// axis ends slightly beyond the range of all but the most extreme one percent.
+    /// The range always contains `include` and spans at least `minimum_span`, so
     /// that noise on a constant does not fill the panel.
     pub fn new(
         extents: impl Iterator<Item = Extent>,
@@ -40,7 +40,8 @@ impl ValueAxis {
         for extent in extents.filter(|extent| !extent.is_empty()) {
             least = least.min(extent.min);
             greatest = greatest.max(extent.max);
-            // An infinity within a bin hides its other values; both ends are finite then.
+            // An infinite extreme hides the other values of its bin; the first and last values
+            // stand in for them.
             minima.extend(
                 [extent.min, extent.first]
                     .into_iter()
@@ -74,7 +75,7 @@ impl ValueAxis {
         let (low, high) = if everything.1 - everything.0 <= WORTH_CLIPPING * ordinary_span {
             everything
         } else {
-            // Either end stretches on its own: a spike upwards costs nothing below.
+            // Each end stretches on its own: a spike upwards does not move the lower end.
             let room = 0.25 * ordinary_span;
             (
                 everything.0.max(ordinary.0 - room),
@@ -88,7 +89,7 @@ impl ValueAxis {
     }
 
     fn padded(low: f64, high: f64, minimum_span: f64) -> Self {
-        // Values beyond this could not be told apart on paper, and their difference
+        // Values beyond this limit are indistinguishable in print, and their difference
         // must stay finite.
         let (low, high) = (low.clamp(-1e300, 1e300), high.clamp(-1e300, 1e300));
         let relative = 1e-9 * low.abs().max(high.abs());
@@ -101,12 +102,12 @@ impl ValueAxis {
         }
     }
 
-    /// A value moved to the nearer end if it is off scale.
+    /// Clamps a value to the range.
     pub fn clamp(&self, value: f64) -> f64 {
         value.clamp(self.range.start, self.range.end)
     }
 
-    /// What is off scale, for the reader; empty if nothing is.
+    /// Returns a note on the off-scale values; empty if there are none.
     pub fn off_scale_note(&self, unit: &str) -> String {
         match (self.off_scale_min, self.off_scale_max) {
             (None, None) => String::new(),
@@ -119,7 +120,7 @@ impl ValueAxis {
     }
 }
 
-/// A label with as many decimals as tell values `step` apart.
+/// Formats a label with enough decimals to distinguish values `step` apart.
 pub fn label(value: f64, step: f64) -> String {
     if !(1e-6..1e7).contains(&step) {
         return format!("{value:.1e}").replace('-', "−");
@@ -138,7 +139,7 @@ pub fn label(value: f64, step: f64) -> String {
     }
 }
 
-/// Three digits, for notes.
+/// Formats a value with three digits, for notes.
 fn short(value: f64) -> String {
     if value.is_infinite() {
         return if value > 0.0 { "∞" } else { "−∞" }.to_owned();
@@ -149,7 +150,7 @@ fn short(value: f64) -> String {
     label(value, value.abs() / 100.0)
 }
 
-/// The value below which a part `p` of the sorted values lies.
+/// Returns the value below which a fraction `p` of the sorted values lies.
 fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     sorted.get((p * last as f64).round() as usize).copied()
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spike_is_cut_and_told_but_a_frequent_value_is_shown() {
+    fn a_spike_is_clamped_and_noted_but_a_frequent_value_is_shown() {
         let mut values = vec![10.0; 1000];
         values[500] = 480.0;
         let spiky = axis(&values);
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_have_the_decimals_their_steps_need() {
+    fn labels_have_enough_decimals_for_their_step() {
         assert_eq!(label(0.148, 0.02), "0.15");
         assert_eq!(label(-0.148, 0.005), "−0.148");
         assert_eq!(label(-1e-17, 0.5), "0.0");

@@ -1,28 +1,28 @@
-//! Runs of any length in bounded memory, for drawing.
+//! Decimation of runs of any length in bounded memory, for drawing.
 //!
-//! Samples fall into bins of equal numbers of samples. When all bins are used,
-//! neighbours merge and bins are twice as wide from then on. A bin keeps first, last,
-//! least and greatest value of each signal, so a spike of a single tick is still there
-//! after a million.
+//! Each bin holds an equal number of samples. When all bins are used,
+//! adjacent bins merge and new bins are twice as wide. A bin keeps the first, last,
+//! smallest and largest value of each signal, so a spike of a single tick survives
+//! a million ticks.
 
-/// Bins in use at most; at least half of that once they have been filled.
+/// Largest number of bins; at least half of them stay in use once all have been filled.
 pub const BINS: usize = 2000;
 
-/// What one signal did within a bin; infinities count, NaN does not.
+/// Range of one signal within a bin, including infinities but not NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// First value.
     pub first: f64,
-    /// Least value.
+    /// Smallest value.
     pub min: f64,
-    /// Greatest value.
+    /// Largest value.
     pub max: f64,
     /// Last value.
     pub last: f64,
 }
 
 impl Extent {
-    /// No value.
+    /// The extent without any value.
     pub const EMPTY: Self = Self {
         first: f64::NAN,
         min: f64::NAN,
@@ -30,7 +30,7 @@ impl Extent {
         last: f64::NAN,
     };
 
-    /// The extent of one value.
+    /// Returns the extent of one value.
     pub fn of(value: f64) -> Self {
         Self {
             first: value,
@@ -40,12 +40,12 @@ impl Extent {
         }
     }
 
-    /// Whether there was no value but NaN.
+    /// Whether all values were NaN.
     pub fn is_empty(&self) -> bool {
         self.min.is_nan()
     }
 
-    /// This extent followed by a later one.
+    /// Returns this extent extended by a later one.
     #[must_use]
     pub fn then(self, later: Self) -> Self {
         if self.is_empty() {
@@ -63,16 +63,16 @@ impl Extent {
     }
 }
 
-/// Consecutive samples seen as one.
+/// Consecutive samples combined into one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bin<const SIGNALS: usize> {
     /// Time of the first sample, s.
     pub start_s: f64,
     /// Time of the last sample, s.
     pub end_s: f64,
-    /// What each signal did.
+    /// Extent of each signal.
     pub extents: [Extent; SIGNALS],
-    /// All flags that any sample had.
+    /// Union of the flags of all samples.
     pub flags: u8,
     samples: u64,
 }
@@ -110,8 +110,8 @@ impl<const SIGNALS: usize> Default for Decimator<SIGNALS> {
 }
 
 impl<const SIGNALS: usize> Decimator<SIGNALS> {
-    /// Adds a sample; never allocates. A time that is not finite has no place in a
-    /// figure: such a sample is left out.
+    /// Adds a sample without allocating. Discards a sample whose time is not finite,
+    /// because it has no position in a figure.
     pub fn push(&mut self, time_s: f64, values: [f64; SIGNALS], flags: u8) {
         if !time_s.is_finite() {
             return;
@@ -134,7 +134,7 @@ impl<const SIGNALS: usize> Decimator<SIGNALS> {
         }
     }
 
-    /// The bins in order of time.
+    /// Returns the bins in order of time.
     pub fn bins(&self) -> &[Bin<SIGNALS>] {
         &self.bins
     }
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn few_samples_are_kept_one_by_one_and_times_must_be_finite() {
+    fn few_samples_are_kept_individually_and_times_must_be_finite() {
         assert!(bins_of(&[]).is_empty());
         let bins = bins_of(&[3.0, f64::NAN, 5.0]);
         assert_eq!(bins[0].extents, [Extent::of(3.0)]);
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_stays_the_same_over_a_million_samples() {
+    fn memory_is_constant_over_a_million_samples() {
         let mut decimator = Decimator::<1>::default();
         let capacity = decimator.bins.capacity();
         for tick in 0..1_000_000 {

@@ -1,9 +1,9 @@
 //! Charts as SVG, laid out as in the paper.
 //!
-//! - [`chart`]: stacked panels of curves, points and regions over one axis
-//! - [`style`]: what all figures share: colours, fonts, ticks
-//! - [`decimate`]: runs of any length in bounded memory, extremes kept
-//! - [`axis`]: ranges that outliers cannot spoil, and their labels
+//! - [`chart`]: stacked panels of curves, points and regions over one shared axis
+//! - [`style`]: colours, fonts and ticks common to all figures
+//! - [`decimate`]: runs of any length in bounded memory, with their extremes
+//! - [`axis`]: ranges that are robust to outliers, and their labels
 
 pub mod axis;
 pub mod chart;
@@ -12,10 +12,10 @@ pub mod style;
 
 pub use chart::{Chart, Mark, Panel};
 
-/// Why a figure could not be made.
+/// Why a figure could not be drawn or written.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
-    /// The drawing library refused.
+    /// The drawing library failed.
     #[error("cannot draw the figure: {0}; please report this")]
     Draw(String),
     /// The figure's file cannot be written.

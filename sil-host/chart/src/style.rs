@@ -1,4 +1,4 @@
-//! What all figures share: colours, fonts, ticks, and SVG at twice the size shown.
+//! Colours, fonts and ticks common to all figures, in SVG at twice the displayed size.
 
 use std::io;
 use std::ops::Range;
@@ -11,9 +11,9 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::PlotError;
 
-// The palette of Okabe and Ito, told apart by colour-blind readers and in grey.
+// The palette of Okabe and Ito, distinguishable by colour-blind readers and in grey.
 
-/// Near black, for text and for what is judged against.
+/// Near black, for text and for the reference of a comparison.
 pub const BLACK_INK: RGBColor = RGBColor(0x1A, 0x1A, 0x1A);
 /// Blue, for the first curve.
 pub const BLUE_INK: RGBColor = RGBColor(0x00, 0x72, 0xB2);
@@ -23,16 +23,16 @@ pub const SKY: RGBColor = RGBColor(0x56, 0xB4, 0xE9);
 pub const GREEN: RGBColor = RGBColor(0x00, 0x9E, 0x73);
 /// Orange.
 pub const ORANGE: RGBColor = RGBColor(0xE6, 0x9F, 0x00);
-/// Red, for what goes wrong.
+/// Red, for failures.
 pub const VERMILLION: RGBColor = RGBColor(0xD5, 0x5E, 0x00);
 /// Grey, for notes and for the background.
 pub const GREY: RGBColor = RGBColor(0x70, 0x70, 0x70);
 /// Light grey, for grids.
 pub const GRID: RGBColor = RGBColor(0xE4, 0xE4, 0xE4);
 
-/// Figures are drawn at twice the size shown, because coordinates are whole pixels.
+/// Figures are drawn at twice the displayed size, because coordinates are whole pixels.
 pub const DRAWN_PER_SHOWN: i32 = 2;
-/// Font family, with substitutes.
+/// Font family, with fallbacks.
 pub const FONT: &str = "Helvetica, Arial, Liberation Sans, DejaVu Sans, sans-serif";
 /// Size, weight and colour of a text.
 pub struct Look {
@@ -60,20 +60,20 @@ pub const SUBTITLE: Look = Look::new(31, FontStyle::Normal, GREY);
 pub const HEADING: Look = Look::new(33, FontStyle::Bold, BLACK_INK);
 /// Names of curves.
 pub const LEGEND: Look = Look::new(31, FontStyle::Normal, BLACK_INK);
-/// Remarks.
+/// Notes.
 pub const NOTE: Look = Look::new(29, FontStyle::Normal, GREY);
 /// Numbers at the axes.
 pub const TICK: Look = Look::new(29, FontStyle::Normal, BLACK_INK);
 
-/// Part of a figure under way.
+/// A region of a figure being drawn.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// Whether the drawing library has drawn.
+/// Result of a call to the drawing library.
 pub type Drawn = Result<(), DrawingAreaErrorKind<io::Error>>;
 
 /// Draws a figure of `size` (width, height) in drawn units.
 ///
 /// # Errors
-/// [`PlotError::Draw`] if the drawing library refuses.
+/// [`PlotError::Draw`] if the drawing library fails.
 pub fn svg(size: (i32, i32), draw: impl FnOnce(&Area<'_>) -> Drawn) -> Result<String, PlotError> {
     let (width, height) = size;
     let mut svg = String::new();
@@ -94,15 +94,15 @@ pub fn svg(size: (i32, i32), draw: impl FnOnce(&Area<'_>) -> Drawn) -> Result<St
     Ok(svg.replacen(&drawn, &shown, 1))
 }
 
-/// The colour that a clear one has on white.
+/// Returns the opaque colour that looks like a translucent one on white.
 pub fn over_white(colour: RGBColor, opacity: f64) -> RGBColor {
     let mix = |part: u8| (255.0 + (f64::from(part) - 255.0) * opacity.clamp(0.0, 1.0)) as u8;
     RGBColor(mix(colour.0), mix(colour.1), mix(colour.2))
 }
 
-/// Round values within a range, about `count` of them, and their distance.
+/// Returns about `count` round values within a range, and their spacing.
 pub fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
-    // A tick at the very end shall not be lost to rounding.
+    // Rounding must not drop a tick at the very end.
     let slack = 1e-6 * (range.end - range.start);
     let ticks = RangedCoordf64::from(range.start - slack..range.end + slack).key_points(count);
     let step = match ticks.as_slice() {
@@ -112,7 +112,7 @@ pub fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
     (ticks, step)
 }
 
-/// Leaves out points on the way straight up, down or ahead to the next one.
+/// Removes points on a straight vertical or horizontal run to the next point.
 pub fn without_straight_ons(points: impl Iterator<Item = (i32, i32)>) -> Vec<(i32, i32)> {
     let mut kept: Vec<(i32, i32)> = Vec::new();
     for next in points {
@@ -134,15 +134,15 @@ pub fn without_straight_ons(points: impl Iterator<Item = (i32, i32)>) -> Vec<(i3
     kept
 }
 
-/// Width of a text in some usual font; the true one is known to the viewer only.
+/// Estimates the width of a text in a common font; only the viewer knows the true width.
 pub fn text_width(text: &str, look: &Look) -> i32 {
     text.chars().count() as i32 * look.size * 45 / 100
 }
 
-/// Draws a text at a point, left, right or centred of it.
+/// Draws a text at a point, aligned left, right or centred.
 ///
 /// # Errors
-/// What the drawing library refuses.
+/// The error of the drawing library.
 pub fn text(root: &Area<'_>, text: &str, look: &Look, at: (i32, i32), side: HPos) -> Drawn {
     if text.is_empty() {
         return Ok(());
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_on_a_straight_way_are_left_out_but_turns_are_kept() {
+    fn points_on_a_straight_run_are_removed_but_corners_are_kept() {
         let points = [
             (0, 0),
             (0, 5),

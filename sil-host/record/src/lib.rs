@@ -1,8 +1,8 @@
-//! What a run leaves behind.
+//! Records of a run.
 //!
 //! - [`mcap`]: every tick as a log file for Foxglove, PlotJuggler and scripts
 //! - [`plot`]: the run over time as a figure
-//! - [`report`]: what the run came to, as JSON and as a table
+//! - [`report`]: the results of the run as JSON and as a table
 
 pub mod mcap;
 pub mod plot;

@@ -1,16 +1,16 @@
 //! A run as an MCAP log: JSON messages with their schemas, in zstd chunks.
 //!
-//! Topics, once a control tick each, `log_time` being simulated time:
+//! Topics, each with one message per control tick; `log_time` is simulated time:
 //! - `/plant`: state, contact and torques of the simulated arm, SI units
-//! - `/sensor`: the frame the controller got, raw counts
-//! - `/actuator`: the frame it answered with, raw counts, state and fault by name
+//! - `/sensor`: the frame that the controller received, raw counts
+//! - `/actuator`: the frame that the controller returned, raw counts, with state and fault by name
 //!
-//! Fields are flat, so that every number is a curve in Foxglove and PlotJuggler; a
-//! value that is not finite becomes `null`. Configuration is in one metadata record.
+//! Fields are flat, so every number is a curve in Foxglove and PlotJuggler. A
+//! value that is not finite becomes `null`. One metadata record holds the configuration.
 //!
 //! The control loop only copies a [`Sample`] into a buffer. Full buffers go to a
-//! writer thread and come back empty; when none is empty the loop waits, so nothing
-//! is ever lost and memory is bounded.
+//! writer thread and come back empty. When no buffer is empty the loop waits, so no
+//! sample is lost and memory is bounded.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -27,52 +27,52 @@ use painleve_system::atomic_file::{AtomicFile, AtomicFileError};
 use schemars::{JsonSchema, SchemaGenerator, generate::SchemaSettings};
 use serde::Serialize;
 
-/// Samples handed to the writer thread at once: a second of a run at 1 kHz.
+/// Samples passed to the writer thread at once: one second of a run at 1 kHz.
 const SAMPLES_PER_BUFFER: usize = 1024;
-/// Buffers in circulation, about 0.8 MB together.
+/// Number of buffers in circulation, about 0.8 MB together.
 const BUFFERS: usize = 4;
 
 /// Why a run could not be recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The file cannot be created or given its name.
+    /// The file cannot be created or renamed.
     #[error(transparent)]
     File(#[from] AtomicFileError),
-    /// The disk is full or failed while recording.
+    /// Writing failed during the recording, for example because the disk is full.
     #[error(
-        "cannot record to `{path}`: {source}; choose a path with enough space or do not record"
+        "cannot record to `{path}`: {source}; choose a path with enough space or run without recording"
     )]
     Write {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
-        /// What failed.
+        /// The reason.
         source: io::Error,
     },
     /// The writer thread cannot be started.
     #[error(
-        "cannot start the thread that writes `{path}`: {source}; end other processes or do not record"
+        "cannot start the thread that writes `{path}`: {source}; end other processes or run without recording"
     )]
     Thread {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
         /// The operating system's reason.
         source: io::Error,
     },
     /// A call after the error that ended the recording.
-    #[error("recording to `{path}` has already failed; start it anew")]
+    #[error("recording to `{path}` has already failed; start a new recording")]
     Ended {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
     },
 }
 
-/// Writes samples to an MCAP file that appears when it is complete.
+/// Writes samples to an MCAP file that appears once it is complete.
 ///
-/// Dropped without [`finish`](Self::finish), it leaves no file.
+/// Leaves no file if dropped without [`finish`](Self::finish).
 #[derive(Debug)]
 pub struct Recorder {
     path: PathBuf,
-    /// The file behind the path.
+    /// The requested path.
     target: PathBuf,
     buffer: Vec<Sample>,
     /// `None` after the recording ended.
@@ -88,13 +88,13 @@ struct WriterThread {
 
 impl Recorder {
     /// Starts a recording; `metadata` (scenario, seed, configuration as JSON, …) goes
-    /// into a record of its own.
+    /// into a separate record.
     ///
     /// The writer thread inherits the caller's scheduling: create the recorder before
     /// raising a priority.
     ///
     /// # Errors
-    /// [`RecordError`] if the file's folder cannot be made or written, or the thread
+    /// [`RecordError`] if the file or its folder cannot be created, or the thread
     /// cannot be started.
     pub fn create(
         path: impl Into<PathBuf>,
@@ -110,7 +110,7 @@ impl Recorder {
         let (full, full_buffers) = sync_channel(BUFFERS);
         let (empty_buffers, empty) = sync_channel(BUFFERS);
         for _ in 1..BUFFERS {
-            // Cannot fail: there is room, and the receiver is at hand.
+            // Cannot fail: the channel has room and its receiver exists.
             let _ = empty_buffers.send(Vec::with_capacity(SAMPLES_PER_BUFFER));
         }
         let thread = thread::Builder::new()
@@ -131,11 +131,11 @@ impl Recorder {
         }
     }
 
-    /// Adds a sample; copies it, and waits only when the disk is behind by
+    /// Adds a copy of a sample. Waits only when the disk is behind by
     /// several thousand samples.
     ///
     /// # Errors
-    /// [`RecordError`] if writing earlier samples failed; the recording has ended then.
+    /// [`RecordError`] if writing earlier samples failed; the recording has then ended.
     #[inline]
     pub fn push(&mut self, sample: &Sample) -> Result<(), RecordError> {
         self.buffer.push(*sample);
@@ -145,7 +145,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes what is left and gives the file its name.
+    /// Writes the remaining samples and gives the file its final name.
     ///
     /// # Errors
     /// [`RecordError`] if anything could not be written; no file is left then.
@@ -158,17 +158,17 @@ impl Recorder {
         Ok(file.commit()?)
     }
 
-    /// Whether the record and `file` would take the same name.
+    /// Whether the recording and `file` have the same target path.
     pub fn is_same_file(&self, file: &AtomicFile) -> bool {
         self.target == file.target()
     }
 
-    /// Writes what there is of a run that has ended early, under a name that says so, with
-    /// the reason in a metadata record `ended early`; that name is returned. A record of an
-    /// earlier run stays.
+    /// Writes the recorded part of a run that ended early, under a name that marks it as partial, with
+    /// the reason in a metadata record `ended early`, and returns that name. Keeps the record of an
+    /// earlier run.
     ///
     /// # Errors
-    /// As [`Recorder::finish`].
+    /// See [`Recorder::finish`].
     pub fn finish_partial(mut self, reason: &str) -> Result<PathBuf, RecordError> {
         self.hand_over()?;
         let mut log = self.end()?;
@@ -190,12 +190,12 @@ impl Recorder {
         if handed_over.is_some() {
             return Ok(());
         }
-        // A closed channel means that the thread has given up: its result says why.
+        // A closed channel means that the thread has stopped: its result holds the reason.
         self.buffer.clear();
         self.end().and_then(|_| Err(self.ended()))
     }
 
-    /// Stops the writer thread and takes over the log.
+    /// Stops the writer thread and takes back the log.
     fn end(&mut self) -> Result<LogWriter, RecordError> {
         let Some(WriterThread { full, thread, .. }) = self.writer.take() else {
             return Err(self.ended());
@@ -217,12 +217,12 @@ impl Recorder {
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        // The log goes out of scope unfinished, and its temporary file with it.
+        // Dropping the unfinished log removes its temporary file.
         let _ = self.end();
     }
 }
 
-/// The writer thread; ends when the recorder closes its channel.
+/// Runs the writer thread until the recorder closes its channel.
 fn write_buffers(
     mut log: LogWriter,
     full: &Receiver<Vec<Sample>>,
@@ -233,7 +233,7 @@ fn write_buffers(
             log.write(sample)?;
         }
         buffer.clear();
-        // Fails only when the recorder is ending and needs no more buffers.
+        // Fails only when the recorder is ending and takes no more buffers.
         let _ = empty.send(buffer);
     }
     Ok(log)
@@ -250,7 +250,7 @@ fn write_error(path: &Path, error: McapError) -> RecordError {
     }
 }
 
-/// Encodes samples; owns the file.
+/// Encodes samples and owns the file.
 struct LogWriter {
     writer: mcap::Writer<BufWriter<AtomicFile>>,
     plant: u16,
@@ -264,7 +264,7 @@ impl LogWriter {
     fn new(file: AtomicFile, metadata: &BTreeMap<String, String>) -> Result<Self, McapError> {
         let mut writer = mcap::WriteOptions::new()
             .library(concat!("painleve ", env!("CARGO_PKG_VERSION")))
-            // The cores belong to the control loop; one thread keeps up with it.
+            // The cores belong to the control loop; one thread is fast enough.
             .compression_threads(0)
             // The default level is slower here and compresses these messages no better.
             .compression_level(1)
@@ -295,7 +295,7 @@ impl LogWriter {
     }
 
     fn write(&mut self, sample: &Sample) -> Result<(), McapError> {
-        // Saturates: negative or undefined time becomes zero.
+        // Saturates: a negative or undefined time becomes zero.
         let time_ns = (sample.plant.time_s * 1e9).round() as u64;
         self.write_message(self.plant, time_ns, &PlantMessage::new(sample))?;
         self.write_message(self.sensor, time_ns, &SensorMessage::new(sample))?;
@@ -332,7 +332,7 @@ fn add_channel<M: JsonSchema>(
     writer: &mut mcap::Writer<BufWriter<AtomicFile>>,
     topic: &str,
 ) -> Result<u16, McapError> {
-    // Foxglove reads draft 7 and does not follow references.
+    // Foxglove reads draft 7 and does not resolve references.
     let settings = SchemaSettings::draft07().with(|settings| settings.inline_subschemas = true);
     let schema = SchemaGenerator::new(settings).into_root_schema_for::<M>();
     let schema = serde_json::to_vec(&schema).map_err(io::Error::from)?;
@@ -375,9 +375,9 @@ struct PlantMessage {
     u1_nm: f64,
     /// Torque on the second joint, N·m.
     u2_nm: f64,
-    /// What holds the tip: flight, slide-positive, slide-negative or stick.
+    /// Contact mode of the tip: flight, slide-positive, slide-negative or stick.
     mode: &'static str,
-    /// The same as a number: 0 flight, 1 slide-positive, 2 slide-negative, 3 stick.
+    /// Contact mode as a number: 0 flight, 1 slide-positive, 2 slide-negative, 3 stick.
     mode_number: u8,
 }
 
@@ -414,7 +414,7 @@ impl PlantMessage {
 struct SensorMessage {
     /// Control tick of the sample; wraps.
     tick: u32,
-    /// Running number of frames sent; wraps.
+    /// Sequence number of the frame; wraps.
     sequence: u32,
     /// Encoder of the first joint, θ1, counts.
     joint1_counts: u32,
@@ -447,9 +447,9 @@ impl SensorMessage {
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "painleve.Actuator")]
 struct ActuatorMessage {
-    /// Tick of the sensor frame this answers.
+    /// Tick of the sensor frame that this frame answers.
     tick: u32,
-    /// Running number of frames sent; wraps.
+    /// Sequence number of the frame; wraps.
     sequence: u32,
     /// Torque on the first joint, counts.
     u1_counts: i32,
@@ -509,7 +509,7 @@ mod tests {
     use painleve_plant::{ContactMode, Snapshot};
 
     fn sample(tick: u32) -> Sample {
-        // Quarters, so that reading them back is exact.
+        // Quarters, so that decoding is exact.
         let value = f64::from(tick) * 0.25;
         let mut sample = Sample {
             plant: Snapshot {
@@ -557,10 +557,10 @@ mod tests {
     }
 
     #[test]
-    fn every_sample_is_read_back_with_its_time_and_values() {
+    fn samples_round_trip_with_their_time_and_values() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out/run.mcap");
-        // Some full buffers and a part of one.
+        // Several full buffers and a partial one.
         let ticks = 5 * SAMPLES_PER_BUFFER as u32 + 17;
         record(&path, ticks);
 
@@ -622,7 +622,7 @@ mod tests {
             let json: Value = serde_json::from_slice(&message.data).unwrap();
             for (field, value) in json.as_object().unwrap() {
                 let property = &schema["properties"][field];
-                // Plain types only: Foxglove's reader knows no unions.
+                // Plain types only: Foxglove's reader does not support unions.
                 let plain = property["type"].as_str().unwrap();
                 assert_eq!(plain == "string", value.is_string(), "{field}");
                 assert!(property["description"].is_string(), "{field}");
@@ -662,7 +662,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recorder_dropped_unfinished_leaves_nothing() {
+    fn a_recorder_dropped_unfinished_leaves_no_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         let mut recorder = Recorder::create(&path, &BTreeMap::new()).unwrap();
@@ -684,7 +684,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_ends_the_recording_with_one_error_and_leaves_nothing() {
+    fn a_full_disk_ends_the_recording_with_one_error_and_leaves_no_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         let start = |room| {

@@ -1,7 +1,7 @@
 //! One run over time: tip position, normal force, torques, contact mode, b and p.
 //!
-//! Panels are stacked on one time axis as in the paper's simulation figures. Where
-//! the tip is off the belt, every panel is shaded, so that cause and effect line up.
+//! Panels are stacked on one time axis as in the paper's simulation figures. Flight
+//! is shaded in every panel, so that cause and effect line up.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use painleve_system::atomic_file;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-/// Signals of the figure, by their place in a bin.
+/// Signals of the figure, by their index in a bin.
 mod signal {
     pub(super) const TIP: usize = 0;
     pub(super) const REFERENCE: usize = 1;
@@ -41,13 +41,13 @@ struct Curve {
 struct Panel {
     title: &'static str,
     unit: &'static str,
-    /// In the order of the legend; the first is drawn on top.
+    /// Signals in the order of the legend; the first is drawn on top.
     curves: &'static [Curve],
-    /// How to read the panel.
+    /// Note on how to read the panel.
     note: &'static str,
-    /// A line at zero, always in view.
+    /// Whether the panel shows a line at zero.
     zero_line: bool,
-    /// Shortest value axis, so that noise on a constant stays small.
+    /// Smallest span of the value axis, so that noise on a constant stays small.
     minimum_span: f64,
 }
 
@@ -61,7 +61,7 @@ const TIP_PANEL: Panel = Panel {
             colour: BLACK_INK,
             width: 3,
         },
-        // Wide and below, so that both can be seen where they agree.
+        // Wide and below, so that both are visible where they agree.
         Curve {
             signal: signal::REFERENCE,
             name: "reference zₜ*",
@@ -160,7 +160,7 @@ const HEIGHT: i32 = TITLE_HEIGHT
 const TIME_TICKS: usize = 10;
 const VALUE_TICKS: usize = 5;
 
-/// The figure of one run; memory does not grow with the length of the run.
+/// The figure of one run; its memory does not grow with the length of the run.
 #[derive(Clone, Debug)]
 pub struct RunPlot {
     title: String,
@@ -169,7 +169,7 @@ pub struct RunPlot {
 }
 
 impl RunPlot {
-    /// An empty figure. The subtitle has room for about 110 characters.
+    /// Creates an empty figure. The subtitle has room for about 110 characters.
     pub fn new(title: impl Into<String>, subtitle: impl Into<String>) -> Self {
         // Control characters are not allowed in XML.
         let printable = |text: String| text.replace(char::is_control, " ");
@@ -180,7 +180,7 @@ impl RunPlot {
         }
     }
 
-    /// Adds a sample; never allocates. Values may be infinite or NaN: an infinity is
+    /// Adds a sample without allocating. Values may be infinite or NaN: an infinity is
     /// shown as off scale, NaN as a gap.
     #[inline]
     pub fn push(&mut self, sample: &Sample) {
@@ -196,15 +196,15 @@ impl RunPlot {
             .push(sample.plant.time_s, values, flag(sample.plant.mode));
     }
 
-    /// The figure as SVG text.
+    /// Returns the figure as SVG text.
     ///
     /// # Errors
-    /// [`PlotError::Draw`] if the drawing library refuses, which it has no reason to.
+    /// [`PlotError::Draw`] if the drawing library fails, which is not expected.
     pub fn svg(&self) -> Result<String, PlotError> {
         style::svg((WIDTH, HEIGHT), |root| self.draw(root))
     }
 
-    /// Writes the figure to an SVG file, whole or not at all.
+    /// Writes the figure to an SVG file, either completely or not at all.
     ///
     /// # Errors
     /// [`PlotError`] if the file cannot be written.
@@ -235,7 +235,7 @@ impl RunPlot {
     }
 }
 
-/// What all panels share.
+/// Layout and time axis that all panels share.
 struct Figure<'a, 'svg> {
     root: &'a Area<'svg>,
     bins: &'a [Bin<{ signal::COUNT }>],
@@ -277,7 +277,7 @@ impl Figure<'_, '_> {
         self.draw_frame(top, bottom)
     }
 
-    /// Title with unit and what is off scale; legend or note to the right.
+    /// Draws the title with unit and off-scale note; legend or note to the right.
     fn draw_header(&self, panel: &Panel, axis: &ValueAxis, top: i32) -> Drawn {
         let title = format!("{} ({})", panel.title, panel.unit);
         self.draw_heading(&title, panel.note, top)?;
@@ -318,7 +318,7 @@ impl Figure<'_, '_> {
                 let extent = bin.extents[curve.signal];
                 let (start, end) = (self.x(bin.start_s), self.x(bin.end_s));
                 let middle = (start + end) / 2;
-                // Within a pixel or two, rising or falling is all that can be seen.
+                // Within a pixel or two, only rising and falling can be distinguished.
                 let (sooner, later) = if extent.first <= extent.last {
                     (extent.min, extent.max)
                 } else {
@@ -347,7 +347,7 @@ impl Figure<'_, '_> {
         Ok(())
     }
 
-    /// A small triangle at the edge beyond which a curve went.
+    /// Draws a small triangle at the edge where a curve leaves the panel.
     fn draw_off_scale_marks(
         &self,
         panel: &Panel,
@@ -414,8 +414,8 @@ impl Figure<'_, '_> {
         Ok(())
     }
 
-    /// Where the mode occurs, from pixel to pixel; at least two pixels wide, so that
-    /// the shortest flight is seen.
+    /// Returns the intervals of a mode in pixels, each at least two pixels wide, so that
+    /// the shortest flight is visible.
     fn times_of(&self, mode: ContactMode) -> Vec<(i32, i32)> {
         let mut times: Vec<(i32, i32)> = Vec::new();
         for (index, bin) in self.bins.iter().enumerate() {
@@ -489,10 +489,11 @@ fn flag(mode: ContactMode) -> u8 {
     1 << mode as u8
 }
 
-/// From the first sample to one sample after the last, where its mode ends; a second
-/// if there are fewer than two.
+/// Returns the interval from the first sample to one sample after the last, where its mode ends;
+/// one second
+/// if there are fewer than two samples.
 fn time_range<const SIGNALS: usize>(bins: &[Bin<SIGNALS>]) -> Range<f64> {
-    // Farther off, neighbouring ticks could not be told apart.
+    // At larger times, adjacent ticks could not be distinguished.
     const FAR_S: f64 = 1e9;
     let start = bins.iter().fold(FAR_S, |start, bin| start.min(bin.start_s));
     let end = bins.iter().fold(-FAR_S, |end, bin| end.max(bin.end_s));
@@ -513,7 +514,7 @@ mod tests {
     use painleve_plant::Snapshot;
     use proptest::prelude::*;
 
-    /// A tip that follows its reference, then leaves the belt for one tick.
+    /// Creates a run whose tip follows its reference, then leaves the belt for one tick.
     fn sample(tick: u32) -> Sample {
         let time_s = f64::from(tick) * 1e-3;
         Sample {
@@ -542,7 +543,7 @@ mod tests {
         plot
     }
 
-    /// The texts of a figure in the order drawn.
+    /// Returns the texts of a figure in the order drawn.
     fn texts(svg: &str) -> Vec<&str> {
         svg.split("<text ")
             .skip(1)
@@ -551,7 +552,7 @@ mod tests {
             .collect()
     }
 
-    /// Filled rectangles of a colour, which only lanes and shades are.
+    /// Returns the filled rectangles of a colour; only lanes and shades are filled.
     fn rectangles(svg: &str, colour: RGBColor) -> usize {
         let RGBColor(r, g, b) = colour;
         let fill = format!("fill=\"#{r:02X}{g:02X}{b:02X}\" stroke=\"none\"");
@@ -592,7 +593,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flight_of_one_tick_shows_in_its_lane_and_shades_all_panels_of_a_long_run() {
+    fn a_flight_of_one_tick_is_visible_in_its_lane_and_shades_all_panels_of_a_long_run() {
         let svg = plot(100_000).svg().unwrap();
         assert_eq!(rectangles(&svg, VERMILLION), 1 + 5);
         assert_eq!(rectangles(&svg, BLUE_INK), 1);
@@ -607,7 +608,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_of_hardly_any_samples_are_drawn() {
+    fn runs_with_few_or_no_samples_are_drawn() {
         for ticks in 0..4 {
             let svg = plot(ticks).svg().unwrap();
             assert!(svg.trim_end().ends_with("</svg>"));
@@ -618,7 +619,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_is_written_whole_and_an_unwritable_path_is_named() {
+    fn a_figure_is_written_completely_and_an_unwritable_path_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out/run.svg");
         let plot = plot(10);

@@ -1,4 +1,4 @@
-//! What a run comes to: one JSON object for programs, one table for people.
+//! The report of a run: one JSON object for programs, one table for readers.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use painleve_plant::closed_loop::LoopResult;
 use painleve_plant::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
-/// Percentiles of a time, µs.
+/// Percentiles of a duration, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Percentiles {
     /// Median.
@@ -23,7 +23,7 @@ pub struct Percentiles {
 }
 
 impl Percentiles {
-    /// Percentiles of a histogram of nanoseconds.
+    /// Returns the percentiles of a histogram of nanoseconds.
     pub fn of_ns(histogram: &Histogram<u64>) -> Self {
         let at = |quantile| histogram.value_at_quantile(quantile) as f64 * 1e-3;
         Self {
@@ -35,14 +35,14 @@ impl Percentiles {
     }
 }
 
-/// Result of a run. The names are a contract: add to them, never rename.
+/// Report of a run. The field names are an interface contract: add fields, never rename them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunReport {
     /// Name of the scenario.
     pub scenario: String,
     /// Name of the control law.
     pub controller: String,
-    /// What ran the controller.
+    /// The host that ran the controller.
     pub host: String,
     /// Control ticks run.
     pub ticks: u64,
@@ -50,17 +50,17 @@ pub struct RunReport {
     pub tick_hz: u32,
     /// Simulated time, s.
     pub sim_s: f64,
-    /// Time it took, s.
+    /// Wall-clock time, s.
     pub wall_s: f64,
-    /// Simulated over wall time.
+    /// Ratio of simulated to wall-clock time.
     pub realtime_factor: f64,
-    /// Times that contact ended in flight.
+    /// Number of lift-offs: contacts that ended in flight.
     pub lift_offs: u64,
-    /// When this first happened, s.
+    /// Time of the first lift-off, s.
     pub first_lift_off_s: Option<f64>,
-    /// Collisions of the tip with the belt.
+    /// Number of collisions of the tip with the belt.
     pub impacts: u64,
-    /// Impacts without collision.
+    /// Number of impacts without collision.
     pub impacts_without_collision: u64,
     /// Largest tip position, m.
     pub max_tip_t_m: f64,
@@ -72,35 +72,35 @@ pub struct RunReport {
     pub min_normal_force_n: Option<f64>,
     /// Largest joint torque, N·m.
     pub peak_torque_nm: f64,
-    /// Part of the time in contact.
+    /// Fraction of the time in contact.
     pub contact_fraction: f64,
-    /// Ticks on which the controller limited its torque.
+    /// Number of ticks on which the controller limited its torque.
     pub saturated_ticks: u64,
-    /// Ticks whose answer did not come in time.
+    /// Number of ticks whose answer did not arrive in time.
     pub stale_ticks: u64,
     /// Time from sensor frame to answer, µs.
     pub round_trip_us: Percentiles,
-    /// Hash of every sensor and actuator frame in order.
+    /// Hash of all sensor and actuator frames in order.
     pub log_hash: String,
-    /// Seed of all noise.
+    /// Seed of all noise generators.
     pub seed: u64,
-    /// How the run was paced.
+    /// Pacing of the run.
     pub pacing: String,
-    /// When the torque stages took the torque away for want of commands, s; null if never.
+    /// Time at which the torque stages removed the torque for lack of commands, s; null if never.
     #[serde(default)]
     pub drive_watchdog_s: Option<f64>,
-    /// Number of the fault latched at the end, null for none.
+    /// Number of the fault latched at the end; null for none.
     pub fault: Option<u8>,
-    /// What that fault is.
+    /// Meaning of that fault.
     pub fault_description: Option<String>,
     /// Lateness of wake-ups in real-time pacing, µs.
     pub wake_up_us: Option<Percentiles>,
-    /// Wake-ups later than a whole tick in real-time pacing.
+    /// Number of wake-ups later than a whole tick in real-time pacing.
     pub missed_deadlines: Option<u64>,
 }
 
 impl RunReport {
-    /// Puts together what a run came to.
+    /// Assembles the report of a run.
     pub fn new(
         scenario: &Scenario,
         host: &str,
@@ -147,7 +147,7 @@ impl RunReport {
         }
     }
 
-    /// The report as a table.
+    /// Returns the report as a table.
     pub fn table(&self) -> String {
         let mut table = Table::new();
         table.load_style(UTF8_FULL_CONDENSED);

@@ -1,7 +1,7 @@
-//! What a cell of the bifurcation diagram costs, with a quarter, half and all of the cells:
+//! Cost of a cell of the bifurcation diagram, with a quarter, half and all of the cells:
 //! the cost is linear if the throughput is the same.
 //!
-//! One element is one cell. The times are shortened (5 s of transient, 1 s recorded instead of
+//! One element is one cell. The durations are shortened (5 s of transient, 1 s recorded instead of
 //! 250 s and 50 s).
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -37,7 +37,7 @@ fn diagram(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(study.len() as u64));
         let cells = format!("{} cells", study.len());
         group.bench_function(BenchmarkId::from_parameter(cells), |bencher| {
-            bencher.iter(|| rows(&study, || ()).expect("all cells go on"));
+            bencher.iter(|| rows(&study, || ()).expect("every cell can be computed"));
         });
     }
     group.finish();

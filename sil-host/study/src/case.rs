@@ -1,5 +1,5 @@
-//! A closed loop to study: which controller, in which posture, behind which converters,
-//! following which kind of reference. Every case is a scenario.
+//! A closed loop to study: its controller, its posture, its converters and its reference.
+//! Every case is a scenario.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -13,25 +13,25 @@ use serde::{Serialize, Serializer};
 
 use super::StudyError;
 
-/// Which controller.
+/// The controller of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Controller {
     /// The paper's PID.
     Pid,
     /// The paper's hybrid law with the paper's gains.
     HybridPaper,
-    /// The same with the friction of a known belt instead of the measured one. The paper's
-    /// continuous law contains itself, through the friction that it measures; this is what it
-    /// is where that loop is solved at every instant.
+    /// The same law with the friction of a known belt instead of the measured friction. In the
+    /// paper's continuous law the torque depends on the friction that it causes; this variant
+    /// is that law with the algebraic loop solved at every instant.
     HybridPaperModel,
-    /// The hybrid law as it comes built in.
+    /// The built-in hybrid law.
     Hybrid,
     /// The controller of another built-in scenario or of a scenario file.
     Scenario(String),
 }
 
 impl Controller {
-    /// The paper's and ours.
+    /// The paper's controllers and the built-in hybrid law.
     pub const ALL: [Self; 4] = [
         Self::Pid,
         Self::HybridPaper,
@@ -39,7 +39,7 @@ impl Controller {
         Self::Hybrid,
     ];
 
-    /// Built-in scenario or file that holds it for a posture, and what must be changed.
+    /// Returns the built-in scenario or file for a posture, and the overrides to apply to it.
     fn source(&self, posture: Posture) -> (&str, &'static [&'static str]) {
         match (self, posture) {
             (Self::Pid, Posture::ElbowUp) => ("pid-elbow-up", &[]),
@@ -74,7 +74,7 @@ impl fmt::Display for Controller {
 impl FromStr for Controller {
     type Err = std::convert::Infallible;
 
-    /// Any other name is a scenario's, looked up when the case is made.
+    /// Any other name is a scenario, looked up when the case is made.
     fn from_str(name: &str) -> Result<Self, Self::Err> {
         let known = Self::ALL
             .into_iter()
@@ -89,31 +89,31 @@ impl Serialize for Controller {
     }
 }
 
-/// Which encoders, force cell and torque stages, and how often they are read.
+/// The converters of a case (encoders, force cell, torque stages) and their sample rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Converters {
-    /// Close to the paper's continuous control: 10 kHz, 22 bits and more, no noise, no delay.
+    /// Close to the paper's continuous control: 10 kHz, at least 22 bits, no noise, no delay.
     Ideal,
-    /// 1 kHz, 14-bit encoders, 12-bit force and torque, noise, a sample of delay.
+    /// 1 kHz, 14-bit encoders, 12-bit force and torque, noise, a delay of one sample.
     Hardware,
-    /// Whatever the controller's scenario has.
+    /// The converters of the controller's scenario.
     Own,
 }
 
-/// How the reference goes from the start to its target.
+/// The shape of the reference from the start to its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reference {
-    /// Minimum jerk within so many seconds.
+    /// Minimum jerk, with its duration in s.
     MinimumJerk(f32),
-    /// Constant speed within so many seconds.
+    /// Constant speed, with its duration in s.
     Ramp(f32),
-    /// At once.
+    /// A step.
     Step,
 }
 
 impl Reference {
-    /// How long it takes, s.
+    /// Returns its duration, s.
     pub fn duration_s(self) -> f64 {
         match self {
             Self::MinimumJerk(duration_s) | Self::Ramp(duration_s) => f64::from(duration_s),
@@ -121,7 +121,7 @@ impl Reference {
         }
     }
 
-    /// The reference to a target (m), as the controller's queue.
+    /// Returns the reference to a target (m) as an entry of the controller's queue.
     pub fn to(self, target_m: f64) -> Program {
         let target_m = target_m as f32;
         let segment = match self {
@@ -158,15 +158,16 @@ impl FromStr for Reference {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let allowed =
-            || format!("'{text}' is no reference; give minimum-jerk:SECONDS, ramp:SECONDS or step");
+        let allowed = || {
+            format!("'{text}' is not a reference; give minimum-jerk:SECONDS, ramp:SECONDS or step")
+        };
         let Some((kind, seconds)) = text.split_once(':') else {
             return (text == "step").then_some(Self::Step).ok_or_else(allowed);
         };
         let duration_s: f32 = seconds.parse().map_err(|_| allowed())?;
         if !(1e-3..=1e4).contains(&duration_s) {
             return Err(format!(
-                "'{text}' takes {duration_s} s; a reference takes 0.001 to 10000 s"
+                "'{text}' lasts {duration_s} s; a reference lasts 0.001 to 10000 s"
             ));
         }
         match kind {
@@ -183,11 +184,11 @@ impl Serialize for Reference {
     }
 }
 
-/// z_t of the paper's x0,d and x0,u as a part of the reach: −0.1624 m of 0.1841 m.
+/// z_t of the paper's x0,d and x0,u as a fraction of the reach: −0.1624 m of 0.1841 m.
 const START: f64 = -0.882;
 
-/// Where a closed loop starts in a posture: the paper's x0,d or x0,u; for an arm of
-/// another shape at rest on the belt at the same part of its reach.
+/// Returns the initial state of a closed loop in a posture: the paper's x0,d or x0,u; for an
+/// arm of another shape, at rest on the belt at the same fraction of its reach.
 ///
 /// # Errors
 /// [`StudyError::Range`] if the arm is out of range.
@@ -204,10 +205,10 @@ pub fn start(arm: &ArmParameters<f64>, posture: Posture) -> Result<InitialState,
     })
 }
 
-/// An arm at rest in a posture with its tip on the belt at `tip_t_m` (m).
+/// Returns an arm at rest in a posture with its tip on the belt at `tip_t_m` (m).
 ///
 /// # Errors
-/// [`StudyError`] if that is out of its reach.
+/// [`StudyError`] if the position is out of reach.
 pub fn at_rest_on_belt(
     arm: &Arm<f64>,
     tip_t_m: f64,
@@ -222,11 +223,11 @@ pub fn at_rest_on_belt(
     ))
 }
 
-/// The scenario of a case: the controller's own without a reference, the converters, the
-/// overrides in this order, and then the start in the posture.
+/// Returns the scenario of a case: the controller's scenario without its reference, then the
+/// converters, then the overrides in the order given, then the start in the posture.
 ///
 /// # Errors
-/// [`StudyError`] naming the controller if there is no such scenario or a key is wrong.
+/// [`StudyError`] naming the controller if the scenario does not exist or a key is wrong.
 pub fn scenario(
     controller: &Controller,
     posture: Posture,
@@ -236,7 +237,7 @@ pub fn scenario(
     let (name, changes) = controller.source(posture);
     let changes: Vec<String> = changes.iter().map(ToString::to_string).collect();
     let mut scenario = Scenario::load_unplaced(name, &changes)?;
-    // It may be out of reach of the arm that is to be studied.
+    // The scenario's own start may be out of reach of the arm to study.
     scenario.controller.reference = Program::default();
     match converters {
         Converters::Ideal => {
@@ -251,7 +252,7 @@ pub fn scenario(
             scenario.run.tick_hz = RunSettings::default().tick_hz;
             scenario.converters = ConverterSettings::default();
             if let Controller::HybridPaper | Controller::HybridPaperModel = controller {
-                // Such gains need the wide loop that the PID has.
+                // These gains need the wide control loop of the PID scenario.
                 let wide = Scenario::load_unplaced("pid-elbow-down", &[])?;
                 scenario.controller.estimator = wide.controller.estimator;
             }
@@ -271,10 +272,10 @@ pub fn scenario(
     Ok(scenario)
 }
 
-/// The seed of each controller's converters, as `noise of hybrid`.
+/// Returns the seed of each controller's converters, named `noise of hybrid` and so on.
 ///
 /// # Errors
-/// [`StudyError`] naming the controller if there is no such scenario or a key is wrong.
+/// [`StudyError`] naming the controller if the scenario does not exist or a key is wrong.
 pub fn noise_seeds(
     controllers: &[Controller],
     overrides: &[String],
@@ -286,7 +287,7 @@ pub fn noise_seeds(
     controllers.iter().map(seed).collect()
 }
 
-/// The scenarios that are not known by the names of [`Controller::ALL`].
+/// Returns the scenarios that are not among [`Controller::ALL`].
 pub fn own_scenarios(controllers: &[Controller]) -> Vec<&str> {
     let own = controllers
         .iter()
@@ -356,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn references_are_read_as_they_are_written() {
+    fn references_round_trip_through_text() {
         for text in ["minimum-jerk:3", "ramp:2.5", "step"] {
             assert_eq!(text.parse::<Reference>().unwrap().to_string(), text);
         }
@@ -373,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_controller_is_told_with_what_there_is() {
+    fn an_unknown_controller_is_reported_with_the_known_ones() {
         let Ok(controller) = "no-such-law".parse::<Controller>();
         let error = scenario(&controller, Posture::ElbowUp, Converters::Own, &[]).unwrap_err();
         assert!(error.to_string().contains("no-such-law"), "{error}");

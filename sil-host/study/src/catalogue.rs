@@ -1,4 +1,4 @@
-//! The list of studies. The command line, sweeps and the page of figures know them from here.
+//! The list of studies, shared by the command line, sweeps and the page of figures.
 
 use std::sync::LazyLock;
 
@@ -30,41 +30,41 @@ pub static STUDIES: LazyLock<Vec<Entry>> = LazyLock::new(|| {
     ]
 });
 
-/// A study as its options describe it. Its doc comment is its line in the command's help.
+/// A study as its options define it. The doc comment of the type is its line in the command's help.
 pub trait StudyOptions: Args + Sync + 'static {
     /// The study's name on the command line.
     const NAME: &'static str;
-    /// What is computed.
+    /// The study.
     type Study: Study + 'static;
-    /// What its rows come to.
+    /// The outcome of its rows.
     type Outcome: Outcome + Figure + Send + 'static;
 
-    /// The study that is asked for, checked.
+    /// Returns the requested study, checked.
     ///
     /// # Errors
     /// [`StudyError`] naming the option or key that is wrong.
     fn study(&self) -> Result<Self::Study, StudyError>;
 
-    /// Puts all rows of a study together.
+    /// Collects all rows of a study into its outcome.
     fn outcome(study: &Self::Study, rows: Vec<<Self::Study as Study>::Row>) -> Self::Outcome;
 
-    /// Whether a sweep can compute it in shards: [`table`](Self::table) gives one.
+    /// Whether a sweep can compute the study in shards; [`table`](Self::table) then returns one.
     const HAS_SHARDS: bool = false;
 
-    /// The study as a table that a sweep computes in shards; none by default.
+    /// Returns the study as a table that a sweep computes in shards; `None` by default.
     fn table(_study: Self::Study) -> Option<Box<dyn tabular::Table>> {
         None
     }
 
-    /// Names of the scenarios that the study starts from.
+    /// Returns the names of the scenarios that the study starts from.
     fn scenarios(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// The study's sections of the page of figures; none by default.
+    /// Returns the study's sections of the page of figures; none by default.
     ///
     /// # Errors
-    /// [`StudyError`] if one cannot be computed.
+    /// [`StudyError`] if a section cannot be computed.
     fn sections(_page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
         Ok(Vec::new())
     }
@@ -73,28 +73,28 @@ pub trait StudyOptions: Args + Sync + 'static {
 /// A section of the page of figures, and the outcome that it shows.
 pub type PageSection = (Section, Box<dyn AnyOutcome>);
 
-/// For [`StudyOptions::table`] of a study whose rows are lines of a table.
+/// Implements [`StudyOptions::table`] for a study whose rows are lines of a table.
 pub fn in_shards<S: Tabular + 'static>(study: S) -> Option<Box<dyn tabular::Table>> {
     Some(Box::new(study))
 }
 
-/// A study of the list.
+/// An entry of the list of studies.
 pub struct Entry {
     /// Its name on the command line.
     pub name: &'static str,
-    /// Adds its options to a command, with the line about the study.
+    /// Adds the study's options and its help line to a command.
     pub augment: fn(Command) -> Command,
-    /// Whether a sweep can compute it in shards.
+    /// Whether a sweep can compute the study in shards.
     pub has_shards: bool,
-    /// Reads its options.
+    /// Parses its options.
     ///
     /// # Errors
-    /// What clap has against them.
+    /// The error of clap.
     pub read: fn(&ArgMatches) -> Result<Box<dyn AnyOptions>, clap::Error>,
-    /// Makes its sections of the page of figures.
+    /// Returns its sections of the page of figures.
     ///
     /// # Errors
-    /// [`StudyError`] if one cannot be computed.
+    /// [`StudyError`] if a section cannot be computed.
     pub sections: fn(&PageMaker<'_>) -> Result<Vec<PageSection>, StudyError>,
 }
 
@@ -109,19 +109,19 @@ impl Entry {
         }
     }
 
-    /// The study of this name.
+    /// Returns the study with this name.
     pub fn find(name: &str) -> Option<&'static Self> {
         STUDIES.iter().find(|entry| entry.name == name)
     }
 
-    /// The study as a subcommand.
+    /// Returns the study as a subcommand.
     pub fn command(&self) -> Command {
         (self.augment)(Command::new(self.name))
     }
 
-    /// The same with more options after its own.
+    /// Returns the subcommand with further options after the study's own.
     pub fn augment_with<A: Args>(&self) -> Command {
-        // The line about the study comes last, or that of the options would replace it.
+        // The help line is set last; the help of the options would replace it.
         let about = self.command().get_about().cloned();
         let command = A::augment_args(self.command());
         about.map_or(command.clone(), |about| command.about(about))
@@ -130,19 +130,19 @@ impl Entry {
 
 /// Options of any study.
 pub trait AnyOptions {
-    /// The study that is asked for, checked.
+    /// Returns the requested study, checked.
     ///
     /// # Errors
     /// [`StudyError`] naming the option or key that is wrong.
     fn study(&self) -> Result<Box<dyn AnyStudy>, StudyError>;
 
-    /// The study as a table, if its rows can be computed apart.
+    /// Returns the study as a table, if its rows can be computed separately.
     ///
     /// # Errors
     /// [`StudyError`] naming the option or key that is wrong.
     fn table(&self) -> Result<Option<Box<dyn tabular::Table>>, StudyError>;
 
-    /// Names of the scenarios that the study starts from.
+    /// Returns the names of the scenarios that the study starts from.
     fn scenarios(&self) -> Vec<String>;
 }
 
@@ -166,13 +166,13 @@ pub type Progress<'a> = &'a (dyn Fn() + Sync);
 
 /// Any study.
 pub trait AnyStudy: Sync {
-    /// How many rows it has.
+    /// Returns the number of rows.
     fn row_count(&self) -> usize;
 
-    /// Computes it on the threads of the current rayon pool.
+    /// Computes the study on the threads of the current rayon pool.
     ///
     /// # Errors
-    /// The error of the first row that has one.
+    /// The error of the first row that fails.
     fn compute(&self, progress: Progress<'_>) -> Result<Box<dyn AnyOutcome>, StudyError>;
 }
 
@@ -191,22 +191,22 @@ impl<O: StudyOptions> AnyStudy for Asked<O> {
 
 /// Any outcome.
 pub trait AnyOutcome: Send {
-    /// The JSON object.
+    /// Returns the JSON object.
     ///
     /// # Errors
-    /// If it cannot be written as JSON, which plain structs can.
+    /// If serialisation to JSON fails, which plain structs do not.
     fn json(&self) -> Result<String, serde_json::Error>;
 
-    /// The CSV file.
+    /// Returns the CSV file.
     ///
     /// # Errors
-    /// If the lines cannot be written as CSV, which flat structs can.
+    /// If serialisation to CSV fails, which flat structs do not.
     fn csv(&self) -> Result<Vec<u8>, csv::Error>;
 
-    /// The table.
+    /// Returns the table.
     fn table(&self) -> Table;
 
-    /// The figure as SVG text.
+    /// Returns the figure as SVG text.
     ///
     /// # Errors
     /// [`StudyError::Plot`] if it cannot be drawn.

@@ -7,16 +7,16 @@ use clap::Args;
 
 use crate::options::BaseOptions;
 
-/// Options that such studies share.
+/// Options shared by the studies of a grid of cells.
 #[derive(Debug, Args)]
 pub struct CellOptions {
-    /// Initial conditions: the paper's a, d, u, and any number of random ones, as in a,d,random:8.
+    /// Initial conditions: the paper's a, d and u, and random ones as random:N, for example a,d,random:8.
     #[arg(long, value_name = "LIST", default_value = "a")]
     initial: Initials,
     /// Seed of the random initial conditions.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How long each cell runs before it is watched, s.
+    /// Transient of each cell before recording starts, s.
     #[arg(
         long,
         value_name = "SECONDS",
@@ -24,7 +24,7 @@ pub struct CellOptions {
         allow_negative_numbers = true
     )]
     transient_s: f64,
-    /// How long it is watched, s.
+    /// Recording time of each cell, s.
     #[arg(
         long,
         value_name = "SECONDS",
@@ -32,7 +32,7 @@ pub struct CellOptions {
         allow_negative_numbers = true
     )]
     record_s: f64,
-    /// Error of one step of the plant relative to its state, the absolute one a tenth of it
+    /// Relative error tolerance of one step of the plant; the absolute tolerance is a tenth of it
     /// [default: 1e-11].
     #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
     relative_tolerance: Option<f64>,
@@ -41,12 +41,12 @@ pub struct CellOptions {
 }
 
 impl CellOptions {
-    /// Name of the scenario that they start from.
+    /// Name of the scenario that the cells start from.
     pub fn scenario(&self) -> &str {
         self.base.name()
     }
 
-    /// The cells over grids of friction and belt speed, checked.
+    /// Returns the cells over grids of friction and belt speed, checked.
     ///
     /// # Errors
     /// [`StudyError`] naming the option or key that is wrong.

@@ -1,59 +1,61 @@
-//! The values of a parameter that a study goes through: `FROM:TO:STEP` or `a,b,c`.
+//! Grids of parameter values: `FROM:TO:STEP` or `a,b,c`.
 
 use std::str::FromStr;
 
-/// More values than anyone means.
+/// Largest number of values in a grid.
 const MOST_VALUES: f64 = 1e6;
 
-/// Larger than any number of a study, and small enough to be written out in decimals.
+/// Largest magnitude of a value: above any number of a study, and short enough to write in decimals.
 const LARGEST: f64 = 1e9;
 
-/// Decimals beyond which a double cannot tell numbers near one apart.
+/// Most decimals: an `f64` cannot resolve more for numbers near one.
 const MOST_DECIMALS: usize = 15;
 
-/// Finite values in the order in which they were asked for; at least one.
+/// Finite values in the order given; at least one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     values: Vec<f64>,
 }
 
-/// Why a text is no [`Grid`].
+/// Why a text is not a [`Grid`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridError {
-    /// There is nothing in it.
-    #[error("'{text}' holds no values; give FROM:TO:STEP or a list as in 0.4,0.6")]
+    /// The text holds no values.
+    #[error("'{text}' holds no values; give FROM:TO:STEP or a list, for example 0.4,0.6")]
     Empty {
-        /// What was given.
+        /// The given text.
         text: String,
     },
-    /// One of its parts is no number, or too large a one.
+    /// A part is not a number, or its magnitude is too large.
     #[error(
         "'{part}' in '{text}' is not a number from -{LARGEST:e} to {LARGEST:e}; give FROM:TO:STEP or a list a,b,c"
     )]
     NotFinite {
-        /// What was given.
+        /// The given text.
         text: String,
-        /// The part.
+        /// The invalid part.
         part: String,
     },
     /// A range has two parts, or more than three.
-    #[error("'{text}' has {parts} parts; a range has three, FROM:TO:STEP, as in -1:-0.1:0.005")]
+    #[error(
+        "'{text}' has {parts} parts; a range has three, FROM:TO:STEP, for example -1:-0.1:0.005"
+    )]
     Parts {
-        /// What was given.
+        /// The given text.
         text: String,
-        /// How many parts.
+        /// Number of parts.
         parts: usize,
     },
-    /// The range never ends.
-    #[error("'{text}' has step 0; give one that leads from FROM to TO")]
+    /// The step of the range is zero.
+    #[error("'{text}' has step 0; give a step that leads from FROM to TO")]
     ZeroStep {
-        /// What was given.
+        /// The given text.
         text: String,
     },
-    /// The range is empty.
+    /// The step points away from the end of the range.
     #[error("'{text}' is empty: step {step} leads away from {to}; start at {from} with step {}", -step)]
     WrongWay {
-        /// What was given.
+        /// The given text.
         text: String,
         /// First value.
         from: f64,
@@ -62,12 +64,12 @@ pub enum GridError {
         /// The step.
         step: f64,
     },
-    /// Far too many values.
+    /// The grid has too many values.
     #[error("'{text}' has {count:e} values; at most {MOST_VALUES:e} are allowed")]
     TooMany {
-        /// What was given.
+        /// The given text.
         text: String,
-        /// How many.
+        /// Number of values.
         count: f64,
     },
 }
@@ -78,7 +80,7 @@ impl Grid {
         &self.values
     }
 
-    /// One value.
+    /// Creates a grid of one value.
     pub fn of(value: f64) -> Self {
         Self {
             values: vec![value],
@@ -105,9 +107,9 @@ impl Grid {
                 count: steps + 1.0,
             });
         }
-        // The multiples of a decimal step are decimals again: 3 · 0.1 is 0.3.
+        // Multiples of a decimal step are rounded to decimals: 3 · 0.1 is 0.3.
         let decimals = decimals(from).max(decimals(step));
-        // The last value is within reach of rounding, or it is not one.
+        // The end belongs to the range if the last multiple is within rounding of it.
         let slack = 0.5 * f64::EPSILON * from.abs().max(to.abs());
         let values = (0..=steps.round() as u64)
             .map(|index| rounded(from + index as f64 * step, decimals))
@@ -146,14 +148,14 @@ impl FromStr for Grid {
     }
 }
 
-/// Decimals of the shortest text that is read as this value.
+/// Returns the number of decimals of the shortest text that parses to this value.
 fn decimals(value: f64) -> usize {
     let text = value.to_string();
     text.split_once('.')
         .map_or(0, |(_, decimals)| decimals.len())
 }
 
-/// The nearest number of so many decimals; never a negative zero.
+/// Returns the nearest number with this many decimals; never a negative zero.
 fn rounded(value: f64, decimals: usize) -> f64 {
     if decimals > MOST_DECIMALS {
         return value;
@@ -192,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_what_is_allowed() {
+    fn invalid_grids_are_reported_with_the_allowed_form() {
         for (text, part) in [
             ("", "holds no values"),
             ("  ", "holds no values"),

@@ -1,7 +1,7 @@
-//! Initial conditions of a bifurcation study: the paper's by their letters, or drawn at random.
+//! Initial conditions of a bifurcation study: the paper's by letter, or drawn at random.
 //!
-//! Random ones come from a ChaCha stream that is numbered by the row, so that a row is
-//! the same wherever and after whatever it is computed.
+//! Random initial conditions come from a ChaCha stream numbered by the row. A row is therefore
+//! the same wherever and whenever it is computed.
 
 use core::fmt;
 
@@ -10,59 +10,59 @@ use painleve_shared::{Arm, Posture};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// Where a run starts.
+/// The initial condition of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Initial {
     /// The paper's x0,a: θ = (32°, 18.27°), at rest on the belt, in the paradox.
     A,
-    /// Its x0,d: θ = (−11.4°, −35.1°), at rest on the belt, elbow down.
+    /// The paper's x0,d: θ = (−11.4°, −35.1°), at rest on the belt, elbow down.
     D,
-    /// Its x0,u: θ = (−35.1°, −11.4°), at the same place elbow up.
+    /// The paper's x0,u: θ = (−35.1°, −11.4°), at the same place, elbow up.
     U,
-    /// The number of a random one within its cell, from 1.
+    /// A random initial condition, by its number within its cell, from 1.
     Random(u32),
 }
 
-/// A list of initial conditions, as in `a,d,random:3`.
+/// A list of initial conditions, for example `a,d,random:3`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Initials(Vec<Initial>);
 
-/// Most random initial conditions per cell.
+/// Largest number of random initial conditions per cell.
 const MOST_RANDOM: u32 = 1_000_000;
 
-/// Why a text is no list of initial conditions.
+/// Why a text is not a list of initial conditions.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InitialError {
-    /// A part is none of them.
+    /// A part is not an initial condition.
     #[error(
-        "'{part}' in '{text}' is no initial condition; give a, d, u or random:N, as in a,d,random:3"
+        "'{part}' in '{text}' is not an initial condition; give a, d, u or random:N, for example a,d,random:3"
     )]
     Unknown {
-        /// What was given.
+        /// The given text.
         text: String,
-        /// The part.
+        /// The invalid part.
         part: String,
     },
-    /// The number of random ones.
-    #[error("'{part}' in '{text}': give a number from 1 to {MOST_RANDOM}")]
+    /// The number of random initial conditions is out of range.
+    #[error("'{part}' in '{text}': the number must be from 1 to {MOST_RANDOM}")]
     Number {
-        /// What was given.
+        /// The given text.
         text: String,
-        /// The part.
+        /// The invalid part.
         part: String,
     },
-    /// The same twice.
-    #[error("'{part}' is twice in '{text}'; give every initial condition once")]
+    /// An initial condition is given twice.
+    #[error("'{part}' appears twice in '{text}'; give every initial condition once")]
     Twice {
-        /// What was given.
+        /// The given text.
         text: String,
-        /// The part.
+        /// The repeated part.
         part: String,
     },
 }
 
 impl Initials {
-    /// In order; at least one.
+    /// The initial conditions in order; at least one.
     pub fn list(&self) -> &[Initial] {
         &self.0
     }
@@ -118,17 +118,17 @@ impl fmt::Display for Initial {
     }
 }
 
-/// Highest random start over the belt, m.
+/// Largest tip height of a random start over the belt, m.
 const RANDOM_HEIGHT_M: f64 = 0.03;
 
-/// Fastest random joint, rad/s.
+/// Largest rate of a joint in a random start, rad/s.
 const RANDOM_RATE_RAD_S: f64 = 5.0;
 
-/// Part of the reach in which random starts lie; at its end the arm is straight.
+/// Fraction of the reach in which random starts lie; at the full reach the arm is straight.
 const RANDOM_REACH: f64 = 0.98;
 
 impl Initial {
-    /// Its name without a number.
+    /// Returns its name without a number.
     pub fn group(self) -> &'static str {
         match self {
             Self::A => "a",
@@ -138,9 +138,10 @@ impl Initial {
         }
     }
 
-    /// The state for an arm. A random one has its tip anywhere within reach, up to 3 cm over
-    /// the belt (less over a high belt), the elbow either way and each joint at up to 5 rad/s; it depends on
-    /// `seed`, `row` and the arm, and on nothing else.
+    /// Returns the initial state for an arm. A random one has its tip anywhere within reach, up to 3 cm
+    /// over the belt (less over a high belt), the elbow on either side and each joint rate at up to
+    /// 5 rad/s. It depends only on
+    /// `seed`, `row` and the arm.
     pub fn state(self, arm: &Arm<f64>, seed: u64, row: u64) -> State {
         let at_rest = |theta1_deg: f64, theta2_deg: f64| {
             State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0)
@@ -157,7 +158,7 @@ impl Initial {
 fn random_state(arm: &Arm<f64>, seed: u64, row: u64) -> State {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(row);
-    // Not into the hole around the first joint, which links of two lengths leave.
+    // Avoids the hole around the first joint that links of unequal lengths leave.
     let over_hole_m = RANDOM_REACH * (arm.height_m() - arm.hole_m());
     let highest_m = (arm.height_m() * 0.5).min(over_hole_m).min(RANDOM_HEIGHT_M);
     let height_m = highest_m * generator.random::<f64>();
@@ -172,7 +173,7 @@ fn random_state(arm: &Arm<f64>, seed: u64, row: u64) -> State {
     } else {
         Posture::ElbowDown
     };
-    // Within reach by construction; straight down is too.
+    // Within reach by construction, also straight down.
     let theta = arm
         .link_angles_rad(&tip_m, posture)
         .unwrap_or_else(painleve_shared::LinkMotion::zeros);
@@ -194,19 +195,19 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_what_is_allowed() {
+    fn invalid_lists_are_reported_with_the_allowed_form() {
         for (text, part) in [
             (
                 "",
-                "'' in '' is no initial condition; give a, d, u or random:N",
+                "'' in '' is not an initial condition; give a, d, u or random:N",
             ),
             ("a,b", "'b' in 'a,b'"),
-            ("random", "'random' in 'random' is no"),
+            ("random", "'random' in 'random' is not"),
             ("random:0", "from 1 to 1000000"),
             ("random:x", "from 1 to"),
             ("random:-1", "from 1 to"),
-            ("a,d,a", "'a' is twice"),
-            ("random:2,random:3", "'random:3' is twice"),
+            ("a,d,a", "'a' appears twice"),
+            ("random:2,random:3", "'random:3' appears twice"),
         ] {
             let message = text.parse::<Initials>().unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
@@ -214,7 +215,7 @@ mod tests {
     }
 
     proptest! {
-        /// Also by the plant, which refuses starts inside the belt.
+        /// The plant, which refuses starts inside the belt, accepts them too.
         #[test]
         fn random_states_are_all_different_and_over_the_belt(
             seed: u64, row in 0_u64..u64::MAX, height_m in 0.05_f64..0.41,

@@ -1,29 +1,29 @@
 //! The paper's studies: pure functions from settings to rows.
 //!
 //! - [`grid`]: the values of a parameter, `FROM:TO:STEP` or a list
-//! - [`outcome`]: what a study came to, as JSON, CSV, table and figure
-//! - [`paper`]: the values to set beside
-//! - [`admissible`]: Table II, where on the belt p > 0; [`belt_line`]: the postures it looks at
+//! - [`outcome`]: the outcome of a study as JSON, CSV, table and figure
+//! - [`paper`]: the paper's values for comparison
+//! - [`admissible`]: Table II, where on the belt p > 0; [`belt_line`]: the postures on the belt
 //! - [`regions`]: Fig. 3, the solution modes over (θ1, θ̇1)
 //! - [`sliding_range`]: Z_t,sliding, how far a controller slides
-//! - [`closed_loop_bifurcation`]: Fig. 12, the belt's speed with the controller in the loop
-//! - [`robustness`]: random arms, belts and converters; [`ablation`]: what each part of the controller contributes
-//! - [`capture`]: a bouncing arm is caught; [`lift_off`]: how soon a lift-off is noticed
-//! - [`contact_watch`], [`distribution`], [`proportion`]: contact, values and success of many runs
-//! - [`case`], [`trial`]: closed loops to study, and running them in this process
-//! - [`bifurcation`]: where over μ × v_belt the arm keeps bouncing
-//! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: what one does
-//! - [`poincare`]: how it bounces
-//! - [`tabular`]: rows as lines of a table, one at a time
-//! - [`chaos`]: periodic or chaotic, by the largest Lyapunov exponent
-//! - [`figures`]: the page that sets the studies beside the paper
+//! - [`closed_loop_bifurcation`]: Fig. 12, bifurcation over the belt speed with the controller in the loop
+//! - [`robustness`]: random arms, belts and converters; [`ablation`]: the contribution of each part of the controller
+//! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
+//! - [`contact_watch`], [`distribution`], [`proportion`]: contact, distributions and success rates of many runs
+//! - [`case`], [`trial`]: closed loops to study, and their execution in this process
+//! - [`bifurcation`]: Fig. 4, where over μ × v_belt the arm keeps bouncing
+//! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: the long-term motion of one
+//! - [`poincare`]: Fig. 5, periodic and chaotic bouncing
+//! - [`tabular`]: rows as lines of a table, one row at a time
+//! - [`chaos`]: classification as periodic or chaotic by the largest Lyapunov exponent
+//! - [`figures`]: the page that compares the studies with the paper
 //! - [`sweep`]: studies in shards, on many machines
 //!
-//! Each study is a folder: its settings and rows in `mod.rs`, `options.rs` reads the settings from
-//! the command line, `outcome.rs` puts the rows together, `figure.rs` draws them, and `page.rs`
-//! sets them beside the paper. The [`catalogue`] lists them all.
+//! Each study is a folder: `mod.rs` holds its settings and rows, `options.rs` parses the settings
+//! from the command line, `outcome.rs` collects the rows, `figure.rs` draws them, and `page.rs`
+//! compares them with the paper. The [`catalogue`] lists all studies.
 //!
-//! A study is a list of rows that know nothing of each other ([`Study`]), so that they
+//! A study is a list of independent rows ([`Study`]), which
 //! can be computed in any order, on any number of threads, or in shards.
 
 pub mod ablation;
@@ -71,10 +71,10 @@ pub use outcome::Outcome;
 /// Why a study has no outcome.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// The scenario that the study varies is wrong.
+    /// The scenario of the study is invalid.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// An option of the study is wrong.
+    /// An option of the study is invalid.
     #[error("{0}")]
     Option(String),
     /// The values of the options have more combinations than can be computed.
@@ -83,23 +83,23 @@ pub enum StudyError {
     /// A parameter is out of range.
     #[error(transparent)]
     Range(#[from] OutOfRange),
-    /// The plant of one row cannot go on.
+    /// The plant of one row cannot continue.
     #[error("{row}: {source}")]
     Plant {
         /// The row's parameters.
         row: String,
-        /// Why.
+        /// The reason.
         source: PlantError,
     },
-    /// The closed loop of one row cannot go on.
+    /// The closed loop of one row cannot continue.
     #[error("{row}: {source}")]
     Loop {
         /// The row's parameters.
         row: String,
-        /// Why.
+        /// The reason.
         source: LoopError,
     },
-    /// There is no figure.
+    /// The figure cannot be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
 }
@@ -110,49 +110,49 @@ impl From<GridError> for StudyError {
     }
 }
 
-/// A numbered list of rows, each of which depends on nothing but its number.
+/// A numbered list of rows, each of which depends only on its number.
 pub trait Study: Sync {
     /// One row of the outcome.
     type Row: Send;
 
-    /// How many rows there are.
+    /// Returns the number of rows.
     fn len(&self) -> usize;
 
-    /// Whether there are none.
+    /// Whether there are no rows.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Row `index`, less than [`len`](Study::len).
+    /// Computes row `index`, less than [`len`](Study::len).
     ///
     /// # Errors
-    /// [`StudyError`] if it cannot be computed.
+    /// [`StudyError`] if the row cannot be computed.
     fn row(&self, index: usize) -> Result<Self::Row, StudyError>;
 }
 
-/// The most rows of a study: more than a machine computes in a year.
+/// Largest number of rows of a study: more than a machine computes in a year.
 pub const MOST_ROWS: usize = 10_000_000;
 
-/// How many combinations there are of so many values; what is too large to count is
-/// [`usize::MAX`].
+/// Returns the number of combinations of these numbers of values; [`usize::MAX`] on
+/// overflow.
 pub(crate) fn combinations(counts: &[usize]) -> usize {
     counts
         .iter()
         .fold(1, |product: usize, &count| product.saturating_mul(count))
 }
 
-/// All rows in order, computed on the threads of the current rayon pool; `done` is
-/// called after each.
+/// Computes all rows in order on the threads of the current rayon pool; `done` is
+/// called after each row.
 ///
 /// # Errors
-/// [`StudyError::TooManyRows`], or the error of the first row that has one, whatever the number of threads.
+/// [`StudyError::TooManyRows`], or the error of the first row that fails, whatever the number of threads.
 pub fn rows<S: Study>(study: &S, done: impl Fn() + Sync) -> Result<Vec<S::Row>, StudyError> {
     if study.len() > MOST_ROWS {
         return Err(StudyError::TooManyRows(study.len()));
     }
     let rows: Vec<Result<S::Row, StudyError>> = (0..study.len())
         .into_par_iter()
-        // Rows differ much in cost.
+        // The cost of rows varies widely.
         .with_max_len(1)
         .map(|index| {
             let row = study.row(index);

@@ -12,7 +12,7 @@ const OPEN_LOOP: &str = "open-loop-bounce";
 /// The scenario that an open-loop study varies.
 #[derive(Clone, Debug, Args)]
 pub struct BaseOptions {
-    /// Built-in scenario or TOML file whose plant and controller are studied.
+    /// Built-in scenario or TOML file that provides the plant and the controller.
     #[arg(long, value_name = "SCENARIO", default_value = OPEN_LOOP)]
     scenario: String,
     #[command(flatten)]
@@ -25,11 +25,11 @@ impl BaseOptions {
         &self.scenario
     }
 
-    /// The scenario, its numbers checked but not where the arm starts. `taken` are keys
-    /// that the study's own options set, with the option of each.
+    /// Returns the scenario with its numbers checked, but not its initial state. `taken` lists
+    /// the keys that the study's own options set, with the option of each.
     ///
     /// # Errors
-    /// [`StudyError`] if it is wrong, or sets a key that is taken.
+    /// [`StudyError`] if the scenario is invalid, or if it sets a key in `taken`.
     pub fn load(&self, taken: &[(&str, &str)]) -> Result<Scenario, StudyError> {
         self.overrides.refuse(taken)?;
         Ok(Scenario::load_unplaced(
@@ -42,16 +42,16 @@ impl BaseOptions {
 /// Changes to every scenario of a study.
 #[derive(Clone, Debug, Args)]
 pub struct Overrides {
-    /// Override one key of plant or controller, as in arm.height_m=0.36; may be repeated.
+    /// Override one key of the plant or the controller, for example arm.height_m=0.36; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
 }
 
 impl Overrides {
-    /// Refuses overrides of keys that the study's own options set.
+    /// Rejects overrides of keys that the study's own options set.
     ///
     /// # Errors
-    /// [`StudyError::Option`] naming the option to use.
+    /// [`StudyError::Option`] naming the option to use instead.
     pub fn refuse(&self, taken: &[(&str, &str)]) -> Result<(), StudyError> {
         for text in &self.overrides {
             let key = text.split('=').next().unwrap_or_default().trim();
@@ -103,7 +103,7 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 pub fn runs(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(runs @ 1..=10_000_000) => Ok(runs),
-        _ => Err("give a number of runs from 1 to 10000000".into()),
+        _ => Err("the number of runs must be from 1 to 10000000".into()),
     }
 }
 

@@ -1,5 +1,5 @@
-//! The paper's Figs. 4 and 5, thinned: where the arm bounces, how, and that neither
-//! depends on the number of threads.
+//! The paper's Figs. 4 and 5 on a coarse grid: where and how the arm bounces, independent of
+//! the number of threads.
 
 use painleve_plant::mechanics::PlantParameters;
 use painleve_study::bifurcation::{Bifurcation, Diagram};
@@ -26,7 +26,7 @@ fn cells(mu: &[f64], v_belt_m_s: &[f64], initial: &[Initial]) -> Cells {
 
 fn diagram(cells: Cells) -> Diagram {
     let study = Bifurcation { cells };
-    let rows = rows(&study, || ()).expect("all cells go on");
+    let rows = rows(&study, || ()).expect("every cell can be computed");
     Diagram::new(&study, rows)
 }
 
@@ -44,7 +44,7 @@ fn the_window_is_the_papers_for_every_friction_from_04_on() {
         assert_eq!(window.paper_m_s, Some([-0.575, -0.3]));
     }
     for row in &diagram.rows {
-        // The paper's measure tells the same.
+        // The paper's measure agrees.
         assert_eq!(row.bouncing, row.max_theta1_dot_rad_s > 1e-6, "{row:?}");
         assert_eq!(row.bouncing, row.contact_fraction < 1.0);
         assert_eq!(row.bouncing, row.impacts_per_s > 0.0 && row.apex_m > 1e-3);
@@ -66,7 +66,7 @@ fn nothing_bounces_below_the_critical_friction_or_from_x0_d() {
     );
 }
 
-/// Rows as CSV, computed on so many threads.
+/// Returns the rows as CSV, computed on this many threads.
 fn csv(threads: usize) -> Vec<u8> {
     let initial = [Initial::A, Initial::Random(1), Initial::Random(2)];
     let mut cells = cells(&[0.3, 0.6], &[-0.5, -0.4, -0.2], &initial);
@@ -74,7 +74,7 @@ fn csv(threads: usize) -> Vec<u8> {
     let study = Bifurcation { cells };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let rows = pool.expect("threads").install(|| rows(&study, || ()));
-    let rows = rows.expect("all cells go on");
+    let rows = rows.expect("every cell can be computed");
     // A row can be computed alone.
     assert_eq!(study.row(13).expect("goes on"), rows[13]);
     outcome::csv(&Diagram::new(&study, rows)).expect("flat rows")
@@ -91,7 +91,7 @@ fn rows_do_not_depend_on_the_number_of_threads() {
 
 /// Periodic and chaotic motion far from all bifurcations; the periods double towards −0.49.
 #[test]
-fn periodic_and_chaotic_bouncing_are_told_apart() {
+fn periodic_and_chaotic_bouncing_are_distinguished() {
     let expected = [
         (-0.56, Regime::Chaotic, None),
         (-0.51, Regime::Periodic, Some(3)),

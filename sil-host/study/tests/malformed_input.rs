@@ -1,7 +1,7 @@
-//! Scenarios, overrides, grids, campaigns, manifests and shards that are wrong: an error in
-//! words, or a scenario that runs; never a panic, and never for long.
+//! Invalid scenarios, overrides, grids, campaigns, manifests and shards give an error message
+//! or a scenario that runs, without a panic and within bounded time.
 //!
-//! `PROPTEST_CASES` sets how many of each.
+//! `PROPTEST_CASES` sets the number of cases of each test.
 
 #![allow(clippy::unwrap_used)]
 
@@ -18,12 +18,12 @@ use painleve_study::sweep::manifest::Manifest;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// More than anything here takes, on a machine that is busy with other tests.
+/// Longer than any test takes, also on a busy machine.
 const LONG: Duration = Duration::from_secs(10);
-/// Ticks that a scenario is run for when it is a valid one.
+/// Number of ticks for which a valid scenario is run.
 const TICKS: u64 = 50;
 
-/// Values that somebody means, and those that nobody does.
+/// Plausible values, and values that no user would mean.
 fn value() -> impl Strategy<Value = String> {
     prop_oneof![
         any::<f64>().prop_map(|number| number.to_string()),
@@ -61,7 +61,7 @@ fn value() -> impl Strategy<Value = String> {
     ]
 }
 
-/// All keys of a scenario, with a dot between the levels.
+/// Returns all keys of a scenario, with a dot between the levels.
 fn keys() -> Vec<String> {
     fn walk(prefix: &str, value: &toml::Value, keys: &mut Vec<String>) {
         match value {
@@ -87,7 +87,7 @@ fn key() -> impl Strategy<Value = String> {
     ]
 }
 
-/// Runs a scenario for a while if it is one.
+/// Runs a scenario for a while if it is valid.
 fn try_out(scenario: &Scenario) {
     let start = Instant::now();
     if let (Ok(simulation), Ok(host)) = (
@@ -96,7 +96,7 @@ fn try_out(scenario: &Scenario) {
     ) {
         let mut closed_loop = ClosedLoop::new(simulation, host);
         for _ in 0..scenario.run.ticks().min(TICKS) {
-            // An arm that cannot go on is an answer, too.
+            // An arm that cannot continue is a valid result, too.
             if closed_loop.tick(&mut ()).is_err() {
                 break;
             }
@@ -105,7 +105,7 @@ fn try_out(scenario: &Scenario) {
     assert!(start.elapsed() < LONG, "took {:?}", start.elapsed());
 }
 
-/// A text with a few of its characters changed, taken out, doubled or replaced by others.
+/// Returns a text with a few of its characters changed, removed, doubled or replaced.
 fn damaged(text: String) -> impl Strategy<Value = String> {
     let edits = prop::collection::vec((any::<prop::sample::Index>(), 0..4_u8, value()), 1..6);
     edits.prop_map(move |edits| {

@@ -1,4 +1,4 @@
-//! The figures of studies: stacked panels of curves, points and regions over one axis.
+//! Figures of studies: stacked panels of curves, points and regions over one shared axis.
 
 mod placed;
 
@@ -24,32 +24,32 @@ const X_TICKS: usize = 12;
 /// A figure.
 #[derive(Clone, Debug, Default)]
 pub struct Chart {
-    /// What the figure shows.
+    /// Title of the figure.
     pub title: String,
-    /// Parameters that hold for all of it; about 110 characters.
+    /// Parameters common to all panels; about 110 characters.
     pub subtitle: String,
     /// Name and unit of the axis that all panels share.
     pub x_title: String,
-    /// Its ends; those of all points if absent.
+    /// Ends of the shared axis; by default those of all points.
     pub x: Option<Range<f64>>,
-    /// From top to bottom.
+    /// Panels from top to bottom.
     pub panels: Vec<Panel>,
 }
 
-/// One of a figure's panels.
+/// A panel of a figure.
 #[derive(Clone, Debug)]
 pub struct Panel {
     /// Name and unit of the value axis.
     pub title: String,
-    /// How to read the panel.
+    /// Note on how to read the panel.
     pub note: String,
-    /// Ends of the value axis; those of all points if absent.
+    /// Ends of the value axis; by default those of all points.
     pub y: Option<Range<f64>>,
-    /// About how many values are labelled; none for a strip without values.
+    /// Approximate number of value labels; zero for a strip without values.
     pub y_ticks: usize,
     /// Height in drawn units; a whole figure is 2000 wide.
     pub height: i32,
-    /// What is in it, from the bottom to the top.
+    /// Contents, from bottom to top.
     pub marks: Vec<Mark>,
 }
 
@@ -66,12 +66,12 @@ impl Default for Panel {
     }
 }
 
-/// Something in a panel; what has a name is in the legend.
+/// An element of a panel; a named element appears in the legend.
 #[derive(Clone, Debug)]
 pub enum Mark {
-    /// Points joined by straight lines; a NaN interrupts them.
+    /// Points joined by straight lines; a NaN interrupts the line.
     Line {
-        /// For the legend.
+        /// Name in the legend.
         name: String,
         /// Colour.
         colour: RGBColor,
@@ -79,29 +79,29 @@ pub enum Mark {
         width: u32,
         /// Dashed instead of solid.
         dashed: bool,
-        /// From the first to the last.
+        /// Points from first to last.
         points: Vec<(f64, f64)>,
     },
-    /// Points each for itself.
+    /// Separate points.
     Dots {
-        /// For the legend.
+        /// Name in the legend.
         name: String,
         /// Colour.
         colour: RGBColor,
         /// Side of the square in drawn units.
         size: i32,
-        /// In any order.
+        /// Points in any order.
         points: Vec<(f64, f64)>,
     },
-    /// A stretch of the axis, shaded over the panel's height.
+    /// An interval of the axis, shaded over the panel's height.
     Span {
-        /// For the legend.
+        /// Name in the legend.
         name: String,
         /// Colour.
         colour: RGBColor,
-        /// 0 for clear to 1 for solid.
+        /// Opacity, from 0 (clear) to 1 (solid).
         opacity: f64,
-        /// From where to where.
+        /// Ends of the interval.
         x: Range<f64>,
     },
     /// A map of equal cells.
@@ -110,27 +110,27 @@ pub enum Mark {
         x: Range<f64>,
         /// Ends of the map along the value axis.
         y: Range<f64>,
-        /// Cells from left to right.
+        /// Number of cells from left to right.
         columns: usize,
-        /// Names and colours.
+        /// Names and colours of the palette.
         palette: Vec<(String, RGBColor)>,
-        /// Place in the palette of each cell, row by row from the bottom, left to right;
-        /// a place that is not there leaves the cell clear.
+        /// Palette index of each cell, row by row from the bottom, left to right;
+        /// an index outside the palette leaves the cell clear.
         cells: Vec<u8>,
     },
-    /// Words in the panel.
+    /// A text in the panel.
     Label {
-        /// Where their middle is, or their left end.
+        /// Position of its middle, or of its left end.
         at: (f64, f64),
         /// Whether `at` is the middle.
         centred: bool,
-        /// The words.
+        /// The text.
         text: String,
     },
 }
 
 impl Mark {
-    /// A solid line.
+    /// Creates a solid line.
     pub fn line(name: &str, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
         Self::Line {
             name: name.into(),
@@ -141,7 +141,7 @@ impl Mark {
         }
     }
 
-    /// A dashed line.
+    /// Creates a dashed line.
     pub fn dashed(name: &str, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
         Self::Line {
             name: name.into(),
@@ -159,7 +159,7 @@ impl Mark {
         }
     }
 
-    /// Entries for the legend.
+    /// Returns the entries for the legend.
     fn legend(&self) -> Vec<Entry<'_>> {
         let entry = |name, colour, symbol| Entry {
             name,
@@ -196,14 +196,14 @@ impl Mark {
     }
 }
 
-/// One entry of a legend.
+/// An entry of a legend.
 struct Entry<'a> {
     name: &'a str,
     colour: RGBColor,
     symbol: Symbol,
 }
 
-/// How an entry of a legend is shown.
+/// The symbol of a legend entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Symbol {
     Line,
@@ -212,10 +212,10 @@ enum Symbol {
 }
 
 impl Chart {
-    /// The figure as SVG text.
+    /// Returns the figure as SVG text.
     ///
     /// # Errors
-    /// [`PlotError::Draw`] if the drawing library refuses, which it has no reason to.
+    /// [`PlotError::Draw`] if the drawing library fails, which is not expected.
     pub fn svg(&self) -> Result<String, PlotError> {
         let x = self.x_range();
         let laid_out: Vec<Placed<'_>> = self

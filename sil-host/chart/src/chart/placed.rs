@@ -1,4 +1,4 @@
-//! Panels with their places and scales, drawn.
+//! Panels placed in the figure, with their scales.
 
 use std::ops::Range;
 
@@ -14,13 +14,13 @@ use crate::style::{
     without_straight_ons,
 };
 
-/// Length of a line in a legend.
+/// Length of a line in a legend, drawn units.
 const LEGEND_LINE: i32 = 66;
 
-/// Dashes and the gaps between them.
+/// Lengths of dashes and gaps, drawn units.
 const DASH: (u32, u32) = (14, 10);
 
-/// A panel with its place in the figure and its scales.
+/// A panel with its position in the figure and its scales.
 pub(super) struct Placed<'a> {
     panel: &'a Panel,
     legend_below_heading: bool,
@@ -90,7 +90,7 @@ impl<'a> Placed<'a> {
         text(root, &note, &NOTE, (after_title, middle), HPos::Left)?;
         self.draw_legend(root)?;
 
-        // Maps cover the grid, everything else lies over it.
+        // Maps cover the grid lines; everything else is drawn over them.
         let (maps, others): (Vec<&Mark>, Vec<&Mark>) = self
             .panel
             .marks
@@ -190,7 +190,7 @@ impl<'a> Placed<'a> {
                 };
                 let points = points.iter().filter(inside);
                 let mut pixels: Vec<_> = points.map(|&(x, y)| (self.x(x), self.y(y))).collect();
-                // Most points of a diagram fall onto others.
+                // Most points of a diagram coincide.
                 pixels.sort_unstable();
                 pixels.dedup();
                 for (x, y) in pixels {
@@ -240,9 +240,9 @@ impl<'a> Placed<'a> {
         };
         for (row, line) in cells.chunks(columns.max(1)).enumerate() {
             let low = self.y(at(y, row, rows));
-            // One unit into the next row, which covers it, so that no seam shows.
+            // Extends one unit into the next row, which covers it, so that no seam shows.
             let high = (self.y(at(y, row + 1, rows)) - 1).max(self.top);
-            // Neighbours of one colour are one rectangle.
+            // Adjacent cells of one colour form one rectangle.
             let mut start = 0;
             for run in line.chunk_by(|one, next| one == next) {
                 let end = start + run.len();
@@ -264,7 +264,7 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// Entries of what is in a panel and has a name.
+/// Returns the legend entries of the panel's named elements.
 fn legend(panel: &Panel) -> Vec<Entry<'_>> {
     let entries = panel.marks.iter().flat_map(Mark::legend);
     entries.filter(|entry| !entry.name.is_empty()).collect()

@@ -1,4 +1,4 @@
-//! Charts of anything stay within their bounds, with a legend of what has a name.
+//! Charts stay within their bounds, and their legend lists the named elements.
 
 use super::*;
 use crate::style::{BLUE_INK, GREEN, ORANGE, VERMILLION};
@@ -22,7 +22,7 @@ fn count(svg: &str, part: &str) -> usize {
 }
 
 #[test]
-fn what_has_a_name_is_in_the_legend_and_titles_are_escaped() {
+fn named_elements_are_in_the_legend_and_titles_are_escaped() {
     let svg = chart(vec![
         Mark::line("solid", BLUE_INK, vec![(0.0, 1.0), (1.0, 2.0)]),
         Mark::dashed("", GREEN, vec![(0.0, 2.0), (1.0, 1.0)]),
@@ -55,12 +55,12 @@ fn what_has_a_name_is_in_the_legend_and_titles_are_escaped() {
             "{text} is not in {svg}"
         );
     }
-    // The lower row is one rectangle, the upper one has a clear cell; one more is the legend's.
+    // The lower row is one rectangle, the upper row has a clear cell, and one is in the legend.
     assert_eq!(count(&svg, "fill=\"#D55E00\""), 3);
 }
 
 #[test]
-fn lines_are_interrupted_by_nan_and_dots_that_coincide_are_one() {
+fn nan_interrupts_lines_and_coincident_dots_are_merged() {
     let points = vec![
         (0.0, 0.0),
         (1.0, 1.0),

@@ -1,4 +1,4 @@
-//! Success without each part as bars.
+//! Bar chart of the success rate without each part.
 
 use painleve_chart::style::{BLACK_INK, GREEN};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
@@ -36,7 +36,7 @@ impl Figure for Ablation {
         }
         Chart {
             title: "What each part contributes".into(),
-            subtitle: format!("the same {runs} runs of the robustness campaign each time"),
+            subtitle: format!("the same {runs} runs of the robustness campaign for every bar"),
             x_title: "Success (%)".into(),
             x: Some(0.0..101.0),
             panels: vec![Panel {

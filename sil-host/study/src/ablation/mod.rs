@@ -1,4 +1,4 @@
-//! The robustness campaign once more, without one part of the controller after the other.
+//! The robustness campaign, repeated with one part of the controller switched off at a time.
 
 mod figure;
 mod options;
@@ -10,12 +10,12 @@ use crate::{Study, StudyError};
 pub use options::Options;
 pub use outcome::{Ablated, Ablation};
 
-/// The same campaign with one part of the controller after the other switched off.
+/// The robustness campaign, repeated with one part of the controller switched off at a time.
 #[derive(Clone, Debug)]
 pub struct AblationStudy {
     /// The campaign.
     pub campaign: Robustness,
-    /// The parts; the whole controller comes first.
+    /// The parts to switch off; the first entry is the whole controller.
     pub parts: Vec<Part>,
 }
 

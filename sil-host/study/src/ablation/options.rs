@@ -11,7 +11,7 @@ use crate::robustness::{Arms, Part, Robustness, Row};
 /// What each part of the controller contributes to the robustness campaign.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// The paper's arm with errors, or any arm, which the controller is told.
+    /// Arms of the campaign: the paper's arm with errors, or any arm, known to the controller.
     #[arg(long, value_enum, default_value = "paper")]
     arms: Arms,
     /// Seed of all runs.
@@ -26,7 +26,7 @@ pub struct Options {
         allow_negative_numbers = true
     )]
     runs: usize,
-    /// Parts to switch off, one at a time; all by default.
+    /// Parts to switch off, one at a time; all parts by default.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
     without: Vec<Part>,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! What each part contributes, as a table.
+//! The contribution of each part as a table.
 
 use comfy_table::Table;
 use serde::Serialize;
@@ -8,26 +8,26 @@ use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
 use crate::robustness::{Campaign, Ending, Part, Row};
 
-/// What the campaign comes to without a part.
+/// Result of the campaign without one part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ablated {
-    /// The part that is switched off; none for the whole controller.
+    /// The part that is switched off; `None` for the whole controller.
     pub without: Option<Part>,
-    /// The keys that do it.
+    /// The configuration keys that switch it off.
     pub keys: String,
-    /// Runs.
+    /// Number of runs.
     pub runs: usize,
-    /// Runs that succeeded.
+    /// Number of runs that succeeded.
     pub successes: usize,
-    /// Part of them.
+    /// Success rate, 0 … 1.
     pub rate: f64,
-    /// Lower end of its 95 % interval.
+    /// Lower bound of its 95 % confidence interval.
     pub lower: f64,
-    /// Upper end of its 95 % interval.
+    /// Upper bound of its 95 % confidence interval.
     pub upper: f64,
     /// Runs with a lift-off after capture.
     pub lift_offs: usize,
-    /// Runs that ended elsewhere, or at an edge that is none.
+    /// Runs that ended elsewhere, or at a wrongly estimated edge.
     pub not_reached: usize,
     /// Runs without capture.
     pub not_captured: usize,
@@ -37,15 +37,15 @@ pub struct Ablated {
     pub mean_error_mm: f64,
 }
 
-/// What each part contributes.
+/// The contribution of each part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ablation {
-    /// The whole controller, then one line per part.
+    /// The whole controller first, then one line per part.
     pub rows: Vec<Ablated>,
 }
 
 impl Ablation {
-    /// Of all rows of a study.
+    /// Collects all rows of a study.
     pub fn new(study: &AblationStudy, rows: Vec<Row>) -> Self {
         let runs = study.campaign.runs.max(1);
         let without = std::iter::once(None).chain(study.parts.iter().copied().map(Some));

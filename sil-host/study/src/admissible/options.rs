@@ -8,7 +8,7 @@ use crate::figures::page_maker::PageMaker;
 use crate::options::BaseOptions;
 use crate::{StudyError, paper};
 
-/// Table II: the tip positions at which p > 0, and the critical friction.
+/// Table II: tip positions at which p > 0, and the critical friction.
 #[derive(Debug, Args)]
 pub struct Options {
     /// Friction coefficient μ.

@@ -1,4 +1,4 @@
-//! Fig. 4 drawn: a section at one friction coefficient as curves, a whole diagram as maps.
+//! Fig. 4: a section at one friction coefficient as curves, a whole diagram as maps.
 
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, GREY, SKY, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
@@ -11,7 +11,7 @@ use crate::initial::Initial;
 use crate::outcome::Figure;
 use crate::places::Places;
 
-/// Colours of a map from little to much, after the quiet one: told apart in grey as well.
+/// Colours of a map in ascending order after the quiet colour; distinguishable in grey.
 const RISING: [RGBColor; 6] = [
     RGBColor(0xFD, 0xE7, 0x25),
     RGBColor(0x90, 0xD7, 0x43),
@@ -21,7 +21,7 @@ const RISING: [RGBColor; 6] = [
     RGBColor(0x44, 0x01, 0x54),
 ];
 
-/// Where the arm is quiet.
+/// Colour of cells where the arm is quiet.
 const QUIET: RGBColor = RGBColor(0xF2, 0xF2, 0xF2);
 
 impl Figure for Diagram {
@@ -30,7 +30,7 @@ impl Figure for Diagram {
     }
 }
 
-/// The figure.
+/// Draws the figure.
 fn chart(diagram: &Diagram) -> Chart {
     let Cells {
         mu,
@@ -50,7 +50,7 @@ fn chart(diagram: &Diagram) -> Chart {
         },
         _ => Chart {
             title: "Bifurcation diagram over belt speed and friction".into(),
-            subtitle: format!("no control, {watched}; dashed: where the paper has bounces"),
+            subtitle: format!("no control, {watched}; dashed: bouncing in the paper"),
             x_title: "belt speed v_belt in m/s".into(),
             x: Some(Places::of(&diagram.settings().v_belt_m_s).ends()),
             panels: groups.iter().map(|group| map(diagram, group)).collect(),
@@ -58,7 +58,7 @@ fn chart(diagram: &Diagram) -> Chart {
     }
 }
 
-/// Name of a group of initial conditions, its colour, and whether its line is dashed.
+/// Returns the name of a group of initial conditions, its colour, and whether its line is dashed.
 fn look(group: &str) -> (String, RGBColor, bool) {
     match group {
         "a" => ("from x0,a".into(), BLACK_INK, false),
@@ -68,8 +68,8 @@ fn look(group: &str) -> (String, RGBColor, bool) {
     }
 }
 
-/// A value of each cell of a section against belt speed; where several random states start
-/// at the same speed, a dot for each.
+/// Draws a value of each cell of a section against belt speed; several random states at
+/// the same speed are drawn as dots.
 fn curve(diagram: &Diagram, group: &str, value: impl Fn(&Row) -> f64) -> Mark {
     let (name, colour, dashed) = look(group);
     let points = diagram
@@ -96,7 +96,7 @@ fn curve(diagram: &Diagram, group: &str, value: impl Fn(&Row) -> f64) -> Mark {
 }
 
 fn curves(diagram: &Diagram, groups: &[&str], value: impl Fn(&Row) -> f64) -> Vec<Mark> {
-    // The one that is named first lies on top.
+    // The first series is drawn last, on top.
     let lines = groups.iter().rev();
     lines.map(|group| curve(diagram, group, &value)).collect()
 }
@@ -132,7 +132,7 @@ fn apexes(diagram: &Diagram, groups: &[&str]) -> Panel {
     }
 }
 
-/// What the panel above has named already.
+/// Removes the legend entries that the panel above shows already.
 fn without_name(mut mark: Mark) -> Mark {
     if let Mark::Line { name, .. } | Mark::Dots { name, .. } = &mut mark {
         name.clear();
@@ -186,7 +186,7 @@ fn map(diagram: &Diagram, group: &str) -> Panel {
     }
 }
 
-/// A palette for values, and the place of each in it; minus infinity is quiet.
+/// Returns a palette for values, and the index of each value in it; minus infinity is quiet.
 fn shades(values: &[f64]) -> (Vec<(String, RGBColor)>, Vec<u8>) {
     let finite = || values.iter().copied().filter(|value| value.is_finite());
     let low = finite().fold(f64::INFINITY, f64::min).floor();

@@ -10,10 +10,10 @@ use crate::{Grid, StudyError};
 
 use crate::cell_options::CellOptions;
 
-/// Fig. 4: where in friction and belt speed the arm keeps bouncing.
+/// Fig. 4: friction and belt speeds at which the arm keeps bouncing.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// Friction coefficients μ, FROM:TO:STEP or a list; with one, a section is drawn.
+    /// Friction coefficients μ, FROM:TO:STEP or a list; a single value draws a section.
     #[arg(
         long,
         value_name = "GRID",

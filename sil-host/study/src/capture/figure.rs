@@ -1,4 +1,4 @@
-//! Times to capture as a histogram, the limit beside.
+//! Histogram of the capture time, with its limit.
 
 use painleve_chart::style::BLUE_INK;
 use painleve_chart::{Chart, PlotError};
@@ -15,7 +15,7 @@ impl Figure for Captures {
         let note = "last bar: that long or longer".to_string();
         Chart {
             title: "Capture of the bouncing arm".into(),
-            subtitle: format!("caught within {LIMIT_S} s and held: {}", self.success),
+            subtitle: format!("captured within {LIMIT_S} s and held: {}", self.success),
             x_title: "Time from enabling to the last landing (s)".into(),
             x: Some(0.0..0.6),
             panels: vec![histogram("Runs", note, BLUE_INK, 0.6, LIMIT_S, &times)],

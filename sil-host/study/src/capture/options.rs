@@ -1,4 +1,4 @@
-//! Options of the study: a bouncing arm is caught.
+//! Options of the study: capture of a bouncing arm.
 
 use clap::Args;
 
@@ -9,7 +9,7 @@ use crate::tabular::Table;
 
 use crate::options::{self, Overrides};
 
-/// How soon a bouncing arm is caught.
+/// How soon a bouncing arm is captured.
 #[derive(Debug, Args)]
 pub struct Options {
     /// Seed of all runs.

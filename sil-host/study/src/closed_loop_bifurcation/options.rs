@@ -12,11 +12,11 @@ use crate::{Grid, StudyError};
 
 use crate::options::{Overrides, seconds};
 
-/// Fig. 12: over the belt's speed with the controller in the loop.
+/// Fig. 12: bifurcation diagram over the belt speed with the controller in the loop.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same with known
-    /// friction), hybrid (as built in), or any scenario or file.
+    /// Controllers: pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same
+    /// with known friction), hybrid (as built in), or any scenario or file.
     #[arg(
         long,
         value_name = "NAMES",
@@ -24,7 +24,7 @@ pub struct Options {
         default_value = "hybrid"
     )]
     controller: Vec<Controller>,
-    /// Ideal (as in the paper), hardware, or the scenario's own.
+    /// Converters: ideal (as in the paper), hardware, or the scenario's own.
     #[arg(
         long,
         value_name = "SETS",
@@ -49,19 +49,19 @@ pub struct Options {
         allow_hyphen_values = true
     )]
     v_belt: Grid,
-    /// Initial conditions, as in d,u,a,random:3; the posture is that of the start.
+    /// Initial conditions, for example d,u,a,random:3; the controller uses the posture of each.
     #[arg(long, value_name = "LIST", default_value = "d")]
     initial: Initials,
     /// Seed of the random initial conditions.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// minimum-jerk:SECONDS, ramp:SECONDS or step.
+    /// Reference: minimum-jerk:SECONDS, ramp:SECONDS or step.
     #[arg(long, default_value = "minimum-jerk:3")]
     reference: Reference,
-    /// Target of the reference, m; the paper's farthest one for law and posture by default.
+    /// Target of the reference, m; by default the paper's farthest target for the law and posture.
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     target_m: Option<f64>,
-    /// How long each cell runs before it is watched, s; the paper has 250.
+    /// Transient of each cell before recording starts, s; 250 in the paper.
     #[arg(
         long,
         value_name = "SECONDS",
@@ -70,7 +70,7 @@ pub struct Options {
         allow_negative_numbers = true
     )]
     transient_s: f64,
-    /// How long it is watched, s; the paper has 50.
+    /// Recording time of each cell, s; 50 in the paper.
     #[arg(
         long,
         value_name = "SECONDS",

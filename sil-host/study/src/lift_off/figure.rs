@@ -1,4 +1,4 @@
-//! Times to the notice of a lift-off as histograms, the bars beside.
+//! Histograms of the detection time of a lift-off, with its limit.
 
 use painleve_chart::style::{BLUE_INK, ORANGE};
 use painleve_chart::{Chart, PlotError};
@@ -22,16 +22,16 @@ impl Figure for LiftOffs {
             let times: Vec<f64> = times.collect();
             let limit_ms = 1e3 * bar_s;
             let note = format!(
-                "{} of {} flights of more than {limit_ms} ms noticed; last bar: that long or longer",
+                "{} of {} flights of more than {limit_ms} ms detected; last bar: that long or longer",
                 times.len(),
                 long.count(),
             );
             histogram(title, note, colour, FARTHEST_MS, limit_ms, &times)
         };
         Chart {
-            title: "How soon a lift-off is noticed".into(),
-            subtitle: "tips led over the edge p = 0 without the governor".into(),
-            x_title: "Time from lift-off to the sample that shows it (ms)".into(),
+            title: "How soon a lift-off is detected".into(),
+            subtitle: "tips led over the edge p = 0 with the governor switched off".into(),
+            x_title: "Time from lift-off to its detection (ms)".into(),
             x: Some(0.0..FARTHEST_MS),
             panels: vec![
                 panel("With the force cell (runs)", Evidence::ForceCell, BLUE_INK),

@@ -1,4 +1,4 @@
-//! Options of the study: how soon a lift-off is noticed.
+//! Options of the study: how soon a lift-off is detected.
 
 use clap::Args;
 
@@ -9,13 +9,13 @@ use crate::tabular::Table;
 
 use crate::options::{self, Overrides};
 
-/// How soon a lift-off is noticed, with the force cell and without.
+/// How soon a lift-off is detected, with the force cell and without.
 #[derive(Debug, Args)]
 pub struct Options {
     /// Seed of all runs.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
-    /// Number of runs.
+    /// Number of runs with each kind of evidence.
     #[arg(
         long,
         value_name = "N",
@@ -24,7 +24,7 @@ pub struct Options {
         allow_negative_numbers = true
     )]
     runs: usize,
-    /// How long the tip slides before it is led over the edge, s.
+    /// Sliding time before the tip is led over the edge, s.
     #[arg(
         long,
         value_name = "SECONDS",

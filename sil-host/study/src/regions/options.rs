@@ -12,19 +12,19 @@ use crate::{Grid, StudyError, paper};
 /// A slip direction on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum SlipOption {
-    /// ż_r > 0, the paper's.
+    /// ż_r > 0, as in the paper.
     Positive,
     /// ż_r < 0.
     Negative,
 }
 
-/// Fig. 3: the solution modes over θ1 and its rate, with the tip on the belt.
+/// Fig. 3: solution modes over θ1 and its rate, with the tip on the belt.
 #[derive(Debug, Args)]
 pub struct Options {
     /// Friction coefficient μ.
     #[arg(long, default_value_t = paper::FRICTION, allow_negative_numbers = true)]
     mu: f64,
-    /// θ1 in degrees, FROM:TO:STEP or a list; what does not reach the belt is left out.
+    /// θ1 in degrees, FROM:TO:STEP or a list; values that do not reach the belt are discarded.
     #[arg(
         long,
         value_name = "GRID",
@@ -40,7 +40,7 @@ pub struct Options {
         allow_hyphen_values = true
     )]
     theta1_dot_rad_s: Grid,
-    /// Which of the two θ2 that put the tip on the belt.
+    /// Sides of the belt normal on which θ2 lies.
     #[arg(
         long,
         value_name = "SIGNS",

@@ -78,7 +78,7 @@ fn figure_3(outcome: &Regions) -> Result<Section, PlotError> {
             agrees,
         ));
         section.reasons.push(format!(
-            "b is no mirror image, because the spring between the links is at rest {:.2}° off the \
+            "b is not a mirror image, because the spring between the links is at rest {:.2}° off the \
              straight arm: {} of one map is inconsistent, {} of the mirrored one. The paper's text gives \
              no numbers for this figure.",
             outcome.spring_rest_deg(),

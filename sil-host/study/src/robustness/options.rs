@@ -9,10 +9,10 @@ use crate::tabular::Table;
 
 use crate::options::{self, Overrides};
 
-/// A campaign of random arms, belts, converters and losses that the controller is not told of.
+/// A campaign of random arms, belts, converters and losses that the controller does not know.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// The paper's arm with errors, or any arm, which the controller is told.
+    /// Arms: the paper's arm with errors, or any arm, known to the controller.
     #[arg(long, value_enum, default_value = "paper")]
     arms: Arms,
     /// Seed of all runs.
@@ -27,7 +27,7 @@ pub struct Options {
         allow_negative_numbers = true
     )]
     runs: usize,
-    /// Parts of the controller that are switched off.
+    /// Parts of the controller to switch off.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
     without: Vec<Part>,
     #[command(flatten)]

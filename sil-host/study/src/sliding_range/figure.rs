@@ -1,4 +1,4 @@
-//! Sliding ranges as bars, the paper's values and the limit beside.
+//! Bar chart of the sliding ranges, with the paper's values and the limit.
 
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, ORANGE, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};

@@ -11,11 +11,11 @@ use crate::{Grid, StudyError};
 
 use crate::options::{Overrides, PostureOption, metres, seconds};
 
-/// How far each controller slides before it leaves the belt.
+/// How far each controller slides before its tip leaves the belt.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same with known
-    /// friction), hybrid (as built in), or any scenario or file.
+    /// Controllers: pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same
+    /// with known friction), hybrid (as built in), or any scenario or file.
     #[arg(
         long,
         value_name = "NAMES",
@@ -23,7 +23,7 @@ pub struct Options {
         default_value = "pid,hybrid-paper,hybrid-paper-model,hybrid"
     )]
     controller: Vec<Controller>,
-    /// Ideal (as in the paper), hardware, or the scenario's own.
+    /// Converters: ideal (as in the paper), hardware, or the scenario's own.
     #[arg(
         long,
         value_name = "SETS",
@@ -49,7 +49,7 @@ pub struct Options {
         allow_hyphen_values = true
     )]
     mu: Grid,
-    /// minimum-jerk:SECONDS, ramp:SECONDS or step; several with commas.
+    /// References: minimum-jerk:SECONDS, ramp:SECONDS or step; separate several with commas.
     #[arg(
         long,
         value_name = "REFERENCES",
@@ -57,7 +57,7 @@ pub struct Options {
         default_value = "minimum-jerk:3"
     )]
     reference: Vec<Reference>,
-    /// How near the tip must come to its target, m.
+    /// Largest distance from the target at which it counts as reached, m.
     #[arg(
         long,
         value_name = "METRES",
@@ -66,7 +66,7 @@ pub struct Options {
         allow_negative_numbers = true
     )]
     within_m: f64,
-    /// How long after the end of the reference it may take for that, s.
+    /// Longest settling time after the end of the reference, s.
     #[arg(
         long,
         value_name = "SECONDS",
@@ -75,7 +75,7 @@ pub struct Options {
         allow_negative_numbers = true
     )]
     patience_s: f64,
-    /// Distance of the targets that are tried first, m.
+    /// Spacing of the targets tried first, m.
     #[arg(
         long,
         value_name = "METRES",

@@ -1,6 +1,6 @@
 //! Lists of shards in the syntax of job arrays: `3,7,9-12`.
 
-/// Rising numbers as `3,7,9-12`; nothing as an empty text.
+/// Formats ascending numbers as `3,7,9-12`; no numbers give an empty text.
 pub fn syntax(numbers: &[usize]) -> String {
     let mut parts = Vec::new();
     for run in numbers.chunk_by(|one, next| one + 1 == *next) {

@@ -1,4 +1,4 @@
-//! The campaign file: a study and its options, under the names that they have on the command line.
+//! The campaign file: a study and its options, with the names of the command line.
 //!
 //! ```toml
 //! study = "bifurcation"
@@ -24,23 +24,23 @@ use super::SweepError;
 pub struct Campaign {
     /// Name of the study.
     pub study: String,
-    /// Values of its options, by their names without dashes in front.
+    /// Values of its options, by their names without leading dashes.
     pub options: BTreeMap<String, Vec<String>>,
 }
 
-/// A campaign as its study understood it.
+/// A campaign as parsed by its study.
 pub struct Understood {
     /// The study.
     pub table: Box<dyn crate::tabular::Table>,
-    /// Every scenario it starts from, in full, by name.
+    /// The complete text of every scenario that it starts from, by name.
     pub scenarios: BTreeMap<String, String>,
 }
 
 impl Campaign {
-    /// Reads a campaign file. Whether the study has such options is not known here.
+    /// Reads a campaign file. Does not check whether the study has these options.
     ///
     /// # Errors
-    /// [`SweepError`] if there is no such file or it is no campaign.
+    /// [`SweepError`] if the file does not exist or is not a campaign.
     pub fn load(path: &Path) -> Result<Self, SweepError> {
         let text = input_file::read(path)
             .map_err(|source| SweepError::unreadable("campaign file", path, source))?;
@@ -65,30 +65,30 @@ impl Campaign {
         for (key, value) in table {
             match (key.as_str(), value) {
                 ("study", Value::String(study)) => campaign.study = study,
-                ("study", _) => return Err("study: give a name in quotes".into()),
+                ("study", _) => return Err("study: the value must be a name in quotes".into()),
                 (_, value) => {
                     let values = texts(&value).ok_or(format!(
-                        "{key}: give a text, a number or a list of these, as on the command line"
+                        "{key}: the value must be a text, a number or a list of these, as on the command line"
                     ))?;
                     campaign.options.insert(key, values);
                 }
             }
         }
         if campaign.study.is_empty() {
-            return Err("no study; give one, as in study = \"bifurcation\"".into());
+            return Err("no study is given; add one, for example study = \"bifurcation\"".into());
         }
         Ok(campaign)
     }
 
-    /// Hash of everything that the rows depend on besides the program.
+    /// Returns the hash of everything that the rows depend on besides the program.
     pub fn hash(&self, scenarios: &BTreeMap<String, String>) -> String {
-        // Unlike plain concatenation, JSON keeps neighbours apart.
+        // Unlike plain concatenation, JSON keeps adjacent texts separate.
         let text = serde_json::json!([self.study, self.options, scenarios]).to_string();
         format!("{:032x}", xxh3_128(text.as_bytes()))
     }
 }
 
-/// The values of an option, if they can be on a command line.
+/// Returns the values of an option, if they can appear on a command line.
 fn texts(value: &Value) -> Option<Vec<String>> {
     let one = |value: &Value| match value {
         Value::String(text) => Some(text.clone()),
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_campaign_is_what_it_says_not_how_it_is_written() {
+    fn the_hash_depends_on_the_content_of_a_campaign_not_on_its_format() {
         let one = "study = 'bifurcation'\nmu = [0.4, 0.6]\nseed = 7\n";
         let other = "# a comment\nseed=7\nmu=[0.40,0.6]\nstudy=\"bifurcation\"";
         let (one, other) = (
@@ -131,11 +131,11 @@ mod tests {
         for (text, part) in [
             ("", "no study"),
             ("mu = 0.6", "no study"),
-            ("study = 3", "study: give a name"),
-            ("study = 'a'\nmu = true", "mu: give"),
-            ("study = 'a'\nmu = []", "mu: give"),
-            ("study = 'a'\n[mu]\nx = 1", "mu: give"),
-            ("study = 'a'\nmu = [[1]]", "mu: give"),
+            ("study = 3", "study: the value must be a name"),
+            ("study = 'a'\nmu = true", "mu: the value must be"),
+            ("study = 'a'\nmu = []", "mu: the value must be"),
+            ("study = 'a'\n[mu]\nx = 1", "mu: the value must be"),
+            ("study = 'a'\nmu = [[1]]", "mu: the value must be"),
             ("study = 'a'\nmu = = 1", "line 2"),
         ] {
             let message = Campaign::parse(text).unwrap_err();

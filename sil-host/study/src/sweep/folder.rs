@@ -1,4 +1,4 @@
-//! The folder of a sweep: which shards are finished, and putting them together.
+//! The folder of a sweep: its finished shards and their merge.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,42 +9,42 @@ use super::manifest::Manifest;
 use super::shard_file::{self, Shard};
 use super::{SweepError, array};
 
-/// What is in the folder, shard by shard.
+/// State of the folder, shard by shard.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Status {
-    /// How many shards there are.
+    /// Number of shards.
     pub shards: usize,
-    /// How many rows.
+    /// Number of rows.
     pub rows: usize,
-    /// How many shards are finished.
+    /// Number of finished shards.
     pub finished: usize,
-    /// Shards that are not, as in `3,7,9-12`.
+    /// Missing shards, for example `3,7,9-12`.
     pub missing: String,
-    /// Files that are no shard of this sweep, and why.
+    /// Files that are not shards of this sweep, with the reason.
     pub unusable: Vec<Unusable>,
-    /// Shards of which there is more than one file.
+    /// Shards with more than one file.
     pub duplicates: Vec<Duplicate>,
 }
 
-/// A file that is no shard of this sweep.
+/// A file that is not a shard of this sweep.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unusable {
     /// The file.
     pub file: PathBuf,
-    /// What is wrong with it.
+    /// The reason.
     pub reason: String,
 }
 
-/// A shard of which there is more than one file.
+/// A shard with more than one file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Duplicate {
-    /// Its number.
+    /// Number of the shard.
     pub shard: usize,
-    /// The files.
+    /// Its files.
     pub files: Vec<PathBuf>,
 }
 
-/// All files of the folder that call themselves shards, in order of their names.
+/// Returns all files of the folder that are named like shards, in the order of their names.
 struct Contents {
     whole: Vec<(PathBuf, Shard)>,
     unusable: Vec<Unusable>,
@@ -73,14 +73,14 @@ impl Contents {
         Ok(Self { whole, unusable })
     }
 
-    /// The files of a shard, which should be one.
+    /// Returns the files of a shard, normally one.
     fn files_of(&self, shard: usize) -> Vec<PathBuf> {
         let files = self.whole.iter().filter(|(_, whole)| whole.shard == shard);
         files.map(|(file, _)| file.clone()).collect()
     }
 }
 
-/// Which shards are not finished.
+/// Returns the shards that are not finished.
 ///
 /// # Errors
 /// [`SweepError::Unreadable`] if the folder cannot be listed.
@@ -98,7 +98,7 @@ fn missing_in(contents: &Contents, manifest: &Manifest) -> Vec<usize> {
         .collect()
 }
 
-/// How far the sweep is.
+/// Returns the progress of the sweep.
 ///
 /// # Errors
 /// [`SweepError::Unreadable`] if the folder cannot be listed.
@@ -131,10 +131,10 @@ fn status_of(contents: &Contents, manifest: &Manifest) -> Status {
     }
 }
 
-/// The CSV file of the whole study, byte for byte the one that the study writes by itself.
+/// Returns the CSV file of the whole study, byte for byte as the study itself writes it.
 ///
 /// # Errors
-/// [`SweepError::Incomplete`] unless every shard is there once.
+/// [`SweepError::Incomplete`] unless every shard is present exactly once.
 pub fn merge(folder: &Path, manifest: &Manifest) -> Result<Vec<u8>, SweepError> {
     let contents = Contents::read(folder, manifest)?;
     refuse(&status_of(&contents, manifest), folder)?;
@@ -156,7 +156,7 @@ fn refuse(status: &Status, folder: &Path) -> Result<(), SweepError> {
             .map(|file| file.display().to_string())
             .collect();
         reasons.push(format!(
-            "shard {shard} is there twice, as {}",
+            "shard {shard} is present twice, as {}",
             names.join(" and ")
         ));
     }
@@ -176,14 +176,14 @@ fn refuse(status: &Status, folder: &Path) -> Result<(), SweepError> {
 fn together(shards: Vec<Shard>, rows: usize) -> Result<Vec<u8>, SweepError> {
     let incomplete = |message: &str| SweepError::Incomplete(message.to_owned());
     let header = shards.first().map(|shard| shard.header.clone());
-    let header = header.ok_or_else(|| incomplete("there are no shards"))?;
+    let header = header.ok_or_else(|| incomplete("the folder holds no shards"))?;
     if shards.iter().any(|shard| shard.header != header) {
-        return Err(incomplete("the shards do not have the same header"));
+        return Err(incomplete("the headers of the shards differ"));
     }
     let mut all: Vec<_> = shards.into_iter().flat_map(|shard| shard.rows).collect();
     all.sort_by_key(|(row, _)| *row);
     if all.iter().map(|(row, _)| *row).ne(0..rows) {
-        return Err(incomplete("the shards do not hold every row once"));
+        return Err(incomplete("the shards do not hold every row exactly once"));
     }
     let mut writer = csv::Writer::from_writer(Vec::new());
     let written = writer.write_byte_record(&header).and_then(|()| {
@@ -195,13 +195,13 @@ fn together(shards: Vec<Shard>, rows: usize) -> Result<Vec<u8>, SweepError> {
     text.map_err(|error| incomplete(&error.into_error().to_string()))
 }
 
-/// Removes what processes that were killed while they wrote a shard have left.
+/// Removes the temporary files of processes that were killed while writing a shard.
 pub fn tidy(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
         if name.starts_with(".shard-") && name.ends_with(".part") {
-            // A file that stays is harmless.
+            // A file that cannot be removed is harmless.
             let _ = fs::remove_file(entry.path());
         }
     }
@@ -261,11 +261,11 @@ mod tests {
             "{}",
             message()
         );
-        // Another shard under the name of a missing one.
+        // Another shard under the name of a missing shard.
         fs::copy(path("shard-0.csv"), path("shard-1.csv")).unwrap();
         assert_eq!(missing(folder.path(), &manifest).unwrap(), [1, 4]);
         assert!(
-            message().contains("shard 0 is there twice"),
+            message().contains("shard 0 is present twice"),
             "{}",
             message()
         );
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn only_leftovers_are_tidied() {
+    fn only_stale_temporary_files_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         for name in [".shard-1.csv.x.part", "shard-1.csv", "mine.part"] {
             fs::write(folder.path().join(name), "").unwrap();

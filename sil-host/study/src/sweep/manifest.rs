@@ -1,4 +1,4 @@
-//! The manifest of a sweep: what exactly is computed, and by which program.
+//! The manifest of a sweep: the exact computation, and the program that performs it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,40 +16,40 @@ use super::SweepError;
 use super::campaign::{Campaign, Understood};
 use super::share::MOST_SHARDS;
 
-/// Version of this file's own form.
+/// Format version of the manifest file.
 const FORMAT: u32 = 1;
 
 /// Version of this program.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Git revision from which this program is built; `…-changed` with changes that are not
-/// committed, `unknown` outside a repository.
+/// Git revision of this build; `…-changed` if it has uncommitted
+/// changes, `unknown` outside a repository.
 const REVISION: &str = env!("PAINLEVE_REVISION");
 
 /// Everything that the rows of a sweep depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// Version of the manifest's form.
+    /// Format version of the manifest.
     format: u32,
     /// Version of the program.
     version: String,
     /// Git revision of the program.
     git_revision: String,
-    /// Hash of campaign and scenarios.
+    /// Hash of the campaign and its scenarios.
     campaign_hash: String,
-    /// How many rows.
+    /// Number of rows.
     pub rows: usize,
-    /// How many shards, numbered from 0.
+    /// Number of shards, numbered from 0.
     pub shards: usize,
-    /// Every seed, by what it is for.
+    /// Every seed, by its purpose.
     seeds: BTreeMap<String, u64>,
-    /// What is computed.
+    /// The campaign.
     pub campaign: Campaign,
 }
 
 impl Manifest {
-    /// Its file in the sweep's folder.
+    /// Name of the manifest file in the sweep's folder.
     pub fn path(folder: &Path) -> PathBuf {
         folder.join("manifest.toml")
     }
@@ -57,7 +57,7 @@ impl Manifest {
     /// Plans a campaign.
     ///
     /// # Errors
-    /// [`SweepError`] if there cannot be so many shards.
+    /// [`SweepError`] if the number of shards is out of range.
     pub fn new(
         campaign: Campaign,
         understood: &Understood,
@@ -85,25 +85,25 @@ impl Manifest {
         })
     }
 
-    /// Hash of all of it: what a shard belongs to.
+    /// Returns the hash of the whole manifest, which identifies the sweep of a shard.
     pub fn hash(&self) -> String {
         let text = serde_json::json!(self).to_string();
         format!("{:032x}", xxh3_128(text.as_bytes()))
     }
 
-    /// Hash of campaign and scenarios.
+    /// Returns the hash of the campaign and its scenarios.
     pub fn campaign_hash(&self) -> &str {
         &self.campaign_hash
     }
 
-    /// Writes the manifest into its folder. The same one may be there already; then it is
-    /// left as it is and `false` returned.
+    /// Writes the manifest into its folder. If the same manifest exists already, leaves it
+    /// unchanged and returns `false`.
     ///
     /// # Errors
-    /// [`SweepError`] if another one is there, or it cannot be written.
+    /// [`SweepError`] if a different manifest exists, or the file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<bool, SweepError> {
         let path = Self::path(folder);
-        // Of several that are planned at once, one is there first.
+        // Of several sweeps planned at once, the first to create the file wins.
         match atomic_file::write_new(&path, self.text().as_bytes()) {
             Err(AtomicFileError::Exists { .. }) => {}
             written => return Ok(written.map(|()| true)?),
@@ -113,7 +113,7 @@ impl Manifest {
         }
         Err(SweepError::Manifest {
             path,
-            message: "another sweep is planned here; choose another --folder or remove this one"
+            message: "another sweep is planned here; choose another --folder or remove that sweep"
                 .into(),
         })
     }
@@ -125,7 +125,7 @@ impl Manifest {
     /// Reads the manifest of a sweep that this program planned.
     ///
     /// # Errors
-    /// [`SweepError`] if there is none, or another program's.
+    /// [`SweepError`] if the file does not exist, or another program wrote it.
     pub fn load(folder: &Path) -> Result<Self, SweepError> {
         let path = Self::path(folder);
         let text = match input_file::read(&path) {
@@ -133,7 +133,7 @@ impl Manifest {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Err(SweepError::Manifest {
                     path,
-                    message: "there is none; plan the sweep first, with `painleve sweep plan`, \
+                    message: "the file does not exist; plan the sweep first, with `painleve sweep plan`, \
                         or give its --folder"
                         .into(),
                 });
@@ -144,9 +144,9 @@ impl Manifest {
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let not_one = |error: &toml::de::Error| format!("is no manifest: {}", error.message());
+        let not_one = |error: &toml::de::Error| format!("is not a manifest: {}", error.message());
         let table: Table = text.parse().map_err(|error| not_one(&error))?;
-        // Before the rest, which another version may have otherwise.
+        // Checked first, because the other fields may differ between versions.
         let of = |key: &str| table.get(key).map(|value| value.to_string());
         let told = |key: &str| of(key).unwrap_or_else(|| "nothing".into());
         for (key, ours) in [
@@ -169,10 +169,10 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Checks that the campaign, understood again, is still the one that was planned.
+    /// Checks that the campaign, parsed again, is still the planned one.
     ///
     /// # Errors
-    /// [`SweepError::Manifest`] if it is not.
+    /// [`SweepError::Manifest`] if it has changed.
     pub fn check(&self, folder: &Path, understood: &Understood) -> Result<(), SweepError> {
         if self.campaign.hash(&understood.scenarios) == self.campaign_hash
             && understood.table.len() == self.rows
@@ -195,7 +195,7 @@ impl Manifest {
 pub(crate) mod tests {
     use super::*;
 
-    /// A manifest of so many rows of nothing.
+    /// Creates a manifest with this many rows and no content.
     pub fn manifest(rows: usize, shards: usize) -> Manifest {
         Manifest {
             format: FORMAT,
@@ -213,7 +213,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn it_is_read_as_it_was_written_and_not_replaced() {
+    fn a_manifest_is_read_back_unchanged_and_not_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let ours = manifest(10, 3);
         assert!(ours.write(folder.path()).unwrap());
@@ -238,7 +238,7 @@ pub(crate) mod tests {
         assert!(parse("format = 1", "").contains("format is nothing"));
         assert!(parse(REVISION, "feed").contains("git_revision is \"feed\""));
         assert!(parse("shards = 3", "shards = 11").contains("more shards"));
-        assert!(parse("shards = 3", "shard = 3").contains("no manifest"));
+        assert!(parse("shards = 3", "shard = 3").contains("not a manifest"));
         assert!(Manifest::parse("").unwrap_err().contains("another version"));
     }
 }

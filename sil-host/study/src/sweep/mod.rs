@@ -1,17 +1,17 @@
-//! Sweeps that outgrow a machine: a study's rows in shards, computed by any scheduler.
+//! Sweeps larger than one machine: the rows of a study in shards, computed under any scheduler.
 //!
-//! A *campaign* is a study and its options, a *sweep* a campaign dealt out into shards, in a
+//! A *campaign* is a study with its options. A *sweep* is a campaign divided into shards, in a
 //! folder of its own:
 //!
 //! - [`campaign`]: the campaign file
-//! - [`manifest`]: what exactly is computed, and by which program
-//! - [`share`]: which rows are a shard's, and which shard is this process's
-//! - [`shard_file`]: a finished shard, complete or not there
-//! - [`folder`]: which shards are finished, and putting them together
+//! - [`manifest`]: the exact computation, and the program that performs it
+//! - [`share`]: the rows of a shard, and the shard of this process
+//! - [`shard_file`]: a finished shard, either complete or absent
+//! - [`folder`]: the finished shards, and their merge
 //! - `parquet`: the merged rows as columns, with the feature of that name
-//! - [`array`]: lists of shards as schedulers read them; [`slurm`]: a script for Slurm
+//! - [`array`]: lists of shards in the syntax of schedulers; [`slurm`]: a job script for Slurm
 //!
-//! There is no state but the files, and no process that waits for another.
+//! The files are the only state, and no process waits for another.
 
 pub mod array;
 pub mod campaign;
@@ -29,42 +29,42 @@ use painleve_system::atomic_file::AtomicFileError;
 
 use crate::StudyError;
 
-/// Why there is no sweep, or not all of one.
+/// Why a sweep cannot be planned, run or merged.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     /// A file of the sweep cannot be read.
     #[error("cannot read {what} {}: {source}", path.display())]
     Unreadable {
-        /// What it should be.
+        /// The kind of file.
         what: &'static str,
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// The campaign file is wrong.
+    /// The campaign file is invalid.
     #[error("campaign file {}: {message}", path.display())]
     Campaign {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what is allowed.
+        /// The error and the allowed values.
         message: String,
     },
-    /// The manifest is wrong, or another program's.
+    /// The manifest is invalid, or belongs to another program.
     #[error("manifest {}: {message}", path.display())]
     Manifest {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// The error and how to correct it.
         message: String,
     },
-    /// There is no such shard.
+    /// No shard is given, or it does not exist.
     #[error("{0}")]
     Shard(String),
-    /// The shards are not all there, once each.
+    /// A shard is missing, duplicated or broken.
     #[error("{0}")]
     Incomplete(String),
-    /// The study is wrong or has no outcome.
+    /// The study is invalid or has no outcome.
     #[error(transparent)]
     Study(#[from] StudyError),
     /// A file cannot be written.
@@ -73,7 +73,7 @@ pub enum SweepError {
 }
 
 impl SweepError {
-    /// The file that cannot be read.
+    /// Returns the error for a file that cannot be read.
     pub fn unreadable(
         what: &'static str,
         path: impl Into<PathBuf>,

@@ -1,7 +1,7 @@
 //! The merged rows as a Parquet file, for tools that read columns.
 //!
-//! A column holds what all its cells are: truth values, whole numbers, numbers or text.
-//! An empty cell is no value.
+//! The type of a column is the common type of its cells: Boolean, integer, number or text.
+//! An empty cell is null.
 
 use std::sync::Arc;
 
@@ -12,13 +12,13 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-/// Why there is no Parquet file.
+/// Why the Parquet file cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ColumnsError {
-    /// The rows are no CSV.
+    /// The rows are not valid CSV.
     #[error("the merged rows cannot be read: {0}")]
     Csv(#[from] csv::Error),
-    /// They cannot be written as columns.
+    /// The rows cannot be written as columns.
     #[error("the merged rows cannot be written as Parquet: {0}")]
     Parquet(#[from] ParquetError),
 }
@@ -106,10 +106,10 @@ impl Column {
     }
 }
 
-/// The rows of a CSV file as a Parquet file.
+/// Returns the rows of a CSV file as a Parquet file.
 ///
 /// # Errors
-/// [`ColumnsError`] if they cannot be read or written.
+/// [`ColumnsError`] if the rows cannot be read or written.
 pub fn from_csv(text: &[u8]) -> Result<Vec<u8>, ColumnsError> {
     let mut reader = csv::Reader::from_reader(text);
     let names = reader.headers()?.clone();

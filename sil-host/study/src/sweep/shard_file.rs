@@ -1,5 +1,5 @@
-//! A finished shard: CSV whose first field is the row's number in the whole study, and whose
-//! last line says what it is and ends in a checksum of everything before.
+//! A finished shard: CSV whose first field is the row's number in the whole study. Its last
+//! line identifies the shard and ends with a checksum of everything before it.
 //!
 //! ```text
 //! row,mu,v_belt_m_s,…
@@ -7,8 +7,8 @@
 //! # shard 1/5 of sweep 4f0c…, 724 rows, xxh3 93ab…
 //! ```
 //!
-//! The file is written in one go under another name and renamed when it is on the disk, so
-//! that it is complete or not there; a disk that lost its tail all the same is noticed.
+//! The file is written under a temporary name and renamed once it is on the disk: it is
+//! either complete or absent. The checksum detects a truncated file.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,18 +24,18 @@ use crate::tabular::Records;
 
 const CHECKSUM: &str = ", xxh3 ";
 
-/// The contents of a finished shard.
+/// Contents of a finished shard.
 #[derive(Debug, PartialEq)]
 pub struct Shard {
-    /// Its number.
+    /// Number of the shard.
     pub shard: usize,
     /// Names of the fields.
     pub header: ByteRecord,
-    /// Row numbers, rising, and the lines of each.
+    /// Row numbers in ascending order, and the lines of each row.
     pub rows: Vec<(usize, Vec<ByteRecord>)>,
 }
 
-/// Its file in the sweep's folder.
+/// Returns the name of its file in the sweep's folder.
 pub fn path(folder: &Path, shard: usize) -> PathBuf {
     folder.join(format!("shard-{shard}.csv"))
 }
@@ -48,7 +48,7 @@ fn footer(manifest: &Manifest, shard: usize, rows: usize) -> String {
 /// Writes the computed rows of a shard.
 ///
 /// # Errors
-/// [`SweepError::Output`] if the file cannot be written; nothing is left then.
+/// [`SweepError::Output`] if the file cannot be written; no file is left then.
 pub fn write(
     folder: &Path,
     manifest: &Manifest,
@@ -92,7 +92,7 @@ fn text(
 /// Reads a shard and checks it against the manifest.
 ///
 /// # Errors
-/// What is wrong with it, in words that follow the file's name.
+/// The error as words that follow the file's name.
 pub fn read(path: &Path, manifest: &Manifest) -> Result<Shard, String> {
     let text = fs::read(path).map_err(|error| format!("cannot be read: {error}"))?;
     let truncated = || "is truncated".to_owned();
@@ -106,22 +106,22 @@ pub fn read(path: &Path, manifest: &Manifest) -> Result<Shard, String> {
     let (claim, checksum) = line.split_once(CHECKSUM).ok_or_else(truncated)?;
     let covered = &text[..start + claim.len() + CHECKSUM.len()];
     if format!("{:032x}", xxh3_128(covered)) != checksum {
-        return Err("does not have the checksum that it ends in".into());
+        return Err("does not match its checksum".into());
     }
     let shard = claim
         .strip_prefix("# shard ")
         .and_then(|rest| rest.split_once('/'))
         .and_then(|(shard, _)| shard.parse::<usize>().ok())
         .filter(|&shard| shard < manifest.shards)
-        .ok_or("is no shard of this sweep")?;
+        .ok_or("is not a shard of this sweep")?;
     let numbers: Vec<usize> = rows_of(shard, manifest.shards, manifest.rows).collect();
     if format!("{claim}{CHECKSUM}") != footer(manifest, shard, numbers.len()) {
         return Err("belongs to another sweep".into());
     }
-    let (header, rows) = parse(body).map_err(|error| format!("is no table: {error}"))?;
+    let (header, rows) = parse(body).map_err(|error| format!("is not a table: {error}"))?;
     if rows.iter().map(|(row, _)| row).ne(&numbers) {
         return Err(format!(
-            "does not hold the rows of shard {shard}, once each"
+            "does not hold every row of shard {shard} exactly once"
         ));
     }
     Ok(Shard {
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shard_is_read_as_it_was_written() {
+    fn a_shard_round_trips_through_its_file() {
         let folder = tempfile::tempdir().unwrap();
         let manifest = manifest(10, 3);
         for shard in 0..3 {
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn every_truncation_and_every_changed_byte_is_noticed() {
+    fn every_truncation_and_every_changed_byte_is_detected() {
         let folder = tempfile::tempdir().unwrap();
         let manifest = manifest(4, 2);
         let text = written(folder.path(), &manifest, 1);
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn shards_of_other_sweeps_are_told_apart() {
+    fn shards_of_other_sweeps_are_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let (ours, other) = (manifest(10, 3), manifest(11, 3));
         written(folder.path(), &other, 0);

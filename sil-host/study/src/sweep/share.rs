@@ -1,8 +1,8 @@
-//! Which rows are a shard's, and which shard is this process's.
+//! The rows of a shard, and the shard of this process.
 //!
-//! Neighbouring rows cost about the same, and some regions of a study cost a hundred times
-//! as much as others. So rows are dealt out like cards, one to each shard in turn, and each
-//! round begins one shard later: an inner loop of the study whose length divides the number of
+//! Neighbouring rows cost about the same, but some regions of a study cost a hundred times
+//! as much as others. Rows are therefore assigned round-robin, one to each shard in turn, and each
+//! round begins one shard later. An inner loop of the study whose length divides the number of
 //! shards does not put all its expensive rows into the same shard.
 
 use std::str::FromStr;
@@ -11,10 +11,10 @@ use super::SweepError;
 use crate::tabular::{Records, Table};
 use crate::{Study, StudyError};
 
-/// More shards than any scheduler's array takes.
+/// Largest number of shards: more than the job array of any scheduler takes.
 pub const MOST_SHARDS: usize = 1_000_000;
 
-/// Variables in which schedulers say which task of an array this is, the first first.
+/// Environment variables in which schedulers give the array index, in order of priority.
 pub const VARIABLES: [&str; 4] = [
     "SLURM_ARRAY_TASK_ID",
     "HQ_TASK_ID",
@@ -22,19 +22,19 @@ pub const VARIABLES: [&str; 4] = [
     "OMPI_COMM_WORLD_RANK",
 ];
 
-/// The shard that gets a row.
+/// Returns the shard that computes a row.
 pub fn shard_of(row: usize, shards: usize) -> usize {
     (row % shards + row / shards) % shards
 }
 
-/// The rows of a shard in rising order.
+/// Returns the rows of a shard in ascending order.
 pub fn rows_of(shard: usize, shards: usize, rows: usize) -> impl Iterator<Item = usize> {
     (0..rows.div_ceil(shards))
         .map(move |round| round * shards + (shard + shards - round % shards) % shards)
         .filter(move |&row| row < rows)
 }
 
-/// A shard on the command line: `K/N` or `K`, K from 0.
+/// A shard on the command line: `K/N` or `K`, with K from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShardOption {
     shard: usize,
@@ -46,7 +46,9 @@ impl FromStr for ShardOption {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |part: &str| {
-            let wrong = || format!("'{text}' is no shard; give K/N, K from 0 to N - 1, as in 0/5");
+            let wrong = || {
+                format!("'{text}' is not a shard; give K/N with K from 0 to N - 1, for example 0/5")
+            };
             part.parse::<usize>().map_err(|_| wrong())
         };
         let (shard, shards) = match text.split_once('/') {
@@ -57,10 +59,10 @@ impl FromStr for ShardOption {
     }
 }
 
-/// The shard to compute out of `shards`: the one asked for, or else what the scheduler says.
+/// Returns the shard to compute out of `shards`: the requested one, or the scheduler's.
 ///
 /// # Errors
-/// [`SweepError::Shard`] if nobody says which, or there is no such shard.
+/// [`SweepError::Shard`] if neither gives a shard, or if the shard does not exist.
 pub fn shard(
     asked: Option<ShardOption>,
     shards: usize,
@@ -81,7 +83,7 @@ pub fn shard(
     if shard >= shards {
         let last = shards - 1;
         return Err(SweepError::Shard(format!(
-            "{origin}: there is no shard {shard} of {shards}; shards are numbered 0 to {last}"
+            "{origin}: shard {shard} does not exist; the {shards} shards are numbered 0 to {last}"
         )));
     }
     Ok(shard)
@@ -93,32 +95,32 @@ fn from_environment(
     let set = |name| variable(name).map(|value| (name, value));
     let Some((name, value)) = VARIABLES.into_iter().find_map(set) else {
         return Err(SweepError::Shard(format!(
-            "which shard? give --shard K/N or --all, or run under a scheduler that sets {}",
+            "no shard is given; give --shard K/N or --all, or run under a scheduler that sets {}",
             VARIABLES.join(", ")
         )));
     };
     match value.parse() {
         Ok(shard) => Ok((shard, format!("{name}={value}"))),
         Err(_) => Err(SweepError::Shard(format!(
-            "{name}={value} is no number of a shard; give --shard K/N"
+            "{name}={value} is not a shard number; give --shard K/N"
         ))),
     }
 }
 
-/// The rows of one shard, as a study of its own.
+/// The rows of one shard as a study.
 pub struct Share<'a> {
     table: &'a dyn Table,
     rows: Vec<usize>,
 }
 
 impl<'a> Share<'a> {
-    /// Shard `shard` of `shards` of a study.
+    /// Creates the study of shard `shard` of `shards`.
     pub fn new(table: &'a dyn Table, shard: usize, shards: usize) -> Self {
         let rows = rows_of(shard, shards, table.len()).collect();
         Self { table, rows }
     }
 
-    /// Its rows' numbers in the whole study.
+    /// Returns the numbers of its rows in the whole study.
     pub fn rows(&self) -> &[usize] {
         &self.rows
     }
@@ -159,14 +161,14 @@ mod tests {
     }
 
     #[test]
-    fn an_inner_loop_is_dealt_out_too() {
-        // Every second row is expensive, as in from a, d with two shards.
+    fn an_inner_loop_is_distributed_over_the_shards() {
+        // Every second row is expensive, for example with `--initial a,d` and two shards.
         let expensive = |shard| rows_of(shard, 2, 100).filter(|row| row % 2 == 0).count();
         assert_eq!((expensive(0), expensive(1)), (25, 25));
     }
 
     #[test]
-    fn the_command_line_comes_before_schedulers_in_their_order() {
+    fn the_command_line_takes_precedence_over_schedulers_in_their_order() {
         let all = |name: &str| VARIABLES.iter().position(|&one| one == name);
         let of = |asked: Option<&str>, from: usize| {
             let asked = asked.map(|text| text.parse().unwrap());

@@ -1,34 +1,34 @@
-//! A script for Slurm: one task of a job array for each shard.
+//! The job script for Slurm, with one array task per shard.
 
 use std::path::Path;
 
-/// What the script asks Slurm for.
+/// Settings of the job script.
 #[derive(Clone, Debug)]
 pub struct Job<'a> {
-    /// The `painleve` program, an absolute path.
+    /// Absolute path of the `painleve` program.
     pub program: &'a Path,
-    /// Where it is started, an absolute path.
+    /// Absolute path of the working directory.
     pub directory: &'a Path,
-    /// The sweep's folder, an absolute path.
+    /// Absolute path of the sweep's folder.
     pub folder: &'a Path,
-    /// Shards, as in `3,7,9-12`.
+    /// Shards to compute, for example `3,7,9-12`.
     pub array: &'a str,
-    /// Cores, and threads, of each.
+    /// Cores of each task, which are also its threads.
     pub cpus: usize,
-    /// Further options of `sbatch`, as in `--time=30`.
+    /// Further options of `sbatch`, for example `--time=30`.
     pub options: &'a [String],
 }
 
 impl Job<'_> {
-    /// The script, or why there cannot be one.
+    /// Returns the script.
     ///
     /// # Errors
-    /// A sentence for the user if a path or option does not fit into a line.
+    /// A message for the user if a path or an option does not fit into a line of the script.
     pub fn script(&self) -> Result<String, String> {
         let text = |path: &Path| match path.to_str() {
             Some(text) if !text.contains(['\n', '"', '\\', '%']) => Ok(text.to_owned()),
             _ => Err(format!(
-                "{} cannot be in a script for Slurm: choose a path without quotes, backslashes, % and line ends",
+                "{} cannot appear in a Slurm script; choose a path without quotes, backslashes, % and line ends",
                 path.display()
             )),
         };
@@ -39,7 +39,7 @@ impl Job<'_> {
             format!("--array={}", self.array),
             format!("--cpus-per-task={}", self.cpus),
             "--ntasks=1".to_owned(),
-            // A task whose node fails is run again; what it had finished is skipped.
+            // Slurm requeues a task whose node fails; finished shards are skipped.
             "--requeue".to_owned(),
             "--open-mode=append".to_owned(),
             format!("--chdir=\"{directory}\""),
@@ -48,7 +48,7 @@ impl Job<'_> {
         for option in self.options {
             if !option.starts_with('-') || option.contains('\n') {
                 return Err(format!(
-                    "--option '{option}' is no option of sbatch; give one as in --option=--time=30"
+                    "--option '{option}' is not an option of sbatch; give one, for example --option=--time=30"
                 ));
             }
             options.push(option.clone());
@@ -66,7 +66,7 @@ impl Job<'_> {
     }
 }
 
-/// A word of the shell.
+/// Quotes a word for the shell.
 fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused() {
+    fn unsuitable_paths_and_options_are_refused() {
         assert!(job("/a\"b", &[]).script().is_err());
         assert!(job("/a\nb", &[]).script().is_err());
         assert!(job("/a", &["time=30".into()]).script().is_err());
