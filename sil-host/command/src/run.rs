@@ -392,8 +392,9 @@ struct Reader(Option<Receiver<Vec<u8>>>);
 impl Reader {
     /// The most that is kept of a pipe, bytes; the rest is read and dropped.
     const KEPT: u64 = 4 << 20;
-    /// How long a pipe may stay open after its process has ended.
-    const PATIENCE: Duration = Duration::from_millis(500);
+    /// How long a pipe may stay open after its process has ended: on a machine with much
+    /// else to do, what was said takes a while to be read.
+    const PATIENCE: Duration = Duration::from_secs(3);
 
     fn start(pipe: Option<impl Read + Send + 'static>) -> std::io::Result<Self> {
         let Some(mut pipe) = pipe else {
