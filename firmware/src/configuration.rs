@@ -1,7 +1,7 @@
-//! Everything that can be set about the controller, checked before it runs.
+//! The controller's configuration, checked before the controller runs.
 //!
-//! Kept apart from state: a configuration is a value that can be stored, sent
-//! over a link (serde) and compared; the controller is made from it.
+//! The configuration is separate from the state: it is a value that can be stored, sent over a link
+//! (serde) and compared, and from which the controller is built.
 
 use painleve_shared::counts::{EncoderScale, LinearScale};
 use painleve_shared::range::{self, OutOfRange};
@@ -24,7 +24,7 @@ use crate::supervise::lapses::LapseLimits;
 use crate::supervise::supervisor::SupervisorSettings;
 
 settings! {
-    /// The converters' scalings as the controller knows them.
+    /// Scalings of the converters, as configured in the controller.
     #[derive(Copy)]
     pub struct Converters {
         /// Encoders of θ1 and of θ2 − θ1.
@@ -41,37 +41,37 @@ settings! {
     pub struct ControllerSettings<L: Law = LawSettings> {
         /// Largest torque on either joint; at most the torque stages' range.
         torque_limit_nm: f32 = 5.0, 0.0..=1e6, "N·m";
-        /// How rates are estimated from counts.
+        /// Estimation of joint angles and rates from encoder counts.
         estimator: EstimatorSettings = EstimatorSettings::default();
-        /// When the tip is taken to touch the belt.
+        /// Detection of contact between tip and belt.
         contact: ContactSettings = ContactSettings::default();
-        /// How friction is estimated.
+        /// Estimation of friction.
         friction: FrictionSettings = FrictionSettings::default();
-        /// What is known about the belt.
+        /// Estimation of the belt's speed.
         belt: BeltSettings = BeltSettings::default();
-        /// How unknown torques are estimated.
+        /// Estimation of unknown torques.
         disturbance: DisturbanceSettings = DisturbanceSettings::default();
-        /// How the links' length is calibrated.
+        /// Calibration of the links' length.
         calibration: CalibrationSettings = CalibrationSettings::default();
-        /// When the drive is armed, and when it is shut down.
+        /// Arming, recovery and shutdown of the drive.
         supervisor: SupervisorSettings = SupervisorSettings::default();
-        /// How many lapses in a row are survived.
+        /// Number of lapses tolerated in a row.
         lapses: LapseLimits = LapseLimits::default();
         /// The control law.
         law: L = L::default();
-        /// How the tip is kept pressed on the belt.
+        /// Contact guard, which keeps the tip pressed on the belt.
         guard: GuardSettings = GuardSettings::default();
-        /// How the reference is kept off the paradox.
+        /// Edge governor, which keeps the reference away from the paradox.
         governor: GovernorSettings = GovernorSettings::default();
-        /// How a tip that left the belt is brought back.
+        /// Recovery of a tip that has left the belt.
         recovery: RecoverySettings = RecoverySettings::default();
-        /// Where the tip shall go, segment after segment.
+        /// Reference of the tip, segment by segment.
         reference: Program = Program::to_the_papers_limit();
     }
 }
 
-/// Configuration of the controller: what it is connected to, and its settings. The default is the
-/// paper's arm at 1 kHz; another rate is
+/// Configuration of the controller: control rate, arm, converters and settings. The default is the
+/// paper's arm at 1 kHz. Another rate is set as follows:
 ///
 /// ```
 /// use painleve_firmware::{Configuration, Controller};
@@ -84,9 +84,9 @@ settings! {
 pub struct Configuration<L: Law = LawSettings> {
     /// Control rate, Hz.
     pub tick_hz: f32,
-    /// The arm as the controller knows it.
+    /// Parameters of the arm, as configured in the controller.
     pub arm: ArmParameters<f32>,
-    /// What a count is worth.
+    /// Scalings of the converters.
     pub converters: Converters,
     /// The settings.
     pub settings: ControllerSettings<L>,
@@ -105,25 +105,26 @@ impl<L: Law> Default for Configuration<L> {
 }
 
 impl<L: Law> Configuration<L> {
-    /// Time between two ticks, s.
+    /// Returns the control period, s.
     pub fn tick_s(&self) -> f32 {
         1.0 / self.tick_hz
     }
 
-    /// How far a count of the coarser encoder moves the tip along the belt, m.
+    /// Returns the distance by which a count of the coarser encoder moves the tip along the belt,
+    /// m.
     pub fn tip_count_m(&self) -> f32 {
         let [one, two] = self.converters.encoders;
         let count_rad = one.rad_per_count::<f32>().at_least(two.rad_per_count());
         self.arm.height_m * count_rad
     }
 
-    /// Checks every number, those of the law included, and makes the arm's model.
+    /// Checks every number, including those of the law, and builds the arm's model.
     ///
     /// # Errors
     /// [`OutOfRange`] for the first setting that is out of range. Its key is relative to
     /// [`settings`](Self::settings), as in `law.hybrid.normal_force_n`, or begins with `tick_hz`,
     /// `arm` or `converters`.
-    // Out of line: its errors do not share the stack with the controller that is being made.
+    // Out of line: the errors do not share the stack with the controller being built.
     #[inline(never)]
     pub fn validate(&self) -> Result<Arm<f32>, OutOfRange> {
         range::check("tick_hz", self.tick_hz, 10.0, 1e5)?;
@@ -134,7 +135,7 @@ impl<L: Law> Configuration<L> {
         Ok(arm)
     }
 
-    /// Checks the settings whose range depends on what the controller is connected to.
+    /// Checks the settings whose range depends on the control rate, the arm or the converters.
     fn relations(&self, arm: &Arm<f32>) -> Result<(), OutOfRange> {
         let settings = &self.settings;
         let force_range_n = self.converters.force.range;
@@ -143,7 +144,7 @@ impl<L: Law> Configuration<L> {
         check_setting!(settings.estimator.bandwidth_rad_s, 1.0, 3.0 * self.tick_hz)?;
         check_setting!(settings.contact.contact_n, 1e-3, force_range_n)?;
         check_setting!(settings.contact.force_noise_n, 1e-4, force_range_n)?;
-        // A governed reference may be out of reach: it is held at the edge.
+        // A governed reference may be out of reach: the governor holds it at the edge.
         let reach_m = if settings.governor.enabled {
             arm.reach_m()
         } else {

@@ -1,8 +1,9 @@
-//! The torque closest to the wanted one that keeps the tip pressed on the belt.
+//! Contact guard: finds the torque closest to the wanted one that keeps the tip pressed on the
+//! belt.
 //!
-//! While sliding, f_n = −b/p, and b = b₀ + n·u is affine in the joint torques u. f_n ≥ f_min
-//! is therefore one half-plane, n·u ≤ −p f_min − b₀, and the torque limits are a
-//! box around it: the nearest point has a closed form.
+//! While sliding, f_n = −b/p, and b = b₀ + n·u is affine in the joint torques u. The condition f_n
+//! ≥ f_min is therefore a half-plane, n·u ≤ −p f_min − b₀. The torque limits form a box around it,
+//! and the nearest point has a closed form.
 
 use nalgebra::Vector2;
 use painleve_shared::{JointTorque, Real, settings};
@@ -27,9 +28,9 @@ pub struct HalfPlane {
     pub bound: f32,
 }
 
-/// The torque (N·m) within ±`limit_nm` nearest to `wanted_nm` in the half-plane, and whether the
-/// half-plane moved it. Where box and half-plane do not meet, the corner of the box deepest
-/// on the half-plane's side.
+/// Returns the torque (N·m) within ±`limit_nm` nearest to `wanted_nm` in the half-plane, and
+/// whether the half-plane changed it. If box and half-plane do not meet, returns the corner of the
+/// box that comes closest to satisfying it.
 pub fn nearest_torque_nm(
     wanted_nm: &JointTorque<f32>,
     plane: &HalfPlane,
@@ -41,11 +42,11 @@ pub fn nearest_torque_nm(
     if normal.dot(limited.vector()) <= plane.bound || square <= 0.0 {
         return (limited, false);
     }
-    // On the line, as near as can be to the wanted torque.
+    // Project the wanted torque onto the line.
     let step = (plane.bound - normal.dot(wanted_nm.vector())) / square;
     let foot = wanted_nm.vector() + normal * step;
-    // Where the foot is outside the box, the nearest point of the line inside it
-    // has one torque at its limit and the other from the line.
+    // If the projection is outside the box, the nearest point of the line inside the box has one
+    // torque at its limit and the other from the line.
     let first = foot.x.within(limit_nm);
     let second = along(plane.bound - normal.x * first, normal.y, foot.y);
     if second.abs() <= limit_nm {
@@ -61,7 +62,7 @@ pub fn nearest_torque_nm(
     }
 }
 
-/// `rest / slope`, or `otherwise` where the slope is too small to solve for.
+/// Returns `rest / slope`, or `otherwise` where the slope is too small.
 fn along(rest: f32, slope: f32, otherwise: f32) -> f32 {
     let value = rest / slope;
     if value.is_finite() { value } else { otherwise }
@@ -93,7 +94,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against a search over the whole box.
+        /// Compares the result with a search over the whole box.
         #[test]
         fn no_torque_within_limits_is_nearer(
             w1 in -8.0_f32..8.0, w2 in -8.0_f32..8.0, n1 in -50.0_f32..50.0, n2 in -50.0_f32..50.0,

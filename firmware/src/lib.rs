@@ -1,16 +1,16 @@
-//! The arm's controller: a pure function from configuration, state and a sensor
-//! frame to an actuator frame, called once per control tick.
+//! The arm's controller: a pure function from configuration, state and sensor frame to an actuator
+//! frame, called once per control tick.
 //!
-//! It does not know where it runs. The same source is flashed to the
-//! microcontroller, linked into the simulation and run under an emulator, and
-//! gives the same bits everywhere: single precision, no fused multiply-add, sine and
-//! cosine from `painleve-shared`. Nothing here allocates, panics or loops without bound.
+//! The controller does not depend on its host. The same source is flashed to the microcontroller,
+//! linked into the simulation and run under an emulator, and gives the same bits everywhere: single
+//! precision, no fused multiply-add, sine and cosine from `painleve-shared`. Nothing here
+//! allocates, panics or loops without bound.
 //!
-//! The folders are in the order of one tick: [`controller`] checks the frame; [`estimate`]
-//! turns counts into angles, rates, contact and friction; [`supervise`] decides what may be
-//! done; [`refer`] says where the tip should be; [`law`] computes torques, or [`recover`]
-//! brings a thrown tip back; [`guard`] keeps the tip pressed to the belt. [`telemetry`]
-//! shows what went on inside.
+//! The modules follow the order of one tick: [`controller`] checks the frame; [`estimate`] converts
+//! counts to angles, rates, contact and friction; [`supervise`] decides which actions are allowed;
+//! [`refer`] gives the target position of the tip; [`law`] computes torques, or [`recover`] returns
+//! a thrown tip to the belt; [`guard`] keeps the tip pressed on the belt. [`telemetry`] exposes the
+//! internal state.
 
 #![no_std]
 

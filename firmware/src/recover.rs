@@ -1,10 +1,10 @@
-//! Brings a tip that left the belt back onto it, softly and where it can slide.
+//! Returns a tip that has left the belt to it, softly and within the admissible stretch.
 //!
 //! In the air the joints are double integrators (computed torque) that follow a tip path: above the
-//! belt to the admissible stretch, then down, the slower the lower, until it touches; the
-//! law takes over from there. The path is followed in joint angles because a thrown arm may
-//! swing through the straight posture, where tip accelerations cannot be had. A tip at
-//! rest lands with the belt's full slip, in the direction in which the stretch is admissible.
+//! belt to the admissible stretch, then down, slower at lower heights, until the tip touches and the
+//! law resumes. The path is followed in joint angles, because a thrown arm may swing through the
+//! straight posture, where some tip accelerations are impossible. A tip at rest lands with the belt's
+//! full slip, in the direction for which the stretch is admissible.
 
 use nalgebra::Vector2;
 use painleve_shared::{Arm, LinkMotion, Posture, Real, settings};
@@ -12,15 +12,16 @@ use painleve_shared::{Arm, LinkMotion, Posture, Real, settings};
 use crate::estimate::model::Model;
 use crate::law::LawOutput;
 
-/// Distance from the landing place within which the tip is lowered, m.
+/// Distance from the landing point within which the tip is lowered, m.
 const OVER_LANDING_PLACE_M: f32 = 2e-3;
-/// Speed with which the tip is raised to its clearance, m/s.
+/// Speed at which the tip is raised to its clearance, m/s.
 const RAISING_M_S: f32 = 0.1;
-/// Rate at which the height above the belt shrinks on the way down, 1/s.
+/// Rate at which the height above the belt decays on the way down, 1/s.
 const DESCENT_PER_S: f32 = 15.0;
-/// How far below the belt the tip is sent until it is felt to touch, m.
+/// Depth below the belt to which the tip is sent until contact is detected, m.
 const DEEPEST_M: f32 = 0.03;
-/// How many times faster it is lowered below where the belt is believed to be: the links are shorter.
+/// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are
+/// shorter.
 const SEARCHING: f32 = 4.0;
 
 settings! {
@@ -35,27 +36,27 @@ settings! {
         clearance_m: f32 = 1e-3, 0.0..=0.05, "m";
         /// Speed at which the tip is lowered onto the belt.
         landing_speed_m_s: f32 = 0.02, 1e-3..=1.0, "m/s";
-        /// Least p/Q22 where the tip may land: closer to the edge, impacts throw the tip off.
+        /// Least p/Q22 at the landing point: closer to the edge, impacts throw the tip off.
         minimum_p_ratio: f32 = 0.2, 0.0..=0.9;
     }
 }
 
-/// Brings the tip back.
+/// Computes the torques that return the tip to the belt.
 #[derive(Clone, Copy, Debug)]
 pub struct Recovery {
     settings: RecoverySettings,
     tick_s: f32,
 }
 
-/// What a [`Recovery`] is about to do; nothing while the tip touches.
+/// State of a [`Recovery`]; idle while the tip touches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RecoveryState {
-    /// Where to land, m, and the height to have (m), once the tip is in the air.
+    /// Landing point (m) and wanted height (m), once the tip is in the air.
     flight: Option<Flight>,
 }
 
 impl RecoveryState {
-    /// Posture in which the tip is to land; `None` while there is nothing to recover.
+    /// Posture in which the tip is to land; `None` while no recovery is in progress.
     pub fn posture(&self) -> Option<Posture> {
         self.flight.map(|flight| flight.posture)
     }
@@ -65,16 +66,16 @@ impl RecoveryState {
 struct Flight {
     landing_m: f32,
     height_m: f32,
-    /// Whether the tip has been over its landing place. It then goes down there, even
-    /// if the first touch drags it along.
+    /// Whether the tip has been above its landing point. It then descends there, even if the first
+    /// touch drags it along.
     lands: bool,
     posture: Posture,
-    /// Link angles of the path at the tick before, rad.
+    /// Link angles of the path at the previous tick, rad.
     path_rad: Option<LinkMotion<f32>>,
 }
 
 impl Recovery {
-    /// A recovery that is called every `tick_s`.
+    /// Makes a recovery that is called every `tick_s`.
     pub fn new(settings: &RecoverySettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
@@ -82,13 +83,13 @@ impl Recovery {
         }
     }
 
-    /// Least p as a part of Q22 where the tip may land.
+    /// Returns the least p, as a fraction of Q22, at which the tip may land.
     pub fn minimum_p_ratio(&self) -> f32 {
         self.settings.minimum_p_ratio
     }
 
-    /// Torques for one tick in the air, with the admissible stretch
-    /// `edges_m`; until that is known the tip is held above the belt.
+    /// Computes the torques for one tick in the air, with the admissible stretch `edges_m`; until it
+    /// is known the tip is held above the belt.
     pub fn tick(
         &self,
         state: &mut RecoveryState,
@@ -112,7 +113,7 @@ impl Recovery {
             let admissible = model.tip_m.x > lower && model.tip_m.x < upper;
             away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible)
         });
-        // The higher the tip, the faster down; the last stretch at landing speed.
+        // Descend faster at greater height, and at landing speed close to the belt.
         let down = if flight.height_m < 0.0 {
             SEARCHING * settings.landing_speed_m_s
         } else {

@@ -1,4 +1,4 @@
-//! What went on inside the controller at its last tick, in SI units.
+//! Internal state of the controller at its last tick, in SI units.
 
 use painleve_shared::Slip;
 use painleve_shared::status::{Fault, SupervisorState};
@@ -9,8 +9,7 @@ use crate::estimate::model::Model;
 use crate::refer::Target;
 use crate::supervise::supervisor::Supervision;
 
-/// A snapshot for logs and displays. The controller writes it and has no means to read it: it
-/// has a [`TelemetrySink`] only.
+/// A snapshot for logs and displays. The controller can only write it, through a [`TelemetrySink`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Telemetry {
@@ -32,37 +31,37 @@ pub struct Telemetry {
     pub normal_force_n: f32,
     /// Measured tangential force, N.
     pub tangential_force_n: f32,
-    /// Joint torques u1, u2 as given, rounded to counts, N·m.
+    /// Joint torques u1, u2 as output, rounded to counts, N·m.
     pub torque_nm: [f32; 2],
-    /// Whether the tip is taken to touch.
+    /// The contact decision: the tip touches the belt.
     pub contact: bool,
-    /// How sure that is, 0 … 1.
+    /// Certainty of the contact decision, 0 … 1.
     pub contact_confidence: f32,
     /// Estimated friction coefficient.
     pub friction: f32,
-    /// Its standard deviation.
+    /// Standard deviation of the friction coefficient.
     pub friction_deviation: f32,
     /// Direction of slip.
     pub slip: Slip,
-    /// Whether the tip seems to move with the belt.
+    /// Whether the tip is estimated to stick to the belt.
     pub sticks: bool,
     /// Edges of the admissible stretch of the belt, m.
     pub edges_m: [f32; 2],
     /// Whether an edge holds the reference back.
     pub at_edge: bool,
-    /// Whether the tip is being brought back onto the belt.
+    /// Whether the tip is being returned to the belt.
     pub recovering: bool,
     /// Whether the contact guard changed the torque.
     pub guarded: bool,
     /// Whether the torque was limited.
     pub saturated: bool,
-    /// Ticks on which the contact guard acted since the start.
+    /// Number of ticks since the start in which the contact guard acted.
     pub guarded_ticks: u32,
-    /// Ticks with limited torque since the start.
+    /// Number of ticks since the start with limited torque.
     pub saturated_ticks: u32,
 }
 
-/// What the stages of one tick have found and decided.
+/// Results of the stages of one tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick<'a> {
     pub(crate) model: &'a Model,
@@ -72,21 +71,21 @@ pub(crate) struct Tick<'a> {
     pub(crate) recovering: bool,
 }
 
-/// Where the controller writes its telemetry, if anybody wants it.
+/// Destination of the controller's telemetry, if it is wanted.
 pub(crate) struct TelemetrySink<'a>(Option<&'a mut Telemetry>);
 
 impl<'a> TelemetrySink<'a> {
-    /// Nobody wants it.
+    /// Discards the telemetry.
     pub(crate) fn nowhere() -> Self {
         Self(None)
     }
 
-    /// For whoever has this.
+    /// Writes to this snapshot.
     pub(crate) fn to(telemetry: &'a mut Telemetry) -> Self {
         Self(Some(telemetry))
     }
 
-    /// Writes down a tick.
+    /// Writes the results of a tick.
     #[inline]
     pub(crate) fn record(self, of: &Tick<'_>, tick: u32, supervision: &Supervision) {
         let Some(telemetry) = self.0 else {
@@ -127,7 +126,7 @@ impl<'a> TelemetrySink<'a> {
         };
     }
 
-    /// Writes down that the torque has been taken off without a tick.
+    /// Records that the torque has been taken off without a tick.
     pub(crate) fn stop(self, supervision: &Supervision) {
         if let Some(telemetry) = self.0 {
             *telemetry = Telemetry {

@@ -1,10 +1,9 @@
-//! A planar two-link arm: its parameters, checked once, and the model made from them.
+//! A planar two-link arm: its parameters, checked once, and the model built from them.
 //!
-//! The arm moves in the vertical plane of the belt's run. Axes are those of the belt: t along
-//! it, n away from it, origin in the first joint; the belt is the line z_n = −H. The link angles
-//! θ1, θ2 are absolute, measured from the belt's inward normal −n towards t: from the
-//! downward vertical if the belt is level, as in the paper. A tilted belt tilts gravity in these axes
-//! and changes nothing else. The joint angles are q' = (θ1, θ2 − θ1).
+//! The arm moves in the vertical plane along the belt. The axes are those of the belt: t along it, n away from
+//! it, origin at the first joint; the belt is the line z_n = −H. The link angles θ1, θ2 are absolute, measured
+//! from the belt's inward normal −n towards t. For a level belt this is the downward vertical, as in the paper.
+//! A tilted belt tilts gravity in these axes and changes nothing else. The joint angles are q' = (θ1, θ2 − θ1).
 
 use core::f64::consts::PI;
 
@@ -14,8 +13,8 @@ use crate::settings::Settings;
 use crate::{check_setting, settings};
 
 settings! {
-    /// Parameters of an arm in SI units; a pair is of link 1 and link 2, or of joint 1 and joint 2.
-    /// The default is the paper's arm: two equal uniform rods (Table I), with g = 9.81 m/s².
+    /// Parameters of an arm in SI units; a pair belongs to links 1 and 2, or to joints 1 and 2. The default is
+    /// the paper's arm: two equal uniform rods (Table I), with g = 9.81 m/s².
     #[derive(Copy)]
     pub struct ArmParameters<T: Real> {
         /// Length l of each link, from its joint to the next one or to the tip.
@@ -51,7 +50,7 @@ settings! {
 }
 
 impl<T: Real> ArmParameters<T> {
-    /// The same arm in another precision.
+    /// Returns the same arm in another precision.
     pub fn cast<U: Real>(&self) -> ArmParameters<U> {
         let cast = |value: T| U::literal(value.to_f64());
         let pair = |values: [T; 2]| values.map(cast);
@@ -71,10 +70,10 @@ impl<T: Real> ArmParameters<T> {
         }
     }
 
-    /// Checks that the belt is in reach all the way to where the arm is straight.
+    /// Checks that the belt is within reach everywhere between the two points of full stretch.
     fn relations(&self) -> Result<(), OutOfRange> {
-        // At full stretch, and folded over the hole that links of two lengths leave around
-        // the first joint, the Jacobian is singular: the belt keeps clear of both.
+        // The Jacobian is singular at full stretch, and where links of different lengths fold over the hole
+        // around the first joint: the belt keeps clear of both.
         let [first, second] = self.link_length_m.map(T::to_f64);
         let (reach, hole) = (first + second, (first - second).abs());
         let least = (0.01 * reach).max(1.001 * hole);
@@ -82,11 +81,11 @@ impl<T: Real> ArmParameters<T> {
     }
 }
 
-/// Least determinant of the mass matrix over all postures, as a part of the product of its
-/// diagonal. Two equal uniform rods have 0.44; below this, single precision loses M⁻¹.
+/// Least determinant of the mass matrix over all postures, as a fraction of the product of its diagonal. Two
+/// equal uniform rods have 0.44; below this limit, single precision loses M⁻¹.
 const LEAST_DETERMINANT: f64 = 1e-3;
 
-/// The arm's model: checked parameters as the coefficients that the equations of motion share.
+/// The arm's model: the coefficients of the equations of motion, computed from checked parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm<T: Real> {
     /// l1 and l2, m.
@@ -99,19 +98,19 @@ pub struct Arm<T: Real> {
     /// M11 and M22, kg·m².
     pub(crate) inertia_1: T,
     pub(crate) inertia_2: T,
-    /// M12 is this times cos δ, less the second rotor's inertia; kg·m².
+    /// A in M12 = A cos δ − J2, kg·m², with δ = θ2 − θ1 and J2 the second rotor's inertia.
     pub(crate) inertia_coupling: T,
-    /// A quarter of that for links of unit length, kg.
+    /// A/4 for links of unit length, kg.
     pub(crate) quarter_coupled_mass: T,
     pub(crate) rotor_1: T,
     pub(crate) rotor_2: T,
-    /// Torques of gravity across and along the belt on either link, N·m.
+    /// Torques of gravity across and along the belt on each link, N·m.
     pub(crate) gravity_1_normal: T,
     pub(crate) gravity_1_tangential: T,
     pub(crate) gravity_2_normal: T,
     pub(crate) gravity_2_tangential: T,
     pub(crate) damping_2: T,
-    /// Damping of joint 1 beyond that of joint 2, N·m·s/rad.
+    /// Damping of joint 1 in excess of joint 2, N·m·s/rad.
     pub(crate) damping_1_excess: T,
     pub(crate) stiffness_1: T,
     pub(crate) stiffness_2: T,
@@ -120,12 +119,12 @@ pub struct Arm<T: Real> {
 }
 
 impl<T: Real> Arm<T> {
-    /// Makes the model from checked parameters.
+    /// Builds the model from checked parameters.
     ///
     /// # Errors
-    /// [`OutOfRange`], with a key in the group `arm`, for the first parameter that is not finite, not physical, or that puts the
-    /// belt out of reach (H ≥ l1 + l2 or H ≤ |l1 − l2|); also if no kinetic energy goes with some motion of the links
-    /// (their mass matrix is singular).
+    /// [`OutOfRange`], with a key in the group `arm`, for the first parameter that is not finite, not physical,
+    /// or that puts the belt out of reach (H ≥ l1 + l2 or H ≤ |l1 − l2|); also if the mass matrix of the links
+    /// is singular, that is, if some motion of the links has no kinetic energy.
     pub fn new(parameters: ArmParameters<T>) -> Result<Self, OutOfRange> {
         parameters.validate().map_err(|error| error.inside("arm"))?;
         let [length_1, length_2] = parameters.link_length_m;
@@ -140,7 +139,7 @@ impl<T: Real> Arm<T> {
             .unwrap_or([rod(mass_1, length_1), rod(mass_2, length_2)]);
         let [rotor_1, rotor_2] = parameters.rotor_inertia_kg_m2;
         let tip = parameters.tip_mass_kg;
-        // What joint 1 carries at the end of link 1, and the moments of mass about both joints.
+        // Mass at the end of link 1, and the moments of mass about both joints.
         let carried = (mass_2 + tip) * length_1;
         let moment_2 = mass_2 * centre_2 + tip * length_2;
         let gravity = parameters.gravity_m_s2;
@@ -178,7 +177,7 @@ impl<T: Real> Arm<T> {
             spring_rest_1,
             spring_rest_2,
         };
-        // M12 = A cos δ − J2 is largest where both terms add.
+        // M12 = A cos δ − J2 has its largest magnitude where both terms add.
         let product = arm.inertia_1 * arm.inertia_2;
         let coupling = arm.inertia_coupling.abs() + rotor_2;
         let determinant = (product - coupling * coupling) / product;
@@ -204,8 +203,8 @@ impl<T: Real> Arm<T> {
         self.height_m
     }
 
-    /// Scales all lengths of the links, at the same masses, so that link 1 is `length_1_m` long.
-    /// Rotors, springs and the belt stay as they are. The length is not checked.
+    /// Scales the lengths of both links, at the same masses, so that link 1 is `length_1_m` long. Rotors,
+    /// springs and the belt stay unchanged. The length is not checked.
     pub fn scale_to(&mut self, length_1_m: T) {
         let ratio = length_1_m / self.length_1_m;
         let square = ratio * ratio;
@@ -221,13 +220,13 @@ impl<T: Real> Arm<T> {
         self.gravity_2_tangential *= ratio;
     }
 
-    /// Farthest that the tip can be from the first joint, m: l1 + l2.
+    /// Largest distance of the tip from the first joint, m: l1 + l2.
     #[inline]
     pub fn reach_m(&self) -> T {
         self.length_1_m + self.length_2_m
     }
 
-    /// Nearest that the tip can be to the first joint, m: |l1 − l2|.
+    /// Smallest distance of the tip from the first joint, m: |l1 − l2|.
     #[inline]
     pub fn hole_m(&self) -> T {
         (self.length_1_m - self.length_2_m).abs()
@@ -247,7 +246,7 @@ mod tests {
     use crate::kinematics::Pose;
     use std::string::ToString;
 
-    /// An arm that differs from the paper's in everything.
+    /// An arm that differs from the paper's in every parameter.
     fn general() -> ArmParameters<f64> {
         ArmParameters {
             link_length_m: [0.25, 0.19],
@@ -290,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_belt_out_of_reach_is_refused_by_name() {
+    fn a_belt_out_of_reach_is_refused_and_named() {
         for (link_length_m, height_m) in [
             ([0.21, 0.21], 0.42),
             ([0.25, 0.16], 0.41),
@@ -316,7 +315,7 @@ mod tests {
         };
         let error = refused(parameters);
         assert_eq!(error.key, "arm.least det M / (M11 M22)");
-        // A mass at the tip of either link makes up for it; on a line with joint 1 alone it does not.
+        // A mass at the tip gives both links inertia; a mass on the line through joint 1 alone does not.
         let ideal = ArmParameters {
             tip_mass_kg: 0.1,
             ..parameters
@@ -333,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn scaled_links_are_those_that_are_made_so() {
+    fn scaled_links_equal_links_built_at_that_length() {
         let parameters = general();
         let scale = 0.95;
         let scaled = |values: [f64; 2]| values.map(|value| value * scale);

@@ -1,7 +1,7 @@
-//! The tip on the belt: Q, b, p and the four solution modes (paper, section II-A).
+//! Contact of the tip with the belt: Q, b, p and the four solution modes (paper, section II-A).
 //!
-//! In contact z̈_n = b + p f_n. The free normal acceleration b depends on state
-//! and torque; p on the posture, the friction coefficient μ and the direction of slip only.
+//! In contact z̈_n = b + p f_n. The free normal acceleration b depends on state and torque; p
+//! depends only on the posture, the friction coefficient μ and the direction of slip.
 
 use core::cmp::Ordering;
 
@@ -26,7 +26,7 @@ pub enum Slip {
 }
 
 impl Slip {
-    /// The direction of a slip velocity; zero counts as positive.
+    /// Returns the direction of a slip velocity; zero counts as positive.
     #[inline]
     pub fn of<T: Real>(slip_velocity: T) -> Self {
         if slip_velocity < T::zero() {
@@ -36,7 +36,7 @@ impl Slip {
         }
     }
 
-    /// +1 or −1.
+    /// Returns +1 or −1.
     #[inline]
     pub fn sign<T: Real>(self) -> T {
         match self {
@@ -45,7 +45,7 @@ impl Slip {
         }
     }
 
-    /// The opposite direction.
+    /// Returns the opposite direction.
     #[inline]
     pub fn reversed(self) -> Self {
         match self {
@@ -55,7 +55,7 @@ impl Slip {
     }
 }
 
-/// How the sliding equations can be solved at one state (paper, section II-A).
+/// The solutions of the sliding equations at one state (paper, section II-A).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -64,17 +64,17 @@ pub enum SolutionMode {
     Sliding,
     /// p > 0, b ≥ 0: the tip leaves the belt.
     Flight,
-    /// p ≤ 0, b ≥ 0: sliding and flight are both solutions.
+    /// p ≤ 0, b ≥ 0: both sliding and flight are solutions.
     Indeterminate,
-    /// p ≤ 0, b < 0: neither is; only an impact without collision remains.
+    /// p ≤ 0, b < 0: neither is a solution; only an impact without collision remains.
     Inconsistent,
 }
 
 impl SolutionMode {
-    /// The mode for given p (1/kg) and b (m/s²).
+    /// Returns the mode for given p (1/kg) and b (m/s²).
     ///
-    /// The paper's section III asks for "b > 0" while sliding; its own equation
-    /// for f_n needs b < 0, which is what its section II says.
+    /// The paper's section III requires "b > 0" while sliding. Its own equation for f_n requires b
+    /// < 0, in agreement with its section II.
     #[inline]
     pub fn classify<T: Real>(p: T, b: T) -> Self {
         match (p > T::zero(), b < T::zero()) {
@@ -91,7 +91,7 @@ impl SolutionMode {
 pub struct ContactTerms<T: Real> {
     /// Q = J M⁻¹ Jᵀ, 1/kg, symmetric.
     pub q: Matrix2<T>,
-    /// Tip acceleration without contact force (m/s²); its normal part is b.
+    /// Tip acceleration without contact force, m/s²; its normal component is b.
     pub free_acceleration_m_s2: Vector2<T>,
 }
 
@@ -114,7 +114,7 @@ impl<T: Real> ContactTerms<T> {
         -self.b() / self.p(friction, slip)
     }
 
-    /// Contact force (f_t, f_n), N, that gives the tip the acceleration
+    /// Returns the contact force (f_t, f_n), N, that gives the tip the acceleration
     /// `tip_acceleration_m_s2`; `None` where Q is singular (straight arm).
     #[inline]
     pub fn force_for_acceleration_n(
@@ -122,7 +122,7 @@ impl<T: Real> ContactTerms<T> {
         tip_acceleration_m_s2: &Vector2<T>,
     ) -> Option<Vector2<T>> {
         let determinant = self.q.m11 * self.q.m22 - self.q.m12 * self.q.m21;
-        // Not `<=`: NaN is refused as well.
+        // Not `<=`: this rejects NaN as well.
         if determinant.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
             return None;
         }
@@ -147,17 +147,18 @@ impl<T: Real> Arm<T> {
         jacobian * self.inverse_mass_matrix(pose) * jacobian.transpose()
     }
 
-    /// p of a posture for friction μ and slip direction, 1/kg.
+    /// Returns p, 1/kg, of a posture for friction μ and slip direction.
     #[inline]
     pub fn p(&self, pose: &Pose<T>, friction: T, slip: Slip) -> T {
         p_of(&self.inverse_tip_inertia(pose), friction, slip)
     }
 
-    /// Q12 and Q22 with the tip on the belt at `tip_t_m`, both times one positive factor: all that
-    /// the sign of p = Q22 − μ s Q12 depends on. `None` out of reach or for a straight arm.
+    /// Returns Q12 and Q22 with the tip on the belt at `tip_t_m`, both scaled by the same positive
+    /// factor. They determine the sign of p = Q22 − μ s Q12. `None` out of reach or for a straight
+    /// arm.
     ///
     /// On the belt the columns (x1, y1) and (x2, y2) of J follow from z_t without trigonometry.
-    /// With d² = z_t² + H², and W four times the area of the triangle of both links,
+    /// With d² = z_t² + H², and W four times the area of the triangle formed by the links,
     ///
     /// ```text
     /// W² = ((l1 + l2)² − d²) (d² − (l1 − l2)²),      h1,2 = d² ± (l1² − l2²),
@@ -171,7 +172,7 @@ impl<T: Real> Arm<T> {
         let square = tip_t_m * tip_t_m + height * height;
         let (within, beyond) = (reach * reach - square, square - difference * difference);
         let width_square = within * beyond;
-        // Not `<=`: NaN is refused as well.
+        // Not `<=`: this rejects NaN as well.
         if width_square.partial_cmp(&T::zero()) != Some(Ordering::Greater) {
             return None;
         }
@@ -191,7 +192,7 @@ impl<T: Real> Arm<T> {
             tip_t_m * along_2 + height * width,
         );
         let coupling = self.quarter_coupled_mass * (beyond - within) - self.rotor_2;
-        // det M times M⁻¹ j2.
+        // M⁻¹ j2, scaled by det M.
         let (row_1, row_2) = (
             self.inertia_2 * y_1 - coupling * y_2,
             self.inertia_1 * y_2 - coupling * y_1,
@@ -199,8 +200,8 @@ impl<T: Real> Arm<T> {
         Some((x_1 * row_1 + x_2 * row_2, y_1 * row_1 + y_2 * row_2))
     }
 
-    /// All contact terms at link angles `theta` (rad), rates `theta_dot`
-    /// (rad/s) and generalised torque `torque_nm`.
+    /// Evaluates all contact terms at link angles `theta` (rad), rates `theta_dot` (rad/s) and
+    /// generalised torque `torque_nm`.
     #[inline]
     pub fn contact_terms(
         &self,
@@ -237,8 +238,8 @@ mod tests {
         arm().p(&Pose::new(&theta), friction, slip)
     }
 
-    /// Table II of the paper at μ = 0.6: 0.183 elbow up; elbow down it prints
-    /// 0.168, which is the value at μ = 0.5.
+    /// Table II of the paper at μ = 0.6 gives 0.183 elbow up. For elbow down it prints 0.168, which
+    /// is the value at μ = 0.5.
     #[test]
     fn p_changes_sign_at_the_admissible_edges() {
         for (edge, margin, posture, friction) in [

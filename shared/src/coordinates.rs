@@ -1,4 +1,4 @@
-//! Two sets of coordinates describe the arm, and a type says which one a pair of numbers is in.
+//! The arm's two sets of coordinates, as distinct types.
 //!
 //! **Links**: absolute angles θ = (θ1, θ2), in which the equations of motion are written. **Joints**:
 //! q' = (θ1, θ2 − θ1), which encoders measure and motors drive. Rates and accelerations
@@ -8,8 +8,8 @@
 //! q' = (θ1, θ2 − θ1)          u = (u1 − u2, u2)          u · θ̇ = u1 q̇'1 + u2 q̇'2
 //! ```
 //!
-//! Units are in names, as everywhere (`theta_rad`, `theta_dot_rad_s`, `torque_nm`). What belongs to
-//! different coordinates does not mix:
+//! Units are in names, as everywhere (`theta_rad`, `theta_dot_rad_s`, `torque_nm`). Values in
+//! different coordinates cannot be mixed:
 //!
 //! ```
 //! use painleve_shared::coordinates::{GeneralisedTorque, JointMotion, JointTorque, LinkMotion};
@@ -22,21 +22,21 @@
 //! assert_eq!(torque_nm.to_links(), GeneralisedTorque::new(1.5, 0.5));
 //! ```
 //!
-//! The angle of a joint is not that of a link:
+//! A joint angle is not a link angle:
 //!
 //! ```compile_fail,E0308
 //! # use painleve_shared::coordinates::{JointMotion, LinkMotion};
 //! let error = LinkMotion::new(0.3, -0.2) - JointMotion::new(0.3, -0.5);
 //! ```
 //!
-//! A motor's torque is not the generalised torque of the equations of motion:
+//! A motor torque is not a generalised torque of the equations of motion:
 //!
 //! ```compile_fail,E0308
 //! # use painleve_shared::coordinates::{GeneralisedTorque, JointTorque};
 //! let sum = GeneralisedTorque::new(1.5, 0.5) + JointTorque::new(2.0, 0.5);
 //! ```
 //!
-//! Encoder readings do not give a pose before they are converted:
+//! Encoder readings must be converted before they give a pose:
 //!
 //! ```compile_fail,E0308
 //! # use painleve_shared::{Pose, coordinates::JointMotion};
@@ -67,49 +67,49 @@ macro_rules! pair {
         pub struct $name<T: Real>(Vector2<T>);
 
         impl<T: Real> $name<T> {
-            /// From both numbers.
+            /// Makes the pair from both numbers.
             #[inline]
             pub fn new($first: T, $second: T) -> Self {
                 Self(Vector2::new($first, $second))
             }
 
-            /// Both zero.
+            /// Returns a pair of zeros.
             #[inline]
             pub fn zeros() -> Self {
                 Self(Vector2::zeros())
             }
 
-            /// The first number.
+            /// Returns the first number.
             #[inline]
             pub fn first(&self) -> T {
                 self.0.x
             }
 
-            /// The second number.
+            /// Returns the second number.
             #[inline]
             pub fn second(&self) -> T {
                 self.0.y
             }
 
-            /// A plain vector as these coordinates: for results of matrix algebra.
+            /// Takes a plain vector, the result of matrix algebra, as these coordinates.
             #[inline]
             pub fn from_vector(vector: Vector2<T>) -> Self {
                 Self(vector)
             }
 
-            /// As a plain vector: for matrix algebra.
+            /// Returns a plain vector, for matrix algebra.
             #[inline]
             pub fn vector(&self) -> &Vector2<T> {
                 &self.0
             }
 
-            /// A function of each number.
+            /// Applies a function to each number.
             #[inline]
             pub fn map(&self, function: impl FnMut(T) -> T) -> Self {
                 Self(self.0.map(function))
             }
 
-            /// The larger magnitude of both.
+            /// Returns the larger magnitude of the two.
             #[inline]
             pub fn amax(&self) -> T {
                 self.0.amax()
@@ -189,8 +189,8 @@ macro_rules! pair {
 }
 
 pair!(
-    /// Absolute angles θ = (θ1, θ2) of both links from the belt's inward normal, or their rates or
-    /// accelerations.
+    /// Absolute angles θ = (θ1, θ2) of both links, measured from the belt's inward normal, or their
+    /// rates or accelerations.
     LinkMotion, link_1, link_2);
 pair!(
     /// Angles q' = (θ1, θ2 − θ1) of both joints, as encoders measure them, or their rates or
@@ -204,7 +204,7 @@ pair!(
     JointTorque, joint_1, joint_2);
 
 impl<T: Real> LinkMotion<T> {
-    /// The same motion of the joints.
+    /// Converts to the motion of the joints.
     #[inline]
     pub fn to_joints(self) -> JointMotion<T> {
         JointMotion::new(self.first(), self.second() - self.first())
@@ -212,13 +212,13 @@ impl<T: Real> LinkMotion<T> {
 }
 
 impl<T: Real> JointMotion<T> {
-    /// The same motion of the links.
+    /// Converts to the motion of the links.
     #[inline]
     pub fn to_links(self) -> LinkMotion<T> {
         LinkMotion::new(self.first(), self.first() + self.second())
     }
 
-    /// Torque of a gain in each joint: stiffness times angle, damping times rate.
+    /// Returns the torque of a gain in each joint: stiffness times angle, or damping times rate.
     #[inline]
     pub fn torque_by(&self, gains: [T; 2]) -> JointTorque<T> {
         let [joint_1, joint_2] = gains;
@@ -227,7 +227,7 @@ impl<T: Real> JointMotion<T> {
 }
 
 impl<T: Real> JointTorque<T> {
-    /// What the motors do to the links.
+    /// Converts to the generalised torque on the links.
     #[inline]
     pub fn to_links(self) -> GeneralisedTorque<T> {
         GeneralisedTorque::new(self.first() - self.second(), self.second())
@@ -235,7 +235,7 @@ impl<T: Real> JointTorque<T> {
 }
 
 impl<T: Real> GeneralisedTorque<T> {
-    /// The motors' torques that do this to the links.
+    /// Converts to the torques of the joints' motors.
     #[inline]
     pub fn to_joints(self) -> JointTorque<T> {
         JointTorque::new(self.first() + self.second(), self.second())

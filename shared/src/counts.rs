@@ -1,8 +1,7 @@
-//! Integers as converters give and take them, and what one count is worth.
+//! Integer readings and commands of the converters, and their scaling to physical units.
 //!
-//! Only integers cross the link. Each quantity has its own type, so that a
-//! force is never scaled as an angle; the plant uses the scalings in `f64`, the
-//! controller in `f32`.
+//! Only integers cross the link. Each quantity has its own type, so a force cannot be scaled as an
+//! angle. The plant uses the scalings in `f64`, the controller in `f32`.
 
 use serde::{Deserialize, Serialize};
 
@@ -49,18 +48,18 @@ counts!(
     /// Command to one torque stage, signed.
     TorqueCounts(i32), "painleve::TorqueCounts");
 counts!(
-    /// A position along the belt in µm, for display and records.
+    /// Position along the belt in µm, for display and logs.
     Micrometres(i32), "painleve::Micrometres");
 
 impl Micrometres {
-    /// The nearest whole number of µm; saturates, and NaN gives 0.
+    /// Rounds to a whole number of µm; saturates, and NaN gives 0.
     #[inline]
     pub fn from_metres<T: Real>(metres: T) -> Self {
-        // Exact for f32 and f64 callers alike: both round the same product.
+        // Exact for `f32` and `f64` callers alike: both round the same product.
         Self(round_to_i32(metres * T::literal(1e6)))
     }
 
-    /// This position in m.
+    /// Returns this position in m.
     #[inline]
     pub fn to_metres(self) -> f64 {
         f64::from(self.0) * 1e-6
@@ -77,10 +76,10 @@ settings! {
     /// A joint encoder: resolution and mounting offset.
     #[derive(Copy, Eq)]
     pub struct EncoderScale {
-        /// Resolution: 2^bits counts a turn. Beyond 24 bits a single precision angle no longer
+        /// Resolution: 2^bits counts per turn. Beyond 24 bits a single-precision angle no longer
         /// resolves a count.
         bits: u8 = 14, 8..=24, "bits";
-        /// Reading at angle zero; less than a turn.
+        /// Reading at angle zero; less than one turn.
         offset: EncoderCounts = EncoderCounts(0), 0..=(1 << 24) - 1, "counts";
     }
     check Self::relations;
@@ -91,7 +90,7 @@ impl EncoderScale {
         check_setting!(self.offset, 0, self.modulus() - 1)
     }
 
-    /// Counts a turn, 2^bits.
+    /// Returns the counts per turn, 2^bits.
     #[inline]
     pub fn modulus(&self) -> u32 {
         1 << (self.bits & 31)
@@ -103,13 +102,13 @@ impl EncoderScale {
         T::literal(core::f64::consts::TAU / f64::from(self.modulus()))
     }
 
-    /// Whether an encoder of this resolution can give this reading.
+    /// Returns whether an encoder of this resolution can give this reading.
     #[inline]
     pub fn contains(&self, reading: EncoderCounts) -> bool {
         reading.0 < self.modulus()
     }
 
-    /// Reading nearest to an angle in rad (any number of turns).
+    /// Returns the reading nearest to an angle in rad (any number of turns).
     pub fn reading(&self, angle_rad: f64) -> EncoderCounts {
         let counts = libm::round(angle_rad / self.rad_per_count::<f64>()) as i64;
         let modulus = i64::from(self.modulus());
@@ -117,14 +116,14 @@ impl EncoderScale {
         EncoderCounts(reading as u32)
     }
 
-    /// Counts from angle zero to a reading, the short way round:
-    /// −2^(bits−1) … 2^(bits−1) − 1.
+    /// Returns the counts from angle zero to a reading, the short way round: −2^(bits−1) …
+    /// 2^(bits−1) − 1.
     #[inline]
     pub fn counts_from_zero(&self, reading: EncoderCounts) -> i32 {
         self.shortest_way(reading.0.wrapping_sub(self.offset.0))
     }
 
-    /// Counts from one reading to the next, the short way round.
+    /// Returns the counts from one reading to the next, the short way round.
     #[inline]
     pub fn difference(&self, from: EncoderCounts, to: EncoderCounts) -> i32 {
         self.shortest_way(to.0.wrapping_sub(from.0))
@@ -143,9 +142,9 @@ settings! {
     #[derive(Copy)]
     pub struct LinearScale<T: Real> {
         /// Resolution: 2^bits counts over the whole range. Beyond 22 bits single precision no
-        /// longer tells a value's nearest count.
+        /// longer resolves a count.
         bits: u8 = 12, 4..=22, "bits";
-        /// Full scale to either side, in the quantity's unit (N or N·m).
+        /// Full scale in either direction, in the quantity's unit (N or N·m).
         range: T = T::one(), 1e-3..=1e6;
     }
 }
@@ -157,20 +156,20 @@ impl<T: Real> LinearScale<T> {
         self.range / T::from_integer(1 << ((self.bits & 31).wrapping_sub(1) & 31))
     }
 
-    /// Largest reading, 2^(bits−1) − 1; the smallest is one below its negative.
+    /// Returns the largest reading, 2^(bits−1) − 1; the smallest is −2^(bits−1).
     #[inline]
     pub fn maximum_counts(&self) -> i32 {
         (1_i32 << ((self.bits & 31).wrapping_sub(1) & 31)).wrapping_sub(1)
     }
 
-    /// Whether a converter of this resolution can give or take this reading.
+    /// Returns whether a converter of this resolution can give or take this reading.
     #[inline]
     pub fn contains(&self, counts: i32) -> bool {
         let maximum = self.maximum_counts();
         (-maximum - 1..=maximum).contains(&counts)
     }
 
-    /// Nearest reading, and whether it had to be limited; NaN gives 0.
+    /// Returns the nearest reading, and whether it was clamped; NaN gives 0.
     #[inline]
     pub fn counts(&self, value: T) -> (i32, bool) {
         let wanted = round_to_i32(value / self.per_count());
@@ -179,7 +178,7 @@ impl<T: Real> LinearScale<T> {
         (counts, counts != wanted)
     }
 
-    /// Value of a reading in the quantity's unit.
+    /// Returns the value of a reading in the quantity's unit.
     #[inline]
     pub fn value(&self, counts: i32) -> T {
         // Exact: a reading has at most 22 bits.
@@ -246,7 +245,7 @@ mod tests {
             if !limited {
                 prop_assert!((double.value(counts) - fraction * 4.999).abs() <= 0.5001 * double.per_count());
             }
-            // What the controller scales and sends back is the same integer.
+            // The controller's scaling returns the same integer.
             prop_assert_eq!(single.counts(single.value(counts)), (counts, false));
         }
     }

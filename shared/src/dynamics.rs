@@ -15,7 +15,8 @@ impl<T: Real> Arm<T> {
         Matrix2::new(self.inertia_1, coupling, coupling, self.inertia_2)
     }
 
-    /// Inverse M⁻¹, 1/(kg·m²). [`Arm::new`] has made sure that it exists in every posture.
+    /// Returns the inverse M⁻¹, 1/(kg·m²). [`Arm::new`] has checked that it exists in every
+    /// posture.
     #[inline]
     pub fn inverse_mass_matrix(&self, pose: &Pose<T>) -> Matrix2<T> {
         let coupling = self.coupled_inertia(pose);
@@ -35,8 +36,8 @@ impl<T: Real> Arm<T> {
         self.inertia_coupling * pose.cosine_elbow() - self.rotor_2
     }
 
-    /// Torque w of gravity, springs and dashpots, N·m, at link angles `theta`
-    /// (rad) and rates `theta_dot` (rad/s).
+    /// Returns the torque w of gravity, springs and dashpots, N·m, at link angles `theta` (rad) and
+    /// rates `theta_dot` (rad/s).
     #[inline]
     pub fn passive_torque_nm(
         &self,
@@ -73,8 +74,8 @@ impl<T: Real> Arm<T> {
         GeneralisedTorque::new(-coupling * rate_2 * rate_2, coupling * rate_1 * rate_1)
     }
 
-    /// Kinetic plus potential energy, J; the potential is zero for springs at rest and centres of
-    /// mass as high as the first joint.
+    /// Returns kinetic plus potential energy, J. The potential energy is zero with relaxed springs
+    /// and the centres of mass level with the first joint.
     pub fn energy_j(&self, theta: &LinkMotion<T>, theta_dot: &LinkMotion<T>) -> T {
         let pose = Pose::new(theta);
         let half = T::literal(0.5);

@@ -1,8 +1,7 @@
-//! What crosses the link at every control tick, in raw counts.
+//! Frames that cross the link at every control tick, in raw counts.
 //!
-//! The plant publishes a [`SensorFrame`]; the controller answers with an
-//! [`ActuatorFrame`] that echoes its tick. Both counters wrap; compare them by
-//! difference only.
+//! The plant publishes a [`SensorFrame`]; the controller answers with an [`ActuatorFrame`] that
+//! echoes its tick. Both counters wrap; compare them only by their difference.
 
 pub use ::bitflags;
 use ::bitflags::bitflags;
@@ -31,8 +30,8 @@ bitflags! {
         const ENABLE = 1;
         /// A rising edge clears a latched fault.
         const RESET = 1 << 1;
-        /// Makes the tick last until the next one is due. Only an emulated board and a
-        /// process that goes by the clock have this input, for tests of the lapse monitor.
+        /// Prolongs the tick until the next one is due, to test the lapse monitor. Only an emulated
+        /// board and a real-time process have this input.
         const OVERLOAD = 1 << 31;
     }
 }
@@ -47,26 +46,26 @@ pub struct StatusFlags(pub u16);
 
 bitflags! {
     impl StatusFlags: u16 {
-        /// The tip is taken to touch the belt.
+        /// The contact decision: the tip touches the belt.
         const CONTACT = 1;
-        /// The law asked for more torque than allowed.
+        /// The law requested more torque than allowed.
         const SATURATED = 1 << 1;
         /// The last segment of the reference has ended.
         const REFERENCE_DONE = 1 << 2;
         /// The contact guard changed the torque to keep the tip pressed on the belt.
         const GUARDED = 1 << 3;
-        /// The reference is beyond the edge of the admissible stretch, and held there.
+        /// The reference is beyond the edge of the admissible stretch and held at the edge.
         const AT_EDGE = 1 << 4;
-        /// The tip is being brought back onto the belt.
+        /// The tip is being returned to the belt.
         const RECOVERING = 1 << 5;
-        /// In contact: the tip seems to slide with ż_r < 0 (clear: ż_r > 0).
+        /// In contact: estimated slip direction ż_r < 0 (clear: ż_r > 0).
         const SLIP_NEGATIVE = 1 << 6;
-        /// In contact: the tip seems to move with the belt.
+        /// In contact: the tip is estimated to stick to the belt.
         const STICKS = 1 << 7;
     }
 }
 
-/// One sample of everything the controller can measure.
+/// One sample of all of the controller's inputs.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "zero-copy", derive(ZeroCopySend))]
@@ -113,17 +112,17 @@ pub struct ActuatorFrame {
 }
 
 impl ActuatorFrame {
-    /// The supervisor's state; `None` for a number this version does not know.
+    /// Returns the supervisor's state; `None` for a number unknown to this version.
     pub fn supervisor_state(&self) -> Option<SupervisorState> {
         SupervisorState::from_code(self.state)
     }
 
-    /// Whether this version knows both the state and the fault.
+    /// Returns whether this version knows both the state and the fault.
     pub fn is_understood(&self) -> bool {
         self.supervisor_state().is_some() && (self.fault == 0 || self.latched_fault().is_some())
     }
 
-    /// The latched fault, if any.
+    /// Returns the latched fault, if any.
     pub fn latched_fault(&self) -> Option<Fault> {
         Fault::from_code(self.fault)
     }
@@ -131,7 +130,7 @@ impl ActuatorFrame {
 
 #[cfg(test)]
 impl SensorFrame {
-    /// The frame that is longest on a wire.
+    /// Returns the frame with the longest encoding.
     pub(crate) const LONGEST: Self = Self {
         tick: u32::MAX,
         sequence: u32::MAX,

@@ -1,6 +1,6 @@
-//! Where the tip is, and which joint angles put it there.
+//! Kinematics: tip position from joint angles, Jacobian, and joint angles from a tip position.
 //!
-//! z = (z_t, z_n): z_t along the belt, z_n upwards, origin in the first joint.
+//! z = (z_t, z_n), with z_t along the belt, z_n upwards and the origin at the first joint.
 //! The belt is at z_n = −H. All lengths in m, angles in rad.
 
 use core::cmp::Ordering;
@@ -12,7 +12,7 @@ use crate::arm::Arm;
 use crate::coordinates::LinkMotion;
 use crate::real::Real;
 
-/// Which way the elbow bends.
+/// The side to which the elbow bends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -24,7 +24,7 @@ pub enum Posture {
 }
 
 impl Posture {
-    /// The posture of link angles (rad); the straight arm counts as elbow down.
+    /// Returns the posture of link angles (rad); the straight arm counts as elbow down.
     pub fn of<T: Real>(theta: &LinkMotion<T>) -> Self {
         if theta.second() > theta.first() {
             Posture::ElbowUp
@@ -33,7 +33,7 @@ impl Posture {
         }
     }
 
-    /// The mirror image about the vertical.
+    /// Returns the mirror image about the vertical.
     pub fn mirrored(self) -> Self {
         match self {
             Posture::ElbowUp => Posture::ElbowDown,
@@ -42,7 +42,7 @@ impl Posture {
     }
 }
 
-/// Sines and cosines of the link angles: evaluated once, used everywhere.
+/// Sines and cosines of the link angles, evaluated once and shared by all terms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose<T: Real> {
     /// sin θ1, sin θ2.
@@ -52,7 +52,7 @@ pub struct Pose<T: Real> {
 }
 
 impl<T: Real> Pose<T> {
-    /// The pose of link angles in rad.
+    /// Evaluates the pose of link angles in rad.
     #[inline]
     pub fn new(theta: &LinkMotion<T>) -> Self {
         let (sine_1, cosine_1) = theta.first().sine_cosine();
@@ -128,11 +128,11 @@ impl<T: Real> Arm<T> {
         (self.length_1_m - self.length_2_m) * self.reach_m()
     }
 
-    /// Link angles (θ1, θ2) that put the tip at `tip_m` = (z_t, z_n) in the
-    /// given posture; `None` where the arm does not reach, for NaN, and in the first joint itself.
+    /// Returns the link angles (θ1, θ2), rad, that put the tip at `tip_m` = (z_t, z_n) in the given
+    /// posture; `None` for a point out of reach, for NaN, and for the first joint itself.
     ///
-    /// The links are to either side of the tip's direction φ, θ = φ ∓ β, with
-    /// tan φ = −z_t/z_n and by the law of cosines
+    /// The links lie on either side of the tip's direction φ: θ = φ ∓ β, with
+    /// tan φ = −z_t/z_n and, by the law of cosines,
     ///
     /// ```text
     /// cos β1 = (d + (l1² − l2²)/d) / 2 l1,   cos β2 = (d − (l1² − l2²)/d) / 2 l2,   d = |z|
@@ -141,9 +141,9 @@ impl<T: Real> Arm<T> {
         let distance = (tip_m.x * tip_m.x + tip_m.y * tip_m.y).square_root();
         let two = T::literal(2.0);
         let shift = self.difference_of_squares_m2() / distance;
-        // NaN stays NaN through the arc cosine.
+        // The arc cosine propagates NaN.
         let angle_1 = ((distance + shift) / (self.length_1_m * two)).arc_cosine();
-        // Equal links make equal angles.
+        // Equal links have equal angles.
         let angle_2 = if shift == T::zero() {
             angle_1
         } else {
@@ -160,15 +160,15 @@ impl<T: Real> Arm<T> {
         })
     }
 
-    /// Link angles with the tip on the belt at `tip_t_m`; `None` out of reach.
+    /// Returns the link angles, rad, with the tip on the belt at `tip_t_m`; `None` out of reach.
     pub fn link_angles_on_belt_rad(&self, tip_t_m: T, posture: Posture) -> Option<LinkMotion<T>> {
         self.link_angles_rad(&Vector2::new(tip_t_m, -self.height_m), posture)
     }
 
-    /// Link rates θ̇ (rad/s) that move the tip along the belt with
-    /// `tip_speed_m_s` at `tip_t_m`; zero where the arm is straight or does not reach.
+    /// Returns the link rates θ̇ (rad/s) that move the tip along the belt at `tip_speed_m_s` from
+    /// `tip_t_m`; zero where the arm is straight or does not reach.
     ///
-    /// The time derivative of θ = φ ∓ β in [`link_angles_rad`](Self::link_angles_rad).
+    /// They are the time derivative of θ = φ ∓ β in [`link_angles_rad`](Self::link_angles_rad).
     pub fn link_rates_on_belt_rad_s(
         &self,
         tip_t_m: T,
@@ -179,7 +179,7 @@ impl<T: Real> Arm<T> {
         let square = tip_t_m * tip_t_m + height * height;
         let distance = square.square_root();
         let (reach, hole) = (self.reach_m(), self.hole_m());
-        // 2 l1 sin β1 = 2 l2 sin β2, by the area of the triangle of both links.
+        // 2 l1 sin β1 = 2 l2 sin β2: both sides give the area of the triangle formed by the links.
         let twice_width =
             ((reach - distance) * (reach + distance) * (T::one() - hole * hole / square))
                 .square_root();

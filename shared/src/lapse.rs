@@ -1,6 +1,6 @@
-//! Lapses: what may go wrong with a tick, a sensor frame or a message, and is survived for a while.
+//! Lapses: errors of a tick, a sensor frame or a message that are tolerated up to a limit.
 //!
-//! Each is declared once, below, with its limit and the fault that it becomes beyond the limit.
+//! Each is declared once, below, with its limit and the fault latched beyond the limit.
 
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +41,7 @@ macro_rules! lapses {
                 }
             }
 
-            /// The fault that too many in a row become.
+            /// Returns the fault that is latched when too many occur in a row.
             pub const fn fault(self) -> Fault {
                 match self {
                     $($(Self::$lapse => Fault::$fault),+),+
@@ -50,11 +50,11 @@ macro_rules! lapses {
         }
 
         settings! {
-            /// How many lapses of each kind are survived in a row; one more is a fault.
+            /// Number of lapses of each kind tolerated in a row; one more latches the fault.
             ///
-            /// A tick that overruns once may have met a rare branch; twice is a processor that is
-            /// too slow. At 1 kHz the arm moves 10 mm in 20 ms at most. A sensor whose answer is
-            /// disturbed is right again at the next tick, or broken.
+            /// One overrun may be a rare branch; two in a row mean that the processor is too slow.
+            /// At 1 kHz the arm moves at most 10 mm in 20 ms. A sensor whose answer was disturbed
+            /// recovers at the next tick, or is broken.
             #[derive(Copy, Eq)]
             pub struct LapseLimits {
                 $($(
@@ -65,7 +65,7 @@ macro_rules! lapses {
         }
 
         impl LapseLimits {
-            /// The limit of one kind.
+            /// Returns the limit of one kind.
             pub const fn of(&self, lapse: Lapse) -> u32 {
                 match lapse {
                     $($(Lapse::$lapse => self.$key),+),+
@@ -73,7 +73,7 @@ macro_rules! lapses {
             }
         }
 
-        /// How often each lapse has happened. Counters wrap.
+        /// Number of lapses of each kind. Counters wrap.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub struct LapseCounts {
@@ -84,7 +84,7 @@ macro_rules! lapses {
         }
 
         impl LapseCounts {
-            /// Counts that `count` gives for each kind.
+            /// Returns the counts that `count` gives for each kind.
             pub fn from_fn(count: impl Fn(Lapse) -> u32) -> Self {
                 Self { $($($key: count(Lapse::$lapse)),+),+ }
             }
@@ -95,16 +95,16 @@ macro_rules! lapses {
 lapses! {
     /// Lapses of the control task.
     OF_TICKS: {
-        /// Ticks that were not done when the next one was due.
+        /// Ticks that were not finished when the next one was due.
         Overrun => overruns = 1, Overrun;
-        /// Ticks without a sensor frame: it is late, or lost.
+        /// Ticks without a sensor frame: the frame is late or lost.
         MissingFrame => missing_frames = 10, MissingFrame;
     }
     /// Lapses detectable from a received sensor frame.
     OF_FRAMES: {
         /// Frames with the sequence number of an earlier one.
         StaleFrame => stale_frames = 5, StaleFrame;
-        /// Sequence numbers that never came.
+        /// Sequence numbers that were never received.
         LostFrame => lost_frames = 5, LostFrames;
         /// Frames with an encoder reading that the resolution does not allow.
         EncoderOutOfRange => encoder_out_of_range = 1, EncoderOutOfRange;
@@ -113,7 +113,7 @@ lapses! {
     }
     /// Lapses of the link that carries messages as bytes.
     OF_MESSAGES: {
-        /// Runs of bytes that are no message.
+        /// Byte sequences that are not a message.
         Garbage => garbage = 10, CorruptMessages;
         /// Messages with a wrong checksum.
         FailedChecksum => failed_checksums = 10, CorruptMessages;

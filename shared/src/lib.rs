@@ -1,16 +1,16 @@
-//! What the arm's controller and its simulated plant must agree on.
+//! Mechanics, units and messages that the arm's controller and its simulated plant share.
 //!
-//! - [`arm`]: the arm's parameters, checked once, and the model made from them
+//! - [`arm`]: the arm's parameters, checked once, and the model built from them
 //! - [`kinematics`], [`dynamics`]: tip, Jacobian, inverse kinematics; M, w, c and energy
 //! - [`contact`]: Q, b, p and the four solution modes of the tip on the belt
-//! - [`coordinates`]: of links and of joints, told apart by types
-//! - [`counts`]: integers as converters give and take them, with their scaling
-//! - [`frame`], [`status`]: what crosses the link at every control tick
-//! - [`lapse`]: what may go wrong around a tick
-//! - [`wire`], [`message`]: the same frames as bytes, for links that are not shared memory,
-//!   and what is said with them
+//! - [`coordinates`]: link and joint coordinates as distinct types
+//! - [`counts`]: integer readings and commands of the converters, with their scaling
+//! - [`frame`], [`status`]: the data that crosses the link at every control tick
+//! - [`lapse`]: counted errors of ticks, frames and messages, with limits
+//! - [`wire`], [`message`]: frames, requests and responses as bytes, for links other than shared
+//!   memory
 //! - [`real`], [`range`]: scalars with host-independent functions, and range errors
-//! - [`settings`](mod@settings): settings with default, range, unit and meaning, declared once
+//! - [`settings`](mod@settings): settings declared once, with default, range, unit and meaning
 //!
 //! Equations and symbols are those of Marchese, Coraggio, Hogan and di Bernardo,
 //! *Control of Painlevé Paradox in a Robotic System* (arXiv:1907.04070), "the
@@ -24,7 +24,7 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
-// The macro `settings!` names this crate where `$crate` cannot stand.
+// The macro `settings!` needs this crate's name where `$crate` is not allowed.
 extern crate self as painleve_shared;
 
 pub mod arm;

@@ -1,7 +1,7 @@
-//! What a board and its host say to each other over bytes, encoded by
-//! [`wire`](crate::wire): one request, one response.
+//! Requests and responses that a host and a board exchange as bytes, encoded by
+//! [`wire`](crate::wire). Each request gets one response.
 //!
-//! The configuration comes first, so that one image serves every scenario.
+//! The first request carries the configuration, so one image serves every scenario.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,54 +14,56 @@ pub const MAXIMUM_LENGTH: usize = 768;
 /// Longest encoded response, in bytes.
 pub const MAXIMUM_RESPONSE_LENGTH: usize = 80;
 
-/// What the host asks of the board.
+/// A request from the host to the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Request<'a> {
-    /// Start afresh; [`Response::Ready`], [`Response::Refused`] or [`Response::OtherBuild`].
+    /// Starts afresh; answered by [`Response::Ready`], [`Response::Refused`] or
+    /// [`Response::OtherBuild`].
     Configure {
-        /// What tells the host's build from another.
+        /// Identifies the host's build.
         build: u64,
-        /// Where its sensor frames come from.
+        /// Source of the sensor frames.
         source: FrameSource,
-        /// Configuration of the controller, whose type is the controller's, by postcard.
+        /// Configuration of the controller, encoded by postcard. The controller defines its type.
         configuration: &'a [u8],
     },
-    /// Control one tick of a simulated plant; [`Response::Actuator`].
+    /// Controls one tick of a simulated plant; answered by [`Response::Actuator`].
     Sensor(SensorFrame),
-    /// Tell what was counted since the configuration; [`Response::Health`].
+    /// Asks for the counters since the configuration; answered by [`Response::Health`].
     Health,
-    /// Take the torque off and forget the configuration; [`Response::Stopped`].
+    /// Takes the torque off and drops the configuration; answered by [`Response::Stopped`].
     Stop,
-    /// The host is still there; no response. With [`FrameSource::Sensors`] the board stops without.
+    /// Reports that the host is present; no response. With [`FrameSource::Sensors`] the board stops
+    /// if these requests cease.
     Alive,
 }
 
-/// Where a controller's sensor frames come from.
+/// Source of a controller's sensor frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FrameSource {
-    /// From the host, in [`Request::Sensor`], who waits for every answer.
+    /// The host, in [`Request::Sensor`]; it waits for every answer.
     Lockstep,
-    /// From the host in time: a tick of the board's timer without a frame is a lapse.
+    /// The host, in real time: a tick of the board's timer without a frame is a lapse.
     Realtime,
-    /// From the board's own sensors, at every tick of its timer.
+    /// The board's own sensors, at every tick of its timer.
     Sensors,
 }
 
-/// What the board answers.
+/// A response from the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Response {
     /// The configuration is accepted and the control timer runs.
     Ready {
-        /// How fast the stopwatch of the answers counts, Hz: the processor's clock on
-        /// hardware, 10⁹ of virtual time under an emulator.
+        /// Frequency of the stopwatch that times the ticks, Hz: the processor's clock on hardware,
+        /// 10⁹ of virtual time under an emulator.
         stopwatch_hz: u32,
     },
-    /// The configuration has a number that is out of range.
+    /// A number in the configuration is out of range.
     Refused,
     /// The configuration comes from another build: its bytes may mean something else.
     OtherBuild {
-        /// What tells the board's build from another.
+        /// Identifies the board's build.
         build: u64,
     },
     /// The torque is off, and there is no configuration any more.
@@ -70,25 +72,25 @@ pub enum Response {
     Actuator {
         /// The frame.
         frame: ActuatorFrame,
-        /// What the tick took, in counts of the board's stopwatch; 0 for an answer
-        /// that nobody asked for, because a fault has taken the torque off.
+        /// Duration of the tick in counts of the board's stopwatch; 0 for an unrequested answer,
+        /// which reports that a fault has taken the torque off.
         elapsed: u32,
     },
     /// Counters.
     Health(Health),
 }
 
-/// What a board has counted since its configuration. Counters wrap.
+/// Counters of a board since its configuration. Counters wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Health {
-    /// Most stack ever used since the start, bytes.
+    /// Largest stack use since the start, bytes.
     pub stack_bytes: u32,
-    /// Ticks controlled.
+    /// Number of ticks controlled.
     pub ticks: u32,
-    /// Answers that nobody took in time.
+    /// Answers discarded because the queue to the link was full.
     pub dropped_responses: u32,
-    /// Lapses, by kind.
+    /// Lapses by kind.
     pub lapses: LapseCounts,
 }
 

@@ -1,4 +1,4 @@
-//! Range errors: which key, which value, what is allowed.
+//! Range errors, which name the key, the value and the allowed range.
 
 use core::fmt::{self, Write};
 
@@ -9,7 +9,7 @@ use crate::Real;
 pub struct OutOfRange {
     /// The setting's key.
     pub key: Key,
-    /// The value that was given.
+    /// The value given.
     pub value: f64,
     /// Smallest allowed value.
     pub minimum: f64,
@@ -18,14 +18,14 @@ pub struct OutOfRange {
 }
 
 impl OutOfRange {
-    /// The same error with the key relative to what holds the group `name`.
+    /// Returns the error with its key prefixed by `name`, the group that holds the setting.
     #[must_use]
     pub fn inside(mut self, name: &'static str) -> Self {
         self.enclose(name);
         self
     }
 
-    /// As [`inside`](Self::inside), in place.
+    /// Does the same as [`inside`](Self::inside), in place.
     #[inline(never)]
     pub fn enclose(&mut self, name: &'static str) {
         if let Some(place) = self.key.parts.iter_mut().find(|part| part.is_empty()) {
@@ -33,8 +33,8 @@ impl OutOfRange {
         }
     }
 
-    /// The same error with the key relative to the list in which the value is the item number
-    /// `index`, counted from 0. Indices beyond 15 are shown as `*`.
+    /// Returns the error with its key prefixed by `index`, the position (from 0) of the value in a
+    /// list. Indices beyond 15 are shown as `*`.
     #[must_use]
     pub fn at(self, index: usize) -> Self {
         self.inside(index_name(index))
@@ -56,29 +56,29 @@ impl fmt::Display for OutOfRange {
 
 impl core::error::Error for OutOfRange {}
 
-/// Most parts of a key; further ones, from the outside, are left out.
+/// Largest number of parts in a key. Further parts are dropped, outermost first.
 const MAXIMUM_PARTS: usize = 6;
 
-/// Indices as parts of a key: text that needs no heap.
+/// Indices as parts of a key: static text, so that no heap is needed.
 const INDICES: [&str; 16] = [
     "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "14", "15",
 ];
 
-/// An index as a part of a key.
+/// Returns an index as a part of a key.
 pub(crate) fn index_name(index: usize) -> &'static str {
     INDICES.get(index).copied().unwrap_or("*")
 }
 
-/// Where a value stands, from the outermost group to the setting, as in a scenario file:
+/// Path of a value from the outermost group to the setting, as in a scenario file:
 /// `controller.law.hybrid.normal_force_n`.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub struct Key {
-    /// From the setting outwards; empty ones are not in use.
+    /// Parts from the setting outwards; unused ones are empty.
     parts: [&'static str; MAXIMUM_PARTS],
 }
 
 impl Key {
-    /// The parts from the outermost group to the setting.
+    /// Returns the parts from the outermost group to the setting.
     pub fn parts(&self) -> impl Iterator<Item = &'static str> {
         self.parts.into_iter().rev().filter(|part| !part.is_empty())
     }
@@ -109,7 +109,7 @@ impl PartialEq<&str> for Key {
     }
 }
 
-/// What of a text has not been written yet.
+/// The part of a text that has not been compared yet.
 struct Rest<'a>(&'a str);
 
 impl Write for Rest<'_> {
@@ -119,7 +119,7 @@ impl Write for Rest<'_> {
     }
 }
 
-/// A number as it was written: one that is exact in `f32` with the digits of an `f32`.
+/// A number with the shortest digits that give it back: those of an `f32` if it is exact in `f32`.
 pub struct Shortest(pub f64);
 
 impl fmt::Display for Shortest {
@@ -151,11 +151,11 @@ pub fn check<T: Real>(
     }
 }
 
-/// Whether `value` is finite and within `minimum ..= maximum`.
+/// Returns whether `value` is finite and within `minimum ..= maximum`.
 #[inline]
 pub(crate) fn is_within<T: Real>(value: T, minimum: f64, maximum: f64) -> bool {
-    // In the value's precision: 0.1 is allowed where 0.1 is the bound, and a microcontroller
-    // without double precision compares singles.
+    // Compare in the value's own precision: the bound 0.1 then allows the single-precision 0.1, and
+    // a microcontroller without double precision compares single-precision numbers.
     value >= T::literal(minimum) && value <= T::literal(maximum) && value.is_finite()
 }
 

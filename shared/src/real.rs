@@ -1,12 +1,11 @@
 //! The scalar of the mechanics: `f32` or `f64` with elementary functions that
 //! give the same bits on every host.
 //!
-//! Addition, multiplication, division and square root are fixed by IEEE 754.
-//! Sine, cosine and their inverses are not: a C library may round them
-//! differently on every machine. They are therefore never taken from the host.
-//! In `f64` (plant) they come from the `libm` crate. In `f32` (controller) sine
-//! and cosine are a polynomial, because `libm` evaluates them in `f64`, which is
-//! software on a Cortex-M4F: about 2,100 instructions against a few dozen.
+//! IEEE 754 fixes addition, multiplication, division and square root, but not sine, cosine and
+//! their inverses: C libraries round them differently. These functions therefore never come from
+//! the host's library. In `f64` (plant) they come from the `libm` crate. In `f32` (controller) sine
+//! and cosine are polynomials, because `libm` evaluates them in `f64`, which a Cortex-M4F computes
+//! in software: about 2,100 instructions against a few dozen.
 
 use core::cmp::Ordering;
 
@@ -17,21 +16,21 @@ use crate::square_root::square_root;
 
 /// A real number whose elementary functions do not depend on the host.
 pub trait Real: RealField + Copy + SettingValue {
-    /// The nearest number to an `f64` literal.
+    /// Returns the number nearest to an `f64` literal.
     fn literal(value: f64) -> Self;
 
-    /// This number as `f64`, exact for `f32` and `f64`.
+    /// Returns this number as `f64`, exact for `f32` and `f64`.
     fn to_f64(self) -> f64;
 
-    /// The nearest number to an integer; exact in `f32` up to 24 bits. Never by way
-    /// of `f64`, which is software on a Cortex-M4F.
+    /// Returns the number nearest to an integer; exact in `f32` up to 24 bits. The conversion
+    /// avoids `f64`, which a Cortex-M4F computes in software.
     fn from_integer(value: i32) -> Self;
 
-    /// The integer part; saturates, and NaN gives 0.
+    /// Returns the integer part; saturates, and NaN gives 0.
     fn truncate_to_i32(self) -> i32;
 
-    /// The nearest number within `minimum ..= maximum`; NaN stays NaN. Unlike the standard
-    /// library's `clamp` it cannot panic.
+    /// Clamps this number to `minimum ..= maximum`; NaN stays NaN. Unlike the standard library's
+    /// `clamp` it cannot panic.
     #[inline]
     fn limited(self, minimum: Self, maximum: Self) -> Self {
         if self < minimum {
@@ -43,8 +42,8 @@ pub trait Real: RealField + Copy + SettingValue {
         }
     }
 
-    /// The nearest number within `±limit`, a limit of at least zero; NaN stays NaN. One comparison
-    /// where [`limited`](Self::limited) needs two.
+    /// Clamps this number to `±limit`, where `limit` is at least zero; NaN stays NaN. It needs one
+    /// comparison, [`limited`](Self::limited) two.
     #[inline]
     fn within(self, limit: Self) -> Self {
         if self.abs() > limit {
@@ -54,14 +53,14 @@ pub trait Real: RealField + Copy + SettingValue {
         }
     }
 
-    /// The lesser of this number and `maximum`; NaN stays NaN. A comparison: the standard
-    /// library's `min` is a function call on a Cortex-M4F.
+    /// Returns the lesser of this number and `maximum`; NaN stays NaN. This is one comparison; the
+    /// standard library's `min` is a function call on a Cortex-M4F.
     #[inline]
     fn at_most(self, maximum: Self) -> Self {
         if self > maximum { maximum } else { self }
     }
 
-    /// The greater of this number and `minimum`; NaN stays NaN.
+    /// Returns the greater of this number and `minimum`; NaN stays NaN.
     #[inline]
     fn at_least(self, minimum: Self) -> Self {
         if self < minimum { minimum } else { self }
@@ -80,8 +79,8 @@ pub trait Real: RealField + Copy + SettingValue {
     fn square_root(self) -> Self;
 }
 
-/// `limit` with the sign of `value`. Out of the way, as limits are rarely reached: inlined, the
-/// compiler would compute it every time rather than jump.
+/// Returns `limit` with the sign of `value`. Kept out of line because limits are rarely reached:
+/// when inlined, the compiler computes it every time instead of branching.
 #[cold]
 #[inline(never)]
 fn bounded<T: Real>(limit: T, value: T) -> T {
@@ -172,20 +171,20 @@ impl Real for f32 {
     }
 }
 
-/// Largest angle (rad) that the three-part reduction below handles exactly; an
-/// unwrapped joint angle stays far inside it.
+/// Largest angle (rad) that the three-part reduction below handles exactly. Unwrapped joint angles
+/// stay far below it.
 const REDUCTION_LIMIT_RAD: f32 = 8192.0;
 
-/// 1.5 · 2²³: the sum with a number below 2²² has no fraction.
+/// 1.5 · 2²³: adding it to a number below 2²² rounds that number to an integer.
 const ROUNDS_TO_INTEGER: f32 = 12_582_912.0;
 
-/// Sine and cosine in single precision only.
+/// Returns sine and cosine, computed in single precision only.
 ///
-/// Reduction to ±π/4 by Cody and Waite's three-part π/2 and the minimax
-/// polynomials of Cephes `sinf.c` (Moshier). The absolute error is below 1.2e-7,
-/// two units in the last place of 1, for |angle| up to 8192 rad. Beyond that both are NaN,
-/// which the controller answers with a fault: a joint never turns so far, and an exact
-/// reduction would cost thousands of instructions and 9 KiB of flash.
+/// The angle is reduced to ±π/4 by Cody and Waite's three-part π/2; the minimax polynomials are
+/// those of Cephes `sinf.c` (Moshier). The absolute error is below 1.2e-7, two units in the last
+/// place of 1, for |angle| up to 8192 rad. Beyond that both results are NaN, on which the
+/// controller latches a fault: a joint never turns that far, and an exact reduction would cost
+/// thousands of instructions and 9 KiB of flash.
 fn sine_cosine_f32(angle: f32) -> (f32, f32) {
     const HALF_PI_HIGH: f32 = 1.570_312_5;
     const HALF_PI_MIDDLE: f32 = 4.837_513e-4;
@@ -195,8 +194,8 @@ fn sine_cosine_f32(angle: f32) -> (f32, f32) {
         return (f32::NAN, f32::NAN);
     }
     let turns = angle * core::f32::consts::FRAC_2_PI;
-    // Beside a number so large there is no room for a fraction: this rounds to the nearest integer,
-    // whose last bits are then those of the sum.
+    // A number this large has no fraction bits, so the sum rounds to the nearest integer and holds
+    // it in its last bits.
     let rounded = turns + ROUNDS_TO_INTEGER;
     let quadrant = rounded.to_bits();
     let k = rounded - ROUNDS_TO_INTEGER;
@@ -218,8 +217,8 @@ mod tests {
     use super::*;
     use std::{f32, format};
 
-    /// The polynomial against double precision, over every angle a joint can
-    /// have and the whole range of the reduction.
+    /// Compares the polynomial with double precision over every angle a joint can have and over the
+    /// whole range of the reduction.
     #[test]
     fn single_precision_sine_and_cosine_are_within_two_units_of_one() {
         let mut worst = 0.0_f64;

@@ -1,9 +1,9 @@
-//! Settings, each declared once: name, type, default, allowed range, unit and meaning.
+//! Settings declared once, with name, type, default, allowed range, unit and meaning.
 //!
-//! The macro [`settings!`](crate::settings!) makes from one declaration the struct with its
-//! documentation, `Default`, serde, the check of every range, and a description of the settings
-//! from which a host makes commented files, schemas and tables. It needs no heap and serves any
-//! crate, as for a control law of one's own:
+//! From one declaration the macro [`settings!`](crate::settings!) generates the struct with its
+//! documentation, `Default`, serde, the check of every range, and a description of the settings from
+//! which a host generates commented files, schemas and tables. It needs no heap and works in any crate,
+//! for example for a custom control law:
 //!
 //! ```
 //! use painleve_shared::settings::Settings;
@@ -27,7 +27,7 @@
 //! assert_eq!(ImpedanceSettings::FIELDS[0].unit, "N/m");
 //! ```
 //!
-//! A choice is an enum, whose variants have the names that they have in files:
+//! A choice is an enum. Each variant is declared with its name in files:
 //!
 //! ```
 //! painleve_shared::settings! {
@@ -45,14 +45,14 @@
 //! }
 //! ```
 //!
-//! A bound that depends on another setting is checked in a function, which the declaration names
-//! after the braces (`check Self::relations;`) and writes with [`check_setting!`](crate::check_setting!).
+//! A bound that depends on another setting is checked in a function. The declaration names it after the
+//! braces (`check Self::relations;`), and it uses [`check_setting!`](crate::check_setting!).
 
 pub use serde;
 
 use crate::range::{Key, OutOfRange, index_name, is_within};
 
-/// A group of settings; [`settings!`](crate::settings!) implements it.
+/// A group of settings, implemented by [`settings!`](crate::settings!).
 pub trait Settings: SettingValue {
     /// Every setting of the group, in the order of the declaration.
     const FIELDS: &'static [Field];
@@ -70,18 +70,18 @@ pub trait Settings: SettingValue {
     }
 }
 
-/// What is known about one setting.
+/// Description of one setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Field {
-    /// Name, with the unit's suffix.
+    /// Name, including the unit's suffix.
     pub key: &'static str,
-    /// One sentence about it.
+    /// Meaning, in one sentence.
     pub meaning: &'static str,
-    /// Unit; empty for a pure number and for what is no number.
+    /// Unit; empty for a dimensionless number and for a setting that is not a number.
     pub unit: &'static str,
-    /// Allowed values of a number, or of each number in an array. Other settings may narrow it.
+    /// Allowed values of a number, or of each number in an array. Other settings may narrow this range.
     pub range: Option<Range>,
-    /// What values look like.
+    /// Kind of value.
     pub shape: Shape,
 }
 
@@ -94,23 +94,23 @@ pub struct Range {
     pub maximum: f64,
 }
 
-/// What it takes to check one setting.
+/// Key and bounds for the check of one setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Name for the error.
+    /// Name in the error.
     pub key: &'static str,
     /// Allowed values, of numbers.
     pub range: Option<Range>,
 }
 
 impl Bounds {
-    /// Those of a value without a name.
+    /// Bounds of a value without a name.
     const NONE: Self = Self {
         key: "",
         range: None,
     };
 
-    /// Bounds of a setting of type `T`: a number without a range does not compile.
+    /// Returns the bounds of a setting of type `T`: a number without a range does not compile.
     #[doc(hidden)]
     pub const fn declared<T: SettingValue>(key: &'static str, range: Option<Range>) -> Self {
         assert!(
@@ -121,7 +121,7 @@ impl Bounds {
     }
 }
 
-/// What the values of a setting look like.
+/// The kind of a setting's values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// True or false.
@@ -136,26 +136,26 @@ pub enum Shape {
     Group(&'static [Field]),
     /// One of several variants.
     Choice {
-        /// Name of the key that holds the variant's name; without it a variant with settings is
-        /// a table of one key, the variant's name.
+        /// Key that holds the variant's name. Without it a variant with settings is a table with one key,
+        /// the variant's name.
         tag: Option<&'static str>,
         /// The variants.
         variants: &'static [Variant],
     },
-    /// May be absent.
+    /// A value that may be absent.
     Optional(&'static Shape),
     /// A fixed number of values.
     Array {
-        /// Each of them.
+        /// Kind of each value.
         item: &'static Shape,
-        /// How many.
+        /// Number of values.
         length: usize,
     },
     /// Any number of values up to a limit.
     List {
-        /// Each of them.
+        /// Kind of each value.
         item: &'static Shape,
-        /// The limit.
+        /// Largest number of values.
         maximum_length: usize,
     },
 }
@@ -176,29 +176,28 @@ impl Shape {
 pub struct Variant {
     /// Name in files.
     pub key: &'static str,
-    /// What it means.
+    /// Meaning.
     pub meaning: &'static str,
-    /// Settings that come with it: a group or another choice.
+    /// Settings of the variant: a group or another choice.
     pub content: Option<Shape>,
-    /// Whether all of these must be given: they have no defaults.
+    /// Whether all of its settings must be given because they have no defaults.
     pub complete: bool,
 }
 
-/// A type that a setting may have.
+/// A type of setting.
 pub trait SettingValue {
-    /// What its values look like.
+    /// Kind of its values.
     const SHAPE: Shape;
 
     /// Checks the value, or every value inside, against its bounds.
     ///
     /// # Errors
-    /// [`Refused`]; then `error` says what is out of range, with a key that begins with that of
-    /// `bounds`.
+    /// [`Refused`] with the details in `error`, whose key begins with that of `bounds`.
     fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused>;
 }
 
-/// A value is out of range. What there is to say about it is written in place: as results, the
-/// errors of all the settings of a group would be on a microcontroller's stack at once.
+/// A value is out of range. The details are written in place: returned as results, the errors of all
+/// settings of a group would be on a microcontroller's stack at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Refused;
 
@@ -215,7 +214,7 @@ macro_rules! numbers {
         impl SettingValue for $number {
             const SHAPE: Shape = Shape::$shape;
 
-            // One copy for all settings keeps a microcontroller's flash free.
+            // A single copy for all settings saves flash.
             #[inline(never)]
             fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
                 let value = *self as $real;
@@ -276,7 +275,7 @@ impl<T: SettingValue, const N: usize> SettingValue for [T; N] {
     }
 }
 
-/// Checks every value of a list; keys are the values' indices.
+/// Checks every value of a list; the keys are the values' indices.
 ///
 /// # Errors
 /// [`Refused`] for the first value that is out of range.
@@ -298,10 +297,10 @@ pub fn check_each<T: SettingValue>(
 
 /// Declares a group of settings or a choice; see the [module](crate::settings).
 ///
-/// A group: `name: type = default, range, "unit";` under a doc comment for every setting, the
-/// last two as the setting needs them. A choice: `"name" => Variant`, with nothing, a group's type
-/// in parentheses or settings without defaults in braces; `enum Name = Variant` makes a variant
-/// the default, `enum Name by "key"` puts the variant's name under a key beside its settings.
+/// A group lists `name: type = default, range, "unit";` with a doc comment on every setting; range and
+/// unit are optional where they do not apply. A choice lists `"name" => Variant`, which takes nothing, a
+/// group's type in parentheses, or settings without defaults in braces. `enum Name = Variant` makes a
+/// variant the default; `enum Name by "key"` stores the variant's name under a key beside its settings.
 #[macro_export]
 macro_rules! settings {
     (@range) => { ::core::option::Option::None };
@@ -469,7 +468,7 @@ macro_rules! settings {
         )?
 
         impl $name {
-            /// The variant's name in files.
+            /// Returns the variant's name in files.
             #[allow(dead_code)]
             pub const fn name(&self) -> &'static str {
                 match self {
@@ -546,7 +545,7 @@ macro_rules! settings {
     };
 }
 
-/// Adds a variant's name to the key of an error, unless the name is a value beside the settings.
+/// Adds a variant's name to the key of an error, unless the name is itself a value beside the settings.
 #[doc(hidden)]
 #[cold]
 pub fn in_variant(error: &mut OutOfRange, choice: &Shape, key: &'static str) {
@@ -555,9 +554,9 @@ pub fn in_variant(error: &mut OutOfRange, choice: &Shape, key: &'static str) {
     }
 }
 
-/// Checks a setting against bounds that depend on other settings:
-/// `check_setting!(self.estimator.bandwidth_rad_s, 1.0, 3.0 * tick_hz)`. The key in the error is
-/// that of the setting relative to `self`; a setting that does not exist does not compile.
+/// Checks a setting against bounds that depend on other settings, as in
+/// `check_setting!(self.estimator.bandwidth_rad_s, 1.0, 3.0 * tick_hz)`. The key in the error is the
+/// setting's path relative to `self`; a setting that does not exist does not compile.
 #[macro_export]
 macro_rules! check_setting {
     ($group:ident $(.$part:ident)+, $minimum:expr, $maximum:expr) => {
@@ -570,7 +569,7 @@ macro_rules! check_setting {
     };
 }
 
-/// Checks a value against bounds; `names` are those of its groups, from the outermost on, and its own.
+/// Checks a value against bounds; `names` are the names of its groups, outermost first, and its own.
 #[doc(hidden)]
 #[inline(never)]
 pub fn check_named<T: SettingValue>(
@@ -706,7 +705,7 @@ mod tests {
     }
 
     #[test]
-    fn the_description_is_the_declaration() {
+    fn the_description_matches_the_declaration() {
         let keys: std::vec::Vec<_> = GripperSettings::FIELDS.iter().map(|it| it.key).collect();
         assert_eq!(
             keys,
@@ -741,14 +740,14 @@ mod tests {
     }
 
     #[test]
-    fn defaults_are_those_declared_and_survive_the_wire() {
+    fn defaults_match_the_declaration_and_survive_the_wire() {
         let settings = GripperSettings {
             speed_m_s: Some(0.1),
             closing: Closing::default(),
             ..Default::default()
         };
         assert_eq!((settings.attempts, settings.closing), (3, Closing::Hard));
-        // Internally tagged enums need a format that describes itself.
+        // Internally tagged enums require a self-describing format.
         let part = (settings.force_n, settings.speed_m_s, settings.closing);
         let mut buffer = [0; 64];
         let bytes = postcard::to_slice(&part, &mut buffer).unwrap();

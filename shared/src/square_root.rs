@@ -1,7 +1,8 @@
-//! The single-precision square root, correctly rounded, with what the processor has for it.
+//! The correctly rounded single-precision square root, by a processor instruction where there is
+//! one.
 //!
-//! IEEE 754 fixes the rounding, so that every way to compute it gives the same bits. On a
-//! Cortex-M4F it is one instruction against 57 of a software root.
+//! IEEE 754 fixes the rounding, so every implementation gives the same bits. On a Cortex-M4F the
+//! square root takes 1 instruction, against 57 for a software routine.
 
 /// √`value`; NaN below zero.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]

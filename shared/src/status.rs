@@ -1,8 +1,8 @@
-//! What the controller says about itself: supervisor state and faults.
+//! The controller's status: supervisor states and faults.
 
 use strum::{EnumMessage, FromRepr, IntoStaticStr, VariantArray};
 
-/// State of the controller's supervisor. The number is what crosses the link.
+/// State of the controller's supervisor. Its number crosses the link.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, FromRepr, IntoStaticStr, VariantArray,
 )]
@@ -13,9 +13,9 @@ pub enum SupervisorState {
     /// Not enabled; torque is zero.
     #[default]
     Idle = 0,
-    /// Enabled; the arm is held where it is while contact is confirmed.
+    /// Enabled; the arm holds its position until contact is confirmed.
     Armed = 1,
-    /// The reference is followed.
+    /// The arm follows the reference.
     Tracking = 2,
     /// Contact was lost while tracking.
     LiftOff = 3,
@@ -24,21 +24,21 @@ pub enum SupervisorState {
 }
 
 impl SupervisorState {
-    /// All states, by number.
+    /// All states, ordered by number.
     pub const ALL: &[Self] = Self::VARIANTS;
 
-    /// The state with this number.
+    /// Returns the state with this number.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::from_repr(code)
     }
 
-    /// The state's name.
+    /// Returns the state's name.
     pub fn name(self) -> &'static str {
         self.into()
     }
 }
 
-/// Why the controller stopped. Numbers are stable: never reuse one.
+/// Reason for a stop of the controller. Numbers are stable and never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, EnumMessage, FromRepr, VariantArray)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -70,15 +70,15 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// All faults, by number.
+    /// All faults, ordered by number.
     pub const ALL: &[Self] = Self::VARIANTS;
 
-    /// The fault with this number; 0 means none.
+    /// Returns the fault with this number; 0 means none.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::from_repr(code)
     }
 
-    /// What happened, as in the documentation of the variant.
+    /// Returns the description in the documentation of the variant.
     pub fn description(self) -> &'static str {
         self.get_documentation().unwrap_or_default()
     }

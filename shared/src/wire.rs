@@ -1,8 +1,8 @@
-//! Messages as bytes, for links that are not shared memory.
+//! Encodes messages as bytes, for links other than shared memory.
 //!
-//! A message is encoded by postcard, followed by its CRC-32 (ISO-HDLC), and framed by
-//! COBS: it contains no zero byte and ends with one, so that a receiver that
-//! lost its place finds the next message.
+//! A message is encoded by postcard, followed by its CRC-32 (ISO-HDLC), and framed by COBS. A frame
+//! contains no zero byte except the last, so a receiver that has lost synchronisation finds the
+//! next message.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
@@ -10,23 +10,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::message::MAXIMUM_LENGTH;
 
-/// The smallest table there is: 256 entries of 4 bytes.
+/// The smallest table available: 256 entries of 4 bytes.
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// Bytes of the checksum behind a message.
+/// Length of the checksum that follows a message, bytes.
 const CHECKSUM_LENGTH: usize = 4;
 
-/// Why bytes are not a message.
+/// Why bytes cannot be decoded as a message, or a message cannot be encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WireError {
     /// The buffer is too small for the message.
     BufferTooSmall,
-    /// The bytes are not framed as a message: noise, or one that is cut or too long.
+    /// The bytes are not a valid frame: noise, or a truncated or overlong message.
     Garbage,
     /// A frame whose checksum is wrong.
     Checksum,
-    /// A frame that arrived as it was sent, but holds nothing that is known here.
+    /// The frame arrived intact but its content is unknown to this version.
     Content,
 }
 
@@ -58,8 +58,7 @@ pub fn encode<'a, M: Serialize>(message: &M, buffer: &'a mut [u8]) -> Result<&'a
         .map_err(|_| WireError::BufferTooSmall)
 }
 
-/// Decodes one message from the bytes up to and without its closing zero; uses
-/// `bytes` as scratch.
+/// Decodes one message from the bytes before its closing zero; uses `bytes` as scratch space.
 ///
 /// # Errors
 /// [`WireError::Garbage`], [`WireError::Checksum`] or [`WireError::Content`] for
@@ -76,12 +75,12 @@ pub fn decode<'a, M: Deserialize<'a>>(bytes: &'a mut [u8]) -> Result<M, WireErro
     postcard::from_bytes(content).map_err(|_| WireError::Content)
 }
 
-/// Collects bytes up to the zero that ends a message; finds its place again after garbage.
+/// Collects bytes up to the zero that ends a message; resynchronises after garbage.
 #[derive(Clone, Debug)]
 pub struct Inbox {
     bytes: [u8; MAXIMUM_LENGTH],
     length: usize,
-    /// The message is longer than any: its rest is skipped.
+    /// Whether the present message exceeds the longest length; the rest of it is skipped.
     overlong: bool,
 }
 
@@ -101,8 +100,8 @@ impl Inbox {
         }
     }
 
-    /// Takes in one byte; returns a message, without its closing zero, when it is complete. An
-    /// overlong one comes out empty, which decodes as [`WireError::Garbage`].
+    /// Takes one byte; returns a message, without its closing zero, when it is complete. An
+    /// overlong message is returned empty, which decodes as [`WireError::Garbage`].
     pub fn push(&mut self, byte: u8) -> Option<&mut [u8]> {
         if byte != 0 {
             match self.bytes.get_mut(self.length) {
@@ -116,7 +115,7 @@ impl Inbox {
         }
         let length = core::mem::take(&mut self.length);
         let overlong = core::mem::take(&mut self.overlong);
-        // A zero after a zero is no message, but how a sender makes sure of a fresh start.
+        // An empty frame is not a message: senders put a zero in front to force a fresh start.
         if length == 0 {
             return None;
         }
@@ -159,7 +158,7 @@ mod tests {
         }
 
         #[test]
-        fn one_flipped_bit_is_noticed(frame in sensor_frame(), at in 0_usize..1000, bit in 0_u8..8) {
+        fn one_flipped_bit_is_detected(frame in sensor_frame(), at in 0_usize..1000, bit in 0_u8..8) {
             let mut bytes = encoded(&frame);
             bytes.pop();
             let at = at % bytes.len();
@@ -173,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_buffer_is_an_error_and_not_a_panic() {
+    fn a_small_buffer_is_an_error() {
         let frame = SensorFrame::default();
         for size in 0..12 {
             assert_eq!(
@@ -185,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn what_arrives_whole_and_is_unknown_is_told_from_what_is_damaged() {
+    fn unknown_and_damaged_messages_are_different_errors() {
         let mut buffer = [0; 16];
         let length = encode(&(1_u8, 2_u8), &mut buffer).unwrap().len();
         let bytes = &mut buffer[..length - 1];
@@ -216,7 +215,7 @@ mod tests {
                 results.push(decode::<SensorFrame>(message));
             }
         }
-        // The first good message is spoilt by the garbage before it.
+        // The garbage before it destroys the first good message.
         assert!(matches!(
             results[..],
             [Err(_), Err(WireError::Garbage), Ok(found)] if found == frame

@@ -1,4 +1,4 @@
-//! What a sensor frame is good for, and what went wrong with it.
+//! Classifies an arriving sensor frame and records its lapses.
 
 use painleve_shared::frame::SensorFrame;
 
@@ -7,29 +7,29 @@ use crate::drive::torque::LastCommand;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::Supervision;
 
-/// Ticks without readings are not counted further: a fault is latched long before.
+/// Largest count of ticks without readings: a fault is latched long before.
 const UNREAD_TICKS_LIMIT: u32 = 1 << 16;
 
-/// What a frame is good for.
+/// Result of the checks of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Arrival {
-    /// Readings so many ticks after the ones before (1 when none were lost).
+    /// Valid readings, this many ticks after the previous ones (1 when none were lost).
     After(u32),
     /// A repeated or old frame.
     Stale,
-    /// A new frame with a reading that cannot be.
+    /// A new frame with an impossible reading.
     OutOfRange,
 }
 
-/// Which frames have come.
+/// Record of the frames received.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ArrivalState {
     last_sequence: Option<u32>,
-    /// Ticks since the last readings that were taken in, before the present frame's.
+    /// Ticks since the last readings used, without those that the present frame adds.
     unread_ticks: u32,
 }
 
-/// Where lapses are counted, and what too many of them stop.
+/// Lapse monitor, and the supervisor that it stops.
 pub(super) struct Lapses<'a> {
     pub monitor: &'a mut LapseMonitor,
     pub supervision: &'a mut Supervision,
@@ -37,11 +37,11 @@ pub(super) struct Lapses<'a> {
 }
 
 impl Lapses<'_> {
-    /// Takes note of how many times something went wrong, 0 for a good one. Says whether that has
-    /// just latched a fault.
+    /// Records how many times a lapse occurred, 0 for none. Returns whether this has just latched a
+    /// fault.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
-        // A good one, which nearly all are, costs next to nothing.
+        // Nearly all calls record no lapse: return early.
         if times == 0 {
             self.monitor.note_good(lapse);
             false
@@ -62,7 +62,7 @@ impl Lapses<'_> {
     }
 }
 
-/// Looks at a frame before anything is made of it.
+/// Checks a frame before its readings are used.
 pub(super) fn arrive(
     converters: &Converters,
     state: &mut ArrivalState,
@@ -89,7 +89,7 @@ pub(super) fn arrive(
     Arrival::After(1 + core::mem::take(&mut state.unread_ticks))
 }
 
-/// A frame that is not the next one, or has readings (`encoders`, `forces`) out of range.
+/// Handles a frame that is out of sequence or has readings (`encoders`, `forces`) out of range.
 #[cold]
 #[inline(never)]
 fn irregular(
@@ -100,7 +100,7 @@ fn irregular(
     encoders: bool,
     forces: bool,
 ) -> Arrival {
-    // More than half the range ahead is behind.
+    // More than half the counter's range ahead means behind.
     let stale = ahead == 0 || ahead > u32::MAX / 2;
     lapses.note(Lapse::StaleFrame, u32::from(stale));
     if stale {

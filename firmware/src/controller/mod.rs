@@ -6,9 +6,9 @@
 //!                     └──────────────── last command ────────────────────┘
 //! ```
 //!
-//! Each stage is made of settings, which never change, and of a state of its own; what flows from
-//! stage to stage is in the stages' signatures. What a tick did is written to the telemetry at its
-//! end and never read.
+//! Each stage consists of constant settings and a state of its own; the stages' signatures show the
+//! data flow between them. At the end of a tick its results are written to the telemetry, which is
+//! never read back.
 
 mod arrival;
 #[cfg(test)]
@@ -54,7 +54,7 @@ struct Stages<L> {
     torques: TorqueStages,
 }
 
-/// What the stages remember from tick to tick.
+/// State of the stages between ticks.
 #[derive(Clone, Debug)]
 struct State<L: Law> {
     arrivals: ArrivalState,
@@ -68,7 +68,7 @@ struct State<L: Law> {
 }
 
 impl<L: Law> Controller<L> {
-    /// A controller that has seen no frame yet.
+    /// Builds a controller that has received no frame yet.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
@@ -111,7 +111,7 @@ impl<L: Law> Controller<L> {
         self.tick_into(frame, TelemetrySink::nowhere())
     }
 
-    /// Answers one sensor frame and writes down what went on inside.
+    /// Answers one sensor frame and writes the internal state to the telemetry.
     pub fn tick_with_telemetry(
         &mut self,
         frame: &SensorFrame,
@@ -120,9 +120,9 @@ impl<L: Law> Controller<L> {
         self.tick_into(frame, TelemetrySink::to(telemetry))
     }
 
-    /// Takes note of how many times something went wrong around this tick, 0 for a
-    /// good one. If that is now too often in a row, the fault is latched, and the last answer
-    /// without its torque is returned, to be put out at once.
+    /// Records how many times a lapse occurred around this tick, 0 for none. If it has now occurred
+    /// too often in a row, latches the fault and returns the last answer with zero torque, to be
+    /// output at once.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
         let State {
@@ -142,7 +142,7 @@ impl<L: Law> Controller<L> {
         })
     }
 
-    /// How often each kind of lapse has happened.
+    /// Returns how often each kind of lapse has occurred.
     pub fn lapse_counts(&self) -> &LapseMonitor {
         &self.state.monitor
     }
@@ -172,7 +172,7 @@ impl<L: Law> Controller<L> {
                 self.stages
                     .tick(&mut self.state, &readings, &mut self.last_answer, telemetry);
             }
-            // There is nothing new to go by: the last torque stays, for a while.
+            // Without new readings, the last torque stays for a limited number of ticks.
             Arrival::Stale if supervision.drives() => {}
             Arrival::OutOfRange
                 if supervision.drives() && frame.inputs.contains(DigitalInputs::ENABLE) => {}
@@ -189,7 +189,7 @@ impl<L: Law> Controller<L> {
         self.last_answer
     }
 
-    /// Torque off, without a tick.
+    /// Takes the torque off without a tick.
     #[cold]
     #[inline(never)]
     fn stop(&mut self, telemetry: TelemetrySink<'_>) {
@@ -208,7 +208,7 @@ impl<L: Law> Controller<L> {
 }
 
 impl<L: Law> Stages<L> {
-    /// One tick, from readings to the answer.
+    /// Runs one tick, from readings to the answer.
     #[inline]
     fn tick(
         &self,
@@ -299,20 +299,20 @@ impl<L: Law> Stages<L> {
 }
 
 impl<L: Law> State<L> {
-    /// Takes the torque off; whatever was begun in the air is given up.
+    /// Takes the torque off and cancels a recovery in progress.
     fn release(&mut self) {
         self.command = LastCommand::default();
         self.recovery = RecoveryState::default();
     }
 }
 
-/// State and fault of an answer.
+/// Returns state and fault of an answer.
 fn report(answer: &mut ActuatorFrame, supervision: &Supervision) {
     answer.state = supervision.state() as u8;
     answer.fault = supervision.fault().map_or(0, |fault| fault as u8);
 }
 
-/// The answer's flags for one tick.
+/// Returns the answer's flags for one tick.
 fn flags(tick: &Tick<'_>, reference_done: bool) -> StatusFlags {
     let Tick {
         contact,

@@ -1,4 +1,4 @@
-//! Tests of the tick's bookkeeping: frames, faults, limits, counters.
+//! Tests of the tick's handling of frames, faults, limits and counters.
 
 use super::*;
 use crate::configuration::ControllerSettings;
@@ -65,7 +65,7 @@ fn tracking() -> Controller {
 fn assert_fault(controller: &mut Controller, bad: &SensorFrame, fault: Fault) {
     let answer = controller.tick(bad);
     assert_eq!(answer.latched_fault(), Some(fault));
-    assert_eq!(answer.torques, [TorqueCounts(0); 2], "safe within the tick");
+    assert_eq!(answer.torques, [TorqueCounts(0); 2], "off within the tick");
     let next = controller.tick(&frame(bad.tick.wrapping_add(1)));
     assert_eq!(next.latched_fault(), Some(fault), "latched");
     assert_eq!(next.torques, [TorqueCounts(0); 2]);
@@ -112,7 +112,7 @@ fn impossible_readings_keep_the_torque_and_too_many_in_a_row_are_a_fault() {
             assert_eq!(answer.torques, before.torques);
             assert_eq!(answer.latched_fault(), None);
         }
-        // The estimator bridges what it has not seen, and the count starts over.
+        // The estimator bridges the missing readings, and the count restarts.
         let good = 21 + limit;
         assert_eq!(controller.tick(&frame(good)).latched_fault(), None);
         for tick in (good + 1..).take(limit as usize) {
@@ -133,7 +133,7 @@ fn the_drive_can_be_disabled_by_a_frame_whose_readings_are_impossible() {
     let answer = controller.tick(&bad);
     assert_eq!(answer.torques, [TorqueCounts(0); 2]);
     assert_eq!(answer.supervisor_state(), Some(SupervisorState::Idle));
-    // ENABLE has to rise again in a frame that can be believed.
+    // ENABLE has to rise again in a valid frame.
     let answer = controller.tick(&frame(21));
     assert_eq!(answer.supervisor_state(), Some(SupervisorState::Idle));
 }
@@ -146,14 +146,14 @@ fn a_joint_that_jumps_is_a_fault_at_once() {
 }
 
 #[test]
-fn after_a_jump_the_encoders_tell_that_the_tip_is_in_the_air() {
+fn after_a_jump_the_encoders_detect_flight() {
     let mut configuration = configuration();
     configuration.settings.contact.evidence = Evidence::Encoders;
     let mut controller = Controller::new(&configuration).unwrap();
     let touches = |answer: ActuatorFrame| answer.flags.contains(StatusFlags::CONTACT);
     assert!(touches(run(&mut controller, 0..20)));
     let encoder = configuration.converters.encoders[0];
-    // 5 cm up and on.
+    // The tip is 5 cm higher from now on.
     let thrown = |tick| {
         let mut thrown = frame(tick);
         thrown.joints[0] = encoder.reading((-4.4 - f64::from(tick)).to_radians());
@@ -166,14 +166,14 @@ fn after_a_jump_the_encoders_tell_that_the_tip_is_in_the_air() {
 }
 
 #[test]
-fn a_lapse_around_the_tick_latches_past_its_limit_until_armed_again() {
+fn a_lapse_around_the_tick_beyond_its_limit_latches_until_armed_again() {
     for lapse in [Lapse::Overrun, Lapse::MissingFrame, Lapse::FailedChecksum] {
         let mut controller = tracking();
         let stopped = (0..20).find_map(|_| controller.note(lapse, 1));
         let stopped = stopped.expect("every kind has a limit");
         assert_eq!(stopped.latched_fault(), Some(lapse.fault()));
-        assert_eq!(stopped.torques, [TorqueCounts(0); 2], "safe at once");
-        // Told once; the fault stays whatever comes.
+        assert_eq!(stopped.torques, [TorqueCounts(0); 2], "torque off at once");
+        // Reported once; the fault stays latched.
         assert_eq!(controller.note(lapse, 1), None);
         controller.note(lapse, 0);
         let answer = run(&mut controller, 20..30);
@@ -222,7 +222,7 @@ fn a_stale_frame_keeps_the_torque_and_many_are_a_fault() {
 #[test]
 fn torque_is_limited_and_counted() {
     let mut limited = configuration();
-    // Less than it takes to hold the arm, so that pressing less does not help.
+    // Less torque than holding the arm takes, so that pressing less does not help.
     limited.settings.torque_limit_nm = 0.05;
     let mut controller = Controller::new(&limited).unwrap();
     let (answer, telemetry) = run_with_telemetry(&mut controller, 0..20);

@@ -1,8 +1,8 @@
-//! The hardware around a tick, and the task that drives it.
+//! The hardware interface of a tick, and the task that runs ticks on it.
 //!
-//! - [`torque`]: from wanted torques to counts: kept on the belt, limited, rounded
-//! - [`Drive`]: what the control task needs of the hardware, or of a stand-in for it
-//! - [`ControlTask`]: one control tick with everything around it, on every host
+//! - [`torque`]: converts wanted torques to counts: guarded against lift-off, limited and rounded
+//! - [`Drive`]: the hardware interface of the control task
+//! - [`ControlTask`]: one control tick with sampling, actuation and monitoring, on every host
 
 mod task;
 pub mod torque;
@@ -11,43 +11,44 @@ pub use self::task::{Answered, ControlTask, TaskCounts};
 
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
-/// What the control task needs of the hardware, or of a stand-in for it.
+/// The hardware interface of the control task, implemented by boards and simulations.
 ///
 /// # Order of calls
-/// Once a tick, in this order: [`begin_tick`](Self::begin_tick), [`sample`](Self::sample),
-/// [`actuate`](Self::actuate) if there is an answer,
-/// [`next_tick_is_due`](Self::next_tick_is_due), and `actuate` again if that, or a message that
-/// came in between, has latched a fault. [`stopwatch`](Self::stopwatch) may be called at any time.
+/// The calls of one tick are, in this order: [`begin_tick`](Self::begin_tick),
+/// [`sample`](Self::sample), [`actuate`](Self::actuate) if there is an answer,
+/// [`next_tick_is_due`](Self::next_tick_is_due), and `actuate` again if an overrun, or a message
+/// received in between, has latched a fault. [`stopwatch`](Self::stopwatch) may be called at any
+/// time.
 ///
 /// # Time
-/// Every call returns in bounded time, and all of a tick's calls together with the controller's
-/// tick in less than the time between two ticks. `sample` alone may wait for the tick to begin,
-/// on a host whose clock is the arrival of frames.
+/// Every call returns in bounded time. All calls of a tick together with the controller's tick take
+/// less than the control period. Only `sample` may wait for the tick to begin, on a host where the
+/// arrival of a frame starts the tick.
 ///
 /// # Faults
-/// None of the calls panics or fails. A sensor that cannot be read is a reading that is out of
-/// range; frames that do not come are `None`; the controller counts both and latches a fault when
-/// there are too many.
+/// No call panics or returns an error. A sensor that cannot be read gives a reading out of range; a
+/// missing frame is `None`. The controller counts both and latches a fault if too many occur in a
+/// row.
 ///
-/// An answer with torque zero in state idle or fault switches the torque stages off before
-/// `actuate` returns. They stay off until an answer in another state. A drive that sees by itself
-/// that it cannot go on does the same without being asked.
+/// An answer with zero torque in state idle or fault switches the torque stages off before
+/// `actuate` returns. They stay off until an answer in another state. A drive that detects its own
+/// failure switches them off by itself.
 pub trait Drive {
-    /// Takes note that a tick begins: from now on, [`next_tick_is_due`](Self::next_tick_is_due)
-    /// tells of the next one.
+    /// Marks the beginning of a tick: from now on, [`next_tick_is_due`](Self::next_tick_is_due)
+    /// refers to the following tick.
     fn begin_tick(&mut self);
 
-    /// The newest sensor frame; `None` if none has come since the last call. The same frame is not
+    /// Returns the newest sensor frame; `None` if none has arrived since the last call. No frame is
     /// returned twice.
     fn sample(&mut self) -> Option<SensorFrame>;
 
-    /// Puts out an answer's torques. Called again within a tick, the last call counts; the same
-    /// answer again changes nothing.
+    /// Outputs an answer's torques. If called again within a tick, the last call takes effect;
+    /// repeating the same answer changes nothing.
     fn actuate(&mut self, answer: &ActuatorFrame);
 
-    /// Whether the next tick should have begun already. Asking changes nothing.
+    /// Returns whether the next tick should have begun already, without side effects.
     fn next_tick_is_due(&self) -> bool;
 
-    /// A running count that times a tick; wraps.
+    /// Returns a free-running count that times a tick; wraps.
     fn stopwatch(&self) -> u32;
 }

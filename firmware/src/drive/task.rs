@@ -1,4 +1,4 @@
-//! The control task: one tick with everything around it.
+//! The control task: one tick with sampling, actuation and monitoring.
 
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::message::FrameSource;
@@ -13,24 +13,24 @@ use crate::supervise::lapses::{Lapse, LapseMonitor};
 /// The answer to one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answered {
-    /// The answer that counts.
+    /// The frame that takes effect.
     pub frame: ActuatorFrame,
-    /// What the controller's tick took, in counts of [`Drive::stopwatch`]; 0 for an answer that
-    /// no frame asked for, because a fault has taken the torque off.
+    /// Duration of the controller's tick in counts of [`Drive::stopwatch`]; 0 for an answer without
+    /// a frame, sent because a fault has taken the torque off.
     pub elapsed: u32,
 }
 
-/// What is counted since the controller was configured.
+/// Statistics since the controller was configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TaskCounts {
-    /// Ticks with an answer to a frame; wraps.
+    /// Ticks that answered a frame; wraps.
     pub ticks: u32,
-    /// Longest of them, in counts of [`Drive::stopwatch`].
+    /// Longest of these ticks, in counts of [`Drive::stopwatch`].
     pub worst_elapsed: u32,
 }
 
-/// Drives an arm, tick by tick: notes a missing frame, samples, ticks, actuates, notes an overrun,
-/// reports. The same on a PC, under an emulator and on a board.
+/// Drives an arm tick by tick: samples, runs the controller, actuates, and records missing frames
+/// and overruns. It is the same on a PC, under an emulator and on a board.
 ///
 /// ```
 /// use painleve_firmware::drive::{ControlTask, Drive};
@@ -38,7 +38,7 @@ pub struct TaskCounts {
 /// use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 /// use painleve_shared::message::FrameSource;
 ///
-/// /// A drive without an arm: its sensors read zero, its stages only remember what they are told.
+/// /// A drive without an arm: its sensors read zero, its stages only record the answer.
 /// #[derive(Default)]
 /// struct Desk {
 ///     frames: u32,
@@ -76,14 +76,14 @@ pub struct TaskCounts {
 #[derive(Debug)]
 pub struct ControlTask<D, L: Law = LawSettings> {
     drive: D,
-    /// `None` until there is a configuration.
+    /// `None` until the task is configured.
     controller: Option<Controller<L>>,
     source: FrameSource,
     counts: TaskCounts,
 }
 
 impl<D: Drive, L: Law> ControlTask<D, L> {
-    /// A task that does nothing yet.
+    /// Makes a task without a configuration, which does nothing.
     pub const fn new(drive: D) -> Self {
         Self {
             drive,
@@ -96,11 +96,12 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         }
     }
 
-    /// Starts afresh with this configuration and frames from `source`. The torque goes off before.
+    /// Starts afresh with this configuration and frames from `source`, after taking the torque off.
     ///
     /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range. The task then does nothing.
-    // Out of line: what it takes to make a controller does not share the stack with its ticks.
+    /// [`OutOfRange`] naming the first key that is out of range. The task then stays without a
+    /// configuration.
+    // Out of line: building a controller does not share the stack with its ticks.
     #[inline(never)]
     pub fn configure(
         &mut self,
@@ -114,13 +115,13 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         Ok(())
     }
 
-    /// Takes the torque off and does nothing from now on.
+    /// Takes the torque off and drops the configuration; further ticks do nothing.
     pub fn stop(&mut self) {
         self.drive.actuate(&ActuatorFrame::default());
         self.controller = None;
     }
 
-    /// One tick; `None` if there is nothing to say.
+    /// Runs one tick; returns `None` if there is no answer to send.
     pub fn tick(&mut self) -> Option<Answered> {
         self.drive.begin_tick();
         let Some(controller) = &mut self.controller else {
@@ -152,8 +153,8 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         })
     }
 
-    /// Takes note of how many times something went wrong between two ticks, 0 for a good one. The
-    /// torque is off on return if that is now too often in a row.
+    /// Records how many times a lapse occurred between two ticks, 0 for none. If it has now occurred
+    /// too often in a row, the torque is off on return.
     pub fn note(&mut self, lapse: Lapse, times: u32) {
         if let Some(controller) = &mut self.controller
             && let Some(stopped) = controller.note(lapse, times)
@@ -162,27 +163,27 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         }
     }
 
-    /// How often each kind of lapse has happened; `None` without a configuration.
+    /// Returns how often each kind of lapse has occurred; `None` without a configuration.
     pub fn lapse_counts(&self) -> Option<&LapseMonitor> {
         self.controller.as_ref().map(Controller::lapse_counts)
     }
 
-    /// Where frames come from.
+    /// Returns the source of the frames.
     pub fn source(&self) -> FrameSource {
         self.source
     }
 
-    /// What is counted besides.
+    /// Returns the statistics of the ticks.
     pub fn counts(&self) -> TaskCounts {
         self.counts
     }
 
-    /// The drive.
+    /// Returns the drive.
     pub fn drive(&self) -> &D {
         &self.drive
     }
 
-    /// The drive, to give it what comes from elsewhere.
+    /// Returns the drive for changes, for example to offer it a frame.
     pub fn drive_mut(&mut self) -> &mut D {
         &mut self.drive
     }
@@ -204,7 +205,7 @@ mod tests {
         Actuate(ActuatorFrame),
     }
 
-    /// A drive that writes down how it is called.
+    /// A drive that records the calls it receives.
     #[derive(Default)]
     struct Mock {
         calls: Vec<Call>,
@@ -260,7 +261,7 @@ mod tests {
         }
     }
 
-    /// A task that tracks after 20 ticks.
+    /// Returns a task that tracks after 20 ticks.
     fn tracking(source: FrameSource) -> ControlTask<Mock> {
         let mut task = ControlTask::new(Mock::default());
         task.configure(&Configuration::default(), source).unwrap();
@@ -295,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_frames_stop_a_drive_that_goes_by_the_clock_and_no_other() {
+    fn missing_frames_stop_only_a_drive_with_its_own_clock() {
         let mut task = tracking(FrameSource::Realtime);
         let limit = 10;
         for _ in 0..limit {
@@ -310,7 +311,7 @@ mod tests {
             task.drive.calls(),
             [Call::BeginTick, Call::Sample, actuated]
         );
-        assert_eq!(task.tick(), None, "told once");
+        assert_eq!(task.tick(), None, "reported once");
         for source in [FrameSource::Lockstep, FrameSource::Sensors] {
             let mut task = tracking(source);
             assert!((0..100).all(|_| task.tick().is_none()));
@@ -319,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn an_overrun_too_many_replaces_the_answer_that_is_out_already() {
+    fn an_overrun_beyond_the_limit_replaces_the_answer_already_output() {
         let mut task = tracking(FrameSource::Realtime);
         task.drive.is_due = true;
         task.drive.frame = Some(frame(20));
@@ -335,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_too_many_stops_the_drive_between_ticks() {
+    fn a_broken_message_beyond_the_limit_stops_the_drive_between_ticks() {
         let mut task = tracking(FrameSource::Lockstep);
         for _ in 0..=10 {
             task.note(Lapse::FailedChecksum, 1);
@@ -363,7 +364,7 @@ mod tests {
         };
         assert!(task.configure(&bad, FrameSource::Lockstep).is_err());
         task.drive.frame = Some(frame(0));
-        assert_eq!(task.tick(), None, "without a configuration nothing is done");
+        assert_eq!(task.tick(), None, "nothing without a configuration");
         assert_eq!(task.lapse_counts().map(|_| ()), None);
     }
 }

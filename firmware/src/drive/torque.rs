@@ -1,4 +1,4 @@
-//! From a law's answer to torque counts: kept on the belt, limited, rounded, checked.
+//! Converts a law's torque to counts: guarded against lift-off, limited, rounded and checked.
 
 use painleve_shared::counts::{LinearScale, TorqueCounts};
 use painleve_shared::{JointMotion, JointTorque, Real};
@@ -8,38 +8,38 @@ use crate::estimate::model::Model;
 use crate::guard::{GuardSettings, HalfPlane, nearest_torque_nm};
 use crate::law::LawOutput;
 
-/// The torques that were commanded last and what they are expected to do: all that the
-/// controller remembers of its output. The default is no torque.
+/// The last commanded torques and their expected effect: the only state the controller keeps of its
+/// output. The default is no torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LastCommand {
     /// Counts for the torque stages.
     pub counts: [TorqueCounts; 2],
-    /// Joint torques that these counts are worth, N·m.
+    /// Joint torques that these counts represent, N·m.
     pub torque_nm: JointTorque<f32>,
     /// Whether a torque was limited.
     pub saturated: bool,
     /// Whether the contact guard changed the torques.
     pub guarded: bool,
-    /// Acceleration of the joints expected until the next tick, rad/s².
+    /// Expected acceleration of the joints until the next tick, rad/s².
     pub expected_acceleration_rad_s2: JointMotion<f32>,
-    /// What of it the contact force is expected to cause, rad/s².
+    /// Part of that acceleration due to the contact force, rad/s².
     pub contact_acceleration_rad_s2: JointMotion<f32>,
-    /// Torque that rounding to counts still owes, N·m.
+    /// Torque withheld by rounding to counts, to be added at the next tick, N·m.
     rounding_nm: JointTorque<f32>,
 }
 
 impl LastCommand {
-    /// Whether the torques were not those that were asked for: integrals have to stand still.
+    /// Whether the torques differ from those requested: integrators then have to stop.
     pub fn is_constrained(&self) -> bool {
         self.saturated || self.guarded
     }
 }
 
-/// A torque was asked for that is not a finite number.
+/// A requested torque is not a finite number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotFinite;
 
-/// The torque stages, and what is allowed to be asked of them.
+/// The torque stages and the limits on their torques.
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueStages {
     guard: GuardSettings,
@@ -48,7 +48,7 @@ pub struct TorqueStages {
 }
 
 impl TorqueStages {
-    /// Stages with this scale, of which ±`limit_nm` (N·m) is used.
+    /// Makes stages with this scale, of which ±`limit_nm` (N·m) is used.
     pub fn new(guard: &GuardSettings, scale: LinearScale<f32>, limit_nm: f32) -> Self {
         Self {
             guard: *guard,
@@ -57,15 +57,15 @@ impl TorqueStages {
         }
     }
 
-    /// Largest torque on either joint, N·m.
+    /// Returns the largest torque on either joint, N·m.
     pub fn limit_nm(&self) -> f32 {
         self.limit_nm
     }
 
-    /// Turns a law's answer at a tick into a command.
+    /// Converts a law's answer at one tick to a command.
     ///
     /// # Errors
-    /// [`NotFinite`] if the law's torque is not a number; the command stays as it was.
+    /// [`NotFinite`] if the law's torque is not a finite number; the command stays unchanged.
     #[inline]
     pub fn tick(
         &self,
@@ -87,8 +87,8 @@ impl TorqueStages {
         Ok(())
     }
 
-    /// The torque (N·m) next to the wanted one that keeps a sliding tip pressed on the belt, and
-    /// whether that is another one.
+    /// Returns the torque (N·m) closest to the wanted one that keeps a sliding tip pressed on the
+    /// belt, and whether it differs from the wanted one.
     fn pressed(
         &self,
         wanted_nm: &JointTorque<f32>,
@@ -106,23 +106,23 @@ impl TorqueStages {
         };
         match nearest_torque_nm(wanted_nm, &plane, self.limit_nm) {
             (nearest_nm, true) => (nearest_nm, true),
-            // Not limited yet: that is counted below.
+            // The torque limit is not applied here: limiting is flagged below.
             (_, false) => (*wanted_nm, false),
         }
     }
 
-    /// Limits the wanted torques and turns them into counts.
+    /// Limits the wanted torques and converts them to counts.
     fn limit(
         &self,
         command: &mut LastCommand,
         wanted_nm: &JointTorque<f32>,
     ) -> Result<(), NotFinite> {
-        // Before clamping, which would turn an infinity into a limit.
+        // Check before clamping, which would turn an infinity into a limit.
         if !(wanted_nm.first().is_finite() && wanted_nm.second().is_finite()) {
             return Err(NotFinite);
         }
-        // What rounding took away is given with the next tick: near the edge, where p is
-        // small, half a count of constant torque would be a newton of force.
+        // Carry the rounding remainder to the next tick: near the edge, where p is small, half a
+        // count of constant torque would cause one newton of force.
         let owed = (*wanted_nm + command.rounding_nm).map(|torque| torque.within(self.limit_nm));
         let (counts_1, over_1) = self.scale.counts(owed.first());
         let (counts_2, over_2) = self.scale.counts(owed.second());
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_rounding_takes_away_is_given_later() {
+    fn the_rounding_remainder_is_carried_to_later_ticks() {
         let count = stages().scale.per_count();
         let wanted = JointTorque::new(0.3 * count, -0.3 * count);
         let mut command = LastCommand::default();

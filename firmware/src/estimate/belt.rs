@@ -1,9 +1,9 @@
-//! What contact tells about the belt's speed.
+//! Bounds the belt's speed from contact.
 //!
-//! Coulomb friction shows only the direction of slip: while it is positive the belt is slower
-//! than the tip, while it is negative faster, and in stick it is exactly as fast. The
-//! observer keeps these bounds; they widen with the acceleration that the belt may have. Once
-//! the tip has slid both ways, or stuck, they meet.
+//! Coulomb friction shows only the direction of slip. At positive slip the belt is slower than the
+//! tip, at negative slip it is faster, and in stick it is as fast as the tip. The observer keeps
+//! these bounds and widens them with the largest acceleration of the belt. After the tip has slid
+//! in both directions, or stuck, the bounds meet.
 
 use painleve_shared::{OutOfRange, Real, Slip, check_setting, settings};
 
@@ -13,9 +13,9 @@ settings! {
     /// Settings of the belt observer.
     #[derive(Copy)]
     pub struct BeltSettings {
-        /// The belt's speed if it is known and constant; at most `fastest_m_s` either way.
+        /// Belt speed if it is known and constant; at most `fastest_m_s` in either direction.
         given_m_s: Option<f32> = None, -100.0..=100.0, "m/s";
-        /// Fastest belt either way.
+        /// Largest belt speed in either direction.
         fastest_m_s: f32 = 2.0, 1e-3..=100.0, "m/s";
         /// Largest acceleration of the belt.
         acceleration_m_s2: f32 = 2.0, 0.0..=1e3, "m/s²";
@@ -37,7 +37,7 @@ pub struct BeltState {
 }
 
 impl Default for BeltState {
-    /// Nothing is known.
+    /// Starts without information.
     fn default() -> Self {
         Self {
             slowest_m_s: f32::NEG_INFINITY,
@@ -46,7 +46,7 @@ impl Default for BeltState {
     }
 }
 
-/// Narrows the bounds of the belt's speed tick by tick.
+/// Narrows the bounds of the belt's speed at each tick.
 #[derive(Clone, Copy, Debug)]
 pub struct BeltEstimator {
     settings: BeltSettings,
@@ -54,7 +54,7 @@ pub struct BeltEstimator {
 }
 
 impl BeltEstimator {
-    /// An estimator that is called every `tick_s`.
+    /// Makes an estimator that is called every `tick_s`.
     pub fn new(settings: &BeltSettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
@@ -62,7 +62,8 @@ impl BeltEstimator {
         }
     }
 
-    /// One tick: the tip's velocity (m/s) and, in contact, what friction says.
+    /// Updates the bounds with one tick: the tip's velocity (m/s) and, in contact, the friction
+    /// estimate.
     pub fn update(
         &self,
         state: &mut BeltState,
@@ -89,7 +90,7 @@ impl BeltEstimator {
         }
     }
 
-    /// Slowest and fastest speed that the belt may have, m/s.
+    /// Returns the lowest and highest speed that the belt may have, m/s.
     pub fn bounds_m_s(&self, state: &BeltState) -> (f32, f32) {
         let known = (state.slowest_m_s, state.fastest_m_s);
         self.settings
@@ -97,7 +98,8 @@ impl BeltEstimator {
             .map_or(known, |speed| (speed, speed))
     }
 
-    /// Direction of slip of a tip with this velocity (m/s); `None` where the bounds leave it open.
+    /// Returns the direction of slip of a tip with this velocity (m/s); `None` where the bounds do
+    /// not decide it.
     pub fn slip(&self, state: &BeltState, tip_velocity_m_s: f32) -> Option<Slip> {
         let (slowest_m_s, fastest_m_s) = self.bounds_m_s(state);
         if tip_velocity_m_s > fastest_m_s {
@@ -138,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn stick_shows_the_speed_and_time_forgets_it() {
+    fn stick_gives_the_speed_and_the_bounds_widen_with_time() {
         let belt = BeltEstimator::new(&BeltSettings::default(), 1e-3);
         let mut state = BeltState::default();
         belt.update(&mut state, -0.25, Some(&friction(Slip::Positive, true)));

@@ -1,12 +1,12 @@
-//! The links' length from the belt.
+//! Calibrates the links' length against the belt.
 //!
-//! With the tip on the belt cos θ₁ + ρ cos θ₂ = H/l₁ in every posture, ρ = l₂/l₁. The mean of the
-//! measured sum therefore gives l₁, and l₂ in proportion, better the longer the tip slides. An arm 5 % longer than its
-//! data sheet says would otherwise miss its references by a centimetre and its edges by more.
+//! With the tip on the belt cos θ₁ + ρ cos θ₂ = H/l₁ in every posture, with ρ = l₂/l₁. The mean of the measured
+//! sum therefore gives l₁, and l₂ in proportion; it improves the longer the tip slides. Without calibration, an
+//! arm 5 % longer than its data sheet states would miss its references by a centimetre and its edges by more.
 
 use painleve_shared::{Real, settings};
 
-/// Part of a reading's error that no mean takes away: roundings in a row are not independent.
+/// Fraction of a reading's error that averaging does not remove: successive roundings are not independent.
 const LASTING_ERROR: f32 = 0.1;
 
 settings! {
@@ -15,14 +15,14 @@ settings! {
     pub struct CalibrationSettings {
         /// Whether the links' length is calibrated.
         enabled: bool = true;
-        /// Largest deviation from the nominal length, as a part of it.
+        /// Largest deviation from the nominal length, as a fraction of it.
         tolerance: f32 = 0.08, 0.0..=0.5;
-        /// Longest time over which the mean is taken.
+        /// Longest averaging time.
         averaging_s: f32 = 2.0, 1e-3..=1e4, "s";
     }
 }
 
-/// The calibration with its mean.
+/// The calibration with its running mean.
 #[derive(Clone, Copy, Debug)]
 pub struct LengthCalibration {
     settings: CalibrationSettings,
@@ -31,13 +31,13 @@ pub struct LengthCalibration {
     length_m: f32,
     /// Mean of cos θ₁ + cos θ₂.
     mean: f32,
-    /// Readings in the mean.
+    /// Number of readings in the mean.
     readings: f32,
     most_readings: f32,
 }
 
 impl LengthCalibration {
-    /// A calibration that has seen nothing: nominal length of link 1 and height above the belt in m.
+    /// Starts without readings: nominal length of link 1 and height above the belt in m.
     pub fn new(settings: &CalibrationSettings, nominal_m: f32, height_m: f32, tick_s: f32) -> Self {
         Self {
             settings: *settings,
@@ -50,7 +50,7 @@ impl LengthCalibration {
         }
     }
 
-    /// Takes in the gap (m) that one tick's readings give for the present length while the tip is
+    /// Updates the mean with the gap (m) that one tick's readings give for the present length while the tip is
     /// on the belt; returns the length of link 1, m.
     pub fn update(&mut self, measured_gap_m: f32) -> f32 {
         if !self.settings.enabled {
@@ -60,27 +60,27 @@ impl LengthCalibration {
         self.readings = (self.readings + 1.0).at_most(self.most_readings);
         self.mean += (sum - self.mean) / self.readings;
         let length = self.height_m / self.mean;
-        // Also refuses what is not finite.
+        // Rejects non-finite lengths as well.
         if (length - self.nominal_m).abs() <= self.settings.tolerance * self.nominal_m {
             self.length_m = length;
         }
         self.length_m
     }
 
-    /// Begins anew with a tip that is taken to be on the belt at this measured gap (m), because it
-    /// cannot be below; returns the length of link 1, m.
+    /// Restarts the mean at this measured gap (m): the tip is assumed on the belt, because it cannot be below
+    /// it. Returns the length of link 1, m.
     pub fn restart(&mut self, measured_gap_m: f32) -> f32 {
         self.readings = 0.0;
         self.update(measured_gap_m)
     }
 
-    /// Whether no length has been looked for yet.
+    /// Returns whether the calibration is enabled but has no reading yet.
     pub fn is_open(&self) -> bool {
         self.settings.enabled && self.readings == 0.0
     }
 
-    /// Largest error (m) of a gap whose readings are wrong by at most `reading_error_m`: the
-    /// length's mean is of such readings, too.
+    /// Returns the largest error (m) of a gap whose readings are wrong by at most `reading_error_m`, including
+    /// the error of the length, which is averaged from such readings.
     pub fn gap_error_m(&self, reading_error_m: f32) -> f32 {
         if self.readings > 0.0 {
             reading_error_m * (1.0 + LASTING_ERROR + 1.0 / self.readings.square_root())
@@ -100,7 +100,7 @@ mod tests {
         LengthCalibration::new(&CalibrationSettings::default(), 0.21, HEIGHT_M, 1e-3)
     }
 
-    /// The gap that readings give for the length in use, while the tip is on the belt.
+    /// Returns the gap that readings give for the length in use, while the tip is on the belt.
     fn gap_m(true_length_m: f32, used_length_m: f32) -> f32 {
         HEIGHT_M - used_length_m * HEIGHT_M / true_length_m
     }
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restart_forgets_what_was_read_before() {
+    fn a_restart_discards_earlier_readings() {
         let mut calibration = calibration();
         assert!(calibration.is_open());
         let mut length_m = 0.21;
@@ -140,9 +140,9 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_the_more_certain_the_more_readings_the_length_is_of() {
+    fn the_gap_error_falls_with_the_number_of_readings() {
         let mut calibration = calibration();
-        assert_eq!(calibration.gap_error_m(50e-6), 50e-6, "nothing is read");
+        assert_eq!(calibration.gap_error_m(50e-6), 50e-6, "without readings");
         let errors_m: [f32; 100] = core::array::from_fn(|_| {
             calibration.update(0.0);
             calibration.gap_error_m(50e-6)

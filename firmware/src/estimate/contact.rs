@@ -1,40 +1,40 @@
-//! Does the tip touch the belt? The log-odds of contact against flight, from what every
-//! tick adds to them.
+//! Decides whether the tip touches the belt. Every tick adds to the log-odds of contact against
+//! flight.
 //!
-//! - **Force cell**: a reading f of noise σ is told apart between a contact of at least
-//!   f_c and none: (f_c/σ²) (f − f_c/2). A noisy reading near zero does not chatter, and a
-//!   clear one decides within two or three ticks.
-//! - **Encoders**: the height of the tip over the belt is known to within half a count of either
-//!   encoder, h = ½ (|z_t| Δθ₁ + l₂ |sin θ₂| Δθ₂₁). A gap beyond h is no contact. And joints on
-//!   which the contact force acts no more run ahead of what the tracking loops expect under the
-//!   wanted one: their innovations weigh the wanted force against none, as the force cell's
-//!   reading does.
+//! - **Force cell**: a reading f with noise σ is weighed between a contact of at least f_c and no
+//!   contact: (f_c/σ²) (f − f_c/2). The decision does not chatter on a noisy reading near zero, and
+//!   a clear reading changes it within two or three ticks.
+//! - **Encoders**: the height of the tip above the belt is measured to half a count of each
+//!   encoder, h = ½ (|z_t| Δθ₁ + l₂ |sin θ₂| Δθ₂₁). A gap larger than h shows flight. In addition,
+//!   when the contact force vanishes, the joints accelerate against the prediction of the tracking
+//!   loops, which includes the wanted force. The innovations therefore weigh the wanted force
+//!   against none, as the force cell's reading does.
 
 use painleve_shared::{Real, settings};
 
-/// Log-odds beyond which contact or flight is taken for certain.
+/// Log-odds beyond which contact or flight is certain.
 const CERTAIN: f32 = 6.0;
 /// Log-odds at which the decision changes.
 const DECISION: f32 = 3.0;
-/// Most that the force cell may add in one tick.
+/// Largest contribution of the force cell in one tick.
 const FORCE_LIMIT: f32 = 6.0;
-/// Most that a gap may add, and take away.
+/// Largest contribution of a gap, in either direction.
 const GAP_FOR: f32 = 2.0;
 const GAP_AGAINST: f32 = 6.0;
 /// Slope of the log-odds over the gap in units of its uncertainty.
 const GAP_SLOPE: f32 = 16.0;
-/// Most that a contact force that is missed may take away.
+/// Largest contribution of a missing contact force to flight.
 const RELEASE_AGAINST: f32 = 6.0;
-/// Variance of an innovation, counts²: that of a rounding.
+/// Variance of an innovation due to rounding, counts².
 const INNOVATION_VARIANCE: f32 = 1.0 / 12.0;
 
 settings! {
-    /// Which readings decide about contact.
+    /// The readings that decide about contact.
     #[derive(Copy, Eq)]
     pub enum Evidence = ForceCell {
         /// The force cell.
         "force-cell" => ForceCell,
-        /// The encoders. Friction estimate and force loop still read the force cell.
+        /// The encoders. Friction estimate and force loop still use the force cell.
         "encoders" => Encoders,
     }
 }
@@ -43,7 +43,7 @@ settings! {
     /// Settings of the contact observer.
     #[derive(Copy)]
     pub struct ContactSettings {
-        /// Which readings decide about contact.
+        /// Readings that decide about contact.
         evidence: Evidence = Evidence::ForceCell;
         /// Smallest normal force of a contact, f_c; at most the force cell's range.
         contact_n: f32 = 0.5, 1e-3..=1e6, "N";
@@ -54,30 +54,30 @@ settings! {
     }
 }
 
-/// What the encoders say about the contact at one tick.
+/// Contact evidence from the encoders at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EncoderReading {
-    /// Measured height of the tip over the belt, m.
+    /// Measured height of the tip above the belt, m.
     pub gap_m: f32,
-    /// Largest error of that, m.
+    /// Largest error of the measured height, m.
     pub gap_error_m: f32,
-    /// Whether the readings differ from the ones before.
+    /// Whether the readings differ from the previous ones.
     pub moved: bool,
-    /// Innovations of the tracking loops along those that the expected contact force leaves in
-    /// the end when it is gone, counts²: their inner product …
+    /// Inner product of the tracking loops' innovations with the steady innovations that the loss
+    /// of the expected contact force causes, counts².
     pub release: f32,
-    /// … which is then the latters' squared length, counts².
+    /// Squared length of those steady innovations, counts².
     pub full_release: f32,
 }
 
 impl EncoderReading {
-    /// Whether the tip seems to be below the belt: the links are shorter than they are taken to be.
+    /// Whether the tip seems to be below the belt: the links are then shorter than configured.
     pub fn is_below_belt(&self) -> bool {
         self.gap_m < -self.gap_error_m
     }
 }
 
-/// Weighs readings for contact against flight.
+/// Weighs readings as evidence for contact or flight.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactDetector {
     settings: ContactSettings,
@@ -85,7 +85,7 @@ pub struct ContactDetector {
     slope_per_n: f32,
 }
 
-/// The log-odds of contact with the decision that follows from them.
+/// The log-odds of contact, and the contact decision.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactState {
     log_odds: f32,
@@ -93,7 +93,7 @@ pub struct ContactState {
 }
 
 impl Default for ContactState {
-    /// The tip is taken to be in the air, in doubt.
+    /// Starts with the tip in the air, without certainty.
     fn default() -> Self {
         Self {
             log_odds: -DECISION,
@@ -103,7 +103,7 @@ impl Default for ContactState {
 }
 
 impl ContactDetector {
-    /// A detector with these settings.
+    /// Makes a detector with these settings.
     pub fn new(settings: &ContactSettings) -> Self {
         Self {
             settings: *settings,
@@ -111,23 +111,24 @@ impl ContactDetector {
         }
     }
 
-    /// Which readings decide.
+    /// Returns which readings decide.
     pub fn evidence(&self) -> Evidence {
         self.settings.evidence
     }
 
-    /// Uncertainty of the gap beyond the encoders' resolution, m.
+    /// Returns the uncertainty of the gap beyond the encoders' resolution, m.
     pub fn gap_uncertainty_m(&self) -> f32 {
         self.settings.gap_uncertainty_m
     }
 
-    /// Takes in one tick's normal force from the force cell, N. Returns whether the tip touches.
+    /// Updates the decision with one tick's normal force from the force cell, N. Returns whether
+    /// the tip touches.
     pub fn update_from_force(&self, state: &mut ContactState, normal_force_n: f32) -> bool {
         let above = normal_force_n - 0.5 * self.settings.contact_n;
         state.weigh((self.slope_per_n * above).within(FORCE_LIMIT))
     }
 
-    /// Takes in what one tick's encoders say. Returns whether the tip touches.
+    /// Updates the decision with one tick's encoder readings. Returns whether the tip touches.
     pub fn update_from_encoders(
         &self,
         state: &mut ContactState,
@@ -138,7 +139,7 @@ impl ContactDetector {
         let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
             .limited(-RELEASE_AGAINST, 0.0);
         let change = gap + release;
-        // The same readings once more say nothing more against contact.
+        // Unchanged readings add no evidence against contact.
         state.weigh(if encoders.moved {
             change
         } else {
@@ -148,7 +149,7 @@ impl ContactDetector {
 }
 
 impl ContactState {
-    /// Adds to the log-odds; decides.
+    /// Adds to the log-odds and updates the decision.
     fn weigh(&mut self, change: f32) -> bool {
         self.log_odds = (self.log_odds + change).within(CERTAIN);
         if self.contact {
@@ -159,22 +160,22 @@ impl ContactState {
         self.contact
     }
 
-    /// Whether the tip is taken to touch.
+    /// Returns the contact decision.
     pub fn touches(&self) -> bool {
         self.contact
     }
 
-    /// Whether the tip is in the air beyond doubt; at the start there is doubt.
+    /// Returns whether flight is certain; initially it is not.
     pub fn is_in_flight(&self) -> bool {
         !self.contact && self.log_odds < -DECISION
     }
 
-    /// Whether contact, or flight, is certain.
+    /// Returns whether the contact decision is certain.
     pub fn is_certain(&self) -> bool {
         self.log_odds.abs() >= CERTAIN
     }
 
-    /// How sure the decision is: 0 at the point of changing it, 1 for certain.
+    /// Returns the certainty of the decision: 0 where it changes, 1 where it is certain.
     pub fn confidence(&self) -> f32 {
         let toward = if self.contact {
             self.log_odds
@@ -202,7 +203,7 @@ mod tests {
         }
     }
 
-    /// Ticks until the decision is `contact`.
+    /// Returns the number of ticks until the decision is `contact`.
     fn ticks_until(contact: bool, mut update: impl FnMut() -> bool) -> u32 {
         (1..100).find(|_| update() == contact).unwrap()
     }
@@ -210,7 +211,7 @@ mod tests {
     #[test]
     fn the_force_cell_decides_within_a_few_ticks_and_does_not_chatter() {
         let (detector, mut state) = (detector(), ContactState::default());
-        assert!(!state.is_in_flight(), "at the start there is doubt");
+        assert!(!state.is_in_flight(), "initially flight is not certain");
         assert_eq!(
             ticks_until(true, || detector.update_from_force(&mut state, 0.5)),
             2
@@ -248,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reading_that_stays_says_nothing_more_against_contact() {
+    fn an_unchanged_reading_adds_no_evidence_against_contact() {
         let (detector, mut state) = (detector(), ContactState::default());
         for _ in 0..20 {
             detector.update_from_encoders(&mut state, &gap(0.0));
@@ -268,8 +269,8 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_force_that_is_missed_is_flight_unless_it_is_too_small_to_be_seen() {
-        // Full release, and the part of it that shows.
+    fn a_missing_contact_force_is_flight_unless_it_is_too_small_to_detect() {
+        // The full loss of force, and the fraction of it that shows.
         let ticks_until_flight = |full_release: f32, part: f32| {
             let reading = |release| EncoderReading {
                 release,

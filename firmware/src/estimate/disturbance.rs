@@ -1,20 +1,20 @@
-//! What the model does not know, as a torque.
+//! Estimates the torque that the model does not explain.
 //!
-//! The equations of motion, M θ̈ + w + c − Jᵀ f − u = d, leave what a wrong mass, spring or
-//! dashpot asks for. Everything on the left is measured, whatever the contact does: d needs
-//! no model of it. Towards the edge it is what counts, as an error of the free normal
-//! acceleration b changes f_n = −b/p by itself over p.
+//! In the equations of motion, M θ̈ + w + c − Jᵀ f − u = d, the residual d shows an error of a mass,
+//! spring or dashpot. Every term on the left is measured or known in contact as well as in the air, so d
+//! needs no contact model. Near the edge d matters most: an error of the free normal acceleration b
+//! changes f_n = −b/p by that error over p.
 //!
-//! The residual is low-passed. The torque of a tick acts one to a few ticks later than the
-//! force and the motion it is compared with, which closes a loop through the contact with
-//! the gain Q22/p; the filter is slowed down with p to keep that loop calm.
+//! The residual passes a low-pass. The torque of a tick acts one to a few ticks later than the force and
+//! motion it is compared with. This closes a loop through the contact with gain Q22/p, so the filter's
+//! bandwidth falls with p to keep the loop stable.
 
 use nalgebra::Vector2;
 use painleve_shared::{GeneralisedTorque, JointTorque, LinkMotion, Real, settings};
 
 use crate::estimate::model::Model;
 
-/// Part of the residual that is taken over in a tick, at most, for each Q22 of p.
+/// Largest fraction of the residual adopted in one tick, per unit of p/Q22.
 const SHARE: f32 = 0.05;
 
 settings! {
@@ -30,16 +30,16 @@ settings! {
     }
 }
 
-/// What the equations of motion are balanced with at one tick.
+/// Inputs of the torque balance at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
-    /// Joint torques of the tick before, N·m.
+    /// Joint torques of the previous tick, N·m.
     pub torque_nm: JointTorque<f32>,
     /// Contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
-    /// p of a tip that touches, 1/kg.
+    /// p of a tip in contact, 1/kg.
     pub p_per_kg: Option<f32>,
-    /// Time since the tick before, s.
+    /// Time since the previous tick, s.
     pub elapsed_s: f32,
 }
 
@@ -50,17 +50,17 @@ pub struct DisturbanceEstimator {
     tick_s: f32,
 }
 
-/// The unknown torque, for a [`DisturbanceEstimator`]; none at the start.
+/// Estimate of a [`DisturbanceEstimator`]; initially zero.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DisturbanceState {
-    /// Generalised torque d that acts on the arm beside those of its model, N·m.
+    /// Generalised torque d on the arm in addition to the model's torques, N·m.
     pub torque_nm: GeneralisedTorque<f32>,
-    /// θ̇ at the tick before, rad/s.
+    /// θ̇ at the previous tick, rad/s.
     rate_rad_s: Option<LinkMotion<f32>>,
 }
 
 impl DisturbanceEstimator {
-    /// An estimator that is called every `tick_s`.
+    /// Makes an estimator that is called every `tick_s`.
     pub fn new(settings: &DisturbanceSettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
@@ -68,7 +68,7 @@ impl DisturbanceEstimator {
         }
     }
 
-    /// Takes in one tick of an arm whose `model` includes the present d.
+    /// Updates the estimate with one tick of an arm whose `model` includes the present d.
     pub fn update(&self, state: &mut DisturbanceState, model: &Model, balance: &Balance) {
         let before = state.rate_rad_s.replace(model.theta_dot_rad_s);
         let Some(before) = before.filter(|_| self.settings.enabled) else {
@@ -78,7 +78,7 @@ impl DisturbanceEstimator {
         let needed_nm = model.inverse_dynamics_nm(&acceleration, &balance.force_n);
         let residual_nm = (needed_nm - balance.torque_nm).to_links();
         let limit = self.settings.limit_nm;
-        // Both may be at the limit, with opposite signs; more than that is an impact.
+        // Estimate and disturbance may be at the limit with opposite signs; more is an impact.
         if residual_nm.amax() > 2.0 * limit {
             return;
         }
@@ -92,7 +92,7 @@ impl DisturbanceEstimator {
 }
 
 impl DisturbanceState {
-    /// A tick that says nothing: contact is in doubt, or a reading is.
+    /// Skips a tick without information, because contact or a reading is in doubt.
     pub fn pause(&mut self) {
         self.rate_rad_s = None;
     }
@@ -106,8 +106,8 @@ mod tests {
 
     const TICK_S: f32 = 1e-3;
 
-    /// Where the estimate ends of an estimator that is shown an arm with an unknown torque, moving with a
-    /// constant acceleration under a contact force, for a while.
+    /// Runs the estimator on an arm with an unknown torque, moving with a constant acceleration under a
+    /// contact force; returns the final estimate.
     fn observed(
         disturbance_nm: GeneralisedTorque<f32>,
         acceleration: LinkMotion<f32>,
@@ -138,7 +138,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever force and motion there are, only the unknown torque is found.
+        /// For every force and motion, only the unknown torque is found.
         #[test]
         fn an_unknown_torque_is_found(
             d1 in -0.8_f32..0.8, d2 in -0.8_f32..0.8, a1 in -5.0_f32..5.0, a2 in -5.0_f32..5.0,
@@ -175,7 +175,7 @@ mod tests {
         assert_eq!(found, GeneralisedTorque::new(1.0, -1.0));
     }
 
-    /// What the estimator of an arm in balance makes of a sudden change of its rates.
+    /// Returns the estimate for an arm in balance after a sudden change of its rates.
     fn after_a_jump(rate_rad_s: LinkMotion<f32>) -> GeneralisedTorque<f32> {
         let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
         let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), TICK_S);
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn an_impact_is_not_taken_for_a_torque() {
+    fn an_impact_is_not_mistaken_for_a_torque() {
         assert_ne!(
             after_a_jump(LinkMotion::new(0.1, -0.1)),
             GeneralisedTorque::zeros()

@@ -1,63 +1,63 @@
-//! Friction coefficient and direction of slip from the force cell.
+//! Estimates the friction coefficient and the direction of slip from the force cell.
 //!
-//! While the tip slides, −s f_t/f_n is μ exactly, whatever the controller does:
-//! the ratio is not part of any loop. A scalar Kalman filter averages it, with the
-//! variance of a ratio of noisy forces, σ² (1 + μ²)/f_n², and μ as a random walk.
+//! While the tip slides, −s f_t/f_n equals μ exactly, whatever the controller does: the ratio is
+//! not part of any loop. A scalar Kalman filter averages it. The variance is that of a ratio of
+//! noisy forces, σ² (1 + μ²)/f_n², and μ is modelled as a random walk.
 //!
-//! A reading is left out where it says nothing about μ: in the air, at a small normal force,
-//! and in stick, where friction is anything up to μ f_n either way. Stick shows as a ratio
-//! well below the estimate; if that lasts, μ has changed and the filter starts to learn again.
-//! The direction of slip is reversed only by a friction force near the other side of
-//! the cone: in stick its sign says nothing.
+//! Readings without information about μ are skipped: in the air, at a small normal force, and in
+//! stick, where friction takes any value up to μ f_n in either direction. Stick is detected by a
+//! ratio well below the estimate; if the ratio stays there, μ has changed and the filter restarts.
+//! The estimated direction of slip reverses only on a friction force near the opposite side of the
+//! cone, because in stick the sign of the force carries no information.
 
 use nalgebra::Vector2;
 use painleve_shared::{Real, Slip, settings};
 
-/// Deviations below the estimate at which the tip may stick.
+/// Number of standard deviations below the estimate at which the tip may stick.
 const STICK_DEVIATIONS: f32 = 5.0;
-/// Part of the estimate below it at which the tip may stick.
+/// Fraction of the estimate that is added to these deviations.
 const STICK_FRACTION: f32 = 0.1;
 
-/// Part of the estimated friction that shows a slip the other way.
+/// Fraction of the estimated friction that indicates a slip in the opposite direction.
 const REVERSAL_FRACTION: f32 = 0.8;
 
-/// Ticks in a row that it takes: in stick the friction force follows what is fed forward, so
-/// that believing it at once would confirm itself, to and fro.
+/// Number of such ticks in a row that reverse the slip. In stick the friction force follows the
+/// feed-forward, so an immediate reversal would confirm itself and then alternate.
 const REVERSAL_TICKS: u8 = 3;
 
-/// Ticks without a sign of stick that end it: what is fed forward in stick is not what it is while
-/// sliding, and going to and fro between them every tick would shake the tip off.
+/// Number of ticks without a sign of stick after which stick ends. The feed-forward differs between
+/// stick and sliding, and switching between them at every tick would shake the tip off.
 const STICK_TICKS: u8 = 3;
 
 settings! {
     /// Settings of the friction estimator.
     #[derive(Copy)]
     pub struct FrictionSettings {
-        /// First guess of μ.
+        /// Initial estimate of μ.
         first_guess: f32 = 0.6, 0.0..=2.0;
-        /// Standard deviation of the first guess, also whenever μ is learnt again.
+        /// Standard deviation of the initial estimate, and of μ whenever the filter restarts.
         first_deviation: f32 = 0.2, 1e-3..=2.0;
         /// Random walk of μ.
         drift_per_sqrt_s: f32 = 0.0005, 1e-4..=1.0, "1/√s";
         /// Normal force below which friction is not observed.
         observable_n: f32 = 1.0, 0.01..=1e3, "N";
-        /// How long a ratio below the estimate is taken for stick.
+        /// Time for which a ratio below the estimate counts as stick; after it the filter restarts.
         stick_limit_s: f32 = 0.5, 0.0..=100.0, "s";
     }
 }
 
-/// What is known about friction.
+/// The friction estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionEstimate {
-    /// Friction coefficient μ̂.
+    /// Estimated friction coefficient μ̂.
     pub coefficient: f32,
-    /// Its standard deviation.
+    /// Standard deviation of μ̂.
     pub deviation: f32,
     /// Direction of slip, from the sign of the friction force.
     pub slip: Slip,
-    /// Whether a slip has been seen at all; before, `slip` is a guess.
+    /// Whether a slip has been observed; until then, `slip` is a guess.
     pub slip_seen: bool,
-    /// Whether the tip seems to move with the belt.
+    /// Whether the tip is estimated to stick to the belt.
     pub sticks: bool,
 }
 
@@ -76,16 +76,16 @@ pub struct FrictionState {
     variance: f32,
     slip: Slip,
     slip_seen: bool,
-    /// Ticks in a row that speak for a slip the other way.
+    /// Ticks in a row that indicate a slip in the opposite direction.
     contrary_ticks: u8,
-    /// Ticks for which the tip is still taken to stick.
+    /// Remaining ticks for which the tip counts as sticking.
     stick_ticks: u8,
     sticking_s: f32,
 }
 
 impl FrictionEstimator {
-    /// An estimator that is called every `tick_s`; `force_noise_n` is the standard deviation of
-    /// one reading of the force cell, N.
+    /// Makes an estimator that is called every `tick_s`; `force_noise_n` is the standard deviation
+    /// of one reading of the force cell, N.
     pub fn new(settings: &FrictionSettings, force_noise_n: f32, tick_s: f32) -> Self {
         Self {
             settings: *settings,
@@ -94,7 +94,7 @@ impl FrictionEstimator {
         }
     }
 
-    /// The first guess.
+    /// Starts with the initial estimate.
     pub fn start(&self) -> FrictionState {
         FrictionState {
             coefficient: self.settings.first_guess,
@@ -111,7 +111,7 @@ impl FrictionEstimator {
         self.settings.first_deviation * self.settings.first_deviation
     }
 
-    /// Takes in one reading (f_t, f_n), N, of a tip in contact.
+    /// Updates the estimate with one reading (f_t, f_n), N, of a tip in contact.
     pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
         let first_variance = self.first_variance();
         let drift = self.settings.drift_per_sqrt_s;
@@ -150,7 +150,7 @@ impl FrictionEstimator {
 
     fn observe_slip(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
         let slip = Slip::of(-force_n.x);
-        // Below the noise the sign says nothing.
+        // Below the noise level the sign carries no information.
         let clear = force_n.x * force_n.x > 9.0 * self.force_variance_n2;
         let cone_n = REVERSAL_FRACTION * state.coefficient * force_n.y;
         let contrary = clear && slip != state.slip && force_n.x.abs() >= cone_n;
@@ -167,7 +167,8 @@ impl FrictionEstimator {
         }
     }
 
-    /// Takes in that the tip was thrown off where sliding has no solution from μ = `critical` on.
+    /// Raises the estimate after a throw, which shows that μ is at least `critical`, above which
+    /// sliding has no solution.
     pub fn thrown(&self, state: &mut FrictionState, critical: f32) {
         if state.coefficient < critical {
             state.coefficient = critical;
@@ -177,13 +178,13 @@ impl FrictionEstimator {
 }
 
 impl FrictionState {
-    /// Takes in the direction in which a tip that lands will slip.
+    /// Sets the direction in which a landing tip will slip.
     pub fn expect_slip(&mut self, slip: Slip) {
         self.slip = slip;
         self.slip_seen = true;
     }
 
-    /// Present knowledge.
+    /// Returns the present estimate.
     pub fn estimate(&self) -> FrictionEstimate {
         FrictionEstimate {
             coefficient: self.coefficient,
@@ -202,7 +203,7 @@ mod tests {
 
     const NOISE_N: f32 = 0.1;
 
-    /// Uniform noise of the right deviation from a fixed stream.
+    /// Returns uniform noise with the given deviation from a fixed stream.
     fn noise(step: u32) -> f32 {
         let bits = step
             .wrapping_mul(2_654_435_761)
@@ -267,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn stick_is_not_taken_for_less_friction_but_a_slippery_belt_is() {
+    fn stick_does_not_lower_the_friction_estimate_but_a_slippery_belt_does() {
         let mut tested = Tested::new(0.6);
         slide(&mut tested, 0.6, Slip::Positive, 200);
         slide(&mut tested, 0.1, Slip::Positive, 400);

@@ -1,12 +1,11 @@
-//! Joint angles and rates from encoder counts.
+//! Estimates joint angles and rates from encoder counts.
 //!
-//! A tracking loop (second-order Luenberger observer) on each joint. A count of a
-//! 14-bit encoder within a millisecond is 0.38 rad/s, so that differencing sees
-//! nothing of a lift-off; the loop spreads a count over its time constant instead.
-//! The acceleration that the control law has just asked for is fed in, so that
-//! the loop may be slow without lagging behind the motion that is commanded.
+//! Each joint has a tracking loop (second-order Luenberger observer). One count of a 14-bit encoder
+//! per millisecond is 0.38 rad/s, so differencing cannot detect a lift-off; the loop spreads a count
+//! over its time constant instead. The acceleration commanded by the control law is fed forward, so
+//! a slow loop does not lag behind the commanded motion.
 //!
-//! Both poles lie at z = exp(−ω T): gains 1 − z² and (1 − z)²/T.
+//! Both poles are at z = exp(−ω T), with gains 1 − z² and (1 − z)²/T.
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
@@ -19,12 +18,12 @@ settings! {
     pub struct EstimatorSettings {
         /// Bandwidth ω of both tracking loops; at most three times the control rate.
         bandwidth_rad_s: f32 = 400.0, 1.0..=3e5, "rad/s";
-        /// Fastest joint motion; a faster reading is the fault `EncoderJump`.
+        /// Largest joint rate; a faster reading latches the fault `EncoderJump`.
         rate_limit_rad_s: f32 = 100.0, 1.0..=1e4, "rad/s";
     }
 }
 
-/// A reading that no motion of the joint explains.
+/// The readings differ by more than the joint can have moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderJump;
 
@@ -32,7 +31,7 @@ pub struct EncoderJump;
 #[derive(Clone, Copy, Debug, Default)]
 struct TrackingLoop {
     reading: EncoderCounts,
-    /// Unwrapped, counts from angle zero.
+    /// Unwrapped angle, counts from angle zero.
     counts: i32,
     angle_rad: f32,
     rate_rad_s: f32,
@@ -40,12 +39,12 @@ struct TrackingLoop {
     innovation_rad: f32,
 }
 
-/// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates: its gains.
+/// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates, with its gains.
 #[derive(Clone, Debug)]
 pub struct JointEstimator {
     scales: [EncoderScale; 2],
     rad_per_count: [f32; 2],
-    /// What an acceleration of 1 rad/s² leaves as innovation that the loops are not told of, counts.
+    /// Innovation in counts that an acceleration of 1 rad/s² causes if it is not fed forward.
     lag_counts_s2: Vector2<f32>,
     jump_counts: [i32; 2],
     rate_limit_rad_s: f32,
@@ -57,14 +56,14 @@ pub struct JointEstimator {
 /// Angles and rates of both joints, for a [`JointEstimator`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct JointState {
-    /// Whether there have been readings; before, everything is zero.
+    /// Whether there have been readings; until then, all estimates are zero.
     started: bool,
     joints: [TrackingLoop; 2],
     moved: bool,
 }
 
 impl JointEstimator {
-    /// An estimator for encoders with these scales, read `tick_hz` times a second.
+    /// Makes an estimator for encoders with these scalings, read `tick_hz` times a second.
     pub fn new(settings: &EstimatorSettings, scales: [EncoderScale; 2], tick_hz: f32) -> Self {
         let tick_s = 1.0 / tick_hz;
         let pole = libm::expf(-settings.bandwidth_rad_s * tick_s);
@@ -74,7 +73,7 @@ impl JointEstimator {
             scales,
             rad_per_count,
             lag_counts_s2: Vector2::from(rad_per_count.map(|lsb| tick_s / rate_gain_per_s / lsb)),
-            // One count more than the limit, for the rounding of two readings.
+            // One count beyond the limit allows for the rounding of two readings.
             jump_counts: rad_per_count
                 .map(|lsb| (settings.rate_limit_rad_s * tick_s / lsb) as i32 + 2),
             rate_limit_rad_s: settings.rate_limit_rad_s,
@@ -84,15 +83,15 @@ impl JointEstimator {
         }
     }
 
-    /// Takes in the readings of one tick.
+    /// Updates the estimate with the readings of one tick.
     ///
-    /// `elapsed_ticks` is the time since the readings before (1 unless frames were lost);
-    /// `acceleration_rad_s2` is the expected θ̈ of q' in that time. The first readings
-    /// set the angles with zero rates.
+    /// `elapsed_ticks` is the time since the previous readings (1 unless frames were lost);
+    /// `acceleration_rad_s2` is the expected acceleration of q' in that time. The first readings set
+    /// the angles with zero rates.
     ///
     /// # Errors
-    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the loops start again
-    /// from these readings.
+    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the loops restart from
+    /// these readings.
     pub fn update(
         &self,
         state: &mut JointState,
@@ -148,7 +147,7 @@ impl JointEstimator {
         Ok(())
     }
 
-    /// Starts both loops from these readings, at rest.
+    /// Restarts both loops from these readings, at rest.
     fn start(&self, state: &mut JointState, readings: &[EncoderCounts; 2]) {
         state.started = true;
         state.moved = true;
@@ -167,22 +166,23 @@ impl JointEstimator {
         }
     }
 
-    /// Measured less expected joint angles q' at the last tick, counts.
+    /// Returns the measured minus the expected joint angles q' at the last tick, counts.
     pub fn innovation_counts(&self, state: &JointState) -> Vector2<f32> {
         let [one, two] = &state.joints;
         let [lsb_1, lsb_2] = self.rad_per_count;
         Vector2::new(one.innovation_rad / lsb_1, two.innovation_rad / lsb_2)
     }
 
-    /// Innovation, counts, that an acceleration of q' (rad/s²) leaves in the end if the loops
-    /// are not told of it: θ̈ T²/(1 − z)².
+    /// Returns the steady innovation, counts, that an acceleration of q' (rad/s²) causes if it is
+    /// not fed forward: q̈' T²/(1 − z)².
     pub fn lag_counts(&self, acceleration_rad_s2: &JointMotion<f32>) -> Vector2<f32> {
         acceleration_rad_s2
             .vector()
             .component_mul(&self.lag_counts_s2)
     }
 
-    /// Part of the innovation that a tick leaves: measured less estimated angles.
+    /// Returns the fraction of the innovation that remains after a tick: measured minus estimated
+    /// angles.
     pub fn residual_share(&self) -> f32 {
         1.0 - self.angle_gain
     }
@@ -194,24 +194,24 @@ impl JointEstimator {
 }
 
 impl JointState {
-    /// Link angles θ = (θ1, θ2), rad; zero before the first readings.
+    /// Returns the link angles θ = (θ1, θ2), rad; zero before the first readings.
     pub fn theta_rad(&self) -> LinkMotion<f32> {
         let [one, two] = &self.joints;
         JointMotion::new(one.angle_rad, two.angle_rad).to_links()
     }
 
-    /// Measured less expected link angles at the last tick, rad.
+    /// Returns the measured minus the expected link angles at the last tick, rad.
     pub fn innovation_rad(&self) -> LinkMotion<f32> {
         let [one, two] = &self.joints;
         JointMotion::new(one.innovation_rad, two.innovation_rad).to_links()
     }
 
-    /// Whether the last readings differed from the ones before.
+    /// Returns whether the last readings differed from the previous ones.
     pub fn has_moved(&self) -> bool {
         self.moved
     }
 
-    /// Link rates θ̇, rad/s; zero before the second readings.
+    /// Returns the link rates θ̇, rad/s; zero before the second readings.
     pub fn theta_dot_rad_s(&self) -> LinkMotion<f32> {
         let [one, two] = &self.joints;
         JointMotion::new(one.rate_rad_s, two.rate_rad_s).to_links()
@@ -277,14 +277,14 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_told_and_the_loops_start_again_from_there() {
+    fn a_jump_is_reported_and_the_loops_restart_from_it() {
         let jumped = [SCALE.reading(0.5), SCALE.reading(0.1)];
         let mut state = track(|t| (0.2 + t, 0.1), 0.0, 10);
         let jump = estimator().update(&mut state, &jumped, 1, &JointMotion::zeros());
         assert_eq!(jump, Err(EncoderJump));
         assert!((state.theta_rad() - LinkMotion::new(0.5, 0.6)).amax() < 6e-4);
         assert_eq!(state.theta_dot_rad_s(), LinkMotion::zeros());
-        // Over a longer time the same difference is a motion.
+        // Over a longer time the same difference is a plausible motion.
         let mut state = track(|_| (0.2, 0.1), 0.0, 10);
         let moved = estimator().update(&mut state, &jumped, 10, &JointMotion::zeros());
         assert!(moved.is_ok());

@@ -1,11 +1,11 @@
-//! What the controller makes of its sensors.
+//! Estimates the state of arm, contact and belt from the sensors.
 //!
 //! - [`joints`]: angles and rates from encoder counts
-//! - [`model`]: the equations of motion there
-//! - [`contact`]: does the tip touch?
+//! - [`model`]: the equations of motion at those angles and rates
+//! - [`contact`]: contact decision
 //! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
-//! - [`calibration`]: the links' length
-//! - [`disturbance`]: torques that the model does not know
+//! - [`calibration`]: length of the links
+//! - [`disturbance`]: torques that the model does not explain
 
 pub mod belt;
 pub mod calibration;
@@ -31,23 +31,23 @@ use crate::configuration::Configuration;
 use crate::drive::torque::LastCommand;
 use crate::law::Law;
 
-/// Friction above the estimate that a throw may be explained by.
+/// Largest friction above the estimate that may explain a throw.
 const THROWN_BY_FRICTION: f32 = 0.4;
 
-/// What is known about the contact after a tick's readings.
+/// The contact estimate after a tick's readings.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactEstimate {
     /// Whether the tip touches.
     pub touches: bool,
-    /// Whether it touches and did not before.
+    /// Whether the tip touches now but did not at the previous tick.
     pub lands: bool,
-    /// Whether the tip is in the air beyond doubt.
+    /// Whether flight is certain.
     pub in_flight: bool,
-    /// How sure `touches` is, 0 … 1.
+    /// Certainty of `touches`, 0 … 1.
     pub confidence: f32,
     /// Measured contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
-    /// What is known about friction.
+    /// Estimated friction.
     pub friction: FrictionEstimate,
     /// p with that friction, 1/kg.
     pub p_per_kg: f32,
@@ -58,7 +58,7 @@ pub struct ContactEstimate {
 pub struct Readings<'a> {
     /// The frame.
     pub frame: &'a SensorFrame,
-    /// Ticks since the readings before: 1 unless frames were lost.
+    /// Ticks since the previous readings: 1 unless frames were lost.
     pub elapsed_ticks: u32,
 }
 
@@ -74,7 +74,7 @@ pub struct Estimators {
     disturbance: DisturbanceEstimator,
 }
 
-/// What the [`Estimators`] remember from tick to tick.
+/// State of the [`Estimators`] between ticks.
 #[derive(Clone, Copy, Debug)]
 pub struct EstimatesState {
     /// The arm with its calibrated length.
@@ -101,7 +101,7 @@ impl EstimatesState {
 }
 
 impl Estimators {
-    /// The estimators of a controller with this configuration.
+    /// Makes the estimators of a controller with this configuration.
     pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
         let tick_s = configuration.tick_s();
         Self {
@@ -123,7 +123,7 @@ impl Estimators {
         }
     }
 
-    /// Nothing has been read of this arm yet.
+    /// Starts without readings of this arm.
     pub fn start<L: Law>(&self, configuration: &Configuration<L>, arm: Arm<f32>) -> EstimatesState {
         EstimatesState {
             arm,
@@ -141,11 +141,12 @@ impl Estimators {
         }
     }
 
-    /// Takes in the encoders' readings, with what the last command was expected to do.
+    /// Updates the joint estimate with the encoders' readings and the expected effect of the last
+    /// command.
     ///
     /// # Errors
-    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the estimate starts
-    /// again from these readings.
+    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the estimate restarts
+    /// from these readings.
     #[inline]
     pub fn follow_joints(
         &self,
@@ -161,9 +162,9 @@ impl Estimators {
         )
     }
 
-    /// Takes in what the readings say about contact, friction, belt, links and unknown torques,
-    /// with the arm's model there and the torque that acted until now; `drives` says whether one
-    /// did.
+    /// Updates contact, friction, belt, calibration and disturbance with the readings, given the
+    /// arm's model at the estimated state and the torque until now; `drives` states whether torque
+    /// was applied.
     #[inline]
     pub fn observe_contact(
         &self,
@@ -181,7 +182,7 @@ impl Estimators {
             self.force_scale.value(frame.tangential_force.0),
             self.force_scale.value(frame.normal_force.0),
         );
-        // At the end of its range the force cell shows less than there is.
+        // At the end of its range the force cell reads less than the actual force.
         let range = self.force_scale.maximum_counts();
         let force_in_range = [frame.tangential_force, frame.normal_force]
             .iter()
@@ -209,7 +210,7 @@ impl Estimators {
             if force_in_range {
                 self.friction.update(&mut state.friction, &force_n);
             }
-            // A reading that stays would weigh more for nothing but time.
+            // An unchanged reading would gain weight merely with time.
             if certain && state.joints.has_moved() {
                 let length = state.calibration.update(gap_m);
                 state.arm.scale_to(length);
@@ -247,14 +248,14 @@ impl Estimators {
         }
     }
 
-    /// Measured height of the tip over the belt, m.
+    /// Returns the measured height of the tip above the belt, m.
     fn gap_m(&self, joints: &JointState, model: &Model) -> f32 {
         let residual = joints.innovation_rad() * self.joints.residual_share();
         let jacobian = &model.jacobian;
         model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
     }
 
-    /// What the encoders show of the contact.
+    /// Returns the contact evidence from the encoders.
     fn encoder_reading(
         &self,
         state: &EstimatesState,
@@ -263,9 +264,9 @@ impl Estimators {
         last: &LastCommand,
     ) -> EncoderReading {
         let count = self.joints.count_rad();
-        // Half a count of either encoder; the second one turns θ2 alone.
+        // Half a count of each encoder; the second encoder affects θ2 alone.
         let rounding_m = 0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
-        // What the innovation settles at when the contact force is gone.
+        // Steady innovation after the contact force has vanished.
         let release = -self.joints.lag_counts(&last.contact_acceleration_rad_s2);
         EncoderReading {
             gap_m,
@@ -277,8 +278,8 @@ impl Estimators {
         }
     }
 
-    /// The tip has just left the belt. Where a little more friction than estimated explains
-    /// that, it is taken to be the reason.
+    /// Handles the loss of contact. If a little more friction than estimated explains the lift-off,
+    /// it is taken as the cause.
     fn explain_throw(&self, state: &mut FrictionState, model: &Model) {
         let friction = state.estimate();
         let coupling = friction.slip.sign::<f32>() * model.q12_per_kg;
@@ -289,8 +290,8 @@ impl Estimators {
     }
 }
 
-/// Where the encoders decide, the belt is taken to be where the tip was lowest: where it
-/// starts, and from then on wherever it gets below that.
+/// With contact from the encoders, the belt is assumed at the lowest tip position so far: initially
+/// the start position, then every lower one.
 fn find_belt(state: &mut EstimatesState, encoders: &mut EncoderReading) {
     let starts = state.calibration.is_open();
     if starts || encoders.is_below_belt() {

@@ -1,11 +1,11 @@
-//! The arm's model at the estimated state, evaluated once a tick and used by
-//! everybody: law, contact guard, recovery.
+//! The arm's model at the estimated state, evaluated once at each tick and shared by law, contact
+//! guard and recovery.
 
 use nalgebra::{Matrix2, Vector2};
 use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose, Real, Slip};
 
-/// |sin(θ2 − θ1)| below which J⁻¹ is bounded: the arm is nearly straight and
-/// no torque moves the tip along the belt any more.
+/// |sin(θ2 − θ1)| below which J⁻¹ is bounded: the arm is nearly straight, and no torque can move
+/// the tip along the belt.
 const STRAIGHT_ARM_SINE: f32 = 0.05;
 
 /// Terms of the equations of motion at one state.
@@ -31,9 +31,9 @@ pub struct Model {
     bias_nm: GeneralisedTorque<f32>,
     /// Centripetal acceleration s of the tip, m/s².
     centripetal_m_s2: Vector2<f32>,
-    /// 1 / det J with the determinant bounded away from zero, 1/m².
+    /// 1 / det J, with the determinant bounded away from zero, 1/m².
     inverse_determinant_per_m2: f32,
-    /// M⁻¹ j2, 1/(kg·m): what a normal force does to the links.
+    /// M⁻¹ j2, 1/(kg·m): link acceleration per unit of normal force.
     normal_mobility: Vector2<f32>,
     /// Q12 and Q22 of Q = J M⁻¹ Jᵀ, 1/kg.
     pub q12_per_kg: f32,
@@ -42,8 +42,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// The arm's terms at link angles θ (rad) and rates θ̇ (rad/s), with a generalised torque
-    /// d (N·m) that acts on it besides.
+    /// Evaluates the terms at link angles θ (rad) and rates θ̇ (rad/s), with an additional
+    /// generalised torque d (N·m) on the arm.
     pub fn new(
         arm: &Arm<f32>,
         theta_rad: LinkMotion<f32>,
@@ -85,7 +85,7 @@ impl Model {
         }
     }
 
-    /// Link acceleration θ̈ = J⁻¹ (z̈ − s) of a tip acceleration z̈ (m/s²), rad/s².
+    /// Returns the link acceleration θ̈ = J⁻¹ (z̈ − s), rad/s², for a tip acceleration z̈ (m/s²).
     pub fn link_acceleration_rad_s2(
         &self,
         tip_acceleration_m_s2: &Vector2<f32>,
@@ -98,8 +98,8 @@ impl Model {
         )
     }
 
-    /// Joint torques, N·m, for a link acceleration θ̈ (rad/s²) under a contact
-    /// force (f_t, f_n), N: inverse dynamics u = w + c + M θ̈ − Jᵀ f.
+    /// Returns the joint torques, N·m, for a link acceleration θ̈ (rad/s²) under a contact force
+    /// (f_t, f_n), N: inverse dynamics u = w + c + M θ̈ − Jᵀ f.
     pub fn inverse_dynamics_nm(
         &self,
         acceleration_rad_s2: &LinkMotion<f32>,
@@ -109,7 +109,7 @@ impl Model {
             .to_joints()
     }
 
-    /// The same without contact: u = w + c + M θ̈.
+    /// Returns the joint torques, N·m, for a link acceleration without contact: u = w + c + M θ̈.
     pub fn inverse_dynamics_in_air_nm(
         &self,
         acceleration_rad_s2: &LinkMotion<f32>,
@@ -117,7 +117,7 @@ impl Model {
         (self.bias_nm + self.motion_torque_nm(acceleration_rad_s2)).to_joints()
     }
 
-    /// Joint torques, N·m, that hold a contact force (f_t, f_n), N: −Jᵀ f.
+    /// Returns the joint torques, N·m, that balance a contact force (f_t, f_n), N: −Jᵀ f.
     pub fn torque_against_nm(&self, force_n: &Vector2<f32>) -> JointTorque<f32> {
         (-self.force_torque_nm(force_n)).to_joints()
     }
@@ -137,19 +137,19 @@ impl Model {
         LinkMotion::from_vector(self.mobility * torque_nm.vector())
     }
 
-    /// Link acceleration θ̈ (rad/s²) of an arm without contact under joint torques, N·m:
-    /// M⁻¹ (u − w − c).
+    /// Returns the link acceleration θ̈ (rad/s²) of an arm without contact under joint torques,
+    /// N·m: M⁻¹ (u − w − c).
     pub fn free_acceleration_rad_s2(&self, torque_nm: &JointTorque<f32>) -> LinkMotion<f32> {
         self.acceleration_by(torque_nm.to_links() - self.bias_nm)
     }
 
-    /// Link acceleration θ̈ (rad/s²) that a contact force (f_t, f_n), N, adds: M⁻¹ Jᵀ f.
+    /// Returns the link acceleration θ̈ (rad/s²) due to a contact force (f_t, f_n), N: M⁻¹ Jᵀ f.
     pub fn contact_acceleration_rad_s2(&self, force_n: &Vector2<f32>) -> LinkMotion<f32> {
         self.acceleration_by(self.force_torque_nm(force_n))
     }
 
-    /// Free normal acceleration as a function of the joint torques,
-    /// b = b₀ + n · (u1, u2): b₀ in m/s² and n in 1/(kg·m).
+    /// Returns the free normal acceleration as a function of the joint torques, b = b₀ + n · (u1,
+    /// u2): b₀ in m/s² and n in 1/(kg·m).
     pub fn free_normal_acceleration(&self) -> (f32, Vector2<f32>) {
         let row = &self.normal_mobility;
         let offset = self.centripetal_m_s2.y - row.dot(self.bias_nm.vector());

@@ -1,11 +1,11 @@
-//! The control laws, and sets of laws to choose from.
+//! The control laws, and sets from which one is selected.
 //!
-//! - [`Law`]: what a law is, given a [`LawInput`] and answering with a [`LawOutput`]
+//! - [`Law`]: the trait of a law, from [`LawInput`] to [`LawOutput`]
 //! - [`off`]: no law
 //! - [`pid`]: the paper's PID on the joints
 //! - [`hybrid`]: the paper's hybrid force/motion law
-//! - [`law_set!`](crate::law_set!): a set of laws, itself a law; [`LawSettings`] is the set that
-//!   comes with the controller
+//! - [`law_set!`](crate::law_set!): declares a set of laws that is itself a law; [`LawSettings`] is
+//!   the set built into the controller
 
 pub mod hybrid;
 pub mod off;
@@ -20,12 +20,12 @@ pub use self::signals::{LawInput, LawOutput};
 use hybrid::HybridSettings;
 use pid::PidSettings;
 
-/// A control law: settings, held once, which compute torques from what is known at a tick and
-/// from a state of their own.
+/// A control law: constant settings that compute torques from the inputs of a tick and a state of
+/// their own.
 ///
 /// The settings are declared with [`settings!`](painleve_shared::settings!), which checks them and
-/// describes them to the host. A law of one's own is put beside the built-in ones with
-/// [`law_set!`](crate::law_set!).
+/// describes them to the host. [`law_set!`](crate::law_set!) combines a custom law with the
+/// built-in ones.
 ///
 /// ```
 /// use painleve_firmware::law::{Law, LawInput, LawOutput};
@@ -55,33 +55,33 @@ use pid::PidSettings;
 /// }
 /// ```
 pub trait Law: Clone + Debug + Default + SettingValue {
-    /// What the law remembers from tick to tick. The default is the state of a law that has not
-    /// run yet.
+    /// State of the law between ticks. The default is the state of a law that has not run yet.
     type State: Clone + Debug + Default;
 
-    /// Name for reports: of a set, the chosen law's; otherwise the settings' type.
+    /// Returns the name for reports: a set returns the chosen law's, a law its settings' type.
     fn name(&self) -> &'static str {
         core::any::type_name::<Self>()
     }
 
-    /// Whether there is a law at all: without one the drive never arms.
+    /// Whether there is a law: without one the drive never arms.
     fn is_on(&self) -> bool {
         true
     }
 
-    /// Starts again; called before the law's tick when the drive is armed and when the tip lands.
+    /// Resets the law's state; called before the law's tick when the drive is armed and when the
+    /// tip lands.
     fn reset(&self, state: &mut Self::State, input: &LawInput<'_>) {
         let _ = input;
         *state = Self::State::default();
     }
 
-    /// Torques for one tick. Takes bounded time, allocates nothing and does not panic; a torque
-    /// that is not a finite number is latched as a fault.
+    /// Computes the torques for one tick. Takes bounded time, does not allocate and does not panic;
+    /// a non-finite torque latches a fault.
     fn tick(&self, state: &mut Self::State, input: &LawInput<'_>) -> LawOutput;
 }
 
 /// Declares a set of laws: an enum of their settings that is itself a [`Law`](crate::law::Law), and
-/// a struct of their states. Every set has the variant `Off` (`"off"`) as well, which never arms.
+/// a struct of their states. Every set also has the variant `Off` (`"off"`), which never arms.
 ///
 /// ```
 /// use painleve_firmware::law::{hybrid::HybridSettings, pid::PidSettings};

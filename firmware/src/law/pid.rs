@@ -8,7 +8,8 @@ use painleve_shared::{JointTorque, LinkMotion, Real, settings};
 use super::{Law, LawInput, LawOutput};
 
 settings! {
-    /// Gains of the PID, for joint 1 and joint 2: the paper's from x0,d.
+    /// Gains of the PID for joint 1 and joint 2. The defaults are the paper's gains for a start at
+    /// x0,d.
     #[derive(Copy)]
     pub struct PidSettings {
         /// K_P of joint 1 and of joint 2.
@@ -48,8 +49,8 @@ impl Law for PidSettings {
         );
         let error = (theta_wanted - input.model.theta_rad).to_joints();
         let error_rate = (rate_wanted - input.model.theta_dot_rad_s).to_joints();
-        // Anti-windup: the integrals stand still while the torque is limited,
-        // and never exceed their own limit.
+        // Anti-windup: the integrals stop while the torque is limited, and never exceed their own
+        // limit.
         if !input.saturated {
             let limit = self.integral_limit_nm;
             let step = error.torque_by(self.integral_nm_rad_s) * input.tick_s;

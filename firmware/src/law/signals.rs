@@ -1,4 +1,4 @@
-//! The control laws' common ground: what they are given and what they answer.
+//! Inputs and outputs common to all control laws.
 
 use nalgebra::Vector2;
 use painleve_shared::{Arm, JointTorque, Posture};
@@ -7,30 +7,30 @@ use crate::estimate::friction::FrictionEstimate;
 use crate::estimate::model::Model;
 use crate::refer::reference::TipReference;
 
-/// What a law knows at one tick.
+/// Inputs of a law at one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct LawInput<'a> {
     /// The arm's model.
     pub arm: &'a Arm<f32>,
-    /// The same at the estimated state.
+    /// The model's terms at the estimated state.
     pub model: &'a Model,
     /// Posture in which the drive was armed.
     pub posture: Posture,
     /// Measured contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
-    /// What is known about friction.
+    /// Estimated friction.
     pub friction: FrictionEstimate,
-    /// p with it, 1/kg.
+    /// p with the estimated friction, 1/kg.
     pub p_per_kg: f32,
     /// Whether the tip touches the belt.
     pub contact: bool,
-    /// Whether the torque of the tick before was limited.
+    /// Whether the torque of the previous tick was limited.
     pub saturated: bool,
-    /// Where the tip shall be.
+    /// Reference of the tip.
     pub reference: TipReference,
     /// Largest torque on either joint, N·m.
     pub torque_limit_nm: f32,
-    /// Time between two ticks, s.
+    /// Control period, s.
     pub tick_s: f32,
 }
 
@@ -39,6 +39,6 @@ pub struct LawInput<'a> {
 pub struct LawOutput {
     /// Wanted joint torques, N·m, before limits.
     pub torque_nm: JointTorque<f32>,
-    /// Contact force (f_t, f_n) that the law expects with them, N.
+    /// Contact force (f_t, f_n) that the law expects with these torques, N.
     pub contact_force_n: Vector2<f32>,
 }

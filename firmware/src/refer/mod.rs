@@ -1,4 +1,4 @@
-//! Where the tip should be.
+//! The target position of the tip.
 //!
 //! - [`reference`](mod@reference): the segments of the program, tick by tick
 //! - [`governor`]: keeps the reference inside the admissible stretch of the belt
@@ -17,33 +17,33 @@ use crate::estimate::model::Model;
 use crate::law::Law;
 use crate::supervise::supervisor::Phase;
 
-/// Where the tip should be at one tick, and where it may be.
+/// The target of the tip at one tick, and its limits.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
-    /// Where the tip should be.
+    /// Reference of the tip.
     pub reference: TipReference,
-    /// Posture in which it should be there.
+    /// Posture in which the tip should be there.
     pub posture: Posture,
     /// Edges of the admissible stretch of the belt, m.
     pub edges_m: (f32, f32),
-    /// The edges once they have been found for the present posture and least p.
+    /// The edges, once found for the present posture and least p.
     pub fresh_edges_m: Option<(f32, f32)>,
     /// Whether an edge holds the reference back.
     pub at_edge: bool,
-    /// Whether the tip is to be brought back onto the belt before it can follow.
+    /// Whether the tip must be returned to the belt before it can follow.
     pub recovering: bool,
 }
 
-/// Follows the program, inside the edges.
+/// Follows the program within the edges.
 #[derive(Clone, Debug)]
 pub struct References {
     generator: ReferenceGenerator,
     governor: EdgeGovernor,
-    /// Least p as a part of Q22 where a tip that is brought back may land.
+    /// Least p as a fraction of Q22 at which a recovered tip may land.
     landing_p_ratio: f32,
 }
 
-/// What the [`References`] remember from tick to tick.
+/// State of the [`References`] between ticks.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferencesState {
     generator: ReferenceState,
@@ -53,7 +53,7 @@ pub struct ReferencesState {
 }
 
 impl References {
-    /// The references of a controller with this configuration.
+    /// Makes the references of a controller with this configuration.
     pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
         Self {
             generator: ReferenceGenerator::new(
@@ -69,7 +69,7 @@ impl References {
         }
     }
 
-    /// Nothing has been followed yet, with this arm.
+    /// Starts without a followed reference, with this arm.
     pub fn start(&self, arm: &Arm<f32>) -> ReferencesState {
         ReferencesState {
             generator: ReferenceState::default(),
@@ -78,13 +78,13 @@ impl References {
         }
     }
 
-    /// Whether the last segment has ended.
+    /// Returns whether the last segment has ended.
     pub fn is_done(&self, state: &ReferencesState) -> bool {
         self.generator.is_done(&state.generator)
     }
 
-    /// The target of one tick. `landing` is the posture in which a thrown tip is being brought
-    /// back.
+    /// Returns the target of one tick. `landing` is the posture in which a thrown tip is being
+    /// returned to the belt.
     #[inline]
     pub fn tick(
         &self,
@@ -107,8 +107,8 @@ impl References {
             state.generator = ReferenceState::at(tip_t_m);
         }
         if phase.starts_tracking {
-            // The tip has been dragged while friction was not known, and what it is
-            // taken to be where has changed with the links' length.
+            // The belt has dragged the tip while friction was unknown, and the estimated tip
+            // position has changed with the links' length.
             state.generator.start_from(tip_t_m);
         }
         let minimum_p_ratio = if recovering {
@@ -126,7 +126,7 @@ impl References {
         );
         let wanted = match phase.state {
             SupervisorState::Armed => state.generator.start(),
-            // A reference does not run away from a tip that is being brought back.
+            // The reference waits for a tip that is being returned to the belt.
             SupervisorState::LiftOff if recovering => self.generator.present(&state.generator),
             SupervisorState::Tracking | SupervisorState::LiftOff => {
                 self.generator.next_tick(&mut state.generator)

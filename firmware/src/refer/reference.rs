@@ -1,7 +1,7 @@
-//! Where the tip shall be: segments along the belt, one after the other.
+//! The reference position of the tip: a sequence of segments along the belt.
 //!
-//! Each segment starts where the one before ended; after the last one the reference
-//! stands still. Time is counted in ticks, so that nothing drifts.
+//! Each segment starts where the previous one ended; after the last one the reference stands still.
+//! Time is counted in ticks, so it does not drift.
 
 use heapless::Vec;
 use painleve_shared::range::{self, OutOfRange};
@@ -9,7 +9,7 @@ use painleve_shared::settings;
 use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape, check_each};
 use serde::{Deserialize, Serialize};
 
-/// Most segments of a program.
+/// Largest number of segments in a program.
 pub const MAXIMUM_SEGMENTS: usize = 16;
 
 settings! {
@@ -46,7 +46,7 @@ settings! {
 }
 
 impl Segment {
-    /// How long the segment lasts, s.
+    /// Returns the duration of the segment, s.
     pub fn duration_s(&self) -> f32 {
         match *self {
             Self::Hold { duration_s }
@@ -56,7 +56,7 @@ impl Segment {
         }
     }
 
-    /// Where the segment ends, m; `None` for where it started.
+    /// Returns the end of the segment, m; `None` if it ends where it started.
     pub fn target_m(&self) -> Option<f32> {
         match *self {
             Self::Hold { .. } => None,
@@ -67,16 +67,16 @@ impl Segment {
     }
 }
 
-/// The segments that are followed from every arming on.
+/// The segments of the reference, which start at every arming.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Program {
-    /// In the order in which they are followed.
+    /// Segments, in order.
     pub segments: Vec<Segment, MAXIMUM_SEGMENTS>,
 }
 
 impl Program {
-    /// The paper's limit elbow down, 0.148 m, in three seconds.
+    /// Returns a move to the paper's limit elbow down, 0.148 m, in three seconds.
     pub fn to_the_papers_limit() -> Self {
         let segment = Segment::MinimumJerk {
             target_m: 0.148,
@@ -90,7 +90,7 @@ impl Program {
     /// Checks that every target is within `reach_m` of the point of the belt under the first joint.
     ///
     /// # Errors
-    /// [`OutOfRange`] naming the first target that is not.
+    /// [`OutOfRange`] naming the first target that is out of reach.
     pub fn check_reach(&self, reach_m: f32) -> Result<(), OutOfRange> {
         let reach = f64::from(reach_m);
         for (index, segment) in self.segments.iter().enumerate() {
@@ -124,7 +124,7 @@ pub struct TipReference {
 }
 
 impl TipReference {
-    /// Standing at `position_m`.
+    /// Stands still at `position_m`.
     pub fn at_rest(position_m: f32) -> Self {
         Self {
             position_m,
@@ -140,14 +140,14 @@ pub struct ReferenceGenerator {
     tick_hz: f32,
 }
 
-/// How far a [`ReferenceGenerator`] has got: at the start of its program, from z_t = 0.
+/// Progress of a [`ReferenceGenerator`]; initially at the start of its program, at z_t = 0.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReferenceState {
     /// Present segment of the program.
     segment: usize,
-    /// Where it started, m.
+    /// Position at the start of the segment, m.
     start_m: f32,
-    /// Ticks since then.
+    /// Ticks since the start of the segment.
     elapsed_ticks: u32,
 }
 
@@ -160,19 +160,19 @@ impl ReferenceState {
         }
     }
 
-    /// Starts the present segment, which has not begun yet, from `start_m` (m).
+    /// Starts the present segment from `start_m` (m).
     pub fn start_from(&mut self, start_m: f32) {
         self.start_m = start_m;
     }
 
-    /// Where the present segment started, at rest: what to hold before following.
+    /// Returns the start of the present segment, at rest: the position to hold before following.
     pub fn start(&self) -> TipReference {
         TipReference::at_rest(self.start_m)
     }
 }
 
 impl ReferenceGenerator {
-    /// A generator that follows `program`, `tick_hz` ticks a second.
+    /// Makes a generator that follows `program` at `tick_hz` ticks a second.
     pub fn new(program: &Program, tick_hz: f32) -> Self {
         Self {
             program: program.clone(),
@@ -180,7 +180,7 @@ impl ReferenceGenerator {
         }
     }
 
-    /// Where the reference has got to, at rest: what to hold while time stands still.
+    /// Returns the present reference at rest: the position to hold while time stands still.
     pub fn present(&self, state: &ReferenceState) -> TipReference {
         let segment = self.program.segments.get(state.segment);
         TipReference::at_rest(segment.map_or(state.start_m, |segment| {
@@ -188,14 +188,14 @@ impl ReferenceGenerator {
         }))
     }
 
-    /// Whether the last segment has ended.
+    /// Returns whether the last segment has ended.
     pub fn is_done(&self, state: &ReferenceState) -> bool {
         state.segment >= self.program.segments.len()
     }
 
-    /// The reference of this tick; then time goes on by one tick.
+    /// Returns the reference of this tick, then advances time by one tick.
     pub fn next_tick(&self, state: &mut ReferenceState) -> TipReference {
-        // A segment without duration ends at once, so that several may end in one tick.
+        // A segment without duration ends at once, so several segments may end in one tick.
         while let Some(segment) = self.program.segments.get(state.segment) {
             let duration_ticks = segment.duration_s() * self.tick_hz;
             if (state.elapsed_ticks as f32) < duration_ticks - 0.5 {
@@ -309,7 +309,8 @@ mod tests {
                 let now = generator.next_tick(&mut state);
                 let slope = (now.position_m - before.position_m) * 1000.0;
                 let mean = 0.5 * (now.velocity_m_s + before.velocity_m_s);
-                // The trapezoid's error, jerk · T²/12, and rounding of the positions.
+                // The tolerance covers the trapezoid's error, jerk · T²/12, and rounding of the
+                // positions.
                 let jerk = 60.0 * (target - start).abs() / (duration * duration * duration);
                 prop_assert!((slope - mean).abs() < jerk * 1e-6 / 12.0 * 1.1 + 1e-3);
                 before = now;

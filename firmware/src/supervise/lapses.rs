@@ -1,8 +1,7 @@
-//! Counts lapses around a tick, each kind by itself, and says when there are too many.
+//! Counts lapses around a tick, each kind separately, and reports when there are too many.
 //!
-//! A single late tick, broken message or impossible reading is counted and
-//! survived; more than a limit in a row is a fault, which the controller latches
-//! until it is reset.
+//! A single late tick, broken message or impossible reading is counted and tolerated. More in a row
+//! than the limit is a fault, which the controller latches until a reset.
 
 pub use painleve_shared::lapse::{Lapse, LapseCounts, LapseLimits};
 
@@ -13,7 +12,7 @@ struct Count {
     in_a_row: u32,
 }
 
-/// Counts lapses and says when there are too many in a row.
+/// Counts lapses and reports when there are too many in a row.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LapseMonitor {
     limits: LapseLimits,
@@ -21,7 +20,7 @@ pub struct LapseMonitor {
 }
 
 impl LapseMonitor {
-    /// A monitor that has seen nothing.
+    /// Makes a monitor with all counts at zero.
     pub fn new(limits: LapseLimits) -> Self {
         Self {
             limits,
@@ -29,13 +28,14 @@ impl LapseMonitor {
         }
     }
 
-    /// Takes note that `lapse` did not happen this time.
+    /// Records that `lapse` did not occur this time.
     #[inline]
     pub fn note_good(&mut self, lapse: Lapse) {
         self.counts[lapse as usize].in_a_row = 0;
     }
 
-    /// Takes note of how many times `lapse` happened; says whether that is now too often in a row.
+    /// Records how many times `lapse` occurred; returns whether it has now occurred too often in a
+    /// row.
     #[must_use]
     pub fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
         let count = &mut self.counts[lapse as usize];
@@ -44,12 +44,12 @@ impl LapseMonitor {
         count.in_a_row > self.limits.of(lapse)
     }
 
-    /// How often `lapse` has happened; wraps.
+    /// Returns how often `lapse` has occurred; wraps.
     pub fn total(&self, lapse: Lapse) -> u32 {
         self.counts[lapse as usize].total
     }
 
-    /// How often each lapse has happened.
+    /// Returns how often each lapse has occurred.
     pub fn totals(&self) -> LapseCounts {
         LapseCounts::from_fn(|lapse| self.total(lapse))
     }
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_kind_has_its_own_counter_and_limit_and_a_good_one_starts_over() {
+    fn each_kind_has_its_own_counter_and_limit_and_a_good_tick_restarts_it() {
         for lapse in Lapse::ALL.iter().copied() {
             let limits = LapseLimits::default();
             let limit = limits.of(lapse);

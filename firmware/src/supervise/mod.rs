@@ -1,4 +1,4 @@
-//! What the controller may do: the supervisor's states, and the faults that stop it.
+//! Supervision: the supervisor's states, and the lapses and faults that stop the drive.
 
 pub mod lapses;
 pub mod supervisor;

@@ -1,17 +1,17 @@
-//! What the controller may do: idle → armed → tracking ⇄ lift-off, and fault
-//! from everywhere. A fault is latched until a reset.
+//! The supervisor's state machine: idle → armed → tracking ⇄ lift-off, and a fault from every
+//! state. A fault is latched until a reset.
 
 use painleve_shared::frame::DigitalInputs;
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::{OutOfRange, check_setting, settings};
 
 settings! {
-    /// What to do when contact is lost while tracking.
+    /// Reaction to a loss of contact while tracking.
     #[derive(Copy, Eq)]
     pub enum OnLiftOff = Recover {
-        /// Bring the tip back onto the belt, a limited number of times.
+        /// Return the tip to the belt, a limited number of times.
         "recover" => Recover,
-        /// Let the law go on, as in the paper, until the time limit.
+        /// Let the law continue, as in the paper, until the time limit.
         "continue" => Continue,
         /// Latch the fault `LiftOffTooLong` at once.
         "fault" => Fault,
@@ -19,22 +19,23 @@ settings! {
 }
 
 settings! {
-    /// Settings of the supervisor. Times are rounded to ticks; the longest is countable at the
-    /// highest control rate.
+    /// Settings of the supervisor. Times are rounded to ticks; the longest time is still countable
+    /// at the highest control rate.
     #[derive(Copy)]
     pub struct SupervisorSettings {
         /// Time in contact before the reference starts.
         arming_s: f32 = 0.01, 0.0..=1e4, "s";
-        /// Time without contact after which arming ends in the fault `ContactNotFound`; at least
+        /// Time without contact after which arming ends with the fault `ContactNotFound`; at least
         /// `arming_s`.
         arming_limit_s: f32 = 1.0, 0.0..=1e4, "s";
-        /// What to do when contact is lost while tracking.
+        /// Reaction to a loss of contact while tracking.
         on_lift_off: OnLiftOff = OnLiftOff::Recover;
         /// Time without contact after which the fault `LiftOffTooLong` is latched; 0 for never.
         lift_off_limit_s: f32 = 2.0, 0.0..=1e4, "s";
-        /// Lift-offs in a row that are recovered from; one more is the fault `RecoveryFailed`.
+        /// Number of lift-offs in a row from which the controller recovers; one more latches the
+        /// fault `RecoveryFailed`.
         recoveries_limit: u32 = 10, 0..=1_000_000;
-        /// Time in contact that ends such a row.
+        /// Time in contact after which the count of lift-offs in a row starts again.
         recovered_s: f32 = 1.0, 0.0..=1e4, "s";
     }
     check Self::relations;
@@ -53,12 +54,12 @@ pub struct Supervisor {
     tick_hz: f32,
 }
 
-/// The state machine's state; idle at the start.
+/// State of the state machine; initially idle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Supervision {
     state: SupervisorState,
     fault: Option<Fault>,
-    /// Ticks in the present state, or in contact while armed.
+    /// Ticks in the present state or, while armed, in contact.
     ticks: u32,
     contact_ticks: u32,
     /// Lift-offs in a row.
@@ -66,7 +67,7 @@ pub struct Supervision {
     inputs: DigitalInputs,
 }
 
-/// What the supervisor has decided at one tick.
+/// The supervisor's decision at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Phase {
     /// Present state.
@@ -75,18 +76,18 @@ pub struct Phase {
     pub arms: bool,
     /// Whether tracking has just started, for the first time since the drive was armed.
     pub starts_tracking: bool,
-    /// Whether a tip in the air is to be brought back onto the belt.
+    /// Whether a tip in the air is to be returned to the belt.
     pub recovers: bool,
 }
 
 impl Phase {
-    /// Whether torque may be applied.
+    /// Returns whether torque may be applied.
     pub fn drives(&self) -> bool {
         drives(self.state)
     }
 }
 
-/// Whether torque may be applied in this state.
+/// Returns whether torque may be applied in this state.
 fn drives(state: SupervisorState) -> bool {
     matches!(
         state,
@@ -95,12 +96,12 @@ fn drives(state: SupervisorState) -> bool {
 }
 
 impl Supervisor {
-    /// A supervisor that is called `tick_hz` times a second.
+    /// Makes a supervisor that is called `tick_hz` times a second.
     pub fn new(settings: SupervisorSettings, tick_hz: f32) -> Self {
         Self { settings, tick_hz }
     }
 
-    /// One tick: `has_law` says whether there is anything to arm.
+    /// Advances one tick; `has_law` states whether there is a law to arm.
     pub fn tick(
         &self,
         supervision: &mut Supervision,
@@ -138,7 +139,7 @@ impl Supervisor {
                 }
             }
             SupervisorState::Idle => {
-                // An edge, so that a reset alone does not start the drive again.
+                // Arm on a rising edge, so that a reset alone does not start the drive again.
                 if rises(DigitalInputs::ENABLE) && has_law {
                     supervision.lift_offs = 0;
                     supervision.enter(SupervisorState::Armed);
@@ -186,29 +187,29 @@ impl Supervisor {
         }
     }
 
-    /// Whether a count of ticks has gone on for longer than `time_s`.
+    /// Returns whether a count of ticks has exceeded `time_s`.
     fn exceeds(&self, ticks: u32, time_s: f32) -> bool {
         ticks as f32 > time_s * self.tick_hz
     }
 }
 
 impl Supervision {
-    /// Present state.
+    /// Returns the present state.
     pub fn state(&self) -> SupervisorState {
         self.state
     }
 
-    /// The latched fault.
+    /// Returns the latched fault.
     pub fn fault(&self) -> Option<Fault> {
         self.fault
     }
 
-    /// Whether torque may be applied.
+    /// Returns whether torque may be applied.
     pub fn drives(&self) -> bool {
         drives(self.state)
     }
 
-    /// Latches a fault. The first one stays.
+    /// Latches a fault unless one is latched already.
     pub fn latch(&mut self, fault: Fault) {
         if self.fault.is_none() {
             self.fault = Some(fault);
@@ -216,7 +217,7 @@ impl Supervision {
         self.enter(SupervisorState::Fault);
     }
 
-    /// Stops the drive without looking at anything else.
+    /// Stops the drive without evaluating the other inputs.
     pub fn disable(&mut self) {
         self.enter(SupervisorState::Idle);
     }

@@ -1,4 +1,4 @@
-//! What boards with an STM32F4 share: the control timer and the serial port.
+//! Code shared by boards with an STM32F4: the control timer and the serial port.
 
 #![no_std]
 #![cfg(target_os = "none")]

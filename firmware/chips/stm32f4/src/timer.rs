@@ -2,8 +2,8 @@
 
 use stm32f4xx_hal::pac::TIM2;
 
-/// Starts the timer's interrupt every `counts` of its clock. A count beyond `counts` has to
-/// be set back before, see [`set_back`].
+/// Starts the timer's interrupt with a period of `counts` of its clock. If the present count is
+/// beyond `counts`, first reset it with [`set_back`].
 pub fn start(timer: &TIM2, counts: f32) {
     timer.cr1().write(|w| w.cen().clear_bit());
     timer.psc().write(|w| w.psc().set(0));
@@ -13,8 +13,8 @@ pub fn start(timer: &TIM2, counts: f32) {
     timer.cr1().write(|w| w.cen().set_bit());
 }
 
-/// Sets the count to zero. Not under QEMU 7.2, whose timer has no count of its own but
-/// tells the time since its start, and where whatever was set back is added to every period.
+/// Sets the count to zero. Do not call it under QEMU 7.2: its timer has no count of its own but
+/// reports the time since its start, and adds the amount set back to every period.
 pub fn set_back(timer: &TIM2) {
     timer.egr().write(|w| w.ug().set_bit());
 }
@@ -24,7 +24,7 @@ pub fn acknowledge(timer: &TIM2) {
     timer.sr().modify(|_, w| w.uif().clear_bit());
 }
 
-/// Whether the interrupt has come again since it was cleared.
+/// Returns whether the interrupt has occurred again since it was cleared.
 pub fn is_due(timer: &TIM2) -> bool {
     timer.sr().read().uif().bit_is_set()
 }

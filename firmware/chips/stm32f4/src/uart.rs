@@ -1,7 +1,7 @@
-//! USART1 with a buffer each way, at 921,600 baud, 8N1.
+//! USART1 with a buffer in each direction, at 921,600 baud, 8N1.
 //!
-//! Its interrupt moves single bytes, 11 µs apart; the link task takes and gives them in bulk and
-//! may be late by a whole buffer: 5.5 ms.
+//! The interrupt moves single bytes, 11 µs apart. The link task moves them in bulk and may be late
+//! by a whole buffer: 5.5 ms.
 
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -12,13 +12,13 @@ use stm32f4xx_hal::serial::{Rx, RxListen, Serial, Tx, TxISR, TxListen};
 
 use painleve_image::board::{Bytes, Port};
 
-/// Speed of the line, bit/s.
+/// Line speed, bit/s.
 pub const BAUD: u32 = 921_600;
 
-/// Bytes that may wait, each way.
+/// Capacity of the buffer in each direction, bytes.
 const CAPACITY: usize = 512;
 
-/// The interrupt's side.
+/// The interrupt's end of the port.
 pub struct UartBytes {
     receiver: Rx<USART1>,
     transmitter: Tx<USART1>,
@@ -26,13 +26,13 @@ pub struct UartBytes {
     to_send: Consumer<'static, u8>,
 }
 
-/// The link task's side.
+/// The link task's end of the port.
 pub struct UartPort {
     received: Consumer<'static, u8>,
     to_send: Producer<'static, u8>,
 }
 
-/// Takes charge of the serial port; `None` the second time.
+/// Takes ownership of the serial port; `None` on the second call.
 pub fn split(serial: Serial<USART1>) -> Option<(UartBytes, UartPort)> {
     let in_queue = cortex_m::singleton!(RECEIVED: Queue<u8, CAPACITY> = Queue::new())?;
     let out_queue = cortex_m::singleton!(TO_SEND: Queue<u8, CAPACITY> = Queue::new())?;
@@ -57,8 +57,9 @@ pub fn split(serial: Serial<USART1>) -> Option<(UartBytes, UartPort)> {
 impl Bytes for UartBytes {
     fn serve(&mut self) {
         loop {
-            // A byte that is broken, came too fast or finds no room spoils its message, which
-            // the checksum notices. Reading on clears the error, which would call again for ever.
+            // A damaged byte, an overrun or a full buffer spoils the message, which the checksum
+            // detects. Reading the data register clears the error, which would otherwise raise the
+            // interrupt forever.
             match self.receiver.read() {
                 Ok(byte) => {
                     let _ = self.received.enqueue(byte);
@@ -67,8 +68,8 @@ impl Bytes for UartBytes {
                 Err(nb::Error::WouldBlock) => break,
             }
         }
-        // Two bytes at most on the chip; all of them under QEMU, which takes bytes at
-        // once and knows no interrupt for them.
+        // At most two bytes on the chip; all of them under QEMU, which accepts bytes at once and
+        // raises no interrupt for them.
         while self.transmitter.is_tx_empty() {
             let Some(byte) = self.to_send.dequeue() else {
                 return self.transmitter.unlisten();
@@ -101,7 +102,7 @@ impl Port for UartPort {
         for byte in bytes {
             let _ = self.to_send.enqueue(*byte);
         }
-        // The interrupt takes the first byte and asks for itself from then on.
+        // The interrupt sends the first byte and then enables itself as needed.
         NVIC::pend(Interrupt::USART1);
         true
     }

@@ -6,13 +6,13 @@
 //! α_f = f_n* + K'_I ∫ (f_n* − f_n) dt
 //! ```
 //!
-//! The paper's f_t is continuous. Sampled, the friction of the last sample fed forward
-//! makes a loop with gain −μ Q12/p per sample, which diverges where |μ Q12| > p.
-//! A first-order low-pass on the measured f_t moves the pole to −Q22/(p τ): stable
-//! wherever p > 0, and μ is needed nowhere. Towards the edge, p → 0, even that pole
-//! outruns the sampling. The default therefore feeds the estimated friction forward,
-//! −μ̂ s α_f, which closes no loop at all, and low-passes only what is left of the measured
-//! f_t, with a gain that falls with p (see [`FrictionFeedForward::Observed`]).
+//! In the paper f_t is continuous. In a sampled controller, feeding forward the friction of the last
+//! sample closes a loop with gain −μ Q12/p per sample, which diverges where |μ Q12| > p. A
+//! first-order low-pass on the measured f_t moves the pole to −Q22/(p τ): stable wherever p > 0,
+//! without knowledge of μ. Near the edge, p → 0, even that pole is too fast for the sampling. By
+//! default the law therefore feeds the estimated friction −μ̂ s α_f forward, which closes no loop,
+//! and low-passes only the difference to the measured f_t, with a gain that falls with p (see
+//! [`FrictionFeedForward::Observed`]).
 
 mod settings;
 
@@ -22,19 +22,20 @@ use painleve_shared::{JointTorque, Real, Slip};
 pub use self::settings::{FrictionFeedForward, HybridSettings};
 use super::{Law, LawInput, LawOutput};
 
-/// Part of the sampling that the loop through the contact may use: its pole is 1 − ½ p̂/p.
+/// Largest share of the loop through the contact per sample: its pole is 1 − ½ p̂/p.
 const OBSERVER_SHARE: f32 = 0.5;
 
-/// Rate at which the friction that is fed forward changes, as a part of f_n, 1/s: at a reversal
-/// of slip it goes through stick without a jerk.
+/// Rate limit of the friction feed-forward, as a fraction of f_n, 1/s: at a reversal of slip it
+/// passes through stick without a jerk.
 const FRICTION_SLEW_PER_S: f32 = 100.0;
 
-/// Part of the torque limit up to which the tip is pressed on the belt; the rest is for motion.
+/// Fraction of the torque limit available for pressing the tip on the belt; the rest is for motion.
 const TORQUE_USED: f32 = 0.95;
-/// Least part of the wanted contact force.
+/// Least fraction of the wanted contact force.
 const LEAST_PRESSING: f32 = 0.1;
 
-/// The part of `pressing_nm` that leaves both joints within ±`limit_nm` together with `motion_nm`.
+/// Returns the fraction of `pressing_nm` that keeps both joints within ±`limit_nm` together with
+/// `motion_nm`.
 fn affordable(motion_nm: &JointTorque<f32>, pressing_nm: &JointTorque<f32>, limit_nm: f32) -> f32 {
     if (*motion_nm + *pressing_nm).amax() <= limit_nm {
         1.0
@@ -43,8 +44,8 @@ fn affordable(motion_nm: &JointTorque<f32>, pressing_nm: &JointTorque<f32>, limi
     }
 }
 
-/// Out of the way, like everything that is rarely needed: inlined, the compiler would divide
-/// every time rather than jump.
+/// Kept out of line because it is rarely needed: when inlined, the compiler computes the divisions
+/// every time instead of branching.
 #[cold]
 #[inline(never)]
 fn affordable_part(
@@ -56,7 +57,7 @@ fn affordable_part(
         if (motion + pressing).abs() <= limit_nm {
             1.0
         } else {
-            // Not finite where nothing is pressed; the motion alone is then too much.
+            // Not finite without a pressing torque; the motion alone is then beyond the limit.
             (limit_nm.copysign(pressing) - motion) / pressing
         }
     };
@@ -65,25 +66,25 @@ fn affordable_part(
         .limited(LEAST_PRESSING, 1.0)
 }
 
-/// Wanted acceleration from which on a sticking tip is to break away, m/s².
+/// Wanted acceleration above which the law makes a sticking tip break away, m/s².
 const BREAKING_AWAY_M_S2: f32 = 1.0;
 
 /// The hybrid law's state.
 #[derive(Clone, Copy, Debug)]
 pub struct HybridState {
-    /// Wanted normal force on its way to f_n*, N; f_n* itself before the first reset.
+    /// Wanted normal force while it approaches f_n*, N; f_n* itself before the first reset.
     wanted_force_n: Option<f32>,
     /// K'_I ∫ (f_n* − f_n) dt, N.
     force_integral_n: f32,
     /// Gain times ∫ (z_t* − z_t) dt, m/s².
     position_integral_m_s2: f32,
-    /// Low-passed f_t, or what the estimated friction leaves of it, N.
+    /// Low-passed f_t, or its difference to the estimated friction, N.
     filtered_friction_n: f32,
-    /// Slip whose friction was fed forward last.
+    /// Slip direction of the last friction feed-forward.
     slip: Option<Slip>,
-    /// f_t/f_n that was fed forward last.
+    /// Last friction feed-forward as a ratio f_t/f_n.
     fed_ratio: f32,
-    /// Part of the wanted contact force for which there is torque.
+    /// Fraction of the wanted contact force for which torque is available.
     pressing: f32,
 }
 
@@ -104,10 +105,10 @@ impl Default for HybridState {
 impl Law for HybridSettings {
     type State = HybridState;
 
-    /// Forgets the integrals and starts from the present contact force.
+    /// Resets the integrals and starts from the present contact force.
     fn reset(&self, state: &mut HybridState, input: &LawInput<'_>) {
         let force_n = input.force_n.y.at_least(0.0);
-        // Within the cone that is believed in: a force cell at the end of its range shows any ratio.
+        // Limit to the friction cone: a saturated force cell gives any ratio.
         let cone_n = input.friction.coefficient * force_n;
         *state = HybridState {
             wanted_force_n: (self.force_time_constant_s > 0.0).then_some(force_n),
@@ -165,8 +166,8 @@ impl HybridSettings {
         let before_n = state.wanted_force_n.unwrap_or(self.normal_force_n);
         let wanted_n = before_n + approach * (self.normal_force_n - before_n);
         state.wanted_force_n = Some(wanted_n);
-        // Anti-windup: no integration in the air, where there is no force to
-        // control, nor while the torque is limited.
+        // Anti-windup: no integration in the air, where there is no force to control, nor while the
+        // torque is limited.
         if input.contact && !input.saturated {
             let step = self.force_integral_gain_per_s
                 * (state.pressing * wanted_n - input.force_n.y)
@@ -177,7 +178,7 @@ impl HybridSettings {
         wanted_n + state.force_integral_n
     }
 
-    /// f_t that is fed forward, N, with α_f (N) and α_v (m/s²).
+    /// Returns the f_t to feed forward, N, for α_f (N) and α_v (m/s²).
     fn compensated_friction_n(
         &self,
         state: &mut HybridState,
@@ -194,9 +195,9 @@ impl HybridSettings {
             }
             FrictionFeedForward::Observed { time_constant_s } => {
                 let friction = &input.friction;
-                // In stick the friction force follows what is fed forward. Feeding forward the
-                // friction of the slip that is wanted brings it to the edge of its cone,
-                // from where the tip breaks away without a jerk.
+                // In stick the friction force follows the feed-forward. Feeding forward the friction
+                // of the wanted slip brings it to the edge of its cone, where the tip breaks away
+                // without a jerk.
                 let wants_slip = tangential_acceleration_m_s2.abs() > BREAKING_AWAY_M_S2;
                 let slip = if friction.sticks && wants_slip {
                     Slip::of(tangential_acceleration_m_s2)
@@ -244,8 +245,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// With the true friction fed forward, the law gives the tip exactly the
-        /// acceleration α_v along the belt and the force f_n* on it.
+        /// With the true friction fed forward, the law gives the tip exactly the acceleration α_v
+        /// along the belt and the force f_n* on it.
         #[test]
         fn the_law_linearises_the_arm_on_the_belt(
             tip in -0.16_f32..0.16, speed in -0.5_f32..0.5, friction in 0.0_f32..0.3, up: bool,

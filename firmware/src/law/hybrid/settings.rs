@@ -3,7 +3,7 @@
 use painleve_shared::settings;
 
 settings! {
-    /// Where the friction f_t that the hybrid law compensates comes from.
+    /// Source of the friction f_t that the hybrid law compensates.
     #[derive(Copy)]
     pub enum FrictionFeedForward {
         /// The last reading of the force cell, as in the paper.
@@ -13,9 +13,9 @@ settings! {
             /// Time constant τ.
             time_constant_s: f32, 0.0..=10.0, "s";
         },
-        /// The estimated friction −μ̂ s α_f, corrected by the reading through a low-pass:
-        /// d̂ += k (f_t + μ̂ s α_f − d̂) with k = min(T/τ, ½ p̂/Q22), so that the pole of the
-        /// loop through the contact, 1 − k Q22/p, stays near ½ however close the edge is.
+        /// The estimated friction −μ̂ s α_f, corrected by the low-passed reading: d̂ += k (f_t + μ̂
+        /// s α_f − d̂) with k = min(T/τ, ½ p̂/Q22). The pole of the loop through the contact, 1 − k
+        /// Q22/p, then stays near ½ even close to the edge.
         "observed" => Observed {
             /// Time constant τ far from the edge.
             time_constant_s: f32, 0.0..=10.0, "s";
@@ -31,27 +31,27 @@ settings! {
 }
 
 settings! {
-    /// Settings of the hybrid law. The default gains survive a sample of delay at 1 kHz with
-    /// 14-bit encoders.
+    /// Settings of the hybrid law. The default gains are stable with one sample of delay at 1 kHz
+    /// and 14-bit encoders.
     #[derive(Copy)]
     pub struct HybridSettings {
         /// Wanted normal force f_n*.
         normal_force_n: f32 = 10.0, 0.0..=1e3, "N";
-        /// K'_P.
+        /// Position gain K'_P.
         position_gain_per_s2: f32 = 3000.0, 0.0..=1e6, "1/s²";
-        /// K'_D.
+        /// Velocity gain K'_D.
         velocity_gain_per_s: f32 = 100.0, 0.0..=1e4, "1/s";
         /// Gain of ∫ (z_t* − z_t) dt, added to α_v; not in the paper.
         position_integral_gain_per_s3: f32 = 20_000.0, 0.0..=1e9, "1/s³";
-        /// Largest acceleration by that integral.
+        /// Largest acceleration due to that integral.
         position_integral_limit_m_s2: f32 = 200.0, 0.0..=1e6, "m/s²";
-        /// Time constant with which f_n* is approached after landing; 0 for at once, as in the
-        /// paper.
+        /// Time constant with which the wanted force approaches f_n* after landing; 0 for at once,
+        /// as in the paper.
         force_time_constant_s: f32 = 0.02, 0.0..=10.0, "s";
-        /// Whether the tip is pressed less where the torque limits do not allow f_n*; not in the
-        /// paper.
+        /// Whether the pressing force is reduced where the torque limits do not allow f_n*; not in
+        /// the paper.
         presses_less: bool = true;
-        /// K'_I.
+        /// Integral gain K'_I of the force.
         force_integral_gain_per_s: f32 = 5.0, 0.0..=1e4, "1/s";
         /// Largest correction by the force integral.
         force_integral_limit_n: f32 = 5.0, 0.0..=1e3, "N";

@@ -1,13 +1,12 @@
 //! Keeps the reference where sliding has a solution.
 //!
-//! p = Q22 (1 − μ s Q12/Q22) depends on the posture only. With the estimated friction and a
-//! margin for its uncertainty, the governor knows how far along the belt p stays above a
-//! given part of Q22: the edges of the admissible stretch around the tip. A reference that
-//! could not stop before an edge is followed with bounded deceleration to the edge
-//! and held there.
+//! p = Q22 (1 − μ s Q12/Q22) depends on the posture only. From the estimated friction and a margin
+//! for its uncertainty, the governor computes how far along the belt p stays above a given fraction
+//! of Q22: the edges of the admissible stretch around the tip. If the reference could not stop
+//! before an edge, the governor decelerates it within a bound and holds it at the edge.
 //!
-//! The edges are searched for outwards from the tip, a point or two a tick, so that the time
-//! of a tick is bounded and the edges follow the friction estimate, within a tenth of a
+//! The search for the edges goes outwards from the tip, one or two points at each tick. The time of
+//! a tick is therefore bounded, and the edges follow the friction estimate within a tenth of a
 //! second at 1 kHz.
 
 mod search;
@@ -20,18 +19,19 @@ pub use self::settings::GovernorSettings;
 use crate::estimate::friction::FrictionEstimate;
 use crate::refer::reference::TipReference;
 
-/// Points looked at in one tick while the edges are not known.
+/// Points evaluated at each tick while the edges are unknown.
 const POINTS_IN_A_HURRY: u32 = 2;
-/// Points from one end of the reach to the other in the search outwards.
+/// Number of points from one end of the reach to the other in the outward search.
 const STEPS_OVER_REACH: f32 = 64.0;
-/// Part of the reach that is used: beyond it the arm is all but straight.
+/// Fraction of the reach in use: beyond it the arm is almost straight.
 const USABLE_REACH: f32 = 0.995;
 
-/// A reference this far from the last one jumps, m; it is caught up with.
+/// A reference farther than this from the last one, m, counts as a jump; the governor catches up
+/// with it.
 const JUMP_M: f32 = 2e-3;
-/// A reference this near is caught up with, m.
+/// A reference nearer than this, m, has been caught up with.
 const CAUGHT_M: f32 = 2e-5;
-/// Rate at which the last stretch to a target is made, 1/s.
+/// Rate at which the remaining distance to a target decays, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
 
 /// The governor's settings for one arm and rate.
@@ -39,9 +39,9 @@ const APPROACH_PER_S: f32 = 20.0;
 pub struct EdgeGovernor {
     settings: GovernorSettings,
     tick_s: f32,
-    /// Least p as a part of Q22, for this rate.
+    /// Least p as a fraction of Q22, at this control rate.
     least_p_ratio: f32,
-    /// Distance from where it has that value, for these encoders, m.
+    /// Distance kept from the point where p has that value, with these encoders, m.
     distance_m: f32,
 }
 
@@ -52,21 +52,21 @@ pub struct GovernorState {
     lower_m: f32,
     upper_m: f32,
     search: Option<Search>,
-    /// What the present search asks for beyond the setting.
+    /// Least ratio p/Q22 that the present search requires beyond the setting.
     asked_p_ratio: f32,
-    /// Whether both edges have been found since it was asked.
+    /// Whether both edges have been found since that requirement was set.
     is_fresh: bool,
-    /// The reference that was followed last: position (m) and velocity (m/s).
+    /// The last reference followed: position (m) and velocity (m/s).
     position_m: f32,
     velocity_m_s: f32,
-    /// Whether that was the given one.
+    /// Whether it was equal to the given reference.
     follows: bool,
     /// Whether the given reference is beyond an edge.
     at_edge: bool,
 }
 
 impl GovernorState {
-    /// No edges are known but the arm's reach (m).
+    /// Starts without edges except the arm's reach (m).
     pub fn new(reach_m: f32) -> Self {
         Self {
             lower_m: -USABLE_REACH * reach_m,
@@ -81,31 +81,31 @@ impl GovernorState {
         }
     }
 
-    /// Starts again from a tip at rest at `tip_t_m`: the reference is caught up with from there.
+    /// Restarts from a tip at rest at `tip_t_m`, from where it catches up with the reference.
     pub fn restart(&mut self, tip_t_m: f32) {
         self.position_m = tip_t_m;
         self.velocity_m_s = 0.0;
         self.follows = false;
     }
 
-    /// Edges of the admissible stretch, m.
+    /// Returns the edges of the admissible stretch, m.
     pub fn edges_m(&self) -> (f32, f32) {
         (self.lower_m, self.upper_m)
     }
 
-    /// The same once both have been found for what the search was last asked for.
+    /// Returns the edges once both have been found for the present requirement.
     pub fn fresh_edges_m(&self) -> Option<(f32, f32)> {
         self.is_fresh.then_some((self.lower_m, self.upper_m))
     }
 
-    /// Whether an edge holds the reference back.
+    /// Returns whether an edge holds the reference back.
     pub fn is_at_edge(&self) -> bool {
         self.at_edge
     }
 }
 
 impl EdgeGovernor {
-    /// A governor that is called every `tick_s`, for encoders one count of which moves the tip by
+    /// Makes a governor that is called every `tick_s`, for encoders whose count moves the tip by
     /// `count_m`.
     pub fn new(settings: &GovernorSettings, tick_s: f32, count_m: f32) -> Self {
         Self {
@@ -116,8 +116,8 @@ impl EdgeGovernor {
         }
     }
 
-    /// Goes on searching for the edges around a tip at `tip_t_m`, with p at least
-    /// `minimum_p_ratio` of Q22 or the setting, whichever is more.
+    /// Continues the search for the edges around a tip at `tip_t_m`, where p is at least
+    /// `minimum_p_ratio` of Q22 or the setting, whichever is greater.
     pub fn search(
         &self,
         state: &mut GovernorState,
@@ -153,7 +153,7 @@ impl EdgeGovernor {
                     state.upper_m = edge;
                     search = Search::start(-1.0, tip_t_m);
                 } else {
-                    // A stretch shorter than both distances is a point.
+                    // A stretch shorter than both margins shrinks to a point.
                     state.lower_m = edge.at_most(state.upper_m);
                     state.is_fresh = true;
                     search = Search::start(1.0, tip_t_m);
@@ -163,7 +163,7 @@ impl EdgeGovernor {
         state.search = Some(search);
     }
 
-    /// The reference to follow instead of `wanted`, a tick after the last one.
+    /// Returns the reference to follow instead of `wanted`, one tick after the last one.
     pub fn govern(&self, state: &mut GovernorState, wanted: &TipReference) -> TipReference {
         let (settings, tick_s) = (&self.settings, self.tick_s);
         if !settings.enabled {
@@ -187,7 +187,7 @@ impl EdgeGovernor {
             state.velocity_m_s = speed;
             return *wanted;
         }
-        // The fastest speed from which the reference still stops within a distance.
+        // The highest speed from which the reference still stops within a distance.
         let stopping_speed = |distance: f32| {
             (2.0 * settings.braking_m_s2 * distance)
                 .square_root()
@@ -201,7 +201,7 @@ impl EdgeGovernor {
             -stopping_speed((state.position_m - lower).at_least(0.0)),
             stopping_speed((upper - state.position_m).at_least(0.0)),
         );
-        // Beyond an edge that has moved in, the limit above forbids nothing but going further.
+        // Beyond an edge that has moved inwards, the limit above only forbids going further out.
         let step = 2.0 * settings.braking_m_s2 * tick_s;
         let change = (velocity - state.velocity_m_s).within(step);
         let velocity = state.velocity_m_s + change;
@@ -274,7 +274,8 @@ mod tests {
         assert!((upper - 0.164_71).abs() < 2e-5, "{upper}");
     }
 
-    /// Goes through the reference `wanted` until it stands; returns where and the largest position.
+    /// Follows the reference `wanted` until it stands still; returns the final and the largest
+    /// position.
     fn follow(
         state: &mut GovernorState,
         wanted: impl Fn(f32) -> TipReference,

@@ -1,32 +1,33 @@
-//! The search for an end of the admissible stretch, one point of the belt at a time.
+//! Searches for one end of the admissible stretch, one point of the belt at a time.
 
 use painleve_shared::{Arm, Posture, Real, Slip};
 
-/// Points that reach from one end over the other, to either side of the tip.
+/// Largest number of inadmissible points that the search tries: enough to cover the whole reach on
+/// either side of the tip.
 const MOST_REFUSED: u32 = 128;
 /// Halvings of the last step: 6 mm / 2⁹ is 11 µm.
 const HALVINGS: u32 = 9;
 
-/// Friction with its margin, and where on the belt it is asked about.
+/// Friction with its margin, for evaluating points of the belt.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Admissibility<'a> {
     pub(super) arm: &'a Arm<f32>,
     pub(super) posture: Posture,
     /// μ̂ plus margin.
     pub(super) friction: f32,
-    /// Direction of slip; `None` while it has not been seen.
+    /// Direction of slip; `None` until a slip has been observed.
     pub(super) slip: Option<Slip>,
     pub(super) minimum_p_ratio: f32,
 }
 
 impl Admissibility<'_> {
-    /// Whether sliding has a solution there with p to spare.
+    /// Returns whether sliding has a solution at this point with p above the margin.
     pub(super) fn at(&self, tip_t_m: f32) -> bool {
         let row = self.arm.inverse_inertia_row_on_belt(tip_t_m, self.posture);
         row.is_some_and(|(tangential, normal)| {
             let against = match self.slip {
                 Some(slip) => slip.sign::<f32>() * tangential,
-                // It must do for either.
+                // Both directions must be admissible.
                 None => tangential.abs(),
             };
             normal - self.friction * against >= self.minimum_p_ratio * normal
@@ -34,26 +35,26 @@ impl Admissibility<'_> {
     }
 }
 
-/// What the search is about.
+/// Phase of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
-    /// From the tip to either side for a point that is admissible.
+    /// Searches from the tip to either side for an admissible point.
     Entering {
-        /// Points that are not.
+        /// Number of points found inadmissible.
         refused: u32,
     },
-    /// Outwards for one that is not.
+    /// Searches outwards for an inadmissible point.
     Marching,
-    /// Between the two.
+    /// Bisects between an admissible and an inadmissible point.
     Halving { beyond_m: f32, times: u32 },
-    /// Done: the edge is at the inside.
+    /// Done: the edge is the inner point.
     Found,
 }
 
-/// The search for one end of the admissible stretch, and how far it is.
+/// The search for one end of the admissible stretch, with its progress.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search {
-    /// +1 towards the upper edge, −1 towards the lower one.
+    /// +1 for the upper edge, −1 for the lower one.
     pub(super) direction: f32,
     /// Last point on the tip's side of the edge, m.
     pub(super) inside_m: f32,
@@ -61,7 +62,8 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// For the upper edge (`direction` +1) or the lower one (−1), from a tip at `tip_t_m`.
+    /// Starts a search for the upper edge (`direction` +1) or the lower one (−1), from a tip at
+    /// `tip_t_m`.
     pub(super) fn start(direction: f32, tip_t_m: f32) -> Self {
         Self {
             direction,
@@ -70,16 +72,16 @@ impl Search {
         }
     }
 
-    /// Whether the edge has been found: at the inside.
+    /// Returns whether the edge, the inner point, has been found.
     pub(super) fn is_over(&self) -> bool {
         self.stage == Stage::Found
     }
 
-    /// The point to look at, m.
+    /// Returns the next point to evaluate, m.
     pub(super) fn point(&self, step_m: f32, reach_m: f32) -> f32 {
         let point = match self.stage {
             Stage::Found => self.inside_m,
-            // By turns on the side of the middle of the belt and on the other.
+            // Alternate between the side towards the middle of the belt and the other side.
             Stage::Entering { refused } => {
                 let away_m = step_m * refused.div_ceil(2) as f32;
                 let inwards = refused % 2 == 1;
@@ -92,11 +94,11 @@ impl Search {
         point.within(reach_m)
     }
 
-    /// The search after the point has been looked at.
+    /// Returns the search after the point has been evaluated.
     pub(super) fn next(self, point_m: f32, admissible: bool, reach_m: f32) -> Self {
         let (inside_m, stage) = match (self.stage, admissible) {
             (Stage::Entering { .. }, true) => (point_m, Stage::Marching),
-            // Nothing is admissible: the middle of the belt is as good as any place.
+            // No point is admissible: fall back to the middle of the belt.
             (Stage::Entering { refused }, false) if refused >= MOST_REFUSED => (0.0, Stage::Found),
             (Stage::Entering { refused }, false) => {
                 let refused = refused + 1;

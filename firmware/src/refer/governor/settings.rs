@@ -6,23 +6,23 @@ settings! {
     /// Settings of the edge governor.
     #[derive(Copy)]
     pub struct GovernorSettings {
-        /// Whether the reference is governed; if not, it must be within reach.
+        /// Whether the governor is active; if not, the reference must be within reach.
         enabled: bool = true;
         /// Least p/Q22.
         minimum_p_ratio: f32 = 0.01, 0.0..=0.9;
-        /// Added to the least p/Q22, times the square of the time between ticks: a disturbance
-        /// moves the tip by as much before the controller reacts.
+        /// Added to the least p/Q22, times the square of the control period: the distance by which a
+        /// disturbance moves the tip before the controller reacts grows with that square.
         p_ratio_per_s2: f32 = 1e4, 0.0..=1e6, "1/s²";
-        /// Standard deviations of the friction estimate that are added to it.
+        /// Number of standard deviations added to the friction estimate.
         friction_deviations: f32 = 1.5, 0.0..=10.0;
-        /// Distance kept from where p/Q22 has its least value.
+        /// Distance kept from the point where p/Q22 has its least value.
         distance_m: f32 = 0.5e-3, 0.0..=0.1, "m";
-        /// Encoder counts, as seen at the tip, that are added to that distance: their rounding moves
-        /// the tip by as much.
+        /// Number of encoder counts, as seen at the tip, added to that distance: rounding moves the
+        /// tip by as much.
         distance_counts: f32 = 3.0, 0.0..=1e3, "counts";
         /// Deceleration at which the reference stops before an edge.
         braking_m_s2: f32 = 1.0, 1e-3..=1e3, "m/s²";
-        /// Fastest approach to a reference that is away from the tip.
+        /// Largest speed of the approach to a reference that is away from the tip.
         catch_up_m_s: f32 = 0.3, 1e-3..=10.0, "m/s";
     }
 }
