@@ -46,6 +46,33 @@ fn the_elbow_up_run_slides_to_its_limit_too() {
 }
 
 #[test]
+fn a_run_fails_for_what_it_is_asked_to_and_for_nothing_else() {
+    let bench = Bench::new("fail-on");
+    let run = |name: &str, events: &str| {
+        let arguments = [
+            "run",
+            name,
+            "--json",
+            QUIET[0],
+            QUIET[1],
+            "--fail-on",
+            events,
+        ];
+        bench.run(&arguments)
+    };
+    let kept = run("hybrid-elbow-down", "fault,lift-off,missed-deadline");
+    assert_eq!(kept.status.code(), Some(0), "{kept:?}");
+    let lost = run("pid-elbow-up", "lift-off");
+    assert_eq!(lost.status.code(), Some(6), "{lost:?}");
+    assert!(
+        String::from_utf8_lossy(&lost.stderr).contains("lift-offs: 3"),
+        "{lost:?}"
+    );
+    let report: Value = serde_json::from_slice(&lost.stdout).unwrap();
+    assert_eq!(report["lift_offs"], 3);
+}
+
+#[test]
 fn the_pid_keeps_contact_elbow_down_and_loses_it_elbow_up() {
     let bench = Bench::new("pid");
     let down = bench.report(&["run", "pid-elbow-down", "--json", QUIET[0], QUIET[1]]);

@@ -2,6 +2,7 @@
 
 mod bridge;
 mod controller;
+mod fail_on;
 mod figures;
 mod output;
 mod plant;
@@ -76,6 +77,9 @@ const INTERRUPTED: u8 = 130;
 /// Exit code of a run by the clock whose controller was too late too often.
 const DEADLINES_MISSED: u8 = 5;
 
+/// Exit code of a run in which something happened that it was asked to fail for.
+const FAILED_ON: u8 = 6;
+
 /// Why a command failed. Every message is one sentence for the user.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
@@ -115,6 +119,9 @@ pub enum CommandError {
         /// Its exit code.
         code: u8,
     },
+    /// Something happened that the run was asked to fail for.
+    #[error("--fail-on: {0}")]
+    FailedOn(String),
     /// By the clock, ticks were late or lost too often in a row.
     #[error("the controller missed its deadlines and took the torque off: {}", .0.description())]
     DeadlinesMissed(Fault),
@@ -152,6 +159,7 @@ impl CommandError {
             Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => 4,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => INTERRUPTED,
             Self::DeadlinesMissed(_) => DEADLINES_MISSED,
+            Self::FailedOn(_) => FAILED_ON,
             Self::Told { code } => *code,
             Self::Unread => 0,
         }

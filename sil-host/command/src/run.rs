@@ -18,6 +18,7 @@ use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
 use painleve_system::terminal::warn;
 
 use super::bridge::{ImageArguments, SensorLineArguments};
+use super::fail_on::{self, FailOn};
 use super::output::OutputArguments;
 use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
 
@@ -145,6 +146,9 @@ pub struct RunArguments {
     lines: SensorLineArguments,
     #[command(flatten)]
     output: OutputArguments,
+    /// End with code 6 if one of these happened; the report is complete all the same.
+    #[arg(long, value_enum, value_name = "EVENTS", value_delimiter = ',')]
+    fail_on: Vec<FailOn>,
     /// Print one JSON object on stdout instead of the table.
     #[arg(long)]
     json: bool,
@@ -242,7 +246,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     if deadlines_missed {
         return Err(failure(status));
     }
-    Ok(())
+    fail_on::check(&arguments.fail_on, &report)
 }
 
 /// Waits for the plant's end, and sees to it that one comes.
