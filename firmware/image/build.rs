@@ -1,4 +1,4 @@
-//! Sets the log level of the images: defmt logs errors only unless told otherwise.
+//! Sets the log level of the images: by default defmt logs errors only.
 
 fn main() {
     println!("cargo:rerun-if-env-changed=DEFMT_LOG");

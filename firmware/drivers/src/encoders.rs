@@ -1,7 +1,7 @@
 //! Two ams AS5048A magnetic encoders of 14 bits on one SPI bus in mode 1 (data sheet DS000298).
 //!
-//! A frame has 16 bits; the answer to a command comes with the next frame. Every word carries even parity,
-//! and every answer a flag that stays set after an error until the error register is read.
+//! A frame has 16 bits; the answer to a command arrives with the next frame. Every word has even parity.
+//! Every answer has a flag that stays set after an error until the error register is read.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
@@ -13,17 +13,17 @@ use crate::{Disturbance, rescale};
 /// Resolution, bits.
 pub const BITS: u8 = 14;
 
-/// Fastest clock, Hz.
+/// Highest clock frequency, Hz.
 pub const FASTEST_HZ: u32 = 10_000_000;
 
 /// From select to the first edge, from the last edge to deselect, and between two frames, ns (t_L, t_H,
 /// t_CSn).
 const SETTLING_NS: u32 = 350;
 
-/// Two readings some microseconds apart differ by no more, counts: 4 counts in 5 µs are 300 rad/s.
+/// Largest difference of two readings some microseconds apart, counts: 4 counts in 5 µs are 300 rad/s.
 const AGREEMENT: u16 = 4;
 
-/// Ticks from one look at an encoder's magnet to the next.
+/// Ticks between two checks of an encoder's magnet.
 const DIAGNOSTICS_INTERVAL: u8 = 64;
 
 /// Reads the angle: parity, read bit, address 0x3fff.
@@ -38,18 +38,18 @@ const CLEAR_ERROR: u16 = 0x4001;
 const ERROR_FLAG: u16 = 1 << 14;
 const DATA: u16 = 0x3fff;
 
-/// What an encoder says about its magnet.
+/// Diagnostics of an encoder's magnet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Diagnostics(u16);
 
 impl Diagnostics {
-    /// The field is too weak (bit 11), too strong (10), or the angle cannot be computed (9), or the
-    /// encoder has not finished its start (8 clear).
+    /// The field is too weak (bit 11) or too strong (10), the angle cannot be computed (9), or the encoder
+    /// has not finished its start-up (8 clear).
     pub fn is_healthy(self) -> bool {
         self.0 & 0x0f00 == 0x0100
     }
 
-    /// Gain of the automatic control: 0 for the strongest field, 255 for the weakest.
+    /// Automatic gain: 0 for the strongest field, 255 for the weakest.
     pub fn gain(self) -> u8 {
         self.0 as u8
     }
@@ -65,8 +65,8 @@ pub struct Encoders<B, S, D> {
 }
 
 impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
-    /// Encoders of θ1 and of the elbow; `selects` are low for selected and high by now. The bus is in
-    /// mode 1 and no faster than [`FASTEST_HZ`].
+    /// Takes the encoders of θ1 and of the elbow. `selects` are active low and must already be high. The
+    /// bus is in mode 1 and no faster than [`FASTEST_HZ`].
     pub fn new(bus: B, selects: [S; 2], delay: D) -> Self {
         Self {
             bus,
@@ -77,8 +77,8 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
         }
     }
 
-    /// Reads both angles as counts of `bits` bits. Takes 6 frames, 7 when it also looks at a magnet, and
-    /// 4 more for every encoder that was disturbed.
+    /// Reads both angles as counts of `bits` bits. Takes 6 frames, 7 when it also checks a magnet, and 4
+    /// more for every encoder that was disturbed.
     pub fn read(&mut self, bits: u8) -> [Result<EncoderCounts, Disturbance>; 2] {
         self.tick = (self.tick + 1) % DIAGNOSTICS_INTERVAL;
         [0, 1].map(|encoder| {
@@ -88,14 +88,14 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
         })
     }
 
-    /// What the encoders last said about their magnets; `None` until then.
+    /// Returns the last diagnostics of the magnets; `None` before the first check.
     pub fn diagnostics(&self) -> [Option<Diagnostics>; 2] {
         self.diagnostics
     }
 
     fn angle(&mut self, encoder: usize, looks: bool) -> Result<u16, Disturbance> {
         self.read_twice(encoder, looks).or_else(|_| {
-            // The error register comes with the frame after; reading it clears it.
+            // The error register arrives with the next frame; reading it clears it.
             self.frame(encoder, CLEAR_ERROR)?;
             self.read_twice(encoder, false)
         })
@@ -118,7 +118,7 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
         }
     }
 
-    /// One frame; what comes back belongs to the command before.
+    /// Transfers one frame; the answer belongs to the previous command.
     fn frame(&mut self, encoder: usize, command: u16) -> Result<u16, Disturbance> {
         let select = &mut self.selects[encoder];
         let mut bytes = command.to_be_bytes();
@@ -134,7 +134,7 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
     }
 }
 
-/// The data of an answer without errors.
+/// Returns the data of an answer without errors.
 fn checked(answer: u16) -> Result<u16, Disturbance> {
     if !answer.count_ones().is_multiple_of(2) {
         Err(Disturbance::Parity)
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_with_one_flipped_bit_is_never_taken() {
+    fn an_answer_with_one_flipped_bit_is_rejected() {
         for bit in 0..16 {
             // 0x1234 has five ones; its parity bit is set.
             assert!(checked(0x9234 ^ 1 << bit).is_err());

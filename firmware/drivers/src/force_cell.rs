@@ -1,9 +1,9 @@
-//! A Microchip MCP3304 (13 bits, signed) behind the bridge amplifiers of a two-axis force cell, SPI mode 0
-//! (data sheet DS21697).
+//! A Microchip MCP3304 converter (13 bits, signed) behind the bridge amplifiers of a two-axis force cell,
+//! SPI mode 0 (data sheet DS21697).
 //!
-//! Each axis is a differential pair: its amplifier's output against the amplifier's reference, so that a
-//! force of either sign is read. Single-ended the converter has no sign. It needs 4.5 to 5.5 V: its
-//! inputs take a level shifter (74AHCT125), its output goes to a pin that stands 5 V.
+//! Each axis is a differential pair, the amplifier's output against its reference, so that forces of either
+//! sign are read; single-ended, the converter has no sign. The converter runs on 4.5 to 5.5 V: its inputs
+//! need a level shifter (74AHCT125), and its output needs a pin that tolerates 5 V.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
@@ -15,16 +15,16 @@ use crate::{Disturbance, rescale};
 /// Resolution, bits.
 pub const BITS: u8 = 13;
 
-/// Fastest clock at 5 V, Hz.
+/// Highest clock frequency at 5 V, Hz.
 pub const FASTEST_HZ: u32 = 2_100_000;
 
 /// Select high between two conversions, ns (t_CSH).
 const PAUSE_NS: u32 = 475;
 
-/// From select to the first edge, ns (t_SUCS).
+/// From select to the first clock edge, ns (t_SUCS).
 const SETUP_NS: u32 = 100;
 
-/// Two conversions of one force differ by no more, counts: the converter's noise.
+/// Largest difference of two conversions of one force, counts: the converter's noise.
 const AGREEMENT: i32 = 2;
 
 /// Start bit, differential.
@@ -33,14 +33,14 @@ const CONVERT: u8 = 0b0000_1000;
 /// The bit before the sign is always 0.
 const NULL_BIT: u8 = 0b0010_0000;
 
-/// The converter's select pin: it keeps the pauses that the data sheet asks for.
+/// The converter's select pin, with the pauses that the data sheet requires.
 pub struct Select<S, D> {
     pin: S,
     delay: D,
 }
 
 impl<S: OutputPin, D: DelayNs> Select<S, D> {
-    /// A pin that is high by now.
+    /// Takes a pin that is already high.
     pub fn new(pin: S, delay: D) -> Self {
         Self { pin, delay }
     }
@@ -70,13 +70,14 @@ pub struct ForceCell<D> {
 }
 
 impl<D: SpiDevice> ForceCell<D> {
-    /// The force cell on this device, in mode 0, no faster than [`FASTEST_HZ`], selected through [`Select`].
+    /// Makes a force cell on this device, in mode 0, no faster than [`FASTEST_HZ`], selected through
+    /// [`Select`].
     pub fn new(device: D) -> Self {
         Self { device }
     }
 
     /// Reads (f_t, f_n) as counts of `bits` bits: f_n on channels 0 (+) and 1 (−), f_t on 2 (+) and 3 (−).
-    /// Takes two conversions of each force; a third, if these two are not the same.
+    /// Each force takes two conversions, and a third if these two disagree.
     pub fn read(
         &mut self,
         bits: u8,
@@ -91,7 +92,7 @@ impl<D: SpiDevice> ForceCell<D> {
         (tangential, normal)
     }
 
-    /// Two conversions that are the same, or the median of three, if two of these agree.
+    /// Returns two conversions that agree, or the median of three if two of these agree.
     fn two_of_three(&mut self, pair: u8) -> Result<i32, Disturbance> {
         let first = self.convert(pair);
         let second = self.convert(pair);
@@ -110,7 +111,7 @@ impl<D: SpiDevice> ForceCell<D> {
     }
 
     fn convert(&mut self, pair: u8) -> Result<i32, Disturbance> {
-        // The upper two bits of three follow the start bit, the third begins the second byte.
+        // The upper two channel bits follow the start bit; the third begins the second byte.
         let mut bytes = [CONVERT | pair, 0, 0];
         let done = self.device.transfer_in_place(&mut bytes);
         done.map_err(|_| Disturbance::Bus)?;

@@ -3,11 +3,11 @@
 //! - [`encoders`]: two AS5048A magnetic encoders on one SPI bus
 //! - [`force_cell`]: an MCP3304 converter behind the force cell's bridge amplifiers
 //! - [`switches`]: ENABLE and RESET, debounced
-//! - [`plausibility`]: whether readings can be those of an arm, before the drive is armed
+//! - [`plausibility`]: checks that readings can come from an arm before the drive is armed
 //!
-//! No reading is passed on that a single disturbed bit could have changed: a value is read twice, and again
-//! in the same tick if the two differ. If that does not settle it, the reading is lost for this tick, and
-//! the controller goes on as with any other lost reading. Every call ends in bounded time.
+//! A reading that a single disturbed bit could have changed is not passed on: each value is read twice, and
+//! again in the same tick if the two differ. If they still differ, the reading is lost for this tick, and
+//! the controller treats it like any other lost reading. Every call ends in bounded time.
 
 #![no_std]
 
@@ -16,14 +16,14 @@ pub mod force_cell;
 pub mod plausibility;
 pub mod switches;
 
-/// Why a sensor gave no reading in this tick.
+/// Reason for a missing reading in this tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Disturbance {
     /// The SPI bus or a select pin failed.
     Bus,
     /// A word with the wrong parity.
     Parity,
-    /// The sensor says that it was disturbed.
+    /// The sensor reports a disturbance.
     Flagged,
     /// A bit that is always 0 was 1.
     NotZero,
@@ -31,7 +31,7 @@ pub enum Disturbance {
     Disagreement,
 }
 
-/// Moves a reading of `from` bits to a scale of `to` bits.
+/// Scales a reading of `from` bits to `to` bits.
 fn rescale(counts: i32, from: u8, to: u8) -> i32 {
     if to < from {
         counts >> (from - to)

@@ -1,56 +1,56 @@
-//! Whether readings can be those of an arm, looked at while the drive is not armed.
+//! Checks whether readings can come from an arm while the drive is not armed.
 //!
-//! A sensor whose lines are cut reads all zeros or all ones; one that hangs repeats itself to the count; two
-//! selects that are shorted give both encoders the same angle. A drive that is armed on such readings
-//! moves an arm that it does not see.
+//! A sensor with cut lines reads all zeros or all ones, and a sensor that hangs repeats the same count. If
+//! two selects are shorted, both encoders give the same angle. A drive armed on such readings would move an
+//! arm that it cannot observe.
 
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 
-/// Ticks of readings that are looked at before anything is said.
+/// Number of ticks checked before readings count as plausible.
 pub const TICKS: u16 = 50;
 
-/// Why the drive must not be armed.
+/// Reason why the drive must not be armed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Implausible {
     /// Not enough readings yet, or the last one was lost.
     NotYet,
-    /// An encoder reads all zeros or all ones, to the count.
+    /// An encoder reads exactly all zeros or all ones.
     DeadLine,
-    /// Both encoders read the same, to the count.
+    /// Both encoders read exactly the same.
     SameAngle,
-    /// An encoder says that its magnet is missing, too near, or not yet measured.
+    /// An encoder reports that its magnet is missing or too near, or has not been checked yet.
     Magnet,
     /// The force cell is at its limit.
     ForceLimit,
 }
 
-/// Readings of one tick; `None` for one that was lost.
+/// Readings of one tick; `None` for a lost reading.
 #[derive(Clone, Copy, Debug)]
 pub struct Readings {
     /// Both encoders, counts of `encoder_bits`.
     pub joints: [Option<EncoderCounts>; 2],
     /// Both forces, counts of `force_bits`.
     pub forces: [Option<ForceCounts>; 2],
-    /// Whether both magnets are healthy; `None` while not measured.
+    /// Whether both magnets are healthy; `None` before they are checked.
     pub magnets: [Option<bool>; 2],
 }
 
-/// Looks at readings tick by tick.
+/// Checks readings at each tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Plausibility {
-    /// Ticks in a row with every reading there.
+    /// Ticks in a row with complete readings.
     complete: u16,
-    /// Ticks in a row with both encoders at one angle.
+    /// Ticks in a row with both encoders at the same angle.
     same: u16,
     /// Ticks in a row with an encoder at all zeros or all ones.
     dead: [u16; 2],
 }
 
 impl Plausibility {
-    /// Takes the readings of one tick; why the drive must not be armed on them.
+    /// Checks the readings of one tick.
     ///
     /// # Errors
-    /// [`Implausible`].
+    /// [`Implausible`] gives the reason why the drive must not be armed on them.
     pub fn tick(
         &mut self,
         readings: &Readings,

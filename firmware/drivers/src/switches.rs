@@ -1,22 +1,22 @@
-//! The switch of the safety chain and the reset button, debounced.
+//! Debounces the switch of the safety chain and the reset button.
 
 use painleve_shared::frame::DigitalInputs;
 
 /// Ticks for which a contact must be open, and then closed, before it counts as closed.
 pub const DEBOUNCE_TICKS: u8 = 5;
 
-/// One contact, as far as it is believed.
+/// Debounced state of one contact.
 #[derive(Clone, Copy, Debug)]
 enum Contact {
-    /// To be seen open first, so many ticks so far.
+    /// Must be open first; open for this many ticks.
     Opening(u8),
-    /// Open; closed for so many ticks.
+    /// Open; closed for this many ticks.
     Open(u8),
     Closed,
 }
 
 impl Contact {
-    /// Whether it counts as closed.
+    /// Returns whether the contact counts as closed.
     fn tick(&mut self, level: bool) -> bool {
         *self = match (*self, level) {
             (Self::Opening(ticks), false) if ticks + 1 >= DEBOUNCE_TICKS => Self::Open(0),
@@ -46,11 +46,11 @@ pub struct Switches {
 }
 
 impl Switches {
-    /// Takes the pins' levels of one tick.
+    /// Updates the state with the pins' levels of one tick.
     ///
-    /// ENABLE goes low with its pin, in the same tick. It goes high again after its pin was low for
-    /// [`DEBOUNCE_TICKS`] without a pause and then high as long. A switch that is already closed when the
-    /// board starts arms nothing, nor does a contact that bounces or a line that was disturbed.
+    /// ENABLE goes low with its pin, in the same tick. It goes high again after its pin has been low for
+    /// [`DEBOUNCE_TICKS`] without interruption and then high for as long. A switch that is already closed
+    /// when the board starts, a contact that bounces and a disturbed line therefore never arm the drive.
     pub fn tick(&mut self, enable: bool, reset: bool) -> DigitalInputs {
         let mut inputs = DigitalInputs::default();
         if self.enable.tick(enable) {
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_switch_closes_once_it_was_seen_open() {
+    fn a_switch_closes_only_after_it_was_open() {
         let mut switches = Switches::default();
         assert!(!enabled(&mut switches, "11111111111111"));
         assert!(!enabled(&mut switches, "000001111"));

@@ -1,4 +1,4 @@
-//! What the tasks need of a board. Nothing else differs between boards.
+//! The interface between the tasks and a board. Boards differ in nothing else.
 
 use painleve_firmware::Configuration;
 use painleve_firmware::drive::Drive;
@@ -6,7 +6,7 @@ use painleve_firmware::law::Law;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::FrameSource;
 
-/// Why a board does not start.
+/// Reason for a failed start of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub enum StartFault {
     /// The crystal oscillator or the phase-locked loop did not settle in time.
@@ -15,13 +15,13 @@ pub enum StartFault {
     Link,
 }
 
-/// A board, taken apart into what each task owns.
+/// A board, split into the parts that each task owns.
 pub struct Parts<B: Board> {
-    /// For the control task.
+    /// Part of the control task.
     pub drive: B::Drive,
-    /// For the serial port's interrupt.
+    /// Part of the serial port's interrupt.
     pub bytes: B::Bytes,
-    /// For the link task.
+    /// Part of the link task.
     pub port: B::Port,
 }
 
@@ -29,14 +29,14 @@ pub struct Parts<B: Board> {
 pub trait Board {
     /// The chip's peripherals.
     type Device;
-    /// What the control task uses.
+    /// Type that the control task owns.
     type Drive: BoardDrive;
-    /// What the serial port's interrupt uses.
+    /// Type that the serial port's interrupt owns.
     type Bytes: Bytes;
-    /// What the link task uses.
+    /// Type that the link task owns.
     type Port: Port;
 
-    /// Name, for the banner.
+    /// Name, for the log.
     const NAME: &'static str;
 
     /// Starts clocks, pins and peripherals in bounded time.
@@ -44,44 +44,44 @@ pub trait Board {
     where
         Self: Sized;
 
-    /// Takes the torque off, whatever state the program is in.
+    /// Takes the torque off in any state of the program.
     fn take_torque_off();
 
-    /// Takes the torque off and stays there.
+    /// Takes the torque off and never returns.
     fn halt() -> !;
 
-    /// Called again and again while nothing else is to be done.
+    /// Idles; called repeatedly while there is nothing else to do.
     fn idle();
 }
 
-/// The side of the control task: a [`Drive`] whose timer can be started, and which may be given
-/// frames from the host instead of its own sensors'.
+/// The control task's part of a board: a [`Drive`] with a timer that can be started, and with an
+/// input for frames from the host instead of the board's own sensors.
 pub trait BoardDrive: Drive {
-    /// Starts the control timer's interrupt at the configuration's rate, with frames from
-    /// `source`; a frame that was offered before is forgotten.
+    /// Starts the control timer's interrupt at the configuration's rate, with frames from `source`.
+    /// Discards a frame offered before.
     fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource);
 
-    /// Takes the newest frame from the link, for a plant that is simulated on the other side of it.
+    /// Takes the newest frame from the link, for a plant that the host simulates.
     fn offer(&mut self, frame: SensorFrame);
 
-    /// How fast [`Drive::stopwatch`] counts, Hz.
+    /// Returns the frequency of [`Drive::stopwatch`], Hz.
     fn stopwatch_hz(&self) -> u32;
 }
 
-/// The side of the serial port's interrupt.
+/// The serial interrupt's part of a board.
 pub trait Bytes {
     /// Moves bytes between the port and its buffers.
     fn serve(&mut self);
 }
 
-/// The side of the link task: bytes to and from the host.
+/// The link task's part of a board: bytes to and from the host.
 pub trait Port {
-    /// Whether more bytes have to wait until the host has read its answer.
+    /// Returns whether further bytes have to wait until the host has read its answer.
     const HALF_DUPLEX: bool;
 
-    /// Moves received bytes into `buffer`; returns how many, 0 when there are none.
+    /// Moves received bytes into `buffer`; returns their number, 0 if there are none.
     fn receive(&mut self, buffer: &mut [u8]) -> usize;
 
-    /// Sends bytes, all of them or, if the host does not take them, none.
+    /// Sends all bytes or, if the host does not accept them, none.
     fn send(&mut self, bytes: &[u8]) -> bool;
 }

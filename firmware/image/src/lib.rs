@@ -1,5 +1,5 @@
-//! What the images of all boards share. It names no chip: a board crate brings its own peripherals,
-//! and [`tasks!`] puts the two together with a set of laws:
+//! Code shared by the images of all boards. It names no chip: a board crate provides its own
+//! peripherals, and [`tasks!`] combines them with this code and a set of laws:
 //!
 //! ```text
 //! #[cfg(target_os = "none")]

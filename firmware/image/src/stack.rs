@@ -1,13 +1,13 @@
-//! Most stack ever used: the free part is painted at the start and looked at later.
+//! Measures the largest stack use: the free part is painted at the start and inspected later.
 
 #![allow(unsafe_code)] // reads and writes the stack below the program's own
 
 use core::ptr::addr_of_mut;
 
-/// What untouched stack holds.
+/// Pattern of untouched stack.
 const PAINT: u32 = 0xdead_57ac;
 
-/// Room left unpainted below the stack pointer of whoever paints, bytes.
+/// Bytes left unpainted below the caller's stack pointer.
 const MARGIN_BYTES: usize = 128;
 
 unsafe extern "C" {
@@ -17,13 +17,13 @@ unsafe extern "C" {
     static mut _stack_start: u32;
 }
 
-/// Paints all of the stack that is not in use. Call it first.
+/// Paints the unused part of the stack. Must be called first.
 pub fn paint() {
     let mut word = addr_of_mut!(__sheap);
     let top = (cortex_m::register::msp::read() as usize - MARGIN_BYTES) as *mut u32;
     while word < top {
-        // SAFETY: between static memory and the margin below the stack pointer
-        // lies memory that nothing uses; both ends are aligned to words.
+        // SAFETY: nothing uses the memory between static memory and the margin below the stack
+        // pointer; both ends are aligned to words.
         unsafe {
             word.write_volatile(PAINT);
             word = word.add(1);
@@ -31,12 +31,12 @@ pub fn paint() {
     }
 }
 
-/// Most stack used since [`paint`], bytes.
+/// Returns the largest stack use since [`paint`], bytes.
 pub fn high_water_bytes() -> u32 {
     let mut word = addr_of_mut!(__sheap);
     let top = addr_of_mut!(_stack_start);
-    // SAFETY: reads words of RAM from the end of static memory up to the start of the
-    // stack; a value that changes meanwhile does no harm.
+    // SAFETY: reads words of RAM from the end of static memory to the start of the stack; a value
+    // that changes during the read does no harm.
     while word < top && unsafe { word.read_volatile() } == PAINT {
         word = word.wrapping_add(1);
     }

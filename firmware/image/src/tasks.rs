@@ -1,12 +1,12 @@
-//! The image's tasks, from the highest priority down:
+//! The image's tasks, in order of priority, highest first:
 //!
 //! - `control`, the timer's interrupt at the control rate: sample → tick → actuate
 //! - `serial`, the serial port's interrupt: bytes from and to the host
 //! - `link`: requests from the host, responses to it
 //! - `idle`: the log
 //!
-//! `control` never waits: for `link` it leaves its answers in a bounded queue,
-//! for `idle` its events, and drops what does not fit.
+//! `control` never waits. It puts its answers for `link` and its events for `idle` in bounded
+//! queues and discards those that do not fit.
 
 use core::panic::PanicInfo;
 
@@ -27,10 +27,10 @@ use crate::stack;
 pub use crate::watch::Change;
 use crate::watch::health;
 
-/// Answers that may wait for the link.
+/// Number of answers that may wait for the link.
 pub const ANSWERS: usize = 4;
 
-/// Changes that may wait for the log.
+/// Number of events that may wait for the log.
 pub const EVENTS: usize = 8;
 
 /// How long a host that watches an arm may be silent, ms. It sends [`Request::Alive`] more often.
@@ -39,13 +39,13 @@ pub const SENSORS_SILENCE_MS: u32 = 200;
 /// How long a host whose frames are awaited may be silent, ms. No torque depends on it.
 pub const FRAMES_SILENCE_MS: u32 = 5000;
 
-/// What the tasks share.
+/// State that the tasks share.
 pub struct Control<D, L: Law> {
     /// The control task.
     pub task: ControlTask<D, L>,
-    /// Answers for which the link had no room.
+    /// Answers discarded because the queue to the link was full.
     pub dropped_responses: u32,
-    /// Ticks a second; 0 until there is a configuration.
+    /// Control rate, Hz; 0 until there is a configuration.
     pub tick_hz: u32,
     /// Ticks since the host's last message.
     pub silent_ticks: u32,
@@ -77,7 +77,7 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
     }
 }
 
-/// What the link task keeps from one call to the next.
+/// State of the link task between calls.
 pub struct Link<L: Law> {
     inbox: Inbox,
     decoded: Option<Configuration<L>>,
@@ -85,7 +85,7 @@ pub struct Link<L: Law> {
 }
 
 impl<L: Law> Link<L> {
-    /// Nothing has been received.
+    /// Starts with an empty inbox.
     pub const fn new() -> Self {
         Self {
             inbox: Inbox::new(),
@@ -101,7 +101,7 @@ impl<L: Law> Default for Link<L> {
     }
 }
 
-/// Starts the board, or stops where it is.
+/// Starts the board; if that fails, logs the fault and stops.
 pub fn start<B: Board>(device: B::Device, core: cortex_m::Peripherals) -> Parts<B> {
     stack::paint();
     match B::start(device, core) {
@@ -113,7 +113,7 @@ pub fn start<B: Board>(device: B::Device, core: cortex_m::Peripherals) -> Parts<
     }
 }
 
-/// One control tick. Returns whether there is something for the link.
+/// Runs one control tick. Returns whether there is an answer for the link.
 pub fn control<D: BoardDrive, L: Law>(
     control: &mut Control<D, L>,
     answers: &mut Producer<'static, Response>,
@@ -129,14 +129,14 @@ pub fn control<D: BoardDrive, L: Law>(
         control.dropped_responses = control.dropped_responses.wrapping_add(1);
     }
     let change = Change::of(&frame);
-    // What the queue has no room for is not said.
+    // An event for which the queue has no room is not logged.
     if change != *reported && events.enqueue(change).is_ok() {
         *reported = change;
     }
     true
 }
 
-/// Sends answers, then serves requests until there are no more bytes.
+/// Sends the waiting answers, then serves requests until no bytes are left.
 pub fn link<D, L, P>(
     mut control: impl Mutex<T = Control<D, L>>,
     port: &mut P,
@@ -207,7 +207,8 @@ pub fn link<D, L, P>(
                 }
                 Ok(Request::Health) => {
                     let mut health = control.lock(|control| health(control));
-                    // Looking at the stack takes too long to hold up the control task.
+                    // Outside the lock: inspecting the stack takes too long to delay the control
+                    // task.
                     health.stack_bytes = stack::high_water_bytes();
                     Response::Health(health)
                 }
@@ -221,15 +222,15 @@ pub fn link<D, L, P>(
             send(port, &response);
         }
         if awaits_control && P::HALF_DUPLEX {
-            // `control` calls again when it has an answer.
+            // `control` invokes this task again when it has an answer.
             return;
         }
     }
 }
 
 /// Decodes a configuration; stores `None` if decoding fails.
-// Out of line: decoding takes more stack than anything else but making the controller, and the
-// two do not add up.
+// Out of line: decoding and building the controller need the most stack, and their stack use must
+// not add up.
 #[inline(never)]
 fn decode<L: Law + DeserializeOwned>(configuration: &mut Option<Configuration<L>>, bytes: &[u8]) {
     *configuration = None;
@@ -238,7 +239,7 @@ fn decode<L: Law + DeserializeOwned>(configuration: &mut Option<Configuration<L>
     }
 }
 
-/// Counts broken messages; a good one starts the count over.
+/// Counts broken messages; an intact one resets the count.
 fn note_message<D: BoardDrive, L: Law, M>(
     task: &mut ControlTask<D, L>,
     request: &Result<M, WireError>,
@@ -250,7 +251,7 @@ fn note_message<D: BoardDrive, L: Law, M>(
     task.note(Lapse::Garbage, u32::from(garbage));
 }
 
-/// A response that the host does not take is lost; the host asks again or gives up.
+/// A response that the host does not accept is lost; the host asks again or gives up.
 #[inline(never)]
 fn send(port: &mut impl Port, response: &Response) {
     let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
@@ -259,7 +260,7 @@ fn send(port: &mut impl Port, response: &Response) {
     }
 }
 
-/// Logs events, and once a second what was counted.
+/// Logs events and, once a second, the statistics.
 pub fn idle<B: Board, L: Law>(
     mut control: impl Mutex<T = Control<B::Drive, L>>,
     events: &mut Consumer<'static, Change>,
@@ -296,20 +297,20 @@ pub fn idle<B: Board, L: Law>(
     }
 }
 
-/// A defect in the program: torque off, and nothing more until a reset.
+/// Handles a panic, that is, a defect in the program: torque off until a reset.
 pub fn panicked<B: Board>(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
     B::take_torque_off();
-    // The place alone: formatting the message would link 20 KiB of text formatting.
+    // Log the location only: formatting the message would link 20 KiB of text formatting.
     if let Some(place) = info.location() {
         defmt::error!("panic at {=str}:{=u32}", place.file(), place.line());
     }
     B::halt()
 }
 
-/// The tasks of an image: a board's, with a set of laws. Board crates call it with their chip's
-/// `device` and three interrupts: the `control` timer's, the `serial` port's, and one that no
-/// peripheral in use raises, which runs the `link`.
+/// Declares the tasks of an image for one board and one set of laws. Board crates invoke it with
+/// their chip's `device` and three interrupts: the `control` timer's, the `serial` port's, and one
+/// that no peripheral in use raises, which runs the `link`.
 #[macro_export]
 macro_rules! tasks {
     (
@@ -377,7 +378,7 @@ macro_rules! tasks {
                     let (answers, events) = (local.answers_in, local.events_in);
                     $crate::tasks::control(control, answers, events, local.reported)
                 });
-                // Bytes may have come without a pause that would have woken `link`.
+                // Bytes may have arrived without the idle line that would have woken `link`.
                 if answered || !<<Hardware as Board>::Port as Port>::HALF_DUPLEX {
                     rtic::pend(LINK);
                 }

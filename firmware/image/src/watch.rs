@@ -1,4 +1,4 @@
-//! What the host and the log hear of the control task.
+//! Events and counters of the control task, for the log and the host.
 
 use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
@@ -9,7 +9,7 @@ use painleve_shared::status::{Fault, SupervisorState};
 
 use crate::tasks::Control;
 
-/// What the log hears of the control task.
+/// State of the control task, as logged.
 #[derive(Clone, Copy, PartialEq)]
 pub struct Change {
     /// The supervisor's state.
@@ -19,13 +19,13 @@ pub struct Change {
 }
 
 impl Change {
-    /// Nothing has happened yet.
+    /// Returns the state before the first answer.
     pub const NONE: Self = Self {
         state: SupervisorState::Idle,
         fault: None,
     };
 
-    /// How things are by the newest answer.
+    /// Returns the state in the newest answer.
     pub fn of(answer: &ActuatorFrame) -> Self {
         Self {
             state: answer.supervisor_state().unwrap_or_default(),
@@ -34,7 +34,7 @@ impl Change {
     }
 }
 
-/// Every counter except the stack.
+/// Returns every counter except the stack.
 pub fn health<D: Drive, L: Law>(control: &Control<D, L>) -> Health {
     let Control {
         task,

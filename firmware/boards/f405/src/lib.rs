@@ -1,8 +1,8 @@
-//! The flash target: a STM32F405 with an 8 MHz crystal, 168 MHz.
+//! The flash target: an STM32F405 with an 8 MHz crystal, at 168 MHz.
 //!
 //! | pin        | what                                                     |
 //! |------------|----------------------------------------------------------|
-//! | PA4, PA5   | torque u1, u2: DAC, 1.65 V is none                       |
+//! | PA4, PA5   | torque u1, u2: DAC, 1.65 V is zero                       |
 //! | PB0        | torque stages enabled (high)                             |
 //! | PA9, PA10  | USART1 to and from the host, 921,600 baud                |
 //! | PB3, PB4, PB5 | SPI1 clock, in, out: encoders                         |
@@ -11,11 +11,10 @@
 //! | PB12       | select force cell (low)                                  |
 //! | PC0, PC1   | enable, reset (high; pulled down)                        |
 //!
-//! The control timer is TIM2, the stopwatch the cycle counter. It runs from the start at
-//! [`IDLE_HZ`], so that the watchdogs are fed by finished control ticks and by nothing else.
+//! The control timer is TIM2, the stopwatch is the cycle counter. The control timer runs from the start,
+//! first at [`IDLE_HZ`], so that only finished control ticks feed the watchdogs.
 //!
-//! The torque stages are on only while the plant is the real one: with frames from the host nothing
-//! drives the arm.
+//! The torque stages are on only with the real plant: with frames from the host they stay off.
 
 #![no_std]
 #![cfg(target_os = "none")]
@@ -54,30 +53,32 @@ use crate::uart_dma::{DmaBytes, DmaPort};
 /// Crystal, MHz.
 const CRYSTAL_MHZ: u32 = 8;
 
-/// Looks at a crystal that does not start, some 10 ms at the internal 16 MHz; it needs about 2.
+/// Number of polls for a crystal that does not start: some 10 ms at the internal 16 MHz; a crystal needs
+/// about 2 ms.
 const CRYSTAL_PATIENCE: u32 = 20_000;
 
-/// Watchdog while starting: also bounds the wait for the phase-locked loop.
+/// Watchdog timeout while starting; it also bounds the wait for the phase-locked loop.
 const START_LIMIT_S: f32 = 0.5;
 
 /// Control rate while there is no configuration.
 const IDLE_HZ: f32 = 1000.0;
 
-/// DAC code without torque; the converter has 12 bits.
+/// DAC code for zero torque; the converter has 12 bits.
 pub const NO_TORQUE: u16 = 1 << 11;
 
 /// Bits of the DAC.
 const DAC_BITS: u8 = 12;
 
-/// Slower than the encoders' 10 MHz and the force cell's 2.1 MHz: what the buses' clocks can be divided to.
+/// Below the encoders' 10 MHz and the force cell's 2.1 MHz, at rates into which the buses' clocks can be
+/// divided.
 const ENCODER_BUS_HZ: u32 = 5_250_000;
 const FORCE_BUS_HZ: u32 = 1_312_500;
 
-/// What a sensor without a reading counts: out of every range, which the controller counts as a lapse.
+/// Count of a sensor without a reading: out of every range, so that the controller counts it as a lapse.
 const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
 const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
 
-/// The image for this board, with these laws.
+/// Declares the image for this board with these laws.
 #[macro_export]
 macro_rules! image {
     ($laws:ty) => {
@@ -88,7 +89,7 @@ macro_rules! image {
     };
 }
 
-/// See the crate's page.
+/// The board; see the crate's page.
 pub struct F405;
 
 impl Board for F405 {
@@ -135,7 +136,7 @@ impl Board for F405 {
             polarity: Polarity::IdleLow,
             phase: Phase::CaptureOnSecondTransition,
         };
-        // Two of these are the debugger's at reset; it needs them for JTAG only.
+        // Two of these pins belong to the debugger at reset; it needs them for JTAG only.
         let pins = (
             Some(b.pb3.into_alternate::<5>()),
             Some(b.pb4.into_alternate::<5>()),
@@ -195,8 +196,7 @@ impl Board for F405 {
         safety::take_torque_off();
     }
 
-    /// Until the watchdog resets the chip, which then waits for a configuration with
-    /// the torque off.
+    /// Waits until the watchdog resets the chip, which then waits for a configuration with the torque off.
     fn halt() -> ! {
         Self::take_torque_off();
         loop {
@@ -209,7 +209,7 @@ impl Board for F405 {
     }
 }
 
-/// Starts the crystal oscillator, or gives up. Nothing in it waits without a bound.
+/// Starts the crystal oscillator, or gives up after a bounded wait.
 fn start_crystal(rcc: &pac::RCC) -> Result<(), StartFault> {
     rcc.cr().modify(|_, w| w.hseon().set_bit());
     let settled = (0..CRYSTAL_PATIENCE).any(|_| rcc.cr().read().hserdy().bit_is_set());
@@ -220,7 +220,8 @@ fn start_crystal(rcc: &pac::RCC) -> Result<(), StartFault> {
     }
 }
 
-/// Both channels without torque and without the buffer, which would cut the range by 0.2 V at either end.
+/// Starts both channels at zero torque and without the output buffer, which would cut the range by 0.2 V at
+/// either end.
 fn start_converter(converter: &pac::DAC) {
     put_out(converter, [NO_TORQUE; 2]);
     converter.cr().modify(|_, w| {
@@ -229,14 +230,14 @@ fn start_converter(converter: &pac::DAC) {
     });
 }
 
-/// Both codes in one store: the stages change together.
+/// Writes both codes in one store, so that the stages change together.
 fn put_out(converter: &pac::DAC, [code_1, code_2]: [u16; 2]) {
     converter
         .dhr12rd()
         .write(|w| w.dacc1dhr().set(code_1).dacc2dhr().set(code_2));
 }
 
-/// Pauses of at least so many nanoseconds.
+/// Pauses for at least a given number of nanoseconds.
 #[derive(Clone, Copy)]
 struct Pause {
     cycles_per_us: u32,
@@ -250,7 +251,7 @@ impl DelayNs for Pause {
 
 type Force = ExclusiveDevice<Spi<SPI2>, force_cell::Select<ErasedPin<Output>, Pause>, NoDelay>;
 
-/// What the control task uses.
+/// The control task's part of the board.
 pub struct F405Drive {
     timer: pac::TIM2,
     timer_hz: f32,
@@ -264,12 +265,12 @@ pub struct F405Drive {
     reset_button: ErasedPin<Input>,
     switches: Switches,
     plausibility: Plausibility,
-    /// Bits of the counts that the controller gives and takes.
+    /// Resolution of the counts that the controller gives and takes, bits.
     torque_bits: u8,
     encoder_bits: u8,
     force_bits: u8,
     source: FrameSource,
-    /// Newest frame from the host, if frames come from there.
+    /// Newest frame from the host, if the host is the source of frames.
     from_host: Option<SensorFrame>,
     sequence: u32,
 }
@@ -300,7 +301,7 @@ impl F405Drive {
             .plausibility
             .tick(&readings, self.encoder_bits, self.force_bits);
         if plausible.is_err() && !self.drives() {
-            // Nothing arms on readings that no arm gives.
+            // Do not arm on implausible readings.
             inputs.remove(DigitalInputs::ENABLE);
         }
         self.sequence = self.sequence.wrapping_add(1);
@@ -318,7 +319,7 @@ impl F405Drive {
         self.enable.is_set_high()
     }
 
-    /// The DAC's code for a torque: offset binary of 12 bits.
+    /// Returns the DAC's code for a torque: offset binary of 12 bits.
     fn code(&self, torque: TorqueCounts) -> u16 {
         let counts = if self.torque_bits > DAC_BITS {
             torque.0 >> (self.torque_bits - DAC_BITS)
@@ -332,7 +333,7 @@ impl F405Drive {
 impl Drive for F405Drive {
     fn begin_tick(&mut self) {
         timer::acknowledge(&self.timer);
-        // The tick before is finished, and this one is not too early.
+        // The previous tick is finished, and this one is not too early.
         self.watchdogs.feed();
     }
 
@@ -375,7 +376,7 @@ impl BoardDrive for F405Drive {
         self.torque_bits = configuration.converters.torque.bits;
         self.source = source;
         self.from_host = None;
-        // The switch has to be opened and closed anew, and the sensors looked at.
+        // Require that the switch is opened and closed again and that the sensors are checked anew.
         self.switches = Switches::default();
         self.plausibility = Plausibility::default();
         self.start_timer(configuration.tick_hz);

@@ -1,7 +1,7 @@
-//! What takes the torque off when the program cannot: the first act after a reset, faults of the processor,
-//! clock and supply, and two watchdogs.
+//! Takes the torque off when the program cannot: the first instructions after a reset, processor faults,
+//! clock and supply monitoring, and two watchdogs.
 //!
-//! The torque stages are enabled by PB0, high. From a reset until the first act the pin floats, and a
+//! PB0 high enables the torque stages. From a reset until the first instructions the pin floats, and a
 //! pull-down resistor on the board holds it low.
 
 #![allow(unsafe_code)] // registers, whatever the program was doing
@@ -13,17 +13,17 @@ use stm32f4xx_hal::pac;
 /// Keys that open the option bytes (RM0090, section 3.6.2).
 const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
 
-/// Looks at a flag that should change within microseconds.
+/// Number of polls of a flag that should change within microseconds.
 const PATIENCE: u32 = 100_000;
 
-/// Fastest rate of the independent watchdog's oscillator, Hz (its slowest is 17 kHz).
+/// Highest frequency of the independent watchdog's oscillator, Hz (the lowest is 17 kHz).
 const FASTEST_OSCILLATOR_HZ: f32 = 47_000.0;
 
-/// Cycles of the slow peripherals' clock that the window watchdog counts as one.
+/// Cycles of the slow peripherals' clock per count of the window watchdog.
 const WINDOW_CYCLES: f32 = 4096.0;
 
-// The first instructions after a reset, before memory is initialised, so that it cannot be Rust: the
-// clock of port B on, PB0 low, then an output.
+// The first instructions after a reset, in assembly because memory is not initialised yet: enable the clock
+// of port B, set PB0 low, then make it an output.
 core::arch::global_asm!(
     ".section .text.__pre_init, \"ax\", %progbits",
     ".global __pre_init",
@@ -49,9 +49,9 @@ core::arch::global_asm!(
     gpiob = const 0x4002_0400_u32,
 );
 
-/// Takes the torque off from wherever the program is: the stages' pin low, and no torque from the converter.
+/// Takes the torque off from any point of the program: stages disabled, and zero torque from the converter.
 pub fn take_torque_off() {
-    // SAFETY: single stores to registers that nobody else sets differently when the torque is to be off.
+    // SAFETY: single stores to registers that hold these values whenever the torque is off.
     unsafe {
         let rcc = &*pac::RCC::ptr();
         rcc.ahb1enr().modify(|_, w| w.gpioben().set_bit());
@@ -73,31 +73,31 @@ pub fn reset() -> ! {
     SCB::sys_reset()
 }
 
-/// An instruction that cannot be executed, a bus that does not answer, a stack that has run over.
+/// Handles an instruction that cannot be executed, a bus that does not answer or a stack overflow.
 #[exception]
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     reset()
 }
 
-/// The crystal has stopped; the chip goes on from its internal oscillator.
+/// Handles a crystal failure; the chip continues on its internal oscillator.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
     reset()
 }
 
-/// The supply is low, or an interrupt that no peripheral in use can have raised.
+/// Handles low supply voltage, or an interrupt that no peripheral in use can have raised.
 #[exception]
 unsafe fn DefaultHandler(_: i16) -> ! {
     reset()
 }
 
-/// Watches the crystal from now on: if it stops, [`NonMaskableInt`] comes at once.
+/// Starts monitoring the crystal: if it stops, [`NonMaskableInt`] is raised at once.
 pub fn watch_crystal(rcc: &pac::rcc::RegisterBlock) {
     rcc.cr().modify(|_, w| w.csson().set_bit());
 }
 
-/// Watches the supply from now on: below 2.9 V the interrupt PVD comes, whose handler is
-/// [`DefaultHandler`], and below 2.7 V the chip is held in reset.
+/// Starts monitoring the supply: below 2.9 V the interrupt PVD is raised, whose handler is
+/// [`DefaultHandler`]; below 2.7 V the chip is held in reset.
 pub fn watch_supply(
     power: &pac::PWR,
     lines: &pac::EXTI,
@@ -118,13 +118,13 @@ pub fn watch_supply(
     raise_brown_out_level(flash);
 }
 
-/// Once in a chip's life: the level survives in the option bytes.
+/// Programs the brown-out level once in a chip's life: it is stored in the option bytes.
 fn raise_brown_out_level(flash: &pac::FLASH) {
     const HIGHEST: u8 = 0;
     if flash.optcr().read().bor_lev().bits() == HIGHEST {
         return;
     }
-    // SAFETY: the keys of the manual, in its order, with nothing being programmed.
+    // SAFETY: the keys of the manual, in its order, with no programming in progress.
     unsafe {
         for key in OPTION_KEYS {
             flash.optkeyr().write(|w| w.bits(key));
@@ -148,9 +148,9 @@ fn write_key(watchdog: &pac::IWDG, key: u16) {
 
 /// The two watchdogs, fed at the end of every control tick.
 ///
-/// The window watchdog goes by the processor's clock and resets the chip one and a half periods after the
-/// last finished tick. The independent one goes by an oscillator of its own, anywhere from 17 to 47 kHz,
-/// and is there for the case that the clock itself stops: 2 to 6 periods.
+/// The window watchdog runs on the processor's clock and resets the chip one and a half periods after the
+/// last finished tick. The independent watchdog runs on its own oscillator of 17 to 47 kHz and covers a
+/// failure of the clock itself: it resets the chip after 2 to 6 periods.
 pub struct Watchdogs {
     independent: pac::IWDG,
     window: pac::WWDG,
@@ -160,8 +160,8 @@ pub struct Watchdogs {
 }
 
 impl Watchdogs {
-    /// The independent watchdog runs from now on; it allows for `limit_s` at least. Call it before
-    /// anything that may hang.
+    /// Starts the independent watchdog with a timeout of at least `limit_s`. Call it before anything that
+    /// may hang.
     pub fn start_independent(independent: &pac::IWDG, limit_s: f32) {
         // Counts of four cycles, doubled until they fit into twelve bits.
         let mut counts = limit_s * FASTEST_OSCILLATOR_HZ / 4.0;
@@ -178,12 +178,13 @@ impl Watchdogs {
             independent.pr().write(|w| w.bits(prescaler));
             independent.rlr().write(|w| w.bits(reload.into()));
         }
-        // Both registers are taken over in the oscillator's time, some 200 µs.
+        // Both registers take effect in the oscillator's time, after some 200 µs.
         let _ = (0..PATIENCE).any(|_| independent.sr().read().bits() == 0);
         write_key(independent, FEED);
     }
 
-    /// Takes charge of both; `slow_bus_hz` is the clock of APB1, and the window watchdog's own clock is on.
+    /// Takes ownership of both watchdogs; `slow_bus_hz` is the clock of APB1. The window watchdog's own
+    /// clock must be on.
     pub fn new(independent: pac::IWDG, window: pac::WWDG, slow_bus_hz: u32) -> Self {
         Self {
             independent,
@@ -193,7 +194,7 @@ impl Watchdogs {
         }
     }
 
-    /// Allows one and a half of these periods from now on.
+    /// Sets the timeout to one and a half of these periods.
     pub fn set_period(&mut self, period_s: f32) {
         Self::start_independent(&self.independent, 2.0 * period_s);
         let mut counts = 1.5 * period_s * self.slow_bus_hz / WINDOW_CYCLES;
@@ -203,20 +204,20 @@ impl Watchdogs {
             prescaler += 1;
         }
         if counts > 63.0 {
-            // It cannot be stopped, and would come too early.
+            // The running window watchdog cannot be stopped, and would reset the chip too early.
             return;
         }
-        // It resets when bit 6 falls.
+        // The chip is reset when bit 6 falls.
         let counter = 0x40 | counts as u8;
         self.counter = Some(counter);
-        // SAFETY: prescalers have two bits; a window of 0x7f is none.
+        // SAFETY: prescalers have two bits; a window of 0x7f disables the window.
         self.window
             .cfr()
             .write(|w| unsafe { w.wdgtb().bits(prescaler).w().bits(0x7f) });
         self.feed();
     }
 
-    /// A tick is finished.
+    /// Feeds both watchdogs when a tick is finished.
     pub fn feed(&mut self) {
         write_key(&self.independent, FEED);
         if let Some(counter) = self.counter {

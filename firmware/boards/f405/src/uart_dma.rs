@@ -1,7 +1,8 @@
-//! USART1 at 921,600 baud, 8N1, with its bytes moved by DMA: none is lost while the control task runs.
+//! USART1 at 921,600 baud, 8N1, with DMA for both directions: no byte is lost while the control task
+//! runs.
 //!
-//! Received bytes go round a buffer; the line's falling idle, and every control tick, wake the link task.
-//! It may be late by a whole buffer: 11 ms.
+//! Received bytes go to a ring buffer. The idle line and every control tick wake the link task, which may
+//! be late by a whole buffer: 11 ms.
 
 #![allow(unsafe_code)] // buffers that DMA reads and writes
 
@@ -10,16 +11,16 @@ use stm32f4xx_hal::pac::{self, DMA2, USART1};
 
 use painleve_image::board::{Bytes, Port};
 
-/// Speed of the line, bit/s.
+/// Line speed, bit/s.
 pub const BAUD: u32 = 921_600;
 
-/// Bytes that may wait to be taken.
+/// Number of received bytes that may wait.
 const RECEIVED: usize = 1024;
 
-/// Bytes that may wait to be sent.
+/// Number of bytes that may wait to be sent.
 const TO_SEND: usize = 512;
 
-/// Bytes that are sent at once.
+/// Largest number of bytes in one transfer.
 const CHUNK: usize = 128;
 
 /// Streams and channel of USART1 (RM0090, table 43).
@@ -30,7 +31,7 @@ const CHANNEL: u8 = 4;
 /// The flag's bit in the status register.
 const TRANSMISSION_COMPLETE: u16 = 1 << 6;
 
-/// The interrupt's side.
+/// The interrupt's end of the port.
 pub struct DmaBytes {
     usart: USART1,
     chunk: &'static mut [u8; CHUNK],
@@ -38,15 +39,16 @@ pub struct DmaBytes {
     is_sending: bool,
 }
 
-/// The link task's side.
+/// The link task's end of the port.
 pub struct DmaPort {
     received: &'static [u8; RECEIVED],
-    /// Where the next byte is taken.
+    /// Index of the next byte to read.
     taken: usize,
     to_send: Producer<'static, u8>,
 }
 
-/// Takes charge of a serial port that is set up, and of DMA2, whose clock is on; `None` the second time.
+/// Takes ownership of a configured serial port, and of DMA2, whose clock is on; `None` on the second
+/// call.
 pub fn split(usart: USART1, dma: &DMA2) -> Option<(DmaBytes, DmaPort)> {
     let received = cortex_m::singleton!(RECEIVED_BYTES: [u8; RECEIVED] = [0; RECEIVED])?;
     let chunk = cortex_m::singleton!(SENT_BYTES: [u8; CHUNK] = [0; CHUNK])?;
@@ -54,7 +56,7 @@ pub fn split(usart: USART1, dma: &DMA2) -> Option<(DmaBytes, DmaPort)> {
     let (producer, consumer) = queue.split();
     let data = usart.dr().as_ptr() as u32;
     let receiver = dma.st(RECEIVER);
-    // SAFETY: the address of a register and of a buffer that lives for ever, and its length.
+    // SAFETY: the address of a register, and address and length of a static buffer.
     unsafe {
         receiver.par().write(|w| w.bits(data));
         receiver.m0ar().write(|w| w.bits(received.as_ptr() as u32));
@@ -92,7 +94,7 @@ impl Bytes for DmaBytes {
     fn serve(&mut self) {
         let flags = self.usart.sr().read();
         if flags.idle().bit_is_set() || flags.ore().bit_is_set() {
-            // Flags, then data: clears both. The byte itself is DMA's.
+            // Reading flags, then data, clears both. DMA moves the byte itself.
             let _ = self.usart.dr().read();
         }
         if self.is_sending && flags.tc().bit_is_clear() {
@@ -118,20 +120,20 @@ impl Bytes for DmaBytes {
 impl DmaBytes {
     fn send_chunk(&mut self, length: u32) {
         self.is_sending = true;
-        // SAFETY: nobody else uses this stream, which has come to its end.
+        // SAFETY: this stream has finished, and nothing else uses it.
         let dma = unsafe { &*DMA2::ptr() };
         dma.hifcr().write(|w| {
             w.ctcif7().set_bit().chtif7().set_bit().cteif7().set_bit();
             w.cdmeif7().set_bit().cfeif7().set_bit()
         });
         let stream = dma.st(TRANSMITTER);
-        // SAFETY: no more than the buffer holds.
+        // SAFETY: the length does not exceed the buffer's.
         stream.ndtr().write(|w| unsafe { w.bits(length) });
-        // SAFETY: a zero clears a flag, a one leaves it.
+        // SAFETY: writing zero clears a flag, writing one leaves it unchanged.
         self.usart
             .sr()
             .write(|w| unsafe { w.bits(!TRANSMISSION_COMPLETE) });
-        // The bytes are in memory before DMA looks at them.
+        // Complete the stores to memory before DMA reads it.
         cortex_m::asm::dmb();
         stream.cr().write(|w| {
             // SAFETY: channels have three bits.

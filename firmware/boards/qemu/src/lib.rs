@@ -1,7 +1,7 @@
-//! QEMU's `netduinoplus2`, a board with an STM32F405, the chip that is flashed.
+//! QEMU's `netduinoplus2`, a board with an STM32F405, the chip of the flash target.
 //!
 //! - [`pipes`]: in lockstep with its host, deterministic to the instruction
-//! - [`serial`]: by a clock of its own, over the flash target's serial port
+//! - [`serial`]: with an independent clock, over the flash target's serial port
 
 #![no_std]
 #![cfg(target_os = "none")]
@@ -13,7 +13,7 @@ pub use pipes::Qemu;
 pub use serial::QemuSerial;
 pub use stm32f4xx_hal::pac;
 
-/// The image for the board in lockstep, with these laws.
+/// Declares the image for the board in lockstep, with these laws.
 #[macro_export]
 macro_rules! image {
     ($laws:ty) => {
@@ -24,7 +24,7 @@ macro_rules! image {
     };
 }
 
-/// The image for the board over its serial port, with these laws.
+/// Declares the image for the board over its serial port, with these laws.
 #[macro_export]
 macro_rules! serial_image {
     ($laws:ty) => {

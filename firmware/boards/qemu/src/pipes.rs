@@ -1,9 +1,9 @@
-//! QEMU's `netduinoplus2`: a STM32F405, the chip that is flashed.
+//! QEMU's `netduinoplus2`: an STM32F405, the chip of the flash target.
 //!
-//! `mps2-an386` would have a timer with more digits and a serial port that is
-//! kept in virtual time, but another memory map and other timers; here the control timer,
-//! its interrupt and the map are those of the flash target. QEMU models no clock
-//! tree, no converters and no watchdog for it: the arm's frames come through the link.
+//! `mps2-an386` would offer a finer timer and a serial port in virtual time, but has another memory
+//! map and other timers. Here the control timer, its interrupt and the memory map are those of the
+//! flash target. QEMU models neither its clock tree nor its converters and watchdogs: the arm's
+//! frames come through the link.
 //!
 //! The link is semihosting on two pipes in QEMU's working folder. The virtual
 //! clock stands still during a semihosting call, so that a run under `-icount` is
@@ -22,10 +22,10 @@ use stm32f4xx_hal::pac;
 use painleve_image::board::{Board, BoardDrive, Bytes, Parts, Port, StartFault};
 use painleve_stm32f4::timer;
 
-/// QEMU's timers count nanoseconds of virtual time, whatever the clock tree says.
+/// QEMU's timers count nanoseconds of virtual time, whatever the clock settings are.
 const TIMER_HZ: f32 = 1e9;
 
-/// See the module's page.
+/// The board; see the module's page.
 pub struct Qemu;
 
 impl Board for Qemu {
@@ -50,7 +50,7 @@ impl Board for Qemu {
         })
     }
 
-    /// The host sees the image end, and takes the torque off in its simulation.
+    /// Ends the image: the host detects it and takes the torque off in its simulation.
     fn take_torque_off() {}
 
     fn halt() -> ! {
@@ -59,10 +59,9 @@ impl Board for Qemu {
 
     #[allow(unsafe_code)]
     fn idle() {
-        // No wait for interrupt: with one timer running, QEMU's virtual clock
-        // would jump past its deadline. A straight piece of code is one block to
-        // QEMU and many times faster than a loop.
-        // SAFETY: does nothing.
+        // No wait for interrupt: with one timer running, QEMU's virtual clock would jump past its
+        // deadline. Straight-line code is one block to QEMU and many times faster than a loop.
+        // SAFETY: has no effect.
         unsafe { core::arch::asm!(".rept 200", "nop", ".endr", options(nomem, nostack)) }
     }
 }
@@ -71,12 +70,12 @@ impl Board for Qemu {
 pub struct Timers {
     control: pac::TIM2,
     stopwatch: pac::TIM5,
-    /// Newest frame from the host: there is no other plant than a simulated one.
+    /// Newest frame from the host: the plant is always simulated.
     from_host: Option<SensorFrame>,
 }
 
 impl Timers {
-    /// Lets the stopwatch run.
+    /// Starts the stopwatch.
     pub fn start(control: pac::TIM2, stopwatch: pac::TIM5) -> Self {
         stopwatch.arr().write(|w| w.arr().set(u32::MAX));
         stopwatch.cr1().write(|w| w.cen().set_bit());
@@ -102,7 +101,7 @@ impl Drive for Timers {
         frame
     }
 
-    /// The answer on the link is the output.
+    /// The answer on the link serves as the output.
     fn actuate(&mut self, _: &ActuatorFrame) {}
 
     fn next_tick_is_due(&self) -> bool {
@@ -129,14 +128,14 @@ impl BoardDrive for Timers {
     }
 }
 
-/// Semihosting has no interrupt.
+/// The serial port's interrupt, which semihosting does not have.
 pub struct NoBytes;
 
 impl Bytes for NoBytes {
     fn serve(&mut self) {}
 }
 
-/// A pipe each way.
+/// The link: a pipe in each direction.
 pub struct Pipes {
     requests: File,
     responses: File,
@@ -145,8 +144,8 @@ pub struct Pipes {
 impl Port for Pipes {
     const HALF_DUPLEX: bool = true;
 
-    /// Blocks, with all of virtual time, until the host asks for something. A host that is gone
-    /// ends the image.
+    /// Blocks, with all of virtual time, until the host sends a request. Ends the image if the host
+    /// is gone.
     fn receive(&mut self, buffer: &mut [u8]) -> usize {
         match self.requests.read(buffer) {
             Ok(length) if length > 0 => length,

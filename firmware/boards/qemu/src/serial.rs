@@ -1,7 +1,7 @@
 //! QEMU's `netduinoplus2` with the flash target's serial port as the link.
 //!
-//! It runs by a clock of its own and is there to test the serial port's driver and what
-//! hardware in the loop needs; for everything else see the lockstep board.
+//! Its clock runs independently of the host. The board tests the serial port's driver and the
+//! host's support for hardware in the loop; for everything else use the lockstep board.
 
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
@@ -11,7 +11,7 @@ use crate::pipes::{Qemu, Timers};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_stm32f4::uart::{self, UartBytes, UartPort};
 
-/// See the module's page.
+/// The board; see the module's page.
 pub struct QemuSerial;
 
 impl Board for QemuSerial {
@@ -26,7 +26,7 @@ impl Board for QemuSerial {
         device: pac::Peripherals,
         _: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
-        // QEMU has no clock tree and sends as fast as the host reads.
+        // QEMU models no clock tree and sends as fast as the host reads.
         let mut rcc = device.RCC.constrain();
         let a = device.GPIOA.split(&mut rcc);
         let line = config::Config::default().baudrate(uart::BAUD.bps());
@@ -46,7 +46,8 @@ impl Board for QemuSerial {
         Qemu::halt()
     }
 
-    /// Unlike in lockstep the clock goes on by itself; several of these share a machine.
+    /// Yields: unlike in lockstep the clock runs on by itself, and several of these boards share a
+    /// machine.
     fn idle() {
         cortex_m::asm::wfi();
     }

@@ -5,6 +5,6 @@
 #[cfg(target_os = "none")]
 painleve_qemu_board::image!(painleve_firmware::law::LawSettings);
 
-/// Nothing runs on a PC.
+/// Does nothing on a PC.
 #[cfg(not(target_os = "none"))]
 fn main() {}
