@@ -1,18 +1,18 @@
-//! What an arm does in the long run, as plain numbers.
+//! The long-term motion of an arm, as plain numbers.
 
 use painleve_plant::mechanics::{ArmOnBelt, MotionError};
 use painleve_plant::{ContactMode, Event, Probe, Snapshot, State, Step};
 
 use super::settled::has_settled;
 
-/// Extremes and counts of a stretch of motion.
+/// Extremes and counts over a time interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attractor {
     /// Largest θ̇1, rad/s: the paper's measure, above zero where the arm keeps bouncing.
     pub max_theta1_dot_rad_s: f64,
-    /// Highest point of the tip over the belt, m.
+    /// Largest tip height over the belt, m.
     pub apex_m: f64,
-    /// Collisions with the belt, and impacts without collision.
+    /// Number of impacts with the belt, collisions included.
     pub impacts: u64,
     /// Time in contact, s.
     pub contact_s: f64,
@@ -20,7 +20,7 @@ pub struct Attractor {
     pub flight_s: f64,
 }
 
-/// Between two looks whether the arm has settled, s.
+/// Interval between checks whether the arm has settled, s.
 const SETTLING_LOOK_S: f64 = 1.0;
 
 /// Index of θ̇1 in the state.
@@ -39,11 +39,11 @@ impl Default for Attractor {
 }
 
 impl Attractor {
-    /// What a plant does after `transient_s`, during `record_s`. A plant that has
-    /// settled for good is not integrated any further.
+    /// Returns the motion during `record_s`, after `transient_s`. Stops integrating a plant that has
+    /// settled permanently.
     ///
     /// # Errors
-    /// [`MotionError`] if the plant cannot go on.
+    /// [`MotionError`] if the plant cannot continue.
     pub fn of(plant: &mut ArmOnBelt, transient_s: f64, record_s: f64) -> Result<Self, MotionError> {
         let mut attractor = Self::default();
         if advance_or_settle(plant, transient_s)? {
@@ -60,21 +60,21 @@ impl Attractor {
         self.flight_s > 0.0
     }
 
-    /// Part of the time in contact, 0 … 1.
+    /// Returns the fraction of the time in contact, 0 … 1.
     pub fn contact_fraction(&self) -> f64 {
         self.contact_s / (self.contact_s + self.flight_s)
     }
 }
 
-/// Lets a plant run for `duration_s`; true, and earlier, if it has settled for good.
+/// Runs a plant for `duration_s`. Returns early, with `true`, if it has settled permanently.
 ///
 /// # Errors
-/// [`MotionError`] if the plant cannot go on.
+/// [`MotionError`] if the plant cannot continue.
 pub fn advance_or_settle(plant: &mut ArmOnBelt, duration_s: f64) -> Result<bool, MotionError> {
     let start_s = plant.time_s();
     let looks = (duration_s / SETTLING_LOOK_S).ceil() as u64;
     for look in 1..=looks {
-        // From whole numbers, so that nothing accumulates.
+        // Computed from whole numbers, so that rounding does not accumulate.
         let elapsed_s = (look as f64 * SETTLING_LOOK_S).min(duration_s);
         plant.advance(start_s + elapsed_s, &mut ())?;
         if has_settled(plant) {
@@ -109,7 +109,7 @@ impl Probe for Attractor {
     }
 }
 
-/// Greatest value of the cubic with these values and slopes at both ends of a stretch of
+/// Returns the maximum of the cubic with these values and slopes at both ends of an interval of
 /// length `h`.
 fn cubic_maximum(h: f64, [v0, s0]: [f64; 2], [v1, s1]: [f64; 2]) -> f64 {
     let ends = v0.max(v1);
@@ -121,7 +121,7 @@ fn cubic_maximum(h: f64, [v0, s0]: [f64; 2], [v1, s1]: [f64; 2]) -> f64 {
     let c = 3.0 * difference - 2.0 * rise - h * s1;
     let d = rise + h * s1 - 2.0 * difference;
     let root = (c * c - 3.0 * d * rise).max(0.0).sqrt();
-    // The zero of the slope where it falls, in the form that does not cancel.
+    // The zero of the slope where the slope falls, in the form without cancellation.
     let at = if c <= 0.0 {
         rise / (root - c)
     } else {
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn bouncing_and_sliding_are_told_apart() {
+    fn bouncing_and_sliding_are_distinguished() {
         let bouncing = Attractor::of(&mut plant(32.0, 18.27), 20.0, 10.0).unwrap();
         assert!(bouncing.is_bouncing());
         assert!(bouncing.max_theta1_dot_rad_s > 4.0, "{bouncing:?}");
@@ -178,9 +178,9 @@ mod tests {
         assert!(settling.time_s() < 200.0);
     }
 
-    /// What is not integrated any further would not have become anything else.
+    /// A motion that is no longer integrated would not have changed.
     #[test]
-    fn settling_early_changes_nothing() {
+    fn an_early_stop_does_not_change_the_result() {
         let early = Attractor::of(&mut plant(-11.4, -35.1), 250.0, 50.0).unwrap();
         let mut late = Attractor::default();
         let mut plant = plant(-11.4, -35.1);

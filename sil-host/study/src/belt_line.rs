@@ -1,14 +1,14 @@
 //! Postures with the tip on the belt, as an analytic curve.
 //!
-//! Along z_t itself the link angles have square roots where the arm is straight. With
-//! z_t = R sin τ, R the reach, they have none: the area of the triangle of both links is
+//! As functions of z_t, the link angles have square-root singularities where the arm is straight. With
+//! z_t = R sin τ, where R is the reach, they have none: the area of the triangle of both links is
 //! ¼ R cos τ √(d² − (l1 − l2)²), d = |z|, and p is an analytic function of τ from −π/2 to π/2.
 
 use nalgebra::Matrix2;
 use painleve_shared::{Arm, LinkMotion, Pose, Posture, Slip};
 
-/// Points at which a quantity is looked at first. It has a handful of extrema at most,
-/// so that each is between its own points.
+/// Number of points of the first search. A quantity has few extrema, so that each lies
+/// between its own points.
 const POINTS: usize = 4096;
 
 /// The tip on the belt of an arm in one posture.
@@ -19,30 +19,30 @@ pub struct BeltLine<'a> {
 }
 
 impl<'a> BeltLine<'a> {
-    /// All places on the belt in a posture.
+    /// Creates the belt line of an arm in a posture.
     pub fn new(arm: &'a Arm<f64>, posture: Posture) -> Self {
         Self { arm, posture }
     }
 
-    /// z_t at τ, m.
+    /// Returns z_t at τ, m.
     pub fn tip_t_m(&self, tau: f64) -> f64 {
         self.arm.reach_on_belt_m() * libm::sin(tau)
     }
 
-    /// τ at z_t (m); `None` out of reach.
+    /// Returns τ at z_t (m); `None` out of reach.
     pub fn tau(&self, tip_t_m: f64) -> Option<f64> {
         let sine = tip_t_m / self.arm.reach_on_belt_m();
         (sine.abs() <= 1.0).then(|| libm::asin(sine))
     }
 
-    /// Link angles at τ, rad.
+    /// Returns the link angles at τ, rad.
     pub fn theta_rad(&self, tau: f64) -> LinkMotion<f64> {
         let (height, hole) = (self.arm.height_m(), self.arm.hole_m());
         let [length_1, length_2] = self.arm.link_length_m();
         let tip = self.tip_t_m(tau);
         let direction = libm::atan2(tip, height);
         let distance = libm::hypot(tip, height);
-        // 2 l sin β and 2 l cos β of either link's angle β with the tip's direction.
+        // 2 l sin β and 2 l cos β, with β the angle between either link and the tip's direction.
         let sine = self.arm.reach_on_belt_m()
             * libm::cos(tau)
             * (libm::sqrt(distance * distance - hole * hole) / distance);
@@ -55,18 +55,18 @@ impl<'a> BeltLine<'a> {
         }
     }
 
-    /// Q at τ, 1/kg.
+    /// Returns Q at τ, 1/kg.
     pub fn inverse_tip_inertia(&self, tau: f64) -> Matrix2<f64> {
         self.arm
             .inverse_tip_inertia(&Pose::new(&self.theta_rad(tau)))
     }
 
-    /// p at τ, 1/kg.
+    /// Returns p at τ, 1/kg.
     pub fn p(&self, tau: f64, friction: f64, slip: Slip) -> f64 {
         self.arm.p(&Pose::new(&self.theta_rad(tau)), friction, slip)
     }
 
-    /// Friction coefficient at which p is zero at τ; infinite where no friction does that.
+    /// Returns the friction coefficient at which p is zero at τ; infinite if there is none.
     pub fn friction_of_zero_p(&self, tau: f64, slip: Slip) -> f64 {
         let q = self.inverse_tip_inertia(tau);
         let pull = slip.sign::<f64>() * q.m21;
@@ -78,10 +78,10 @@ impl<'a> BeltLine<'a> {
     }
 }
 
-/// Stretches of τ on which `value` is positive, in order, to rounding.
+/// Returns the intervals of τ on which `value` is positive, in order, to rounding.
 pub fn positive_stretches(value: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     let mut points = samples(&value);
-    // Between two points of one sign the value may still cross zero twice.
+    // Between two points of equal sign the value may still cross zero twice.
     let mut extrema: Vec<(f64, f64)> = points
         .windows(3)
         .filter_map(|three| {
@@ -124,7 +124,7 @@ pub fn positive_stretches(value: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     stretches
 }
 
-/// The τ at which `value` is least, and the value there.
+/// Returns the τ at which `value` is smallest, and the value there.
 pub fn least(value: impl Fn(f64) -> f64) -> (f64, f64) {
     let points = samples(&value);
     let lowest = (0..points.len())
@@ -150,7 +150,7 @@ fn samples(value: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Where a property that holds at `holds` and not at `fails` ends, to rounding.
+/// Bisects, to rounding, for the end of a property that holds at `holds` and not at `fails`.
 pub fn bisected(mut holds: f64, mut fails: f64, property: impl Fn(f64) -> bool) -> f64 {
     loop {
         let middle = 0.5 * (holds + fails);
@@ -165,7 +165,7 @@ pub fn bisected(mut holds: f64, mut fails: f64, property: impl Fn(f64) -> bool) 
     }
 }
 
-/// Golden-section search for the minimum of a function with one between two points.
+/// Golden-section search for the single minimum of a function between two points.
 fn minimum(left: f64, right: f64, value: impl Fn(f64) -> f64) -> f64 {
     let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut left, mut right) = (left, right);
@@ -174,7 +174,7 @@ fn minimum(left: f64, right: f64, value: impl Fn(f64) -> f64) -> f64 {
         left + ratio * (right - left),
     );
     let (mut at_one, mut at_two) = (value(one), value(two));
-    // Near a minimum values differ by less than rounding within the root of rounding.
+    // Near a minimum, values differ by less than rounding within the square root of rounding.
     while right - left > 1e-9 {
         if at_one <= at_two {
             (right, two, at_two) = (two, one, at_one);
@@ -195,7 +195,7 @@ mod tests {
     use painleve_shared::ArmParameters;
 
     #[test]
-    fn the_curve_is_the_inverse_kinematics_without_their_roots() {
+    fn the_curve_agrees_with_the_inverse_kinematics() {
         let arm = Arm::new(ArmParameters::default()).unwrap();
         for posture in [Posture::ElbowUp, Posture::ElbowDown] {
             let line = BeltLine::new(&arm, posture);
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn roots_are_found_to_rounding_also_where_they_are_closer_than_the_grid() {
+    fn roots_closer_than_the_grid_are_found_to_rounding() {
         let stretches = positive_stretches(|t| (t - 0.3) * (t - 0.3) - 1e-10);
         let expected = [
             (-core::f64::consts::FRAC_PI_2, 0.3 - 1e-5),
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_value_is_found_inside_and_at_the_ends() {
+    fn the_minimum_is_found_inside_and_at_the_ends() {
         let (tau, value) = least(|t| 2.0 + (t - 0.1234).powi(2));
         assert!((tau - 0.1234).abs() < 1e-7 && value == 2.0, "{tau} {value}");
         assert_eq!(least(|t| t).0, -core::f64::consts::FRAC_PI_2);

@@ -11,18 +11,18 @@ use painleve_shared::range::{self, OutOfRange};
 use super::StudyError;
 use super::initial::Initial;
 
-/// Error of one step of the plant relative to its state, unless asked for otherwise. A hundredth
+/// Default relative error tolerance of one step of the plant. It is a hundredth
 /// of a scenario's: near the ends of the window the arm bounces chaotically for minutes before
 /// it settles, and every second multiplies errors by about 200.
 pub const RELATIVE_TOLERANCE: f64 = 1e-11;
 
-/// Every combination of friction, belt speed and initial condition, in this order: the
-/// last one changes fastest.
+/// All combinations of friction, belt speed and initial condition, in this order; the
+/// last varies fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cells {
     /// The plant; its friction, belt and tolerances are replaced.
     pub plant: PlantParameters,
-    /// Error of one step of the plant relative to its state; the absolute one is a tenth of it.
+    /// Relative error tolerance of one step of the plant; the absolute tolerance is a tenth of it.
     pub relative_tolerance: f64,
     /// Friction coefficients μ.
     pub mu: Vec<f64>,
@@ -30,11 +30,11 @@ pub struct Cells {
     pub v_belt_m_s: Vec<f64>,
     /// Initial conditions.
     pub initial: Vec<Initial>,
-    /// Seed of the random ones.
+    /// Seed of the random initial conditions.
     pub seed: u64,
-    /// How long a cell runs before anything is recorded, s.
+    /// Transient of a cell before recording starts, s.
     pub transient_s: f64,
-    /// How long it is recorded, s.
+    /// Recording time of a cell, s.
     pub record_s: f64,
 }
 
@@ -47,7 +47,7 @@ pub struct Cell {
     pub v_belt_m_s: f64,
     /// Initial condition.
     pub initial: Initial,
-    /// Where that is, before the tip is put onto the belt.
+    /// Initial state, before the tip is put onto the belt.
     pub start: State,
 }
 
@@ -67,22 +67,22 @@ impl fmt::Display for Cell {
 }
 
 impl Cells {
-    /// How many there are.
+    /// Returns the number of cells.
     pub fn len(&self) -> usize {
         crate::combinations(&[self.mu.len(), self.v_belt_m_s.len(), self.initial.len()])
     }
 
-    /// The seed, by what it is for.
+    /// Returns the seed, by its purpose.
     pub fn seeds(&self) -> BTreeMap<String, u64> {
         BTreeMap::from([("initial".to_owned(), self.seed)])
     }
 
-    /// Whether there are none.
+    /// Whether there are no cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Checks everything before anything is computed.
+    /// Checks all settings before the computation.
     ///
     /// # Errors
     /// [`StudyError`] naming the first value that is out of range, or an initial
@@ -112,10 +112,10 @@ impl Cells {
         Ok(())
     }
 
-    /// Cell `index`, less than [`len`](Self::len). It depends on nothing but its index.
+    /// Returns cell `index`, less than [`len`](Self::len). It depends only on its index.
     ///
     /// # Errors
-    /// [`StudyError::Range`] if the arm is impossible.
+    /// [`StudyError::Range`] if the arm is invalid.
     pub fn cell(&self, index: usize) -> Result<Cell, StudyError> {
         let (rest, initial) = (index / self.initial.len(), index % self.initial.len());
         let (mu, speed) = (rest / self.v_belt_m_s.len(), rest % self.v_belt_m_s.len());
@@ -128,7 +128,7 @@ impl Cells {
         })
     }
 
-    /// The plant of a cell at its start.
+    /// Returns the plant of a cell in its initial state.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first parameter that is out of range.
@@ -228,7 +228,7 @@ mod tests {
             let message = cells.check().unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
-        // Over so high a belt x0,a is deep inside it.
+        // With so high a belt, x0,a is deep inside it.
         let mut high = cells();
         high.plant.arm.height_m = 0.3;
         assert!(

@@ -1,8 +1,8 @@
-//! Contact and flight from an instant on, at the plant's own resolution.
+//! Contact and flight from a given instant, at the plant's own resolution.
 
 use painleve_plant::{Event, Probe, State, Step};
 
-/// Watches when the tip is caught, and whether it leaves again.
+/// Observes when the tip is captured, and whether it leaves the belt again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactWatch {
     from_s: f64,
@@ -10,16 +10,16 @@ pub struct ContactWatch {
     contact_since_s: Option<f64>,
     /// Start of the first contact that lasted for the holding time, s.
     pub captured_s: Option<f64>,
-    /// End of the last flight, s; where the watch began if there was none.
+    /// End of the last flight, s; the start of the observation if there was none.
     pub last_flight_end_s: f64,
-    /// Lift-offs after the capture.
+    /// Number of lift-offs after the capture.
     pub lift_offs: u64,
-    /// When the first of them was, s.
+    /// Time of the first of them, s.
     pub first_lift_off_s: Option<f64>,
 }
 
 impl ContactWatch {
-    /// Watches from `from_s` on; a contact that lasts for `hold_s` is a capture.
+    /// Starts observing at `from_s`; a contact that lasts for `hold_s` is a capture.
     pub fn new(from_s: f64, hold_s: f64) -> Self {
         Self {
             from_s,
@@ -32,7 +32,7 @@ impl ContactWatch {
         }
     }
 
-    /// Whether the tip touches.
+    /// Whether the tip touches the belt.
     pub fn touches(&self) -> bool {
         self.contact_since_s.is_some()
     }

@@ -1,33 +1,34 @@
-//! Values of many runs: percentiles and a histogram.
+//! Distribution of a value over many runs: percentiles and a histogram.
 
 use painleve_chart::style::VERMILLION;
 use painleve_chart::{Mark, Panel};
 use plotters::style::RGBColor;
 use serde::Serialize;
 
-/// Bars of a histogram.
+/// Number of bars of a histogram.
 const BARS: usize = 60;
-/// Their width in drawn units; they are some 29 apart.
+/// Width of a bar in drawn units; bars are about 29 apart.
 const BAR_WIDTH: u32 = 25;
 
-/// Where values lie.
+/// Percentiles of a set of values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Percentiles {
-    /// How many there are.
+    /// Number of values.
     pub count: usize,
-    /// Half are at most this.
+    /// Median.
     pub median: f64,
-    /// 90 % are at most this.
+    /// 90th percentile.
     pub p90: f64,
-    /// 99 % are at most this.
+    /// 99th percentile.
     pub p99: f64,
-    /// The largest.
+    /// The largest value.
     pub max: f64,
 }
 
 impl Percentiles {
-    /// Of values in any order; none of none. A percentile is the least value that enough
-    /// values do not exceed.
+    /// Returns the distribution of values in any order; `None` without values. A percentile is the
+    /// smallest value
+    /// that this fraction of the values does not exceed.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_unstable_by(f64::total_cmp);
         let max = *values.last()?;
@@ -45,8 +46,9 @@ impl Percentiles {
     }
 }
 
-/// A panel with the number of values in equal bins from 0 to `end`, larger ones in the last,
-/// beside the `limit` that values shall keep.
+/// Returns a panel with the number of values in equal bins from 0 to `end` and the `limit` of the
+/// values.
+/// Larger values are in the last bin.
 pub fn histogram(
     title: &str,
     note: String,
@@ -79,7 +81,7 @@ pub fn histogram(
         title: title.into(),
         note,
         y: Some(0.0..top),
-        // Runs are whole.
+        // Numbers of runs are whole.
         y_ticks: highest.clamp(2, 6) as usize,
         marks: vec![
             bars,
@@ -94,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_are_values_that_occurred() {
+    fn percentiles_are_among_the_values() {
         let found = Percentiles::of((1..=200).rev().map(f64::from).collect()).unwrap();
         assert_eq!((found.median, found.p90, found.p99), (100.0, 180.0, 198.0));
         assert_eq!((found.count, found.max), (200, 200.0));

@@ -1,20 +1,20 @@
-//! Values that need not be equally far apart, laid out on the equal cells of a map.
+//! Values with unequal spacing, laid out on the equal cells of a map.
 
-/// Most places along an axis: more would be thinner than a pixel.
+/// Largest number of cells along an axis: more would be thinner than a pixel.
 const MOST_PLACES: usize = 1800;
 
-/// Equal places along an axis, each with the value nearest to its middle.
+/// Equal cells along an axis, each with the value nearest to its middle.
 pub struct Places {
-    /// Middle of the first.
+    /// Middle of the first cell.
     pub first: f64,
-    /// Distance of neighbours.
+    /// Spacing of the cells.
     pub step: f64,
-    /// Which value each place shows.
+    /// Index of the value that each cell shows.
     pub nearest: Vec<usize>,
 }
 
 impl Places {
-    /// Places as wide as the values are apart at the narrowest.
+    /// Creates cells as wide as the smallest spacing of the values.
     pub fn of(values: &[f64]) -> Self {
         let mut rising: Vec<f64> = values.to_vec();
         rising.sort_by(f64::total_cmp);
@@ -45,7 +45,7 @@ impl Places {
         }
     }
 
-    /// From the edge of the first to that of the last.
+    /// Returns the outer edges of the first and the last cell.
     pub fn ends(&self) -> core::ops::Range<f64> {
         let start = self.first - 0.5 * self.step;
         start..start + self.step * self.nearest.len() as f64
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_distances_have_a_place_each_and_others_as_many_as_they_need() {
+    fn equally_spaced_values_have_one_cell_each_and_others_several() {
         let equal = Places::of(&[0.3, 0.1, 0.2]);
         assert_eq!(equal.nearest, [1, 2, 0]);
         assert!(

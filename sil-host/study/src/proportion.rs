@@ -1,27 +1,27 @@
-//! A success rate and how well it is known.
+//! A success rate and its confidence interval.
 
 use serde::Serialize;
 
-/// 97.5 % of a standard normal variable lie below.
+/// 97.5 % quantile of the standard normal distribution.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// Successes among so many runs, with Wilson's 95 % interval, which holds near 0 and 1 too.
+/// Number of successes in a number of runs, with Wilson's 95 % interval, which also holds near 0 and 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Proportion {
-    /// Successes.
+    /// Number of successes.
     pub successes: usize,
-    /// Runs.
+    /// Number of runs.
     pub runs: usize,
-    /// Part that succeeded, 0 … 1; 0 of none.
+    /// Success rate, 0 … 1; 0 without runs.
     pub rate: f64,
-    /// Lower end of the interval.
+    /// Lower bound of the interval.
     pub lower: f64,
-    /// Upper end of the interval.
+    /// Upper bound of the interval.
     pub upper: f64,
 }
 
 impl Proportion {
-    /// So many out of so many.
+    /// Creates the proportion from the number of successes and the number of runs.
     pub fn new(successes: usize, runs: usize) -> Self {
         if runs == 0 {
             return Self {

@@ -1,6 +1,6 @@
-//! Has the motion ended in a slide that nothing can wake up?
+//! Detection of a motion that has ended in permanent sliding.
 //!
-//! A run may stop early where the rest of it is certain: the tip slides at rest on a
+//! A run may stop early where its rest is certain: the tip slides at rest on a
 //! belt of constant speed (θ̇ and θ̈ below 10⁻¹⁰), the equilibrium of the slide is
 //! stable with its eigenvalues to the left of −10⁻³ 1/s, and slip, pressure and p are all well away
 //! from zero. The state is then within about 10⁻⁷ of the equilibrium, where the linear
@@ -17,16 +17,16 @@ use painleve_shared::Pose;
 
 use super::chaos::tangent::along;
 
-/// At rest: rad/s and rad/s².
+/// Largest rates and accelerations at rest, rad/s and rad/s².
 const AT_REST: f64 = 1e-10;
 
-/// Real parts of the eigenvalues are below minus this, 1/s.
+/// Required stability margin: the real parts of the eigenvalues are below minus this, 1/s.
 const SLOWEST_DECAY_PER_S: f64 = 1e-3;
 
-/// Slip (m/s), pressure (m/s²) and p (1/kg) are above this.
+/// Required margin of slip (m/s), pressure (m/s²) and p (1/kg) from zero.
 const WELL_AWAY: f64 = 1e-3;
 
-/// Whether the plant, left alone, slides on for ever where it is.
+/// Whether the plant, without further input, slides permanently where it is.
 pub fn has_settled(plant: &ArmOnBelt) -> bool {
     let (mode, state, time_s) = (plant.mode(), plant.state(), plant.time_s());
     let motion = plant.motion();
@@ -44,7 +44,7 @@ pub fn has_settled(plant: &ArmOnBelt) -> bool {
     {
         return false;
     }
-    // At rest on the belt there is one direction to go, in which θ̈ = −stiffness·offset −
+    // At rest on the belt there is one degree of freedom, in which θ̈ = −stiffness·offset −
     // damping·rate.
     let pose = Pose::new(&theta(state));
     let normal = motion.arm.jacobian(&pose).row(1).transpose();
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_settled_stays_there_and_settles_only_late() {
+    fn a_settled_motion_stays_settled_and_settles_only_late() {
         let mut plant = plant(&PlantParameters::default(), -11.4, -35.1);
         plant.advance(5.0, &mut ()).unwrap();
         assert!(!has_settled(&plant));
@@ -103,8 +103,8 @@ mod tests {
         }
     }
 
-    /// A stiff spring would rather have the arm straight, to either side of a place where it
-    /// pushes neither way.
+    /// A stiff spring pushes the arm straight, away on either side from a position in which it
+    /// exerts no torque.
     #[test]
     fn rest_on_an_unstable_equilibrium_does_not_count() {
         let parameters = PlantParameters {

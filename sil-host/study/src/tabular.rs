@@ -7,42 +7,42 @@ use serde::Serialize;
 
 use super::{Study, StudyError};
 
-/// A study each of whose rows makes lines of its CSV file by itself, so that the file can
-/// be put together from rows that were computed apart.
+/// A study whose rows each make lines of its CSV file, so that the file can
+/// be assembled from rows computed separately.
 pub trait Tabular: Study {
     /// One line: a flat struct, whose field names are the header.
     type Line: Serialize;
 
-    /// The lines of a row, at least one.
+    /// Returns the lines of a row, at least one.
     fn lines(row: &Self::Row) -> Vec<Self::Line>;
 
-    /// Every seed that the rows depend on, by what it is for.
+    /// Returns every seed that the rows depend on, by its purpose.
     ///
     /// # Errors
-    /// [`StudyError`] if the study is wrong.
+    /// [`StudyError`] if the study is invalid.
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError>;
 }
 
-/// Any [`Tabular`] study, its rows already as text.
+/// Any [`Tabular`] study, with its rows as text.
 pub trait Table: Sync {
-    /// How many rows there are.
+    /// Returns the number of rows.
     fn len(&self) -> usize;
 
-    /// Whether there are none.
+    /// Whether there are no rows.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The header and the lines of row `index`, less than [`len`](Table::len).
+    /// Returns the header and the lines of row `index`, less than [`len`](Table::len).
     ///
     /// # Errors
-    /// [`StudyError`] if it cannot be computed.
+    /// [`StudyError`] if the row cannot be computed.
     fn records(&self, index: usize) -> Result<Records, StudyError>;
 
-    /// Every seed that the rows depend on, by what it is for.
+    /// Returns every seed that the rows depend on, by its purpose.
     ///
     /// # Errors
-    /// [`StudyError`] if the study is wrong.
+    /// [`StudyError`] if the study is invalid.
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError>;
 }
 
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn text_comes_back_as_it_was_written() {
+    fn text_round_trips_through_csv() {
         let lines = [
             Line {
                 name: "a \"b\", c\nd",

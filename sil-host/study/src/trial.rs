@@ -1,5 +1,5 @@
-//! One closed loop in this process, tick by tick: the same simulation and the same
-//! controller as in a run of two processes, without its record.
+//! A closed loop in this process, tick by tick, with the same simulation and the same
+//! controller as a run of two processes, but without its record.
 
 use painleve_plant::Controller;
 use painleve_plant::mechanics::BuiltInPlant;
@@ -18,7 +18,7 @@ pub struct Trial<P = BuiltInPlant> {
 }
 
 impl Trial {
-    /// The scenario at its start.
+    /// Creates the closed loop in the scenario's initial state.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
@@ -28,7 +28,7 @@ impl Trial {
 }
 
 impl<P: Plant> Trial<P> {
-    /// A simulation of any plant, with the scenario's controller.
+    /// Creates a closed loop of any plant with the scenario's controller.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
@@ -43,7 +43,7 @@ impl<P: Plant> Trial<P> {
     /// Runs one control tick.
     ///
     /// # Errors
-    /// [`PlantError`] if the plant cannot go on.
+    /// [`PlantError`] if the plant cannot continue.
     pub fn tick(&mut self, probe: &mut impl Probe) -> Result<(), PlantError> {
         let sensor = self.simulation.sample(probe)?;
         let arrives = !self.simulation.sensor_frame_is_lost();
@@ -54,22 +54,22 @@ impl<P: Plant> Trial<P> {
         self.simulation.advance(answer, probe)
     }
 
-    /// Simulated time, s.
+    /// Returns the simulated time, s.
     pub fn time_s(&self) -> f64 {
         self.simulation.plant().time_s()
     }
 
-    /// Where the tip is along the belt, m.
+    /// Returns the tip position along the belt, m.
     pub fn tip_t_m(&self) -> f64 {
         self.simulation.plant().snapshot().tip_t_m
     }
 
-    /// What the controller answered last.
+    /// Returns the last answer of the controller.
     pub fn answer(&self) -> &ActuatorFrame {
         &self.answer
     }
 
-    /// The fault that the controller has latched.
+    /// Returns the latched fault of the controller.
     pub fn fault(&self) -> Option<Fault> {
         self.answer.latched_fault()
     }

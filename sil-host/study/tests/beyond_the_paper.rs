@@ -1,6 +1,6 @@
-//! What the controller does that the paper's does not, in the closed loop with hardware-like
-//! converters: to the edge and not over it, with friction guessed wrongly, on reversed and
-//! standing belts, and out of the bounce.
+//! Features of the controller beyond the paper's, in the closed loop with hardware-like
+//! converters: stopping at the edge, wrong friction estimates, reversed and
+//! standing belts, and capture from bouncing.
 
 // Helpers of tests may panic as tests do.
 #![allow(clippy::unwrap_used)]
@@ -18,16 +18,16 @@ use painleve_study::rows;
 /// 0.5 % of the force cell's range.
 const NOISE: &str = "converters.force.noise_n=0.1";
 
-/// What a test asks about the course of a run.
+/// Quantities that a test checks over the course of a run.
 #[derive(Default)]
 struct Course {
     /// Largest distance from the reference after 0.2 s, m.
     tip_error_m: f64,
-    /// The same in the last second, m.
+    /// Largest distance from the reference in the last second, m.
     rest_error_m: f64,
     /// Largest deviation from 10 N after 0.2 s, N.
     force_error_n: f64,
-    /// Last time in the air, s.
+    /// Time of the last flight, s.
     last_flight_s: f64,
     at_edge: bool,
     duration_s: f64,
@@ -85,8 +85,8 @@ fn ramp(target_m: f64) -> String {
     format!("controller.reference=[{{ ramp = {{ target_m = {target_m}, duration_s = 2.0 }} }}]")
 }
 
-/// Where p = 0 for both postures at three frictions, m. At μ = 0.4 elbow up there is no such
-/// place within the arm's reach, 0.1841 m.
+/// Tip position with p = 0 for both postures at three friction coefficients, m. At μ = 0.4
+/// elbow up there is no such position within the arm's reach, 0.1841 m.
 const EDGES: [(&str, f64, f64); 6] = [
     ("hybrid-elbow-down", 0.4, 0.172_68),
     ("hybrid-elbow-down", 0.6, 0.164_70),
@@ -119,7 +119,7 @@ fn a_reference_beyond_the_edge_ends_at_the_edge_without_lift_off() {
 }
 
 #[test]
-fn a_first_guess_of_friction_that_is_wrong_does_not_matter() {
+fn a_wrong_initial_friction_does_not_matter() {
     for guess in [0.42, 0.78] {
         let guess = format!("controller.friction.first_guess={guess}");
         for scenario in ["hybrid-elbow-down", "hybrid-elbow-up"] {
@@ -133,7 +133,7 @@ fn a_first_guess_of_friction_that_is_wrong_does_not_matter() {
 }
 
 #[test]
-fn a_bouncing_arm_is_caught() {
+fn a_bouncing_arm_is_captured() {
     for seed in 0..20 {
         let enable_s = 5.0 + 0.037 * f64::from(seed);
         let overrides = [
@@ -172,7 +172,7 @@ fn belts_may_stand_reverse_and_stick() {
         );
         assert_eq!(result.statistics.lift_offs, 0, "{profile}");
         assert_eq!(result.fault, None, "{profile}");
-        // On a belt that stands the tip hunts about its place: stick, and an integral.
+        // On a standing belt, stick and the integral action make the tip hunt about its target.
         let limit_m = if profile.ends_with("=0.0") {
             3e-3
         } else {
@@ -233,7 +233,7 @@ fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
     assert!(without < 30, "{without}");
 }
 
-/// No readings of forces at all, so that friction and the belt's speed have to be given.
+/// Without any force reading, so that friction and the belt speed must be given.
 const NO_FORCE_CELL: [&str; 8] = [
     "controller.contact.evidence=encoders",
     "controller.law.hybrid.friction={ model = { friction = 0.6, belt_speed_m_s = -0.4 } }",
@@ -246,7 +246,7 @@ const NO_FORCE_CELL: [&str; 8] = [
 ];
 
 #[test]
-fn an_arm_without_any_force_cell_slides_with_friction_given_and_is_caught() {
+fn an_arm_without_any_force_cell_slides_with_given_friction_and_is_captured() {
     for scenario in ["hybrid-elbow-down", "hybrid-elbow-up", "capture"] {
         let (result, course) = run(scenario, &NO_FORCE_CELL);
         assert_eq!(result.fault, None, "{scenario}");
@@ -255,7 +255,7 @@ fn an_arm_without_any_force_cell_slides_with_friction_given_and_is_caught() {
             "{scenario}: {}",
             course.rest_error_m
         );
-        // In `capture` it is switched on after 1.5 s.
+        // In `capture` the controller is switched on after 1.5 s.
         let flies_until_s = if scenario == "capture" { 2.0 } else { 0.0 };
         let last_s = course.last_flight_s;
         assert!(last_s <= flies_until_s, "{scenario}: {last_s} s");
@@ -327,7 +327,7 @@ fn a_tip_that_sticks_to_a_slow_belt_breaks_away_without_leaving_it() {
     }
 }
 
-/// Slow sampling, coarse encoders: the governor keeps away from the edge by more.
+/// Slow sampling and coarse encoders: the governor increases its margin to the edge.
 #[test]
 fn margins_grow_with_the_tick_and_with_the_counts() {
     let beyond = minimum_jerk(0.18471);

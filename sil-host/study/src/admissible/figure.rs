@@ -14,7 +14,7 @@ const CURVE_POINTS: usize = 400;
 impl Figure for Admissible {
     fn svg(&self) -> Result<String, PlotError> {
         let mut marks = Vec::new();
-        // The arm has been checked before.
+        // The arm was checked before.
         if let Ok(arm) = Arm::new(self.arm) {
             for ((posture, name, _), colour) in
                 self.postures().into_iter().zip([BLUE_INK, VERMILLION])

@@ -1,5 +1,5 @@
-//! Table II: the tip positions at which p > 0, so that neither an indeterminate nor an
-//! inconsistent solution is near, and the least friction with which the paradox is possible.
+//! Table II: the tip positions at which p > 0, away from all indeterminate and
+//! inconsistent solutions, and the critical friction coefficient of the paradox.
 
 mod figure;
 mod options;
@@ -15,51 +15,51 @@ use super::{Study, StudyError, paper};
 
 pub use options::Options;
 
-/// Where p > 0 at one friction coefficient, while the tip slips with ż_r > 0.
+/// The admissible tip positions (p > 0) at one friction coefficient, with slip ż_r > 0.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Admissible {
     /// Friction coefficient μ.
     pub mu: f64,
-    /// Least friction coefficient with which p = 0 somewhere on the belt.
+    /// Smallest friction coefficient with which p = 0 somewhere on the belt.
     pub critical_friction: f64,
-    /// Where that is, m.
+    /// Tip position at which this happens, m.
     pub critical_tip_t_m: f64,
-    /// In which posture.
+    /// Posture in which this happens.
     pub critical_posture: Posture,
-    /// Farthest the tip reaches on the belt, m.
+    /// Largest tip position that the arm reaches on the belt, m.
     pub reach_m: f64,
-    /// θ2 > θ1.
+    /// Elbow posture with θ2 > θ1.
     pub elbow_up: Intervals,
-    /// θ2 < θ1.
+    /// Elbow posture with θ2 < θ1.
     pub elbow_down: Intervals,
     #[serde(skip)]
     arm: ArmParameters<f64>,
 }
 
-/// Where p > 0 in one posture.
+/// The admissible tip positions in one posture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Intervals {
-    /// Tip positions z_t from … to, m, in order.
+    /// Intervals of the tip position z_t, m, in ascending order.
     pub intervals_m: Vec<[f64; 2]>,
-    /// The paper's interval, where it gives one.
+    /// The paper's interval, if it gives one.
     pub paper_m: Option<[f64; 2]>,
-    /// Upper end of ours minus that of the paper's, m.
+    /// Computed upper end minus the paper's, m.
     pub difference_m: Option<f64>,
-    /// Friction coefficient of the paper's grid (steps of 0.1) at which the upper end is the
-    /// paper's to its three digits, and that end, m: the paper's own μ, unless it slipped.
+    /// Friction coefficient of the paper's grid (steps of 0.1) whose upper end matches the paper's
+    /// three digits, and that upper end, m. It is the paper's own μ except for a misprint.
     pub paper_fits: Option<PaperFits>,
 }
 
-/// Where a value of the paper is right.
+/// The friction coefficient that matches a printed value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PaperFits {
     /// Friction coefficient μ.
     pub mu: f64,
-    /// Upper end there, m.
+    /// Upper end at that coefficient, m.
     pub to_m: f64,
 }
 
-/// What to compute.
+/// Settings of the study.
 #[derive(Clone, Debug)]
 pub struct AdmissibleStudy {
     /// The arm.
@@ -68,7 +68,7 @@ pub struct AdmissibleStudy {
     pub mu: f64,
 }
 
-/// One row: everything.
+/// The single row of the study.
 impl Study for AdmissibleStudy {
     type Row = Admissible;
 
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn table_two_of_the_paper_and_its_one_slip() {
+    fn table_two_of_the_paper_and_its_one_error() {
         let ours = at(0.6);
         let [[from, to]] = ours.elbow_up.intervals_m[..] else {
             panic!("{ours:?}");
@@ -167,7 +167,7 @@ mod tests {
             (from + 0.184_102_6).abs() < 1e-6 && (to - 0.164_705).abs() < 5e-7,
             "{ours:?}"
         );
-        // What the paper prints for elbow down is its value at μ = 0.5.
+        // The paper's elbow-down value belongs to μ = 0.5.
         assert_eq!(
             format!("{:.3}", at(0.5).elbow_down.intervals_m[0][1]),
             "0.168"
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_critical_friction_parts_one_interval_from_two() {
+    fn the_critical_friction_separates_one_interval_from_two() {
         let critical = at(0.6).critical_friction;
         assert!((critical - 0.363_96).abs() < 5e-6, "{critical}");
         assert!((at(0.6).critical_tip_t_m - 0.1782).abs() < 5e-5);

@@ -1,4 +1,4 @@
-//! The intervals as a table, the paper's beside.
+//! Table of the intervals, with the paper's for comparison.
 
 use comfy_table::Table;
 use painleve_shared::Posture;
@@ -8,7 +8,7 @@ use super::{Admissible, Intervals};
 use crate::outcome::{self, Outcome};
 use crate::paper;
 
-/// One interval.
+/// One interval, as a line of the CSV file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Line {
     mu: f64,

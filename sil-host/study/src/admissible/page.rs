@@ -53,7 +53,7 @@ fn table_2(outcome: &Admissible) -> Result<Section, PlotError> {
             &format!("p > 0, {name}"),
             format!("{from} … {to} m"),
             ours.join(", "),
-            // To the digits that the paper prints.
+            // Compares to the digits that the paper prints.
             intervals
                 .difference_m
                 .is_some_and(|metres| metres.abs() <= 5e-4),

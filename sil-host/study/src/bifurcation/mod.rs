@@ -1,8 +1,8 @@
-//! Fig. 4: where in friction and belt speed the arm keeps bouncing, by brute force.
+//! Fig. 4: friction and belt speeds at which the arm keeps bouncing, by brute force.
 //!
-//! Every cell is run through a transient and then watched. The arm bounces if its tip leaves the belt
-//! while it is watched; the paper's measure, the largest θ̇1, is above zero there
-//! and zero up to rounding elsewhere.
+//! Every cell runs through a transient and is then recorded. The arm bounces if its tip leaves the belt
+//! during the recording; the paper's measure, the largest θ̇1, is then above zero,
+//! and otherwise zero up to rounding.
 
 mod figure;
 mod options;
@@ -25,11 +25,11 @@ pub use outcome::{Diagram, Window};
 /// The diagram, cell by cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bifurcation {
-    /// Its cells.
+    /// Cells of the diagram.
     pub cells: Cells,
 }
 
-/// What the arm does in one cell.
+/// Motion of the arm in one cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Friction coefficient μ.
@@ -42,19 +42,19 @@ pub struct Row {
     pub max_theta1_dot_rad_s: f64,
     /// Whether the tip keeps leaving the belt.
     pub bouncing: bool,
-    /// Part of the time in contact.
+    /// Fraction of the time in contact.
     pub contact_fraction: f64,
-    /// Highest point of the tip over the belt, m.
+    /// Largest tip height over the belt, m.
     pub apex_m: f64,
     /// Impacts with the belt per second.
     pub impacts_per_s: f64,
-    /// Where it started: θ1, degrees.
+    /// Initial angle θ1, degrees.
     pub start_theta1_deg: f64,
-    /// θ2, degrees.
+    /// Initial angle θ2, degrees.
     pub start_theta2_deg: f64,
-    /// θ̇1, rad/s.
+    /// Initial rate θ̇1, rad/s.
     pub start_theta1_dot_rad_s: f64,
-    /// θ̇2, rad/s.
+    /// Initial rate θ̇2, rad/s.
     pub start_theta2_dot_rad_s: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The cells put together: where the arm bounces at each friction coefficient.
+//! The outcome of all cells: the belt speeds with bouncing at each friction coefficient.
 
 use comfy_table::Table;
 use serde::Serialize;
@@ -14,34 +14,34 @@ use crate::paper;
 pub struct Diagram {
     /// All cells, in the order of their numbers.
     pub rows: Vec<Row>,
-    /// Where the arm bounces.
+    /// Belt speeds with bouncing.
     pub windows: Vec<Window>,
     #[serde(skip)]
     settings: Cells,
 }
 
-/// Where the arm bounces at one friction coefficient.
+/// Belt speeds with bouncing at one friction coefficient.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Window {
     /// Friction coefficient μ.
     pub mu: f64,
-    /// Initial condition; `random` for all random ones together, of which one that bounces
-    /// is enough.
+    /// Initial condition; `random` for all random ones together, one of which must
+    /// bounce.
     pub initial: String,
-    /// Belt speeds from … to, m/s: the outermost of neighbouring ones that bounce.
+    /// Intervals of belt speed, m/s, bounded by the outermost of adjacent speeds with bouncing.
     pub v_belt_m_s: Vec<[f64; 2]>,
-    /// Cells that bounce.
+    /// Number of cells with bouncing.
     pub bouncing: usize,
-    /// Cells in all.
+    /// Number of cells.
     pub cells: usize,
     /// Largest θ̇1, rad/s.
     pub max_theta1_dot_rad_s: f64,
-    /// The paper's belt speeds, if it has any bounces there, m/s.
+    /// The paper's belt speeds with bouncing, m/s, if it has any here.
     pub paper_m_s: Option<[f64; 2]>,
 }
 
 impl Diagram {
-    /// Puts the rows of a study together.
+    /// Collects the rows of a study.
     pub fn new(study: &Bifurcation, rows: Vec<Row>) -> Self {
         let settings = study.cells.clone();
         let mut diagram = Self {
@@ -59,12 +59,12 @@ impl Diagram {
         diagram
     }
 
-    /// What was varied.
+    /// Returns the varied parameters.
     pub fn settings(&self) -> &Cells {
         &self.settings
     }
 
-    /// Names of the initial conditions, all random ones as one.
+    /// Returns the names of the initial conditions, with all random ones as one.
     pub fn groups(&self) -> Vec<&'static str> {
         let initial = self.settings.initial.iter();
         let mut groups: Vec<&str> = initial.map(|one| one.group()).collect();
@@ -72,7 +72,8 @@ impl Diagram {
         groups
     }
 
-    /// The rows of one friction coefficient, belt speed (both by place) and group of initial conditions.
+    /// Returns the rows of one friction coefficient and belt speed (both by index) and group of
+    /// initial conditions.
     pub fn at(&self, mu: usize, v_belt: usize, group: &str) -> impl Iterator<Item = &Row> {
         let Cells {
             v_belt_m_s,
@@ -87,7 +88,7 @@ impl Diagram {
             .map(|(row, _)| row)
     }
 
-    /// Places of the belt speeds in rising order.
+    /// Returns the indices of the belt speeds in ascending order.
     pub fn rising_speeds(&self) -> Vec<usize> {
         let speeds = &self.settings.v_belt_m_s;
         let mut places: Vec<usize> = (0..speeds.len()).collect();

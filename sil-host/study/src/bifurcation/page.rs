@@ -12,7 +12,7 @@ use crate::{StudyError, paper};
 /// A section at the paper's friction, and a map over friction and belt speed.
 ///
 /// # Errors
-/// [`StudyError`] if one cannot be computed.
+/// [`StudyError`] if a diagram cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let fineness = page.fineness;
     let cells = page.cells("0.6", fineness.section_v_belt, &[Initial::A, Initial::D])?;
@@ -67,8 +67,8 @@ fn bifurcation_section(outcome: &Diagram) -> Result<Section, PlotError> {
         }
     }
     section.reasons.push(
-        "The paper names no impact law, and the edges of the window depend on it: Routh's impulse \
-         process with Poisson restitution 0.10 has the paper's window to within a step or two of 0.005 m/s."
+        "The paper does not name its impact law, and the edges of the window depend on it: Routh's impulse \
+         process with Poisson restitution 0.10 reproduces the paper's window to within a step or two of 0.005 m/s."
             .into(),
     );
     Ok(section)
@@ -101,7 +101,7 @@ fn bifurcation_map(outcome: &Diagram) -> Result<Section, PlotError> {
         least.map_or("none".into(), |mu| mu.to_string()),
         least == Some(0.4) && quiet.iter().all(|window| window.mu < 0.4),
     ));
-    // The window proper, without belt speeds at which the arm bounces all by itself.
+    // The main window, without belt speeds at which the arm bounces in isolation.
     let widest = |window: &&Window| {
         let width = |stretch: &[f64; 2]| stretch[1] - stretch[0];
         let stretches = window.v_belt_m_s.iter().copied();
@@ -134,7 +134,7 @@ fn bifurcation_map(outcome: &Diagram) -> Result<Section, PlotError> {
             .collect();
         if !lonely.is_empty() {
             section.comparisons.push(Comparison::beyond(
-                &format!("bounces outside of the window at μ = {}", window.mu),
+                &format!("bounces outside the window at μ = {}", window.mu),
                 stretches(&lonely),
             ));
         }
@@ -153,10 +153,10 @@ fn stretches(speeds: &[[f64; 2]]) -> String {
     words.join(", ")
 }
 
-/// Whether the outer ends of some stretches are those of one interval, within a tolerance.
+/// Whether the outer ends of several intervals agree within a tolerance.
 fn within(speeds: &[[f64; 2]], [from, to]: [f64; 2], tolerance: f64) -> bool {
     match (speeds.first(), speeds.last()) {
-        // A little more than the tolerance, for the rounding of both.
+        // Slightly more than the tolerance, for the rounding of both.
         (Some(first), Some(last)) => {
             (first[0] - from).abs() <= tolerance + 1e-9 && (last[1] - to).abs() <= tolerance + 1e-9
         }

@@ -1,4 +1,4 @@
-//! Capture: the arm bounces without control, and the controller is switched on at a random phase.
+//! Capture of a bouncing arm: the controller is switched on at a random phase of the bouncing.
 
 mod figure;
 mod options;
@@ -19,19 +19,19 @@ use super::{Study, StudyError};
 pub use options::Options;
 pub use outcome::Captures;
 
-/// Time for which the arm bounces at least before it is caught, s.
+/// Shortest time of bouncing before the controller is switched on, s.
 const BOUNCES_S: f64 = 5.0;
-/// Stretch of time within which the controller is switched on, s; many bounces.
+/// Interval within which the controller is switched on, s; it spans many bounces.
 const PHASES_S: f64 = 2.0;
-/// How long a run goes on from then, s.
+/// Duration of a run after switching on, s.
 const CAUGHT_S: f64 = 2.0;
-/// By then the tip must have left the belt for the last time, s.
+/// Latest time for the last landing, s.
 const LIMIT_S: f64 = 0.5;
-/// Time at the end in which the tip must be at its reference, s, and how near, m.
+/// Final interval in which the tip must be at its reference, s, and the tolerance, m.
 const WATCHED_S: f64 = 0.1;
 const WITHIN_M: f64 = 1e-3;
 
-/// What to study.
+/// Settings of the study.
 #[derive(Clone, Debug)]
 pub struct Capture {
     /// Seed of all runs.
@@ -45,32 +45,33 @@ pub struct Capture {
 /// One run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Its number.
+    /// Number of the run.
     pub index: usize,
-    /// When the controller was switched on, s.
+    /// Time at which the controller was switched on, s.
     pub enabled_s: f64,
-    /// Seed of its noise.
+    /// Seed of the noise.
     pub noise_seed: u64,
-    /// Time from there to the end of the last flight, s.
+    /// Time from switching on to the end of the last flight, s.
     pub capture_s: f64,
-    /// Largest distance from the reference at the end, m.
+    /// Largest distance from the reference in the final interval, m.
     pub error_m: f64,
-    /// Number of the fault that the controller has latched.
+    /// Number of the latched fault.
     pub fault: Option<u8>,
-    /// Where the tip ended, m.
+    /// Final tip position, m.
     pub tip_t_m: f64,
-    /// Whether the tip was caught in time and held its reference.
+    /// Whether the tip was captured in time and held its reference.
     pub success: bool,
-    /// Whether the plant could be solved to the end; what else is here is as far as it could.
+    /// Whether the plant could be solved to the end; otherwise the other fields describe the run
+    /// until then.
     pub solved: bool,
 }
 
 impl Capture {
-    /// The scenario of a run: x0,a, 0.5 % noise of the force cell, no reference but the
-    /// place where the tip is caught.
+    /// Returns the scenario of a run: x0,a, 0.5 % noise of the force cell, and as reference only
+    /// the position at which the tip is captured.
     ///
     /// # Errors
-    /// [`StudyError`] if an override is wrong.
+    /// [`StudyError`] if an override is invalid.
     pub fn scenario(&self, index: usize) -> Result<Scenario, StudyError> {
         let mut generator = ChaCha8Rng::seed_from_u64(self.seed);
         generator.set_stream(index as u64);
@@ -86,10 +87,10 @@ impl Capture {
         Ok(scenario.with_overrides("capture", &self.overrides)?)
     }
 
-    /// Makes the first run, so that a wrong override is told before anything runs.
+    /// Builds the first run, so that an invalid override is reported before any run starts.
     ///
     /// # Errors
-    /// [`StudyError`] if it cannot be made.
+    /// [`StudyError`] if it cannot be built.
     pub fn check(&self) -> Result<(), StudyError> {
         Trial::new(&self.scenario(0)?)?;
         Ok(())

@@ -1,4 +1,4 @@
-//! Captures as a table and as a histogram, the limit beside.
+//! Captures as a table and as a histogram, with the limit.
 
 use comfy_table::Table;
 use serde::Serialize;
@@ -8,12 +8,12 @@ use crate::distribution::Percentiles;
 use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
 
-/// What came of it.
+/// Outcome of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Captures {
-    /// Runs that succeeded.
+    /// Success rate.
     pub success: Proportion,
-    /// Runs whose plant could not be solved; the distributions are of the others.
+    /// Number of runs whose plant could not be solved; the distributions are of the other runs.
     pub unsolved: usize,
     /// Times to capture, s.
     pub capture_s: Option<Percentiles>,
@@ -24,7 +24,7 @@ pub struct Captures {
 }
 
 impl Captures {
-    /// Of all rows.
+    /// Collects all rows.
     pub fn new(rows: Vec<Row>) -> Self {
         let solved: Vec<&Row> = rows.iter().filter(|row| row.solved).collect();
         let of = |value: fn(&Row) -> f64| {

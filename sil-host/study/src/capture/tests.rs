@@ -5,7 +5,7 @@ use crate::outcome::plain;
 use crate::{Outcome, rows};
 
 #[test]
-fn bouncing_arms_are_caught_alike_on_any_number_of_threads() {
+fn captures_do_not_depend_on_the_number_of_threads() {
     let study = Capture {
         seed: 1,
         runs: 6,
@@ -23,7 +23,7 @@ fn bouncing_arms_are_caught_alike_on_any_number_of_threads() {
 }
 
 #[test]
-fn an_arm_without_torque_is_not_caught() {
+fn an_arm_without_torque_is_not_captured() {
     let study = Capture {
         seed: 1,
         runs: 1,
@@ -34,9 +34,9 @@ fn an_arm_without_torque_is_not_caught() {
 }
 
 #[test]
-fn a_run_that_cannot_be_solved_is_counted_and_none_of_the_others_is_lost() {
+fn a_run_that_cannot_be_solved_is_counted_and_all_others_are_kept() {
     let unsolvable = [
-        // As it falls, this arm jams at full stretch.
+        // During its fall, this arm jams at full stretch.
         "belt.friction=0.488",
         "belt.profile={ kind = \"constant\", speed_m_s = 0.0 }",
         "impact={ law = \"poisson\", restitution = 0.0 }",
@@ -62,7 +62,7 @@ fn a_run_that_cannot_be_solved_is_counted_and_none_of_the_others_is_lost() {
     assert_eq!(captures.capture_s.map(|times| times.count), Some(1));
 }
 
-/// Made by hand, so that no change of the controller changes it.
+/// Uses rows made by hand, so that a change of the controller does not change the snapshot.
 #[test]
 fn the_table_names_the_runs_that_failed() {
     let row = |index: usize, capture_s: f64, error_m: f64| Row {

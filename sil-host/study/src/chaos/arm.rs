@@ -1,4 +1,4 @@
-//! A small deviation from the motion of the simulated arm.
+//! Deviation of a neighbouring motion of the simulated arm.
 
 use painleve_plant::mechanics::dop853::{Step, Tolerance};
 use painleve_plant::mechanics::impact::{ImpactKind, ImpactLaw, state_after};
@@ -10,33 +10,34 @@ use painleve_shared::Pose;
 
 use super::tangent::{Crossing, Tangent, along, along_by, slope_along};
 
-/// Watches a plant on a belt of constant speed and carries a deviation along.
+/// Follows a plant on a belt of constant speed and propagates a deviation.
 #[derive(Clone, Debug)]
 pub struct ArmTangent {
     impact: ImpactLaw,
     tangent: Tangent<4>,
-    /// Mode and end of the last step: what an event sets out from.
+    /// Mode and state at the end of the last step, where the next event starts.
     before: Option<(ContactMode, State)>,
     /// Impacts since the last step, in order.
     impacts: Vec<ImpactKind>,
     step: Box<Step<4>>,
 }
 
-/// No step is refused here: the plant has chosen its size.
+/// Tolerances with which no step is rejected: the plant has chosen the step size.
 const ANY_ERROR: Tolerance = Tolerance {
     relative: 1.0,
     absolute: 1.0,
 };
 
-/// Differences at an impact, rad/s per m/s of approach: neighbours shall approach as well.
+/// Size of differences at an impact, rad/s per m/s of approach, so that neighbours approach as well.
 const PER_APPROACH: f64 = 0.1;
 
-/// Impacts slower than this, m/s, are as slow as it for the size of differences.
+/// Smallest approach speed used for the size of differences, m/s.
 const SLOWEST_APPROACH_M_S: f64 = 1e-6;
 
 impl ArmTangent {
-    /// A deviation `tangent` at the beginning of the plant's next step; `impact` is
-    /// the plant's law.
+    /// Creates the observer with the deviation `tangent` at the beginning of the plant's next step;
+    /// `impact` is
+    /// the plant's impact law.
     pub fn new(impact: ImpactLaw, tangent: Tangent<4>) -> Self {
         Self {
             impact,
@@ -47,22 +48,22 @@ impl ArmTangent {
         }
     }
 
-    /// The deviation at the end of the last step.
+    /// Returns the deviation at the end of the last step.
     pub fn tangent(&self) -> &Tangent<4> {
         &self.tangent
     }
 
-    /// As [`tangent`](Self::tangent).
+    /// Returns the deviation mutably, see [`tangent`](Self::tangent).
     pub fn tangent_mut(&mut self) -> &mut Tangent<4> {
         &mut self.tangent
     }
 
-    /// The state before the event from which the next step sets out, if there was a step.
+    /// Returns the state before the event that starts the next step; `None` before the first step.
     pub fn before(&self) -> Option<&State> {
         self.before.as_ref().map(|(_, state)| state)
     }
 
-    /// Carries the deviation across what happened between the last step and this one.
+    /// Propagates the deviation across the events between the last step and this one.
     fn cross(&mut self, mode: ContactMode, state: &State, now: &ArmStep<'_>) {
         let (motion, time_s) = (now.motion, now.start_s);
         let flow_before = motion.derivative(mode, time_s, state);
@@ -74,13 +75,13 @@ impl ArmTangent {
             .transpose();
         let guard = |number: usize, direction: &State| {
             if mode == ContactMode::Flight {
-                // In a series of bounces that dies out differences would drown in rounding.
+                // In a decaying series of bounces, differences would drown in rounding.
                 normal.dot(theta(direction).vector())
             } else {
                 slope_along(state, direction, |x| functions(x)[number])
             }
         };
-        // The event that has happened is the one whose guard is nearest to zero in time.
+        // The event is the one whose guard is nearest to zero in time.
         let nearest = (0..3)
             .map(|number| {
                 let rate = guard(number, &flow_before);
@@ -108,14 +109,14 @@ impl ArmTangent {
             |direction| guard(number, direction),
             |direction| {
                 let jumped = along_by(size, state, direction, jump);
-                // Only velocities jump, and along the guard nothing is moved onto the belt.
+                // Only velocities jump, and no position moves along the guard.
                 State::new(direction[0], direction[1], jumped[2], jumped[3])
             },
         );
     }
 }
 
-/// The state after the impacts between two steps, on the manifold of the mode that follows.
+/// Returns the state after the impacts between two steps, on the manifold of the next mode.
 fn jump(
     motion: &Motion<'_>,
     law: &ImpactLaw,
@@ -129,13 +130,13 @@ fn jump(
         if kind == ImpactKind::WithoutCollision {
             state = motion.onto_belt(&state);
         }
-        // The plant has come through this impact, and so do its neighbours.
+        // The plant has completed this impact, and so do its neighbours.
         state = state_after(motion, law, time_s, &state, kind).unwrap_or(state);
     }
     onto_manifold(motion, time_s, mode, &state)
 }
 
-/// The nearest state that a contact mode allows.
+/// Returns the nearest state that a contact mode allows.
 fn onto_manifold(motion: &Motion<'_>, time_s: f64, mode: ContactMode, state: &State) -> State {
     match mode {
         ContactMode::Flight => *state,

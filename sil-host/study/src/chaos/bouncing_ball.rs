@@ -1,4 +1,4 @@
-//! The criterion on a ball that bounces on a vibrating table, whose answers are known.
+//! The criterion on a ball bouncing on a vibrating table, whose exponents are known.
 
 use nalgebra::{SVector, Vector2};
 use painleve_plant::mechanics::event::first_negative;
@@ -6,9 +6,9 @@ use painleve_plant::mechanics::event::first_negative;
 use super::tangent::{Crossing, along, slope_along};
 use super::{Regime, Return, Tangent, Verdict};
 
-/// A ball on a table that goes up and down as A sin ωt, with restitution e: flights with
-/// the height and velocity of the ball and the phase of the table as state, impacts as
-/// events, the deviation carried across them as in the arm.
+/// A ball on a table that moves as A sin ωt, with restitution e. The state is
+/// the height and velocity of the ball and the phase of the table; flights are smooth, impacts are
+/// events, and the deviation is propagated across them as in the arm.
 struct Ball {
     amplitude_m: f64,
     restitution: f64,
@@ -49,7 +49,7 @@ impl Ball {
         SVector::from([x.x, table + self.restitution * (table - x.y), x.z])
     }
 
-    /// How long the ball flies.
+    /// Returns the duration of the ball's flight.
     fn flight_s(&self, x: &SVector<f64, 3>) -> f64 {
         let gap = |t: f64| self.guard(&Self::fly(x, t));
         let look = 1e-3 / OMEGA_RAD_S;
@@ -117,7 +117,7 @@ impl Ball {
         (ball, start)
     }
 
-    /// Larger multiplier of the map with that trace.
+    /// Returns the larger multiplier of the map with this trace.
     fn multiplier(restitution: f64, trace: f64) -> f64 {
         let root = 0.25 * trace * trace - restitution * restitution;
         if root < 0.0 {
@@ -127,7 +127,7 @@ impl Ball {
         }
     }
 
-    /// The exponent by the map's Jacobian, written down by hand, along the same orbit.
+    /// Returns the exponent along the same orbit from the map's Jacobian, derived by hand.
     fn exponent_by_hand(&self, start: SVector<f64, 3>, transient: usize, impacts: usize) -> f64 {
         let (mut x, mut deviation, mut growth, mut time_s) =
             (start, Vector2::new(1.0, 0.3), 0.0, 0.0);
@@ -184,7 +184,7 @@ fn the_ball_with_one_impact_per_period_has_the_exponent_of_its_multiplier() {
 
 /// The multiplier is −1 where the trace is −(1 + e²), here −1.25.
 #[test]
-fn the_balls_period_doubles_where_it_must() {
+fn the_balls_period_doubles_at_the_known_amplitude() {
     for (trace, period) in [(-1.2, 1), (-1.3, 2), (-1.5, 2)] {
         let (ball, mut start) = Ball::with_period_one(0.5, trace);
         start.y *= 1.001;
@@ -198,7 +198,7 @@ fn the_balls_period_doubles_where_it_must() {
 }
 
 #[test]
-fn a_hard_shaken_ball_is_chaotic_with_the_exponent_of_its_jacobian() {
+fn a_strongly_shaken_ball_is_chaotic_with_the_exponent_of_its_jacobian() {
     let (ball, mut start) = Ball::with_period_one(0.95, -5.0);
     start.y *= 1.1;
     let verdict = ball.judge(start, 300, 1700);

@@ -1,11 +1,11 @@
-//! The criterion on maps whose answer is known.
+//! The criterion on maps with known exponents.
 
 use nalgebra::{Matrix2, SVector, Vector1, Vector2};
 
 use super::tangent::along;
 use super::{Regime, Return, Tangent, Verdict};
 
-/// Judges a map by its iterates after a transient.
+/// Classifies a map by its iterates after a transient.
 fn judge_map<const N: usize>(
     start: SVector<f64, N>,
     transient: usize,
@@ -65,7 +65,7 @@ fn the_logistic_maps_2_cycle_has_the_exponent_of_its_multiplier() {
 /// Period doublings at r = 3, 3.4495, 3.5441, 3.5644 …, chaos from 3.5699, the window of period 3 from
 /// 1 + √8 = 3.8284.
 #[test]
-fn the_logistic_maps_cascade_and_windows_are_told() {
+fn the_logistic_maps_cascade_and_windows_are_classified() {
     for (r, regime, period) in [
         (2.9, Regime::Periodic, Some(1)),
         (3.4, Regime::Periodic, Some(2)),
@@ -85,9 +85,9 @@ fn the_logistic_maps_cascade_and_windows_are_told() {
     }
 }
 
-/// At a period doubling the exponent is zero: nothing may be claimed.
+/// At a period doubling the exponent is zero, and the verdict must be undecided.
 #[test]
-fn at_a_bifurcation_the_verdict_is_open() {
+fn at_a_bifurcation_the_verdict_is_undecided() {
     assert_eq!(logistic(3.0, 400).regime, Regime::Undecided);
 }
 
@@ -104,7 +104,7 @@ fn the_henon_map_has_its_exponent() {
     );
 }
 
-/// A rotation by an irrational angle neither returns nor forgets.
+/// A rotation by an irrational angle neither recurs nor amplifies or damps deviations.
 #[test]
 fn a_rotation_is_undecided() {
     let (sine, cosine) = 1.0_f64.sin_cos();
@@ -114,7 +114,7 @@ fn a_rotation_is_undecided() {
 }
 
 #[test]
-fn forgetting_everything_is_periodic_with_exponent_minus_infinity() {
+fn vanishing_deviations_are_periodic_with_exponent_minus_infinity() {
     let verdict = judge_map(Vector1::new(0.3), 10, 100, |_| Vector1::new(0.7));
     assert_eq!(
         (verdict.regime, verdict.period),
@@ -124,7 +124,7 @@ fn forgetting_everything_is_periodic_with_exponent_minus_infinity() {
 }
 
 #[test]
-fn too_few_returns_are_not_judged_and_none_are_quiet() {
+fn too_few_returns_are_undecided_and_none_are_quiet() {
     assert_eq!(logistic(4.0, 30).regime, Regime::Undecided);
     assert_eq!(Verdict::of::<1>(&[]).regime, Regime::Quiet);
 }

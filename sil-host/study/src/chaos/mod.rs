@@ -1,15 +1,15 @@
-//! Is an orbit periodic or chaotic?
+//! Classification of an orbit as periodic or chaotic.
 //!
-//! - [`tangent`]: a small deviation from an orbit, carried through smooth motion and
-//!   across events (saltation), and how fast it grows
-//! - [`arm`]: the same along the motion of the simulated arm
-//! - [`section`]: its returns to θ̇1 = 0
+//! - [`tangent`]: a small deviation of an orbit, propagated through smooth motion and
+//!   across events (saltation), and its growth
+//! - [`arm`]: the deviation along the motion of the simulated arm
+//! - [`section`]: the returns of the arm to θ̇1 = 0
 //! - [`verdict`]: the largest Lyapunov exponent with its uncertainty, the period, and
-//!   what follows from them
+//!   the classification
 //!
-//! What is measured is the growth of deviations *across* the flow: the part along it,
-//! which neither grows nor shrinks, is taken out, so that a periodic orbit has a
-//! negative exponent and not zero.
+//! The exponent measures the growth of deviations *across* the flow. The component along the flow,
+//! which neither grows nor shrinks, is removed, so that a periodic orbit has a
+//! negative exponent rather than zero.
 
 pub mod arm;
 pub mod section;

@@ -1,4 +1,4 @@
-//! Returns of the arm to θ̇1 = 0, upwards: the section of the paper's Fig. 5.
+//! Returns of the arm to θ̇1 = 0 from below: the section of the paper's Fig. 5.
 
 use painleve_plant::mechanics::dop853::{Step, Tolerance};
 use painleve_plant::mechanics::event::first_negative;
@@ -10,17 +10,17 @@ use super::arm::ArmTangent;
 use super::tangent::Tangent;
 use super::verdict::Return;
 
-/// θ̇1 must have been below this since the last return, rad/s: a quiet slide is at rest up to
-/// rounding, which changes sign as it likes.
+/// Threshold below which θ̇1 must fall between returns, rad/s: during quiet sliding, rounding
+/// changes the sign of θ̇1.
 const DOWNWARDS_RAD_S: f64 = -1e-6;
 
-/// Parts of a step that are looked at one by one.
+/// Number of intervals of a step that are searched separately.
 const SEARCH_PARTS: u32 = 8;
 
 /// Index of θ̇1 in the state.
 const RATE: usize = 2;
 
-/// Watches a plant on a belt of constant speed: its returns, and how a deviation grows
+/// Observes a plant on a belt of constant speed: its returns, and the growth of a deviation
 /// between them.
 #[derive(Clone, Debug)]
 pub struct Returns {
@@ -31,7 +31,7 @@ pub struct Returns {
 }
 
 impl Returns {
-    /// No return yet; `impact` is the plant's law.
+    /// Creates an observer without returns; `impact` is the plant's impact law.
     pub fn new(impact: ImpactLaw) -> Self {
         Self {
             tangent: ArmTangent::new(impact, Tangent::default()),
@@ -41,8 +41,8 @@ impl Returns {
         }
     }
 
-    /// The returns in order. A velocity that jumps from negative to positive in an
-    /// impact counts, with the state after it.
+    /// Returns the returns in order. A velocity that jumps from negative to positive in an
+    /// impact counts as a return, with the state after it.
     pub fn returns(&self) -> &[Return<4>] {
         &self.returns
     }
@@ -56,13 +56,13 @@ impl Returns {
         });
     }
 
-    /// The first time at which θ̇1 turns positive in a step, s, and the state there.
+    /// Returns the first time at which θ̇1 turns positive in a step, s, and the state there.
     fn upward_zero(&mut self, now: &ArmStep<'_>) -> Option<(f64, State)> {
         let (motion, mode, size_s) = (now.motion, now.mode, now.end_s - now.start_s);
         let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
         let slope = derivative(now.start_s, now.start);
         let end_slope = derivative(now.end_s, now.end);
-        // The cubic through both ends lies in the hull of its Bernstein coefficients.
+        // The cubic through both ends lies in the convex hull of its Bernstein coefficients.
         let third = size_s / 3.0;
         let hull = [
             now.start[RATE],
@@ -121,7 +121,7 @@ impl ArmProbe for Returns {
             self.upward_zero(now)
         };
         if let Some((time_s, state)) = zero {
-            // Where exactly within a step the flow is taken out makes no difference in the
+            // The position within a step at which the flow is removed makes no difference in the
             // long run.
             self.tangent.tangent_mut().remove_flow(&flow);
             self.note(time_s, state);

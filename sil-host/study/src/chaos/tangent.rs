@@ -1,10 +1,10 @@
-//! A small deviation from an orbit, and how fast it grows.
+//! A small deviation of an orbit, and its growth.
 //!
 //! The variational equation δ̇ = Df δ and the jump of δ at an event, in directional
 //! form: only derivatives along δ are needed, never a matrix, and every one of them is a
-//! central difference of a function that is known without its derivative — a step
-//! of the integrator, the law of impact. With differences of relative size 10⁻⁶ they are
-//! good to about nine digits.
+//! central difference of a function without a closed-form derivative: a step
+//! of the integrator or the impact law. Differences of relative size 10⁻⁶ are
+//! accurate to about nine digits.
 //!
 //! At an event, where the guard g is zero, the neighbour arrives dt = −(∇g·δ)/(∇g·f⁻)
 //! later, is mapped by the jump R, and is compared at the same time again:
@@ -18,14 +18,14 @@
 
 use nalgebra::SVector;
 
-/// Size of the central differences, relative to the state's usual size of one.
+/// Size of the central differences, relative to a state of order one.
 const DIFFERENCE: f64 = 1e-6;
 
-/// A deviation that a map shrinks to less than this part of itself is gone: what is left
+/// Ratio below which a map has annihilated a deviation: the remainder
 /// is rounding.
 const GONE: f64 = 1e-11;
 
-/// Derivative of `function` at `x` along `direction`.
+/// Returns the derivative of `function` at `x` along `direction`.
 pub fn along<const N: usize, const M: usize>(
     x: &SVector<f64, N>,
     direction: &SVector<f64, N>,
@@ -34,7 +34,7 @@ pub fn along<const N: usize, const M: usize>(
     along_by(DIFFERENCE, x, direction, function)
 }
 
-/// As [`along`], with differences no larger than `size` (and never larger than usual).
+/// Returns the derivative as [`along`], with differences no larger than `size` or the default.
 pub fn along_by<const N: usize, const M: usize>(
     size: f64,
     x: &SVector<f64, N>,
@@ -50,7 +50,7 @@ pub fn along_by<const N: usize, const M: usize>(
     (function(&(x + offset)) - function(&(x - offset))) * (0.5 * length / size)
 }
 
-/// Derivative of the scalar `function` at `x` along `direction`.
+/// Returns the derivative of the scalar `function` at `x` along `direction`.
 pub fn slope_along<const N: usize>(
     x: &SVector<f64, N>,
     direction: &SVector<f64, N>,
@@ -59,12 +59,12 @@ pub fn slope_along<const N: usize>(
     along(x, direction, |x| SVector::<f64, 1>::new(function(x))).x
 }
 
-/// What happens at an event: the flow on both sides and the event's guard.
+/// An event: the flow on both sides and the rate of its guard.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing<const N: usize> {
-    /// Derivative of the state before.
+    /// Derivative of the state before the event.
     pub before: SVector<f64, N>,
-    /// Derivative of the state after.
+    /// Derivative of the state after the event.
     pub after: SVector<f64, N>,
     /// Rate of the guard along the flow before, ∇g·f⁻.
     pub guard_rate: f64,
@@ -87,31 +87,31 @@ impl<const N: usize> Default for Tangent<N> {
 }
 
 impl<const N: usize> Tangent<N> {
-    /// A deviation along a direction other than zero.
+    /// Creates a deviation along a nonzero direction.
     pub fn along(direction: SVector<f64, N>) -> Self {
         let mut tangent = Self::default();
         tangent.take(direction);
         tangent
     }
 
-    /// The deviation, its length included; infinite or zero where it has grown or shrunk
-    /// beyond all numbers.
+    /// Returns the deviation with its length; infinite or zero on overflow or
+    /// underflow.
     pub fn deviation(&self) -> SVector<f64, N> {
         self.direction * libm::exp(self.log_growth)
     }
 
-    /// The deviation, of length one.
+    /// Returns the deviation, normalised to length one.
     pub fn direction(&self) -> &SVector<f64, N> {
         &self.direction
     }
 
-    /// Carries the deviation by a linear map.
+    /// Propagates the deviation by a linear map.
     pub fn carry(&mut self, map: impl FnOnce(&SVector<f64, N>) -> SVector<f64, N>) {
         let image = map(&self.direction);
         self.take(image);
     }
 
-    /// Carries the deviation across an event: `guard` is the derivative of the event's
+    /// Propagates the deviation across an event: `guard` is the derivative of the event's
     /// guard along a direction, `jump` that of the map of the state.
     pub fn cross(
         &mut self,
@@ -125,7 +125,7 @@ impl<const N: usize> Tangent<N> {
         });
     }
 
-    /// Takes out the part along the flow `derivative`.
+    /// Removes the component along the flow `derivative`.
     pub fn remove_flow(&mut self, derivative: &SVector<f64, N>) {
         let square = derivative.norm_squared();
         if square > 0.0 {
@@ -133,8 +133,8 @@ impl<const N: usize> Tangent<N> {
         }
     }
 
-    /// Logarithm of the growth since the last call; minus infinity if the deviation has
-    /// vanished, as it does where sticking forgets the past. A new one has been taken then.
+    /// Returns the logarithm of the growth since the last call; minus infinity if the deviation has
+    /// vanished, for example during sticking. A new deviation has then been started.
     pub fn take_log_growth(&mut self) -> f64 {
         core::mem::take(&mut self.log_growth)
     }
@@ -146,7 +146,7 @@ impl<const N: usize> Tangent<N> {
             self.log_growth += libm::log(length);
         } else {
             self.direction = generic_direction();
-            // Not a number is no growth; it must not pass for one.
+            // NaN must not pass for growth.
             self.log_growth += if length.is_finite() {
                 f64::NEG_INFINITY
             } else {
@@ -156,7 +156,7 @@ impl<const N: usize> Tangent<N> {
     }
 }
 
-/// A direction without symmetry, so that it is along no special one.
+/// Returns a direction that coincides with no axis or symmetry.
 fn generic_direction<const N: usize>() -> SVector<f64, N> {
     SVector::<f64, N>::from_fn(|i, _| libm::sqrt((2 * i + 2) as f64) - i as f64).normalize()
 }

@@ -1,7 +1,7 @@
 //! Periodic or chaotic, from the returns of an orbit to a section.
 //!
 //! **The criterion.** The largest Lyapunov exponent across the flow is the growth of a
-//! deviation over the time it took, with a standard error from the means of 19 batches
+//! deviation per unit of time, with a standard error from the means of 19 batches
 //! of returns. If it is above zero by more than three standard errors, and the deviation has
 //! grown by more than a factor e, the orbit is chaotic; if it is below zero by as much,
 //! periodic; otherwise undecided. The period is the smallest number of returns, up to 64,
@@ -11,48 +11,48 @@
 use nalgebra::SVector;
 use serde::Serialize;
 
-/// Consecutive returns are put together into so many batches.
+/// Number of batches into which consecutive returns are grouped.
 const BATCHES: usize = 20;
 
-/// Standard errors by which an exponent has to be away from zero.
+/// Number of standard errors by which an exponent must differ from zero.
 const CLEARLY: f64 = 3.0;
 
-/// Logarithm of the least growth or decay over the whole record that says anything.
+/// Smallest significant growth or decay over the whole record, as a logarithm.
 const LEAST_LOG_GROWTH: f64 = 1.0;
 
-/// Longest period that is looked for, returns.
+/// Longest period searched for, returns.
 pub const LONGEST_PERIOD: usize = 64;
 
-/// Two states closer than this in every component are the same.
+/// Tolerance in every component within which two states are equal.
 const RECURRENCE: f64 = 1e-5;
 
 /// One return of an orbit to its section.
 #[derive(Clone, Copy, Debug)]
 pub struct Return<const N: usize> {
-    /// When, s (or the number of a map's iteration).
+    /// Time, s (or the number of a map's iteration).
     pub time_s: f64,
-    /// Where.
+    /// State.
     pub state: SVector<f64, N>,
-    /// Logarithm of the growth of a deviation since the last return.
+    /// Logarithm of the growth of the deviation since the last return.
     pub log_growth: f64,
 }
 
-/// What an orbit is in the long run.
+/// The long-term regime of an orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Regime {
-    /// It does not return: the arm slides quietly.
+    /// The orbit does not return: the arm slides quietly.
     Quiet,
-    /// Deviations die out: the orbit closes.
+    /// Deviations decay: the orbit closes.
     Periodic,
     /// Deviations grow.
     Chaotic,
-    /// Neither is certain from the record.
+    /// The record does not decide between the two.
     Undecided,
 }
 
 impl Regime {
-    /// The regime's name, as it is serialised.
+    /// Returns the regime's name, as it is serialised.
     pub fn name(self) -> &'static str {
         match self {
             Self::Quiet => "quiet",
@@ -63,22 +63,22 @@ impl Regime {
     }
 }
 
-/// The regime of an orbit and what it was judged by.
+/// The regime of an orbit and its evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// Periodic, chaotic, …
+    /// The regime.
     pub regime: Regime,
-    /// Returns per period, of a periodic orbit that is no longer than [`LONGEST_PERIOD`].
+    /// Returns per period of a periodic orbit, up to [`LONGEST_PERIOD`].
     pub period: Option<usize>,
-    /// Largest Lyapunov exponent across the flow, 1/s; minus infinity where the orbit
-    /// forgets deviations altogether. `None` without enough returns.
+    /// Largest Lyapunov exponent across the flow, 1/s; minus infinity where
+    /// deviations vanish. `None` without enough returns.
     pub exponent_per_s: Option<f64>,
-    /// Its standard error, 1/s; none of minus infinity.
+    /// Standard error of the exponent, 1/s; `None` if the exponent is minus infinity.
     pub standard_error_per_s: Option<f64>,
 }
 
 impl Verdict {
-    /// Judges an orbit by its returns, the transient left out.
+    /// Classifies an orbit by its returns after the transient.
     pub fn of<const N: usize>(returns: &[Return<N>]) -> Self {
         let mut verdict = Self {
             regime: if returns.is_empty() {
@@ -113,7 +113,7 @@ impl Verdict {
     }
 }
 
-/// A mean growth over a stretch of time.
+/// Mean growth over an interval of time.
 struct Exponent {
     mean_per_s: f64,
     standard_error_per_s: f64,
@@ -121,9 +121,9 @@ struct Exponent {
 }
 
 impl Exponent {
-    /// `None` without two returns for every batch. The first batch is left out: in it the
-    /// deviation turns into the direction that grows most. Batches hold whole periods
-    /// where they can.
+    /// Returns `None` without two returns for every batch. Leaves out the first batch, in which the
+    /// deviation turns into the direction of fastest growth. Batches hold whole periods
+    /// where possible.
     fn of<const N: usize>(returns: &[Return<N>], period: Option<usize>) -> Option<Self> {
         let mut size = returns.len().checked_sub(1)? / BATCHES;
         if size < 2 {
@@ -157,7 +157,7 @@ impl Exponent {
     }
 }
 
-/// Returns per period; `None` if the states do not recur.
+/// Returns the number of returns per period; `None` if the states do not recur.
 fn period<const N: usize>(returns: &[Return<N>]) -> Option<usize> {
     let last = &returns[returns.len() / 2..];
     (1..=LONGEST_PERIOD.min(last.len() / 2)).find(|&period| {

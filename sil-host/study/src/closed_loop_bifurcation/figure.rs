@@ -48,7 +48,7 @@ impl Figure for Diagram {
         }
         Chart {
             title: "Belt speed with the controller in the loop (Fig. 12)".into(),
-            subtitle: "the firmware's controller in this process, behind the same converters"
+            subtitle: "the firmware's controller in this process, with the converters of the bench"
                 .into(),
             x_title: "Belt speed v_belt (m/s)".into(),
             x: None,

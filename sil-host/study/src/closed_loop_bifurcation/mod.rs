@@ -1,9 +1,9 @@
 //! Fig. 12: the bifurcation diagram with the controller in the loop.
 //!
-//! Every cell is a closed loop that takes the tip to a target, and is then left running
-//! through a transient before it is watched, as in the open loop. Encoders of finite
-//! resolution keep the joints trembling, so that the largest θ̇1 is never quite zero: the
-//! arm bounces if its tip leaves the belt while it is watched.
+//! Every cell is a closed loop that moves the tip to a target, and then runs
+//! through a transient before it is recorded, as in the open loop. Encoders of finite
+//! resolution keep the joints trembling, so the largest θ̇1 is never exactly zero: the
+//! arm bounces if its tip leaves the belt during the recording.
 
 mod figure;
 mod options;
@@ -29,7 +29,7 @@ use super::{Study, StudyError, paper};
 pub use options::Options;
 pub use outcome::{Diagram, Section};
 
-/// What to study: all combinations, the last varying fastest.
+/// Settings of the study: all combinations, the last varying fastest.
 #[derive(Clone, Debug)]
 pub struct ClosedLoopBifurcation {
     /// Controllers.
@@ -42,21 +42,21 @@ pub struct ClosedLoopBifurcation {
     pub v_belt_m_s: Vec<f64>,
     /// Initial conditions.
     pub initial: Vec<Initial>,
-    /// Seed of the random ones.
+    /// Seed of the random initial conditions.
     pub seed: u64,
-    /// How the reference goes to its target.
+    /// Shape of the reference.
     pub reference: Reference,
-    /// Target, m; if absent the paper's Z_t,sliding of law and posture.
+    /// Target, m; by default the paper's Z_t,sliding for the law and posture.
     pub target_m: Option<f64>,
-    /// How long a cell runs before it is watched, s.
+    /// Transient of a cell before recording starts, s.
     pub transient_s: f64,
-    /// How long it is watched, s.
+    /// Recording time of a cell, s.
     pub record_s: f64,
     /// Changes to every scenario.
     pub overrides: Vec<String>,
 }
 
-/// What the closed loop does in one cell.
+/// Motion of the closed loop in one cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Controller.
@@ -69,29 +69,29 @@ pub struct Row {
     pub v_belt_m_s: f64,
     /// Initial condition: `a`, `d`, `u` or `random:K`.
     pub initial: String,
-    /// Largest θ̇1 while watched, rad/s.
+    /// Largest θ̇1 during the recording, rad/s.
     pub max_theta1_dot_rad_s: f64,
-    /// Whether the tip left the belt while watched.
+    /// Whether the tip left the belt during the recording.
     pub bouncing: bool,
-    /// Part of the watched time in contact.
+    /// Fraction of the recording in contact.
     pub contact_fraction: f64,
-    /// Times the tip left the belt in the whole run.
+    /// Number of lift-offs in the whole run.
     pub lift_offs: u64,
-    /// When it first did, s.
+    /// Time of the first lift-off, s.
     pub first_lift_off_s: Option<f64>,
-    /// Number of the fault that the controller has latched at the end.
+    /// Number of the fault latched at the end.
     pub fault: Option<u8>,
     /// Target of the reference, m.
     pub target_m: f64,
-    /// Where the tip is at the end, m.
+    /// Final tip position, m.
     pub tip_t_m: f64,
 }
 
 impl ClosedLoopBifurcation {
-    /// Makes every cell once, so that a mistake is told before anything runs.
+    /// Builds every cell once, so that an error is reported before any cell runs.
     ///
     /// # Errors
-    /// [`StudyError`] of the first cell that cannot be run.
+    /// [`StudyError`] of the first invalid cell.
     pub fn check(&self) -> Result<(), StudyError> {
         for index in 0..self.len() {
             Trial::new(&self.scenario(index)?.1)?;
@@ -99,7 +99,7 @@ impl ClosedLoopBifurcation {
         Ok(())
     }
 
-    /// What a row starts with, and its scenario.
+    /// Returns the parameters of a row, and its scenario.
     fn scenario(&self, index: usize) -> Result<(Cell<'_>, Scenario), StudyError> {
         let mut rest = index;
         let mut place = |count: usize| {

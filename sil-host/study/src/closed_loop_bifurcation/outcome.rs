@@ -1,4 +1,4 @@
-//! The cells put together: sections over the belt's speed, as a table and as a figure.
+//! The outcome of all cells: sections over the belt speed, as a table and as a figure.
 
 use comfy_table::Table;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::paper;
 pub struct Diagram {
     /// All cells, in the order of their numbers.
     pub rows: Vec<Row>,
-    /// One per controller, converter set, friction coefficient and initial condition.
+    /// One section per controller, converter set, friction coefficient and initial condition.
     pub sections: Vec<Section>,
 }
 
@@ -28,17 +28,17 @@ pub struct Section {
     pub mu: f64,
     /// Initial condition.
     pub initial: String,
-    /// Belt speeds in all.
+    /// Number of belt speeds.
     pub cells: usize,
     /// Belt speeds at which the arm keeps bouncing, m/s.
     pub bouncing_m_s: Vec<f64>,
-    /// Belt speeds at which the tip left the belt at any time, m/s.
+    /// Belt speeds at which the tip ever left the belt, m/s.
     pub lifted_m_s: Vec<f64>,
-    /// Cells that end with a fault.
+    /// Number of cells that end with a fault.
     pub faults: usize,
-    /// Largest θ̇1 while watched, rad/s.
+    /// Largest θ̇1 during the recording, rad/s.
     pub max_theta1_dot_rad_s: f64,
-    /// Largest distance of the tip from its target at the end, m.
+    /// Largest final distance of the tip from its target, m.
     pub max_error_m: f64,
 }
 
@@ -50,7 +50,7 @@ impl Section {
 }
 
 impl Diagram {
-    /// Puts the rows of a study together.
+    /// Collects the rows of a study.
     pub fn new(rows: Vec<Row>) -> Self {
         let mut sections: Vec<Section> = Vec::new();
         for row in &rows {

@@ -10,10 +10,10 @@ use crate::figures::page_maker::{PageMaker, SAMPLED_FRICTION, section};
 use crate::initial::Initial;
 use crate::{StudyError, outcome, paper};
 
-/// The hybrid laws over belt speed, behind both sets of converters.
+/// The hybrid laws over belt speed, with both sets of converters.
 ///
 /// # Errors
-/// [`StudyError`] if it cannot be computed.
+/// [`StudyError`] if the study cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let fineness = page.fineness;
     let [transient_s, record_s] = fineness.closed_loop_s;
@@ -34,7 +34,7 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
         record_s,
         overrides: Vec::new(),
     };
-    // As near to the paper as sampling goes; ten times the ticks, so fewer speeds.
+    // As close to the paper as sampling permits; ten times the ticks, so fewer speeds.
     let ideal = ClosedLoopBifurcation {
         controllers: vec![Controller::HybridPaper],
         converters: vec![Converters::Ideal],

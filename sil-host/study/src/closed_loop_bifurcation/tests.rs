@@ -36,7 +36,7 @@ fn the_hybrid_law_keeps_the_tip_on_the_belt_from_either_posture() {
 }
 
 #[test]
-fn lift_offs_are_counted_and_the_rest_of_the_motion_is_watched() {
+fn lift_offs_are_counted_and_the_rest_of_the_motion_is_recorded() {
     let study = ClosedLoopBifurcation {
         initial: vec![Initial::U],
         ..study(Controller::Pid)
@@ -69,7 +69,7 @@ fn random_starts_are_followed_in_their_own_posture() {
 }
 
 #[test]
-fn what_is_out_of_range_is_told_before_anything_runs() {
+fn out_of_range_values_are_reported_before_any_cell_runs() {
     let far = ClosedLoopBifurcation {
         target_m: Some(0.5),
         ..study(Controller::Hybrid)

@@ -1,4 +1,4 @@
-//! One HTML page that needs nothing but itself: figures inline, no scripts, no network.
+//! A self-contained HTML page: inline figures, no scripts, no network.
 
 use comfy_table::Table;
 use core::fmt::Write;
@@ -6,65 +6,65 @@ use core::fmt::Write;
 /// The page.
 #[derive(Clone, Debug, Default)]
 pub struct Page {
-    /// Its title.
+    /// Title of the page.
     pub title: String,
-    /// What it is, one paragraph.
+    /// Introduction, one paragraph.
     pub introduction: String,
-    /// From top to bottom.
+    /// Sections from top to bottom.
     pub sections: Vec<Section>,
 }
 
 /// One study on the page.
 #[derive(Clone, Debug, Default)]
 pub struct Section {
-    /// Name of its files, without ending, and its anchor.
+    /// Name of its files without extension, and its anchor.
     pub name: String,
     /// Heading, with the paper's number of the figure or table.
     pub title: String,
-    /// Command that computes it again.
+    /// Command that reproduces it.
     pub command: String,
-    /// What the paper says beside what is found here.
+    /// Statements of the paper with the computed results.
     pub comparisons: Vec<Comparison>,
-    /// Why the two differ where they do, a paragraph each.
+    /// Reasons for the differences, one paragraph each.
     pub reasons: Vec<String>,
     /// The figure as SVG text.
     pub svg: String,
-    /// The numbers.
+    /// Table of the numbers.
     pub table: Option<Table>,
-    /// Files with the same beside the page.
+    /// Files with the same content, next to the page.
     pub files: Vec<String>,
 }
 
-/// One number or statement of the paper.
+/// A number or statement of the paper, compared with the computed one.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// What it is about.
+    /// Subject of the comparison.
     pub what: String,
-    /// What the paper says.
+    /// Value or statement of the paper.
     pub paper: String,
-    /// What is found here.
+    /// Computed result.
     pub here: String,
-    /// How they compare.
+    /// Verdict of the comparison.
     pub verdict: Verdict,
 }
 
-/// How what is found here compares with the paper.
+/// Verdict of a comparison with the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The same, to the digits of the paper.
+    /// Equal to the digits of the paper.
     Agrees,
-    /// Not the same.
+    /// Different.
     Differs,
     /// Better than in the paper.
     Farther,
     /// Worse than in the paper.
     FallsShort,
-    /// The paper says nothing to be compared.
+    /// The paper gives no value to compare with.
     Open,
 }
 
 impl Verdict {
-    /// Class and words on the page.
+    /// Returns the CSS class and the words on the page.
     fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Agrees => ("yes", "agrees"),
@@ -77,7 +77,7 @@ impl Verdict {
 }
 
 impl Comparison {
-    /// A statement that agrees or not.
+    /// Creates a comparison that agrees or differs.
     pub fn new(
         what: &str,
         paper: impl Into<String>,
@@ -96,7 +96,7 @@ impl Comparison {
         }
     }
 
-    /// Something the paper does not say.
+    /// Creates a result that the paper does not give.
     pub fn beyond(what: &str, here: impl Into<String>) -> Self {
         Self {
             what: what.into(),
@@ -119,7 +119,7 @@ vertical-align:top;padding:5px 12px 5px 0;border-bottom:1px solid #e4e4e4}th{bor
 .files{color:#707070;font-size:14px}a{color:#0072b2}";
 
 impl Page {
-    /// The page as HTML text.
+    /// Returns the page as HTML text.
     pub fn html(&self) -> String {
         let mut html = String::new();
         // Writing to a string cannot fail.
@@ -216,7 +216,7 @@ fn write_table(html: &mut String, table: &Table) -> core::fmt::Result {
     writeln!(html, "</table></div>")
 }
 
-/// Text as HTML; control characters, which HTML does not allow, are left out.
+/// Escapes text for HTML; removes control characters, which HTML does not allow.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -237,7 +237,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_page_holds_its_figures_and_escapes_its_words() {
+    fn a_page_contains_its_figures_and_escapes_its_text() {
         let mut table = Table::new();
         table.set_header(["a < b"]).add_row(["1 & 2"]);
         let page = Page {

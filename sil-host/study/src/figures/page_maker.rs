@@ -1,4 +1,4 @@
-//! What the sections of the page share: how fine everything is, and computing with progress.
+//! What the sections of the page share: resolution, and computation with progress.
 
 use painleve_chart::PlotError;
 use painleve_plant::mechanics::PlantParameters;
@@ -9,7 +9,7 @@ use crate::initial::Initial;
 use crate::outcome::{Figure, Outcome};
 use crate::{Grid, Study, StudyError, rows};
 
-/// How fine everything is: grids of friction and of belt speed, transients and records.
+/// Resolution of the page: grids of friction and belt speed, transients and recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fineness {
     /// Friction coefficients of the map.
@@ -18,22 +18,22 @@ pub struct Fineness {
     pub map_v_belt: &'static str,
     /// Belt speeds of the section, m/s.
     pub section_v_belt: &'static str,
-    /// Belt speeds of the returns, m/s.
+    /// Belt speeds of the Poincaré section, m/s.
     pub poincare_v_belt: &'static str,
     /// Belt speeds with the controller in the loop, m/s.
     pub closed_loop_v_belt: &'static str,
-    /// The same behind ideal converters, m/s.
+    /// Belt speeds with the controller in the loop and ideal converters, m/s.
     pub ideal_v_belt: &'static str,
-    /// Transient and record without control, s.
+    /// Transient and recording time without control, s.
     pub open_loop_s: [f64; 2],
-    /// Transient and record with control, s.
+    /// Transient and recording time with control, s.
     pub closed_loop_s: [f64; 2],
-    /// Distance of the targets that are tried first, m.
+    /// Spacing of the targets tried first, m.
     pub scan_step_m: f64,
 }
 
 impl Fineness {
-    /// The paper's steps, and its times in the open loop.
+    /// The paper's steps, and its durations in the open loop.
     pub const FULL: Self = Self {
         map_mu: "0.1:1:0.1",
         map_v_belt: "-1:-0.1:0.005",
@@ -46,7 +46,7 @@ impl Fineness {
         scan_step_m: 5e-3,
     };
 
-    /// Coarse grids and short runs, for a first look.
+    /// Coarse grids and short runs, for a preview.
     pub const DRAFT: Self = Self {
         map_mu: "0.2:1:0.2",
         map_v_belt: "-1:-0.1:0.1",
@@ -63,27 +63,27 @@ impl Fineness {
 /// Called after every row.
 pub type RowDone = Box<dyn Fn() + Sync>;
 
-/// Makes the rows of the page's sections.
+/// Computes the rows of the page's sections.
 pub struct PageMaker<'a> {
-    /// How fine everything is.
+    /// Resolution of the page.
     pub fineness: &'a Fineness,
-    /// Starts showing the progress of a study: its title, and its number of rows.
+    /// Starts a progress display with the title of a study and its number of rows.
     pub progress: &'a (dyn Fn(&str, usize) -> RowDone + Sync),
 }
 
 impl PageMaker<'_> {
-    /// All rows of a study, computed on the threads of the current rayon pool.
+    /// Returns all rows of a study, computed on the threads of the current rayon pool.
     ///
     /// # Errors
-    /// The error of the first row that has one.
+    /// The error of the first row that fails.
     pub fn rows<S: Study>(&self, title: &str, study: &S) -> Result<Vec<S::Row>, StudyError> {
         rows(study, (self.progress)(title, study.len()))
     }
 
-    /// Cells of the paper's arm over grids of friction and belt speed.
+    /// Returns the cells of the paper's arm over grids of friction and belt speed.
     ///
     /// # Errors
-    /// [`StudyError`] if a grid is none.
+    /// [`StudyError`] if a grid is invalid.
     pub fn cells(&self, mu: &str, v_belt: &str, initial: &[Initial]) -> Result<Cells, StudyError> {
         let [transient_s, record_s] = self.fineness.open_loop_s;
         Ok(Cells {
@@ -98,16 +98,16 @@ impl PageMaker<'_> {
         })
     }
 
-    /// The values of a grid.
+    /// Returns the values of a grid.
     ///
     /// # Errors
-    /// [`StudyError`] if it is none.
+    /// [`StudyError`] if the grid is invalid.
     pub fn values(&self, grid: &str) -> Result<Vec<f64>, StudyError> {
         Ok(grid.parse::<Grid>()?.values().to_vec())
     }
 }
 
-/// What all sections have in common.
+/// Creates the common part of a section.
 ///
 /// # Errors
 /// [`PlotError`] if the figure cannot be drawn.
@@ -130,15 +130,15 @@ pub fn section<O: Outcome + Figure>(
     })
 }
 
-/// Values as a list on the command line.
+/// Formats values as a list on the command line.
 pub fn list(values: &[f64]) -> String {
     let words: Vec<String> = values.iter().map(ToString::to_string).collect();
     words.join(",")
 }
 
 /// Why the sampled law of the paper differs from the continuous one.
-pub const SAMPLED_FRICTION: &str = "hybrid-paper is the paper's law as it is written, sampled: the friction \
-    that it feeds forward is the last sample's, which makes a loop of gain −μ Q₁₂/p per sample. It \
+pub const SAMPLED_FRICTION: &str = "hybrid-paper is the paper's law, sampled: the friction \
+    that it feeds forward is that of the last sample, which closes a loop of gain −μ Q₁₂/p per sample. It \
     diverges at any rate of sampling where |μ Q₁₂| > p: elbow down near the edge, elbow up over much of the \
     way. hybrid-paper-model takes the friction of a known belt instead, which is what the continuous law is \
-    where its algebraic loop is solved at every instant; hybrid is the law as built in here.";
+    where its algebraic loop is solved at every instant; hybrid is the built-in law.";

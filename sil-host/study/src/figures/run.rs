@@ -5,7 +5,7 @@ use painleve_plant::scenario::Scenario;
 
 use super::page::{Comparison, Section};
 
-/// One run over time.
+/// Returns the section of one run over time.
 pub fn section(scenario: &Scenario, result: &LoopResult, svg: String) -> Section {
     let name = format!("run-{}", scenario.name);
     let paper = match scenario.name.as_str() {

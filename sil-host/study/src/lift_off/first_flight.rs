@@ -1,20 +1,20 @@
-//! The first flight of some length, at the plant's own resolution.
+//! The first sufficiently long flight, at the plant's own resolution.
 
 use painleve_plant::{Event, Probe, State, Step};
 
-/// Looks for the first flight that is long enough to be noticed in time.
+/// Observes the first flight that is long enough to be detected in time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FirstFlight {
     from_s: f64,
     shortest_s: f64,
-    /// When it began, or a shorter one before it, s.
+    /// Start of that flight, or of a shorter one before it, s.
     pub(super) start_s: Option<f64>,
-    /// When the tip touched again, s.
+    /// Time at which the tip touched the belt again, s.
     pub(super) end_s: Option<f64>,
 }
 
 impl FirstFlight {
-    /// Looks from `from_s` on for a flight of more than `shortest_s`.
+    /// Starts observing at `from_s` for a flight longer than `shortest_s`.
     pub(super) fn new(from_s: f64, shortest_s: f64) -> Self {
         Self {
             from_s,
@@ -24,14 +24,14 @@ impl FirstFlight {
         }
     }
 
-    /// Whether a flight is over that was long enough.
+    /// Whether a sufficiently long flight has ended.
     pub(super) fn is_over(&self) -> bool {
         self.end_s
             .zip(self.start_s)
             .is_some_and(|(end_s, start_s)| end_s - start_s > self.shortest_s)
     }
 
-    /// The tip leaves the belt: a flight before that was too short does not count.
+    /// Records a lift-off, in place of an earlier flight that was too short.
     fn leaves(&mut self, time_s: f64) {
         if self.start_s.is_none() || (self.end_s.is_some() && !self.is_over()) {
             self.start_s = Some(time_s);

@@ -1,7 +1,7 @@
-//! Lift-off: how soon the controller notices that the tip has left the belt.
+//! Lift-off: the time until the controller detects that the tip has left the belt.
 //!
-//! The governor is switched off and the reference goes 20 mm beyond the edge, so that p turns
-//! negative under a tip that slides. Before that the tip slides inside for a while, in which every
+//! The governor is switched off and the reference goes 20 mm beyond the edge, so that p becomes
+//! negative while the tip slides. Before that, the tip slides inside the edge for a while, in which every
 //! loss of contact that the controller reports is a false alarm.
 
 mod figure;
@@ -34,24 +34,24 @@ pub use outcome::{LiftOffs, OfEvidence};
 
 /// Time at the start that does not count as sliding, s.
 const SETTLING_S: f64 = 0.1;
-/// Distance from the ends of the admissible stretch while the tip slides, m.
+/// Distance from the ends of the admissible interval while the tip slides, m.
 const INSIDE_M: f64 = 0.02;
-/// How far beyond the edge the reference goes, m, but not beyond what the arm reaches.
+/// Distance of the reference beyond the edge, m, within the reach of the arm.
 const BEYOND_M: f64 = 0.02;
 const FARTHEST_M: f64 = 0.183;
-/// Time after the reference's end in which the tip may still lift off, s.
+/// Time after the end of the reference in which the tip may still lift off, s.
 const PATIENCE_S: f64 = 1.0;
-/// How long after a landing a notice is still waited for, s.
+/// Time after a landing in which a detection still counts, s.
 const LATE_S: f64 = 0.05;
 
-/// What to study.
+/// Settings of the study.
 #[derive(Clone, Debug)]
 pub struct LiftOff {
     /// Seed of all runs.
     pub seed: u64,
     /// Number of runs with each kind of evidence.
     pub runs: usize,
-    /// How long the tip slides before it is led over the edge, s.
+    /// Sliding time before the tip is led over the edge, s.
     pub slide_s: f64,
     /// Changes to every scenario.
     pub overrides: Vec<String>,
@@ -60,30 +60,31 @@ pub struct LiftOff {
 /// One run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Its number; the same disturbance with either evidence.
+    /// Number of the run; it has the same disturbance with either evidence.
     pub index: usize,
-    /// From what the controller tells contact.
+    /// Sensors from which the controller decides contact.
     pub evidence: Evidence,
     /// Friction coefficient μ.
     pub mu: f64,
     /// Belt speed, m/s.
     pub v_belt_m_s: f64,
-    /// When the tip left the belt for longer than the bar, else for the last time, s; none if it
-    /// never did.
+    /// Time of the first lift-off into a flight longer than the limit, otherwise of the last
+    /// lift-off, s; null if the tip never left the belt.
     pub lift_off_s: Option<f64>,
-    /// Time to the first touch after it, s.
+    /// Time from lift-off to the next touch, s.
     pub flight_s: Option<f64>,
-    /// Time until the controller said so, s; none if it was not noticed.
+    /// Time from lift-off to its detection, s; null if it was not detected.
     pub noticed_s: Option<f64>,
-    /// Times that contact was taken for flight while the tip slid.
+    /// Number of times that contact was taken for flight while the tip slid.
     pub false_alarms: u32,
-    /// Time for which the tip slid before, s.
+    /// Sliding time before the lift-off, s.
     pub slid_s: f64,
-    /// Whether the plant could be solved to the end; what else is here is as far as it could.
+    /// Whether the plant could be solved to the end; otherwise the other fields describe the run
+    /// until then.
     pub solved: bool,
 }
 
-/// Within which time a lift-off shall be noticed, s.
+/// Time limit for the detection of a lift-off, s.
 fn bar_s(evidence: Evidence) -> f64 {
     match evidence {
         Evidence::ForceCell => 5e-3,
@@ -92,13 +93,13 @@ fn bar_s(evidence: Evidence) -> f64 {
 }
 
 impl LiftOff {
-    /// What the controller may go by.
+    /// Returns the evidence that the controller may use.
     const EVIDENCE: [Evidence; 2] = [Evidence::ForceCell, Evidence::Encoders];
 
-    /// The scenario of a row.
+    /// Returns the scenario of a row.
     ///
     /// # Errors
-    /// [`StudyError`] if an override is wrong.
+    /// [`StudyError`] if an override is invalid.
     pub fn scenario(&self, row: usize) -> Result<Scenario, StudyError> {
         let mut generator = ChaCha8Rng::seed_from_u64(self.seed);
         generator.set_stream((row / 2) as u64);
@@ -125,7 +126,7 @@ impl LiftOff {
         let stretch = stretches.into_iter().next().unwrap_or(0.0..0.0);
         let inside = (stretch.start + INSIDE_M, stretch.end - INSIDE_M);
         let start_m = draw(inside.0, inside.1);
-        // With ż_r > 0 the paradox is ahead at z_t > 0.
+        // With ż_r > 0 the paradox lies ahead at z_t > 0.
         let target_m = if direction < 0.0 {
             (stretch.end + BEYOND_M).min(FARTHEST_M)
         } else {
@@ -149,10 +150,10 @@ impl LiftOff {
         Ok(scenario.with_overrides("lift-off", &self.overrides)?)
     }
 
-    /// Makes the first run, so that a wrong override is told before anything runs.
+    /// Builds the first run, so that an invalid override is reported before any run starts.
     ///
     /// # Errors
-    /// [`StudyError`] if it cannot be made.
+    /// [`StudyError`] if it cannot be built.
     pub fn check(&self) -> Result<(), StudyError> {
         Trial::new(&self.scenario(0)?)?;
         Ok(())
@@ -176,7 +177,7 @@ impl Study for LiftOff {
         let mut noticed_s = None;
         let mut solved = true;
         for _ in 0..scenario.run.ticks() {
-            // The controller answers the sample at the start of the tick.
+            // The controller answers the sample taken at the start of the tick.
             let sampled_s = trial.time_s();
             let flying = flight.start_s;
             if trial.tick(&mut (&mut flight, &mut watch)).is_err() {
@@ -194,7 +195,7 @@ impl Study for LiftOff {
                 break;
             }
         }
-        // The flight may still have to end.
+        // The flight may not have ended yet.
         let patience_s = scenario.run.duration_s + LATE_S;
         while solved && flight.start_s.is_some() && flight.end_s.is_none() {
             solved = trial.tick(&mut (&mut flight, &mut watch)).is_ok();

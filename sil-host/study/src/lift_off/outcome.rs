@@ -1,4 +1,4 @@
-//! Lift-offs as a table and as histograms, the bars beside.
+//! Lift-offs as a table and as histograms, with the limits.
 
 use comfy_table::Table;
 use painleve_firmware::estimate::contact::Evidence;
@@ -8,37 +8,37 @@ use super::{LiftOff, Row, bar_s};
 use crate::distribution::Percentiles;
 use crate::outcome::{self, Outcome};
 
-/// What came of one kind of evidence.
+/// Outcome with one kind of evidence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfEvidence {
-    /// From what the controller tells contact.
+    /// Sensors from which the controller decides contact.
     pub evidence: Evidence,
-    /// Within which time a lift-off shall be noticed, s.
+    /// Time limit for the detection of a lift-off, s.
     pub bar_s: f64,
-    /// Runs in which the tip left the belt.
+    /// Number of runs in which the tip left the belt.
     pub lift_offs: usize,
-    /// Those that flew for longer than the bar.
+    /// Number of flights longer than the limit.
     pub long_flights: usize,
-    /// Those of them that were noticed in time.
+    /// Number of those detected in time.
     pub in_time: usize,
-    /// Those of them that were noticed never.
+    /// Number of those never detected.
     pub missed: usize,
-    /// Runs whose plant could not be solved; of these only false alarms and sliding are counted.
+    /// Number of runs whose plant could not be solved; only their false alarms and sliding time count.
     pub unsolved: usize,
-    /// Times to the notice of long flights, s.
+    /// Detection times of long flights, s.
     pub noticed_s: Option<Percentiles>,
-    /// Lengths of all flights, s.
+    /// Durations of all flights, s.
     pub flight_s: Option<Percentiles>,
-    /// False alarms.
+    /// Number of false alarms.
     pub false_alarms: u32,
-    /// Time of sliding, h.
+    /// Sliding time, h.
     pub slid_h: f64,
 }
 
-/// What came of it.
+/// Outcome of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LiftOffs {
-    /// With the force cell, and without.
+    /// With the force cell, and without it.
     pub evidence: Vec<OfEvidence>,
     /// All runs.
     pub rows: Vec<Row>,
@@ -53,7 +53,7 @@ impl Row {
 }
 
 impl LiftOffs {
-    /// Of all rows.
+    /// Collects all rows.
     pub fn new(rows: Vec<Row>) -> Self {
         let evidence = LiftOff::EVIDENCE.map(|evidence| {
             let bar_s = bar_s(evidence);

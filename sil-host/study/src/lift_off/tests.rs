@@ -5,7 +5,7 @@ use crate::outcome::plain;
 use crate::{Outcome, rows};
 
 #[test]
-fn lift_offs_are_thrown_and_noticed_alike_on_any_number_of_threads() {
+fn lift_offs_and_detections_do_not_depend_on_the_number_of_threads() {
     let study = LiftOff {
         seed: 1,
         runs: 8,
@@ -33,7 +33,7 @@ fn lift_offs_are_thrown_and_noticed_alike_on_any_number_of_threads() {
 }
 
 #[test]
-fn with_its_governor_the_tip_stays_down() {
+fn with_the_governor_the_tip_stays_on_the_belt() {
     let study = LiftOff {
         seed: 1,
         runs: 2,
@@ -46,9 +46,9 @@ fn with_its_governor_the_tip_stays_down() {
 }
 
 #[test]
-fn runs_that_cannot_be_solved_are_counted_and_none_of_the_others_is_lost() {
+fn runs_that_cannot_be_solved_are_counted_and_all_others_are_kept() {
     let unsolvable = [
-        // As it falls, this arm jams at full stretch.
+        // During its fall, this arm jams at full stretch.
         "belt.friction=0.488",
         "belt.profile={ kind = \"constant\", speed_m_s = 0.0 }",
         "impact={ law = \"poisson\", restitution = 0.0 }",
@@ -75,7 +75,7 @@ fn runs_that_cannot_be_solved_are_counted_and_none_of_the_others_is_lost() {
     }
 }
 
-/// Made by hand, so that no change of the controller changes it.
+/// Uses rows made by hand, so that a change of the controller does not change the snapshot.
 #[test]
 fn the_table_tells_early_late_short_and_missed_apart() {
     let row = |evidence, flight_s: f64, noticed_s: Option<f64>| Row {

@@ -1,4 +1,4 @@
-//! Fig. 5 drawn: θ1 at the returns, the strip of periodic and chaotic motion, the exponent.
+//! Fig. 5: θ1 at the returns, a strip of periodic and chaotic motion, and the exponent.
 
 use core::ops::Range;
 
@@ -13,10 +13,10 @@ use crate::chaos::Regime;
 use crate::outcome::Figure;
 use crate::places::Places;
 
-/// Chaotic, as red as in the paper.
+/// Red for chaotic motion, as in the paper.
 const RED: RGBColor = RGBColor(0xC6, 0x1A, 0x1A);
 
-/// The kinds of motion of the strip, in the paper's colours.
+/// The regimes of the strip, in the paper's colours.
 const STRIP: [(Regime, RGBColor); 4] = [
     (Regime::Periodic, BLACK_INK),
     (Regime::Chaotic, RED),
@@ -30,7 +30,7 @@ impl Figure for Diagram {
     }
 }
 
-/// The figure, for the first friction coefficient and initial condition.
+/// Draws the figure for the first friction coefficient and initial condition.
 fn chart(diagram: &Diagram) -> Chart {
     let Cells {
         mu,

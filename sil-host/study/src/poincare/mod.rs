@@ -1,5 +1,5 @@
-//! Fig. 5: how the arm bounces. θ1 at each upward zero of θ̇1, and whether that goes on
-//! periodically or chaotically, by the criterion of [`verdict`](super::chaos::verdict).
+//! Fig. 5: θ1 at each upward zero of θ̇1, and whether the bouncing is
+//! periodic or chaotic, by the criterion of [`verdict`](super::chaos::verdict).
 
 mod figure;
 mod options;
@@ -25,11 +25,11 @@ pub use outcome::{Diagram, Stretch};
 /// The diagram, cell by cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Poincare {
-    /// Its cells.
+    /// Cells of the diagram.
     pub cells: Cells,
 }
 
-/// What the arm does in one cell.
+/// Motion of the arm in one cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Friction coefficient μ.
@@ -38,14 +38,14 @@ pub struct Row {
     pub v_belt_m_s: f64,
     /// Initial condition: `a`, `d`, `u` or `random:K`.
     pub initial: String,
-    /// Quiet, periodic, chaotic or undecided.
+    /// Regime: quiet, periodic, chaotic or undecided.
     pub regime: Regime,
-    /// Returns per period, of a periodic motion whose period was found.
+    /// Returns per period, if the motion is periodic and its period was found.
     pub period: Option<usize>,
-    /// Largest Lyapunov exponent across the flow, 1/s: null where there are too few
-    /// returns, and with a periodic motion that forgets deviations altogether (minus infinity).
+    /// Largest Lyapunov exponent across the flow, 1/s; null with too few
+    /// returns, and for a periodic motion whose deviations vanish (minus infinity).
     pub exponent_per_s: Option<f64>,
-    /// Its standard error, 1/s.
+    /// Standard error of the exponent, 1/s.
     pub standard_error_per_s: Option<f64>,
     /// θ1 at each return, rad.
     pub theta1_rad: Vec<f64>,

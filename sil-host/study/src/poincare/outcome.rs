@@ -1,4 +1,4 @@
-//! The cells put together: stretches of belt speed with the same kind of motion.
+//! The outcome of all cells: intervals of belt speed with the same regime.
 
 use comfy_table::Table;
 use serde::Serialize;
@@ -14,35 +14,35 @@ use crate::tabular::Tabular;
 pub struct Diagram {
     /// All cells, in the order of their numbers.
     pub rows: Vec<Row>,
-    /// Neighbouring belt speeds with the same kind of motion.
+    /// Intervals of adjacent belt speeds with the same regime.
     pub stretches: Vec<Stretch>,
     #[serde(skip)]
     settings: Cells,
 }
 
-/// Neighbouring belt speeds with the same kind of motion.
+/// Adjacent belt speeds with the same regime.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stretch {
     /// Friction coefficient μ.
     pub mu: f64,
     /// Initial condition.
     pub initial: String,
-    /// Belt speeds from … to, m/s.
+    /// Ends of the interval of belt speed, m/s.
     pub v_belt_m_s: [f64; 2],
-    /// Kind of motion.
+    /// Regime.
     pub regime: Regime,
     /// Returns per period.
     pub period: Option<usize>,
-    /// How many belt speeds.
+    /// Number of belt speeds.
     pub cells: usize,
-    /// Least exponent, 1/s.
+    /// Smallest exponent, 1/s.
     pub least_exponent_per_s: Option<f64>,
-    /// Greatest exponent, 1/s.
+    /// Largest exponent, 1/s.
     pub greatest_exponent_per_s: Option<f64>,
 }
 
 impl Diagram {
-    /// Puts the rows of a study together.
+    /// Collects the rows of a study.
     pub fn new(study: &Poincare, rows: Vec<Row>) -> Self {
         let settings = study.cells.clone();
         let mut stretches: Vec<Stretch> = Vec::new();
@@ -68,7 +68,7 @@ impl Diagram {
         }
     }
 
-    /// What was varied.
+    /// Returns the varied parameters.
     pub fn settings(&self) -> &Cells {
         &self.settings
     }

@@ -12,7 +12,7 @@ use crate::{StudyError, outcome};
 /// Fig. 5 at the paper's friction.
 ///
 /// # Errors
-/// [`StudyError`] if it cannot be computed.
+/// [`StudyError`] if the figure cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let cells = page.cells("0.6", page.fineness.poincare_v_belt, &[Initial::A])?;
     let study = Poincare { cells };
@@ -57,7 +57,7 @@ fn figure_5(outcome: &Diagram) -> Result<Section, PlotError> {
         has("periodic") && has("chaotic"),
     ));
     section.reasons.push(
-        "The paper does not say how it tells chaos; here it is the sign of the largest Lyapunov exponent \
+        "The paper does not state its criterion for chaos; here it is the sign of the largest Lyapunov exponent \
          across the flow, through the saltation matrices of the impacts."
             .into(),
     );

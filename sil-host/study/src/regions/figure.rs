@@ -1,4 +1,4 @@
-//! The maps drawn, with the lines p = 0 and b = 0.
+//! Fig. 3: the maps with the lines p = 0 and b = 0.
 
 use std::ops::Range;
 
@@ -12,17 +12,17 @@ use super::lines::Column;
 use super::{Map, Regions, Theta2};
 use crate::outcome::Figure;
 
-/// The paper's colour of p = 0.
+/// The paper's colour of the line p = 0.
 const RED: RGBColor = RGBColor(0xB0, 0x00, 0x20);
 
-/// Cells of a map in the figure.
+/// Number of cells of a map in the figure.
 const FINE_COLUMNS: usize = 445;
 const FINE_ROWS: usize = 260;
 
 impl Figure for Regions {
     fn svg(&self) -> Result<String, PlotError> {
         let columns = self.maps.first().map_or(&[][..], |map| &map.grid.0);
-        // The arm has been checked before.
+        // The arm was checked before.
         let arm = Arm::new(self.arm).ok();
         let maps = self.maps.iter();
         Chart {
@@ -54,7 +54,7 @@ impl Map {
         format!("θ̇₁ (rad/s): {side}, {slip}")
     }
 
-    /// The paper's initial conditions on this side of the vertical.
+    /// Returns the paper's initial conditions on this side of the vertical.
     fn initial_conditions(&self) -> Vec<(&'static str, f64)> {
         let down = InitialState::default();
         [
@@ -90,7 +90,7 @@ impl Map {
                 .map(|index| start + (index as f64 + 0.5) * step)
                 .collect()
         };
-        // A map of its own, fine enough for the eye, whatever the grid of the numbers.
+        // The figure has its own map with a fine grid, independent of the grid of the numbers.
         let fine: Vec<Option<Column<'_>>> = middles(&theta1_range, FINE_COLUMNS)
             .into_iter()
             .map(|theta1| Column::new(arm, theta1.to_radians(), self.theta2))
@@ -149,7 +149,7 @@ impl Map {
     }
 }
 
-/// Half a step beyond the first and the last value.
+/// Extends the first and the last value by half a step.
 fn ends_of_cells(middles: &[f64]) -> Range<f64> {
     match middles {
         [first, .., last] => {

@@ -1,19 +1,19 @@
-//! The lines p = 0 and b = 0, to rounding.
+//! The lines p = 0 and b = 0, accurate to rounding.
 
 use painleve_shared::{Arm, GeneralisedTorque, LinkMotion, Pose, Posture, Slip};
 
 use super::Theta2;
 use crate::belt_line::{BeltLine, bisected, positive_stretches};
 
-/// Points of a curve b = 0 over the whole of θ1.
+/// Number of points of a curve b = 0 over the whole range of θ1.
 const CURVE_POINTS: usize = 2000;
 
-/// One θ1 with the tip on the belt.
+/// The posture at one θ1 with the tip on the belt.
 pub(super) struct Column<'a> {
     arm: &'a Arm<f64>,
     /// Link angles, rad.
     pub(super) theta: LinkMotion<f64>,
-    /// θ̇2/θ̇1 without normal velocity.
+    /// Ratio θ̇2/θ̇1 without normal velocity of the tip.
     pub(super) ratio: f64,
 }
 
@@ -33,7 +33,7 @@ impl<'a> Column<'a> {
         })
     }
 
-    /// b at a rate θ̇1.
+    /// Returns b at a rate θ̇1.
     pub(super) fn b(&self, rate: f64) -> f64 {
         let rates = LinkMotion::new(rate, self.ratio * rate);
         let pose = Pose::new(&self.theta);
@@ -46,7 +46,7 @@ impl<'a> Column<'a> {
         self.arm.p(&Pose::new(&self.theta), mu, slip)
     }
 
-    /// Both θ̇1 at which b = 0, ascending.
+    /// Returns the two rates θ̇1 at which b = 0, in ascending order.
     fn rates_of_zero_b(&self) -> Option<[f64; 2]> {
         let (minus, zero, plus) = (self.b(-1.0), self.b(0.0), self.b(1.0));
         let (square, linear) = (0.5 * (plus + minus) - zero, 0.5 * (plus - minus));
@@ -54,20 +54,20 @@ impl<'a> Column<'a> {
         if discriminant < 0.0 || square == 0.0 {
             return None;
         }
-        // In the form that does not cancel.
+        // In the form without cancellation.
         let far = -0.5 * (linear + linear.signum() * discriminant.sqrt());
         let roots = [far / square, if far == 0.0 { 0.0 } else { zero / far }];
         Some([roots[0].min(roots[1]), roots[0].max(roots[1])])
     }
 }
 
-/// θ1 at which p = 0, degrees.
+/// Returns the angles θ1 at which p = 0, degrees.
 pub(super) fn zeros_of_p(arm: &Arm<f64>, mu: f64, theta2: Theta2, slip: Slip) -> Vec<f64> {
     let mut zeros = Vec::new();
     for posture in [Posture::ElbowUp, Posture::ElbowDown] {
         let line = BeltLine::new(arm, posture);
         let stretches = positive_stretches(|tau| line.p(tau, mu, slip));
-        // Ends of the whole line are no zeros.
+        // The ends of the whole line are not zeros.
         let inside = |tau: &f64| tau.abs() < core::f64::consts::FRAC_PI_2;
         let ends = stretches.into_iter().flat_map(|(from, to)| [from, to]);
         let thetas = ends.filter(inside).map(|tau| line.theta_rad(tau));
@@ -81,8 +81,8 @@ pub(super) fn zeros_of_p(arm: &Arm<f64>, mu: f64, theta2: Theta2, slip: Slip) ->
     zeros
 }
 
-/// Curves along which b = 0: over each stretch of θ1 that has such rates, the greater
-/// ones there and the lesser ones back, closed where they meet.
+/// Returns the curves along which b = 0: over each interval of θ1 that has such rates, the larger
+/// rates forwards and the smaller rates backwards, closed where they meet.
 pub(super) fn zeros_of_b(arm: &Arm<f64>, reach: f64, theta2: Theta2) -> Vec<Vec<[f64; 2]>> {
     let roots = |theta1: f64| Column::new(arm, theta1, theta2).and_then(|c| c.rates_of_zero_b());
     let points: Vec<(f64, Option<[f64; 2]>)> = (1..CURVE_POINTS)
@@ -106,7 +106,7 @@ pub(super) fn zeros_of_b(arm: &Arm<f64>, reach: f64, theta2: Theta2) -> Vec<Vec<
             .filter_map(|(theta1, rates)| Some((*theta1, (*rates)?)))
             .collect();
         if let (Some(first), Some(last)) = (known.first().copied(), known.last().copied()) {
-            // The lesser and the greater rate meet where this stretch gives way to one without.
+            // The two rates meet where this interval borders on one without such rates.
             if let Some(before) = start.checked_sub(1).and_then(|index| points.get(index)) {
                 known.splice(0..0, meeting(first.0, before.0));
             }

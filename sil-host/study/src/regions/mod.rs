@@ -1,9 +1,9 @@
 //! Fig. 3: the four solution modes over (θ1, θ̇1) with the tip on the belt and no torque.
 //!
-//! With the tip on the belt θ1 leaves two θ2, one to either side of the belt's normal; θ̇2 is
-//! that of a tip without normal velocity. p depends on θ1 alone, so that its zeros are upright
-//! lines; b is a quadratic in θ̇1 at every θ1, so that its zeros are roots of quadratics. Both
-//! are found to rounding, whatever the grid.
+//! With the tip on the belt, θ1 allows two values of θ2, one on either side of the belt normal; θ̇2 is
+//! that of a tip without normal velocity. p depends only on θ1, so its zeros are vertical
+//! lines; b is a quadratic in θ̇1 at every θ1, so its zeros are roots of quadratics. Both
+//! are accurate to rounding on any grid.
 
 mod figure;
 mod lines;
@@ -19,7 +19,7 @@ use lines::{Column, zeros_of_b, zeros_of_p};
 
 pub use options::Options;
 
-/// Which of the two θ2 that a θ1 leaves.
+/// The side of the belt normal on which θ2 lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Theta2 {
@@ -38,18 +38,18 @@ impl Theta2 {
     }
 }
 
-/// What to map.
+/// Settings of the study.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// The arm.
     pub arm: ArmParameters<f64>,
     /// Friction coefficient μ.
     pub mu: f64,
-    /// Middles of the cells, degrees; those out of reach of the belt are left out.
+    /// Values of θ1 (cell centres), degrees; values out of reach of the belt are discarded.
     pub theta1_deg: Grid,
-    /// Middles of the cells, rad/s.
+    /// Values of θ̇1 (cell centres), rad/s.
     pub theta1_dot_rad_s: Grid,
-    /// Sides of the vertical on which the upper arm's end may be.
+    /// Sides of the belt normal on which θ2 may lie.
     pub theta2: Vec<Theta2>,
     /// Slip directions.
     pub slips: Vec<Slip>,
@@ -62,7 +62,7 @@ pub struct Regions {
     pub mu: f64,
     /// Largest |θ1| with the tip on the belt, degrees.
     pub reach_deg: f64,
-    /// One per side and slip direction.
+    /// One map per side and slip direction.
     pub maps: Vec<Map>,
     #[serde(skip)]
     arm: ArmParameters<f64>,
@@ -70,24 +70,24 @@ pub struct Regions {
     spring_rest_deg: f64,
 }
 
-/// One map.
+/// One map of the solution modes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Map {
-    /// Side of the vertical.
+    /// Side of the belt normal on which θ2 lies.
     pub theta2: Theta2,
     /// Slip direction.
     pub slip: Slip,
-    /// θ1 at which p = 0, degrees, ascending.
+    /// Angles θ1 at which p = 0, degrees, in ascending order.
     pub p_zero_theta1_deg: Vec<f64>,
     /// Curves of (θ1 in degrees, θ̇1 in rad/s) along which b = 0.
     pub b_zero: Vec<Vec<[f64; 2]>>,
-    /// Part of the cells that is sliding.
+    /// Fraction of the cells that is sliding.
     pub sliding: f64,
-    /// Part that is flight.
+    /// Fraction of the cells that is flight.
     pub flight: f64,
-    /// Part that is indeterminate.
+    /// Fraction of the cells that is indeterminate.
     pub indeterminate: f64,
-    /// Part that is inconsistent.
+    /// Fraction of the cells that is inconsistent.
     pub inconsistent: f64,
     #[serde(skip)]
     cells: Vec<Cell>,
@@ -115,7 +115,7 @@ struct Columns {
     arm: Arm<f64>,
     /// Largest |θ1| with the tip on the belt, rad.
     reach_rad: f64,
-    /// Middles of the cells within reach, degrees.
+    /// Values of θ1 (cell centres) within reach, degrees.
     theta1_deg: Vec<f64>,
 }
 
@@ -131,7 +131,7 @@ impl Settings {
     }
 
     fn reach_rad(&self) -> f64 {
-        // θ2 = 0 at the end of the reach.
+        // θ2 = 0 at the full reach.
         let [length_1, length_2] = self.arm.link_length_m;
         let cosine = self.arm.height_m / length_1 - length_2 / length_1;
         libm::acos(cosine.clamp(-1.0, 1.0))
@@ -179,7 +179,7 @@ impl Study for Settings {
 }
 
 impl Regions {
-    /// Puts the maps of a study together.
+    /// Collects the maps of a study.
     pub fn new(settings: &Settings, maps: Vec<Map>) -> Self {
         Self {
             mu: settings.mu,
@@ -241,7 +241,7 @@ fn map(
 }
 
 impl Regions {
-    /// How far from the straight arm the spring of joint 2 is relaxed, degrees.
+    /// Returns the angle of joint 2 from the straight arm at which its spring is relaxed, degrees.
     pub fn spring_rest_deg(&self) -> f64 {
         self.spring_rest_deg
     }

@@ -1,4 +1,4 @@
-//! The maps as a table.
+//! Table of the maps.
 
 use comfy_table::Table;
 

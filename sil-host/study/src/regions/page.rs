@@ -13,7 +13,7 @@ use crate::{StudyError, paper};
 /// Fig. 3 with the paper's arm.
 ///
 /// # Errors
-/// [`StudyError`] if it cannot be computed.
+/// [`StudyError`] if the study cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let settings = Settings {
         arm: PlantParameters::default().arm,

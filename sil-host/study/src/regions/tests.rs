@@ -1,4 +1,4 @@
-//! The paradox where the paper has it, and lines that are exact.
+//! The paradox lies where the paper shows it, and the lines are exact.
 
 use painleve_shared::Posture;
 
@@ -86,7 +86,7 @@ fn b_is_zero_on_its_line_and_changes_sign_across() {
 }
 
 #[test]
-fn what_never_touches_the_belt_is_refused() {
+fn a_grid_out_of_reach_of_the_belt_is_refused() {
     let settings = Settings {
         theta1_deg: "40,50".parse().unwrap(),
         ..settings()

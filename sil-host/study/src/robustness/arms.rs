@@ -1,4 +1,4 @@
-//! Which arms the campaign is run with, and how they are drawn.
+//! The arms of the campaign and their random distribution.
 
 use core::ops::Range;
 
@@ -6,24 +6,24 @@ use painleve_plant::scenario::Scenario;
 use painleve_shared::ArmParameters;
 use serde::Serialize;
 
-/// The paper's arm with errors, or any arm.
+/// The arms of the campaign.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Arms {
-    /// The paper's, up to 5 % and 20 % off what the controller is told.
+    /// The paper's arm, with errors of up to 5 % and 20 % that the controller does not know.
     #[default]
     Paper,
-    /// Unequal links on a tilted belt, a tip mass; the controller is told the arm.
+    /// Arms with unequal links, a tip mass and a tilted belt, known to the controller.
     General,
 }
 
-/// Farthest target of the paper's arm: within the reach that the controller believes in, m.
+/// Farthest target of the paper's arm, within the reach of the controller's model, m.
 const FARTHEST_OF_PAPER_M: f64 = 0.183;
-/// The same as a part of the reach of an arm that it is told.
+/// Farthest target of a known arm, as a fraction of its reach.
 const FARTHEST: f64 = 0.994;
 
 impl Arms {
-    /// Draws the arm of a scenario, and what the controller knows of it.
+    /// Draws the arm of a scenario, and the model that the controller has of it.
     pub(super) fn draw(self, scenario: &mut Scenario, draw: &mut impl FnMut(Range<f64>) -> f64) {
         let nominal = ArmParameters::<f64>::default();
         match self {
@@ -49,7 +49,7 @@ impl Arms {
                 let stiffness = each(0.8..1.2);
                 let damping = each(0.8..1.2);
                 let rotors = each(0.0..2e-4);
-                // As many on either side of equal masses.
+                // Symmetric about equal masses.
                 let ratio = libm::exp(draw(libm::log(0.3)..libm::log(3.0)));
                 let masses = [0.24 / (1.0 + ratio), 0.24 * ratio / (1.0 + ratio)];
                 let both = |value: fn(f64, f64) -> f64, one: [f64; 2], other: [f64; 2]| {
@@ -79,7 +79,7 @@ impl Arms {
         }
     }
 
-    /// Farthest target of an arm that reaches `reach_m` along the belt, m.
+    /// Returns the farthest target of an arm that reaches `reach_m` along the belt, m.
     pub(super) fn farthest_m(self, reach_m: f64) -> f64 {
         match self {
             Self::Paper => FARTHEST_OF_PAPER_M,

@@ -13,18 +13,18 @@ use crate::StudyError;
 use crate::belt_line::{BeltLine, positive_stretches};
 use crate::case::{self, Reference};
 
-/// Part of the reach that is used: at its end the arm is straight.
+/// Usable fraction of the reach: at the full reach the arm is straight.
 const USED_REACH: f64 = 0.97;
-/// Least p as a part of Q22 where the arm is put down. Nearer to the edge an arm without torque
+/// Smallest p at the start, as a fraction of Q22. Nearer to the edge, an arm without torque
 /// presses on the belt with hundreds of newtons, and sticks to it before the first tick.
 const START_P_RATIO: f64 = 0.2;
-/// How far beyond an edge a target may be, m.
+/// Largest distance of a target beyond an edge, m.
 const BEYOND_M: f64 = 0.02;
-/// Time after the end of the reference in which the tip comes to rest, s.
+/// Settling time after the end of the reference, s.
 const REST_S: f64 = 2.0;
 
-/// Stretches of z_t (m) with p of at least a part of Q22 in a posture and slip, within the part
-/// of the reach that is used; the longest comes first.
+/// Returns the intervals of z_t (m) in which p is at least a fraction of Q22 in a posture and slip,
+/// within the usable reach; the longest comes first.
 pub fn admissible_m(
     arm: &Arm<f64>,
     posture: Posture,
@@ -44,10 +44,10 @@ pub fn admissible_m(
     stretches
 }
 
-/// The scenario of run `index` of the campaign with such arms and a seed.
+/// Returns the scenario of run `index` of the campaign with these arms and this seed.
 ///
 /// # Errors
-/// [`StudyError`] if the built-in scenario cannot be had.
+/// [`StudyError`] if the built-in scenario is unavailable.
 pub fn scenario(arms: Arms, seed: u64, index: u64) -> Result<Scenario, StudyError> {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(index);
@@ -56,7 +56,7 @@ pub fn scenario(arms: Arms, seed: u64, index: u64) -> Result<Scenario, StudyErro
     scenario.name = format!("robustness-{seed}-{index}");
     scenario.description = format!("Run {index} of the robustness campaign with seed {seed}");
     scenario.run.seed = seed.wrapping_add(index.wrapping_mul(0x9e37_79b9_7f4a_7c15)) >> 1;
-    // As many runs per octave.
+    // Logarithmic: equally many runs per octave.
     scenario.run.tick_hz = (500.0 * libm::exp2(draw(0.0..libm::log2(10.0)))) as u32;
 
     let friction = draw(0.2..1.0);
@@ -82,7 +82,7 @@ pub fn scenario(arms: Arms, seed: u64, index: u64) -> Result<Scenario, StudyErro
     let arm = Arm::new(scenario.arm)?;
     let slip = Slip::of(-speed_m_s);
     let first = |stretches: Vec<Range<f64>>| {
-        let none = || StudyError::Option("nothing is admissible".into());
+        let none = || StudyError::Option("the arm has no admissible tip position".into());
         stretches.into_iter().next().ok_or_else(none)
     };
     let start_m = draw(first(admissible_m(

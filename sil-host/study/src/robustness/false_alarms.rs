@@ -1,20 +1,20 @@
-//! Contact that is taken for flight.
+//! False alarms: contact that the controller takes for flight.
 
 use painleve_shared::frame::StatusFlags;
 
 use crate::contact_watch::ContactWatch;
 use crate::trial::Trial;
 
-/// Counts how often the controller gives up a contact that lasts.
+/// Counts how often the controller reports flight during a lasting contact.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FalseAlarms {
-    /// Alarms so far.
+    /// Number of false alarms.
     pub count: u32,
     said_contact: bool,
 }
 
 impl FalseAlarms {
-    /// Looks at a tick that has ended: what the controller said, and whether the tip touches.
+    /// Evaluates a completed tick: the contact that the controller reports against the true one.
     pub fn tick(&mut self, trial: &Trial, watch: &ContactWatch) {
         let says = trial.answer().flags.contains(StatusFlags::CONTACT);
         let slides = watch.captured_s.is_some() && watch.lift_offs == 0 && watch.touches();

@@ -1,4 +1,4 @@
-//! Runs over belt speed, friction, rate and encoder resolution.
+//! Dot plots of the runs over belt speed, friction, control rate and encoder resolution.
 
 use painleve_chart::style::{BLUE_INK, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
@@ -9,7 +9,7 @@ use crate::outcome::Figure;
 
 impl Figure for Campaign {
     fn svg(&self) -> Result<String, PlotError> {
-        // Thousands of dots would hide each other, and a hundred small ones are hard to see.
+        // Thousands of large dots would hide each other, and a hundred small ones are hard to see.
         let size = if self.rows.len() > 2000 { 4 } else { 9 };
         let dots = |name: &str, colour, size, success, y: fn(&Row) -> f64| {
             let rows = self.rows.iter();

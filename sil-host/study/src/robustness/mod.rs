@@ -1,5 +1,5 @@
 //! The robustness campaign: closed loops drawn at random, with an arm, a belt, converters
-//! and a link that the controller is not told about.
+//! and a link that the controller does not know.
 //!
 //! A run succeeds if the tip is captured in time, never leaves the belt again, and ends at
 //! its reference or, where that is beyond the edge, at the governed edge.
@@ -35,47 +35,48 @@ pub use outcome::Campaign;
 pub use part::Part;
 pub use row::{Ending, Row};
 
-/// A contact that lasts so long is a capture, s.
+/// Shortest contact that counts as a capture, s.
 pub const CAPTURE_S: f64 = 0.1;
-/// By then it must have lasted so long, s after enabling.
+/// Latest completion of the capture, s after enabling.
 pub const CAPTURE_LIMIT_S: f64 = 0.5;
-/// Time at the end of a run in which the tip must be at its place, s.
+/// Final interval of a run in which the tip must be at its target or governed edge, s.
 const WATCHED_S: f64 = 0.1;
-/// How far from its place the tip may end, beyond the encoders' resolution, m.
+/// Largest final distance from target or governed edge, beyond the encoders' resolution, m.
 const WITHIN_M: f64 = 1e-3;
-/// How far before the true edge a governed reference may be held, m …
+/// Largest distance before the true edge at which a governed reference may be held, m.
 const SHORT_M: f64 = 0.01;
-/// … or with how much of Q22 for p there: where p hardly changes along the belt, a little friction
-/// moves its edge far.
+/// Largest p, as a fraction of Q22, at which a governed reference may be held farther from the
+/// edge: where p hardly changes along the belt, a small change of friction moves
+/// the edge far.
 const SHORT_P_RATIO: f64 = 0.1;
 
-/// The campaign.
+/// Settings of the campaign.
 #[derive(Clone, Debug)]
 pub struct Robustness {
-    /// Which arms.
+    /// The arms of the campaign.
     pub arms: Arms,
     /// Seed of all runs.
     pub seed: u64,
     /// Number of runs.
     pub runs: usize,
-    /// Changes to every scenario after it is drawn.
+    /// Overrides applied to every scenario after it is drawn.
     pub overrides: Vec<String>,
 }
 
 impl Robustness {
-    /// The scenario of a run.
+    /// Returns the scenario of a run.
     ///
     /// # Errors
-    /// [`StudyError`] if an override is wrong.
+    /// [`StudyError`] if an override is invalid.
     pub fn scenario(&self, index: usize) -> Result<Scenario, StudyError> {
         let scenario = scenario(self.arms, self.seed, index as u64)?;
         Ok(scenario.with_overrides("robustness campaign", &self.overrides)?)
     }
 
-    /// Makes the first run, so that a wrong override is told before anything runs.
+    /// Builds the first run, so that an invalid override is reported before any run starts.
     ///
     /// # Errors
-    /// [`StudyError`] if it cannot be made.
+    /// [`StudyError`] if it cannot be built.
     pub fn check(&self) -> Result<(), StudyError> {
         Trial::new(&self.scenario(0)?)?;
         Ok(())
@@ -212,7 +213,7 @@ impl Tabular for Robustness {
     }
 }
 
-/// Target of a scenario's last reference, m; NaN without one.
+/// Returns the target of a scenario's last reference, m; NaN without a reference.
 fn target_m(scenario: &Scenario) -> f64 {
     let segments = scenario.controller.reference.segments.iter();
     let mut targets = segments.filter_map(|segment| match segment {

@@ -9,32 +9,32 @@ use super::{Arms, Ending, Row};
 use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
 
-/// How many of the worst runs are listed.
+/// Number of worst runs listed.
 const WORST: usize = 20;
 
-/// A campaign's outcome.
+/// Outcome of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Campaign {
-    /// Which arms.
+    /// The arms of the campaign.
     pub arms: Arms,
-    /// Its seed.
+    /// Seed of the campaign.
     pub seed: u64,
-    /// Runs that succeeded.
+    /// Success rate.
     pub success: Proportion,
-    /// How many runs ended in which way.
+    /// Number of runs with each ending.
     pub endings: BTreeMap<Ending, usize>,
-    /// Times that contact was taken for flight, before any lift-off.
+    /// Number of times that contact was taken for flight, before any lift-off.
     pub false_alarms: u32,
     /// Simulated time after captures, h.
     pub slid_h: f64,
-    /// Numbers of the worst runs: gravest ending first, then the largest error.
+    /// Numbers of the worst runs: the most severe ending first, then the largest error.
     pub worst: Vec<usize>,
     /// All runs.
     pub rows: Vec<Row>,
 }
 
 impl Campaign {
-    /// Of all rows.
+    /// Collects all rows.
     pub fn new(arms: Arms, seed: u64, rows: Vec<Row>) -> Self {
         let mut endings = BTreeMap::new();
         for row in &rows {
@@ -58,7 +58,7 @@ impl Campaign {
         }
     }
 
-    /// How many runs ended in this way.
+    /// Returns the number of runs with this ending.
     pub fn count(&self, ending: Ending) -> usize {
         self.endings.get(&ending).copied().unwrap_or(0)
     }

@@ -1,4 +1,4 @@
-//! The parts of the controller that can be switched off, each by its configuration keys.
+//! The parts of the controller that can be switched off, with their configuration keys.
 
 use serde::Serialize;
 
@@ -6,32 +6,32 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
-    /// The torque is kept on the side on which the tip stays pressed.
+    /// Guard: limits the torque to the side on which the tip stays pressed.
     Guard,
-    /// The reference is kept off the paradox.
+    /// Governor: keeps the reference away from the paradox.
     Governor,
-    /// A tip that left the belt is brought back; without it the law goes on.
+    /// Recovery: brings a tip that left the belt back; without it the law continues.
     Recovery,
-    /// The length of the links is calibrated.
+    /// Calibration of the link lengths.
     Calibration,
-    /// Friction is estimated; without it the first guess is taken for certain.
+    /// Friction estimate; without it the initial friction is taken as certain.
     FrictionEstimate,
-    /// Friction is fed forward from the estimate; without it from the last reading, as in the paper.
+    /// Feedforward of the estimated friction; without it the last reading is used, as in the paper.
     FrictionObserver,
-    /// Integral of the position's error.
+    /// Integral of the position error.
     PositionIntegral,
-    /// Integral of the force's error.
+    /// Integral of the force error.
     ForceIntegral,
-    /// The tip is pressed less where torque is short.
+    /// Reduction of the normal force where the torque is limited.
     PressesLess,
-    /// The normal force is approached slowly after landing.
+    /// Gradual increase of the normal force after landing.
     ForceRamp,
-    /// Unknown torques are estimated.
+    /// Estimate of unknown torques.
     Disturbance,
 }
 
 impl Part {
-    /// All of them.
+    /// All parts.
     pub const ALL: [Self; 11] = [
         Self::Guard,
         Self::Governor,
@@ -46,7 +46,7 @@ impl Part {
         Self::Disturbance,
     ];
 
-    /// The overrides that switch it off.
+    /// Returns the overrides that switch the part off.
     pub fn without(self) -> &'static [&'static str] {
         match self {
             Self::Guard => &["controller.guard.enabled=false"],

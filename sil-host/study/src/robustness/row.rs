@@ -1,17 +1,17 @@
-//! One run of the campaign and what it came to.
+//! One run of the campaign and its ending.
 
 use painleve_shared::Posture;
 use serde::Serialize;
 
-/// What a run came to.
+/// Ending of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
     /// At the reference.
     Reached,
-    /// At the governed edge, the reference being beyond it.
+    /// At the governed edge, because the reference is beyond it.
     AtEdge,
-    /// At the governed edge, but that is more than 10 mm before the true one, and p not small.
+    /// At the governed edge, but more than 10 mm before the true edge, with a p that is not small.
     StoppedEarly,
     /// Elsewhere.
     NotReached,
@@ -19,7 +19,7 @@ pub enum Ending {
     LiftOff,
     /// The tip was not captured in time.
     NotCaptured,
-    /// The controller gave up.
+    /// The controller latched a fault.
     Fault,
     /// The plant could not be solved.
     Unsolved,
@@ -35,35 +35,35 @@ impl Ending {
 /// One run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Its number: with the seed of the campaign it defines the run.
+    /// Number of the run; together with the seed of the campaign it defines the run.
     pub index: usize,
-    /// What it came to.
+    /// Ending of the run.
     pub ending: Ending,
-    /// Number of the fault that the controller has latched.
+    /// Number of the latched fault.
     pub fault: Option<u8>,
-    /// Start of the capture after enabling, s.
+    /// Time from enabling to the start of the capture, s.
     pub capture_s: Option<f64>,
-    /// Lift-offs after the capture.
+    /// Number of lift-offs after the capture.
     pub lift_offs: u64,
-    /// When the first of them was, s.
+    /// Time of the first of them, s.
     pub first_lift_off_s: Option<f64>,
-    /// Largest distance from target or governed edge at the end, m.
+    /// Largest final distance from target or governed edge, m.
     pub error_m: f64,
-    /// What is tolerated of it, m.
+    /// Tolerance of that distance, m.
     pub tolerance_m: f64,
     /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.
     pub to_edge_m: f64,
-    /// p at the tip as a part of Q22.
+    /// p at the tip as a fraction of Q22.
     pub p_ratio: f64,
-    /// Times that contact was taken for flight while the tip slid.
+    /// Number of times that contact was taken for flight while the tip slid.
     pub false_alarms: u32,
-    /// Time after capture, s.
+    /// Simulated time after the capture, s.
     pub slid_s: f64,
-    /// Where the tip ended, m.
+    /// Final tip position, m.
     pub tip_t_m: f64,
     /// Target of the reference, m.
     pub target_m: f64,
-    /// Posture of the start.
+    /// Initial posture.
     pub posture: Posture,
     /// Friction coefficient μ.
     pub mu: f64,
@@ -71,9 +71,9 @@ pub struct Row {
     pub v_belt_m_s: f64,
     /// Control rate, Hz.
     pub tick_hz: u32,
-    /// Bits of the encoders.
+    /// Resolution of the encoders, bits.
     pub encoder_bits: u8,
-    /// Bits of the torque stages.
+    /// Resolution of the torque stages, bits.
     pub torque_bits: u8,
     /// Lag of the torque stages, s.
     pub torque_lag_s: f64,

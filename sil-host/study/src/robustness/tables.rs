@@ -1,4 +1,4 @@
-//! The tables of runs made by hand, so that no change of the controller changes them.
+//! Tables of runs made by hand, so that a change of the controller does not change the snapshots.
 
 use super::*;
 use crate::ablation::{Ablation, AblationStudy};

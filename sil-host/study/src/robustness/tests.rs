@@ -108,7 +108,7 @@ fn general_arms_are_in_their_ranges_and_all_different() {
             assert!((0.3..0.7).contains(&(centre / length)));
         }
         assert!(arm.belt_tilt_rad.to_degrees().abs() < 10.0);
-        assert_eq!(scenario.arm_model, None, "the controller is told the arm");
+        assert_eq!(scenario.arm_model, None, "the controller knows the arm");
         assert!(Simulation::new(scenario).is_ok());
     }
     assert!(drawn.windows(2).all(|pair| pair[0].arm != pair[1].arm));
@@ -152,7 +152,7 @@ fn every_part_can_be_switched_off() {
 }
 
 #[test]
-fn a_wrong_override_is_told_before_anything_runs() {
+fn an_invalid_override_is_reported_before_any_run_starts() {
     let mut study = campaign(1);
     study.overrides = vec!["converters.link.frame_loss=2".into()];
     let error = study.check().unwrap_err().to_string();

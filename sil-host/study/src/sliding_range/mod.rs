@@ -1,10 +1,10 @@
-//! How far a controller slides: the largest reference that the tip reaches within a
+//! Sliding range of a controller: the largest reference that the tip reaches within a
 //! tolerance without leaving the belt (the paper's Z_t,sliding).
 //!
-//! Success need not be monotone in the target. Targets on a coarse grid from the start to
-//! the limit p = 0 are all tried first; the range ends between the last target before
-//! the first failure and that failure, where it is bisected. Targets that are reached
-//! beyond the first failure are not part of the range: they are told apart, as
+//! Success need not be monotone in the target. All targets on a coarse grid from the start to
+//! the limit p = 0 are tried first. The range ends between the last target before
+//! the first failure and that failure, where it is bisected. Targets reached
+//! beyond the first failure are not part of the range; they are reported as
 //! [`Row::reached_beyond_m`].
 
 mod figure;
@@ -28,18 +28,18 @@ use super::{Study, StudyError, paper};
 
 pub use options::Options;
 
-/// When a reference counts as reached, and how finely the range is searched.
+/// Conditions for reaching a reference, and the resolution of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Criterion {
     /// Largest distance from the target, m.
     pub within_m: f64,
-    /// How long the tip must stay so near after the reference has ended, s.
+    /// Time for which the tip must stay within that distance after the end of the reference, s.
     pub stay_s: f64,
-    /// Latest end of that after the end of the reference, s.
+    /// Time limit for this, from the end of the reference, s.
     pub patience_s: f64,
-    /// Distance of the targets tried first, m.
+    /// Spacing of the targets tried first, m.
     pub scan_step_m: f64,
-    /// Accuracy of the range's end, m.
+    /// Accuracy of the end of the range, m.
     pub resolution_m: f64,
 }
 
@@ -56,7 +56,7 @@ impl Default for Criterion {
     }
 }
 
-/// What to study: all combinations, the last varying fastest.
+/// Settings of the study: all combinations, the last varying fastest.
 #[derive(Clone, Debug)]
 pub struct SlidingRange {
     /// Controllers.
@@ -71,21 +71,21 @@ pub struct SlidingRange {
     pub references: Vec<Reference>,
     /// Changes to every scenario.
     pub overrides: Vec<String>,
-    /// What counts.
+    /// Conditions for reaching a target.
     pub criterion: Criterion,
 }
 
-/// Why the range ends where it does.
+/// Why the range ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
-    /// p = 0: there is nothing farther to reach.
+    /// The limit p = 0 is reached.
     Limit,
     /// The tip left the belt.
     LiftOff,
-    /// The tip came to rest elsewhere, or not in time.
+    /// The tip came to rest elsewhere, or too late.
     NotReached,
-    /// The controller gave up.
+    /// The controller latched a fault.
     Fault,
 }
 
@@ -100,7 +100,7 @@ impl Ending {
     }
 }
 
-/// The sliding range of one case.
+/// Sliding range of one case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Controller.
@@ -113,19 +113,19 @@ pub struct Row {
     pub mu: f64,
     /// Reference.
     pub reference: Reference,
-    /// Where the tip starts, m.
+    /// Initial tip position, m.
     pub start_m: f64,
-    /// Z_t,sliding, m; none if not even the first target is reached.
+    /// Z_t,sliding, m; null if the first target is not reached.
     pub z_sliding_m: Option<f64>,
-    /// Where p = 0 in this posture, m.
+    /// Tip position at which p = 0 in this posture, m.
     pub limit_m: f64,
-    /// The paper's Z_t,sliding for this law, posture and μ, m; none where it has none.
+    /// The paper's Z_t,sliding for this law, posture and μ, m; null if it gives none.
     pub paper_m: Option<f64>,
-    /// Where the tip was at the end of the run to `z_sliding_m`, m.
+    /// Tip position at the end of the run to `z_sliding_m`, m.
     pub tip_t_m: Option<f64>,
-    /// What happened at the next farther target.
+    /// Result at the next farther target.
     pub ends_by: Ending,
-    /// Farthest target beyond the range that was reached all the same, m.
+    /// Farthest target beyond the range that was still reached, m.
     pub reached_beyond_m: Option<f64>,
 }
 
@@ -135,10 +135,10 @@ enum Trialled {
 }
 
 impl SlidingRange {
-    /// Makes every case once, so that a mistake is told before anything runs.
+    /// Builds every case once, so that an error is reported before any case runs.
     ///
     /// # Errors
-    /// [`StudyError`] of the first case that cannot be run.
+    /// [`StudyError`] of the first invalid case.
     pub fn check(&self) -> Result<(), StudyError> {
         for index in 0..self.len() {
             let case = self.case(index)?;
@@ -257,7 +257,7 @@ impl Case<'_> {
         })
     }
 
-    /// End of the stretch of p > 0 around the start.
+    /// Returns the end of the interval with p > 0 around the start.
     fn limit_m(&self, start_m: f64) -> Result<f64, StudyError> {
         let arm = Arm::new(self.scenario.arm)?;
         let line = BeltLine::new(&arm, self.posture);
@@ -271,7 +271,7 @@ impl Case<'_> {
         Ok(around.map_or(start_m, |(_, to)| to))
     }
 
-    /// Targets tried first: beyond the start on whole multiples of the step, and the limit.
+    /// Returns the targets tried first: whole multiples of the step beyond the start, and the limit.
     fn targets(&self, start_m: f64, limit_m: f64) -> Vec<f64> {
         let step = self.criterion.scan_step_m;
         let first = (start_m / step).floor() as i64 + 1;
@@ -279,7 +279,7 @@ impl Case<'_> {
             .map(|index| index as f64 * step)
             .take_while(|target| *target < limit_m)
             .collect();
-        // A step short of rounding, so that the reference is within the reach.
+        // Slightly less than the limit, so that the reference is within reach despite rounding.
         targets.push(limit_m - 1e-6);
         targets
     }
@@ -322,7 +322,7 @@ impl Case<'_> {
 /// The sliding ranges of all cases.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SlidingRanges {
-    /// One per case.
+    /// One row per case.
     pub rows: Vec<Row>,
 }
 

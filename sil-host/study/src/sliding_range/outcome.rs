@@ -1,4 +1,4 @@
-//! Sliding ranges as a table and as bars, the paper's values and the limit beside.
+//! Sliding ranges as a table and as bars, with the paper's values and the limit.
 
 use comfy_table::Table;
 

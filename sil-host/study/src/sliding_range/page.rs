@@ -10,10 +10,10 @@ use crate::figures::page::{Comparison, Section, Verdict};
 use crate::figures::page_maker::{PageMaker, SAMPLED_FRICTION, section};
 use crate::{StudyError, outcome, paper};
 
-/// Every controller, and what a ramp as reference is worth.
+/// Returns the section on every controller, and on a ramp as reference.
 ///
 /// # Errors
-/// [`StudyError`] if it cannot be computed.
+/// [`StudyError`] if the study cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let study = SlidingRange {
         controllers: Controller::ALL.to_vec(),
@@ -55,9 +55,9 @@ fn ranges(outcome: &SlidingRanges) -> Result<Section, PlotError> {
         section.comparisons.push(compared(row));
     }
     section.reasons.push(
-        "What a controller reaches depends on the reference, which the paper does not give for these numbers: \
+        "The position that a controller reaches depends on the reference, which the paper does not give for these numbers: \
          a ramp throws the tip off by the jump of speed at its start, a minimum jerk does not; \
-         here it is the one of each row, and a target counts as reached when the tip stays within 1 mm of it \
+         here it is given in each row, and a target counts as reached when the tip stays within 1 mm of it \
          for 2 s without ever having left the belt."
             .into(),
     );
@@ -80,7 +80,7 @@ fn compared(row: &Row) -> Comparison {
     match row.paper_m {
         Some(paper) => Comparison {
             verdict: row.z_sliding_m.map_or(Verdict::FallsShort, |metres| {
-                // To the digits that the paper prints.
+                // Compares to the digits that the paper prints.
                 match metres - paper {
                     difference if difference.abs() <= 5e-4 => Verdict::Agrees,
                     difference if difference > 0.0 => Verdict::Farther,

@@ -34,13 +34,13 @@ fn the_hybrid_law_goes_farther_than_in_the_paper_and_the_pid_lifts_off_elbow_up(
 
 /// Unequal links, offset centres of mass, a tip mass, a tilted belt.
 #[test]
-fn an_arm_of_ones_own_slides_to_its_own_edge_in_both_postures() {
+fn a_user_defined_arm_slides_to_its_own_edge_in_both_postures() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/own-arm.toml");
     for posture in [Posture::ElbowDown, Posture::ElbowUp] {
         let mut study = study(Controller::Scenario(file.into()), posture);
         study.converters = vec![Converters::Own];
         let row = study.row(0).unwrap();
-        // Farther than the paper's arm reaches at all.
+        // Farther than the full reach of the paper's arm.
         assert!(row.limit_m > 0.2, "{row:?}");
         assert!(row.z_sliding_m.unwrap() >= 0.98 * row.limit_m, "{row:?}");
     }
@@ -49,7 +49,7 @@ fn an_arm_of_ones_own_slides_to_its_own_edge_in_both_postures() {
 #[test]
 fn the_range_ends_where_the_next_target_fails() {
     let mut study = study(Controller::Pid, Posture::ElbowDown);
-    // The jump of speed at the start of a fast ramp throws the tip off.
+    // The step of speed at the start of a fast ramp throws the tip off.
     study.references = vec![Reference::Ramp(2.0)];
     let row = study.row(0).unwrap();
     assert_eq!(row.ends_by, Ending::LiftOff);
@@ -62,7 +62,7 @@ fn the_range_ends_where_the_next_target_fails() {
 }
 
 #[test]
-fn a_tolerance_that_nothing_meets_is_told_as_not_reached() {
+fn an_unattainable_tolerance_is_reported_as_not_reached() {
     let mut study = study(Controller::Hybrid, Posture::ElbowDown);
     study.criterion.within_m = 1e-9;
     study.criterion.patience_s = 2.5;
@@ -72,7 +72,7 @@ fn a_tolerance_that_nothing_meets_is_told_as_not_reached() {
 }
 
 #[test]
-fn a_controller_that_does_not_reach_the_belt_is_told_before_anything_runs() {
+fn a_controller_that_does_not_reach_the_belt_is_reported_before_any_case_runs() {
     let mut study = study(Controller::Scenario("nothing".into()), Posture::ElbowUp);
     assert!(study.check().unwrap_err().to_string().contains("nothing"));
     study.controllers = vec![Controller::Hybrid];

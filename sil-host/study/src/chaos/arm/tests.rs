@@ -1,4 +1,4 @@
-//! The deviation from the arm's motion against neighbouring motions, and against Liouville.
+//! The deviation of the arm's motion, compared with neighbouring motions and with Liouville's theorem.
 
 use nalgebra::Matrix4;
 use painleve_plant::mechanics::belt::BeltProfile;
@@ -10,7 +10,7 @@ use painleve_shared::{Arm, ArmParameters, Pose, Posture};
 
 use super::*;
 
-/// The deviation from a run, and the modes that the run goes through.
+/// The deviation of a run, and the sequence of its modes.
 struct TangentAndModes {
     tangent: ArmTangent,
     modes: Vec<ContactMode>,
@@ -40,7 +40,7 @@ fn accurate() -> PlantParameters {
     }
 }
 
-/// Where a run of `duration_s` ends, and the deviation from it.
+/// Returns the final state of a run of `duration_s`, and its deviation.
 fn run(
     parameters: &PlantParameters,
     start: State,
@@ -57,7 +57,7 @@ fn run(
     (*plant.state(), deviation, probe.modes)
 }
 
-/// The deviation is the difference of neighbours that start at `start(±ε)`, over 2ε.
+/// Checks that the deviation is the difference of neighbours that start at `start(±ε)`, over 2ε.
 fn assert_as_neighbours(
     parameters: &PlantParameters,
     start: impl Fn(f64) -> State,
@@ -77,7 +77,7 @@ fn assert_as_neighbours(
     modes
 }
 
-/// A state of the bouncing arm, in flight.
+/// Returns a state of the bouncing arm, in flight.
 fn bouncing(parameters: &PlantParameters) -> State {
     let initial = State::new(32_f64.to_radians(), 18.27_f64.to_radians(), 0.0, 0.0);
     let mut plant = ArmOnBelt::new(parameters, initial).unwrap();
@@ -89,7 +89,7 @@ fn bouncing(parameters: &PlantParameters) -> State {
 }
 
 #[test]
-fn bounces_carry_a_deviation_as_neighbours_do() {
+fn the_deviation_matches_neighbours_across_bounces() {
     for speed_m_s in [-0.4, -0.5] {
         let parameters = PlantParameters {
             belt: BeltProfile::Constant { speed_m_s },
@@ -105,7 +105,7 @@ fn bounces_carry_a_deviation_as_neighbours_do() {
     }
 }
 
-/// States with the tip sliding along the belt from `tip_t_m` at `tip_speed_m_s`.
+/// Returns states with the tip sliding along the belt from `tip_t_m` at `tip_speed_m_s`.
 fn on_belt(parameters: &PlantParameters, tip_t_m: f64, tip_speed_m_s: f64) -> State {
     let arm = Arm::new(parameters.arm).unwrap();
     let theta = arm.link_angles_on_belt_rad(tip_t_m, Posture::ElbowDown);
@@ -114,9 +114,9 @@ fn on_belt(parameters: &PlantParameters, tip_t_m: f64, tip_speed_m_s: f64) -> St
     State::new(theta.first(), theta.second(), rates.first(), rates.second())
 }
 
-/// Slip dies, the tip moves with the belt until friction holds it no more, and slides back.
+/// Slip stops, the tip sticks to the belt until friction no longer holds it, and slides back.
 #[test]
-fn slip_that_dies_and_returns_carries_a_deviation_as_neighbours_do() {
+fn the_deviation_matches_neighbours_across_sticking() {
     let parameters = PlantParameters {
         belt: BeltProfile::Constant { speed_m_s: -0.02 },
         friction: 0.3,
@@ -129,9 +129,9 @@ fn slip_that_dies_and_returns_carries_a_deviation_as_neighbours_do() {
     }
 }
 
-/// Infinitely many impacts that end in a slide.
+/// Infinitely many impacts that end in sliding.
 #[test]
-fn chatter_carries_a_deviation_as_neighbours_do() {
+fn the_deviation_matches_neighbours_across_chatter() {
     for restitution in [0.1, 0.5] {
         let mut parameters = accurate();
         parameters.friction = 0.2;
@@ -154,8 +154,8 @@ fn chatter_carries_a_deviation_as_neighbours_do() {
     }
 }
 
-/// Without friction, damping and loss the arm is a Hamiltonian system, impacts included: in
-/// angles and momenta no volume is lost or gained.
+/// Without friction, damping and loss the arm is a Hamiltonian system, impacts included: the
+/// volume in angles and momenta is constant.
 #[test]
 fn a_conservative_arm_keeps_the_volume_of_deviations() {
     let parameters = PlantParameters {
@@ -176,7 +176,7 @@ fn a_conservative_arm_keeps_the_volume_of_deviations() {
         run(&parameters, start, direction, 2.0)
     });
     let arm = Arm::new(parameters.arm).unwrap();
-    // Momenta are M θ̇: the determinant of M takes rates to them.
+    // Momenta are M θ̇: the determinant of M converts between rates and momenta.
     let inertia = |state: &State| arm.mass_matrix(&Pose::new(&theta(state))).determinant();
     let rates = Matrix4::from_columns(&ends.clone().map(|(_, deviation, _)| deviation));
     let volume = rates.determinant() * inertia(&ends[0].0) / inertia(&start);
