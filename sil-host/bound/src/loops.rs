@@ -75,6 +75,11 @@ impl Limits {
                 "eight bits at 5.25 MHz: APB2's 84 MHz over 16",
             ),
             declare("plausibility::", Limit::Times(2), "two joints"),
+            declare(
+                "div_rem",
+                Limit::Times(64),
+                "a division of 64 bits: at least a bit of the quotient a round",
+            ),
             declare("set_bytes", Limit::Times(4), "a word's bytes at either end"),
             declare(
                 "__aeabi_mem",
