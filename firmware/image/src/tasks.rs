@@ -69,8 +69,9 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
             FrameSource::Sensors => SENSORS_SILENCE_MS,
             FrameSource::Lockstep | FrameSource::Realtime => FRAMES_SILENCE_MS,
         };
-        let limit = u64::from(limit_ms) * u64::from(self.tick_hz) / 1000;
-        if self.tick_hz > 0 && u64::from(self.silent_ticks) > limit {
+        // 32 bits hold 5 s at 100 kHz; dividing 64 would be a loop without a declared limit.
+        let limit = limit_ms.saturating_mul(self.tick_hz) / 1000;
+        if self.tick_hz > 0 && self.silent_ticks > limit {
             self.task.stop();
             self.tick_hz = 0;
         }

@@ -74,7 +74,7 @@ impl Limits {
                 Limit::Cycles(8 * 32),
                 "eight bits at 5.25 MHz: APB2's 84 MHz over 16",
             ),
-            declare("plausibility::", Limit::Times(2), "two joints"),
+            declare("plausibility::", Limit::Times(3), "two joints, and the end"),
             declare(
                 "div_rem",
                 Limit::Times(64),
