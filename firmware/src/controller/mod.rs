@@ -95,7 +95,7 @@ impl<L: Law> Controller<L> {
             estimates: stages.estimators.start(configuration, arm),
             supervision: Supervision::default(),
             references: stages.references.start(&arm),
-            law: L::State::default(),
+            law: settings.law.initial_state(),
             recovery: RecoveryState::default(),
             command: LastCommand::default(),
         };

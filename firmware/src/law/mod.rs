@@ -68,6 +68,12 @@ pub trait Law: Clone + Debug + Default + SettingValue {
         true
     }
 
+    /// Returns the state before the law's first tick. A law on a PC may allocate it here, once:
+    /// the ticks must not.
+    fn initial_state(&self) -> Self::State {
+        Self::State::default()
+    }
+
     /// Resets the law's state; called before the law's tick when the drive is armed and when the
     /// tip lands.
     fn reset(&self, state: &mut Self::State, input: &LawInput<'_>) {

@@ -89,6 +89,7 @@ trait AnyLaw: Debug + Send + Sync + erased_serde::Serialize {
     fn is_equal(&self, other: &dyn Any) -> bool;
     fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused>;
     fn is_on(&self) -> bool;
+    fn initial_state(&self) -> LawChoiceState;
     fn reset(&self, state: &mut LawChoiceState, input: &LawInput<'_>);
     fn tick(&self, state: &mut LawChoiceState, input: &LawInput<'_>) -> LawOutput;
 }
@@ -114,6 +115,10 @@ impl<L: ScenarioLaws> AnyLaw for L {
         Law::is_on(self)
     }
 
+    fn initial_state(&self) -> LawChoiceState {
+        LawChoiceState(Some(Box::new(Law::initial_state(self))))
+    }
+
     fn reset(&self, state: &mut LawChoiceState, input: &LawInput<'_>) {
         Law::reset(self, state.of::<L>(), input);
     }
@@ -123,7 +128,7 @@ impl<L: ScenarioLaws> AnyLaw for L {
     }
 }
 
-/// The state of a [`LawChoice`]: that of the law behind it, once that has run.
+/// The state of a [`LawChoice`]: that of the law behind it, allocated by [`Law::initial_state`].
 #[derive(Default)]
 pub struct LawChoiceState(Option<Box<dyn AnyState>>);
 
@@ -182,6 +187,10 @@ impl Law for LawChoice {
 
     fn is_on(&self) -> bool {
         self.0.is_on()
+    }
+
+    fn initial_state(&self) -> LawChoiceState {
+        self.0.initial_state()
     }
 
     fn reset(&self, state: &mut LawChoiceState, input: &LawInput<'_>) {
