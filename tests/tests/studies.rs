@@ -268,7 +268,7 @@ fn mistakes_are_told_in_one_line_and_overwrite_nothing() {
         ),
         (
             &["closed-loop-bifurcation", "--mu", "inf"],
-            &["not a finite number"],
+            &["is not a number from -1e9 to 1e9"],
         ),
         (&["closed-loop-bifurcation", "--initial", "x"], &["'x'"]),
         (
