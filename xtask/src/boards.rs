@@ -1,6 +1,7 @@
 //! The boards that images are built for: one folder each in `firmware/boards`, whose `Cargo.toml`
 //! says in `[package.metadata.board]` what is to be known about the board.
 
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
@@ -26,23 +27,35 @@ pub struct Board {
 /// # Errors
 /// If cargo cannot read the workspace, or a board does not say what it must.
 pub fn all() -> Result<Vec<Board>, ChoreError> {
-    let output = Command::new(cargo())
-        .args(["metadata", "--no-deps", "--format-version", "1"])
-        .current_dir(workspace())
-        .output()
-        .map_err(|cause| ChoreError(format!("cannot start `cargo metadata`: {cause}")))?;
-    let metadata: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
-        let reason = String::from_utf8_lossy(&output.stderr);
-        ChoreError(format!("`cargo metadata` failed: {}", reason.trim()))
-    })?;
-    let mut boards: Vec<_> = metadata["packages"]
-        .as_array()
-        .into_iter()
-        .flatten()
+    let packages = packages(&workspace().join("Cargo.toml"))?;
+    let mut boards: Vec<_> = packages
+        .iter()
         .filter(|package| package["metadata"]["board"].is_object())
         .collect();
     boards.sort_by_key(|package| package["manifest_path"].as_str());
     boards.into_iter().map(board).collect()
+}
+
+/// The packages of the workspace with this manifest, as `cargo metadata` describes them.
+///
+/// # Errors
+/// If cargo cannot read the workspace.
+pub fn packages(manifest: &Path) -> Result<Vec<Value>, ChoreError> {
+    let output = Command::new(cargo())
+        .args(["metadata", "--no-deps", "--format-version", "1"])
+        .arg("--manifest-path")
+        .arg(manifest)
+        .current_dir(workspace())
+        .output()
+        .map_err(|cause| ChoreError(format!("cannot start `cargo metadata`: {cause}")))?;
+    let mut metadata: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
+        let reason = String::from_utf8_lossy(&output.stderr);
+        ChoreError(format!("`cargo metadata` failed: {}", reason.trim()))
+    })?;
+    match metadata["packages"].take() {
+        Value::Array(packages) => Ok(packages),
+        _ => Err(ChoreError("`cargo metadata` lists no packages".into())),
+    }
 }
 
 fn board(package: &Value) -> Result<Board, ChoreError> {

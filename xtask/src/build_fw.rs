@@ -29,12 +29,31 @@ enum Toolchain {
 /// If the target is not installed, or the build fails.
 pub fn run() -> Result<(), ChoreError> {
     let boards = boards::all()?;
-    let mut build = vec!["build", "--profile", PROFILE, "--bins", "--target", TARGET];
+    let mut selection = vec!["--profile", PROFILE, "--bins"];
     for board in &boards {
-        build.extend(["--package", &board.package]);
+        selection.extend(["--package", &board.package]);
     }
+    let images: Vec<_> = boards.iter().flat_map(|board| &board.images).collect();
+    build(&selection, "target", PROFILE, &images)
+}
+
+/// Builds `images`, the programs that `selection` selects for cargo, with the profile `profile`
+/// into the workspace's folder `target`.
+///
+/// # Errors
+/// If the target is not installed, or the build fails.
+pub fn build(
+    selection: &[&str],
+    target: &str,
+    profile: &str,
+    images: &[&String],
+) -> Result<(), ChoreError> {
+    let build = [&["build", "--target", TARGET], selection].concat();
     match toolchain()? {
-        Toolchain::Installed => run_with(&cargo(), &build, &[]),
+        Toolchain::Installed => {
+            let build = [&build[..], &["--target-dir", target]].concat();
+            run_with(&cargo(), &build, &[])
+        }
         Toolchain::Debian => {
             // A target folder of its own: objects of two compilers do not mix.
             let folder = workspace().join("target/debian");
@@ -47,9 +66,10 @@ pub fn run() -> Result<(), ChoreError> {
                 ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld"),
             ];
             run_with("/usr/bin/cargo", &build, &environment)?;
-            for name in boards.iter().flat_map(|board| &board.images) {
-                let built = workspace().join(format!("target/debian/{TARGET}/{PROFILE}/{name}"));
-                copy(&built, &image(name))?;
+            for name in images {
+                let built = workspace().join(format!("target/debian/{TARGET}/{profile}/{name}"));
+                let image = workspace().join(format!("{target}/{TARGET}/{profile}/{name}"));
+                copy(&built, &image)?;
             }
             Ok(())
         }

@@ -1,28 +1,40 @@
-//! `cargo xtask examples`: builds and runs every example, each a crate outside the workspace.
+//! `cargo xtask examples`: builds, runs and tests every example, each a crate outside the workspace.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::command::{ChoreError, run_cargo, workspace};
+use crate::{boards, build_fw};
 
-/// Runs every folder of `examples/` that has a `Cargo.toml`, in the order of their names.
+/// The examples' own target folder, one for all of them: they share most dependencies.
+const TARGET: &str = "target/examples";
+
+/// Runs every folder of `examples/` that has a `Cargo.toml`, in the order of their names: builds the
+/// image that `[package.metadata] image` names, runs the program, then its tests.
 ///
 /// # Errors
-/// The first example that does not build, or that ends with an error.
+/// The first example that does not build, ends with an error, or fails a test.
 pub fn run() -> Result<(), ChoreError> {
     for manifest in manifests()? {
-        let manifest = manifest.to_string_lossy();
-        // One target folder for all of them: they share most dependencies.
-        run_cargo(&[
-            "run",
-            "--release",
-            "--manifest-path",
-            &manifest,
-            "--target-dir",
-            "target/examples",
-        ])?;
+        let manifest_path = manifest.to_string_lossy();
+        let of_example = ["--release", "--manifest-path", &manifest_path];
+        for image in images(&manifest)? {
+            let selection = [&of_example[..], &["--bin", &image]].concat();
+            build_fw::build(&selection, TARGET, "release", &[&image])?;
+        }
+        for chore in ["run", "test"] {
+            run_cargo(&[&[chore], &of_example[..], &["--target-dir", TARGET]].concat())?;
+        }
     }
     Ok(())
+}
+
+/// The images that an example has for a microcontroller.
+fn images(manifest: &Path) -> Result<Vec<String>, ChoreError> {
+    let packages = boards::packages(manifest)?;
+    let image =
+        |package: &serde_json::Value| package["metadata"]["image"].as_str().map(str::to_owned);
+    Ok(packages.iter().filter_map(image).collect())
 }
 
 fn manifests() -> Result<Vec<PathBuf>, ChoreError> {

@@ -1,0 +1,76 @@
+//! The whole command works with a law of one's own: runs, studies, error messages, and the image in
+//! QEMU, whose torque counts are those of the native controller to the last bit.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+const LAW: &str = "controller.law={impedance={}}";
+
+fn own_law(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_own-law"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn run(more: &[&str]) -> Value {
+    let arguments = ["run", "--set", LAW, "--no-plot", "--no-record", "--json"];
+    let output = own_law(&[&arguments, more].concat());
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn it_slides_to_the_papers_limit() {
+    let report = run(&[]);
+    assert_eq!(report["controller"], "impedance");
+    assert_eq!(report["lift_offs"], 0);
+    let tip_m = report["final_tip_t_m"].as_f64().unwrap();
+    assert!((tip_m - 0.148).abs() < 1e-3, "{tip_m}");
+}
+
+#[test]
+fn the_emulated_board_gives_the_same_bits() {
+    let image = Path::new(env!("CARGO_BIN_EXE_own-law"))
+        .with_file_name("../thumbv7em-none-eabihf/release/own-law-qemu");
+    let image = image.to_str().unwrap();
+    let short = ["--set", "run.duration_s=1"];
+    let native = run(&short);
+    let emulated = run(&[&short[..], &["--host", "qemu", "--elf", image]].concat());
+    assert_eq!(native["log_hash"], emulated["log_hash"]);
+}
+
+#[test]
+fn a_study_takes_it() {
+    let study = [
+        "study",
+        "sliding-range",
+        "--controller",
+        "hybrid-elbow-up",
+        "--posture",
+        "elbow-up",
+    ];
+    let output = own_law(
+        &[
+            &study[..],
+            &["--converters", "hardware", "--set", LAW, "--json"],
+        ]
+        .concat(),
+    );
+    assert!(output.status.success(), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("hybrid-elbow-up"));
+}
+
+#[test]
+fn a_setting_out_of_range_is_refused_by_its_key() {
+    let set = "controller.law={impedance={stiffness_n_m=-1}}";
+    let output = own_law(&["run", "--set", set]);
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        message.contains("controller.law.impedance.stiffness_n_m"),
+        "{message}"
+    );
+}
