@@ -37,13 +37,12 @@ impl Monitor for Course {
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
         let error_m = (sample.plant.tip_t_m - sample.reference_tip_t_m).abs();
         if sample.plant.time_s > 0.2 {
-            self.tip_error_m = self.tip_error_m.max(error_m);
-            self.force_error_n = self
-                .force_error_n
-                .max((sample.plant.normal_force_n - 10.0).abs());
+            let force_error_n = (sample.plant.normal_force_n - 10.0).abs();
+            self.tip_error_m = larger(self.tip_error_m, error_m);
+            self.force_error_n = larger(self.force_error_n, force_error_n);
         }
         if sample.plant.time_s > self.duration_s - 1.0 {
-            self.rest_error_m = self.rest_error_m.max(error_m);
+            self.rest_error_m = larger(self.rest_error_m, error_m);
         }
         if !sample.plant.mode.is_contact() {
             self.last_flight_s = sample.plant.time_s;
@@ -51,6 +50,15 @@ impl Monitor for Course {
         self.at_edge = sample.actuator.flags.contains(StatusFlags::AT_EDGE);
         Ok(())
     }
+}
+
+/// The larger error. A controller that follows no reference, whose error is NaN, is as far off as
+/// can be: `f64::max` would pass over it.
+fn larger(largest: f64, error: f64) -> f64 {
+    if error.is_nan() {
+        return f64::INFINITY;
+    }
+    largest.max(error)
 }
 
 fn run(scenario: &str, overrides: &[&str]) -> (LoopResult, Course) {
