@@ -3,6 +3,8 @@
 //! Panels are stacked on one time axis as in the paper's simulation figures. Flight
 //! is shaded in every panel, so that cause and effect line up.
 
+mod panels;
+
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -10,8 +12,8 @@ use painleve_chart::PlotError;
 use painleve_chart::axis::{ValueAxis, label};
 use painleve_chart::decimate::{Bin, Decimator, Extent};
 use painleve_chart::style::{
-    self, Area, BLACK_INK, BLUE_INK, Drawn, GREEN, GREY, GRID, HEADING, LEGEND, NOTE, ORANGE, SKY,
-    SUBTITLE, TICK, TITLE, VERMILLION, text, text_width, ticks, without_straight_ons,
+    self, Area, BLUE_INK, Drawn, GREEN, GREY, GRID, HEADING, LEGEND, NOTE, SKY, SUBTITLE, TICK,
+    TITLE, VERMILLION, text, text_width, ticks, without_straight_ons,
 };
 use painleve_plant::ContactMode;
 use painleve_plant::sample::Sample;
@@ -19,121 +21,7 @@ use painleve_system::atomic_file;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-/// Signals of the figure, by their index in a bin.
-mod signal {
-    pub(super) const TIP: usize = 0;
-    pub(super) const REFERENCE: usize = 1;
-    pub(super) const NORMAL_FORCE: usize = 2;
-    pub(super) const U1: usize = 3;
-    pub(super) const U2: usize = 4;
-    pub(super) const B: usize = 5;
-    pub(super) const P: usize = 6;
-    pub(super) const COUNT: usize = 7;
-}
-
-struct Curve {
-    signal: usize,
-    name: &'static str,
-    colour: RGBColor,
-    width: u32,
-}
-
-struct Panel {
-    title: &'static str,
-    unit: &'static str,
-    /// Signals in the order of the legend; the first is drawn on top.
-    curves: &'static [Curve],
-    /// Note on how to read the panel.
-    note: &'static str,
-    /// Whether the panel shows a line at zero.
-    zero_line: bool,
-    /// Smallest span of the value axis, so that noise on a constant stays small.
-    minimum_span: f64,
-}
-
-const TIP_PANEL: Panel = Panel {
-    title: "Tip position zₜ",
-    unit: "m",
-    curves: &[
-        Curve {
-            signal: signal::TIP,
-            name: "tip zₜ",
-            colour: BLACK_INK,
-            width: 3,
-        },
-        // Wide and below, so that both are visible where they agree.
-        Curve {
-            signal: signal::REFERENCE,
-            name: "reference zₜ*",
-            colour: ORANGE,
-            width: 9,
-        },
-    ],
-    note: "",
-    zero_line: false,
-    minimum_span: 0.002,
-};
-const FORCE_PANEL: Panel = Panel {
-    title: "Normal force fₙ",
-    unit: "N",
-    curves: &[Curve {
-        signal: signal::NORMAL_FORCE,
-        name: "",
-        colour: BLUE_INK,
-        width: 3,
-    }],
-    note: "",
-    zero_line: true,
-    minimum_span: 1.0,
-};
-const TORQUE_PANEL: Panel = Panel {
-    title: "Joint torques u₁, u₂",
-    unit: "N·m",
-    curves: &[
-        Curve {
-            signal: signal::U1,
-            name: "u₁",
-            colour: BLACK_INK,
-            width: 3,
-        },
-        Curve {
-            signal: signal::U2,
-            name: "u₂",
-            colour: VERMILLION,
-            width: 5,
-        },
-    ],
-    note: "",
-    zero_line: true,
-    minimum_span: 0.5,
-};
-const B_PANEL: Panel = Panel {
-    title: "Free normal acceleration b",
-    unit: "m/s²",
-    curves: &[Curve {
-        signal: signal::B,
-        name: "",
-        colour: BLUE_INK,
-        width: 3,
-    }],
-    note: "lift-off where b ≥ 0",
-    zero_line: true,
-    minimum_span: 1.0,
-};
-const P_PANEL: Panel = Panel {
-    title: "Contact coefficient p",
-    unit: "1/kg",
-    curves: &[Curve {
-        signal: signal::P,
-        name: "",
-        colour: GREEN,
-        width: 3,
-    }],
-    note: "paradox where p ≤ 0",
-    zero_line: true,
-    minimum_span: 0.5,
-};
-
+use self::panels::{B_PANEL, Curve, FORCE_PANEL, P_PANEL, Panel, TIP_PANEL, TORQUE_PANEL, signal};
 /// Lanes of the contact mode, from top to bottom.
 const LANES: [(ContactMode, &str, RGBColor); 4] = [
     (ContactMode::SlidePositive, "slide +", BLUE_INK),
