@@ -13,10 +13,25 @@ use iceoryx2::prelude::{
     Config, FileName, NodeBuilder, Path, SemanticString, SignalHandlingMode, ipc,
 };
 
+/// Removes every segment with a prefix when dropped: iceoryx2 keeps its management segment.
+struct Segments(String);
+
+impl Drop for Segments {
+    fn drop(&mut self) {
+        for entry in fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&self.0) {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
 #[test]
 fn opening_a_segment_of_size_zero_ends_only_when_it_is_removed() {
     let folder = tempfile::tempdir().unwrap();
     let prefix = format!("iox2_zero_{}_", std::process::id());
+    // Before the nodes, so that it is dropped after them.
+    let _segments = Segments(prefix.clone());
     let mut config = Config::default();
     config.global.prefix = FileName::new(prefix.as_bytes()).unwrap();
     let root = folder.path().to_str().unwrap();
