@@ -1,4 +1,4 @@
-//! The name that keeps runs side by side apart.
+//! Names of buses, which keep simultaneous runs apart.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,7 +15,8 @@ impl BusName {
     /// Longest name, in characters.
     pub const MAX_LENGTH: usize = 64;
 
-    /// A name no other run on this machine has: process id, time and a count.
+    /// Returns a name that no other run on this machine uses, made of process
+    /// id, time and a counter.
     pub fn unique() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let since_epoch = SystemTime::now()
@@ -29,7 +30,7 @@ impl BusName {
         ))
     }
 
-    /// The name.
+    /// Returns the name as a string.
     pub fn as_str(&self) -> &str {
         &self.0
     }

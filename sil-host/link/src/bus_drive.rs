@@ -1,4 +1,4 @@
-//! The plant on the bus as the drive of a control task: a process is its board.
+//! The plant on the bus as the drive of a control task; the process takes the place of a board.
 
 use std::time::{Duration, Instant};
 
@@ -10,22 +10,23 @@ use crate::{ControllerEnd, LinkError, Pacing, Received, Session};
 
 /// The controller's end of the link as a [`Drive`].
 ///
-/// In lockstep a tick begins with the plant's frame, whenever it comes. By the clock it is also
-/// due when no frame has come for half a tick longer than it should have: the clocks of two
-/// processes are not one, and a frame that is a little late is no lapse.
+/// In lockstep, each tick begins when the plant's frame arrives. In real time, a tick also begins
+/// without a frame once the frame is half a tick overdue. The two processes have separate clocks,
+/// so a slightly late frame is not a lapse.
 pub struct BusDrive {
     end: ControllerEnd,
-    /// Time between two ticks by the clock; `None` in lockstep.
+    /// Time between two ticks in real time; `None` in lockstep.
     period: Option<Duration>,
-    /// When the present tick was due: at its frame, if there is one. `None` before the first.
+    /// Time at which the present tick was due: the arrival of its frame, if it arrived. `None`
+    /// before the first frame.
     due: Option<Instant>,
     start: Instant,
-    /// How the session has ended.
+    /// Result of the session, once it has ended.
     outcome: Option<Result<(), LinkError>>,
 }
 
 impl BusDrive {
-    /// A drive for the session that this end has joined.
+    /// Creates a drive for the session that `end` has joined.
     pub fn new(end: ControllerEnd, session: &Session) -> Self {
         Self {
             end,
@@ -37,7 +38,7 @@ impl BusDrive {
         }
     }
 
-    /// Where the control task's frames come from.
+    /// Returns the source of the control task's frames.
     pub fn source(&self) -> FrameSource {
         match self.period {
             Some(_) => FrameSource::Realtime,
@@ -45,7 +46,7 @@ impl BusDrive {
         }
     }
 
-    /// How the session has ended; `None` while it goes on.
+    /// Takes the result of the session; `None` while the session continues.
     pub fn take_outcome(&mut self) -> Option<Result<(), LinkError>> {
         self.outcome.take()
     }
@@ -64,11 +65,11 @@ impl BusDrive {
 }
 
 impl Drive for BusDrive {
-    /// A tick begins when its frame is there.
+    /// Does nothing: a tick begins when its frame arrives.
     fn begin_tick(&mut self) {}
 
-    /// Waits for the tick. A frame with the input OVERLOAD is taken by the clock when the next one
-    /// is due.
+    /// Waits for the tick's frame. In real time, the frame whose input is OVERLOAD is taken only
+    /// when the next frame is due.
     fn sample(&mut self) -> Option<SensorFrame> {
         match self.receive() {
             Ok(Some(Received::Frame(frame))) => {
@@ -92,7 +93,7 @@ impl Drive for BusDrive {
         }
     }
 
-    /// Sends the answer; before the first frame nobody waits for one.
+    /// Sends the answer. Before the first frame the plant expects none, so nothing is sent.
     fn actuate(&mut self, answer: &ActuatorFrame) {
         if self.due.is_some()
             && let Err(error) = self.end.send(answer)
@@ -107,7 +108,7 @@ impl Drive for BusDrive {
             .is_some_and(|(period, due)| due.elapsed() >= period)
     }
 
-    /// Nanoseconds.
+    /// Returns a time in nanoseconds.
     fn stopwatch(&self) -> u32 {
         self.start.elapsed().as_nanos() as u32
     }

@@ -1,16 +1,18 @@
-//! Who is on a bus: a lock that the kernel releases when its holder dies.
+//! Records which processes are on a bus, with locks that the kernel releases when their holder
+//! dies.
 //!
 //! Every bus has a folder with one file, `lock`, whose first bytes are locked:
 //!
 //! | byte | locked                                                     |
 //! |------|------------------------------------------------------------|
-//! | 0    | for a moment, by whoever changes what the folder holds     |
+//! | 0    | briefly, by a process that changes the folder's contents   |
 //! | 1    | by the plant, as long as it is on the bus                  |
 //! | 2    | by the controller, as long as it is on the bus             |
 //!
-//! The locks belong to the open file (`F_OFD_SETLK`), so that they end with the process,
-//! however it ends, and that another process can ask who lives without taking anything.
-//! Whoever leaves a bus last removes its folder and its shared memory; what killed
+//! The locks belong to the open file (`F_OFD_SETLK`). They end with the process, however it ends,
+//! and another process can test them without taking them. The last process to leave a bus removes
+//! the bus's folder and shared memory. The next start removes whatever killed processes left
+//! behind.
 //! processes leave, the next start removes.
 
 use std::fs::{self, File, OpenOptions};
@@ -28,13 +30,13 @@ use super::run_files::RunFiles;
 use super::{BusName, LinkError};
 
 const LOCK: &str = "lock";
-/// Longest wait for another process that changes the folder: it takes milliseconds.
+/// Longest wait for another process that changes the folder; a change normally takes milliseconds.
 const GATE_PATIENCE: Duration = Duration::from_millis(1000);
 const GATE_POLL: Duration = Duration::from_millis(1);
-/// Bytes for the number of a process in the lock file, with its line break.
+/// Bytes reserved for a process id in the lock file, including its line break.
 const NUMBER_WIDTH: usize = 11;
 
-/// What a process is on a bus.
+/// Role of a process on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     Plant,
@@ -49,7 +51,7 @@ impl Role {
         }
     }
 
-    /// The other end.
+    /// Returns the role of the other end.
     pub(super) fn peer(self) -> Self {
         match self {
             Self::Plant => Self::Controller,
@@ -76,13 +78,13 @@ impl LockFile {
             .map(Self)
     }
 
-    /// The same open file: it shares the locks.
+    /// Returns another handle to the same open file; both share its locks.
     pub(super) fn share(&self) -> io::Result<Self> {
         self.0.try_clone().map(Self)
     }
 
-    /// Whether a process of this role is on the bus. When the system cannot tell, yes:
-    /// the limit of silence remains.
+    /// Returns whether a process with this role is on the bus. If the system cannot say, the answer
+    /// is yes; the silence limit still applies.
     pub(super) fn is_held(&self, role: Role) -> bool {
         let mut asked = byte_lock(role.byte(), F_RDLCK);
         match fcntl(&self.0, FcntlArg::F_OFD_GETLK(&mut asked)) {
@@ -91,7 +93,7 @@ impl LockFile {
         }
     }
 
-    /// Takes a lock; `false` if another process holds it.
+    /// Takes a lock; returns `false` if another process holds it.
     fn try_lock(&self, byte: i64) -> io::Result<bool> {
         match fcntl(&self.0, FcntlArg::F_OFD_SETLK(&byte_lock(byte, F_WRLCK))) {
             Ok(_) => Ok(true),
@@ -101,11 +103,11 @@ impl LockFile {
     }
 
     fn unlock(&self, byte: i64) {
-        // Closing the file would do the same; there is nothing to do about an error.
+        // Closing the file has the same effect, so an error here can be ignored.
         let _ = fcntl(&self.0, FcntlArg::F_OFD_SETLK(&byte_lock(byte, F_UNLCK)));
     }
 
-    /// Whether the file still has its name: its folder may have been removed.
+    /// Returns whether the file still has its name; its folder may have been removed.
     fn is_at(&self, path: &Path) -> bool {
         match (self.0.metadata(), fs::symlink_metadata(path)) {
             (Ok(own), Ok(there)) => own.ino() == there.ino() && own.dev() == there.dev(),
@@ -113,14 +115,14 @@ impl LockFile {
         }
     }
 
-    /// Notes this process as the holder of a byte, for messages only.
+    /// Records this process as the holder of a byte, for messages only.
     fn sign(&self, byte: i64) {
         let line = format!("{:>1$}\n", std::process::id(), NUMBER_WIDTH - 1);
         let at = byte.unsigned_abs() * NUMBER_WIDTH as u64;
         let _ = self.0.write_at(line.as_bytes(), at);
     }
 
-    /// The process that has last taken a byte.
+    /// Returns the id of the process that last took a byte.
     fn signed(&self, byte: i64) -> Option<u32> {
         let mut line = [0; NUMBER_WIDTH];
         let at = byte.unsigned_abs() * NUMBER_WIDTH as u64;
@@ -139,7 +141,7 @@ fn byte_lock(byte: i64, kind: i32) -> flock {
     }
 }
 
-/// A bus, seen from the file system.
+/// A bus as seen in the file system.
 #[derive(Clone, Debug)]
 pub(super) struct Bus {
     pub(super) name: BusName,
@@ -162,12 +164,12 @@ impl Bus {
         }
     }
 
-    /// The lock file, if anybody has ever been here; without taking anything.
+    /// Opens the lock file without taking a lock; `None` if the bus has never been used.
     pub(super) fn look(&self) -> Option<LockFile> {
         LockFile::open(&self.lock_path(), false).ok()
     }
 
-    /// Opens the lock file and waits for the right to change the folder.
+    /// Opens the lock file and waits for permission to change the folder.
     fn enter(&self) -> Result<Gate, LinkError> {
         let folder = self.folder();
         let mut waited = Duration::ZERO;
@@ -175,7 +177,7 @@ impl Bus {
             make_private(&folder)?;
             let file = match LockFile::open(&self.lock_path(), true) {
                 Ok(file) => file,
-                // The last of others has just left and taken the folder along.
+                // The last process on the bus has just left and removed the folder.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(error) => return Err(self.refuse(&error)),
             };
@@ -196,17 +198,17 @@ impl Bus {
         }
     }
 
-    /// Takes a role on the bus; what killed processes have left there is removed.
+    /// Takes a role on the bus, after removing what killed processes left there.
     ///
-    /// # Errors
-    /// [`LinkError::Folder`] and [`LinkError::Held`].
+    /// # Errors [`LinkError::Folder`] if the folder cannot be used; [`LinkError::Held`] if another
+    /// process keeps it locked.
     pub(super) fn claim(&self, role: Role) -> Result<Result<Claim, Taken>, LinkError> {
         let gate = self.enter()?;
         if gate.0.is_held(role) {
             return Ok(Err(Taken::ByAnother));
         }
         if role == Role::Plant {
-            // Its controller must find the plant gone before another one is there.
+            // A controller must notice that its plant has gone before another plant takes over.
             if gate.0.is_held(Role::Controller) {
                 return Ok(Err(Taken::ByEarlierRun));
             }
@@ -227,22 +229,22 @@ impl Bus {
         }))
     }
 
-    /// Removes everything of the bus if nobody is on it. What cannot be removed now stays for
-    /// the next start.
+    /// Removes all files of the bus if no process is on it. The next start removes whatever cannot
+    /// be removed now.
     pub(super) fn remove_if_dead(&self) {
         let Some(file) = self.look() else {
-            // Somebody was killed before the lock file was there.
+            // A process was killed before it had created the lock file.
             let _ = fs::remove_dir(self.folder());
             return;
         };
-        // First without taking anything: a stopped process must not hold up a living bus.
+        // Test without taking a lock first, so that a stopped process cannot block a bus in use.
         let is_dead = || !file.is_held(Role::Plant) && !file.is_held(Role::Controller);
         if !is_dead() || !matches!(file.try_lock(GATE), Ok(true)) {
             return;
         }
         file.sign(GATE);
         if file.is_at(&self.lock_path()) && is_dead() {
-            // One step, after which the name is free and nobody is held up any more.
+            // One rename frees the name, so that no other process has to wait any longer.
             let away = self.place.folder.join(away_name());
             if fs::rename(self.folder(), &away).is_ok() {
                 file.unlock(GATE);
@@ -252,10 +254,10 @@ impl Bus {
     }
 }
 
-/// First letter of the names of folders that are being removed; no bus begins so.
+/// First character of the names of folders that are being removed; no bus name begins with it.
 const AWAY: char = '.';
 
-/// A name that is not taken.
+/// Returns an unused name for a folder that is to be removed.
 fn away_name() -> String {
     format!("{AWAY}{}", BusName::unique())
 }
@@ -266,7 +268,7 @@ fn remove_away(folder: &Path, place: &Place) {
     }
 }
 
-/// The right to change what the folder holds, until dropped.
+/// Permission to change the folder's contents, held until dropped.
 struct Gate(LockFile);
 
 impl Drop for Gate {
@@ -275,16 +277,16 @@ impl Drop for Gate {
     }
 }
 
-/// Why a role cannot be had now.
+/// Why a role is not available now.
 #[derive(Debug)]
 pub(super) enum Taken {
-    /// A live process has it.
+    /// A live process holds it.
     ByAnother,
     /// The controller of an earlier run has not left yet.
     ByEarlierRun,
 }
 
-/// A role on a bus, held until dropped. Whoever is last removes the bus.
+/// A role on a bus, held until dropped. The last process to drop its claim removes the bus.
 #[derive(Debug)]
 pub(super) struct Claim {
     bus: Bus,
@@ -301,12 +303,12 @@ impl Claim {
         self.role
     }
 
-    /// Whether the other end's process is on the bus.
+    /// Returns whether the other end's process is on the bus.
     pub(super) fn peer_is_alive(&self) -> bool {
         self.file.is_held(self.role.peer())
     }
 
-    /// The lock file, for another thread of this process.
+    /// Returns the lock file for another thread of this process.
     pub(super) fn share(&self) -> io::Result<LockFile> {
         self.file.share()
     }
@@ -319,11 +321,12 @@ impl Drop for Claim {
     }
 }
 
-/// Removes what killed processes have left on any bus of this place.
+/// Removes what killed processes left on any bus of this place.
 pub(super) fn remove_dead(place: &Place) {
     for entry in fs::read_dir(&place.folder).into_iter().flatten().flatten() {
         if entry.file_name().to_string_lossy().starts_with(AWAY) {
-            // Whoever began to remove it may have been killed; two at it do no harm.
+            // The process that began the removal may have been killed; a second attempt at the same
+            // time does no harm.
             remove_away(&entry.path(), place);
         } else if let Some(name) = entry
             .file_name()

@@ -17,10 +17,11 @@ use super::session::{Announcement, Session, SessionMessage};
 use super::{BusName, LinkError};
 use painleve_system::interrupt::Interrupt;
 
-/// Time between two looks for a plant, short enough not to be in its way.
+/// Interval at which a waiting controller looks for a plant, long enough not to disturb the plant's
+/// start.
 const PLANT_POLL: Duration = Duration::from_millis(10);
 
-/// What the plant has sent.
+/// Message received from the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// A sensor frame, to be answered with an actuator frame of the same tick.
@@ -29,26 +30,26 @@ pub enum Received {
     End,
 }
 
-/// The controller's end: receives sensor frames, sends the answers.
+/// The controller's end of the link: receives sensor frames and sends the answers.
 ///
-/// Nothing of it stays in shared memory once dropped.
+/// Dropping it removes everything it holds in shared memory.
 pub struct ControllerEnd {
-    // Fields drop in this order: the guardian watches the ports go, the claim cleans up.
+    // Fields drop in this order: the guardian watches the ports drop, then the claim cleans up.
     ports: Ports,
     guardian: Guardian,
     claim: Claim,
     silence_limit: Duration,
     interrupt: Interrupt,
-    /// With the plant, since its last frame.
+    /// Patience with the plant since its last frame.
     patience: Patience,
-    /// `End` has arrived.
+    /// Whether `End` has arrived.
     ended: bool,
 }
 
-/// What iceoryx2 has made for this end.
+/// Everything iceoryx2 has created for this end.
 struct Ports {
     _leaving: Mark,
-    // Ports before services before the node.
+    // Drop order: ports, services, node.
     sensor: Receiver<SensorFrame>,
     session: Receiver<SessionMessage>,
     actuator: Sender<ActuatorFrame>,
@@ -57,7 +58,7 @@ struct Ports {
     _left: Mark,
 }
 
-/// What becomes of an attempt to join.
+/// Result of an attempt to join.
 enum Attempt {
     Joined(Box<ControllerEnd>, Session),
     /// There is no plant.
@@ -67,8 +68,7 @@ enum Attempt {
 }
 
 impl ControllerEnd {
-    /// Joins the plant on `bus`, waiting at most `timeout` for it, and learns
-    /// of its session.
+    /// Joins the plant on `bus`, waiting at most `timeout` for it, and reads its session.
     ///
     /// # Errors
     /// [`LinkError::PlantMissing`] after `timeout`,
@@ -115,7 +115,7 @@ impl ControllerEnd {
             }
             let waited = start.elapsed();
             if waited >= timeout {
-                // The plant may have been killed while it made its bus.
+                // The plant may have been killed while it created its bus.
                 bus.remove_if_dead();
                 return Err(LinkError::PlantMissing {
                     bus: bus.name,
@@ -126,14 +126,14 @@ impl ControllerEnd {
         }
     }
 
-    /// The bus.
+    /// Returns the name of the bus.
     pub fn bus(&self) -> &BusName {
         self.ports.presence.bus()
     }
 
-    /// Sets how long the plant may be silent before that is an error;
-    /// [`DEFAULT_SILENCE_LIMIT`] at first. Make it longer than the tick, and
-    /// long to stop the plant at breakpoints.
+    /// Sets how long the plant may be silent before [`LinkError::PlantSilent`] is returned;
+    /// initially [`DEFAULT_SILENCE_LIMIT`]. The limit must be longer than a tick; choose a long one
+    /// to stop the plant at breakpoints.
     pub fn set_silence_limit(&mut self, limit: Duration) {
         self.silence_limit = limit;
         self.patience = Patience::new(limit);
@@ -155,11 +155,11 @@ impl ControllerEnd {
         }
     }
 
-    /// The same until `deadline`; `None` if nothing has come by then. If several frames have, the
-    /// newest one: the others are lost, which its `sequence` shows.
+    /// Waits as [`ControllerEnd::receive`] does, but only until `deadline`, and returns `None` if
+    /// nothing has arrived by then. If several frames have arrived, returns the newest; the
+    /// discarded ones show as a jump of its `sequence`.
     ///
-    /// # Errors
-    /// As [`ControllerEnd::receive`]; the silence limit counts on from call to call.
+    /// # Errors As [`ControllerEnd::receive`]; the silence limit keeps counting across calls.
     pub fn receive_newest(&mut self, deadline: Instant) -> Result<Option<Received>, LinkError> {
         let mut newest = self.receive_before(Some(deadline))?;
         while let (Some(Received::Frame(_)), Some(newer)) = (newest, self.take()?) {
@@ -178,7 +178,7 @@ impl ControllerEnd {
             if self.ended {
                 return Ok(Some(Received::End));
             }
-            // Frames sent before `End` come before it: the loop takes them first.
+            // The loop first takes the frames sent before `End`.
             self.ended = self.announcement()? == Some(Announcement::End);
             if self.ended {
                 continue;
@@ -191,7 +191,7 @@ impl ControllerEnd {
             match self.patience.pause() {
                 Next::Poll => {}
                 Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
-                // What was sent just before leaving still counts: poll once more.
+                // A frame sent just before the plant left still counts: poll once more.
                 Next::Look => known_gone = !self.claim.peer_is_alive(),
                 Next::GiveUp(silence) => return Err(self.silent_for(silence)),
             }
@@ -205,9 +205,8 @@ impl ControllerEnd {
     ///
     /// Does not allocate.
     ///
-    /// # Errors
-    /// [`LinkError::Transport`]. That the plant is gone is left to
-    /// [`ControllerEnd::receive`].
+    /// # Errors [`LinkError::Transport`]. Only [`ControllerEnd::receive`] detects that the plant is
+    /// gone.
     #[inline]
     pub fn send(&mut self, frame: &ActuatorFrame) -> Result<(), LinkError> {
         self.guardian
@@ -244,7 +243,7 @@ impl ControllerEnd {
         }
     }
 
-    /// Waits for what the plant tells about its session; `None` if it has left.
+    /// Waits for the plant's session; `None` if the plant has left.
     fn wait_for_begin(&self) -> Result<Option<Session>, LinkError> {
         let mut patience = Patience::new(self.silence_limit);
         loop {
@@ -272,7 +271,7 @@ impl ControllerEnd {
     }
 }
 
-/// Joins the run of the plant on the bus.
+/// Tries to join the run of the plant on the bus.
 fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
     let Some(lock) = bus.look().filter(|lock| lock.is_held(Role::Plant)) else {
         return Ok(Attempt::NoPlant);
@@ -281,7 +280,7 @@ fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
         bus: bus.name.clone(),
     };
     let Some(run) = RunFiles::ready(bus) else {
-        // Joined by another, or not ready yet.
+        // Another controller has joined, or the plant is not ready yet.
         return if lock.is_held(Role::Controller) {
             Err(in_use())
         } else {

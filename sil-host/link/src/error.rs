@@ -1,4 +1,4 @@
-//! What can go wrong on the link, said to the person at the terminal.
+//! Errors of the link, worded for the user at the terminal.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -7,11 +7,11 @@ use thiserror::Error;
 
 use super::{BusName, CONFIGURATION_CAPACITY};
 
-/// A failure of the link; the message names the bus and what to do.
+/// A failure of the link. The message names the bus and the remedy.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// A name that cannot be a bus.
+    /// The name is not a valid bus name.
     #[error(
         "bus name {name:?} is not allowed: use 1 to 64 characters of A-Z, a-z, 0-9, '_' and '-'"
     )]
@@ -27,7 +27,8 @@ pub enum LinkError {
         bus: BusName,
     },
 
-    /// The services of an earlier plant are still held by its controller.
+    /// A process of an earlier run, normally its controller, still holds the
+    /// bus.
     #[error(
         "bus `{bus}` is still held by a process of an earlier run: \
          end that process, or choose another name with --bus"
@@ -46,34 +47,35 @@ pub enum LinkError {
         bus: BusName,
     },
 
-    /// No plant came up in time.
+    /// No plant appeared in time.
     #[error("no plant on bus `{bus}` after {waited:.1?}: start `painleve plant --bus {bus}`")]
     PlantMissing {
         /// The bus.
         bus: BusName,
-        /// How long was waited.
+        /// Time waited.
         waited: Duration,
     },
 
-    /// No controller came up in time.
+    /// No controller appeared in time.
     #[error(
         "no controller on bus `{bus}` after {waited:.1?}: start `painleve controller --bus {bus}`"
     )]
     ControllerMissing {
         /// The bus.
         bus: BusName,
-        /// How long was waited.
+        /// Time waited.
         waited: Duration,
     },
 
-    /// The plant's process ended or was killed before the session's end.
+    /// The plant's process ended or was killed before the end of the session.
     #[error("the plant on bus `{bus}` is gone: it failed or was killed before the end of the run")]
     PlantGone {
         /// The bus.
         bus: BusName,
     },
 
-    /// The controller's process ended or was killed before the session's end.
+    /// The controller's process ended or was killed before the end of the
+    /// session.
     #[error(
         "the controller on bus `{bus}` is gone: it failed or was killed before the end of the run"
     )]
@@ -82,34 +84,34 @@ pub enum LinkError {
         bus: BusName,
     },
 
-    /// The plant's process lives but sends nothing.
+    /// The plant's process is alive but sends nothing.
     #[error("the plant on bus `{bus}` has sent nothing for {silence:.1?}: it is stopped or stuck")]
     PlantSilent {
         /// The bus.
         bus: BusName,
-        /// How long it has been silent.
+        /// Duration of the silence.
         silence: Duration,
     },
 
-    /// The controller's process lives but does not answer.
+    /// The controller's process is alive but does not answer.
     #[error(
         "the controller on bus `{bus}` has not answered for {silence:.1?}: it is stopped or stuck"
     )]
     ControllerSilent {
         /// The bus.
         bus: BusName,
-        /// How long it has been silent.
+        /// Duration of the silence.
         silence: Duration,
     },
 
-    /// The controller answered another tick than the one asked for.
+    /// The controller answered a different tick from the one requested.
     #[error("the controller on bus `{bus}` answered tick {answered} when asked for tick {asked}")]
     WrongTick {
         /// The bus.
         bus: BusName,
         /// Tick of the sensor frame.
         asked: u32,
-        /// Tick the answer echoes.
+        /// Tick that the answer echoes.
         answered: u32,
     },
 
@@ -122,7 +124,7 @@ pub enum LinkError {
         length: usize,
     },
 
-    /// The peer speaks another version of the frames or the session message.
+    /// The peer uses another version of the frames or of the session message.
     #[error("bus `{bus}` is used by another version of painleve: use the same build for both ends")]
     Incompatible {
         /// The bus.
@@ -131,46 +133,47 @@ pub enum LinkError {
 
     /// The folder of a bus cannot be used.
     #[error(
-        "cannot keep a bus in `{folder}`: {reason}; \
+        "cannot use `{folder}` for a bus: {reason}; \
          set XDG_RUNTIME_DIR to a folder that only you can write to"
     )]
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// Why not.
+        /// Reason.
         reason: String,
     },
 
-    /// A process keeps the folder of the bus locked.
+    /// Another process keeps the folder of the bus locked.
     #[error("bus `{bus}` is held by {}, which is stopped or stuck: end it", holder(*process))]
     Held {
         /// The bus.
         bus: BusName,
-        /// The process, if it is known.
+        /// Id of the process, if known.
         process: Option<u32>,
     },
 
     /// There is too little shared memory for a bus.
     #[error(
-        "bus `{bus}`: {folder} has {available} bytes left, a bus needs {needed}: \
-         make it larger, or remove what `painleve doctor` names"
+        "bus `{bus}`: {folder} has {available} bytes free, but a bus needs {needed}: \
+         enlarge it, or remove the files that `painleve doctor` lists"
     )]
     SharedMemoryFull {
         /// The bus.
         bus: BusName,
-        /// Where shared memory is.
+        /// Folder of the shared memory.
         folder: &'static str,
-        /// Bytes that can be taken.
+        /// Free bytes.
         available: u64,
-        /// Bytes that are needed.
+        /// Required bytes.
         needed: u64,
     },
 
-    /// Ctrl-C or a request to end, while waiting for the peer.
+    /// The user pressed Ctrl-C or the process was asked to end while it waited
+    /// for the peer.
     #[error("interrupted")]
     Interrupted,
 
-    /// iceoryx2 or the operating system refused.
+    /// iceoryx2 or the operating system reported an error.
     #[error(
         "bus `{bus}`: could not {action} ({cause}); \
          check that /dev/shm is writable and not full, and `ulimit -n`"
@@ -178,9 +181,9 @@ pub enum LinkError {
     Transport {
         /// The bus.
         bus: BusName,
-        /// What was tried.
+        /// Attempted action.
         action: &'static str,
-        /// iceoryx2's reason.
+        /// Cause as reported by iceoryx2 or the system.
         cause: String,
     },
 }

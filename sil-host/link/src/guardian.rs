@@ -1,10 +1,10 @@
-//! A thread that sees to it that no call into iceoryx2 lasts for ever.
+//! A thread that bounds the time of every call into iceoryx2.
 //!
-//! Every such call is bracketed by [`Guardian::during`]. When one lasts long and the peer is
-//! dead, what the peer has left half-made is removed, which ends the call (see
-//! [`RunFiles::remove_half_made`]). When the peer lives but is stopped in the middle of
-//! making something, or anything else holds the call up, the process says so and ends: a call
-//! into iceoryx2 cannot be broken off.
+//! Every such call goes through [`Guardian::during`]. If a call takes long and the peer is dead,
+//! the guardian removes what the peer left half-made, which ends the call (see
+//! [`RunFiles::remove_half_made`]). If the peer is alive but was stopped while it created
+//! something, or if the call blocks for another reason, the process reports this and exits, because
+//! a call into iceoryx2 cannot be cancelled.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -16,18 +16,18 @@ use super::LinkError;
 use super::claim::{Bus, Claim, LockFile, Role};
 use super::run_files::RunFiles;
 
-/// Exit code of a process that is held up, as of any whose peer has failed.
+/// Exit code of a process whose call is blocked; the same as for any failed peer.
 const PEER_FAILED: i32 = 3;
-/// Time between two looks. Looks are counted, not the clock: when this very process is
-/// stopped, both of its threads are.
+/// Interval between two checks. The limits count checks rather than time, because stopping this
+/// process stops both of its threads.
 const LOOK: Duration = Duration::from_millis(25);
-/// Looks until what a dead peer has left is removed: so many that nothing this process is
-/// making itself, however busy the machine, is still half-made then.
+/// Checks before the guardian removes what a dead peer left half-made. By then nothing that this
+/// process itself creates is still half-made, even on a busy machine.
 const LOOKS_UNTIL_REMOVAL: u32 = 40;
-/// Looks until the process ends.
+/// Checks before the process exits.
 const LOOKS_UNTIL_END: u32 = 60;
 
-/// Watches the calls of one end.
+/// Watches the calls of one end of the link.
 #[derive(Debug)]
 pub(super) struct Guardian {
     shared: Arc<Shared>,
@@ -36,13 +36,13 @@ pub(super) struct Guardian {
 
 #[derive(Debug, Default)]
 struct Shared {
-    /// Odd during a call; another number for every call.
+    /// Odd during a call; every call changes it.
     calls: AtomicU32,
     over: AtomicBool,
 }
 
 impl Guardian {
-    /// Starts to watch.
+    /// Starts the watching thread.
     pub(super) fn start(claim: &Claim) -> io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let watch = Watch {
@@ -60,7 +60,7 @@ impl Guardian {
         })
     }
 
-    /// Makes a call into iceoryx2 that must end soon.
+    /// Runs a call into iceoryx2 under the guardian's time limit.
     #[inline]
     pub(super) fn during<T>(&self, call: impl FnOnce() -> T) -> T {
         self.shared.calls.fetch_add(1, Ordering::Relaxed);
@@ -69,14 +69,15 @@ impl Guardian {
         outcome
     }
 
-    /// First and last field of a struct that is watched while its other fields drop.
+    /// Returns the first and last field of a struct whose remaining fields are watched while they
+    /// drop.
     pub(super) fn marks(&self) -> (Mark, Mark) {
         let mark = || Mark(Arc::clone(&self.shared));
         (mark(), mark())
     }
 }
 
-/// Begins a call, or ends it, when it drops.
+/// Begins or ends a watched call when it drops.
 #[derive(Debug)]
 pub(super) struct Mark(Arc<Shared>);
 
@@ -122,7 +123,7 @@ impl Watch {
         }
     }
 
-    /// Ends the process: the thread that called cannot be called back.
+    /// Exits the process, because the blocked thread cannot be interrupted.
     fn give_up(&self) -> ! {
         let (bus, silence) = (self.bus.name.clone(), LOOK * LOOKS_UNTIL_END);
         let error = match self.peer {

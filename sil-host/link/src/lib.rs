@@ -8,23 +8,21 @@
 //! | `painleve/<bus>/sensor`   | [`SensorFrame`]                | plant → controller  |
 //! | `painleve/<bus>/actuator` | [`ActuatorFrame`]              | controller → plant  |
 //!
-//! The plant makes the services and holds the [`PlantEnd`]; whatever hosts the
-//! controller holds the [`ControllerEnd`]. There is at most one of each on a
-//! bus. Both ends stay in the thread that made them.
+//! The plant creates the services and holds the [`PlantEnd`]; the host of the controller holds the
+//! [`ControllerEnd`]. A bus has at most one of each. Each end stays in the thread that created it.
 //!
-//! Frames keep their order. Each direction buffers [`FRAME_BUFFER`] frames; in
-//! lockstep at most one is ever under way. When a receiver falls further behind
-//! in real time, the *oldest* frames are dropped, which it sees as a jump of
-//! `sequence`.
+//! Frames keep their order. Each direction buffers [`FRAME_BUFFER`] frames; in lockstep at most one
+//! is under way. If a receiver falls further behind in real time, the *oldest* frames are dropped,
+//! which the receiver sees as a jump of `sequence`.
 //!
-//! A peer that has ended, was killed or stays silent becomes an error within
-//! [`DEFAULT_SILENCE_LIMIT`], never a hang, in every phase. Who is on a bus is told by locks
-//! that the kernel releases (`claim`). Every run has files of its own (`run_files`), so that
-//! nobody meets what a killed process has left; the last on a bus, or the next plant on the
-//! machine, removes it. A thread watches every call into iceoryx2 (`guardian`).
+//! If a peer ends, is killed or falls silent, the other end returns an error within
+//! [`DEFAULT_SILENCE_LIMIT`], in every phase; it never hangs. Locks that the kernel releases show
+//! which processes are on a bus (`claim`). Every run has its own files (`run_files`), so that no
+//! process meets the remains of a killed one. The last process to leave a bus, or the next plant on
+//! the machine, removes those remains. A thread watches every call into iceoryx2 (`guardian`).
 //!
-//! Set `IOX2_LOG_LEVEL=debug` to see what iceoryx2 itself has to say; otherwise
-//! it is quiet and [`LinkError`] speaks.
+//! Set `IOX2_LOG_LEVEL=debug` to see the log of iceoryx2; by default iceoryx2 is silent and
+//! failures are reported as [`LinkError`].
 //!
 //! [`SensorFrame`]: painleve_shared::frame::SensorFrame
 //! [`ActuatorFrame`]: painleve_shared::frame::ActuatorFrame

@@ -7,7 +7,7 @@ use painleve_shared::frame::SensorFrame;
 
 use crate::PlantEnd;
 
-/// The link's plant end, tick by tick.
+/// The plant's end of the link as a lockstep controller.
 pub struct Lockstep(pub PlantEnd);
 
 impl ControllerHost for Lockstep {

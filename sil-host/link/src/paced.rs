@@ -1,6 +1,6 @@
-//! A controller in another process, by the clock: a tick lasts as long as its
-//! simulated time, and an answer that is not there at its end is missed. A late answer is obeyed
-//! only if it tells of a fault: the controller has taken the torque off.
+//! A controller in another process, in real time: a tick lasts as long as its simulated time, and
+//! an answer that has not arrived by the end of its tick is missed. A late answer is applied only
+//! if it reports a fault, because the controller has then removed the torque.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -18,11 +18,11 @@ const BUSY: Duration = Duration::from_micros(100);
 /// Sleep between two polls after that.
 const NAP: Duration = Duration::from_micros(50);
 
-/// The link's plant end with absolute deadlines.
+/// The plant's end of the link with absolute deadlines.
 pub struct Paced {
     end: PlantEnd,
     pacer: Pacer,
-    /// Part of a tick in which an answer is in time.
+    /// Part of a tick within which an answer is in time.
     patience: Duration,
     lateness_ns: Histogram<u64>,
     missed_deadlines: u64,
@@ -46,7 +46,8 @@ impl Paced {
         })
     }
 
-    /// How late the wake-ups were, ns, and how many came a whole tick or more late; and the link.
+    /// Returns the lateness of the wake-ups in ns, the number that were late by a tick or more, and
+    /// the link.
     pub fn finish(self) -> (Histogram<u64>, u64, PlantEnd) {
         (self.lateness_ns, self.missed_deadlines, self.end)
     }
@@ -66,7 +67,7 @@ impl ControllerHost for Paced {
                     round_trip = start.elapsed();
                     break;
                 }
-                // The late answer to a tick that has been given up.
+                // A late answer to a tick that was given up.
                 Some(late) => late_fault = late.latched_fault().map(|_| late),
                 None if start.elapsed() < BUSY => std::thread::yield_now(),
                 None => std::thread::sleep(NAP),

@@ -1,39 +1,39 @@
-//! How an end waits for its peer: spin briefly, then yield, then nap.
+//! How an end waits for its peer: it spins briefly, then yields, then naps.
 //!
-//! On two idle cores the answer of a lockstep peer arrives while spinning, about
-//! a microsecond. With other work on the machine a pure spin would wait whole
-//! scheduler slices for a peer that cannot run, so it soon gives the core away,
-//! and naps when the wait is long (a real-time tick, an emulator, a debugger).
+//! On two idle cores the answer of a lockstep peer arrives during the spin, after about a
+//! microsecond. On a busy machine a pure spin would waste whole scheduler slices on a peer that
+//! cannot run. The wait therefore soon yields the core, and naps if it lasts long (a real-time
+//! tick, an emulator, a debugger).
 
 use std::time::{Duration, Instant};
 
-/// A peer silent for longer than this is an error, unless set otherwise.
+/// Default limit of a peer's silence; a longer silence is an error.
 pub const DEFAULT_SILENCE_LIMIT: Duration = Duration::from_millis(1500);
 
-/// Polls without a pause; some tens of microseconds.
+/// Polls without a pause; they take some tens of microseconds.
 const SPIN_POLLS: u32 = 1000;
 /// Time spent yielding before the first nap.
 const YIELD_TIME: Duration = Duration::from_micros(200);
-/// A nap; the kernel adds its timer slack, 50 µs unless real-time.
+/// Length of a nap; the kernel adds its timer slack, 50 µs unless the process is real-time.
 const NAP: Duration = Duration::from_micros(20);
-/// Time between two looks at whether the peer's process is alive: a look takes
-/// some tens of microseconds and allocates.
+/// Interval between two checks whether the peer's process is alive. A check takes some tens of
+/// microseconds and allocates.
 const LOOK_INTERVAL: Duration = Duration::from_millis(50);
-/// The most one pause counts. A longer one means that this process was stopped
-/// (Ctrl-Z, a debugger), most likely with its peer, who deserves a new chance.
+/// Longest time that one pause adds to the silence. A longer pause means that this process was
+/// stopped (Ctrl-Z, a debugger), most likely together with its peer, so the peer gets more time.
 const LONGEST_PAUSE: Duration = Duration::from_millis(100);
 
-/// What to do after a pause.
+/// Next step after a pause.
 pub(super) enum Next {
     /// Poll again.
     Poll,
-    /// See whether the peer is alive, then poll again.
+    /// Check whether the peer is alive, then poll again.
     Look,
-    /// Give up: silent for this long.
+    /// Give up: the peer has been silent for this long.
     GiveUp(Duration),
 }
 
-/// How long a peer has been silent.
+/// Duration of a peer's silence.
 #[derive(Default)]
 pub(super) struct Silence {
     last: Option<Instant>,
@@ -42,7 +42,7 @@ pub(super) struct Silence {
 }
 
 impl Silence {
-    /// Counts the time since the last call, none at the first.
+    /// Adds the time since the last call; the first call adds none.
     pub(super) fn grow(&mut self, limit: Duration) -> Next {
         let now = Instant::now();
         let pause = now - self.last.replace(now).unwrap_or(now);
@@ -59,16 +59,16 @@ impl Silence {
     }
 }
 
-/// One wait, from the first fruitless poll to the answer.
+/// One wait, from the first unsuccessful poll to the answer.
 pub(super) struct Patience {
     limit: Duration,
     polls: u32,
-    /// Counted once spinning is over: the clock is not read before.
+    /// Counted only after spinning; until then the clock is not read.
     silence: Silence,
 }
 
 impl Patience {
-    /// A wait that gives up after `limit`.
+    /// Starts a wait that gives up after `limit`.
     #[inline]
     pub(super) fn new(limit: Duration) -> Self {
         Self {
@@ -78,7 +78,7 @@ impl Patience {
         }
     }
 
-    /// Pauses once and says what to do next.
+    /// Pauses once and returns the next step.
     #[inline]
     pub(super) fn pause(&mut self) -> Next {
         if self.polls < SPIN_POLLS {
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wait_looks_after_the_peer_and_then_gives_up() {
+    fn a_wait_checks_the_peer_and_then_gives_up() {
         let limit = Duration::from_millis(120);
         let mut patience = Patience::new(limit);
         let mut looks = 0;
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_of_this_process_is_not_the_silence_of_the_peer() {
+    fn stopping_this_process_does_not_count_as_silence_of_the_peer() {
         let mut silence = Silence::default();
         assert!(matches!(silence.grow(DEFAULT_SILENCE_LIMIT), Next::Poll));
         silence.last = Instant::now().checked_sub(Duration::from_secs(1));

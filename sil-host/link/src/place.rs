@@ -1,5 +1,4 @@
-//! Where buses live: a private folder for each user, and names in shared memory that
-//! nobody can foresee.
+//! Locations of buses: a private folder for each user, and unpredictable names in shared memory.
 
 use std::fs::{self, DirBuilder, Metadata};
 use std::io;
@@ -10,27 +9,28 @@ use nix::unistd::getuid;
 
 use super::LinkError;
 
-/// Where Linux keeps POSIX shared memory.
+/// Folder in which Linux keeps POSIX shared memory.
 pub(super) const SHARED_MEMORY: &str = "/dev/shm";
 
-/// Only the owner may enter.
+/// Mode: only the owner may enter.
 const PRIVATE: u32 = 0o700;
-/// Write permission of others than the owner.
+/// Write permission for users other than the owner.
 const WRITABLE_BY_OTHERS: u32 = 0o022;
 
-/// Where the buses of one user live.
+/// Location of one user's buses.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
-    /// One folder for each bus is made in it.
+    /// Holds one folder for each bus.
     pub(super) folder: PathBuf,
-    /// First part of the names of this user's shared memory.
+    /// Prefix of the names of this user's shared memory.
     pub(super) prefix: String,
 }
 
 impl Place {
-    /// The place of the user who runs this process: `painleve` in `$XDG_RUNTIME_DIR`, or in
-    /// `/run/user/<uid>`, or else `/tmp/painleve-<uid>`. The first two belong to the user by
-    /// the system's own hand. Anybody can make the last one first, so it is checked.
+    /// Returns the place of the user who runs this process: `painleve` in `$XDG_RUNTIME_DIR`,
+    /// otherwise in `/run/user/<uid>`, otherwise `/tmp/painleve-<uid>`. The system guarantees that
+    /// the first two belong to the user. Any user could have created the last one, so its ownership
+    /// is checked.
     ///
     /// # Errors
     /// [`LinkError::Folder`] if there is no folder that belongs to this user alone.
@@ -53,7 +53,7 @@ impl Place {
     }
 }
 
-/// Whether a folder is this user's, and nobody else may put files into it.
+/// Returns whether a folder belongs to this user and no other user may write to it.
 fn is_trusted(folder: &Path) -> bool {
     fs::metadata(folder).is_ok_and(|metadata| {
         metadata.is_dir() && is_own(&metadata) && metadata.mode() & WRITABLE_BY_OTHERS == 0
@@ -64,10 +64,10 @@ fn is_own(metadata: &Metadata) -> bool {
     metadata.uid() == getuid().as_raw()
 }
 
-/// Makes a folder that only this user may enter, or checks that it is one.
+/// Creates a folder that only this user may enter, or checks that an existing one is private.
 ///
-/// # Errors
-/// [`LinkError::Folder`] if it is somebody else's, no folder, or cannot be made.
+/// # Errors [`LinkError::Folder`] if it belongs to another user, is not a folder, or cannot be
+/// created.
 pub(super) fn make_private(folder: &Path) -> Result<(), LinkError> {
     let refuse = |reason: String| LinkError::Folder {
         folder: folder.to_path_buf(),
@@ -78,10 +78,10 @@ pub(super) fn make_private(folder: &Path) -> Result<(), LinkError> {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
         Err(error) => return Err(refuse(error.to_string())),
     }
-    // Not through a symbolic link, which somebody else may have put there.
+    // Does not follow a symbolic link, which another user may have placed there.
     let found = fs::symlink_metadata(folder).map_err(|error| refuse(error.to_string()))?;
     if !found.is_dir() {
-        return Err(refuse("it is no folder".into()));
+        return Err(refuse("it is not a folder".into()));
     }
     if !is_own(&found) {
         return Err(refuse(format!("it belongs to user {}", found.uid())));
@@ -109,13 +109,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_folder_of_ones_own_is_refused_by_name() {
+    fn a_path_that_is_not_a_private_folder_of_the_user_is_refused() {
         let parent = tempfile::tempdir().unwrap();
         let file = parent.path().join("file");
         fs::write(&file, "").unwrap();
         let link = parent.path().join("link");
         std::os::unix::fs::symlink(parent.path(), &link).unwrap();
-        // Root may give a folder away; for anybody else the root folder is foreign.
+        // Root can give a folder to another user; for other users the root folder is foreign.
         let foreign = parent.path().join("foreign");
         fs::create_dir(&foreign).unwrap();
         let given = std::os::unix::fs::chown(&foreign, Some(4_242_424), None);

@@ -17,36 +17,36 @@ use super::session::{Session, SessionMessage};
 use super::{BusName, LinkError};
 use painleve_system::interrupt::Interrupt;
 
-/// How long the controller of a plant that was killed may take to leave the bus. Shorter
-/// than the limit of silence: whoever waits for this plant must not call it silent.
+/// Time allowed for the controller of a killed plant to leave the bus. It is shorter than the
+/// silence limit, so that a controller waiting for this plant does not report it as silent.
 const TAKEOVER_TIMEOUT: Duration = Duration::from_secs(1);
 const TAKEOVER_POLL: Duration = Duration::from_millis(10);
 const CONTROLLER_POLL: Duration = Duration::from_millis(5);
-/// Free shared memory without which no bus is made: three times what one takes. A segment
-/// takes its memory only when it is written, and with none left the kernel ends the writer.
+/// Free shared memory required to create a bus, in bytes: three times the amount one bus uses. A
+/// segment takes its memory only when it is written; if none is left, the kernel kills the writer.
 const SHARED_MEMORY_NEEDED: u64 = 256 * 1024;
 
-/// The plant's end: sends sensor frames, receives the controller's answers.
+/// The plant's end of the link: sends sensor frames and receives the controller's answers.
 ///
-/// Dropping it without [`PlantEnd::end`] tells the controller that the plant
-/// has failed. Either way nothing stays in shared memory.
+/// Dropping it without [`PlantEnd::end`] shows the controller that the plant has failed. Either
+/// way, nothing remains in shared memory.
 pub struct PlantEnd {
-    // Fields drop in this order: the guardian watches the ports go, the claim cleans up.
+    // Fields drop in this order: the guardian watches the ports drop, then the claim cleans up.
     ports: Ports,
     run: RunFiles,
     guardian: Guardian,
     claim: Claim,
     begin: SessionMessage,
     silence_limit: Duration,
-    /// Of the controller, while frames go by the clock.
+    /// Silence of the controller in real time.
     silence: Silence,
     interrupt: Interrupt,
 }
 
-/// What iceoryx2 has made for this end.
+/// Everything iceoryx2 has created for this end.
 struct Ports {
     _leaving: Mark,
-    // Ports before services before the node.
+    // Drop order: ports, services, node.
     sensor: Sender<SensorFrame>,
     actuator: Receiver<ActuatorFrame>,
     session: Sender<SessionMessage>,
@@ -73,10 +73,10 @@ impl Ports {
 }
 
 impl PlantEnd {
-    /// Makes the bus and announces `session` on it.
+    /// Creates the bus and announces `session` on it.
     ///
-    /// What killed processes have left is removed first. A controller of a killed plant is
-    /// given a second to leave.
+    /// First removes what killed processes left behind. The controller of a killed plant gets a
+    /// second to leave.
     ///
     /// # Errors
     /// [`LinkError::BusInUse`] if a plant is alive on the bus,
@@ -121,23 +121,22 @@ impl PlantEnd {
         })
     }
 
-    /// The bus.
+    /// Returns the name of the bus.
     pub fn bus(&self) -> &BusName {
         self.ports.presence.bus()
     }
 
-    /// Sets how long the controller may be silent before that is an error;
-    /// [`DEFAULT_SILENCE_LIMIT`] at first. Make it long to stop at breakpoints.
+    /// Sets how long the controller may be silent before [`LinkError::ControllerSilent`] is
+    /// returned; initially [`DEFAULT_SILENCE_LIMIT`]. Choose a long limit to stop at breakpoints.
     pub fn set_silence_limit(&mut self, limit: Duration) {
         self.silence_limit = limit;
     }
 
     /// Waits until a controller has read the session and is ready for frames.
     ///
-    /// # Errors
-    /// [`LinkError::ControllerMissing`] after `timeout`; may be called again.
-    /// [`LinkError::ControllerSilent`] if a controller has come and does not become ready
-    /// within the silence limit. [`LinkError::Interrupted`], [`LinkError::Transport`].
+    /// # Errors [`LinkError::ControllerMissing`] after `timeout`; the call may be repeated.
+    /// [`LinkError::ControllerSilent`] if a controller has joined but is not ready within the
+    /// silence limit. [`LinkError::Interrupted`], [`LinkError::Transport`].
     pub fn wait_for_controller(&mut self, timeout: Duration) -> Result<(), LinkError> {
         let start = Instant::now();
         let mut silence = Silence::default();
@@ -168,8 +167,7 @@ impl PlantEnd {
         }
     }
 
-    /// Makes everything anew for the next controller: the last one has died in the middle of
-    /// something.
+    /// Creates a new run for the next controller, because the last one died while it joined.
     fn restart(&mut self) -> Result<(), LinkError> {
         let bus = self.claim.bus();
         RunFiles::remove_half_made(bus);
@@ -212,15 +210,15 @@ impl PlantEnd {
             match patience.pause() {
                 Next::Poll => {}
                 Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
-                // An answer sent just before leaving still counts: poll once more.
+                // An answer sent just before the controller left still counts: poll once more.
                 Next::Look => known_gone = !self.claim.peer_is_alive(),
                 Next::GiveUp(silence) => return Err(self.silent_for(silence)),
             }
         }
     }
 
-    /// Sends a frame without waiting, for real-time pacing. A controller that
-    /// joins later gets the session, and the frames from then on.
+    /// Sends a frame without waiting, for real-time pacing. A controller that joins later receives
+    /// the session and all frames from then on.
     ///
     /// # Errors
     /// [`LinkError::Transport`].
@@ -229,7 +227,8 @@ impl PlantEnd {
         self.send_to_controller(frame).map(|_| ())
     }
 
-    /// The next answer, if one has arrived; call until `None` to get the newest.
+    /// Returns the next answer, if one has arrived. Call it until it returns `None` to get the
+    /// newest.
     ///
     /// # Errors
     /// [`LinkError::ControllerGone`] and [`LinkError::ControllerSilent`] as for
@@ -242,13 +241,13 @@ impl PlantEnd {
         match self.silence.grow(self.silence_limit) {
             Next::Poll => Ok(None),
             Next::Look if self.claim.peer_is_alive() => Ok(None),
-            // An answer sent just before leaving still counts: poll once more.
+            // An answer sent just before the controller left still counts: poll once more.
             Next::Look => self.take()?.map(Some).ok_or_else(|| self.gone()),
             Next::GiveUp(silence) => Err(self.silent_for(silence)),
         }
     }
 
-    /// Tells the controller that the session is over, and leaves the bus.
+    /// Announces the end of the session and leaves the bus.
     ///
     /// # Errors
     /// [`LinkError::Transport`].
@@ -260,7 +259,7 @@ impl PlantEnd {
         self.guardian.during(|| announce(&self.ports, message))
     }
 
-    /// Hands `Begin` to a controller that has joined since.
+    /// Delivers `Begin` to a controller that has joined since the last call.
     fn deliver_session(&self) -> Result<(), LinkError> {
         self.guardian
             .during(|| self.ports.session.update_connections())
@@ -308,7 +307,7 @@ impl PlantEnd {
     }
 }
 
-/// Makes a run, announces its session and lets a controller join.
+/// Creates a run, announces its session and admits a controller.
 fn start_run(
     bus: &Bus,
     guardian: &Guardian,
@@ -332,7 +331,7 @@ fn announce(ports: &Ports, message: SessionMessage) -> Result<(), LinkError> {
         .map_err(|cause| ports.presence.transport("announce the session", cause))
 }
 
-/// Takes the bus, once nobody of an earlier run is on it any more.
+/// Claims the bus once no process of an earlier run is on it.
 fn take_over(bus: &Bus, interrupt: &Interrupt) -> Result<Claim, LinkError> {
     let start = Instant::now();
     loop {

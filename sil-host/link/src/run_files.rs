@@ -1,10 +1,10 @@
-//! The files of one run on a bus: used by one plant and one controller, once.
+//! The files of one run on a bus, used once by one plant and one controller.
 //!
-//! iceoryx2 lets many processes share services, and lets the survivors put right what a
-//! killed process has left half-made. That fails at many points (see
-//! [`remove_half_made`]), so here nobody ever shares what a killed process has touched:
-//! each run has a folder and a prefix of its own for everything that iceoryx2 makes. When a
-//! controller dies while it joins, the plant makes all of it anew under another name.
+//! iceoryx2 lets many processes share services, and lets the survivors repair what a killed process
+//! left half-made. That repair fails at many points (see [`RunFiles::remove_half_made`]), so here
+//! no process shares anything that a killed process has touched. Each run has its own folder, and
+//! its own prefix for everything that iceoryx2 creates. If a controller dies while it joins, the
+//! plant creates all of it anew under another name.
 //!
 //! | file in `<bus>/<run>/` | made                                                  |
 //! |------------------------|-------------------------------------------------------|
@@ -27,7 +27,7 @@ use super::place::{Place, SHARED_MEMORY};
 const READY: &str = "ready";
 const JOINED: &str = "joined";
 const ANSWERING: &str = "answering";
-/// Letters and digits of a run's random name: nobody guesses 71 bits.
+/// Length of a run's random name in letters and digits: 71 bits, which cannot be guessed.
 const NAME_LENGTH: usize = 12;
 
 /// Folder and prefix of one run.
@@ -38,7 +38,7 @@ pub(super) struct RunFiles {
 }
 
 impl RunFiles {
-    /// Makes the folder of a new run. For the plant alone.
+    /// Creates the folder of a new run. Only the plant calls it.
     pub(super) fn create(bus: &Bus) -> io::Result<Self> {
         let folder = tempfile::Builder::new()
             .prefix("")
@@ -48,7 +48,7 @@ impl RunFiles {
         Ok(Self::at(folder, &bus.place))
     }
 
-    /// The run that waits for a controller on the bus, if there is one.
+    /// Returns the run that waits for a controller on the bus, if there is one.
     pub(super) fn ready(bus: &Bus) -> Option<Self> {
         let runs = all(&bus.folder(), &bus.place).unwrap_or_default();
         runs.into_iter()
@@ -61,8 +61,8 @@ impl RunFiles {
         Self { folder, prefix }
     }
 
-    /// The settings of iceoryx2: its defaults, whatever configuration file a user has, with
-    /// this run's folder and prefix. Its own search for dead processes is switched off.
+    /// Returns the settings of iceoryx2: its defaults, regardless of any configuration file of the
+    /// user, with this run's folder and prefix, and without its own search for dead processes.
     pub(super) fn config(&self) -> Result<Config, LinkError> {
         let refuse = || LinkError::Folder {
             folder: self.folder.clone(),
@@ -79,12 +79,12 @@ impl RunFiles {
         Ok(config)
     }
 
-    /// Lets a controller join.
+    /// Admits a controller.
     pub(super) fn set_ready(&self) -> io::Result<()> {
         fs::write(self.folder.join(READY), "")
     }
 
-    /// Joins; `false` if another controller has been here before.
+    /// Joins the run; returns `false` if another controller has joined it before.
     pub(super) fn join(&self) -> io::Result<bool> {
         let joined = OpenOptions::new()
             .write(true)
@@ -97,17 +97,17 @@ impl RunFiles {
         }
     }
 
-    /// Tells the plant that the controller is ready for frames.
+    /// Signals the plant that the controller is ready for frames.
     pub(super) fn set_answering(&self) -> io::Result<()> {
         fs::write(self.folder.join(ANSWERING), "")
     }
 
-    /// Whether a controller has been ready for frames.
+    /// Returns whether a controller has been ready for frames.
     pub(super) fn is_answering(&self) -> bool {
         self.has(ANSWERING)
     }
 
-    /// Whether a controller has ever joined.
+    /// Returns whether a controller has ever joined.
     pub(super) fn is_joined(&self) -> bool {
         self.has(JOINED)
     }
@@ -118,25 +118,25 @@ impl RunFiles {
 
     /// Removes the run's folder and its segments.
     pub(super) fn remove(&self) -> io::Result<()> {
-        // The folder last: without it nobody would know the segments' names any more.
+        // The folder goes last, because its name leads to the names of the segments.
         for (path, _) in segments(&self.prefix)? {
             tolerate_missing(fs::remove_file(path))?;
         }
         tolerate_missing(fs::remove_dir_all(&self.folder))
     }
 
-    /// Removes every run in the folder of a bus on which nobody is.
+    /// Removes every run in a bus's folder; no process may be on that bus.
     pub(super) fn remove_all(folder: &Path, place: &Place) -> io::Result<()> {
         all(folder, place)?.iter().try_for_each(Self::remove)
     }
 
-    /// Removes segments that a dead process has left half-made, so that opening them
-    /// ends: of size zero, or still write-only.
+    /// Removes segments that a dead process left half-made (of size zero, or still write-only), so
+    /// that a call that tries to open them ends.
     ///
-    /// iceoryx2-cal 0.9.3 (and 0.10.0) opens a segment of size zero again and again without
-    /// looking at its timeout: `dynamic_storage/posix_shared_memory.rs`, `open_impl`, the arm
-    /// `MappingSizeIsZero`. A process that dies between `shm_open` and `ftruncate`
-    /// leaves such a segment. Each turn opens by name, so that removing the name ends it.
+    /// iceoryx2-cal 0.9.3 (and 0.10.0) tries to open a segment of size zero again and again without
+    /// checking its timeout: `dynamic_storage/posix_shared_memory.rs`, `open_impl`, match arm
+    /// `MappingSizeIsZero`. A process that dies between `shm_open` and `ftruncate` leaves such a
+    /// segment. Each attempt opens the segment by name, so removing the name ends the call.
     pub(super) fn remove_half_made(bus: &Bus) {
         for run in all(&bus.folder(), &bus.place).unwrap_or_default() {
             for (path, metadata) in segments(&run.prefix).unwrap_or_default() {

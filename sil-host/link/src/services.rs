@@ -18,24 +18,24 @@ use super::{BusName, LinkError};
 /// Frames buffered in each direction before the oldest is dropped: 64 ms at 1 kHz.
 pub const FRAME_BUFFER: usize = 64;
 
-/// `Begin` and `End`.
+/// Messages buffered for the session: `Begin` and `End`.
 const SESSION_BUFFER: usize = 2;
-/// Plant and controller.
+/// Largest number of nodes: plant and controller.
 const MAX_NODES: usize = 2;
 
 pub(super) type Service<T> = PortFactory<ipc::Service, T, ()>;
 pub(super) type Sender<T> = Publisher<ipc::Service, T, ()>;
 pub(super) type Receiver<T> = Subscriber<ipc::Service, T, ()>;
 
-/// What may cross the link.
+/// Data that may cross the link.
 pub(super) trait Payload: ZeroCopySend + std::fmt::Debug + Copy + 'static {}
 impl<T: ZeroCopySend + std::fmt::Debug + Copy + 'static> Payload for T {}
 
-/// Why services could not be had right now.
+/// Why services are not available now.
 pub(super) enum Unavailable {
-    /// They are not there: the plant has just left.
+    /// They do not exist: the plant has just left.
     NotYet,
-    /// Will not change by waiting.
+    /// Waiting will not help.
     Never(LinkError),
 }
 
@@ -46,7 +46,7 @@ pub(super) struct Presence {
 }
 
 impl Presence {
-    /// Joins a run.
+    /// Joins a run as an iceoryx2 node.
     pub(super) fn new(bus: &BusName, run: &RunFiles) -> Result<Self, LinkError> {
         quieten();
         let node = NodeBuilder::new()
@@ -64,7 +64,7 @@ impl Presence {
         &self.bus
     }
 
-    /// A [`LinkError::Transport`] on this bus.
+    /// Returns a [`LinkError::Transport`] on this bus.
     pub(super) fn transport(&self, action: &'static str, cause: impl ToString) -> LinkError {
         transport(&self.bus, action, cause)
     }
@@ -84,19 +84,20 @@ impl Presence {
     }
 }
 
-/// Says nothing: what matters becomes a [`LinkError`], and a panic is told by the program.
+/// Discards the log of iceoryx2: relevant failures become a [`LinkError`], and the program itself
+/// reports a panic.
 struct Silent;
 
 impl Log for Silent {
     fn log(&self, _: LogLevel, _: std::fmt::Arguments, _: std::fmt::Arguments) {}
 }
 
-/// Keeps iceoryx2 quiet unless somebody asks it to speak.
+/// Silences iceoryx2 unless its log is requested.
 fn quieten() {
     if std::env::var_os("IOX2_LOG_LEVEL").is_some() {
         set_log_level_from_env_or(LogLevel::Fatal);
     } else {
-        // Refused from the second time on, when it is there already.
+        // Refused from the second call on, because the logger is already set.
         let _ = set_logger(&Silent);
     }
 }
@@ -117,7 +118,7 @@ pub(super) struct Services {
 }
 
 impl Services {
-    /// Makes the services of a new run.
+    /// Creates the services of a new run.
     pub(super) fn create(presence: &Presence) -> Result<Self, LinkError> {
         Ok(Self {
             session: create(presence, "session", SESSION_BUFFER, 1)?,
@@ -126,7 +127,7 @@ impl Services {
         })
     }
 
-    /// Opens the services a plant has made.
+    /// Opens the services that a plant has created.
     pub(super) fn open(presence: &Presence) -> Result<Self, Unavailable> {
         Ok(Self {
             session: open(presence, "session")?,
@@ -136,7 +137,7 @@ impl Services {
     }
 }
 
-/// The publishing port of a service.
+/// Creates the publishing port of a service.
 pub(super) fn sender<T: Payload>(
     presence: &Presence,
     service: &Service<T>,
@@ -147,7 +148,7 @@ pub(super) fn sender<T: Payload>(
         .map_err(|cause| presence.transport("create a publisher", cause))
 }
 
-/// The receiving port of a service.
+/// Creates the receiving port of a service.
 pub(super) fn receiver<T: Payload>(
     presence: &Presence,
     service: &Service<T>,

@@ -1,25 +1,26 @@
-//! What the plant tells the controller about a run before its first frame.
+//! The session message: what the plant announces about a run before its first
+//! frame.
 
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 use super::LinkError;
 
-/// Most bytes of configuration a session can carry.
+/// Largest size of a session's configuration in bytes.
 pub const CONFIGURATION_CAPACITY: usize = 2048;
 
 /// How the plant paces its ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Pacing {
-    /// Tick by tick, as fast as both ends go; deterministic.
+    /// Tick by tick, as fast as both ends can run; deterministic.
     Lockstep,
-    /// By the clock, whether the controller has answered or not.
+    /// At wall-clock rate, whether or not the controller has answered.
     Realtime,
 }
 
 impl Pacing {
-    /// The name, as on the command line.
+    /// Returns the name as it is written on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lockstep => "lockstep",
@@ -28,19 +29,19 @@ impl Pacing {
     }
 }
 
-/// A run, as the controller needs to know it.
+/// The description of a run that the controller receives.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Session {
     /// Control ticks per simulated second; not 0.
     pub tick_hz: u32,
     /// Pacing of the plant.
     pub pacing: Pacing,
-    /// The controller's configuration, encoded with postcard; opaque to the
-    /// link, at most [`CONFIGURATION_CAPACITY`] bytes.
+    /// The controller's configuration, encoded with postcard, at most
+    /// [`CONFIGURATION_CAPACITY`] bytes; the link does not interpret it.
     pub configuration: Vec<u8>,
 }
 
-/// What a session message says, once checked.
+/// Content of a session message after validation.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Announcement {
     Begin(Session),
@@ -49,8 +50,8 @@ pub(super) enum Announcement {
 
 /// The session message in shared memory.
 ///
-/// Plain numbers, as another process wrote them: every bit pattern is a valid
-/// value, and [`SessionMessage::read`] checks what it means.
+/// It holds plain numbers, since another process writes them: every bit pattern
+/// is a valid value, and [`SessionMessage::read`] checks their meaning.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, ZeroCopySend)]
 #[type_name("painleve::SessionMessage")]
@@ -97,7 +98,7 @@ impl SessionMessage {
         }
     }
 
-    /// What the message says; `None` if this version does not understand it.
+    /// Decodes the message; `None` if this version does not understand it.
     pub(super) fn read(&self) -> Option<Announcement> {
         match self.kind {
             Self::BEGIN if self.tick_hz > 0 => Some(Announcement::Begin(Session {
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_say_what_was_put_in() {
+    fn a_message_is_read_back_as_it_was_written() {
         for length in [0, 1, CONFIGURATION_CAPACITY] {
             let message = SessionMessage::begin(&session(length)).unwrap();
             assert_eq!(message.read(), Some(Announcement::Begin(session(length))));
@@ -146,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_not_understood() {
+    fn an_invalid_message_is_rejected() {
         let good = SessionMessage::begin(&session(3)).unwrap();
         for bad in [
             SessionMessage { kind: 9, ..good },

@@ -1,7 +1,7 @@
-//! Proof that the plant's step, the converters, the controller's tick and the
-//! exchange of frames never touch the heap: a counting allocator watches them.
+//! Checks with a counting allocator that the plant's step, the converters, the
+//! controller's tick and the exchange of frames never allocate.
 
-// A global allocator is `unsafe` by nature; this one only counts.
+// A global allocator requires `unsafe`; this one only counts.
 #![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -24,17 +24,17 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: every call is handed to the system's allocator unchanged.
+// SAFETY: every call is passed on to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // A thread that is ending has no count any more.
+        // The counter of an ending thread is no longer available.
         let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's contract is the system's.
+        // SAFETY: the caller upholds the contract of the system's allocator.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's contract is the system's.
+        // SAFETY: the caller upholds the contract of the system's allocator.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -140,7 +140,7 @@ fn frames_cross_the_link_without_allocation_on_either_end() {
             ..SensorFrame::default()
         };
         plant.exchange(&frame).unwrap();
-        // As in real time: without an answer waiting.
+        // Polls without an answer waiting, as in real time.
         plant.try_receive().unwrap();
     }
     let plant_allocations = ALLOCATIONS.get() - before;

@@ -1,10 +1,11 @@
-//! The fault of iceoryx2-cal 0.9.3 (and 0.10.0) that the link contains, as small as it can be
-//! shown: opening a segment of size zero never ends, whatever the timeout. A process that dies
-//! between `shm_open` and `ftruncate` leaves such a segment.
+//! Minimal reproduction of the fault of iceoryx2-cal 0.9.3 (and 0.10.0) that the link contains:
+//! opening a segment of size zero never ends, whatever the timeout. A process that dies between
+//! `shm_open` and `ftruncate` leaves such a segment.
 //!
-//! When this test fails after an upgrade, the fault is gone: `open_impl` in
-//! `dynamic_storage/posix_shared_memory.rs` looks at its timeout in the arm `MappingSizeIsZero`,
-//! and the removal of half-made segments in `run_files` and `guardian` can go.
+//! If this test fails after an upgrade, the fault is fixed: `open_impl` in
+//! `dynamic_storage/posix_shared_memory.rs` checks its timeout in the match arm
+//! `MappingSizeIsZero`, and the removal of half-made segments in `run_files` and `guardian` can be
+//! deleted.
 
 use std::fs::{self, OpenOptions};
 use std::time::Duration;
@@ -13,7 +14,8 @@ use iceoryx2::prelude::{
     Config, FileName, NodeBuilder, Path, SemanticString, SignalHandlingMode, ipc,
 };
 
-/// Removes every segment with a prefix when dropped: iceoryx2 keeps its management segment.
+/// Removes every segment with a given prefix when dropped; iceoryx2 leaves its management segment
+/// behind.
 struct Segments(String);
 
 impl Drop for Segments {
@@ -30,7 +32,7 @@ impl Drop for Segments {
 fn opening_a_segment_of_size_zero_ends_only_when_it_is_removed() {
     let folder = tempfile::tempdir().unwrap();
     let prefix = format!("iox2_zero_{}_", std::process::id());
-    // Before the nodes, so that it is dropped after them.
+    // Declared before the nodes, so that it is dropped after them.
     let _segments = Segments(prefix.clone());
     let mut config = Config::default();
     config.global.prefix = FileName::new(prefix.as_bytes()).unwrap();
@@ -58,7 +60,7 @@ fn opening_a_segment_of_size_zero_ends_only_when_it_is_removed() {
             name.starts_with(&prefix) && name.ends_with(".dynamic")
         })
         .unwrap();
-    // As after shm_open and before ftruncate.
+    // The state after shm_open and before ftruncate.
     fs::remove_file(&segment).unwrap();
     OpenOptions::new()
         .write(true)
@@ -73,7 +75,7 @@ fn opening_a_segment_of_size_zero_ends_only_when_it_is_removed() {
             service.open().is_err()
         });
         std::thread::sleep(20 * config.global.creation_timeout);
-        assert!(!opening.is_finished(), "it has looked at its timeout");
+        assert!(!opening.is_finished(), "the call has checked its timeout");
         fs::remove_file(&segment).unwrap();
         assert!(opening.join().unwrap());
     });
