@@ -9,7 +9,7 @@ use painleve_shared::settings::Settings;
 use painleve_shared::{Arm, ArmParameters, Real, check_setting, settings};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::belt::BeltSettings;
+use crate::estimate::belt::BeltSpeedSettings;
 use crate::estimate::calibration::CalibrationSettings;
 use crate::estimate::contact::ContactSettings;
 use crate::estimate::disturbance::DisturbanceSettings;
@@ -48,7 +48,7 @@ settings! {
         /// Estimation of friction.
         friction: FrictionSettings = FrictionSettings::default();
         /// Estimation of the belt's speed.
-        belt: BeltSettings = BeltSettings::default();
+        belt: BeltSpeedSettings = BeltSpeedSettings::default();
         /// Estimation of unknown torques.
         disturbance: DisturbanceSettings = DisturbanceSettings::default();
         /// Calibration of the links' length.

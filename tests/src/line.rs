@@ -34,7 +34,7 @@ const QUIET_MESSAGES: u64 = 20;
 
 /// How a line disturbs what it carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Noise {
+pub enum LineNoise {
     /// Not at all.
     None,
     /// In each direction, of every twelve messages one has a flipped bit, one is followed by garbage
@@ -52,7 +52,7 @@ pub enum Direction {
 }
 
 /// A line; gone with this value.
-pub struct Line {
+pub struct SerialLine {
     /// The port at the host's end.
     pub host_port: PathBuf,
     /// The port at the board's end.
@@ -64,12 +64,12 @@ pub struct Line {
     _ends: [OwnedFd; 2],
 }
 
-impl Line {
+impl SerialLine {
     /// Lays a line.
     ///
     /// # Panics
     /// If the system has no pseudo-terminals.
-    pub fn new(noise: Noise) -> Self {
+    pub fn new(noise: LineNoise) -> Self {
         let (host, host_end, host_port) = terminal();
         let (board, board_end, board_port) = terminal();
         let is_over = Arc::new(AtomicBool::new(false));
@@ -145,7 +145,7 @@ impl Drop for SerialBoard {
     }
 }
 
-impl Drop for Line {
+impl Drop for SerialLine {
     fn drop(&mut self) {
         self.is_over.store(true, Ordering::SeqCst);
         for carrier in self.carriers.drain(..) {
@@ -190,7 +190,7 @@ fn carry(mut from: File, mut to: File, mut disturber: Disturber, is_over: &Atomi
 
 /// Decides what is disturbed, the same in every run. Holds a message until it is complete.
 struct Disturber {
-    noise: Noise,
+    noise: LineNoise,
     message: Vec<u8>,
     /// Messages seen.
     messages: u64,
@@ -200,7 +200,7 @@ struct Disturber {
 
 impl Disturber {
     fn pass(&mut self, bytes: &[u8]) -> Vec<u8> {
-        if self.noise == Noise::None {
+        if self.noise == LineNoise::None {
             return bytes.to_vec();
         }
         let mut passed = Vec::new();

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use painleve_board::{Board, OnBoard, Serial};
+use painleve_board::{ConnectedBoard, OnBoard, Serial};
 use painleve_plant::closed_loop::{ClosedLoop, LoopResult};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
 use painleve_plant::scenario::Scenario;
@@ -13,14 +13,14 @@ use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::{FrameSource, Response};
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_tests::Bench;
-use painleve_tests::line::{Direction, Line, Noise};
+use painleve_tests::line::{Direction, LineNoise, SerialLine};
 use serde_json::Value;
 
 const QUIET: [&str; 3] = ["--json", "--no-record", "--no-plot"];
 const SHORT: [&str; 2] = ["--set", "run.duration_s=0.4"];
 
 /// Runs on the board at the end of `line`; the run's report and the board's.
-fn run(bench: &Bench, line: &Line, more: &[&str]) -> (Value, Value) {
+fn run(bench: &Bench, line: &SerialLine, more: &[&str]) -> (Value, Value) {
     let port = line.host_port.to_string_lossy();
     let serial = [
         "run", "--host", "serial", "--port", &port, "--timing", "t.json",
@@ -55,7 +55,7 @@ fn course(report: &Value) -> Vec<&Value> {
 #[test]
 fn a_run_over_the_line_is_the_native_run() {
     let bench = Bench::new("serial");
-    let line = Line::new(Noise::None);
+    let line = SerialLine::new(LineNoise::None);
     let _board = line.start_board();
     let native = bench.report(&[&["run"], &SHORT[..], &QUIET].concat());
     let (report, timing) = run(&bench, &line, &SHORT);
@@ -82,7 +82,7 @@ fn first_ticks<H: ControllerHost>(host: H) -> (LoopResult, H) {
 
 #[test]
 fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
-    let line = Line::new(Noise::Steady);
+    let line = SerialLine::new(LineNoise::Steady);
     let _board = line.start_board();
     let configuration = Scenario::default().controller_configuration();
     let mut serial = Serial::open(&line.host_port, &configuration, FrameSource::Lockstep).unwrap();
@@ -131,7 +131,7 @@ fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
 #[test]
 fn by_the_clock_the_board_keeps_the_time() {
     let bench = Bench::new("board-clock");
-    let line = Line::new(Noise::None);
+    let line = SerialLine::new(LineNoise::None);
     let _board = line.start_board();
     // Slow enough for a busy machine.
     let clock = ["open-loop-bounce", "--pacing", "realtime"];
@@ -156,7 +156,7 @@ struct Pressing {
 }
 
 impl Pressing {
-    fn start(line: &Line) -> Self {
+    fn start(line: &SerialLine) -> Self {
         let overrides = [
             "run.tick_hz=50",
             "controller.estimator.bandwidth_rad_s=100",
@@ -195,7 +195,7 @@ const NO_TORQUE: [TorqueCounts; 2] = [TorqueCounts(0); 2];
 
 #[test]
 fn silence_latches_a_fault_without_torque_until_it_is_armed_again() {
-    let line = Line::new(Noise::None);
+    let line = SerialLine::new(LineNoise::None);
     let _board = line.start_board();
     let mut arm = Pressing::start(&line);
     let answers: Vec<_> = (0..15).map(|_| arm.tick(ON)).collect();
@@ -236,7 +236,7 @@ fn silence_latches_a_fault_without_torque_until_it_is_armed_again() {
 #[test]
 fn a_board_that_is_gone_ends_the_run_with_a_message() {
     let bench = Bench::new("unplugged");
-    let line = Line::new(Noise::None);
+    let line = SerialLine::new(LineNoise::None);
     let board = line.start_board();
     let port = line.host_port.to_string_lossy();
     let serial = ["run", "--host", "serial", "--port", &port];

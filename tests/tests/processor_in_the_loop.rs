@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
 use painleve_board::timing::{TickTimes, TimingReport};
-use painleve_board::{Board, Emulator};
+use painleve_board::{ConnectedBoard, Emulator};
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
 use painleve_plant::scenario::{Scenario, built_in};

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::command::{ChoreError, cargo, workspace};
 
 /// A board, as its `Cargo.toml` describes it.
-pub struct Board {
+pub struct BoardPackage {
     /// Its crate.
     pub package: String,
     /// Its images: the crate's programs.
@@ -26,7 +26,7 @@ pub struct Board {
 ///
 /// # Errors
 /// If cargo cannot read the workspace, or a board does not say what it must.
-pub fn all() -> Result<Vec<Board>, ChoreError> {
+pub fn all() -> Result<Vec<BoardPackage>, ChoreError> {
     let packages = packages(&workspace().join("Cargo.toml"))?;
     let mut boards: Vec<_> = packages
         .iter()
@@ -58,7 +58,7 @@ pub fn packages(manifest: &Path) -> Result<Vec<Value>, ChoreError> {
     }
 }
 
-fn board(package: &Value) -> Result<Board, ChoreError> {
+fn board(package: &Value) -> Result<BoardPackage, ChoreError> {
     let described = &package["metadata"]["board"];
     let bytes = |key: &str| {
         described[key].as_u64().ok_or_else(|| {
@@ -68,7 +68,7 @@ fn board(package: &Value) -> Result<Board, ChoreError> {
     };
     let is_image = |target: &&Value| target["kind"] == serde_json::json!(["bin"]);
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-    Ok(Board {
+    Ok(BoardPackage {
         package: text(&package["name"]),
         images: package["targets"]
             .as_array()

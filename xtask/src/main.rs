@@ -19,7 +19,7 @@ use clap::{Parser, Subcommand};
 /// Chores of the painleve workspace.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask")]
-struct Cli {
+struct Xtask {
     #[command(subcommand)]
     chore: Chore,
 }
@@ -47,7 +47,7 @@ enum Chore {
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().chore {
+    let result = match Xtask::parse().chore {
         Chore::Test => test::run(),
         Chore::Setup => setup::run(),
         Chore::BuildFw => build_fw::run(),

@@ -8,7 +8,7 @@ use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::SpiBus;
 use painleve_shared::counts::EncoderCounts;
 
-use crate::{Disturbance, rescale};
+use crate::{ReadError, rescale};
 
 /// Resolution, bits.
 pub const BITS: u8 = 14;
@@ -56,7 +56,7 @@ impl Diagnostics {
 }
 
 /// Two encoders.
-pub struct Encoders<B, S, D> {
+pub struct EncoderDriver<B, S, D> {
     bus: B,
     selects: [S; 2],
     delay: D,
@@ -64,7 +64,7 @@ pub struct Encoders<B, S, D> {
     diagnostics: [Option<Diagnostics>; 2],
 }
 
-impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
+impl<B: SpiBus, S: OutputPin, D: DelayNs> EncoderDriver<B, S, D> {
     /// Takes the encoders of θ1 and of the elbow. `selects` are active low and must already be high. The
     /// bus is in mode 1 and no faster than [`FASTEST_HZ`].
     pub fn new(bus: B, selects: [S; 2], delay: D) -> Self {
@@ -79,7 +79,7 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
 
     /// Reads both angles as counts of `bits` bits. Takes 6 frames, 7 when it also checks a magnet, and 4
     /// more for every encoder that was disturbed.
-    pub fn read(&mut self, bits: u8) -> [Result<EncoderCounts, Disturbance>; 2] {
+    pub fn read(&mut self, bits: u8) -> [Result<EncoderCounts, ReadError>; 2] {
         self.tick = (self.tick + 1) % DIAGNOSTICS_INTERVAL;
         [0, 1].map(|encoder| {
             let looks = usize::from(self.tick) == encoder;
@@ -93,7 +93,7 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
         self.diagnostics
     }
 
-    fn angle(&mut self, encoder: usize, looks: bool) -> Result<u16, Disturbance> {
+    fn angle(&mut self, encoder: usize, looks: bool) -> Result<u16, ReadError> {
         self.read_twice(encoder, looks).or_else(|_| {
             // The error register arrives with the next frame; reading it clears it.
             self.frame(encoder, CLEAR_ERROR)?;
@@ -101,7 +101,7 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
         })
     }
 
-    fn read_twice(&mut self, encoder: usize, looks: bool) -> Result<u16, Disturbance> {
+    fn read_twice(&mut self, encoder: usize, looks: bool) -> Result<u16, ReadError> {
         self.frame(encoder, READ_ANGLE)?;
         let first = checked(self.frame(encoder, READ_ANGLE)?)?;
         let next = if looks { READ_DIAGNOSTICS } else { READ_ANGLE };
@@ -114,32 +114,32 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> Encoders<B, S, D> {
         if apart <= AGREEMENT || apart >= (DATA + 1) - AGREEMENT {
             Ok(second)
         } else {
-            Err(Disturbance::Disagreement)
+            Err(ReadError::Disagreement)
         }
     }
 
     /// Transfers one frame; the answer belongs to the previous command.
-    fn frame(&mut self, encoder: usize, command: u16) -> Result<u16, Disturbance> {
+    fn frame(&mut self, encoder: usize, command: u16) -> Result<u16, ReadError> {
         let select = &mut self.selects[encoder];
         let mut bytes = command.to_be_bytes();
-        select.set_low().map_err(|_| Disturbance::Bus)?;
+        select.set_low().map_err(|_| ReadError::Bus)?;
         self.delay.delay_ns(SETTLING_NS);
         let bus = &mut self.bus;
         let done = bus.transfer_in_place(&mut bytes).and_then(|()| bus.flush());
         self.delay.delay_ns(SETTLING_NS);
-        select.set_high().map_err(|_| Disturbance::Bus)?;
+        select.set_high().map_err(|_| ReadError::Bus)?;
         self.delay.delay_ns(SETTLING_NS);
-        done.map_err(|_| Disturbance::Bus)?;
+        done.map_err(|_| ReadError::Bus)?;
         Ok(u16::from_be_bytes(bytes))
     }
 }
 
 /// Returns the data of an answer without errors.
-fn checked(answer: u16) -> Result<u16, Disturbance> {
+fn checked(answer: u16) -> Result<u16, ReadError> {
     if !answer.count_ones().is_multiple_of(2) {
-        Err(Disturbance::Parity)
+        Err(ReadError::Parity)
     } else if answer & ERROR_FLAG != 0 {
-        Err(Disturbance::Flagged)
+        Err(ReadError::Flagged)
     } else {
         Ok(answer & DATA)
     }

@@ -10,7 +10,7 @@ use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::SpiDevice;
 use painleve_shared::counts::ForceCounts;
 
-use crate::{Disturbance, rescale};
+use crate::{ReadError, rescale};
 
 /// Resolution, bits.
 pub const BITS: u8 = 13;
@@ -34,23 +34,23 @@ const CONVERT: u8 = 0b0000_1000;
 const NULL_BIT: u8 = 0b0010_0000;
 
 /// The converter's select pin, with the pauses that the data sheet requires.
-pub struct Select<S, D> {
+pub struct PausedSelect<S, D> {
     pin: S,
     delay: D,
 }
 
-impl<S: OutputPin, D: DelayNs> Select<S, D> {
+impl<S: OutputPin, D: DelayNs> PausedSelect<S, D> {
     /// Takes a pin that is already high.
     pub fn new(pin: S, delay: D) -> Self {
         Self { pin, delay }
     }
 }
 
-impl<S: OutputPin, D> digital::ErrorType for Select<S, D> {
+impl<S: OutputPin, D> digital::ErrorType for PausedSelect<S, D> {
     type Error = S::Error;
 }
 
-impl<S: OutputPin, D: DelayNs> OutputPin for Select<S, D> {
+impl<S: OutputPin, D: DelayNs> OutputPin for PausedSelect<S, D> {
     fn set_low(&mut self) -> Result<(), S::Error> {
         self.pin.set_low()?;
         self.delay.delay_ns(SETUP_NS);
@@ -65,13 +65,13 @@ impl<S: OutputPin, D: DelayNs> OutputPin for Select<S, D> {
 }
 
 /// A force cell.
-pub struct ForceCell<D> {
+pub struct ForceCellDriver<D> {
     device: D,
 }
 
-impl<D: SpiDevice> ForceCell<D> {
+impl<D: SpiDevice> ForceCellDriver<D> {
     /// Makes a force cell on this device, in mode 0, no faster than [`FASTEST_HZ`], selected through
-    /// [`Select`].
+    /// [`PausedSelect`].
     pub fn new(device: D) -> Self {
         Self { device }
     }
@@ -82,8 +82,8 @@ impl<D: SpiDevice> ForceCell<D> {
         &mut self,
         bits: u8,
     ) -> (
-        Result<ForceCounts, Disturbance>,
-        Result<ForceCounts, Disturbance>,
+        Result<ForceCounts, ReadError>,
+        Result<ForceCounts, ReadError>,
     ) {
         let [normal, tangential] = [0, 1].map(|pair| {
             let counts = self.two_of_three(pair);
@@ -93,7 +93,7 @@ impl<D: SpiDevice> ForceCell<D> {
     }
 
     /// Returns two conversions that agree, or the median of three if two of these agree.
-    fn two_of_three(&mut self, pair: u8) -> Result<i32, Disturbance> {
+    fn two_of_three(&mut self, pair: u8) -> Result<i32, ReadError> {
         let first = self.convert(pair);
         let second = self.convert(pair);
         if first == second {
@@ -103,21 +103,21 @@ impl<D: SpiDevice> ForceCell<D> {
             (Ok(one), Ok(two), three) => {
                 let [low, median, high] = sorted([one, two, three]);
                 let is_agreed = (median - low).min(high - median) <= AGREEMENT;
-                is_agreed.then_some(median).ok_or(Disturbance::Disagreement)
+                is_agreed.then_some(median).ok_or(ReadError::Disagreement)
             }
             (Ok(one), Err(_), two) | (Err(_), Ok(one), two) if one == two => Ok(two),
-            _ => Err(Disturbance::Disagreement),
+            _ => Err(ReadError::Disagreement),
         }
     }
 
-    fn convert(&mut self, pair: u8) -> Result<i32, Disturbance> {
+    fn convert(&mut self, pair: u8) -> Result<i32, ReadError> {
         // The upper two channel bits follow the start bit; the third begins the second byte.
         let mut bytes = [CONVERT | pair, 0, 0];
         let done = self.device.transfer_in_place(&mut bytes);
-        done.map_err(|_| Disturbance::Bus)?;
+        done.map_err(|_| ReadError::Bus)?;
         let [_, high, low] = bytes;
         if high & NULL_BIT != 0 {
-            return Err(Disturbance::NotZero);
+            return Err(ReadError::NotZero);
         }
         let word = u16::from_be_bytes([high & 0x1f, low]);
         // Extends the sign of 13 bits.

@@ -18,7 +18,7 @@ pub mod switches;
 
 /// Reason for a missing reading in this tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Disturbance {
+pub enum ReadError {
     /// The SPI bus or a select pin failed.
     Bus,
     /// A word with the wrong parity.

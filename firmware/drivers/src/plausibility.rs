@@ -26,7 +26,7 @@ pub enum Implausible {
 
 /// Readings of one tick; `None` for a lost reading.
 #[derive(Clone, Copy, Debug)]
-pub struct Readings {
+pub struct SensorReadings {
     /// Both encoders, counts of `encoder_bits`.
     pub joints: [Option<EncoderCounts>; 2],
     /// Both forces, counts of `force_bits`.
@@ -53,7 +53,7 @@ impl Plausibility {
     /// [`Implausible`] gives the reason why the drive must not be armed on them.
     pub fn tick(
         &mut self,
-        readings: &Readings,
+        readings: &SensorReadings,
         encoder_bits: u8,
         force_bits: u8,
     ) -> Result<(), Implausible> {
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     fn after(ticks: u16, joints: [u32; 2], force: i32, magnet: bool) -> Result<(), Implausible> {
-        let readings = Readings {
+        let readings = SensorReadings {
             joints: joints.map(|it| Some(EncoderCounts(it))),
             forces: [Some(ForceCounts(force)); 2],
             magnets: [Some(magnet); 2],

@@ -22,7 +22,7 @@ use painleve_shared::status::Fault;
 
 use self::arrival::{Arrival, ArrivalState, Lapses, arrive};
 use crate::configuration::{Configuration, Converters};
-use crate::drive::torque::{LastCommand, NotFinite, TorqueStages};
+use crate::drive::torque::{LastCommand, NotFinite, TorqueOutput};
 use crate::estimate::joints::EncoderJump;
 use crate::estimate::{EstimatesState, Estimators, Readings};
 use crate::law::LawInput;
@@ -51,7 +51,7 @@ struct Stages<L> {
     references: References,
     law: L,
     recovery: Recovery,
-    torques: TorqueStages,
+    torques: TorqueOutput,
 }
 
 /// State of the stages between ticks.
@@ -83,7 +83,7 @@ impl<L: Law> Controller<L> {
             references: References::new(configuration),
             law: settings.law.clone(),
             recovery: Recovery::new(&settings.recovery, configuration.tick_s()),
-            torques: TorqueStages::new(
+            torques: TorqueOutput::new(
                 &settings.guard,
                 configuration.converters.torque,
                 settings.torque_limit_nm,

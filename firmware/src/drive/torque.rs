@@ -41,13 +41,13 @@ pub struct NotFinite;
 
 /// The torque stages and the limits on their torques.
 #[derive(Clone, Copy, Debug)]
-pub struct TorqueStages {
+pub struct TorqueOutput {
     guard: GuardSettings,
     scale: LinearScale<f32>,
     limit_nm: f32,
 }
 
-impl TorqueStages {
+impl TorqueOutput {
     /// Makes stages with this scale, of which ±`limit_nm` (N·m) is used.
     pub fn new(guard: &GuardSettings, scale: LinearScale<f32>, limit_nm: f32) -> Self {
         Self {
@@ -140,12 +140,12 @@ impl TorqueStages {
 mod tests {
     use super::*;
 
-    fn stages() -> TorqueStages {
+    fn stages() -> TorqueOutput {
         let scale = LinearScale {
             bits: 12,
             range: 5.0,
         };
-        TorqueStages::new(&GuardSettings::default(), scale, 5.0)
+        TorqueOutput::new(&GuardSettings::default(), scale, 5.0)
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Bounds the belt's speed from contact.
 //!
 //! Coulomb friction shows only the direction of slip. At positive slip the belt is slower than the
-//! tip, at negative slip it is faster, and in stick it is as fast as the tip. The observer keeps
+//! tip, at negative slip it is faster, and in stick it is as fast as the tip. The estimator keeps
 //! these bounds and widens them with the largest acceleration of the belt. After the tip has slid
 //! in both directions, or stuck, the bounds meet.
 
@@ -10,9 +10,9 @@ use painleve_shared::{OutOfRange, Real, Slip, check_setting, settings};
 use crate::estimate::friction::FrictionEstimate;
 
 settings! {
-    /// Settings of the belt observer.
+    /// Settings of the belt-speed estimator.
     #[derive(Copy)]
-    pub struct BeltSettings {
+    pub struct BeltSpeedSettings {
         /// Belt speed if it is known and constant; at most `fastest_m_s` in either direction.
         given_m_s: Option<f32> = None, -100.0..=100.0, "m/s";
         /// Largest belt speed in either direction.
@@ -23,7 +23,7 @@ settings! {
     check Self::relations;
 }
 
-impl BeltSettings {
+impl BeltSpeedSettings {
     fn relations(&self) -> Result<(), OutOfRange> {
         check_setting!(self.given_m_s, -self.fastest_m_s, self.fastest_m_s)
     }
@@ -49,13 +49,13 @@ impl Default for BeltState {
 /// Narrows the bounds of the belt's speed at each tick.
 #[derive(Clone, Copy, Debug)]
 pub struct BeltEstimator {
-    settings: BeltSettings,
+    settings: BeltSpeedSettings,
     tick_s: f32,
 }
 
 impl BeltEstimator {
     /// Makes an estimator that is called every `tick_s`.
-    pub fn new(settings: &BeltSettings, tick_s: f32) -> Self {
+    pub fn new(settings: &BeltSpeedSettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
             tick_s,
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn sliding_both_ways_closes_the_bounds() {
-        let belt = BeltEstimator::new(&BeltSettings::default(), 1e-3);
+        let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
         let mut state = BeltState::default();
         assert_eq!(belt.slip(&state, 0.0), None);
         belt.update(&mut state, 0.1, Some(&friction(Slip::Positive, false)));
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn stick_gives_the_speed_and_the_bounds_widen_with_time() {
-        let belt = BeltEstimator::new(&BeltSettings::default(), 1e-3);
+        let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
         let mut state = BeltState::default();
         belt.update(&mut state, -0.25, Some(&friction(Slip::Positive, true)));
         assert_eq!(belt.bounds_m_s(&state), (-0.25, -0.25));
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn a_belt_faster_than_its_bounds_moves_them() {
-        let belt = BeltEstimator::new(&BeltSettings::default(), 1e-3);
+        let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
         let mut state = BeltState::default();
         belt.update(&mut state, -0.5, Some(&friction(Slip::Positive, false)));
         belt.update(&mut state, 0.5, Some(&friction(Slip::Negative, false)));
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn a_given_speed_stays() {
         let belt = BeltEstimator::new(
-            &BeltSettings {
+            &BeltSpeedSettings {
                 given_m_s: Some(-0.4),
                 ..Default::default()
             },

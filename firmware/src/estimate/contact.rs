@@ -40,7 +40,7 @@ settings! {
 }
 
 settings! {
-    /// Settings of the contact observer.
+    /// Settings of the contact estimator.
     #[derive(Copy)]
     pub struct ContactSettings {
         /// Readings that decide about contact.

@@ -9,17 +9,17 @@ use std::rc::Rc;
 use std::time::Instant;
 
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
-use painleve_drivers::encoders::{self, Encoders};
-use painleve_drivers::force_cell::{self, ForceCell};
+use painleve_drivers::encoders::{self, EncoderDriver};
+use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_firmware::supervise::lapses::Lapse;
-use painleve_parts::wires::{Bus, Clock, Select, Shared};
+use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
 use painleve_parts::{As5048a, BitErrors, Mcp3304};
 use painleve_plant::{Configuration, Controller};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::Health;
 
-use super::{Board, BoardError, TimedAnswer};
+use super::{BoardError, ConnectedBoard, TimedAnswer};
 use crate::timing::Unit;
 
 /// What a sensor without a reading counts: out of every range, which the controller counts as a lapse.
@@ -33,16 +33,21 @@ const FORCE_BUS_HZ: u64 = 1_312_500;
 /// Output of a bridge amplifier without force, and its reference, counts.
 const BRIDGE_MIDDLE: i32 = 2048;
 
-type Force =
-    ForceCell<ExclusiveDevice<Bus<Mcp3304>, force_cell::Select<Select<Mcp3304>, Clock>, NoDelay>>;
+type Force = ForceCellDriver<
+    ExclusiveDevice<
+        ModelledBus<Mcp3304>,
+        force_cell::PausedSelect<SelectPin<Mcp3304>, Clock>,
+        NoDelay,
+    >,
+>;
 
 /// Drivers, parts and the controller, in this process.
 pub struct Drivers {
     controller: Controller,
-    encoders: Encoders<Bus<As5048a>, Select<As5048a>, Clock>,
+    encoders: EncoderDriver<ModelledBus<As5048a>, SelectPin<As5048a>, Clock>,
     force_cell: Force,
-    encoder_parts: [Shared<As5048a>; 2],
-    force_part: Shared<Mcp3304>,
+    encoder_parts: [SharedPart<As5048a>; 2],
+    force_part: SharedPart<Mcp3304>,
     encoder_bits: u8,
     force_bits: u8,
     ticks: u32,
@@ -66,7 +71,7 @@ impl Drivers {
             }
         }
         let clock = Clock::default();
-        let mut encoder_bus = Bus::new(&clock, ENCODER_BUS_HZ, true);
+        let mut encoder_bus = ModelledBus::new(&clock, ENCODER_BUS_HZ, true);
         let encoder_parts = [1, 2].map(|seed| {
             let mut part = As5048a::default();
             part.bit_errors = BitErrors::new(bit_errors, seed);
@@ -75,18 +80,18 @@ impl Drivers {
         let selects = encoder_parts
             .each_ref()
             .map(|part| encoder_bus.attach(part));
-        let mut force_bus = Bus::new(&clock, FORCE_BUS_HZ, false);
+        let mut force_bus = ModelledBus::new(&clock, FORCE_BUS_HZ, false);
         let mut force_part = Mcp3304::default();
         force_part.bit_errors = BitErrors::new(bit_errors, 3);
         let force_part = Rc::new(RefCell::new(force_part));
-        let select = force_cell::Select::new(force_bus.attach(&force_part), clock.clone());
+        let select = force_cell::PausedSelect::new(force_bus.attach(&force_part), clock.clone());
         let device = ExclusiveDevice::new_no_delay(force_bus, select);
         // Pins of a PC do not fail.
         let Ok(device) = device;
         Ok(Self {
             controller: Controller::new(configuration).map_err(|_| BoardError::Refused)?,
-            encoders: Encoders::new(encoder_bus, selects, clock),
-            force_cell: ForceCell::new(device),
+            encoders: EncoderDriver::new(encoder_bus, selects, clock),
+            force_cell: ForceCellDriver::new(device),
             encoder_parts,
             force_part,
             encoder_bits: encoder.bits,
@@ -129,7 +134,7 @@ impl Drivers {
     }
 }
 
-impl Board for Drivers {
+impl ConnectedBoard for Drivers {
     const HOST: &'static str = "drivers";
 
     fn unit(&self) -> Unit {

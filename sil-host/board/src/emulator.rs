@@ -25,7 +25,7 @@ use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Res
 use painleve_shared::wire;
 use painleve_system::lifetime::{Guarded, end_with_parent};
 
-use super::{Board, BoardError, SILENCE_LIMIT, TimedAnswer, log};
+use super::{BoardError, ConnectedBoard, SILENCE_LIMIT, TimedAnswer, log};
 use crate::timing::Unit;
 
 /// The emulator's program.
@@ -100,7 +100,9 @@ impl Emulator {
         check(image)?;
         // QEMU runs in a folder of its own.
         let image = image.canonicalize()?;
-        let table = with_log.then(|| log::Table::of_image(&image)).transpose()?;
+        let table = with_log
+            .then(|| log::LogTable::of_image(&image))
+            .transpose()?;
         let folder = tempfile::Builder::new().prefix("painleve-").tempdir()?;
         let pipe = |name| -> io::Result<File> {
             let path = folder.path().join(name);
@@ -185,7 +187,7 @@ impl Emulator {
     }
 }
 
-impl Board for Emulator {
+impl ConnectedBoard for Emulator {
     const HOST: &'static str = "qemu";
 
     fn unit(&self) -> Unit {

@@ -37,7 +37,7 @@ use crate::timing::Unit;
 pub struct TimedAnswer {
     /// The frame.
     pub frame: ActuatorFrame,
-    /// What the controller's tick took, in [`Board::unit`].
+    /// What the controller's tick took, in [`ConnectedBoard::unit`].
     pub cost: u32,
 }
 
@@ -46,7 +46,7 @@ pub struct TimedAnswer {
 const SILENCE_LIMIT: Duration = Duration::from_millis(1000);
 
 /// A board that has its configuration and answers sensor frames.
-pub trait Board {
+pub trait ConnectedBoard {
     /// What reports call it.
     const HOST: &'static str;
 
@@ -62,7 +62,7 @@ pub trait Board {
     /// What the image has counted.
     ///
     /// # Errors
-    /// As [`Board::exchange`].
+    /// As [`ConnectedBoard::exchange`].
     fn health(&mut self) -> Result<Health, BoardError>;
 
     /// One sentence about what disturbed the run, if anything did.

@@ -9,9 +9,9 @@ use painleve_system::terminal::warn;
 use super::BoardError;
 
 /// The table of an image's messages: they cross as numbers, the text is in the image.
-pub struct Table(defmt_decoder::Table);
+pub struct LogTable(defmt_decoder::Table);
 
-impl Table {
+impl LogTable {
     /// Reads the table from an image.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use std::time::Instant;
 use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
 use painleve_shared::frame::SensorFrame;
 
-use crate::Board;
+use crate::ConnectedBoard;
 use crate::timing::TickTimes;
 
 /// The controller on a board that belongs to this process.
@@ -26,7 +26,7 @@ impl<B> OnBoard<B> {
     }
 }
 
-impl<B: Board> ControllerHost for OnBoard<B> {
+impl<B: ConnectedBoard> ControllerHost for OnBoard<B> {
     fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
         let start = Instant::now();
         let answer = self.board.exchange(frame).map_err(HostError::new)?;

@@ -22,7 +22,7 @@ use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox, WireError};
 
-use super::{Board, BoardError, LineHealth, SILENCE_LIMIT, TimedAnswer};
+use super::{BoardError, ConnectedBoard, LineHealth, SILENCE_LIMIT, TimedAnswer};
 use crate::timing::Unit;
 
 /// Time in which a board answers anything but a frame.
@@ -211,7 +211,7 @@ impl Drop for Serial {
     }
 }
 
-impl Board for Serial {
+impl ConnectedBoard for Serial {
     const HOST: &'static str = "serial";
 
     fn unit(&self) -> Unit {

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::cycles::{
-    FLASH_DATA_WAIT, FLASH_LINE_BYTES, FLASH_READ, FLASH_WAIT_STATES, Kind, PERIPHERAL_WAIT,
-    PIPELINE_REFILL,
+    FLASH_DATA_WAIT, FLASH_LINE_BYTES, FLASH_READ, FLASH_WAIT_STATES, InstructionKind,
+    PERIPHERAL_WAIT, PIPELINE_REFILL,
 };
 use crate::graph::{Block, Graph};
 use crate::instruction::{Effect, Instruction, PROGRAM_COUNTER};
@@ -128,7 +128,10 @@ impl Walk {
             }
         }
         let mut cycles = instruction.kind.cycles();
-        if matches!(instruction.kind, Kind::Float | Kind::FloatMultiplyAdd) {
+        if matches!(
+            instruction.kind,
+            InstructionKind::Float | InstructionKind::FloatMultiplyAdd
+        ) {
             let uses = |next: &Instruction| {
                 let mut written = instruction.writes.iter();
                 written.any(|register| next.reads.contains(register))
@@ -159,7 +162,7 @@ impl Walk {
 
 /// What the memory of a load or store adds.
 fn wait(instruction: &Instruction, now: &Constants) -> Option<u32> {
-    if instruction.kind == Kind::TableBranch {
+    if instruction.kind == InstructionKind::TableBranch {
         return Some(FLASH_DATA_WAIT);
     }
     let (base, offset) = instruction.memory?;

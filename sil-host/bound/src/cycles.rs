@@ -50,7 +50,7 @@ pub const EXCEPTION_EXIT: u32 = 12 + 17 + FLASH_READ;
 
 /// Kinds of instruction that differ in cost, with the number of registers where that matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum InstructionKind {
     /// One cycle: arithmetic, logic, moves, 32-bit and long multiplication, IT.
     Simple,
     /// Integer division: 2 … 12.
@@ -76,7 +76,7 @@ pub enum Kind {
     FloatDivide,
 }
 
-impl Kind {
+impl InstructionKind {
     /// Cycles at zero wait, without the refill of a branch.
     pub fn cycles(self) -> u32 {
         match self {

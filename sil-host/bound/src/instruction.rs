@@ -9,7 +9,7 @@ use capstone::arch::arm::{ArmCC, ArmInsn, ArmOperand, ArmOperandType, ArmReg};
 use capstone::prelude::*;
 
 use crate::BoundError;
-use crate::cycles::Kind;
+use crate::cycles::InstructionKind;
 use crate::image::Image;
 
 /// Where an instruction goes.
@@ -56,7 +56,7 @@ pub struct Instruction {
     /// Bytes: 2 or 4.
     pub size: u32,
     /// What it costs.
-    pub kind: Kind,
+    pub kind: InstructionKind,
     /// Where it goes.
     pub flow: Flow,
     /// Base register and offset of the memory that it reads or writes.
@@ -184,7 +184,7 @@ impl Decoder {
         let mut flow = Flow::Next;
         let kind = if is(ARM_INS_BL) {
             flow = Flow::Call(immediate.ok_or_else(|| unknown(&text))? as u32);
-            Kind::Branch
+            InstructionKind::Branch
         } else if any(&[ARM_INS_B, ARM_INS_CBZ, ARM_INS_CBNZ]) {
             let target = immediate.ok_or_else(|| unknown(&text))? as u32;
             let conditional = conditional || !is(ARM_INS_B);
@@ -192,27 +192,27 @@ impl Decoder {
                 target,
                 conditional,
             };
-            Kind::Branch
+            InstructionKind::Branch
         } else if is(ARM_INS_BX) && base.starts_with("bx") {
             if !reads.contains(&(ArmReg::ARM_REG_LR as u16)) {
                 return Err(unknown(&text));
             }
             flow = Flow::Return { conditional };
-            Kind::Branch
+            InstructionKind::Branch
         } else if any(&[ARM_INS_TBB, ARM_INS_TBH]) {
             flow = Flow::Table;
-            Kind::TableBranch
+            InstructionKind::TableBranch
         } else if any(&[ARM_INS_UDF, ARM_INS_BKPT]) {
             flow = Flow::Trap;
-            Kind::Simple
+            InstructionKind::Simple
         } else if any(&[ARM_INS_SDIV, ARM_INS_UDIV]) {
-            Kind::Divide
+            InstructionKind::Divide
         } else if any(&[ARM_INS_ISB, ARM_INS_DSB, ARM_INS_DMB]) {
-            Kind::Barrier
+            InstructionKind::Barrier
         } else if any(&[ARM_INS_MRS, ARM_INS_MSR, ARM_INS_CPS]) {
-            Kind::Special
+            InstructionKind::Special
         } else if any(&[ARM_INS_VDIV, ARM_INS_VSQRT]) {
-            Kind::FloatDivide
+            InstructionKind::FloatDivide
         } else if any(&[
             ARM_INS_VMLA,
             ARM_INS_VMLS,
@@ -223,40 +223,40 @@ impl Decoder {
             ARM_INS_VFNMA,
             ARM_INS_VFNMS,
         ]) {
-            Kind::FloatMultiplyAdd
+            InstructionKind::FloatMultiplyAdd
         } else if any(&[ARM_INS_VLDR, ARM_INS_VPOP]) {
-            Kind::Load(doubles(0))
+            InstructionKind::Load(doubles(0))
         } else if any(&[ARM_INS_VSTR, ARM_INS_VPUSH]) {
-            Kind::Store(doubles(0))
+            InstructionKind::Store(doubles(0))
         } else if any(&[ARM_INS_VLDMIA, ARM_INS_VLDMDB]) {
-            Kind::Load(doubles(1))
+            InstructionKind::Load(doubles(1))
         } else if any(&[ARM_INS_VSTMIA, ARM_INS_VSTMDB]) {
-            Kind::Store(doubles(1))
+            InstructionKind::Store(doubles(1))
         } else if base.starts_with('v') {
-            Kind::Float
+            InstructionKind::Float
         } else if is(ARM_INS_POP) {
-            Kind::Load(registers(0))
+            InstructionKind::Load(registers(0))
         } else if is(ARM_INS_PUSH) {
-            Kind::Store(registers(0))
+            InstructionKind::Store(registers(0))
         } else if base.starts_with("ldm") {
-            Kind::Load(registers(1))
+            InstructionKind::Load(registers(1))
         } else if base.starts_with("stm") {
-            Kind::Store(registers(1))
+            InstructionKind::Store(registers(1))
         } else if base.starts_with("ldrd") {
-            Kind::Load(2)
+            InstructionKind::Load(2)
         } else if base.starts_with("strd") {
-            Kind::Store(2)
+            InstructionKind::Store(2)
         } else if base.starts_with("ldr") {
-            Kind::Load(1)
+            InstructionKind::Load(1)
         } else if base.starts_with("str") {
-            Kind::Store(1)
+            InstructionKind::Store(1)
         } else if SIMPLE.iter().any(|simple| base.starts_with(simple)) {
-            Kind::Simple
+            InstructionKind::Simple
         } else {
             return Err(unknown(&text));
         };
         if to_counter && matches!(flow, Flow::Next) {
-            if !matches!(kind, Kind::Load(_)) || operands.iter().any(|o| matches!(o.op_type, ArmOperandType::Mem(m) if m.base().0 != ArmReg::ARM_REG_SP as u16)) {
+            if !matches!(kind, InstructionKind::Load(_)) || operands.iter().any(|o| matches!(o.op_type, ArmOperandType::Mem(m) if m.base().0 != ArmReg::ARM_REG_SP as u16)) {
                 return Err(unknown(&text));
             }
             flow = Flow::Return { conditional };

@@ -32,7 +32,7 @@ pub struct Bound {
     /// Instructions on the worst path.
     pub instructions: u32,
     /// The path, in order of execution.
-    pub path: Vec<Stretch>,
+    pub path: Vec<PathStretch>,
     /// Loops of the interrupt and of what it calls.
     #[serde(skip)]
     pub loops: Vec<Loop>,
@@ -40,7 +40,7 @@ pub struct Bound {
 
 /// A stretch of the path that comes from one function of the source.
 #[derive(Clone, Debug, Serialize)]
-pub struct Stretch {
+pub struct PathStretch {
     /// The innermost function of the project.
     pub function: String,
     /// Its file.
@@ -119,8 +119,8 @@ impl Bound {
     }
 }
 
-fn stretches(image: &Image, path: &[Visit]) -> Vec<Stretch> {
-    let mut all: Vec<Stretch> = Vec::new();
+fn stretches(image: &Image, path: &[Visit]) -> Vec<PathStretch> {
+    let mut all: Vec<PathStretch> = Vec::new();
     let mut rest = 0.0;
     for visit in path {
         let frames = image.frames(visit.block);
@@ -139,7 +139,7 @@ fn stretches(image: &Image, path: &[Visit]) -> Vec<Stretch> {
                 last.cycles += cycles;
                 last.lines.extend((line > 0).then_some(line));
             }
-            _ => all.push(Stretch {
+            _ => all.push(PathStretch {
                 function,
                 file: file.to_owned(),
                 lines: BTreeSet::from_iter((line > 0).then_some(line)),

@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::{Args, Subcommand};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::{TickTimes, TimingReport};
-use painleve_board::{Board, BoardError, Drivers, LineHealth, Serial};
+use painleve_board::{BoardError, ConnectedBoard, Drivers, LineHealth, Serial};
 use painleve_link::{BusName, ControllerEnd, Pacing, Received};
 use painleve_plant::Configuration;
 use painleve_shared::message::FrameSource;
@@ -21,11 +21,11 @@ use super::{CommandError, or_interrupted};
 #[derive(Debug, Args)]
 pub struct BridgeArguments {
     #[command(subcommand)]
-    target: Target,
+    target: BridgeTarget,
 }
 
 #[derive(Debug, Subcommand)]
-enum Target {
+enum BridgeTarget {
     /// The image under QEMU: deterministic, with instruction counts.
     Qemu {
         #[command(flatten)]
@@ -122,15 +122,17 @@ impl ImageArguments {
 /// Carries frames between the bus and the board until the plant's session ends.
 pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
     match &arguments.target {
-        Target::Qemu { bus, image } => carry(bus, image.timing.as_deref(), |configuration, _| {
-            Emulator::start(&image.path(), configuration, image.log)
-        }),
-        Target::Drivers { bus, lines, timing } => {
+        BridgeTarget::Qemu { bus, image } => {
+            carry(bus, image.timing.as_deref(), |configuration, _| {
+                Emulator::start(&image.path(), configuration, image.log)
+            })
+        }
+        BridgeTarget::Drivers { bus, lines, timing } => {
             carry(bus, timing.as_deref(), |configuration, _| {
                 Drivers::new(configuration, lines.bit_errors)
             })
         }
-        Target::Serial { bus, port, timing } => {
+        BridgeTarget::Serial { bus, port, timing } => {
             carry(bus, timing.as_deref(), |configuration, pacing| {
                 Serial::open(port, configuration, frame_source(pacing))
             })
@@ -146,7 +148,7 @@ fn frame_source(pacing: Pacing) -> FrameSource {
     }
 }
 
-fn carry<B: Board>(
+fn carry<B: ConnectedBoard>(
     bus: &BusArguments,
     timing: Option<&Path>,
     start: impl FnOnce(&Configuration, Pacing) -> Result<B, BoardError>,
@@ -155,7 +157,7 @@ fn carry<B: Board>(
     or_interrupted(carry_until(bus, timing, start, &interrupt), &interrupt)
 }
 
-fn carry_until<B: Board>(
+fn carry_until<B: ConnectedBoard>(
     bus: &BusArguments,
     timing: Option<&Path>,
     start: impl FnOnce(&Configuration, Pacing) -> Result<B, BoardError>,

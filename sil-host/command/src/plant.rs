@@ -11,7 +11,7 @@ use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult};
 use painleve_plant::controller_host::ControllerHost;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
-use painleve_record::report::{Percentiles, RunReport};
+use painleve_record::report::{DurationPercentiles, RunReport};
 use painleve_shared::status::Fault;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
@@ -119,7 +119,7 @@ fn simulate(
             let (lateness_ns, missed, end) = host.finish();
             end.end()?;
             Ok(RunReport {
-                wake_up_us: Some(Percentiles::of_ns(&lateness_ns)),
+                wake_up_us: Some(DurationPercentiles::of_ns(&lateness_ns)),
                 missed_deadlines: Some(missed),
                 ..RunReport::new(scenario, name, pacing.name(), &result, wall)
             })

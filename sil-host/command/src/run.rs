@@ -197,14 +197,14 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     if arguments.host == Host::Serial {
         plant_arguments.push("--board-keeps-time".into());
     }
-    let mut plant = Process::start(plant_arguments, &bus, Stdio::inherit())?;
+    let mut plant = RunProcess::start(plant_arguments, &bus, Stdio::inherit())?;
     // Its complaints matter only while the plant has none, a log at once.
     let stderr = if arguments.image.log {
         Stdio::inherit()
     } else {
         Stdio::piped()
     };
-    let mut controller = Process::start(controller_arguments(arguments), &bus, stderr)?;
+    let mut controller = RunProcess::start(controller_arguments(arguments), &bus, stderr)?;
 
     let status = watch(&mut plant, &mut controller, &interrupt)?;
     let deadlines_missed = status.code() == Some(i32::from(DEADLINES_MISSED));
@@ -251,8 +251,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
 
 /// Waits for the plant's end, and sees to it that one comes.
 fn watch(
-    plant: &mut Process,
-    controller: &mut Process,
+    plant: &mut RunProcess,
+    controller: &mut RunProcess,
     interrupt: &Interrupt,
 ) -> Result<ExitStatus, CommandError> {
     let ended_early = |status, complaint: String| {
@@ -324,14 +324,14 @@ fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
 }
 
 /// A child with all that it says.
-struct Process {
+struct RunProcess {
     child: Guarded,
     stdout: Reader,
     stderr: Reader,
     stopped: Duration,
 }
 
-impl Process {
+impl RunProcess {
     fn start(arguments: Vec<OsString>, bus: &BusName, stderr: Stdio) -> Result<Self, CommandError> {
         let program = std::env::current_exe()?;
         let mut command = Command::new(&program);

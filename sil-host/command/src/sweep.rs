@@ -29,11 +29,11 @@ enum SweepCommand {
     /// Deal the rows of a campaign out to shards and write the manifest.
     Plan(PlanArguments),
     /// Compute one shard, or all that are missing; finished ones are skipped.
-    Run(RunArguments),
+    Run(ShardArguments),
     /// Show which shards are finished.
     Status(StatusArguments),
     /// Print the shards that are not finished in array syntax, as in 3,7,9-12.
-    Missing(Place),
+    Missing(SweepFolder),
     /// Put all shards together; refuses gaps and duplicates.
     Merge(MergeArguments),
     /// Write a script that submits the missing shards to a scheduler.
@@ -42,7 +42,7 @@ enum SweepCommand {
 
 /// Which sweep.
 #[derive(Debug, Args)]
-struct Place {
+struct SweepFolder {
     /// Folder of the sweep: its manifest and its shards.
     #[arg(long, value_name = "PATH", default_value = "out/sweep")]
     folder: PathBuf,
@@ -56,11 +56,11 @@ struct PlanArguments {
     #[arg(long, value_name = "N")]
     shards: NonZeroUsize,
     #[command(flatten)]
-    place: Place,
+    place: SweepFolder,
 }
 
 #[derive(Debug, Args)]
-struct RunArguments {
+struct ShardArguments {
     /// Shard K of N, K from 0; by default what the scheduler says in SLURM_ARRAY_TASK_ID,
     /// HQ_TASK_ID, JOB_COMPLETION_INDEX or OMPI_COMM_WORLD_RANK.
     #[arg(long, value_name = "K/N", allow_hyphen_values = true)]
@@ -71,7 +71,7 @@ struct RunArguments {
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
-    place: Place,
+    place: SweepFolder,
 }
 
 #[derive(Debug, Args)]
@@ -80,7 +80,7 @@ struct StatusArguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    place: Place,
+    place: SweepFolder,
 }
 
 #[derive(Debug, Args)]
@@ -93,7 +93,7 @@ struct MergeArguments {
     #[arg(long, value_name = "PATH")]
     parquet: Option<PathBuf>,
     #[command(flatten)]
-    place: Place,
+    place: SweepFolder,
 }
 
 #[derive(Debug, Args)]
@@ -120,7 +120,7 @@ struct SlurmArguments {
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    place: Place,
+    place: SweepFolder,
 }
 
 /// Runs one step of a sweep.
@@ -168,7 +168,7 @@ fn load(folder: &Path) -> Result<(Manifest, Understood), SweepError> {
     Ok((manifest, understood))
 }
 
-fn compute(arguments: &RunArguments) -> Result<(), CommandError> {
+fn compute(arguments: &ShardArguments) -> Result<(), CommandError> {
     let folder = &arguments.place.folder;
     let (manifest, understood) = load(folder)?;
     let shards = if arguments.all {
@@ -184,7 +184,7 @@ fn compute(arguments: &RunArguments) -> Result<(), CommandError> {
 }
 
 fn compute_shard(
-    arguments: &RunArguments,
+    arguments: &ShardArguments,
     manifest: &Manifest,
     understood: &Understood,
     shard: usize,

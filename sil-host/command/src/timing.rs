@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
 use painleve_board::timing::{Metronome, TimingReport, Unit, report};
-use painleve_board::{Board, Drivers, OnBoard, Serial};
+use painleve_board::{ConnectedBoard, Drivers, OnBoard, Serial};
 use painleve_bound::report::Bound;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
@@ -122,7 +122,7 @@ fn measure(
     }
 }
 
-fn on_board<B: Board>(
+fn on_board<B: ConnectedBoard>(
     scenario: &Scenario,
     board: B,
     interrupt: &Interrupt,

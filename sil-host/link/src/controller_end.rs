@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
 use super::claim::{Bus, Claim, Role, remove_dead};
-use super::guardian::{Guardian, Mark};
-use super::patience::{DEFAULT_SILENCE_LIMIT, Next, Patience, Silence};
+use super::guardian::{CallMark, Guardian};
+use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
 use super::place::Place;
 use super::run_files::RunFiles;
 use super::services::{
@@ -48,14 +48,14 @@ pub struct ControllerEnd {
 
 /// Everything iceoryx2 has created for this end.
 struct Ports {
-    _leaving: Mark,
+    _leaving: CallMark,
     // Drop order: ports, services, node.
     sensor: Receiver<SensorFrame>,
     session: Receiver<SessionMessage>,
     actuator: Sender<ActuatorFrame>,
     _services: Services,
     presence: Presence,
-    _left: Mark,
+    _left: CallMark,
 }
 
 /// Result of an attempt to join.
@@ -102,7 +102,7 @@ impl ControllerEnd {
                 Attempt::Joined(end, session) => return Ok((*end, session)),
                 Attempt::NoPlant => silence = Silence::default(),
                 Attempt::NotReady => {
-                    if let Next::GiveUp(silence) = silence.grow(DEFAULT_SILENCE_LIMIT) {
+                    if let AfterPause::GiveUp(silence) = silence.grow(DEFAULT_SILENCE_LIMIT) {
                         return Err(LinkError::PlantSilent {
                             bus: bus.name,
                             silence,
@@ -189,11 +189,13 @@ impl ControllerEnd {
                 });
             }
             match self.patience.pause() {
-                Next::Poll => {}
-                Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
+                AfterPause::Poll => {}
+                AfterPause::Look if self.interrupt.is_requested() => {
+                    return Err(LinkError::Interrupted);
+                }
                 // A frame sent just before the plant left still counts: poll once more.
-                Next::Look => known_gone = !self.claim.peer_is_alive(),
-                Next::GiveUp(silence) => return Err(self.silent_for(silence)),
+                AfterPause::Look => known_gone = !self.claim.peer_is_alive(),
+                AfterPause::GiveUp(silence) => return Err(self.silent_for(silence)),
             }
             if !known_gone && deadline.is_some_and(|deadline| Instant::now() >= deadline) {
                 return Ok(None);
@@ -253,11 +255,13 @@ impl ControllerEnd {
                 None => {}
             }
             match patience.pause() {
-                Next::Poll => {}
-                Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
-                Next::Look if self.claim.peer_is_alive() => {}
-                Next::Look => return Ok(None),
-                Next::GiveUp(silence) => return Err(self.silent_for(silence)),
+                AfterPause::Poll => {}
+                AfterPause::Look if self.interrupt.is_requested() => {
+                    return Err(LinkError::Interrupted);
+                }
+                AfterPause::Look if self.claim.peer_is_alive() => {}
+                AfterPause::Look => return Ok(None),
+                AfterPause::GiveUp(silence) => return Err(self.silent_for(silence)),
             }
         }
     }

@@ -30,12 +30,12 @@ const LOOKS_UNTIL_END: u32 = 60;
 /// Watches the calls of one end of the link.
 #[derive(Debug)]
 pub(super) struct Guardian {
-    shared: Arc<Shared>,
+    shared: Arc<CallCount>,
     thread: Option<JoinHandle<()>>,
 }
 
 #[derive(Debug, Default)]
-struct Shared {
+struct CallCount {
     /// Odd during a call; every call changes it.
     calls: AtomicU32,
     over: AtomicBool,
@@ -44,8 +44,8 @@ struct Shared {
 impl Guardian {
     /// Starts the watching thread.
     pub(super) fn start(claim: &Claim) -> io::Result<Self> {
-        let shared = Arc::new(Shared::default());
-        let watch = Watch {
+        let shared = Arc::new(CallCount::default());
+        let watch = PeerWatch {
             shared: Arc::clone(&shared),
             bus: claim.bus().clone(),
             lock: claim.share()?,
@@ -71,17 +71,17 @@ impl Guardian {
 
     /// Returns the first and last field of a struct whose remaining fields are watched while they
     /// drop.
-    pub(super) fn marks(&self) -> (Mark, Mark) {
-        let mark = || Mark(Arc::clone(&self.shared));
+    pub(super) fn marks(&self) -> (CallMark, CallMark) {
+        let mark = || CallMark(Arc::clone(&self.shared));
         (mark(), mark())
     }
 }
 
 /// Begins or ends a watched call when it drops.
 #[derive(Debug)]
-pub(super) struct Mark(Arc<Shared>);
+pub(super) struct CallMark(Arc<CallCount>);
 
-impl Drop for Mark {
+impl Drop for CallMark {
     fn drop(&mut self) {
         self.0.calls.fetch_add(1, Ordering::Relaxed);
     }
@@ -97,14 +97,14 @@ impl Drop for Guardian {
     }
 }
 
-struct Watch {
-    shared: Arc<Shared>,
+struct PeerWatch {
+    shared: Arc<CallCount>,
     bus: Bus,
     lock: LockFile,
     peer: Role,
 }
 
-impl Watch {
+impl PeerWatch {
     fn run(&self) {
         let mut last = 0;
         let mut looks = 0;

@@ -24,7 +24,7 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_millis(100);
 
 /// Next step after a pause.
-pub(super) enum Next {
+pub(super) enum AfterPause {
     /// Poll again.
     Poll,
     /// Check whether the peer is alive, then poll again.
@@ -43,18 +43,18 @@ pub(super) struct Silence {
 
 impl Silence {
     /// Adds the time since the last call; the first call adds none.
-    pub(super) fn grow(&mut self, limit: Duration) -> Next {
+    pub(super) fn grow(&mut self, limit: Duration) -> AfterPause {
         let now = Instant::now();
         let pause = now - self.last.replace(now).unwrap_or(now);
         self.total += pause.min(LONGEST_PAUSE);
 
         if self.total >= limit {
-            Next::GiveUp(self.total)
+            AfterPause::GiveUp(self.total)
         } else if self.total - self.looked >= LOOK_INTERVAL {
             self.looked = self.total;
-            Next::Look
+            AfterPause::Look
         } else {
-            Next::Poll
+            AfterPause::Poll
         }
     }
 }
@@ -80,20 +80,20 @@ impl Patience {
 
     /// Pauses once and returns the next step.
     #[inline]
-    pub(super) fn pause(&mut self) -> Next {
+    pub(super) fn pause(&mut self) -> AfterPause {
         if self.polls < SPIN_POLLS {
             self.polls += 1;
             std::hint::spin_loop();
-            Next::Poll
+            AfterPause::Poll
         } else {
             self.pause_longer()
         }
     }
 
     #[cold]
-    fn pause_longer(&mut self) -> Next {
+    fn pause_longer(&mut self) -> AfterPause {
         let next = self.silence.grow(self.limit);
-        if let Next::Poll = next {
+        if let AfterPause::Poll = next {
             if self.silence.total < YIELD_TIME {
                 std::thread::yield_now();
             } else {
@@ -115,9 +115,9 @@ mod tests {
         let mut looks = 0;
         let silence = loop {
             match patience.pause() {
-                Next::Poll => {}
-                Next::Look => looks += 1,
-                Next::GiveUp(silence) => break silence,
+                AfterPause::Poll => {}
+                AfterPause::Look => looks += 1,
+                AfterPause::GiveUp(silence) => break silence,
             }
         };
         assert!(silence >= limit);
@@ -127,7 +127,10 @@ mod tests {
     #[test]
     fn stopping_this_process_does_not_count_as_silence_of_the_peer() {
         let mut silence = Silence::default();
-        assert!(matches!(silence.grow(DEFAULT_SILENCE_LIMIT), Next::Poll));
+        assert!(matches!(
+            silence.grow(DEFAULT_SILENCE_LIMIT),
+            AfterPause::Poll
+        ));
         silence.last = Instant::now().checked_sub(Duration::from_secs(1));
         silence.grow(DEFAULT_SILENCE_LIMIT);
         assert_eq!(silence.total, LONGEST_PAUSE);

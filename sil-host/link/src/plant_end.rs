@@ -8,8 +8,8 @@ use nix::sys::statvfs::statvfs;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
 use super::claim::{Bus, Claim, Role, Taken, remove_dead};
-use super::guardian::{Guardian, Mark};
-use super::patience::{DEFAULT_SILENCE_LIMIT, Next, Patience, Silence};
+use super::guardian::{CallMark, Guardian};
+use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
 use super::place::{Place, SHARED_MEMORY};
 use super::run_files::RunFiles;
 use super::services::{Presence, Receiver, Sender, Services, receiver, sender, transport};
@@ -45,14 +45,14 @@ pub struct PlantEnd {
 
 /// Everything iceoryx2 has created for this end.
 struct Ports {
-    _leaving: Mark,
+    _leaving: CallMark,
     // Drop order: ports, services, node.
     sensor: Sender<SensorFrame>,
     actuator: Receiver<ActuatorFrame>,
     session: Sender<SessionMessage>,
     _services: Services,
     presence: Presence,
-    _left: Mark,
+    _left: CallMark,
 }
 
 impl Ports {
@@ -149,7 +149,7 @@ impl PlantEnd {
                 } else if self.run.is_answering() {
                     self.silence = Silence::default();
                     return Ok(());
-                } else if let Next::GiveUp(silence) = silence.grow(self.silence_limit) {
+                } else if let AfterPause::GiveUp(silence) = silence.grow(self.silence_limit) {
                     return Err(self.silent_for(silence));
                 }
             }
@@ -208,11 +208,13 @@ impl PlantEnd {
                 return Err(self.gone());
             }
             match patience.pause() {
-                Next::Poll => {}
-                Next::Look if self.interrupt.is_requested() => return Err(LinkError::Interrupted),
+                AfterPause::Poll => {}
+                AfterPause::Look if self.interrupt.is_requested() => {
+                    return Err(LinkError::Interrupted);
+                }
                 // An answer sent just before the controller left still counts: poll once more.
-                Next::Look => known_gone = !self.claim.peer_is_alive(),
-                Next::GiveUp(silence) => return Err(self.silent_for(silence)),
+                AfterPause::Look => known_gone = !self.claim.peer_is_alive(),
+                AfterPause::GiveUp(silence) => return Err(self.silent_for(silence)),
             }
         }
     }
@@ -239,11 +241,11 @@ impl PlantEnd {
             return Ok(Some(answer));
         }
         match self.silence.grow(self.silence_limit) {
-            Next::Poll => Ok(None),
-            Next::Look if self.claim.peer_is_alive() => Ok(None),
+            AfterPause::Poll => Ok(None),
+            AfterPause::Look if self.claim.peer_is_alive() => Ok(None),
             // An answer sent just before the controller left still counts: poll once more.
-            Next::Look => self.take()?.map(Some).ok_or_else(|| self.gone()),
-            Next::GiveUp(silence) => Err(self.silent_for(silence)),
+            AfterPause::Look => self.take()?.map(Some).ok_or_else(|| self.gone()),
+            AfterPause::GiveUp(silence) => Err(self.silent_for(silence)),
         }
     }
 

@@ -33,23 +33,23 @@ impl DelayNs for Clock {
 }
 
 /// A part that its owner and its wires share.
-pub type Shared<P> = Rc<RefCell<P>>;
+pub type SharedPart<P> = Rc<RefCell<P>>;
 
 /// A part and whether it is selected.
-struct Place<P> {
-    part: Shared<P>,
+struct Slot<P> {
+    part: SharedPart<P>,
     selected: Rc<Cell<bool>>,
 }
 
 /// A SPI bus with parts on it.
-pub struct Bus<P> {
+pub struct ModelledBus<P> {
     clock: Clock,
     hz: u64,
     second_edge: bool,
-    places: Vec<Place<P>>,
+    places: Vec<Slot<P>>,
 }
 
-impl<P: SpiPart> Bus<P> {
+impl<P: SpiPart> ModelledBus<P> {
     /// A bus that idles low, at this rate; `second_edge` for mode 1.
     pub fn new(clock: &Clock, hz: u64, second_edge: bool) -> Self {
         Self {
@@ -61,13 +61,13 @@ impl<P: SpiPart> Bus<P> {
     }
 
     /// Puts a part on the bus; its select pin, high.
-    pub fn attach(&mut self, part: &Shared<P>) -> Select<P> {
+    pub fn attach(&mut self, part: &SharedPart<P>) -> SelectPin<P> {
         let selected = Rc::new(Cell::new(false));
-        self.places.push(Place {
+        self.places.push(Slot {
             part: Rc::clone(part),
             selected: Rc::clone(&selected),
         });
-        Select {
+        SelectPin {
             clock: self.clock.clone(),
             part: Rc::clone(part),
             selected,
@@ -93,11 +93,11 @@ impl<P: SpiPart> Bus<P> {
     }
 }
 
-impl<P> spi::ErrorType for Bus<P> {
+impl<P> spi::ErrorType for ModelledBus<P> {
     type Error = Infallible;
 }
 
-impl<P: SpiPart> SpiBus for Bus<P> {
+impl<P: SpiPart> SpiBus for ModelledBus<P> {
     fn read(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
         for word in words {
             *word = self.exchange(0);
@@ -135,17 +135,17 @@ impl<P: SpiPart> SpiBus for Bus<P> {
 }
 
 /// A part's select pin, low for selected.
-pub struct Select<P> {
+pub struct SelectPin<P> {
     clock: Clock,
-    part: Shared<P>,
+    part: SharedPart<P>,
     selected: Rc<Cell<bool>>,
 }
 
-impl<P> digital::ErrorType for Select<P> {
+impl<P> digital::ErrorType for SelectPin<P> {
     type Error = Infallible;
 }
 
-impl<P: SpiPart> OutputPin for Select<P> {
+impl<P: SpiPart> OutputPin for SelectPin<P> {
     fn set_low(&mut self) -> Result<(), Infallible> {
         if !self.selected.replace(true) {
             self.part.borrow_mut().select(self.clock.now());

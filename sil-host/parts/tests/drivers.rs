@@ -4,33 +4,33 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use embedded_hal_bus::spi::ExclusiveDevice;
-use painleve_drivers::Disturbance;
-use painleve_drivers::encoders::{self, Encoders};
-use painleve_drivers::force_cell::{self, ForceCell};
-use painleve_parts::wires::{Bus, Clock, Select, Shared};
+use painleve_drivers::ReadError;
+use painleve_drivers::encoders::{self, EncoderDriver};
+use painleve_drivers::force_cell::{self, ForceCellDriver};
+use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
 use painleve_parts::{As5048a, BitErrors, Mcp3304, SpiPart};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 
-type EncoderDriver = Encoders<Bus<As5048a>, Select<As5048a>, Clock>;
+type TestedEncoders = EncoderDriver<ModelledBus<As5048a>, SelectPin<As5048a>, Clock>;
 
-fn encoders() -> (EncoderDriver, [Shared<As5048a>; 2]) {
+fn encoders() -> (TestedEncoders, [SharedPart<As5048a>; 2]) {
     let clock = Clock::default();
-    let mut bus = Bus::new(&clock, encoders::FASTEST_HZ.into(), true);
+    let mut bus = ModelledBus::new(&clock, encoders::FASTEST_HZ.into(), true);
     let parts = [0, 1].map(|_| Rc::new(RefCell::new(As5048a::default())));
     let selects = parts.each_ref().map(|part| bus.attach(part));
-    (Encoders::new(bus, selects, clock), parts)
+    (EncoderDriver::new(bus, selects, clock), parts)
 }
 
-type ForceSelect = force_cell::Select<Select<Mcp3304>, Clock>;
-type ForceDriver = ForceCell<ExclusiveDevice<Bus<Mcp3304>, ForceSelect, Clock>>;
+type ForceSelect = force_cell::PausedSelect<SelectPin<Mcp3304>, Clock>;
+type TestedForceCell = ForceCellDriver<ExclusiveDevice<ModelledBus<Mcp3304>, ForceSelect, Clock>>;
 
-fn force_cell() -> (ForceDriver, Shared<Mcp3304>) {
+fn force_cell() -> (TestedForceCell, SharedPart<Mcp3304>) {
     let clock = Clock::default();
-    let mut bus = Bus::new(&clock, force_cell::FASTEST_HZ.into(), false);
+    let mut bus = ModelledBus::new(&clock, force_cell::FASTEST_HZ.into(), false);
     let part = Rc::new(RefCell::new(Mcp3304::default()));
-    let select = force_cell::Select::new(bus.attach(&part), clock.clone());
+    let select = force_cell::PausedSelect::new(bus.attach(&part), clock.clone());
     let device = ExclusiveDevice::new(bus, select, clock).unwrap();
-    (ForceCell::new(device), part)
+    (ForceCellDriver::new(device), part)
 }
 
 #[test]
@@ -73,11 +73,11 @@ fn dead_lines_give_no_reading_or_one_that_is_known_as_dead() {
     parts[1].borrow_mut().dead = Some(false);
     assert_eq!(
         driver.read(encoders::BITS),
-        [Err(Disturbance::Flagged), Ok(EncoderCounts(0))]
+        [Err(ReadError::Flagged), Ok(EncoderCounts(0))]
     );
     let (mut driver, part) = force_cell();
     part.borrow_mut().dead = Some(true);
-    assert_eq!(driver.read(13).0, Err(Disturbance::NotZero));
+    assert_eq!(driver.read(13).0, Err(ReadError::NotZero));
 }
 
 #[test]

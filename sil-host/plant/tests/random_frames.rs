@@ -20,7 +20,7 @@ const MOST_UNBELIEVED: u32 = 10;
 
 /// What kind of frames come for a while.
 #[derive(Clone, Copy, Debug)]
-enum Kind {
+enum FrameKind {
     /// Small steps from the last reading, as of an arm that moves.
     Walk,
     /// The same readings again and again.
@@ -33,7 +33,7 @@ enum Kind {
 
 struct Frames {
     random: Pcg64,
-    kind: Kind,
+    kind: FrameKind,
     last: SensorFrame,
     encoder_counts: u32,
 }
@@ -43,18 +43,18 @@ impl Frames {
         let random = &mut self.random;
         if tick.is_multiple_of(PHASE) {
             self.kind = match random.random_range(0..5) {
-                0 | 1 => Kind::Walk,
-                2 => Kind::Stuck,
-                3 => Kind::Wild,
-                _ => Kind::Lossy,
+                0 | 1 => FrameKind::Walk,
+                2 => FrameKind::Stuck,
+                3 => FrameKind::Wild,
+                _ => FrameKind::Lossy,
             };
         }
         let mut frame = self.last;
         frame.tick = frame.tick.wrapping_add(1);
         frame.sequence = frame.sequence.wrapping_add(1);
         match self.kind {
-            Kind::Stuck => {}
-            Kind::Wild => {
+            FrameKind::Stuck => {}
+            FrameKind::Wild => {
                 frame.joints = [random.random(), random.random()].map(EncoderCounts);
                 frame.normal_force = ForceCounts(random.random());
                 frame.tangential_force = ForceCounts(random.random());
@@ -62,7 +62,7 @@ impl Frames {
                     frame.sequence = random.random();
                 }
             }
-            Kind::Walk | Kind::Lossy => {
+            FrameKind::Walk | FrameKind::Lossy => {
                 let steps = [random.random_range(0..7), random.random_range(0..7)];
                 for (joint, step) in frame.joints.iter_mut().zip(steps) {
                     let counts = joint.0 % self.encoder_counts;
@@ -70,7 +70,7 @@ impl Frames {
                 }
                 frame.normal_force = ForceCounts(random.random_range(-100..600));
                 frame.tangential_force = ForceCounts(random.random_range(-400..400));
-                if let Kind::Lossy = self.kind {
+                if let FrameKind::Lossy = self.kind {
                     let gap = random.random_range(0..5);
                     frame.sequence = frame.sequence.wrapping_add(gap).wrapping_sub(1);
                 }
@@ -102,7 +102,7 @@ fn no_frame_brings_the_controller_out_of_its_limits() {
         let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
         let mut frames = Frames {
             random: Pcg64::seed_from_u64(seed as u64),
-            kind: Kind::Walk,
+            kind: FrameKind::Walk,
             last: SensorFrame::default(),
             encoder_counts: 1 << scenario.converters.encoder.bits,
         };

@@ -21,7 +21,9 @@ use painleve_system::atomic_file;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use self::panels::{B_PANEL, Curve, FORCE_PANEL, P_PANEL, Panel, TIP_PANEL, TORQUE_PANEL, signal};
+use self::panels::{
+    B_PANEL, Curve, FORCE_PANEL, P_PANEL, SignalPanel, TIP_PANEL, TORQUE_PANEL, signal,
+};
 /// Lanes of the contact mode, from top to bottom.
 const LANES: [(ContactMode, &str, RGBColor); 4] = [
     (ContactMode::SlidePositive, "slide +", BLUE_INK),
@@ -104,7 +106,7 @@ impl RunPlot {
         text(root, &self.title, &TITLE, (LEFT, 44), HPos::Left)?;
         text(root, &self.subtitle, &SUBTITLE, (LEFT, 90), HPos::Left)?;
 
-        let figure = Figure {
+        let figure = SignalFigure {
             root,
             bins: self.samples.bins(),
             time: time_range(self.samples.bins()),
@@ -124,14 +126,14 @@ impl RunPlot {
 }
 
 /// Layout and time axis that all panels share.
-struct Figure<'a, 'svg> {
+struct SignalFigure<'a, 'svg> {
     root: &'a Area<'svg>,
     bins: &'a [Bin<{ signal::COUNT }>],
     time: Range<f64>,
 }
 
-impl Figure<'_, '_> {
-    fn draw_panel(&self, panel: &Panel, top: i32) -> Drawn {
+impl SignalFigure<'_, '_> {
+    fn draw_panel(&self, panel: &SignalPanel, top: i32) -> Drawn {
         let axis = ValueAxis::new(
             panel
                 .curves
@@ -166,7 +168,7 @@ impl Figure<'_, '_> {
     }
 
     /// Draws the title with unit and off-scale note; legend or note to the right.
-    fn draw_header(&self, panel: &Panel, axis: &ValueAxis, top: i32) -> Drawn {
+    fn draw_header(&self, panel: &SignalPanel, axis: &ValueAxis, top: i32) -> Drawn {
         let title = format!("{} ({})", panel.title, panel.unit);
         self.draw_heading(&title, panel.note, top)?;
         let middle = top + HEADER_HEIGHT / 2;
@@ -238,7 +240,7 @@ impl Figure<'_, '_> {
     /// Draws a small triangle at the edge where a curve leaves the panel.
     fn draw_off_scale_marks(
         &self,
-        panel: &Panel,
+        panel: &SignalPanel,
         axis: &ValueAxis,
         top: i32,
         bottom: i32,

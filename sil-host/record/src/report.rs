@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// Percentiles of a duration, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Percentiles {
+pub struct DurationPercentiles {
     /// Median.
     pub p50: f64,
     /// 99th percentile.
@@ -22,7 +22,7 @@ pub struct Percentiles {
     pub max: f64,
 }
 
-impl Percentiles {
+impl DurationPercentiles {
     /// Returns the percentiles of a histogram of nanoseconds.
     pub fn of_ns(histogram: &Histogram<u64>) -> Self {
         let at = |quantile| histogram.value_at_quantile(quantile) as f64 * 1e-3;
@@ -79,7 +79,7 @@ pub struct RunReport {
     /// Number of ticks whose answer did not arrive in time.
     pub stale_ticks: u64,
     /// Time from sensor frame to answer, µs.
-    pub round_trip_us: Percentiles,
+    pub round_trip_us: DurationPercentiles,
     /// Hash of all sensor and actuator frames in order.
     pub log_hash: String,
     /// Seed of all noise generators.
@@ -94,7 +94,7 @@ pub struct RunReport {
     /// Meaning of that fault.
     pub fault_description: Option<String>,
     /// Lateness of wake-ups in real-time pacing, µs.
-    pub wake_up_us: Option<Percentiles>,
+    pub wake_up_us: Option<DurationPercentiles>,
     /// Number of wake-ups later than a whole tick in real-time pacing.
     pub missed_deadlines: Option<u64>,
 }
@@ -133,7 +133,7 @@ impl RunReport {
             contact_fraction: statistics.contact_fraction(),
             saturated_ticks: result.saturated_ticks,
             stale_ticks: result.stale_ticks,
-            round_trip_us: Percentiles::of_ns(&result.round_trips_ns),
+            round_trip_us: DurationPercentiles::of_ns(&result.round_trips_ns),
             log_hash: result.log_hash.clone(),
             seed: scenario.run.seed,
             pacing: pacing.into(),
@@ -230,8 +230,8 @@ impl RunReport {
     }
 }
 
-fn microseconds(percentiles: &Percentiles) -> String {
-    let Percentiles {
+fn microseconds(percentiles: &DurationPercentiles) -> String {
+    let DurationPercentiles {
         p50,
         p99,
         p999,

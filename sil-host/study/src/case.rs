@@ -15,7 +15,7 @@ use super::StudyError;
 
 /// The controller of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Controller {
+pub enum ControllerChoice {
     /// The paper's PID.
     Pid,
     /// The paper's hybrid law with the paper's gains.
@@ -30,7 +30,7 @@ pub enum Controller {
     Scenario(String),
 }
 
-impl Controller {
+impl ControllerChoice {
     /// The paper's controllers and the built-in hybrid law.
     pub const ALL: [Self; 4] = [
         Self::Pid,
@@ -59,7 +59,7 @@ impl Controller {
     }
 }
 
-impl fmt::Display for Controller {
+impl fmt::Display for ControllerChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Pid => "pid",
@@ -71,7 +71,7 @@ impl fmt::Display for Controller {
     }
 }
 
-impl FromStr for Controller {
+impl FromStr for ControllerChoice {
     type Err = std::convert::Infallible;
 
     /// Any other name is a scenario, looked up when the case is made.
@@ -83,7 +83,7 @@ impl FromStr for Controller {
     }
 }
 
-impl Serialize for Controller {
+impl Serialize for ControllerChoice {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
@@ -92,7 +92,7 @@ impl Serialize for Controller {
 /// The converters of a case (encoders, force cell, torque stages) and their sample rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub enum Converters {
+pub enum ConverterChoice {
     /// Close to the paper's continuous control: 10 kHz, at least 22 bits, no noise, no delay.
     Ideal,
     /// 1 kHz, 14-bit encoders, 12-bit force and torque, noise, a delay of one sample.
@@ -229,9 +229,9 @@ pub fn at_rest_on_belt(
 /// # Errors
 /// [`StudyError`] naming the controller if the scenario does not exist or a key is wrong.
 pub fn scenario(
-    controller: &Controller,
+    controller: &ControllerChoice,
     posture: Posture,
-    converters: Converters,
+    converters: ConverterChoice,
     overrides: &[String],
 ) -> Result<Scenario, StudyError> {
     let (name, changes) = controller.source(posture);
@@ -240,28 +240,28 @@ pub fn scenario(
     // The scenario's own start may be out of reach of the arm to study.
     scenario.controller.reference = Program::default();
     match converters {
-        Converters::Ideal => {
+        ConverterChoice::Ideal => {
             let ideal = Scenario::load_unplaced("paper-gains", &[])?;
             scenario.run.tick_hz = ideal.run.tick_hz;
             scenario.converters = ideal.converters;
-            if *controller == Controller::Pid {
+            if *controller == ControllerChoice::Pid {
                 scenario.controller.estimator = ideal.controller.estimator;
             }
         }
-        Converters::Hardware => {
+        ConverterChoice::Hardware => {
             scenario.run.tick_hz = RunSettings::default().tick_hz;
             scenario.converters = ConverterSettings::default();
-            if let Controller::HybridPaper | Controller::HybridPaperModel = controller {
+            if let ControllerChoice::HybridPaper | ControllerChoice::HybridPaperModel = controller {
                 // These gains need the wide control loop of the PID scenario.
                 let wide = Scenario::load_unplaced("pid-elbow-down", &[])?;
                 scenario.controller.estimator = wide.controller.estimator;
             }
         }
-        Converters::Own => {}
+        ConverterChoice::Own => {}
     }
     let origin = format!("controller {controller}");
     let mut scenario = scenario.with_overrides(&origin, overrides)?;
-    if *controller == Controller::HybridPaperModel {
+    if *controller == ControllerChoice::HybridPaperModel {
         let (friction, speed_m_s) = (scenario.belt.friction, scenario.belt.profile.speed_m_s(0.0));
         let model = format!(
             "controller.law.hybrid.friction={{ model = {{ friction = {friction:?}, belt_speed_m_s = {speed_m_s:?} }} }}"
@@ -277,22 +277,27 @@ pub fn scenario(
 /// # Errors
 /// [`StudyError`] naming the controller if the scenario does not exist or a key is wrong.
 pub fn noise_seeds(
-    controllers: &[Controller],
+    controllers: &[ControllerChoice],
     overrides: &[String],
 ) -> Result<BTreeMap<String, u64>, StudyError> {
     let seed = |controller| {
-        let scenario = scenario(controller, Posture::ElbowDown, Converters::Own, overrides)?;
+        let scenario = scenario(
+            controller,
+            Posture::ElbowDown,
+            ConverterChoice::Own,
+            overrides,
+        )?;
         Ok((format!("noise of {controller}"), scenario.run.seed))
     };
     controllers.iter().map(seed).collect()
 }
 
-/// Returns the scenarios that are not among [`Controller::ALL`].
-pub fn own_scenarios(controllers: &[Controller]) -> Vec<&str> {
+/// Returns the scenarios that are not among [`ControllerChoice::ALL`].
+pub fn own_scenarios(controllers: &[ControllerChoice]) -> Vec<&str> {
     let own = controllers
         .iter()
         .filter_map(|controller| match controller {
-            Controller::Scenario(name) => Some(name.as_str()),
+            ControllerChoice::Scenario(name) => Some(name.as_str()),
             _ => None,
         });
     own.collect()
@@ -306,10 +311,10 @@ mod tests {
     #[test]
     fn cases_are_the_built_in_scenarios_behind_other_converters() {
         for posture in [Posture::ElbowUp, Posture::ElbowDown] {
-            for controller in Controller::ALL {
-                for converters in [Converters::Ideal, Converters::Hardware] {
+            for controller in ControllerChoice::ALL {
+                for converters in [ConverterChoice::Ideal, ConverterChoice::Hardware] {
                     let scenario = scenario(&controller, posture, converters, &[]).unwrap();
-                    let ideal = converters == Converters::Ideal;
+                    let ideal = converters == ConverterChoice::Ideal;
                     assert_eq!(scenario.run.tick_hz, if ideal { 10_000 } else { 1000 });
                     assert_eq!(
                         scenario.converters.encoder.bits,
@@ -320,8 +325,15 @@ mod tests {
                 }
             }
         }
-        let own =
-            |posture| scenario(&Controller::HybridPaper, posture, Converters::Own, &[]).unwrap();
+        let own = |posture| {
+            scenario(
+                &ControllerChoice::HybridPaper,
+                posture,
+                ConverterChoice::Own,
+                &[],
+            )
+            .unwrap()
+        };
         let integral = |scenario: Scenario| match scenario.controller.law.of_set() {
             Some(LawSettings::Hybrid(law)) => law.force_integral_gain_per_s,
             _ => panic!("not the hybrid law"),
@@ -338,9 +350,9 @@ mod tests {
             "arm.link_length_m=[0.3, 0.2]",
         ] {
             let case = scenario(
-                &Controller::Hybrid,
+                &ControllerChoice::Hybrid,
                 Posture::ElbowUp,
-                Converters::Ideal,
+                ConverterChoice::Ideal,
                 &["run.tick_hz=2000".into(), shape.into()],
             )
             .unwrap();
@@ -375,8 +387,8 @@ mod tests {
 
     #[test]
     fn an_unknown_controller_is_reported_with_the_known_ones() {
-        let Ok(controller) = "no-such-law".parse::<Controller>();
-        let error = scenario(&controller, Posture::ElbowUp, Converters::Own, &[]).unwrap_err();
+        let Ok(controller) = "no-such-law".parse::<ControllerChoice>();
+        let error = scenario(&controller, Posture::ElbowUp, ConverterChoice::Own, &[]).unwrap_err();
         assert!(error.to_string().contains("no-such-law"), "{error}");
     }
 }

@@ -15,18 +15,18 @@ use crate::{
 };
 
 /// Every study, in the order of the command's help and of the page.
-pub static STUDIES: LazyLock<Vec<Entry>> = LazyLock::new(|| {
+pub static STUDIES: LazyLock<Vec<CatalogueEntry>> = LazyLock::new(|| {
     vec![
-        Entry::of::<admissible::Options>(),
-        Entry::of::<regions::Options>(),
-        Entry::of::<bifurcation::Options>(),
-        Entry::of::<poincare::Options>(),
-        Entry::of::<sliding_range::Options>(),
-        Entry::of::<closed_loop_bifurcation::Options>(),
-        Entry::of::<robustness::Options>(),
-        Entry::of::<ablation::Options>(),
-        Entry::of::<capture::Options>(),
-        Entry::of::<lift_off::Options>(),
+        CatalogueEntry::of::<admissible::Options>(),
+        CatalogueEntry::of::<regions::Options>(),
+        CatalogueEntry::of::<bifurcation::Options>(),
+        CatalogueEntry::of::<poincare::Options>(),
+        CatalogueEntry::of::<sliding_range::Options>(),
+        CatalogueEntry::of::<closed_loop_bifurcation::Options>(),
+        CatalogueEntry::of::<robustness::Options>(),
+        CatalogueEntry::of::<ablation::Options>(),
+        CatalogueEntry::of::<capture::Options>(),
+        CatalogueEntry::of::<lift_off::Options>(),
     ]
 });
 
@@ -79,7 +79,7 @@ pub fn in_shards<S: Tabular + 'static>(study: S) -> Option<Box<dyn tabular::Tabl
 }
 
 /// An entry of the list of studies.
-pub struct Entry {
+pub struct CatalogueEntry {
     /// Its name on the command line.
     pub name: &'static str,
     /// Adds the study's options and its help line to a command.
@@ -98,7 +98,7 @@ pub struct Entry {
     pub sections: fn(&PageMaker<'_>) -> Result<Vec<PageSection>, StudyError>,
 }
 
-impl Entry {
+impl CatalogueEntry {
     fn of<O: StudyOptions>() -> Self {
         Self {
             name: O::NAME,

@@ -9,7 +9,7 @@
 //! - [`closed_loop_bifurcation`]: Fig. 12, bifurcation over the belt speed with the controller in the loop
 //! - [`robustness`]: random arms, belts and converters; [`ablation`]: the contribution of each part of the controller
 //! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
-//! - [`contact_watch`], [`distribution`], [`proportion`]: contact, distributions and success rates of many runs
+//! - [`contact_probe`], [`distribution`], [`proportion`]: contact, distributions and success rates of many runs
 //! - [`case`], [`trial`]: closed loops to study, and their execution in this process
 //! - [`bifurcation`]: Fig. 4, where over μ × v_belt the arm keeps bouncing
 //! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: the long-term motion of one
@@ -38,7 +38,7 @@ mod cell_options;
 pub mod cells;
 pub mod chaos;
 pub mod closed_loop_bifurcation;
-pub mod contact_watch;
+pub mod contact_probe;
 pub mod distribution;
 pub mod figures;
 pub mod grid;

@@ -5,7 +5,7 @@ use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::{ArmParameters, Posture};
 
-use super::case::Controller;
+use super::case::ControllerChoice;
 
 /// Friction coefficient of the paper's sections.
 pub const FRICTION: f64 = 0.6;
@@ -31,15 +31,15 @@ pub fn critical_friction(arm: &ArmParameters<f64>) -> Option<f64> {
 /// no gains that slide, `None` if it gives no value.
 pub fn sliding_m(
     scenario: &Scenario,
-    controller: &Controller,
+    controller: &ControllerChoice,
     posture: Posture,
 ) -> Option<Option<f64>> {
     let of_paper = scenario.arm == ArmParameters::default()
         && scenario.belt.friction == FRICTION
         && scenario.belt.profile == BeltProfile::default();
     let value = match (controller, posture) {
-        (Controller::Scenario(_), _) => return None,
-        (Controller::Pid, Posture::ElbowUp) => None,
+        (ControllerChoice::Scenario(_), _) => return None,
+        (ControllerChoice::Pid, Posture::ElbowUp) => None,
         _ => Some(target_m(controller, posture)),
     };
     of_paper.then_some(value)
@@ -47,18 +47,20 @@ pub fn sliding_m(
 
 /// Returns the farthest target that the paper shows for a law in a posture, m; for the PID elbow
 /// up, which never slides, that of elbow down.
-pub fn target_m(controller: &Controller, posture: Posture) -> f64 {
+pub fn target_m(controller: &ControllerChoice, posture: Posture) -> f64 {
     match (controller, posture) {
-        (Controller::Pid, _) => 0.0375,
+        (ControllerChoice::Pid, _) => 0.0375,
         (_, Posture::ElbowDown) => 0.148,
         (_, Posture::ElbowUp) => 0.163,
     }
 }
 
 /// Returns the paper's Fig. 12 result for a law and an initial condition.
-pub fn closed_loop_bounces(controller: &Controller, initial: &str) -> Option<&'static str> {
+pub fn closed_loop_bounces(controller: &ControllerChoice, initial: &str) -> Option<&'static str> {
     match controller {
-        Controller::Hybrid | Controller::HybridPaper | Controller::HybridPaperModel
+        ControllerChoice::Hybrid
+        | ControllerChoice::HybridPaper
+        | ControllerChoice::HybridPaperModel
             if initial == "d" =>
         {
             Some("never bounces")

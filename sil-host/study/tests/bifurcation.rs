@@ -2,7 +2,7 @@
 //! the number of threads.
 
 use painleve_plant::mechanics::PlantParameters;
-use painleve_study::bifurcation::{Bifurcation, Diagram};
+use painleve_study::bifurcation::{Bifurcation, BifurcationDiagram};
 use painleve_study::cells::{Cells, RELATIVE_TOLERANCE};
 use painleve_study::chaos::Regime;
 use painleve_study::initial::Initial;
@@ -24,10 +24,10 @@ fn cells(mu: &[f64], v_belt_m_s: &[f64], initial: &[Initial]) -> Cells {
     cells
 }
 
-fn diagram(cells: Cells) -> Diagram {
+fn diagram(cells: Cells) -> BifurcationDiagram {
     let study = Bifurcation { cells };
     let rows = rows(&study, || ()).expect("every cell can be computed");
-    Diagram::new(&study, rows)
+    BifurcationDiagram::new(&study, rows)
 }
 
 const FRICTIONS: [f64; 7] = [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
@@ -77,7 +77,7 @@ fn csv(threads: usize) -> Vec<u8> {
     let rows = rows.expect("every cell can be computed");
     // A row can be computed alone.
     assert_eq!(study.row(13).expect("goes on"), rows[13]);
-    outcome::csv(&Diagram::new(&study, rows)).expect("flat rows")
+    outcome::csv(&BifurcationDiagram::new(&study, rows)).expect("flat rows")
 }
 
 #[test]

@@ -7,7 +7,7 @@ use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Request, Response};
 
-use crate::board::{self, Board};
+use crate::board::{BoardSnapshot, FlashedBoard};
 use crate::stm32f4::Pin;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
@@ -21,9 +21,9 @@ const BEFORE_ENABLE: u32 = 100;
 const ALIVE_TICKS: u32 = 50;
 
 /// A board that controls a simulated arm by its own sensors.
-pub struct Bench {
+pub struct BoardBench {
     /// The board.
-    pub board: Board,
+    pub board: FlashedBoard,
     /// The arm.
     pub simulation: Simulation,
     statistics: Statistics,
@@ -39,8 +39,8 @@ pub struct Bench {
 }
 
 /// A bench at one instant.
-pub struct Snapshot {
-    board: board::Snapshot,
+pub struct BenchSnapshot {
+    board: BoardSnapshot,
     simulation: Simulation,
     frame: SensorFrame,
 }
@@ -63,17 +63,17 @@ pub fn encoded(scenario: &Scenario) -> Vec<u8> {
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
-impl Bench {
+impl BoardBench {
     /// Booted and configured for the arm on the board's own sensors, not enabled.
     pub fn new(scenario: &Scenario) -> Self {
-        Self::with_board(scenario, Board::booted())
+        Self::with_board(scenario, FlashedBoard::booted())
     }
 
     /// The same with a board that has booted.
     ///
     /// # Panics
     /// If the scenario is out of range, or the image refuses it.
-    pub fn with_board(scenario: &Scenario, board: Board) -> Self {
+    pub fn with_board(scenario: &Scenario, board: FlashedBoard) -> Self {
         let simulation = Simulation::new(scenario).unwrap_or_else(|error| panic!("{error}"));
         let mut bench = Self {
             board,
@@ -153,7 +153,7 @@ impl Bench {
         answered
     }
 
-    /// Whether the switch of the safety chain was closed by [`Bench::tick`].
+    /// Whether the switch of the safety chain was closed by [`BoardBench::tick`].
     pub fn switch_is_closed(&self) -> bool {
         self.ticks >= BEFORE_ENABLE
     }
@@ -220,8 +220,8 @@ impl Bench {
     }
 
     /// Everything, to come back to.
-    pub fn snapshot(&self) -> Snapshot {
-        Snapshot {
+    pub fn snapshot(&self) -> BenchSnapshot {
+        BenchSnapshot {
             board: self.board.snapshot(),
             simulation: self.simulation.clone(),
             frame: self.frame,
@@ -229,7 +229,7 @@ impl Bench {
     }
 
     /// Comes back to a snapshot.
-    pub fn restore(&mut self, snapshot: &Snapshot) {
+    pub fn restore(&mut self, snapshot: &BenchSnapshot) {
         self.board.restore(&snapshot.board);
         self.simulation = snapshot.simulation.clone();
         self.frame = snapshot.frame;

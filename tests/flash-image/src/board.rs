@@ -8,7 +8,7 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox};
 
-use crate::machine::{self, Machine, Reset};
+use crate::machine::{Machine, MachineSnapshot, Reset};
 use crate::stm32f4::{Outside, Pin, PinMode, Stm32f4};
 use crate::{MILLISECOND, Picoseconds, SECOND};
 
@@ -104,15 +104,15 @@ impl Torque {
 }
 
 /// A board at one instant.
-pub struct Snapshot {
-    machine: machine::Snapshot<Stm32f4<Wiring>>,
+pub struct BoardSnapshot {
+    machine: MachineSnapshot<Stm32f4<Wiring>>,
     inbox: Inbox,
     heard: usize,
     line_free: Picoseconds,
 }
 
 /// A board with the image in its flash, powered, on a bench.
-pub struct Board {
+pub struct FlashedBoard {
     /// The microcontroller.
     pub machine: Machine<Stm32f4<Wiring>>,
     inbox: Inbox,
@@ -152,13 +152,13 @@ fn workspace() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
-impl Default for Board {
+impl Default for FlashedBoard {
     fn default() -> Self {
         Self::with_oscillator(32_000)
     }
 }
 
-impl Board {
+impl FlashedBoard {
     /// Powered, with a healthy arm that is not enabled; nothing has been executed yet.
     pub fn with_oscillator(watchdog_hz: u64) -> Self {
         let mut chip = Stm32f4::new(Wiring::default(), watchdog_hz);
@@ -202,8 +202,8 @@ impl Board {
     }
 
     /// Everything, to come back to.
-    pub fn snapshot(&self) -> Snapshot {
-        Snapshot {
+    pub fn snapshot(&self) -> BoardSnapshot {
+        BoardSnapshot {
             machine: self.machine.snapshot(),
             inbox: self.inbox.clone(),
             heard: self.heard,
@@ -212,7 +212,7 @@ impl Board {
     }
 
     /// Comes back to a snapshot.
-    pub fn restore(&mut self, snapshot: &Snapshot) {
+    pub fn restore(&mut self, snapshot: &BoardSnapshot) {
         self.machine.restore(&snapshot.machine);
         self.inbox = snapshot.inbox.clone();
         self.heard = snapshot.heard;

@@ -233,14 +233,14 @@ impl<C: Chip> Surroundings for Core<C> {
 
 /// A machine at one instant.
 #[derive(Clone)]
-pub struct Snapshot<C> {
+pub struct MachineSnapshot<C> {
     core: Core<C>,
     registers: Vec<u32>,
     ram: Vec<u8>,
     resets: Vec<(Picoseconds, Reset)>,
 }
 
-impl<C> Snapshot<C> {
+impl<C> MachineSnapshot<C> {
     /// Where the program was.
     pub fn program_counter(&self) -> u32 {
         // Behind the thirteen numbered registers, stack pointer and link register.
@@ -415,10 +415,10 @@ impl<C: Chip> Machine<C> {
     }
 
     /// Everything, to come back to.
-    pub fn snapshot(&self) -> Snapshot<C> {
+    pub fn snapshot(&self) -> MachineSnapshot<C> {
         let mut ram = vec![0; C::RAM.1];
         self.unicorn.processor().read_memory(C::RAM.0, &mut ram);
-        Snapshot {
+        MachineSnapshot {
             core: self.unicorn.surroundings().clone(),
             registers: registers().map(|it| self.unicorn.get(it)).collect(),
             ram,
@@ -427,7 +427,7 @@ impl<C: Chip> Machine<C> {
     }
 
     /// Comes back to a snapshot.
-    pub fn restore(&mut self, snapshot: &Snapshot<C>) {
+    pub fn restore(&mut self, snapshot: &MachineSnapshot<C>) {
         *self.unicorn.surroundings_mut() = snapshot.core.clone();
         self.resets.clone_from(&snapshot.resets);
         self.unicorn

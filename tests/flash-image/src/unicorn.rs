@@ -179,7 +179,7 @@ impl Processor {
 }
 
 /// What the callbacks reach.
-struct Shared<S> {
+struct CallbackContext<S> {
     processor: Processor,
     surroundings: S,
     regions: Vec<Region>,
@@ -196,7 +196,7 @@ struct Region {
 /// A Cortex-M4F with memory and [`Surroundings`].
 pub struct Unicorn<S> {
     /// Owned; a raw pointer, because the callbacks use it during a run.
-    shared: *mut Shared<S>,
+    shared: *mut CallbackContext<S>,
 }
 
 const MODE_THUMB_AND_MCLASS: i32 = 16 | 32;
@@ -225,7 +225,7 @@ impl<S: Surroundings> Unicorn<S> {
             check((functions.open)(1, MODE_THUMB_AND_MCLASS, &raw mut handle));
             check((functions.control)(handle, SET_CPU_MODEL, CORTEX_M4));
         }
-        let shared = Box::into_raw(Box::new(Shared {
+        let shared = Box::into_raw(Box::new(CallbackContext {
             processor: Processor { functions, handle },
             surroundings,
             regions: Vec::new(),
@@ -254,7 +254,7 @@ impl<S: Surroundings> Unicorn<S> {
         Ok(unicorn)
     }
 
-    fn parts(&self) -> &Shared<S> {
+    fn parts(&self) -> &CallbackContext<S> {
         // SAFETY: allocated in `new`, freed in `drop`; no callback runs while `self` is borrowed,
         // except within `run`, which holds it exclusively and uses the raw pointer.
         unsafe { &*self.shared }
@@ -382,7 +382,7 @@ impl<S> Drop for Unicorn<S> {
 /// # Safety
 /// `shared` is what [`Unicorn::new`] has made, and nothing else uses it.
 unsafe fn call<S, R>(
-    shared: *mut Shared<S>,
+    shared: *mut CallbackContext<S>,
     otherwise: R,
     work: impl FnOnce(&mut S, &Processor) -> R,
 ) -> R {
@@ -410,7 +410,7 @@ unsafe extern "C" fn on_code<S: Surroundings>(
     // SAFETY: `context` is what `new` gave; nothing else uses it during a run.
     unsafe {
         call(
-            context.cast::<Shared<S>>(),
+            context.cast::<CallbackContext<S>>(),
             (),
             |surroundings, processor| {
                 if !surroundings.before_instruction(address as u32, processor) {
@@ -432,7 +432,7 @@ unsafe extern "C" fn on_read<S: Surroundings>(
         let region = &*context.cast::<Region>();
         let address = region.base + offset as u32;
         let read = |it: &mut S, processor: &Processor| it.read(address, size, processor);
-        call(region.shared.cast::<Shared<S>>(), 0, read).into()
+        call(region.shared.cast::<CallbackContext<S>>(), 0, read).into()
     }
 }
 
@@ -449,6 +449,6 @@ unsafe extern "C" fn on_write<S: Surroundings>(
         let address = region.base + offset as u32;
         let value = value as u32;
         let write = |it: &mut S, processor: &Processor| it.write(address, size, value, processor);
-        call(region.shared.cast::<Shared<S>>(), (), write);
+        call(region.shared.cast::<CallbackContext<S>>(), (), write);
     }
 }

@@ -2,7 +2,7 @@
 //! The image starts on the modelled board and controls a simulated arm as a PC does.
 
 use painleve_flash_image::bench::{encoded, scenario};
-use painleve_flash_image::board::Board;
+use painleve_flash_image::board::FlashedBoard;
 use painleve_plant::Controller;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
@@ -10,7 +10,7 @@ use painleve_shared::message::{FrameSource, Response};
 
 #[test]
 fn the_image_boots_and_waits_with_the_stages_off() {
-    let board = Board::booted();
+    let board = FlashedBoard::booted();
     assert!(board.torque().is_off());
 }
 
@@ -21,7 +21,7 @@ fn frames_over_the_serial_line_are_answered_as_on_a_pc() {
     let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
     let mut simulation = Simulation::new(&scenario).unwrap();
     let mut statistics = Statistics::new(0.05);
-    let mut board = Board::booted();
+    let mut board = FlashedBoard::booted();
     let ready = board.configure(FrameSource::Lockstep, &encoded(&scenario));
     assert!(matches!(ready, Some(Response::Ready { .. })), "{ready:?}");
     for _ in 0..200 {

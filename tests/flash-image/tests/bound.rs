@@ -8,8 +8,8 @@ use painleve_bound::image::Image;
 use painleve_bound::loops::Limit;
 use painleve_bound::report::{Bound, CONTROL_INTERRUPT};
 use painleve_bound::trace::{Executed, Tracer, rounds};
-use painleve_flash_image::bench::{Bench, encoded, scenario};
-use painleve_flash_image::board::{self, Board};
+use painleve_flash_image::bench::{BoardBench, encoded, scenario};
+use painleve_flash_image::board::{self, FlashedBoard};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
@@ -40,14 +40,14 @@ fn tries(otherwise: u64) -> u64 {
 }
 
 /// Executed interrupts against their bound.
-struct Watch<'a> {
+struct BoundCheck<'a> {
     bound: &'a Bound,
     tracer: Tracer<'a>,
     worst: Executed,
     ticks: u64,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> BoundCheck<'a> {
     fn new(image: &'a Image, bound: &'a Bound) -> Self {
         Self {
             bound,
@@ -58,7 +58,7 @@ impl<'a> Watch<'a> {
     }
 
     /// The worst of the interrupts that were executed since the last call.
-    fn look(&mut self, board: &mut Board) -> Executed {
+    fn look(&mut self, board: &mut FlashedBoard) -> Executed {
         let mut worst = Executed::default();
         for addresses in board.machine.take_traces() {
             let cost = self.tracer.cost(&addresses).unwrap();
@@ -81,10 +81,10 @@ impl<'a> Watch<'a> {
     }
 }
 
-fn with_bound(run: impl FnOnce(&mut Watch<'_>)) {
+fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
     let image = Image::read(&board::image()).unwrap();
     let bound = Bound::of(&board::image()).unwrap_or_else(|error| panic!("{error}"));
-    let mut watch = Watch::new(&image, &bound);
+    let mut watch = BoundCheck::new(&image, &bound);
     run(&mut watch);
     println!(
         "{} interrupts, worst {} instructions, {} cycles by the model; bound {} cycles, {:.2} times as much",
@@ -97,14 +97,14 @@ fn with_bound(run: impl FnOnce(&mut Watch<'_>)) {
     assert!(watch.ticks > 0);
 }
 
-fn traced(mut board: Board) -> Board {
+fn traced(mut board: FlashedBoard) -> FlashedBoard {
     let handler = board.machine.symbol(CONTROL_INTERRUPT).unwrap();
     board.machine.trace(handler);
     board
 }
 
-fn configured(scenario: &Scenario) -> Board {
-    let mut board = Board::booted();
+fn configured(scenario: &Scenario) -> FlashedBoard {
+    let mut board = FlashedBoard::booted();
     board
         .configure(FrameSource::Lockstep, &encoded(scenario))
         .unwrap();
@@ -135,7 +135,7 @@ fn scenarios_stay_below_the_bound() {
 #[test]
 fn ticks_with_sensors_stay_below_the_bound() {
     with_bound(|watch| {
-        let mut bench = Bench::new(&scenario("hybrid-elbow-down"));
+        let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));
         let handler = bench.board.machine.symbol(CONTROL_INTERRUPT).unwrap();
         bench.board.machine.trace(handler);
         bench.drive();

@@ -5,7 +5,7 @@
 
 use painleve_drivers::switches::Switches;
 use painleve_firmware::Controller;
-use painleve_flash_image::bench::{Bench, scenario};
+use painleve_flash_image::bench::{BoardBench, scenario};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::status::SupervisorState;
 
@@ -15,7 +15,7 @@ fn torques_by_the_boards_own_sensors_are_those_of_a_pc() {
         let scenario = scenario(name);
         let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
         let mut switches = Switches::default();
-        let mut bench = Bench::new(&scenario);
+        let mut bench = BoardBench::new(&scenario);
         let mut answer = |tick, closed, sampled| {
             controller.tick(&SensorFrame {
                 tick,

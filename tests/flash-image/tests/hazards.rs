@@ -6,8 +6,8 @@
 use std::collections::BTreeSet;
 
 use painleve_firmware::BUILD;
-use painleve_flash_image::bench::{Bench, encoded, scenario};
-use painleve_flash_image::board::Board;
+use painleve_flash_image::bench::{BoardBench, encoded, scenario};
+use painleve_flash_image::board::FlashedBoard;
 use painleve_flash_image::machine::Reset;
 use painleve_flash_image::{MICROSECOND, MILLISECOND};
 use painleve_plant::simulation::Simulation;
@@ -20,22 +20,22 @@ const DEFAULT: &str = "hybrid-elbow-down";
 /// Number of the control timer's interrupt.
 const CONTROL_TIMER: usize = 28;
 
-fn driven() -> Bench {
-    let mut bench = Bench::new(&scenario(DEFAULT));
+fn driven() -> BoardBench {
+    let mut bench = BoardBench::new(&scenario(DEFAULT));
     bench.drive();
     bench
 }
 
 /// The torque is off by the end of the second tick from now, and stays off, although the switch stays closed.
-fn assert_off_in_time(mut bench: Bench) {
+fn assert_off_in_time(mut bench: BoardBench) {
     let off = bench.time_until_off();
     assert!(off.is_some(), "{:?}", bench.board.torque());
     bench.assert_stays_off(100);
 }
 
-fn in_lockstep() -> (Board, Simulation) {
+fn in_lockstep() -> (FlashedBoard, Simulation) {
     let scenario = scenario(DEFAULT);
-    let mut board = Board::booted();
+    let mut board = FlashedBoard::booted();
     let response = board.configure(FrameSource::Lockstep, &encoded(&scenario));
     assert!(matches!(response, Some(Response::Ready { .. })));
     (board, Simulation::new(&scenario).unwrap())
@@ -124,7 +124,7 @@ fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
 
 #[test]
 fn the_first_act_is_to_switch_the_stages_off() {
-    let mut board = Board::default();
+    let mut board = FlashedBoard::default();
     board.machine.run_instructions(40, MILLISECOND);
     assert!(board.torque().is_off(), "{:?}", board.torque());
     // From then on the pin is never high, and never floats for long.
@@ -140,7 +140,7 @@ fn the_first_act_is_to_switch_the_stages_off() {
 
 #[test]
 fn a_dead_crystal_leaves_the_stages_off() {
-    let mut board = Board::default();
+    let mut board = FlashedBoard::default();
     board.machine.chip_mut().rcc.crystal_works = false;
     for _ in 0..200 {
         board.machine.run_for(10 * MILLISECOND);
@@ -166,9 +166,9 @@ fn an_unexpected_interrupt_takes_the_torque_off() {
 #[test]
 fn a_control_timer_that_stops_takes_the_torque_off() {
     for oscillator_hz in [17_000, 32_000, 47_000] {
-        let mut board = Board::with_oscillator(oscillator_hz);
+        let mut board = FlashedBoard::with_oscillator(oscillator_hz);
         board.machine.run_for(20 * MILLISECOND);
-        let mut bench = Bench::with_board(&scenario(DEFAULT), board);
+        let mut bench = BoardBench::with_board(&scenario(DEFAULT), board);
         bench.drive();
         for _ in 0..500 {
             bench.tick();
@@ -305,7 +305,7 @@ fn one_disturbed_transfer_is_no_fault() {
 #[test]
 fn nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before() {
     for level in [false, true] {
-        let mut board = Board::default();
+        let mut board = FlashedBoard::default();
         board.enable(true);
         for encoder in &mut board.wiring().encoders {
             encoder.dead = Some(level);
@@ -322,10 +322,10 @@ fn nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before() {
         }
     }
     // Healthy sensors, but the switch was closed all the time.
-    let mut board = Board::default();
+    let mut board = FlashedBoard::default();
     board.enable(true);
     board.machine.run_for(20 * MILLISECOND);
-    let mut bench = Bench::with_board(&scenario(DEFAULT), board);
+    let mut bench = BoardBench::with_board(&scenario(DEFAULT), board);
     for _ in 0..300 {
         bench.board.enable(true);
         bench.wait_for_tick();
@@ -365,7 +365,7 @@ fn a_log_that_nobody_reads_holds_nothing_up() {
 
 #[test]
 fn a_board_without_a_configuration_waits() {
-    let mut board = Board::booted();
+    let mut board = FlashedBoard::booted();
     board.machine.run_for(5000 * MILLISECOND);
     assert_eq!(board.resets(), []);
 }

@@ -1,6 +1,6 @@
 //! A thousand random faults at random instructions.
 
-use painleve_flash_image::bench::{Bench, scenario};
+use painleve_flash_image::bench::{BoardBench, scenario};
 use painleve_parts::BitErrors;
 
 /// Faults drawn.
@@ -19,7 +19,7 @@ impl Random {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fault {
+enum InjectedFault {
     BitErrors,
     SerialNoise,
     ResetPin,
@@ -33,7 +33,7 @@ enum Fault {
     ForceCellDies,
 }
 
-impl Fault {
+impl InjectedFault {
     const ALL: [Self; 11] = [
         Self::BitErrors,
         Self::SerialNoise,
@@ -53,7 +53,7 @@ impl Fault {
         matches!(self, Self::BitErrors | Self::SerialNoise)
     }
 
-    fn strike(self, bench: &mut Bench, random: &mut Random) {
+    fn strike(self, bench: &mut BoardBench, random: &mut Random) {
         let board = &mut bench.board;
         match self {
             Self::BitErrors => {
@@ -98,14 +98,14 @@ impl Fault {
 /// Off by the end of the second tick for what ends the drive, and off for good; on for what does not.
 #[test]
 fn a_thousand_random_faults_take_the_torque_off_or_are_survived() {
-    let mut bench = Bench::new(&scenario("hybrid-elbow-down"));
+    let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));
     bench.drive();
     let healthy = bench.snapshot();
     let mut random = Random(1);
     let mut exceptions = Vec::new();
     for number in 0..FAULTS {
         bench.restore(&healthy);
-        let fault = Fault::ALL[random.below(Fault::ALL.len() as u64) as usize];
+        let fault = InjectedFault::ALL[random.below(InjectedFault::ALL.len() as u64) as usize];
         for _ in 0..random.below(5) {
             bench.tick();
         }

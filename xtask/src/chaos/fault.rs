@@ -5,9 +5,9 @@ use std::fs;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use super::place::Place;
+use super::place::ChaosFolder;
 use super::trial::{
-    Expected, Flaw, Outcome, Role, Running, command, judge, next_run, orphans, other,
+    ChaosRole, Expected, Flaw, TrialOutcome, TrialProcess, command, judge, next_run, orphans, other,
 };
 
 /// A traced start, and two seconds of waiting for a peer that may have failed.
@@ -17,17 +17,17 @@ const NOT_LOADED: i32 = 127;
 
 /// A system call, and the error it fails with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Fault {
+pub struct InjectedFault {
     pub call: &'static str,
     pub error: &'static str,
 }
 
-const fn fault(error: &'static str, call: &'static str) -> Fault {
-    Fault { call, error }
+const fn fault(error: &'static str, call: &'static str) -> InjectedFault {
+    InjectedFault { call, error }
 }
 
 /// What disks, memory and signals do to the calls that plant and controller make.
-pub const FAULTS: [Fault; 22] = [
+pub const FAULTS: [InjectedFault; 22] = [
     fault("ENOSPC", "write"),
     fault("ENOSPC", "openat"),
     fault("ENOSPC", "mkdir"),
@@ -54,22 +54,23 @@ pub const FAULTS: [Fault; 22] = [
 
 /// Runs one trial in which the victim's call `number` of its kind fails.
 pub fn run(
-    place: &Place,
+    place: &ChaosFolder,
     bus: &str,
-    (victim, fault, number): (Role, Fault, u32),
+    (victim, fault, number): (ChaosRole, InjectedFault, u32),
     expected: &Expected,
-) -> std::io::Result<Outcome> {
+) -> std::io::Result<TrialOutcome> {
     let mut findings = Vec::new();
     let log = place.path("strace.log");
     let _ = fs::remove_file(&log);
     let peer_first = number.is_multiple_of(2);
-    let start_peer = || Running::start(&mut command(place, other(victim), bus, "out/run.mcap"));
+    let start_peer =
+        || TrialProcess::start(&mut command(place, other(victim), bus, "out/run.mcap"));
     let mut peer = None;
     if peer_first {
         peer = Some(start_peer()?);
     }
     let plain = command(place, victim, bus, "out/run.mcap");
-    let Fault { call, error } = fault;
+    let InjectedFault { call, error } = fault;
     let mut traced = Command::new("strace");
     traced
         .args(["-f", "-qq", "-o"])
@@ -78,7 +79,7 @@ pub fn run(
         .args(["-e", &format!("inject={call}:error={error}:when={number}")])
         .arg(plain.get_program())
         .args(plain.get_args());
-    let mut victim = Running::start(place.equip(&mut traced))?;
+    let mut victim = TrialProcess::start(place.equip(&mut traced))?;
     let mut peer = match peer {
         Some(peer) => peer,
         None => start_peer()?,
@@ -97,5 +98,5 @@ pub fn run(
     let reached = fs::read_to_string(&log).is_ok_and(|log| log.contains("(INJECTED)"));
     orphans(place, deadline, &mut findings);
     next_run(place, bus, expected, &mut findings)?;
-    Ok(Outcome { reached, findings })
+    Ok(TrialOutcome { reached, findings })
 }

@@ -19,9 +19,9 @@ use clap::Args;
 use nix::sys::prctl::set_child_subreaper;
 
 use crate::command::{ChoreError, run_cargo, say, workspace};
-use fault::{FAULTS, Fault};
-use place::{Place, unused_segments};
-use trial::{Disturbance, Expected, Flaw, Plan, Role, Running};
+use fault::{FAULTS, InjectedFault};
+use place::{ChaosFolder, unused_segments};
+use trial::{ChaosRole, Disturbance, Expected, Flaw, Plan, TrialProcess};
 
 /// Options of `cargo xtask chaos`.
 #[derive(Debug, Args)]
@@ -93,7 +93,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
 
     let plans = plans(arguments);
     let next = AtomicUsize::new(0);
-    let table = Mutex::new(Table::default());
+    let table = Mutex::new(TrialTable::default());
     let start = Instant::now();
     std::thread::scope(|scope| {
         let workers: Vec<_> = (0..arguments.jobs)
@@ -103,15 +103,15 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                 scope.spawn(move || {
                     let mark = format!("{}-{worker}", std::process::id());
                     let bus = format!("chaos-{worker}");
-                    let place = Place::new(program, mark, runtime)?;
+                    let place = ChaosFolder::new(program, mark, runtime)?;
                     let expected = Expected {
                         log_hash: undisturbed(&place, &bus)?,
                         end: Duration::from_secs(arguments.end_s),
                     };
                     while let Some(&plan) = plans.get(next.fetch_add(1, Ordering::Relaxed)) {
                         let outcome = match plan {
-                            Trial::Signal(plan) => trial::run(&place, &bus, plan, &expected)?,
-                            Trial::Fault(victim, fault, number) => {
+                            ChaosTrial::Signal(plan) => trial::run(&place, &bus, plan, &expected)?,
+                            ChaosTrial::Fault(victim, fault, number) => {
                                 fault::run(&place, &bus, (victim, fault, number), &expected)?
                             }
                         };
@@ -156,7 +156,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
 }
 
 /// The log hash of a run that nobody disturbs.
-fn undisturbed(place: &Place, bus: &str) -> std::io::Result<String> {
+fn undisturbed(place: &ChaosFolder, bus: &str) -> std::io::Result<String> {
     let arguments = [
         "run",
         "--bus",
@@ -167,7 +167,7 @@ fn undisturbed(place: &Place, bus: &str) -> std::io::Result<String> {
         "--no-plot",
         "--json",
     ];
-    let mut run = Running::start(&mut place.command(&arguments))?;
+    let mut run = TrialProcess::start(&mut place.command(&arguments))?;
     run.wait(Instant::now() + Duration::from_secs(20))?;
     let (_, text) = run.outcome();
     trial::log_hash(&text.stdout)
@@ -176,12 +176,12 @@ fn undisturbed(place: &Place, bus: &str) -> std::io::Result<String> {
 
 /// One trial.
 #[derive(Clone, Copy, Debug)]
-enum Trial {
+enum ChaosTrial {
     Signal(Plan),
-    Fault(Role, Fault, u32),
+    Fault(ChaosRole, InjectedFault, u32),
 }
 
-impl Trial {
+impl ChaosTrial {
     /// Its line in the table.
     fn kind(&self) -> String {
         match self {
@@ -195,13 +195,13 @@ impl Trial {
 }
 
 /// Every system call of every role with every disturbance, or a draw of them.
-fn plans(arguments: &ChaosArguments) -> Vec<Trial> {
+fn plans(arguments: &ChaosArguments) -> Vec<ChaosTrial> {
     let mut plans = Vec::new();
     for call in arguments.first..=arguments.last {
-        for victim in [Role::Plant, Role::Controller, Role::Run] {
+        for victim in [ChaosRole::Plant, ChaosRole::Controller, ChaosRole::Run] {
             for disturbance in Disturbance::ALL {
                 let peer_first = (call + disturbance as u32).is_multiple_of(2);
-                plans.push(Trial::Signal(Plan {
+                plans.push(ChaosTrial::Signal(Plan {
                     victim,
                     disturbance,
                     call,
@@ -215,8 +215,8 @@ fn plans(arguments: &ChaosArguments) -> Vec<Trial> {
         plans.clear();
     }
     for fault in FAULTS {
-        for victim in [Role::Plant, Role::Controller] {
-            plans.extend((1..=arguments.faults).map(|n| Trial::Fault(victim, fault, n)));
+        for victim in [ChaosRole::Plant, ChaosRole::Controller] {
+            plans.extend((1..=arguments.faults).map(|n| ChaosTrial::Fault(victim, fault, n)));
         }
     }
     // Shuffled, so that long waits spread over the workers and a draw is a fair one.
@@ -244,7 +244,7 @@ impl SplitMix {
 
 /// Counts of trials and flaws.
 #[derive(Default)]
-struct Table {
+struct TrialTable {
     rows: BTreeMap<String, Row>,
     findings: usize,
 }
@@ -266,8 +266,8 @@ const FLAWS: [(Flaw, &str); 7] = [
     (Flaw::Message, "messages"),
 ];
 
-impl Table {
-    fn add(&mut self, trial: Trial, outcome: trial::Outcome) {
+impl TrialTable {
+    fn add(&mut self, trial: ChaosTrial, outcome: trial::TrialOutcome) {
         let row = self.rows.entry(trial.kind()).or_default();
         row.trials += 1;
         row.injections += usize::from(outcome.reached);

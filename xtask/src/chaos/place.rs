@@ -12,14 +12,14 @@ const MARK: &str = "PAINLEVE_CHAOS";
 const SHARED_MEMORY: &str = "/dev/shm";
 
 /// A folder to work in, and one for the buses.
-pub struct Place {
+pub struct ChaosFolder {
     program: PathBuf,
     mark: String,
     work: tempfile::TempDir,
     runtime: PathBuf,
 }
 
-impl Place {
+impl ChaosFolder {
     /// New folders; `runtime` may be shared with other places.
     pub fn new(program: &Path, mark: String, runtime: &Path) -> std::io::Result<Self> {
         Ok(Self {

@@ -10,7 +10,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 
-use super::place::Place;
+use super::place::ChaosFolder;
 use super::tracer::{Traced, Victim};
 
 /// How long a traced process may take to get to its system call.
@@ -23,7 +23,7 @@ const QUICK: [&str; 4] = ["--set", "run.duration_s=0.05", "--no-plot", "--json"]
 
 /// The process that is disturbed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
+pub enum ChaosRole {
     Plant,
     Controller,
     /// The parent of both.
@@ -63,7 +63,7 @@ impl Disturbance {
 /// Who is disturbed, how, and at which of its system calls.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
-    pub victim: Role,
+    pub victim: ChaosRole,
     pub disturbance: Disturbance,
     pub call: u32,
     /// The victim's peer starts first.
@@ -96,14 +96,19 @@ pub enum Flaw {
 pub type Finding = (Flaw, String);
 
 /// What a trial has found.
-pub struct Outcome {
+pub struct TrialOutcome {
     /// Whether the victim got as far as the system call.
     pub reached: bool,
     pub findings: Vec<Finding>,
 }
 
 /// Runs one trial on `bus`; `expected` says what must follow.
-pub fn run(place: &Place, bus: &str, plan: Plan, expected: &Expected) -> std::io::Result<Outcome> {
+pub fn run(
+    place: &ChaosFolder,
+    bus: &str,
+    plan: Plan,
+    expected: &Expected,
+) -> std::io::Result<TrialOutcome> {
     let end = expected.end;
     let mut findings = Vec::new();
     let record = if plan.call.is_multiple_of(2) {
@@ -113,13 +118,13 @@ pub fn run(place: &Place, bus: &str, plan: Plan, expected: &Expected) -> std::io
     };
     let mut crowd = Vec::new();
     for _ in 0..plan.crowd {
-        for role in [Role::Plant, Role::Controller] {
-            crowd.push(Running::start(&mut command(place, role, bus, ""))?);
+        for role in [ChaosRole::Plant, ChaosRole::Controller] {
+            crowd.push(TrialProcess::start(&mut command(place, role, bus, ""))?);
         }
     }
     let mut peer = None;
-    if plan.victim != Role::Run && plan.peer_first {
-        peer = Some(Running::start(&mut command(
+    if plan.victim != ChaosRole::Run && plan.peer_first {
+        peer = Some(TrialProcess::start(&mut command(
             place,
             other(plan.victim),
             bus,
@@ -128,8 +133,8 @@ pub fn run(place: &Place, bus: &str, plan: Plan, expected: &Expected) -> std::io
     }
     let mut victim = Victim::start(&mut command(place, plan.victim, bus, record))?;
     let victim_said = Said::of(&mut victim.child)?;
-    if plan.victim != Role::Run && !plan.peer_first {
-        peer = Some(Running::start(&mut command(
+    if plan.victim != ChaosRole::Run && !plan.peer_first {
+        peer = Some(TrialProcess::start(&mut command(
             place,
             other(plan.victim),
             bus,
@@ -139,7 +144,7 @@ pub fn run(place: &Place, bus: &str, plan: Plan, expected: &Expected) -> std::io
     let traced = victim.signal_at(plan.call, plan.disturbance.signal(), REACH)?;
     let disturbed = Instant::now();
     let reached = traced == Traced::Injected;
-    let mut victim = Running {
+    let mut victim = TrialProcess {
         child: victim.child,
         said: victim_said,
         ended: match traced {
@@ -161,7 +166,7 @@ pub fn run(place: &Place, bus: &str, plan: Plan, expected: &Expected) -> std::io
         }
     }
     if reached && plan.disturbance == Disturbance::Stop {
-        if plan.victim == Role::Run {
+        if plan.victim == ChaosRole::Run {
             // Nobody watches over the parent: its children finish what they do.
             std::thread::sleep(Duration::from_millis(200));
         }
@@ -187,19 +192,19 @@ pub fn run(place: &Place, bus: &str, plan: Plan, expected: &Expected) -> std::io
     }
     orphans(place, disturbed + end, &mut findings);
     next_run(place, bus, expected, &mut findings)?;
-    Ok(Outcome { reached, findings })
+    Ok(TrialOutcome { reached, findings })
 }
 
 /// Whom a role meets.
-pub fn other(role: Role) -> Role {
+pub fn other(role: ChaosRole) -> ChaosRole {
     match role {
-        Role::Plant => Role::Controller,
-        Role::Controller | Role::Run => Role::Plant,
+        ChaosRole::Plant => ChaosRole::Controller,
+        ChaosRole::Controller | ChaosRole::Run => ChaosRole::Plant,
     }
 }
 
 /// The command of a role.
-pub fn command(place: &Place, role: Role, bus: &str, record: &str) -> Command {
+pub fn command(place: &ChaosFolder, role: ChaosRole, bus: &str, record: &str) -> Command {
     let recorded = ["--record", record];
     let unrecorded = ["--no-record"];
     let record = if record.is_empty() {
@@ -208,17 +213,17 @@ pub fn command(place: &Place, role: Role, bus: &str, record: &str) -> Command {
         &recorded
     };
     match role {
-        Role::Plant => {
+        ChaosRole::Plant => {
             let wait = ["plant", "--bus", bus, "--wait-s", WAIT_S];
             place.command(&[&wait, &QUICK[..], record].concat())
         }
-        Role::Controller => place.command(&["controller", "--bus", bus, "--wait-s", WAIT_S]),
-        Role::Run => place.command(&[&["run", "--bus", bus], &QUICK[..], record].concat()),
+        ChaosRole::Controller => place.command(&["controller", "--bus", bus, "--wait-s", WAIT_S]),
+        ChaosRole::Run => place.command(&[&["run", "--bus", bus], &QUICK[..], record].concat()),
     }
 }
 
 /// Whatever is left: processes whose parent has gone must go, too.
-pub fn orphans(place: &Place, deadline: Instant, findings: &mut Vec<Finding>) {
+pub fn orphans(place: &ChaosFolder, deadline: Instant, findings: &mut Vec<Finding>) {
     loop {
         let left = place.processes();
         if left.is_empty() {
@@ -237,13 +242,13 @@ pub fn orphans(place: &Place, deadline: Instant, findings: &mut Vec<Finding>) {
 
 /// The next run on the same bus must go as if nothing had been, and leave nothing.
 pub fn next_run(
-    place: &Place,
+    place: &ChaosFolder,
     bus: &str,
     expected: &Expected,
     findings: &mut Vec<Finding>,
 ) -> std::io::Result<()> {
     let run = ["run", "--bus", bus, "--record", "out/run.mcap"];
-    let mut next = Running::start(&mut place.command(&[&run, &QUICK[..]].concat()))?;
+    let mut next = TrialProcess::start(&mut place.command(&[&run, &QUICK[..]].concat()))?;
     if !next.wait(Instant::now() + expected.end)? {
         findings.push((Flaw::UnusableBus, "the next run does not end".into()));
     }
@@ -335,13 +340,13 @@ fn read(pipe: Option<impl Read + Send + 'static>) -> std::io::Result<Receiver<St
 }
 
 /// A process of a trial; killed when this value goes.
-pub struct Running {
+pub struct TrialProcess {
     child: Child,
     said: Said,
     ended: Option<Option<i32>>,
 }
 
-impl Running {
+impl TrialProcess {
     /// Starts a command.
     pub fn start(command: &mut Command) -> std::io::Result<Self> {
         let mut child = command.spawn()?;
@@ -374,7 +379,7 @@ impl Running {
     }
 }
 
-impl Drop for Running {
+impl Drop for TrialProcess {
     fn drop(&mut self) {
         if self.ended.is_none() {
             let _ = self.child.kill();

@@ -26,9 +26,9 @@ use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use embedded_hal::delay::DelayNs;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
-use painleve_drivers::encoders::Encoders;
-use painleve_drivers::force_cell::{self, ForceCell};
-use painleve_drivers::plausibility::{Plausibility, Readings};
+use painleve_drivers::encoders::EncoderDriver;
+use painleve_drivers::force_cell::{self, ForceCellDriver};
+use painleve_drivers::plausibility::{Plausibility, SensorReadings};
 use painleve_drivers::switches::Switches;
 use painleve_firmware::Configuration;
 use painleve_firmware::drive::Drive;
@@ -145,7 +145,7 @@ impl Board for F405 {
         let pause = Pause {
             cycles_per_us: rcc.clocks.sysclk().to_MHz(),
         };
-        let encoders = Encoders::new(
+        let encoders = EncoderDriver::new(
             Spi::new(device.SPI1, pins, mode_1, ENCODER_BUS_HZ.Hz(), &mut rcc),
             [
                 b.pb6.into_push_pull_output_in_state(PinState::High).erase(),
@@ -159,7 +159,7 @@ impl Board for F405 {
             .pb12
             .into_push_pull_output_in_state(PinState::High)
             .erase();
-        let select = force_cell::Select::new(select, pause);
+        let select = force_cell::PausedSelect::new(select, pause);
         let force_cell =
             ExclusiveDevice::new_no_delay(bus, select).map_err(|_| StartFault::Link)?;
 
@@ -176,7 +176,7 @@ impl Board for F405 {
             converter: device.DAC,
             enable,
             encoders,
-            force_cell: ForceCell::new(force_cell),
+            force_cell: ForceCellDriver::new(force_cell),
             enable_switch: c.pc0.into_pull_down_input().erase(),
             reset_button: c.pc1.into_pull_down_input().erase(),
             switches: Switches::default(),
@@ -249,7 +249,8 @@ impl DelayNs for Pause {
     }
 }
 
-type Force = ExclusiveDevice<Spi<SPI2>, force_cell::Select<ErasedPin<Output>, Pause>, NoDelay>;
+type Force =
+    ExclusiveDevice<Spi<SPI2>, force_cell::PausedSelect<ErasedPin<Output>, Pause>, NoDelay>;
 
 /// The control task's part of the board.
 pub struct F405Drive {
@@ -259,8 +260,8 @@ pub struct F405Drive {
     watchdogs: Watchdogs,
     converter: pac::DAC,
     enable: ErasedPin<Output>,
-    encoders: Encoders<Spi<SPI1>, ErasedPin<Output>, Pause>,
-    force_cell: ForceCell<Force>,
+    encoders: EncoderDriver<Spi<SPI1>, ErasedPin<Output>, Pause>,
+    force_cell: ForceCellDriver<Force>,
     enable_switch: ErasedPin<Input>,
     reset_button: ErasedPin<Input>,
     switches: Switches,
@@ -286,7 +287,7 @@ impl F405Drive {
         let joints = self.encoders.read(self.encoder_bits).map(Result::ok);
         let (tangential, normal) = self.force_cell.read(self.force_bits);
         let forces = [tangential.ok(), normal.ok()];
-        let readings = Readings {
+        let readings = SensorReadings {
             joints,
             forces,
             magnets: self

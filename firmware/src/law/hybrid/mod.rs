@@ -128,7 +128,7 @@ impl Law for HybridSettings {
         let wanted = Vector2::new(friction_force, normal_force);
         let motion_nm = input.model.inverse_dynamics_in_air_nm(&acceleration);
         let pressing_nm = input.model.torque_against_nm(&wanted);
-        state.pressing = if self.presses_less {
+        state.pressing = if self.reduce_force_when_torque_limited {
             affordable(
                 &motion_nm,
                 &pressing_nm,

@@ -50,7 +50,7 @@ settings! {
         force_time_constant_s: f32 = 0.02, 0.0..=10.0, "s";
         /// Whether the pressing force is reduced where the torque limits do not allow f_n*; not in
         /// the paper.
-        presses_less: bool = true;
+        reduce_force_when_torque_limited: bool = true;
         /// Integral gain K'_I of the force.
         force_integral_gain_per_s: f32 = 5.0, 0.0..=1e4, "1/s";
         /// Largest correction by the force integral.

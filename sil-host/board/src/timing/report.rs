@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::tick_times::WorstTick;
 use super::{TickTimes, Unit};
-use crate::{Board, BoardError, LineHealth};
+use crate::{BoardError, ConnectedBoard, LineHealth};
 
 /// What the ticks of one scenario cost. The names are a contract: add to them, never rename.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ impl TimingReport {
     ///
     /// # Errors
     /// [`BoardError`] if the board does not answer.
-    pub fn of_board<B: Board>(
+    pub fn of_board<B: ConnectedBoard>(
         scenario: &str,
         tick_hz: u32,
         times: &TickTimes,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use clap::{ArgAction, Command};
 use painleve_plant::scenario::Scenario;
-use painleve_study::catalogue::{Entry, STUDIES};
+use painleve_study::catalogue::{CatalogueEntry, STUDIES};
 use painleve_study::sweep::campaign::{Campaign, Understood};
 
 /// The study of a campaign.
@@ -13,7 +13,7 @@ use painleve_study::sweep::campaign::{Campaign, Understood};
 /// What is wrong with it and what is allowed, in one sentence.
 pub fn understand(campaign: &Campaign) -> Result<Understood, String> {
     let name = campaign.study.as_str();
-    let entry = Entry::find(name)
+    let entry = CatalogueEntry::find(name)
         .filter(|entry| entry.has_shards)
         .ok_or_else(|| {
             let all = STUDIES.iter().filter(|entry| entry.has_shards);

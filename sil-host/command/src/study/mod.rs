@@ -5,7 +5,7 @@ pub mod campaign;
 pub mod outcome;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
-use painleve_study::catalogue::{AnyOptions, Entry, STUDIES};
+use painleve_study::catalogue::{AnyOptions, CatalogueEntry, STUDIES};
 
 use super::CommandError;
 use outcome::OutcomeOptions;
@@ -31,7 +31,7 @@ impl std::fmt::Debug for StudyCommand {
 
 impl Subcommand for StudyCommand {
     fn augment_subcommands(command: Command) -> Command {
-        let study = |entry: &Entry| entry.augment_with::<OutcomeOptions>();
+        let study = |entry: &CatalogueEntry| entry.augment_with::<OutcomeOptions>();
         command
             .subcommand_required(true)
             .arg_required_else_help(true)
@@ -43,7 +43,7 @@ impl Subcommand for StudyCommand {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        Entry::find(name).is_some()
+        CatalogueEntry::find(name).is_some()
     }
 }
 
@@ -51,7 +51,7 @@ impl FromArgMatches for StudyCommand {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
         let (name, matches) = matches.subcommand().ok_or_else(missing)?;
-        let entry = Entry::find(name).ok_or_else(missing)?;
+        let entry = CatalogueEntry::find(name).ok_or_else(missing)?;
         Ok(Self {
             options: (entry.read)(matches)?,
             outcome: OutcomeOptions::from_arg_matches(matches)?,

@@ -44,19 +44,19 @@ pub struct TorqueStages {
     /// Ring of commanded torques, N·m.
     commands: [JointTorque<f64>; MAXIMUM_DELAY_TICKS],
     next: usize,
-    watchdog: Watchdog,
+    watchdog: CommandWatchdog,
 }
 
 /// Takes the torque away when commands stop coming; latched.
 #[derive(Clone, Debug)]
-struct Watchdog {
+struct CommandWatchdog {
     limit_ticks: u32,
     /// Ticks since the last command; `None` before the first.
     silent_ticks: Option<u32>,
     tripped: bool,
 }
 
-impl Watchdog {
+impl CommandWatchdog {
     fn tick(&mut self, is_command: bool) {
         self.silent_ticks = if is_command {
             Some(0)
@@ -78,7 +78,7 @@ impl TorqueStages {
             fraction: settings.delay_ticks.fract(),
             commands: [JointTorque::zeros(); MAXIMUM_DELAY_TICKS],
             next: 0,
-            watchdog: Watchdog {
+            watchdog: CommandWatchdog {
                 limit_ticks: settings.watchdog_ticks,
                 silent_ticks: None,
                 tripped: false,

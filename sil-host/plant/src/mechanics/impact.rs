@@ -62,7 +62,7 @@ pub struct EndlessImpact;
 
 /// The process at some impulse.
 #[derive(Clone, Copy)]
-struct Process<'a> {
+struct ImpactProcess<'a> {
     q: &'a Matrix2<f64>,
     friction: f64,
     /// (v_r, v_n), m/s.
@@ -78,7 +78,7 @@ struct Process<'a> {
 /// slip dies, and then it sticks or reverses for good.
 const MAXIMUM_PHASES: usize = 4;
 
-impl<'a> Process<'a> {
+impl<'a> ImpactProcess<'a> {
     fn new(q: &'a Matrix2<f64>, friction: f64, velocity: Vector2<f64>) -> Self {
         let mut process = Self {
             q,
@@ -204,7 +204,7 @@ pub fn collide(
     law: &ImpactLaw,
     velocity_m_s: Vector2<f64>,
 ) -> Result<Impact, EndlessImpact> {
-    rebound(Process::new(q, friction, velocity_m_s), law)
+    rebound(ImpactProcess::new(q, friction, velocity_m_s), law)
 }
 
 /// Impact without collision: the tip slides with `slip_m_s` ≠ 0 along the belt, p is zero or
@@ -218,7 +218,7 @@ pub fn throw(
     law: &ImpactLaw,
     slip_m_s: f64,
 ) -> Result<Impact, EndlessImpact> {
-    let mut start = Process::new(q, friction, Vector2::new(slip_m_s, 0.0));
+    let mut start = ImpactProcess::new(q, friction, Vector2::new(slip_m_s, 0.0));
     let until_slip_dies = start.until_slip_dies();
     if !until_slip_dies.is_finite() {
         return Err(EndlessImpact);
@@ -257,8 +257,8 @@ pub fn state_after(
 }
 
 /// The rest of a collision: compression to its end, then restitution.
-fn rebound(start: Process<'_>, law: &ImpactLaw) -> Result<Impact, EndlessImpact> {
-    let compressed = start.run(Process::until_compressed)?;
+fn rebound(start: ImpactProcess<'_>, law: &ImpactLaw) -> Result<Impact, EndlessImpact> {
+    let compressed = start.run(ImpactProcess::until_compressed)?;
     let end = match law.law {
         Restitution::Poisson => {
             let total = (1.0 + law.restitution) * compressed.impulse.y;

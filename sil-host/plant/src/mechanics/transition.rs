@@ -21,7 +21,7 @@ settings! {
 
 /// What follows from a tip on the belt without normal velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Next {
+pub enum Continuation {
     /// Motion in this mode.
     Mode(ContactMode),
     /// An impact without collision.
@@ -53,7 +53,12 @@ const SHORT_STEP_S: f64 = 5e-3;
 
 /// Decides what follows at time `t_s` from a state with the tip on the belt
 /// and no normal velocity.
-pub fn decide(motion: &Motion<'_>, t_s: f64, state: &State, indeterminate: Indeterminate) -> Next {
+pub fn decide(
+    motion: &Motion<'_>,
+    t_s: f64,
+    state: &State,
+    indeterminate: Indeterminate,
+) -> Continuation {
     let terms = motion.terms(t_s, state);
     let slip_speed = motion.relative_velocity_m_s(t_s, state).x;
     if slip_speed.abs() <= REST_SLIP_M_S {
@@ -61,14 +66,14 @@ pub fn decide(motion: &Motion<'_>, t_s: f64, state: &State, indeterminate: Indet
     }
     let slip = Slip::of(slip_speed);
     let p = guarded_p(motion, &terms, slip);
-    Next::Mode(match SolutionMode::classify(p, terms.b()) {
+    Continuation::Mode(match SolutionMode::classify(p, terms.b()) {
         SolutionMode::Sliding => ContactMode::slide(slip),
         SolutionMode::Flight => ContactMode::Flight,
         SolutionMode::Indeterminate => match indeterminate {
             Indeterminate::Flight => ContactMode::Flight,
             Indeterminate::Slide => ContactMode::slide(slip),
         },
-        SolutionMode::Inconsistent => return Next::Thrown,
+        SolutionMode::Inconsistent => return Continuation::Thrown,
     })
 }
 
@@ -76,12 +81,12 @@ fn guarded_p(motion: &Motion<'_>, terms: &ContactTerms<f64>, slip: Slip) -> f64 
     terms.p(motion.friction, slip) - P_GUARD * terms.q.m22
 }
 
-fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Next {
+fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Continuation {
     if terms.b() >= 0.0 {
-        return Next::Mode(ContactMode::Flight);
+        return Continuation::Mode(ContactMode::Flight);
     }
     if cone_margin(motion, t_s, terms) >= 0.0 {
-        return Next::Mode(ContactMode::Stick);
+        return Continuation::Mode(ContactMode::Stick);
     }
     // At the edge of the cone one direction has an acceleration of zero up to
     // rounding and the other one against itself: take the better of the two.
@@ -90,7 +95,9 @@ fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Next {
         .into_iter()
         .filter(|slip| guarded_p(motion, terms, *slip) > 0.0)
         .max_by(|one, other| away(*one).total_cmp(&away(*other)))
-        .map_or(Next::Thrown, |slip| Next::Mode(ContactMode::slide(slip)))
+        .map_or(Continuation::Thrown, |slip| {
+            Continuation::Mode(ContactMode::slide(slip))
+        })
 }
 
 /// How far the force of sticking is inside the friction cone, N; negative outside.

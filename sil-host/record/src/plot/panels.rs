@@ -22,7 +22,7 @@ pub(super) struct Curve {
     pub(super) width: u32,
 }
 
-pub(super) struct Panel {
+pub(super) struct SignalPanel {
     pub(super) title: &'static str,
     pub(super) unit: &'static str,
     /// Signals in the order of the legend; the first is drawn on top.
@@ -35,7 +35,7 @@ pub(super) struct Panel {
     pub(super) minimum_span: f64,
 }
 
-pub(super) const TIP_PANEL: Panel = Panel {
+pub(super) const TIP_PANEL: SignalPanel = SignalPanel {
     title: "Tip position zₜ",
     unit: "m",
     curves: &[
@@ -57,7 +57,7 @@ pub(super) const TIP_PANEL: Panel = Panel {
     zero_line: false,
     minimum_span: 0.002,
 };
-pub(super) const FORCE_PANEL: Panel = Panel {
+pub(super) const FORCE_PANEL: SignalPanel = SignalPanel {
     title: "Normal force fₙ",
     unit: "N",
     curves: &[Curve {
@@ -70,7 +70,7 @@ pub(super) const FORCE_PANEL: Panel = Panel {
     zero_line: true,
     minimum_span: 1.0,
 };
-pub(super) const TORQUE_PANEL: Panel = Panel {
+pub(super) const TORQUE_PANEL: SignalPanel = SignalPanel {
     title: "Joint torques u₁, u₂",
     unit: "N·m",
     curves: &[
@@ -91,7 +91,7 @@ pub(super) const TORQUE_PANEL: Panel = Panel {
     zero_line: true,
     minimum_span: 0.5,
 };
-pub(super) const B_PANEL: Panel = Panel {
+pub(super) const B_PANEL: SignalPanel = SignalPanel {
     title: "Free normal acceleration b",
     unit: "m/s²",
     curves: &[Curve {
@@ -104,7 +104,7 @@ pub(super) const B_PANEL: Panel = Panel {
     zero_line: true,
     minimum_span: 1.0,
 };
-pub(super) const P_PANEL: Panel = Panel {
+pub(super) const P_PANEL: SignalPanel = SignalPanel {
     title: "Contact coefficient p",
     unit: "1/kg",
     curves: &[Curve {

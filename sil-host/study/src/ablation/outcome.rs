@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::AblationStudy;
 use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
-use crate::robustness::{Campaign, Ending, Part, Row};
+use crate::robustness::{Ending, Part, RobustnessOutcome, Row};
 
 /// Result of the campaign without one part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -53,7 +53,7 @@ impl Ablation {
             .zip(rows.chunks(runs))
             .map(|(without, rows)| {
                 let campaign =
-                    Campaign::new(study.campaign.arms, study.campaign.seed, rows.to_vec());
+                    RobustnessOutcome::new(study.campaign.arms, study.campaign.seed, rows.to_vec());
                 let errors: f64 = rows.iter().map(|row| row.error_m).sum();
                 Ablated {
                     without,

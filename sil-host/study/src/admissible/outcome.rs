@@ -10,7 +10,7 @@ use crate::paper;
 
 /// One interval, as a line of the CSV file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
+pub struct IntervalLine {
     mu: f64,
     posture: Posture,
     from_m: f64,
@@ -31,13 +31,13 @@ impl Admissible {
 }
 
 impl Outcome for Admissible {
-    type Line = Line;
+    type Line = IntervalLine;
 
-    fn lines(&self) -> Vec<Line> {
+    fn lines(&self) -> Vec<IntervalLine> {
         let mut lines = Vec::new();
         for (posture, _, intervals) in self.postures() {
             for &[from_m, to_m] in &intervals.intervals_m {
-                lines.push(Line {
+                lines.push(IntervalLine {
                     mu: self.mu,
                     posture,
                     from_m,

@@ -5,7 +5,7 @@ use painleve_chart::{Chart, Mark, Panel, PlotError};
 use plotters::style::RGBColor;
 
 use super::Row;
-use super::outcome::Diagram;
+use super::outcome::BifurcationDiagram;
 use crate::cells::Cells;
 use crate::initial::Initial;
 use crate::outcome::Figure;
@@ -24,14 +24,14 @@ const RISING: [RGBColor; 6] = [
 /// Colour of cells where the arm is quiet.
 const QUIET: RGBColor = RGBColor(0xF2, 0xF2, 0xF2);
 
-impl Figure for Diagram {
+impl Figure for BifurcationDiagram {
     fn svg(&self) -> Result<String, PlotError> {
         chart(self).svg()
     }
 }
 
 /// Draws the figure.
-fn chart(diagram: &Diagram) -> Chart {
+fn chart(diagram: &BifurcationDiagram) -> Chart {
     let Cells {
         mu,
         transient_s,
@@ -70,7 +70,7 @@ fn look(group: &str) -> (String, RGBColor, bool) {
 
 /// Draws a value of each cell of a section against belt speed; several random states at
 /// the same speed are drawn as dots.
-fn curve(diagram: &Diagram, group: &str, value: impl Fn(&Row) -> f64) -> Mark {
+fn curve(diagram: &BifurcationDiagram, group: &str, value: impl Fn(&Row) -> f64) -> Mark {
     let (name, colour, dashed) = look(group);
     let points = diagram
         .rising_speeds()
@@ -95,13 +95,13 @@ fn curve(diagram: &Diagram, group: &str, value: impl Fn(&Row) -> f64) -> Mark {
     }
 }
 
-fn curves(diagram: &Diagram, groups: &[&str], value: impl Fn(&Row) -> f64) -> Vec<Mark> {
+fn curves(diagram: &BifurcationDiagram, groups: &[&str], value: impl Fn(&Row) -> f64) -> Vec<Mark> {
     // The first series is drawn last, on top.
     let lines = groups.iter().rev();
     lines.map(|group| curve(diagram, group, &value)).collect()
 }
 
-fn section(diagram: &Diagram, groups: &[&str]) -> Panel {
+fn section(diagram: &BifurcationDiagram, groups: &[&str]) -> Panel {
     let mut marks = Vec::new();
     if let Some([from, to]) = diagram.windows.iter().find_map(|window| window.paper_m_s) {
         marks.push(Mark::Span {
@@ -119,7 +119,7 @@ fn section(diagram: &Diagram, groups: &[&str]) -> Panel {
     }
 }
 
-fn apexes(diagram: &Diagram, groups: &[&str]) -> Panel {
+fn apexes(diagram: &BifurcationDiagram, groups: &[&str]) -> Panel {
     Panel {
         title: "apex of the tip in mm".into(),
         height: 300,
@@ -140,7 +140,7 @@ fn without_name(mut mark: Mark) -> Mark {
     mark
 }
 
-fn map(diagram: &Diagram, group: &str) -> Panel {
+fn map(diagram: &BifurcationDiagram, group: &str) -> Panel {
     let settings = diagram.settings();
     let (columns, lines) = (Places::of(&settings.v_belt_m_s), Places::of(&settings.mu));
     let strongest = |mu: usize, speed: usize| {

@@ -20,7 +20,7 @@ use super::tabular::Tabular;
 use super::{Study, StudyError};
 
 pub use options::Options;
-pub use outcome::{Diagram, Window};
+pub use outcome::{BifurcationDiagram, Window};
 
 /// The diagram, cell by cell.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{Bifurcation, Diagram, Row, page};
+use super::{Bifurcation, BifurcationDiagram, Row, page};
 use crate::catalogue::{PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
 use crate::tabular::Table;
@@ -37,7 +37,7 @@ impl StudyOptions for Options {
     const NAME: &'static str = "bifurcation";
     const HAS_SHARDS: bool = true;
     type Study = Bifurcation;
-    type Outcome = Diagram;
+    type Outcome = BifurcationDiagram;
 
     fn study(&self) -> Result<Bifurcation, StudyError> {
         let cells = self.cells.cells(&self.mu, &self.v_belt)?;
@@ -48,8 +48,8 @@ impl StudyOptions for Options {
         vec![self.cells.scenario().to_owned()]
     }
 
-    fn outcome(study: &Bifurcation, rows: Vec<Row>) -> Diagram {
-        Diagram::new(study, rows)
+    fn outcome(study: &Bifurcation, rows: Vec<Row>) -> BifurcationDiagram {
+        BifurcationDiagram::new(study, rows)
     }
 
     fn table(study: Bifurcation) -> Option<Box<dyn Table>> {

@@ -11,7 +11,7 @@ use crate::paper;
 
 /// The whole diagram.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Diagram {
+pub struct BifurcationDiagram {
     /// All cells, in the order of their numbers.
     pub rows: Vec<Row>,
     /// Belt speeds with bouncing.
@@ -40,7 +40,7 @@ pub struct Window {
     pub paper_m_s: Option<[f64; 2]>,
 }
 
-impl Diagram {
+impl BifurcationDiagram {
     /// Collects the rows of a study.
     pub fn new(study: &Bifurcation, rows: Vec<Row>) -> Self {
         let settings = study.cells.clone();
@@ -131,7 +131,7 @@ impl Diagram {
     }
 }
 
-impl Outcome for Diagram {
+impl Outcome for BifurcationDiagram {
     type Line = Row;
 
     fn lines(&self) -> Vec<Row> {

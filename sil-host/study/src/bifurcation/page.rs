@@ -2,7 +2,7 @@
 
 use painleve_chart::PlotError;
 
-use super::{Bifurcation, Diagram, Window};
+use super::{Bifurcation, BifurcationDiagram, Window};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
 use crate::figures::page_maker::{PageMaker, list, section};
@@ -17,10 +17,10 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let fineness = page.fineness;
     let cells = page.cells("0.6", fineness.section_v_belt, &[Initial::A, Initial::D])?;
     let study = Bifurcation { cells };
-    let section = Diagram::new(&study, page.rows("Fig. 4: section", &study)?);
+    let section = BifurcationDiagram::new(&study, page.rows("Fig. 4: section", &study)?);
     let cells = page.cells(fineness.map_mu, fineness.map_v_belt, &[Initial::A])?;
     let study = Bifurcation { cells };
-    let map = Diagram::new(&study, page.rows("Friction and belt speed", &study)?);
+    let map = BifurcationDiagram::new(&study, page.rows("Friction and belt speed", &study)?);
     Ok(vec![
         (bifurcation_section(&section)?, Box::new(section)),
         (bifurcation_map(&map)?, Box::new(map)),
@@ -31,7 +31,7 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
 ///
 /// # Errors
 /// [`PlotError`] if the figure cannot be drawn.
-fn bifurcation_section(outcome: &Diagram) -> Result<Section, PlotError> {
+fn bifurcation_section(outcome: &BifurcationDiagram) -> Result<Section, PlotError> {
     let settings = outcome.settings();
     let command = format!(
         "painleve study bifurcation --mu {} --initial a,d --transient-s {} --record-s {}",
@@ -78,7 +78,7 @@ fn bifurcation_section(outcome: &Diagram) -> Result<Section, PlotError> {
 ///
 /// # Errors
 /// [`PlotError`] if the figure cannot be drawn.
-fn bifurcation_map(outcome: &Diagram) -> Result<Section, PlotError> {
+fn bifurcation_map(outcome: &BifurcationDiagram) -> Result<Section, PlotError> {
     let settings = outcome.settings();
     let command = format!(
         "painleve study bifurcation --mu {} --initial a",

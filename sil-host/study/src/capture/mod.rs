@@ -11,7 +11,7 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
-use super::contact_watch::ContactWatch;
+use super::contact_probe::ContactProbe;
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
@@ -109,11 +109,11 @@ impl Study for Capture {
         let enabled_s = scenario.run.enable_at_s;
         let end_s = scenario.run.duration_s;
         let mut trial = Trial::new(&scenario)?;
-        let mut watch = ContactWatch::new(enabled_s, 0.0);
+        let mut contact = ContactProbe::new(enabled_s, 0.0);
         let mut error_m = 0.0_f64;
         let mut solved = true;
         for _ in 0..scenario.run.ticks() {
-            if trial.tick(&mut watch).is_err() {
+            if trial.tick(&mut contact).is_err() {
                 solved = false;
                 break;
             }
@@ -122,7 +122,7 @@ impl Study for Capture {
                 error_m = error_m.max((trial.tip_t_m() - reference_m).abs());
             }
         }
-        let capture_s = watch.last_flight_end_s - enabled_s;
+        let capture_s = contact.last_flight_end_s - enabled_s;
         let fault = trial.fault().map(|fault| fault as u8);
         Ok(Row {
             index,

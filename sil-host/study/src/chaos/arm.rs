@@ -35,7 +35,7 @@ const PER_APPROACH: f64 = 0.1;
 const SLOWEST_APPROACH_M_S: f64 = 1e-6;
 
 impl ArmTangent {
-    /// Creates the observer with the deviation `tangent` at the beginning of the plant's next step;
+    /// Creates the probe with the deviation `tangent` at the beginning of the plant's next step;
     /// `impact` is
     /// the plant's impact law.
     pub fn new(impact: ImpactLaw, tangent: Tangent<4>) -> Self {

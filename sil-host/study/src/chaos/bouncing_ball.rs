@@ -4,7 +4,7 @@ use nalgebra::{SVector, Vector2};
 use painleve_plant::mechanics::event::first_negative;
 
 use super::tangent::{Crossing, along, slope_along};
-use super::{Regime, Return, Tangent, Verdict};
+use super::{Regime, RegimeVerdict, Return, Tangent};
 
 /// A ball on a table that moves as A sin ωt, with restitution e. The state is
 /// the height and velocity of the ball and the phase of the table; flights are smooth, impacts are
@@ -62,7 +62,7 @@ impl Ball {
         first_negative((before, gap(before)), (after, gap(after)), gap)
     }
 
-    fn judge(&self, start: SVector<f64, 3>, transient: usize, impacts: usize) -> Verdict {
+    fn judge(&self, start: SVector<f64, 3>, transient: usize, impacts: usize) -> RegimeVerdict {
         let (mut x, mut tangent, mut time_s) = (start, Tangent::default(), 0.0);
         let mut returns = Vec::new();
         for impact in 0..transient + impacts {
@@ -94,7 +94,7 @@ impl Ball {
                 });
             }
         }
-        Verdict::of(&returns)
+        RegimeVerdict::of(&returns)
     }
 
     /// The orbit with one impact per period T of the table: the ball leaves at v = g T/2,

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, SVector, Vector1, Vector2};
 
 use super::tangent::along;
-use super::{Regime, Return, Tangent, Verdict};
+use super::{Regime, RegimeVerdict, Return, Tangent};
 
 /// Classifies a map by its iterates after a transient.
 fn judge_map<const N: usize>(
@@ -11,7 +11,7 @@ fn judge_map<const N: usize>(
     transient: usize,
     iterations: usize,
     map: impl Fn(&SVector<f64, N>) -> SVector<f64, N>,
-) -> Verdict {
+) -> RegimeVerdict {
     let mut state = (0..transient).fold(start, |state, _| map(&state));
     let mut tangent = Tangent::default();
     let returns: Vec<Return<N>> = (0..iterations)
@@ -25,10 +25,10 @@ fn judge_map<const N: usize>(
             }
         })
         .collect();
-    Verdict::of(&returns)
+    RegimeVerdict::of(&returns)
 }
 
-fn logistic(r: f64, iterations: usize) -> Verdict {
+fn logistic(r: f64, iterations: usize) -> RegimeVerdict {
     judge_map(Vector1::new(0.3), 10_000, iterations, |x| {
         Vector1::new(r * x.x * (1.0 - x.x))
     })
@@ -126,5 +126,5 @@ fn vanishing_deviations_are_periodic_with_exponent_minus_infinity() {
 #[test]
 fn too_few_returns_are_undecided_and_none_are_quiet() {
     assert_eq!(logistic(4.0, 30).regime, Regime::Undecided);
-    assert_eq!(Verdict::of::<1>(&[]).regime, Regime::Quiet);
+    assert_eq!(RegimeVerdict::of::<1>(&[]).regime, Regime::Quiet);
 }

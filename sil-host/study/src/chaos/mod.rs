@@ -22,4 +22,4 @@ mod bouncing_ball;
 mod known_answers;
 
 pub use tangent::Tangent;
-pub use verdict::{Regime, Return, Verdict};
+pub use verdict::{Regime, RegimeVerdict, Return};

@@ -31,7 +31,7 @@ pub struct Returns {
 }
 
 impl Returns {
-    /// Creates an observer without returns; `impact` is the plant's impact law.
+    /// Creates a probe without returns; `impact` is the plant's impact law.
     pub fn new(impact: ImpactLaw) -> Self {
         Self {
             tangent: ArmTangent::new(impact, Tangent::default()),

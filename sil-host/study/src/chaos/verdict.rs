@@ -65,7 +65,7 @@ impl Regime {
 
 /// The regime of an orbit and its evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Verdict {
+pub struct RegimeVerdict {
     /// The regime.
     pub regime: Regime,
     /// Returns per period of a periodic orbit, up to [`LONGEST_PERIOD`].
@@ -77,7 +77,7 @@ pub struct Verdict {
     pub standard_error_per_s: Option<f64>,
 }
 
-impl Verdict {
+impl RegimeVerdict {
     /// Classifies an orbit by its returns after the transient.
     pub fn of<const N: usize>(returns: &[Return<N>]) -> Self {
         let mut verdict = Self {

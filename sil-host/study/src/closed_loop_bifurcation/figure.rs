@@ -3,16 +3,16 @@
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, ORANGE, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
 
-use super::outcome::{Diagram, Section};
+use super::outcome::{BeltSpeedSection, ClosedLoopDiagram};
 use crate::outcome;
 use crate::outcome::Figure;
 
-impl Figure for Diagram {
+impl Figure for ClosedLoopDiagram {
     fn svg(&self) -> Result<String, PlotError> {
         const COLOURS: [plotters::style::RGBColor; 5] =
             [BLUE_INK, VERMILLION, GREEN, ORANGE, BLACK_INK];
         let mut panels: Vec<Panel> = Vec::new();
-        let together = |one: &Section, other: &Section| {
+        let together = |one: &BeltSpeedSection, other: &BeltSpeedSection| {
             (&one.controller, one.converters) == (&other.controller, other.converters)
         };
         for sections in self.sections.chunk_by(together) {

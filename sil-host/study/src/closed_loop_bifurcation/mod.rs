@@ -20,22 +20,22 @@ use painleve_shared::{Arm, Posture};
 use serde::Serialize;
 
 use super::attractor::Attractor;
-use super::case::{self, Controller, Converters, Reference};
+use super::case::{self, ControllerChoice, ConverterChoice, Reference};
 use super::initial::Initial;
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
 
 pub use options::Options;
-pub use outcome::{Diagram, Section};
+pub use outcome::{BeltSpeedSection, ClosedLoopDiagram};
 
 /// Settings of the study: all combinations, the last varying fastest.
 #[derive(Clone, Debug)]
 pub struct ClosedLoopBifurcation {
     /// Controllers.
-    pub controllers: Vec<Controller>,
+    pub controllers: Vec<ControllerChoice>,
     /// Converter sets.
-    pub converters: Vec<Converters>,
+    pub converters: Vec<ConverterChoice>,
     /// Friction coefficients μ.
     pub mu: Vec<f64>,
     /// Belt speeds, m/s.
@@ -60,9 +60,9 @@ pub struct ClosedLoopBifurcation {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Controller.
-    pub controller: Controller,
+    pub controller: ControllerChoice,
     /// Converter set.
-    pub converters: Converters,
+    pub converters: ConverterChoice,
     /// Friction coefficient μ.
     pub mu: f64,
     /// Belt speed, m/s.
@@ -100,7 +100,7 @@ impl ClosedLoopBifurcation {
     }
 
     /// Returns the parameters of a row, and its scenario.
-    fn scenario(&self, index: usize) -> Result<(Cell<'_>, Scenario), StudyError> {
+    fn scenario(&self, index: usize) -> Result<(LoopCell<'_>, Scenario), StudyError> {
         let mut rest = index;
         let mut place = |count: usize| {
             let place = rest % count;
@@ -145,7 +145,7 @@ impl ClosedLoopBifurcation {
             .target_m
             .unwrap_or_else(|| paper::target_m(controller, start_posture));
         scenario.controller.reference = self.reference.to(target_m);
-        let cell = Cell {
+        let cell = LoopCell {
             controller,
             converters,
             mu,
@@ -157,9 +157,9 @@ impl ClosedLoopBifurcation {
     }
 }
 
-struct Cell<'a> {
-    controller: &'a Controller,
-    converters: Converters,
+struct LoopCell<'a> {
+    controller: &'a ControllerChoice,
+    converters: ConverterChoice,
     mu: f64,
     v_belt_m_s: f64,
     initial: Initial,

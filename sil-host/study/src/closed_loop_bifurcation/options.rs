@@ -2,8 +2,8 @@
 
 use clap::Args;
 
-use super::{ClosedLoopBifurcation, Diagram, Row, page};
-use crate::case::{self, Controller, Converters, Reference};
+use super::{ClosedLoopBifurcation, ClosedLoopDiagram, Row, page};
+use crate::case::{self, ControllerChoice, ConverterChoice, Reference};
 use crate::catalogue::{PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
 use crate::initial::Initials;
@@ -23,7 +23,7 @@ pub struct Options {
         value_delimiter = ',',
         default_value = "hybrid"
     )]
-    controller: Vec<Controller>,
+    controller: Vec<ControllerChoice>,
     /// Converters: ideal (as in the paper), hardware, or the scenario's own.
     #[arg(
         long,
@@ -32,7 +32,7 @@ pub struct Options {
         value_delimiter = ',',
         default_value = "hardware"
     )]
-    converters: Vec<Converters>,
+    converters: Vec<ConverterChoice>,
     /// Friction coefficients μ, FROM:TO:STEP or a list.
     #[arg(
         long,
@@ -87,7 +87,7 @@ impl StudyOptions for Options {
     const NAME: &'static str = "closed-loop-bifurcation";
     const HAS_SHARDS: bool = true;
     type Study = ClosedLoopBifurcation;
-    type Outcome = Diagram;
+    type Outcome = ClosedLoopDiagram;
 
     fn study(&self) -> Result<ClosedLoopBifurcation, StudyError> {
         self.overrides.refuse(&[
@@ -119,8 +119,8 @@ impl StudyOptions for Options {
         own.into_iter().map(str::to_owned).collect()
     }
 
-    fn outcome(_: &ClosedLoopBifurcation, rows: Vec<Row>) -> Diagram {
-        Diagram::new(rows)
+    fn outcome(_: &ClosedLoopBifurcation, rows: Vec<Row>) -> ClosedLoopDiagram {
+        ClosedLoopDiagram::new(rows)
     }
 
     fn table(study: ClosedLoopBifurcation) -> Option<Box<dyn Table>> {

@@ -4,26 +4,26 @@ use comfy_table::Table;
 use serde::Serialize;
 
 use super::Row;
-use crate::case::{Controller, Converters};
+use crate::case::{ControllerChoice, ConverterChoice};
 use crate::outcome::{self, Outcome};
 use crate::paper;
 
 /// The whole diagram.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Diagram {
+pub struct ClosedLoopDiagram {
     /// All cells, in the order of their numbers.
     pub rows: Vec<Row>,
     /// One section per controller, converter set, friction coefficient and initial condition.
-    pub sections: Vec<Section>,
+    pub sections: Vec<BeltSpeedSection>,
 }
 
 /// One controller over all belt speeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Section {
+pub struct BeltSpeedSection {
     /// Controller.
-    pub controller: Controller,
+    pub controller: ControllerChoice,
     /// Converter set.
-    pub converters: Converters,
+    pub converters: ConverterChoice,
     /// Friction coefficient μ.
     pub mu: f64,
     /// Initial condition.
@@ -42,21 +42,21 @@ pub struct Section {
     pub max_error_m: f64,
 }
 
-impl Section {
+impl BeltSpeedSection {
     pub(super) fn is_of(&self, row: &Row) -> bool {
         (&self.controller, self.converters, self.mu, &self.initial)
             == (&row.controller, row.converters, row.mu, &row.initial)
     }
 }
 
-impl Diagram {
+impl ClosedLoopDiagram {
     /// Collects the rows of a study.
     pub fn new(rows: Vec<Row>) -> Self {
-        let mut sections: Vec<Section> = Vec::new();
+        let mut sections: Vec<BeltSpeedSection> = Vec::new();
         for row in &rows {
             let place = sections.iter().position(|section| section.is_of(row));
             let place = place.unwrap_or_else(|| {
-                sections.push(Section {
+                sections.push(BeltSpeedSection {
                     controller: row.controller.clone(),
                     converters: row.converters,
                     mu: row.mu,
@@ -87,7 +87,7 @@ impl Diagram {
     }
 }
 
-impl Outcome for Diagram {
+impl Outcome for ClosedLoopDiagram {
     type Line = Row;
 
     fn lines(&self) -> Vec<Row> {

@@ -2,8 +2,8 @@
 
 use painleve_chart::PlotError;
 
-use super::{ClosedLoopBifurcation, Diagram};
-use crate::case::{Controller, Converters, Reference};
+use super::{ClosedLoopBifurcation, ClosedLoopDiagram};
+use crate::case::{ControllerChoice, ConverterChoice, Reference};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
 use crate::figures::page_maker::{PageMaker, SAMPLED_FRICTION, section};
@@ -19,11 +19,11 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let [transient_s, record_s] = fineness.closed_loop_s;
     let hardware = ClosedLoopBifurcation {
         controllers: vec![
-            Controller::HybridPaper,
-            Controller::HybridPaperModel,
-            Controller::Hybrid,
+            ControllerChoice::HybridPaper,
+            ControllerChoice::HybridPaperModel,
+            ControllerChoice::Hybrid,
         ],
-        converters: vec![Converters::Hardware],
+        converters: vec![ConverterChoice::Hardware],
         mu: vec![paper::FRICTION],
         v_belt_m_s: page.values(fineness.closed_loop_v_belt)?,
         initial: vec![Initial::D, Initial::U],
@@ -36,15 +36,15 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     };
     // As close to the paper as sampling permits; ten times the ticks, so fewer speeds.
     let ideal = ClosedLoopBifurcation {
-        controllers: vec![Controller::HybridPaper],
-        converters: vec![Converters::Ideal],
+        controllers: vec![ControllerChoice::HybridPaper],
+        converters: vec![ConverterChoice::Ideal],
         v_belt_m_s: page.values(fineness.ideal_v_belt)?,
         initial: vec![Initial::D],
         ..hardware.clone()
     };
     let mut rows = page.rows("Fig. 12: ideal", &ideal)?;
     rows.extend(page.rows("Fig. 12: hardware", &hardware)?);
-    let outcome = Diagram::new(rows);
+    let outcome = ClosedLoopDiagram::new(rows);
     Ok(vec![(figure_12(&outcome)?, Box::new(outcome))])
 }
 
@@ -52,7 +52,7 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
 ///
 /// # Errors
 /// [`PlotError`] if the figure cannot be drawn.
-fn figure_12(outcome: &Diagram) -> Result<Section, PlotError> {
+fn figure_12(outcome: &ClosedLoopDiagram) -> Result<Section, PlotError> {
     let command = "painleve study closed-loop-bifurcation \
                    --controller hybrid-paper,hybrid-paper-model,hybrid --initial d,u"
         .to_owned();

@@ -2,10 +2,10 @@
 
 use super::*;
 
-fn study(controller: Controller) -> ClosedLoopBifurcation {
+fn study(controller: ControllerChoice) -> ClosedLoopBifurcation {
     ClosedLoopBifurcation {
         controllers: vec![controller],
-        converters: vec![Converters::Hardware],
+        converters: vec![ConverterChoice::Hardware],
         mu: vec![0.6],
         v_belt_m_s: vec![-0.9, -0.4],
         initial: vec![Initial::D, Initial::U],
@@ -20,7 +20,7 @@ fn study(controller: Controller) -> ClosedLoopBifurcation {
 
 #[test]
 fn the_hybrid_law_keeps_the_tip_on_the_belt_from_either_posture() {
-    let study = study(Controller::Hybrid);
+    let study = study(ControllerChoice::Hybrid);
     study.check().unwrap();
     let rows = super::super::rows(&study, || ()).unwrap();
     assert_eq!(rows.len(), 4);
@@ -39,9 +39,9 @@ fn the_hybrid_law_keeps_the_tip_on_the_belt_from_either_posture() {
 fn lift_offs_are_counted_and_the_rest_of_the_motion_is_recorded() {
     let study = ClosedLoopBifurcation {
         initial: vec![Initial::U],
-        ..study(Controller::Pid)
+        ..study(ControllerChoice::Pid)
     };
-    let diagram = Diagram::new(super::super::rows(&study, || ()).unwrap());
+    let diagram = ClosedLoopDiagram::new(super::super::rows(&study, || ()).unwrap());
     assert!(
         diagram
             .rows
@@ -57,7 +57,7 @@ fn random_starts_are_followed_in_their_own_posture() {
     let study = ClosedLoopBifurcation {
         initial: (1..=12).map(Initial::Random).collect(),
         v_belt_m_s: vec![-0.4],
-        ..study(Controller::Hybrid)
+        ..study(ControllerChoice::Hybrid)
     };
     let targets: Vec<f64> = (0..study.len())
         .map(|index| study.scenario(index).unwrap().0.target_m)
@@ -72,13 +72,13 @@ fn random_starts_are_followed_in_their_own_posture() {
 fn out_of_range_values_are_reported_before_any_cell_runs() {
     let far = ClosedLoopBifurcation {
         target_m: Some(0.5),
-        ..study(Controller::Hybrid)
+        ..study(ControllerChoice::Hybrid)
     };
     let error = far.check().unwrap_err().to_string();
     assert!(error.contains("target_m = 0.5"), "{error}");
     let fast = ClosedLoopBifurcation {
         v_belt_m_s: vec![1e9],
-        ..study(Controller::Hybrid)
+        ..study(ControllerChoice::Hybrid)
     };
     assert!(
         fast.check().unwrap_err().to_string().contains("belt."),

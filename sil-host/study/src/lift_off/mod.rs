@@ -22,7 +22,7 @@ use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
 use super::case;
-use super::contact_watch::ContactWatch;
+use super::contact_probe::ContactProbe;
 use super::robustness::{FalseAlarms, admissible_m};
 use super::tabular::Tabular;
 use super::trial::Trial;
@@ -172,7 +172,7 @@ impl Study for LiftOff {
         let mut trial = Trial::new(&scenario)?;
         let bar_s = bar_s(scenario.controller.contact.evidence);
         let mut flight = FirstFlight::new(SETTLING_S, bar_s);
-        let mut watch = ContactWatch::new(SETTLING_S, 0.0);
+        let mut contact = ContactProbe::new(SETTLING_S, 0.0);
         let mut alarms = FalseAlarms::default();
         let mut noticed_s = None;
         let mut solved = true;
@@ -180,11 +180,11 @@ impl Study for LiftOff {
             // The controller answers the sample taken at the start of the tick.
             let sampled_s = trial.time_s();
             let flying = flight.start_s;
-            if trial.tick(&mut (&mut flight, &mut watch)).is_err() {
+            if trial.tick(&mut (&mut flight, &mut contact)).is_err() {
                 solved = false;
                 break;
             }
-            alarms.tick(&trial, &watch);
+            alarms.tick(&trial, &contact);
             let Some(start_s) = flying else { continue };
             if !trial.answer().flags.contains(StatusFlags::CONTACT) {
                 noticed_s = Some(sampled_s - start_s);
@@ -198,12 +198,12 @@ impl Study for LiftOff {
         // The flight may not have ended yet.
         let patience_s = scenario.run.duration_s + LATE_S;
         while solved && flight.start_s.is_some() && flight.end_s.is_none() {
-            solved = trial.tick(&mut (&mut flight, &mut watch)).is_ok();
+            solved = trial.tick(&mut (&mut flight, &mut contact)).is_ok();
             if trial.time_s() > patience_s {
                 break;
             }
         }
-        let end_s = watch.first_lift_off_s.unwrap_or(trial.time_s());
+        let end_s = contact.first_lift_off_s.unwrap_or(trial.time_s());
         Ok(Row {
             index: index / 2,
             evidence: scenario.controller.contact.evidence,

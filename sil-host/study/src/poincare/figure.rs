@@ -7,7 +7,7 @@ use painleve_chart::{Chart, Mark, Panel, PlotError};
 use plotters::style::RGBColor;
 
 use super::Row;
-use super::outcome::Diagram;
+use super::outcome::PoincareDiagram;
 use crate::cells::Cells;
 use crate::chaos::Regime;
 use crate::outcome::Figure;
@@ -24,14 +24,14 @@ const STRIP: [(Regime, RGBColor); 4] = [
     (Regime::Quiet, RGBColor(0xF2, 0xF2, 0xF2)),
 ];
 
-impl Figure for Diagram {
+impl Figure for PoincareDiagram {
     fn svg(&self) -> Result<String, PlotError> {
         chart(self).svg()
     }
 }
 
 /// Draws the figure for the first friction coefficient and initial condition.
-fn chart(diagram: &Diagram) -> Chart {
+fn chart(diagram: &PoincareDiagram) -> Chart {
     let Cells {
         mu,
         v_belt_m_s,

@@ -15,12 +15,12 @@ use serde::Serialize;
 use super::attractor::advance_or_settle;
 use super::cells::Cells;
 use super::chaos::section::Returns;
-use super::chaos::{Regime, Verdict};
+use super::chaos::{Regime, RegimeVerdict};
 use super::tabular::Tabular;
 use super::{Study, StudyError};
 
 pub use options::Options;
-pub use outcome::{Diagram, Stretch};
+pub use outcome::{PoincareDiagram, RegimeInterval};
 
 /// The diagram, cell by cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +53,7 @@ pub struct Row {
 
 /// One return in the CSV file; a cell without returns has one line without θ1.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
+pub struct ReturnLine {
     mu: f64,
     v_belt_m_s: f64,
     initial: String,
@@ -83,7 +83,7 @@ impl Study for Poincare {
             let until_s = plant.time_s() + self.cells.record_s;
             plant.advance(until_s, &mut returns).map_err(failed)?;
         }
-        let verdict = Verdict::of(returns.returns());
+        let verdict = RegimeVerdict::of(returns.returns());
         Ok(Row {
             mu: cell.mu,
             v_belt_m_s: cell.v_belt_m_s,
@@ -98,10 +98,10 @@ impl Study for Poincare {
 }
 
 impl Tabular for Poincare {
-    type Line = Line;
+    type Line = ReturnLine;
 
-    fn lines(row: &Row) -> Vec<Line> {
-        let line = |theta1_rad| Line {
+    fn lines(row: &Row) -> Vec<ReturnLine> {
+        let line = |theta1_rad| ReturnLine {
             mu: row.mu,
             v_belt_m_s: row.v_belt_m_s,
             initial: row.initial.clone(),

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{Diagram, Poincare, Row, page};
+use super::{Poincare, PoincareDiagram, Row, page};
 use crate::catalogue::{PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
 use crate::tabular::Table;
@@ -37,7 +37,7 @@ impl StudyOptions for Options {
     const NAME: &'static str = "poincare";
     const HAS_SHARDS: bool = true;
     type Study = Poincare;
-    type Outcome = Diagram;
+    type Outcome = PoincareDiagram;
 
     fn study(&self) -> Result<Poincare, StudyError> {
         let cells = self.cells.cells(&self.mu, &self.v_belt)?;
@@ -48,8 +48,8 @@ impl StudyOptions for Options {
         vec![self.cells.scenario().to_owned()]
     }
 
-    fn outcome(study: &Poincare, rows: Vec<Row>) -> Diagram {
-        Diagram::new(study, rows)
+    fn outcome(study: &Poincare, rows: Vec<Row>) -> PoincareDiagram {
+        PoincareDiagram::new(study, rows)
     }
 
     fn table(study: Poincare) -> Option<Box<dyn Table>> {

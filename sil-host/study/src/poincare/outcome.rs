@@ -3,7 +3,7 @@
 use comfy_table::Table;
 use serde::Serialize;
 
-use super::{Line, Poincare, Row};
+use super::{Poincare, ReturnLine, Row};
 use crate::cells::Cells;
 use crate::chaos::Regime;
 use crate::outcome::{self, Outcome};
@@ -11,18 +11,18 @@ use crate::tabular::Tabular;
 
 /// The whole diagram.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Diagram {
+pub struct PoincareDiagram {
     /// All cells, in the order of their numbers.
     pub rows: Vec<Row>,
     /// Intervals of adjacent belt speeds with the same regime.
-    pub stretches: Vec<Stretch>,
+    pub stretches: Vec<RegimeInterval>,
     #[serde(skip)]
     settings: Cells,
 }
 
 /// Adjacent belt speeds with the same regime.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Stretch {
+pub struct RegimeInterval {
     /// Friction coefficient μ.
     pub mu: f64,
     /// Initial condition.
@@ -41,11 +41,11 @@ pub struct Stretch {
     pub greatest_exponent_per_s: Option<f64>,
 }
 
-impl Diagram {
+impl PoincareDiagram {
     /// Collects the rows of a study.
     pub fn new(study: &Poincare, rows: Vec<Row>) -> Self {
         let settings = study.cells.clone();
-        let mut stretches: Vec<Stretch> = Vec::new();
+        let mut stretches: Vec<RegimeInterval> = Vec::new();
         for mu in 0..settings.mu.len() {
             for initial in 0..settings.initial.len() {
                 let place = |v_belt: usize| {
@@ -58,7 +58,7 @@ impl Diagram {
                 let alike = |one: &&Row, other: &&Row| {
                     (one.regime, one.period) == (other.regime, other.period)
                 };
-                stretches.extend(line.chunk_by(alike).filter_map(Stretch::of));
+                stretches.extend(line.chunk_by(alike).filter_map(RegimeInterval::of));
             }
         }
         Self {
@@ -74,7 +74,7 @@ impl Diagram {
     }
 }
 
-impl Stretch {
+impl RegimeInterval {
     fn of(rows: &[&Row]) -> Option<Self> {
         let (first, last) = (rows.first()?, rows.last()?);
         let exponents = || rows.iter().filter_map(|row| row.exponent_per_s);
@@ -91,10 +91,10 @@ impl Stretch {
     }
 }
 
-impl Outcome for Diagram {
-    type Line = Line;
+impl Outcome for PoincareDiagram {
+    type Line = ReturnLine;
 
-    fn lines(&self) -> Vec<Line> {
+    fn lines(&self) -> Vec<ReturnLine> {
         self.rows.iter().flat_map(Poincare::lines).collect()
     }
 

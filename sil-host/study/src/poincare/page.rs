@@ -2,7 +2,7 @@
 
 use painleve_chart::PlotError;
 
-use super::{Diagram, Poincare};
+use super::{Poincare, PoincareDiagram};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
 use crate::figures::page_maker::{PageMaker, list, section};
@@ -16,7 +16,7 @@ use crate::{StudyError, outcome};
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let cells = page.cells("0.6", page.fineness.poincare_v_belt, &[Initial::A])?;
     let study = Poincare { cells };
-    let outcome = Diagram::new(&study, page.rows("Fig. 5: Poincaré", &study)?);
+    let outcome = PoincareDiagram::new(&study, page.rows("Fig. 5: Poincaré", &study)?);
     Ok(vec![(figure_5(&outcome)?, Box::new(outcome))])
 }
 
@@ -24,7 +24,7 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
 ///
 /// # Errors
 /// [`PlotError`] if the figure cannot be drawn.
-fn figure_5(outcome: &Diagram) -> Result<Section, PlotError> {
+fn figure_5(outcome: &PoincareDiagram) -> Result<Section, PlotError> {
     let settings = outcome.settings();
     let command = format!("painleve study poincare --mu {}", list(&settings.mu));
     let mut section = section(

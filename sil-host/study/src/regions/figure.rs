@@ -8,7 +8,7 @@ use painleve_plant::scenario::InitialState;
 use painleve_shared::{Arm, Slip, SolutionMode};
 use plotters::style::RGBColor;
 
-use super::lines::Column;
+use super::lines::RegionColumn;
 use super::{Map, Regions, Theta2};
 use crate::outcome::Figure;
 
@@ -91,9 +91,9 @@ impl Map {
                 .collect()
         };
         // The figure has its own map with a fine grid, independent of the grid of the numbers.
-        let fine: Vec<Option<Column<'_>>> = middles(&theta1_range, FINE_COLUMNS)
+        let fine: Vec<Option<RegionColumn<'_>>> = middles(&theta1_range, FINE_COLUMNS)
             .into_iter()
-            .map(|theta1| Column::new(arm, theta1.to_radians(), self.theta2))
+            .map(|theta1| RegionColumn::new(arm, theta1.to_radians(), self.theta2))
             .collect();
         let p: Vec<f64> = fine
             .iter()

@@ -9,7 +9,7 @@ use crate::belt_line::{BeltLine, bisected, positive_stretches};
 const CURVE_POINTS: usize = 2000;
 
 /// The posture at one θ1 with the tip on the belt.
-pub(super) struct Column<'a> {
+pub(super) struct RegionColumn<'a> {
     arm: &'a Arm<f64>,
     /// Link angles, rad.
     pub(super) theta: LinkMotion<f64>,
@@ -17,7 +17,7 @@ pub(super) struct Column<'a> {
     pub(super) ratio: f64,
 }
 
-impl<'a> Column<'a> {
+impl<'a> RegionColumn<'a> {
     pub(super) fn new(arm: &'a Arm<f64>, theta1: f64, theta2: Theta2) -> Option<Self> {
         let [length_1, length_2] = arm.link_length_m();
         let cosine = arm.height_m() / length_2 - length_1 / length_2 * libm::cos(theta1);
@@ -84,7 +84,8 @@ pub(super) fn zeros_of_p(arm: &Arm<f64>, mu: f64, theta2: Theta2, slip: Slip) ->
 /// Returns the curves along which b = 0: over each interval of θ1 that has such rates, the larger
 /// rates forwards and the smaller rates backwards, closed where they meet.
 pub(super) fn zeros_of_b(arm: &Arm<f64>, reach: f64, theta2: Theta2) -> Vec<Vec<[f64; 2]>> {
-    let roots = |theta1: f64| Column::new(arm, theta1, theta2).and_then(|c| c.rates_of_zero_b());
+    let roots =
+        |theta1: f64| RegionColumn::new(arm, theta1, theta2).and_then(|c| c.rates_of_zero_b());
     let points: Vec<(f64, Option<[f64; 2]>)> = (1..CURVE_POINTS)
         .map(|index| {
             // Denser towards both ends, where θ̇2 grows without bound.

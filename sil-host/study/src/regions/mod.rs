@@ -15,7 +15,7 @@ use painleve_shared::{Arm, ArmParameters, Slip, SolutionMode, range};
 use serde::Serialize;
 
 use super::{Grid, Study, StudyError};
-use lines::{Column, zeros_of_b, zeros_of_p};
+use lines::{RegionColumn, zeros_of_b, zeros_of_p};
 
 pub use options::Options;
 
@@ -40,7 +40,7 @@ impl Theta2 {
 
 /// Settings of the study.
 #[derive(Clone, Debug)]
-pub struct Settings {
+pub struct RegionsStudy {
     /// The arm.
     pub arm: ArmParameters<f64>,
     /// Friction coefficient μ.
@@ -90,14 +90,14 @@ pub struct Map {
     /// Fraction of the cells that is inconsistent.
     pub inconsistent: f64,
     #[serde(skip)]
-    cells: Vec<Cell>,
+    cells: Vec<RegionCell>,
     #[serde(skip)]
     grid: (Vec<f64>, Vec<f64>),
 }
 
 /// One cell, as a line of the CSV file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Cell {
+pub struct RegionCell {
     mu: f64,
     theta2: Theta2,
     slip: Slip,
@@ -119,7 +119,7 @@ struct Columns {
     theta1_deg: Vec<f64>,
 }
 
-impl Settings {
+impl RegionsStudy {
     /// Checks the settings.
     ///
     /// # Errors
@@ -158,7 +158,7 @@ impl Settings {
 }
 
 /// One row per map.
-impl Study for Settings {
+impl Study for RegionsStudy {
     type Row = Map;
 
     fn len(&self) -> usize {
@@ -180,7 +180,7 @@ impl Study for Settings {
 
 impl Regions {
     /// Collects the maps of a study.
-    pub fn new(settings: &Settings, maps: Vec<Map>) -> Self {
+    pub fn new(settings: &RegionsStudy, maps: Vec<Map>) -> Self {
         Self {
             mu: settings.mu,
             reach_deg: settings.reach_rad().to_degrees(),
@@ -193,7 +193,7 @@ impl Regions {
 
 fn map(
     arm: &Arm<f64>,
-    settings: &Settings,
+    settings: &RegionsStudy,
     theta1_deg: &[f64],
     reach: f64,
     theta2: Theta2,
@@ -204,11 +204,11 @@ fn map(
     let mut cells = Vec::with_capacity(theta1_deg.len() * rates.len());
     for &rate in rates {
         for &degrees in theta1_deg {
-            let Some(column) = Column::new(arm, degrees.to_radians(), theta2) else {
+            let Some(column) = RegionColumn::new(arm, degrees.to_radians(), theta2) else {
                 continue;
             };
             let (b, p) = (column.b(rate), column.p(mu, slip));
-            cells.push(Cell {
+            cells.push(RegionCell {
                 mu,
                 theta2,
                 slip,

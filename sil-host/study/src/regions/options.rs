@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use painleve_shared::Slip;
 
-use super::{Map, Regions, Settings, Theta2, page};
+use super::{Map, Regions, RegionsStudy, Theta2, page};
 use crate::catalogue::{PageSection, StudyOptions};
 use crate::figures::page_maker::PageMaker;
 use crate::options::BaseOptions;
@@ -64,16 +64,16 @@ pub struct Options {
 
 impl StudyOptions for Options {
     const NAME: &'static str = "regions";
-    type Study = Settings;
+    type Study = RegionsStudy;
     type Outcome = Regions;
 
-    fn study(&self) -> Result<Settings, StudyError> {
+    fn study(&self) -> Result<RegionsStudy, StudyError> {
         let scenario = self.base.load(&[("belt.friction", "--mu")])?;
         let slips = self.slip.iter().map(|slip| match slip {
             SlipOption::Positive => Slip::Positive,
             SlipOption::Negative => Slip::Negative,
         });
-        let settings = Settings {
+        let settings = RegionsStudy {
             arm: scenario.arm,
             mu: self.mu,
             theta1_deg: self.theta1_deg.clone(),
@@ -85,7 +85,7 @@ impl StudyOptions for Options {
         Ok(settings)
     }
 
-    fn outcome(settings: &Settings, maps: Vec<Map>) -> Regions {
+    fn outcome(settings: &RegionsStudy, maps: Vec<Map>) -> Regions {
         Regions::new(settings, maps)
     }
 

@@ -2,13 +2,13 @@
 
 use comfy_table::Table;
 
-use super::{Cell, Regions, Theta2};
+use super::{RegionCell, Regions, Theta2};
 use crate::outcome::{self, Outcome};
 
 impl Outcome for Regions {
-    type Line = Cell;
+    type Line = RegionCell;
 
-    fn lines(&self) -> Vec<Cell> {
+    fn lines(&self) -> Vec<RegionCell> {
         let cells = self.maps.iter().flat_map(|map| &map.cells);
         cells.copied().collect()
     }

@@ -4,7 +4,7 @@ use painleve_chart::PlotError;
 use painleve_plant::mechanics::PlantParameters;
 use painleve_shared::Slip;
 
-use super::{Map, Regions, Settings, Theta2};
+use super::{Map, Regions, RegionsStudy, Theta2};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
 use crate::figures::page_maker::{PageMaker, section};
@@ -15,7 +15,7 @@ use crate::{StudyError, paper};
 /// # Errors
 /// [`StudyError`] if the study cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
-    let settings = Settings {
+    let settings = RegionsStudy {
         arm: PlantParameters::default().arm,
         mu: paper::FRICTION,
         theta1_deg: "-37:37:0.5".parse()?,

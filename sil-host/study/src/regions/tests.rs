@@ -4,13 +4,13 @@ use painleve_shared::Posture;
 
 use super::*;
 
-fn maps_of(settings: &Settings) -> Result<Regions, StudyError> {
+fn maps_of(settings: &RegionsStudy) -> Result<Regions, StudyError> {
     settings.check()?;
     Ok(Regions::new(settings, crate::rows(settings, || ())?))
 }
 
-fn settings() -> Settings {
-    Settings {
+fn settings() -> RegionsStudy {
+    RegionsStudy {
         arm: ArmParameters::default(),
         mu: 0.6,
         theta1_deg: "-37:37:0.5".parse().unwrap(),
@@ -72,7 +72,7 @@ fn b_is_zero_on_its_line_and_changes_sign_across() {
     let mut points = 0;
     for map in &regions.maps {
         for &[theta1, rate] in map.b_zero.iter().flatten() {
-            let column = Column::new(&arm, theta1.to_radians(), map.theta2).unwrap();
+            let column = RegionColumn::new(&arm, theta1.to_radians(), map.theta2).unwrap();
             let scale = column.b(2.0 * rate + 1.0).abs() + column.b(0.0).abs();
             assert!(
                 column.b(rate).abs() < 1e-9 * scale,
@@ -87,7 +87,7 @@ fn b_is_zero_on_its_line_and_changes_sign_across() {
 
 #[test]
 fn a_grid_out_of_reach_of_the_belt_is_refused() {
-    let settings = Settings {
+    let settings = RegionsStudy {
         theta1_deg: "40,50".parse().unwrap(),
         ..settings()
     };

@@ -2,7 +2,7 @@
 
 use painleve_shared::frame::StatusFlags;
 
-use crate::contact_watch::ContactWatch;
+use crate::contact_probe::ContactProbe;
 use crate::trial::Trial;
 
 /// Counts how often the controller reports flight during a lasting contact.
@@ -15,9 +15,9 @@ pub struct FalseAlarms {
 
 impl FalseAlarms {
     /// Evaluates a completed tick: the contact that the controller reports against the true one.
-    pub fn tick(&mut self, trial: &Trial, watch: &ContactWatch) {
+    pub fn tick(&mut self, trial: &Trial, contact: &ContactProbe) {
         let says = trial.answer().flags.contains(StatusFlags::CONTACT);
-        let slides = watch.captured_s.is_some() && watch.lift_offs == 0 && watch.touches();
+        let slides = contact.captured_s.is_some() && contact.lift_offs == 0 && contact.touches();
         if slides && self.said_contact && !says && trial.fault().is_none() {
             self.count += 1;
         }

@@ -4,10 +4,10 @@ use painleve_chart::style::{BLUE_INK, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
 
 use super::Row;
-use super::outcome::Campaign;
+use super::outcome::RobustnessOutcome;
 use crate::outcome::Figure;
 
-impl Figure for Campaign {
+impl Figure for RobustnessOutcome {
     fn svg(&self) -> Result<String, PlotError> {
         // Thousands of large dots would hide each other, and a hundred small ones are hard to see.
         let size = if self.rows.len() > 2000 { 4 } else { 9 };

@@ -22,7 +22,7 @@ use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
 
 use super::belt_line::BeltLine;
-use super::contact_watch::ContactWatch;
+use super::contact_probe::ContactProbe;
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
@@ -31,7 +31,7 @@ pub use arms::Arms;
 pub use draw::{admissible_m, scenario};
 pub use false_alarms::FalseAlarms;
 pub use options::Options;
-pub use outcome::Campaign;
+pub use outcome::RobustnessOutcome;
 pub use part::Part;
 pub use row::{Ending, Row};
 
@@ -100,16 +100,16 @@ impl Study for Robustness {
         let enabled_s = scenario.run.enable_at_s;
         let mut trial = Trial::new(&scenario)?;
         let start_m = trial.tip_t_m();
-        let mut watch = ContactWatch::new(enabled_s, CAPTURE_S);
+        let mut contact = ContactProbe::new(enabled_s, CAPTURE_S);
         let mut alarms = FalseAlarms::default();
         let (mut of_target_m, mut of_governed_m) = (0.0_f64, 0.0_f64);
         let mut solved = true;
         for _ in 0..scenario.run.ticks() {
-            if trial.tick(&mut watch).is_err() {
+            if trial.tick(&mut contact).is_err() {
                 solved = false;
                 break;
             }
-            alarms.tick(&trial, &watch);
+            alarms.tick(&trial, &contact);
             if trial.time_s() > end_s - WATCHED_S {
                 let tip_m = trial.tip_t_m();
                 let governed_m = trial.answer().reference_tip.to_metres();
@@ -136,7 +136,7 @@ impl Study for Robustness {
             trial.tip_t_m() - stretch.start
         };
         let at_edge = trial.answer().flags.contains(StatusFlags::AT_EDGE);
-        let captured = watch
+        let captured = contact
             .captured_s
             .is_some_and(|start_s| start_s + CAPTURE_S <= enabled_s + CAPTURE_LIMIT_S);
         let ending = if !solved {
@@ -145,7 +145,7 @@ impl Study for Robustness {
             Ending::Fault
         } else if !captured {
             Ending::NotCaptured
-        } else if watch.lift_offs > 0 {
+        } else if contact.lift_offs > 0 {
             Ending::LiftOff
         } else if of_target_m <= tolerance_m {
             Ending::Reached
@@ -163,9 +163,9 @@ impl Study for Robustness {
             index,
             ending,
             fault: trial.fault().map(|fault| fault as u8),
-            capture_s: watch.captured_s.map(|start_s| start_s - enabled_s),
-            lift_offs: watch.lift_offs,
-            first_lift_off_s: watch.first_lift_off_s,
+            capture_s: contact.captured_s.map(|start_s| start_s - enabled_s),
+            lift_offs: contact.lift_offs,
+            first_lift_off_s: contact.first_lift_off_s,
             error_m: if at_edge {
                 of_target_m.min(of_governed_m)
             } else {
@@ -175,7 +175,7 @@ impl Study for Robustness {
             to_edge_m,
             p_ratio,
             false_alarms: alarms.count,
-            slid_s: watch
+            slid_s: contact
                 .captured_s
                 .map_or(0.0, |start_s| trial.time_s() - start_s),
             tip_t_m: trial.tip_t_m(),

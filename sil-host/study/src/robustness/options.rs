@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{Arms, Campaign, Part, Robustness, Row};
+use super::{Arms, Part, Robustness, RobustnessOutcome, Row};
 use crate::StudyError;
 use crate::catalogue::{StudyOptions, in_shards};
 use crate::tabular::Table;
@@ -38,7 +38,7 @@ impl StudyOptions for Options {
     const NAME: &'static str = "robustness";
     const HAS_SHARDS: bool = true;
     type Study = Robustness;
-    type Outcome = Campaign;
+    type Outcome = RobustnessOutcome;
 
     fn study(&self) -> Result<Robustness, StudyError> {
         let parts = self.without.iter().flat_map(|part| part.without());
@@ -54,8 +54,8 @@ impl StudyOptions for Options {
         Ok(study)
     }
 
-    fn outcome(study: &Robustness, rows: Vec<Row>) -> Campaign {
-        Campaign::new(study.arms, study.seed, rows)
+    fn outcome(study: &Robustness, rows: Vec<Row>) -> RobustnessOutcome {
+        RobustnessOutcome::new(study.arms, study.seed, rows)
     }
 
     fn table(study: Robustness) -> Option<Box<dyn Table>> {

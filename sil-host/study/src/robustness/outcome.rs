@@ -14,7 +14,7 @@ const WORST: usize = 20;
 
 /// Outcome of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Campaign {
+pub struct RobustnessOutcome {
     /// The arms of the campaign.
     pub arms: Arms,
     /// Seed of the campaign.
@@ -33,7 +33,7 @@ pub struct Campaign {
     pub rows: Vec<Row>,
 }
 
-impl Campaign {
+impl RobustnessOutcome {
     /// Collects all rows.
     pub fn new(arms: Arms, seed: u64, rows: Vec<Row>) -> Self {
         let mut endings = BTreeMap::new();
@@ -64,7 +64,7 @@ impl Campaign {
     }
 }
 
-impl Outcome for Campaign {
+impl Outcome for RobustnessOutcome {
     type Line = Row;
 
     fn lines(&self) -> Vec<Row> {

@@ -17,13 +17,13 @@ pub enum Part {
     /// Friction estimate; without it the initial friction is taken as certain.
     FrictionEstimate,
     /// Feedforward of the estimated friction; without it the last reading is used, as in the paper.
-    FrictionObserver,
+    FrictionFeedForward,
     /// Integral of the position error.
     PositionIntegral,
     /// Integral of the force error.
     ForceIntegral,
     /// Reduction of the normal force where the torque is limited.
-    PressesLess,
+    ReduceForceWhenTorqueLimited,
     /// Gradual increase of the normal force after landing.
     ForceRamp,
     /// Estimate of unknown torques.
@@ -38,10 +38,10 @@ impl Part {
         Self::Recovery,
         Self::Calibration,
         Self::FrictionEstimate,
-        Self::FrictionObserver,
+        Self::FrictionFeedForward,
         Self::PositionIntegral,
         Self::ForceIntegral,
-        Self::PressesLess,
+        Self::ReduceForceWhenTorqueLimited,
         Self::ForceRamp,
         Self::Disturbance,
     ];
@@ -57,10 +57,12 @@ impl Part {
                 "controller.friction.first_deviation=0.001",
                 "controller.friction.drift_per_sqrt_s=0.0001",
             ],
-            Self::FrictionObserver => &["controller.law.hybrid.friction=measured"],
+            Self::FrictionFeedForward => &["controller.law.hybrid.friction=measured"],
             Self::PositionIntegral => &["controller.law.hybrid.position_integral_gain_per_s3=0"],
             Self::ForceIntegral => &["controller.law.hybrid.force_integral_gain_per_s=0"],
-            Self::PressesLess => &["controller.law.hybrid.presses_less=false"],
+            Self::ReduceForceWhenTorqueLimited => {
+                &["controller.law.hybrid.reduce_force_when_torque_limited=false"]
+            }
             Self::ForceRamp => &["controller.law.hybrid.force_time_constant_s=0"],
             Self::Disturbance => &["controller.disturbance.enabled=false"],
         }

@@ -50,7 +50,7 @@ fn rows(endings: &[(Ending, f64)]) -> Vec<Row> {
 
 #[test]
 fn every_ending_is_counted_and_the_gravest_come_first() {
-    let found = Campaign::new(
+    let found = RobustnessOutcome::new(
         Arms::Paper,
         7,
         rows(&[

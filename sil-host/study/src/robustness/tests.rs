@@ -29,7 +29,7 @@ fn rows_do_not_depend_on_threads() {
     };
     let found = on(1);
     assert_eq!(found, on(3));
-    let outcome = Campaign::new(Arms::Paper, 1, found);
+    let outcome = RobustnessOutcome::new(Arms::Paper, 1, found);
     assert_eq!(outcome.endings.values().sum::<usize>(), 12);
     let failed = 12 - outcome.success.successes;
     assert_eq!(outcome.worst.len(), failed);
@@ -42,7 +42,7 @@ fn most_runs_of_a_held_out_seed_succeed() {
         seed: HELD_OUT_SEED,
         ..campaign(300)
     };
-    let outcome = Campaign::new(Arms::Paper, study.seed, rows(&study, || ()).unwrap());
+    let outcome = RobustnessOutcome::new(Arms::Paper, study.seed, rows(&study, || ()).unwrap());
     assert!(outcome.success.lower > 0.93, "{}", outcome.table());
 }
 
@@ -123,7 +123,7 @@ fn general_arms_succeed_too() {
         seed: 77_003,
         ..campaign(100)
     };
-    let outcome = Campaign::new(Arms::General, study.seed, rows(&study, || ()).unwrap());
+    let outcome = RobustnessOutcome::new(Arms::General, study.seed, rows(&study, || ()).unwrap());
     assert!(outcome.success.successes >= 97, "{}", outcome.table());
 }
 

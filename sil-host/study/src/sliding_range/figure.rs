@@ -4,7 +4,7 @@ use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, ORANGE, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
 
 use super::SlidingRanges;
-use crate::case::Controller;
+use crate::case::ControllerChoice;
 use crate::outcome::Figure;
 
 impl Figure for SlidingRanges {
@@ -23,14 +23,16 @@ impl Figure for SlidingRanges {
                 text: row.title(),
             });
             let colour = match row.controller {
-                Controller::Pid => ORANGE,
-                Controller::HybridPaper | Controller::HybridPaperModel => BLUE_INK,
-                Controller::Hybrid | Controller::Scenario(_) => GREEN,
+                ControllerChoice::Pid => ORANGE,
+                ControllerChoice::HybridPaper | ControllerChoice::HybridPaperModel => BLUE_INK,
+                ControllerChoice::Hybrid | ControllerChoice::Scenario(_) => GREEN,
             };
             let name = match row.controller {
-                Controller::Pid => "PID",
-                Controller::HybridPaper | Controller::HybridPaperModel => "paper's hybrid law",
-                Controller::Hybrid | Controller::Scenario(_) => "hybrid law here",
+                ControllerChoice::Pid => "PID",
+                ControllerChoice::HybridPaper | ControllerChoice::HybridPaperModel => {
+                    "paper's hybrid law"
+                }
+                ControllerChoice::Hybrid | ControllerChoice::Scenario(_) => "hybrid law here",
             };
             let mut line = |name: &'static str, colour, width, points| {
                 let name = if named.contains(&name) { "" } else { name };

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::belt_line::{BeltLine, positive_stretches};
-use super::case::{self, Controller, Converters, Reference};
+use super::case::{self, ControllerChoice, ConverterChoice, Reference};
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
@@ -60,9 +60,9 @@ impl Default for Criterion {
 #[derive(Clone, Debug)]
 pub struct SlidingRange {
     /// Controllers.
-    pub controllers: Vec<Controller>,
+    pub controllers: Vec<ControllerChoice>,
     /// Converter sets.
-    pub converters: Vec<Converters>,
+    pub converters: Vec<ConverterChoice>,
     /// Postures.
     pub postures: Vec<Posture>,
     /// Friction coefficients μ.
@@ -78,7 +78,7 @@ pub struct SlidingRange {
 /// Why the range ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Ending {
+pub enum RangeEnd {
     /// The limit p = 0 is reached.
     Limit,
     /// The tip left the belt.
@@ -89,7 +89,7 @@ pub enum Ending {
     Fault,
 }
 
-impl Ending {
+impl RangeEnd {
     fn name(self) -> &'static str {
         match self {
             Self::Limit => "p = 0",
@@ -104,9 +104,9 @@ impl Ending {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Controller.
-    pub controller: Controller,
+    pub controller: ControllerChoice,
     /// Converter set.
-    pub converters: Converters,
+    pub converters: ConverterChoice,
     /// Posture.
     pub posture: Posture,
     /// Friction coefficient.
@@ -124,14 +124,14 @@ pub struct Row {
     /// Tip position at the end of the run to `z_sliding_m`, m.
     pub tip_t_m: Option<f64>,
     /// Result at the next farther target.
-    pub ends_by: Ending,
+    pub ends_by: RangeEnd,
     /// Farthest target beyond the range that was still reached, m.
     pub reached_beyond_m: Option<f64>,
 }
 
 enum Trialled {
     Reached { tip_t_m: f64 },
-    Failed(Ending),
+    Failed(RangeEnd),
 }
 
 impl SlidingRange {
@@ -203,8 +203,8 @@ impl Tabular for SlidingRange {
 }
 
 struct Case<'a> {
-    controller: &'a Controller,
-    converters: Converters,
+    controller: &'a ControllerChoice,
+    converters: ConverterChoice,
     posture: Posture,
     mu: f64,
     reference: Reference,
@@ -252,7 +252,7 @@ impl Case<'_> {
             limit_m,
             paper_m: paper::sliding_m(&self.scenario, self.controller, self.posture).flatten(),
             tip_t_m: reached.map(|(_, tip_t_m)| tip_t_m),
-            ends_by: failed.map_or(Ending::Limit, |(_, ending)| ending),
+            ends_by: failed.map_or(RangeEnd::Limit, |(_, ending)| ending),
             reached_beyond_m,
         })
     }
@@ -303,10 +303,10 @@ impl Case<'_> {
                 .tick(&mut statistics)
                 .map_err(|source| StudyError::Plant { row: row(), source })?;
             if statistics.lift_offs > 0 {
-                return Ok(Trialled::Failed(Ending::LiftOff));
+                return Ok(Trialled::Failed(RangeEnd::LiftOff));
             }
             if trial.fault().is_some() {
-                return Ok(Trialled::Failed(Ending::Fault));
+                return Ok(Trialled::Failed(RangeEnd::Fault));
             }
             let (now_s, tip_t_m) = (trial.time_s(), trial.tip_t_m());
             if now_s < end_s || (tip_t_m - target_m).abs() > criterion.within_m {
@@ -315,7 +315,7 @@ impl Case<'_> {
                 return Ok(Trialled::Reached { tip_t_m });
             }
         }
-        Ok(Trialled::Failed(Ending::NotReached))
+        Ok(Trialled::Failed(RangeEnd::NotReached))
     }
 }
 

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
-use crate::case::{self, Controller, Converters, Reference};
+use crate::case::{self, ControllerChoice, ConverterChoice, Reference};
 use crate::catalogue::{PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
 use crate::tabular::Table;
@@ -22,7 +22,7 @@ pub struct Options {
         value_delimiter = ',',
         default_value = "pid,hybrid-paper,hybrid-paper-model,hybrid"
     )]
-    controller: Vec<Controller>,
+    controller: Vec<ControllerChoice>,
     /// Converters: ideal (as in the paper), hardware, or the scenario's own.
     #[arg(
         long,
@@ -31,7 +31,7 @@ pub struct Options {
         value_delimiter = ',',
         default_value = "ideal,hardware"
     )]
-    converters: Vec<Converters>,
+    converters: Vec<ConverterChoice>,
     /// Postures to start in.
     #[arg(
         long,

@@ -4,7 +4,7 @@ use painleve_chart::PlotError;
 use painleve_shared::Posture;
 
 use super::{Criterion, Row, SlidingRange, SlidingRanges};
-use crate::case::{Controller, Converters, Reference};
+use crate::case::{ControllerChoice, ConverterChoice, Reference};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section, Verdict};
 use crate::figures::page_maker::{PageMaker, SAMPLED_FRICTION, section};
@@ -16,8 +16,8 @@ use crate::{StudyError, outcome, paper};
 /// [`StudyError`] if the study cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let study = SlidingRange {
-        controllers: Controller::ALL.to_vec(),
-        converters: vec![Converters::Ideal, Converters::Hardware],
+        controllers: ControllerChoice::ALL.to_vec(),
+        converters: vec![ConverterChoice::Ideal, ConverterChoice::Hardware],
         postures: vec![Posture::ElbowDown, Posture::ElbowUp],
         mu: vec![paper::FRICTION],
         references: vec![Reference::MinimumJerk(3.0)],
@@ -28,8 +28,8 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
         },
     };
     let ramps = SlidingRange {
-        controllers: vec![Controller::Pid, Controller::Hybrid],
-        converters: vec![Converters::Ideal],
+        controllers: vec![ControllerChoice::Pid, ControllerChoice::Hybrid],
+        converters: vec![ConverterChoice::Ideal],
         postures: vec![Posture::ElbowDown],
         references: vec![Reference::Ramp(2.0), Reference::Ramp(3.0)],
         ..study.clone()
@@ -76,7 +76,7 @@ fn compared(row: &Row) -> Comparison {
     let here = row.z_sliding_m.map_or("none".into(), |metres| {
         format!("{metres:.4} m of {:.4} m", row.limit_m)
     });
-    let pid_elbow_up = row.controller == Controller::Pid && row.paper_m.is_none();
+    let pid_elbow_up = row.controller == ControllerChoice::Pid && row.paper_m.is_none();
     match row.paper_m {
         Some(paper) => Comparison {
             verdict: row.z_sliding_m.map_or(Verdict::FallsShort, |metres| {

@@ -11,7 +11,7 @@ use super::{SweepError, array};
 
 /// State of the folder, shard by shard.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Status {
+pub struct SweepStatus {
     /// Number of shards.
     pub shards: usize,
     /// Number of rows.
@@ -102,11 +102,11 @@ fn missing_in(contents: &Contents, manifest: &Manifest) -> Vec<usize> {
 ///
 /// # Errors
 /// [`SweepError::Unreadable`] if the folder cannot be listed.
-pub fn status(folder: &Path, manifest: &Manifest) -> Result<Status, SweepError> {
+pub fn status(folder: &Path, manifest: &Manifest) -> Result<SweepStatus, SweepError> {
     Ok(status_of(&Contents::read(folder, manifest)?, manifest))
 }
 
-fn status_of(contents: &Contents, manifest: &Manifest) -> Status {
+fn status_of(contents: &Contents, manifest: &Manifest) -> SweepStatus {
     let missing = missing_in(contents, manifest);
     let mut shards: Vec<usize> = contents
         .whole
@@ -121,7 +121,7 @@ fn status_of(contents: &Contents, manifest: &Manifest) -> Status {
             shard: same[0],
             files: contents.files_of(same[0]),
         });
-    Status {
+    SweepStatus {
         shards: manifest.shards,
         rows: manifest.rows,
         finished: manifest.shards - missing.len(),
@@ -142,7 +142,7 @@ pub fn merge(folder: &Path, manifest: &Manifest) -> Result<Vec<u8>, SweepError> 
     together(shards.collect(), manifest.rows)
 }
 
-fn refuse(status: &Status, folder: &Path) -> Result<(), SweepError> {
+fn refuse(status: &SweepStatus, folder: &Path) -> Result<(), SweepError> {
     let mut reasons = Vec::new();
     if !status.missing.is_empty() {
         reasons.push(format!(

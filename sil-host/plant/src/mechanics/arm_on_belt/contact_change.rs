@@ -2,7 +2,7 @@
 
 use super::super::impact::{self, ImpactKind};
 use super::super::probe::ArmProbe;
-use super::super::transition::{self, Next};
+use super::super::transition::{self, Continuation};
 use super::{ArmOnBelt, MotionError};
 use crate::plant::{ContactMode, Event};
 
@@ -49,7 +49,7 @@ impl ArmOnBelt {
             let next =
                 transition::decide(&motion, self.time_s, &self.state, self.solver.indeterminate);
             match next {
-                Next::Mode(mode) => {
+                Continuation::Mode(mode) => {
                     if mode == ContactMode::Stick && self.mode != ContactMode::Stick {
                         let tip_t_m = motion.tip_t_m(&self.state);
                         self.state = motion.onto_stick(self.time_s, tip_t_m, &self.state);
@@ -58,7 +58,7 @@ impl ArmOnBelt {
                     self.change_mode(mode, probe);
                     return Ok(());
                 }
-                Next::Thrown => {
+                Continuation::Thrown => {
                     self.collide(probe, Event::ImpactWithoutCollision)?;
                     let motion = self.motion();
                     let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;

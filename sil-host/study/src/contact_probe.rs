@@ -4,7 +4,7 @@ use painleve_plant::{Event, Probe, State, Step};
 
 /// Observes when the tip is captured, and whether it leaves the belt again.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactWatch {
+pub struct ContactProbe {
     from_s: f64,
     hold_s: f64,
     contact_since_s: Option<f64>,
@@ -18,7 +18,7 @@ pub struct ContactWatch {
     pub first_lift_off_s: Option<f64>,
 }
 
-impl ContactWatch {
+impl ContactProbe {
     /// Starts observing at `from_s`; a contact that lasts for `hold_s` is a capture.
     pub fn new(from_s: f64, hold_s: f64) -> Self {
         Self {
@@ -38,7 +38,7 @@ impl ContactWatch {
     }
 }
 
-impl Probe for ContactWatch {
+impl Probe for ContactProbe {
     fn step(&mut self, step: &impl Step) {
         if step.end_s() <= self.from_s {
             return;
