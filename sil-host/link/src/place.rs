@@ -121,8 +121,8 @@ mod tests {
         let given = std::os::unix::fs::chown(&foreign, Some(4_242_424), None);
         let foreign = if given.is_ok() { foreign } else { "/".into() };
         for (folder, reason) in [
-            (&file, "no folder"),
-            (&link, "no folder"),
+            (&file, "not a folder"),
+            (&link, "not a folder"),
             (&foreign, "belongs to user"),
         ] {
             let error = make_private(folder).unwrap_err().to_string();
