@@ -137,7 +137,7 @@ fn finished_shards_are_skipped_and_broken_ones_computed_again() {
     }
     let missing = || text(&bench.run(&["sweep", "missing"]));
     assert_eq!(missing(), "3");
-    assert!(text(&run("2")).contains("finished before"));
+    assert!(text(&run("2")).contains("already finished"));
     let whole = read(&bench, "out/sweep/shard-2.csv");
     for broken in [
         &whole[..whole.len() / 2],

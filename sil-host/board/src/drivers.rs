@@ -1,8 +1,8 @@
-//! The board's sensor drivers on this PC, over models of the sensors' chips: the driver in the loop.
+//! Driver in the loop: the board's sensor drivers on this PC, over models of the sensors' chips.
 //!
-//! Counts of the simulated converters are put into the parts and read back through the very drivers that
-//! the board runs, bit by bit, before the controller sees them. Without bit errors the controller sees what
-//! it would have seen natively, and gives the same answers.
+//! The counts of the simulated converters are loaded into the chip models and read back, bit by
+//! bit, through the drivers that run on the board. Without bit errors the controller receives the
+//! same counts as natively and gives the same answers.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -22,7 +22,7 @@ use painleve_shared::message::Health;
 use super::{BoardError, ConnectedBoard, TimedAnswer};
 use crate::timing::Unit;
 
-/// What a sensor without a reading counts: out of every range, which the controller counts as a lapse.
+/// Counts of a sensor without a reading: out of every range, so that the controller counts a lapse.
 const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
 const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
 
@@ -30,7 +30,7 @@ const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
 const ENCODER_BUS_HZ: u64 = 5_250_000;
 const FORCE_BUS_HZ: u64 = 1_312_500;
 
-/// Output of a bridge amplifier without force, and its reference, counts.
+/// Output of a bridge amplifier at zero force, and its reference, counts.
 const BRIDGE_MIDDLE: i32 = 2048;
 
 type Force = ForceCellDriver<
@@ -41,7 +41,7 @@ type Force = ForceCellDriver<
     >,
 >;
 
-/// Drivers, parts and the controller, in this process.
+/// The drivers, the chip models and the controller in this process.
 pub struct Drivers {
     controller: Controller,
     encoders: EncoderDriver<ModelledBus<As5048a>, SelectPin<As5048a>, Clock>,
@@ -54,11 +54,12 @@ pub struct Drivers {
 }
 
 impl Drivers {
-    /// Configured, with this probability of a bit error on every sensor line.
+    /// Creates the drivers and a configured controller, with probability `bit_errors` of a flipped
+    /// bit on every sensor line.
     ///
     /// # Errors
-    /// [`BoardError::Parts`] if the scenario's converters resolve more than the parts, and
-    /// [`BoardError::Refused`] if the configuration is out of range.
+    /// [`BoardError::Parts`] if the scenario's converters have a higher resolution than the parts,
+    /// and [`BoardError::Refused`] if the configuration is out of range.
     pub fn new(configuration: &Configuration, bit_errors: f64) -> Result<Self, BoardError> {
         let [encoder, _] = configuration.converters.encoders;
         let force = configuration.converters.force;
@@ -86,7 +87,7 @@ impl Drivers {
         let force_part = Rc::new(RefCell::new(force_part));
         let select = force_cell::PausedSelect::new(force_bus.attach(&force_part), clock.clone());
         let device = ExclusiveDevice::new_no_delay(force_bus, select);
-        // Pins of a PC do not fail.
+        // The simulated pins cannot fail.
         let Ok(device) = device;
         Ok(Self {
             controller: Controller::new(configuration).map_err(|_| BoardError::Refused)?,
@@ -100,14 +101,14 @@ impl Drivers {
         })
     }
 
-    /// Bits flipped on the sensor lines so far.
+    /// Returns the number of bits flipped on the sensor lines.
     fn bit_errors(&self) -> u64 {
         let encoders = self.encoder_parts.iter();
         let encoders: u64 = encoders.map(|it| it.borrow().bit_errors.count).sum();
         encoders + self.force_part.borrow().bit_errors.count
     }
 
-    /// Gives the parts what the simulated converters have.
+    /// Loads the counts of the simulated converters into the chip models.
     fn present(&self, frame: &SensorFrame) {
         let up = encoders::BITS - self.encoder_bits;
         for (part, joint) in self.encoder_parts.iter().zip(frame.joints) {
@@ -120,7 +121,7 @@ impl Drivers {
             [normal, BRIDGE_MIDDLE, tangential, BRIDGE_MIDDLE, 0, 0, 0, 0];
     }
 
-    /// The frame as the drivers read it.
+    /// Returns the frame as the drivers read it.
     fn read(&mut self, frame: &SensorFrame) -> SensorFrame {
         self.present(frame);
         let joints = self.encoders.read(self.encoder_bits);

@@ -1,10 +1,10 @@
 //! The image under QEMU, in lockstep.
 //!
-//! QEMU's semihosting lets the image read requests from one pipe and write its
-//! responses to another. While it waits for a request its virtual clock stands
-//! still, and under `-icount` every instruction takes the same virtual time: what the image does, and
-//! how many instructions it takes, is the same in every run. They are instructions and not
-//! cycles: QEMU knows no pipeline, no flash wait states and no bus.
+//! Through QEMU's semihosting the image reads requests from one pipe and writes its responses to
+//! another. While it waits for a request, its virtual clock stands still, and under `-icount` every
+//! instruction takes the same virtual time. The image's behaviour and its instruction counts are
+//! therefore the same in every run. The counts are instructions, not cycles: QEMU models no
+//! pipeline, no flash wait states and no bus.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -31,23 +31,23 @@ use crate::timing::Unit;
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
 
-/// Where the workspace builds the image, below its target folder.
+/// Folder of the images, below the workspace's target folder.
 const IMAGES: &str = "thumbv7em-none-eabihf/firmware";
 
-/// Time between two looks at whether the emulator is alive.
+/// Interval between two checks whether the emulator is alive.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Instructions to leave room for between two control ticks: tick, link, and back.
-/// More only makes the emulator spin longer.
+/// Instructions allowed between two control ticks: the tick, the link, and back. A larger value
+/// only makes the emulator spin longer.
 const INSTRUCTIONS_PER_TICK: f32 = 6000.0;
 
-/// The image that the workspace this program was built in has made.
+/// Returns the path of the image in the workspace that built this program.
 pub fn default_image() -> PathBuf {
     built_image("painleve-qemu")
 }
 
-/// The workspace's own build of an image, found from where this program lies; where it would be if
-/// there is none.
+/// Returns the path of the workspace's own build of an image, relative to this program. The image
+/// need not exist.
 pub fn built_image(name: &str) -> PathBuf {
     let image = Path::new(IMAGES).join(name);
     let program = std::env::current_exe().unwrap_or_default();
@@ -60,7 +60,7 @@ pub fn built_image(name: &str) -> PathBuf {
         .unwrap_or(image)
 }
 
-/// Checks that image and emulator are there, before anything is started.
+/// Checks that image and emulator exist, before anything is started.
 ///
 /// # Errors
 /// [`BoardError::ImageMissing`], [`BoardError::EmulatorMissing`].
@@ -75,30 +75,30 @@ pub fn check(image: &Path) -> Result<(), BoardError> {
     Ok(())
 }
 
-/// An image running under QEMU, configured.
+/// A configured image running under QEMU.
 ///
-/// QEMU ends with this value, and with the thread that made it.
+/// QEMU ends when this value is dropped or the thread that created it ends.
 pub struct Emulator {
     process: Guarded,
     requests: File,
     responses: File,
-    /// 2^shift ns of virtual time are one instruction.
+    /// One instruction takes 2^shift ns of virtual time.
     shift: u32,
 }
 
 impl Emulator {
-    /// Starts `image` and gives it its configuration. With `with_log` what it says
-    /// is printed on stderr.
+    /// Starts `image` and sends it its configuration. With `with_log`, prints the image's log on
+    /// stderr.
     ///
     /// # Errors
-    /// [`BoardError`], all of them.
+    /// Any [`BoardError`].
     pub fn start(
         image: &Path,
         configuration: &Configuration,
         with_log: bool,
     ) -> Result<Self, BoardError> {
         check(image)?;
-        // QEMU runs in a folder of its own.
+        // QEMU runs in its own folder.
         let image = image.canonicalize()?;
         let table = with_log
             .then(|| log::LogTable::of_image(&image))
@@ -107,7 +107,7 @@ impl Emulator {
         let pipe = |name| -> io::Result<File> {
             let path = folder.path().join(name);
             mkfifo(&path, Mode::S_IRUSR | Mode::S_IWUSR)?;
-            // Both ways, so that opening does not wait for the other side.
+            // Opened for reading and writing, so that the call does not wait for the other side.
             OpenOptions::new().read(true).write(true).open(path)
         };
         let (requests, responses) = (pipe("requests")?, pipe("responses")?);
@@ -147,13 +147,13 @@ impl Emulator {
             Response::OtherBuild { build } => Err(BoardError::other_build(build)),
             other => Err(BoardError::OutOfTurn(other)),
         }
-        // The folder goes here: both sides have their pipes open.
+        // The folder is removed here: both sides have opened their pipes.
     }
 
     fn request(&mut self, request: &Request<'_>) -> Result<Response, BoardError> {
         let mut buffer = [0; MAXIMUM_LENGTH];
         let bytes = wire::encode(request, &mut buffer)?;
-        // One write, shorter than a pipe's buffer: it arrives whole and never blocks.
+        // A single write, shorter than a pipe's buffer, arrives whole and never blocks.
         self.requests.write_all(bytes)?;
         let mut length = 0;
         while length == 0 || buffer[length - 1] != 0 {
@@ -213,13 +213,14 @@ impl ConnectedBoard for Emulator {
 }
 
 impl Drop for Emulator {
-    /// By force: a QEMU whose image waits in a pipe ignores requests to end.
+    /// Kills QEMU, because it ignores requests to end while its image waits in a pipe.
     fn drop(&mut self) {
         self.process.kill();
     }
 }
 
-/// The slowest processor on which [`INSTRUCTIONS_PER_TICK`] fit into a tick, as QEMU's `shift`.
+/// Returns the slowest processor, as QEMU's `shift`, on which [`INSTRUCTIONS_PER_TICK`] fit into a
+/// tick.
 fn shift_for(tick_hz: f32) -> u32 {
     let ns_per_instruction = 1e9 / tick_hz / INSTRUCTIONS_PER_TICK;
     (ns_per_instruction.log2().floor() as u32).clamp(0, 10)
@@ -235,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_image_is_named_with_the_command_that_makes_it() {
+    fn the_error_about_a_missing_image_names_it_and_the_build_command() {
         let configuration =
             painleve_plant::scenario::Scenario::default().controller_configuration();
         let error = Emulator::start(Path::new("/nowhere/image"), &configuration, false);

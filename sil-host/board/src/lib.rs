@@ -1,11 +1,11 @@
-//! The controller's image on a microcontroller, as the host talks to it.
+//! The host's side of the controller's image on a microcontroller.
 //!
-//! - [`drivers`]: no board, but its sensor drivers on this PC, over models of the chips
+//! - [`drivers`]: the board's sensor drivers on this PC, over models of the sensors' chips
 //! - [`emulator`]: the image under QEMU, in deterministic lockstep
 //! - [`serial`]: a flashed board behind a serial port
-//! - [`log`]: what the image says, decoded with its own table
+//! - [`log`]: the image's log, decoded with the table in the image
 //! - [`on_board`]: a board of this process in a closed loop
-//! - [`timing`]: what control ticks cost, on a board or on this machine
+//! - [`timing`]: the cost of control ticks, on a board or on this machine
 
 pub mod drivers;
 pub mod emulator;
@@ -37,78 +37,78 @@ use crate::timing::Unit;
 pub struct TimedAnswer {
     /// The frame.
     pub frame: ActuatorFrame,
-    /// What the controller's tick took, in [`ConnectedBoard::unit`].
+    /// Cost of the controller's tick, in [`Board::unit`].
     pub cost: u32,
 }
 
-/// A board silent for longer than this hangs; shorter than the link's own limit, so that
-/// the message that is seen is about the board.
+/// Longest silence of a board. It is shorter than the link's silence limit, so that the error names
+/// the board.
 const SILENCE_LIMIT: Duration = Duration::from_millis(1000);
 
-/// A board that has its configuration and answers sensor frames.
+/// A configured board that answers sensor frames.
 pub trait ConnectedBoard {
-    /// What reports call it.
+    /// Name of the host in reports.
     const HOST: &'static str;
 
-    /// What costs are counted in.
+    /// Returns the unit of costs.
     fn unit(&self) -> Unit;
 
-    /// Lets the image control one tick.
+    /// Runs one control tick on the board.
     ///
     /// # Errors
-    /// [`BoardError`] if the image has stopped, hangs or answers wrongly.
+    /// [`BoardError`] if the image has stopped, does not answer or gives an invalid answer.
     fn exchange(&mut self, frame: &SensorFrame) -> Result<TimedAnswer, BoardError>;
 
-    /// What the image has counted.
+    /// Returns the board's counters.
     ///
     /// # Errors
     /// As [`ConnectedBoard::exchange`].
     fn health(&mut self) -> Result<Health, BoardError>;
 
-    /// One sentence about what disturbed the run, if anything did.
+    /// Returns one sentence about disturbances of the run, if there were any.
     fn remark(&self) -> Option<String> {
         None
     }
 
-    /// What the host's end of a line has counted; `None` for a link that loses nothing.
+    /// Returns the counters of the host's end of a line; `None` for a lossless link.
     fn line(&self) -> Option<LineHealth> {
         None
     }
 }
 
-/// What the host's end of a serial line has counted.
+/// Counters of the host's end of a serial line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LineHealth {
     /// Requests that were sent again because no answer came.
     pub repeated_requests: u64,
-    /// Runs of bytes that were no message.
+    /// Byte sequences that were not a message.
     pub garbage: u64,
     /// Messages whose checksum was wrong.
     pub failed_checksums: u64,
 }
 
-/// A configuration as boards get it.
+/// Encodes a configuration for a board.
 fn encode(configuration: &Configuration) -> Result<Vec<u8>, BoardError> {
     postcard::to_stdvec(configuration).map_err(|_| WireError::BufferTooSmall.into())
 }
 
-/// Why a board does not answer.
+/// Failure of a board.
 #[derive(Debug, thiserror::Error)]
 pub enum BoardError {
-    /// There is no image.
-    #[error("no image at {}: build it with `cargo xtask build-fw`, or name one with --elf", .0.display())]
+    /// The image does not exist.
+    #[error("no image at {}: build it with `cargo xtask build-fw`, or give its path with --elf", .0.display())]
     ImageMissing(PathBuf),
     /// The image cannot be read.
     #[error("cannot use the image {}: {reason}", path.display())]
     Image {
         /// The image.
         path: PathBuf,
-        /// What is wrong with it.
+        /// What is wrong with the image.
         reason: String,
     },
-    /// There is no emulator.
+    /// The emulator is not installed.
     #[error(
-        "qemu-system-arm is not installed: `cargo xtask setup`, or `apt-get install qemu-system-arm`"
+        "qemu-system-arm is not installed: run `cargo xtask setup` or `apt-get install qemu-system-arm`"
     )]
     EmulatorMissing,
     /// The serial port cannot be used.
@@ -116,16 +116,16 @@ pub enum BoardError {
     Port {
         /// The port.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the system.
         source: io::Error,
     },
-    /// The emulator has ended by itself.
-    #[error("the emulated board has stopped ({0}): run with --log to see what its image says")]
+    /// The emulator has ended on its own.
+    #[error("the emulated board has stopped ({0}): run with --log to see the log of its image")]
     Ended(ExitStatus),
-    /// Nothing has come for too long.
-    #[error("the board has not answered for {0:.1?}: its image hangs, or is not there")]
+    /// The board has been silent for too long.
+    #[error("the board has not answered for {0:.1?}: its image hangs or is missing")]
     Silent(Duration),
-    /// What has come is no message.
+    /// The received bytes are not a message.
     #[error(
         "the board's answer cannot be read: {0}; its image may be older than this program, see `cargo xtask build-fw`"
     )]
@@ -135,7 +135,7 @@ pub enum BoardError {
         "the image refuses the configuration: it may be older than this program, see `cargo xtask build-fw`"
     )]
     Refused,
-    /// Image and program come from different sources.
+    /// Image and program were built from different sources.
     #[error(
         "the image is of build {board:016x} and this program of build {host:016x}: build both from the same sources, see `cargo xtask build-fw`, and flash again"
     )]
@@ -145,26 +145,26 @@ pub enum BoardError {
         /// This program's build.
         host: u64,
     },
-    /// The board's parts cannot give the counts that are asked for.
-    #[error("{key} = {wanted}: the board's part has {has} bits")]
+    /// The board's parts cannot give the requested counts.
+    #[error("{key} = {wanted}: the board's part has only {has} bits")]
     Parts {
-        /// The setting.
+        /// Key of the setting.
         key: &'static str,
         /// Its value.
         wanted: u8,
-        /// What the part has.
+        /// Bits of the part.
         has: u8,
     },
-    /// A message that does not answer what was asked.
-    #[error("the board answered out of turn with {0:?}")]
+    /// The message does not answer the request.
+    #[error("unexpected answer from the board: {0:?}")]
     OutOfTurn(Response),
-    /// Pipes or processes fail.
+    /// A pipe or a process failed.
     #[error("cannot talk to the board: {0}")]
     System(#[from] io::Error),
 }
 
 impl BoardError {
-    /// The image is of this build.
+    /// Returns the error for an image of another build.
     fn other_build(board: u64) -> Self {
         Self::OtherBuild {
             board,

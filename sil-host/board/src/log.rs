@@ -1,4 +1,4 @@
-//! What an image says with defmt, as text.
+//! Decodes the defmt log of an image.
 
 use std::io::Read;
 use std::path::Path;
@@ -8,14 +8,14 @@ use painleve_system::terminal::warn;
 
 use super::BoardError;
 
-/// The table of an image's messages: they cross as numbers, the text is in the image.
+/// The table of an image's messages. The image sends numbers; the text is in the table.
 pub struct LogTable(defmt_decoder::Table);
 
 impl LogTable {
     /// Reads the table from an image.
     ///
     /// # Errors
-    /// [`BoardError::Image`] if it has none.
+    /// [`BoardError::Image`] if the image has no table.
     pub fn of_image(image: &Path) -> Result<Self, BoardError> {
         let error = |reason: String| BoardError::Image {
             path: image.into(),
@@ -25,10 +25,10 @@ impl LogTable {
         defmt_decoder::Table::parse(&bytes)
             .map_err(|cause| error(cause.to_string()))?
             .map(Self)
-            .ok_or_else(|| error("it has no defmt table".into()))
+            .ok_or_else(|| error("no defmt table in it".into()))
     }
 
-    /// Prints everything from `output` on stderr until it ends, in a thread of its own.
+    /// Prints the log in `output` on stderr until it ends, in its own thread.
     pub fn print_from(self, mut output: impl Read + Send + 'static) {
         std::thread::spawn(move || {
             let mut decoder = self.0.new_stream_decoder();
@@ -38,7 +38,7 @@ impl LogTable {
                 loop {
                     match decoder.decode() {
                         Ok(frame) => warn(format_args!("board: {}", frame.display(false))),
-                        // The stream finds its place again at the next frame.
+                        // The stream resynchronises at the next frame.
                         Err(DecodeError::Malformed) => {}
                         Err(DecodeError::UnexpectedEof) => break,
                     }

@@ -1,4 +1,4 @@
-//! A board that belongs to this process, as the closed loop sees it.
+//! A board of this process as the controller of a closed loop.
 
 use std::time::Instant;
 
@@ -8,16 +8,16 @@ use painleve_shared::frame::SensorFrame;
 use crate::ConnectedBoard;
 use crate::timing::TickTimes;
 
-/// The controller on a board that belongs to this process.
+/// The controller on a board of this process.
 pub struct OnBoard<B> {
     /// The board.
     pub board: B,
-    /// What its ticks have cost.
+    /// Costs of its ticks.
     pub times: TickTimes,
 }
 
 impl<B> OnBoard<B> {
-    /// A board that has its configuration.
+    /// Takes a configured board.
     pub fn new(board: B) -> Self {
         Self {
             board,

@@ -1,8 +1,8 @@
-//! A board behind a serial port, 921,600 baud, 8N1: hardware in the loop.
+//! Hardware in the loop: a board behind a serial port, 921,600 baud, 8N1.
 //!
-//! The board's timer sets the pace: it answers a frame at its next tick. Bytes that are no message
-//! are counted and skipped, here and on the board. A request whose answer does not come is
-//! sent again; a frame that the board has seen before changes nothing there.
+//! The board's timer sets the pace: it answers a frame at its next tick. Both ends count and skip
+//! bytes that are not a message. The host repeats a request that is not answered; a repeated frame
+//! changes nothing on the board.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -25,14 +25,15 @@ use painleve_shared::wire::{self, Inbox, WireError};
 use super::{BoardError, ConnectedBoard, LineHealth, SILENCE_LIMIT, TimedAnswer};
 use crate::timing::Unit;
 
-/// Time in which a board answers anything but a frame.
+/// Time allowed for the answer to any request other than a frame.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// Time in which it answers a frame when nobody minds the wait.
+/// Time allowed for the answer to a frame in lockstep.
 const LOCKSTEP_PATIENCE: Duration = Duration::from_millis(50);
 
-/// The same by the clock, in ticks: a frame can be repeated twice before the board's
-/// patience of [10 ticks](painleve_firmware::supervise::lapses::LapseLimits) is over.
+/// Time allowed for the answer to a frame in real time, in ticks: a frame can be repeated twice
+/// before the board's limit of [10 ticks](painleve_firmware::supervise::lapses::LapseLimits) is
+/// reached.
 const REALTIME_PATIENCE_TICKS: u32 = 3;
 
 /// Checks that the port can be used, before anything is started.
@@ -43,15 +44,15 @@ pub fn check(path: &Path) -> Result<(), BoardError> {
     open(path).map(|_| ())
 }
 
-/// How much longer every further answer is waited for. In lockstep five repetitions fit into
-/// the time that a board may be silent, which is as many as it takes in a row.
+/// Factor by which the allowed time grows with every repetition. In lockstep, five repetitions fit
+/// into the time that a board may be silent, which covers the longest series that occurs.
 const PATIENCE_GROWTH: f32 = 1.5;
 
-/// A flashed board, configured.
+/// A flashed and configured board.
 pub struct Serial {
     port: File,
     inbox: Inbox,
-    /// Bytes that have come and are not yet looked at.
+    /// Received bytes not decoded yet.
     pending: Vec<u8>,
     line: LineHealth,
     frame_patience: Duration,
@@ -60,7 +61,7 @@ pub struct Serial {
 }
 
 impl Serial {
-    /// Opens the port and gives the board its configuration. With [`FrameSource::Realtime`] the
+    /// Opens the port and sends the board its configuration. With [`FrameSource::Realtime`] the
     /// board counts its ticks without a frame, and stops after too many.
     ///
     /// # Errors
@@ -85,7 +86,7 @@ impl Serial {
             silence_limit: SILENCE_LIMIT,
             stopwatch_hz: 0,
         };
-        // Ends whatever the board may have received half.
+        // Terminates a message of which the board may have received a part.
         serial.port.write_all(&[0])?;
         let configuration = super::encode(configuration)?;
         let request = Request::Configure {
@@ -107,13 +108,13 @@ impl Serial {
         Ok(serial)
     }
 
-    /// Sets how long the board may be silent before that is an error; a second at first, so that
-    /// the plant hears of it in time.
+    /// Sets how long the board may be silent before that is an error; initially one second, so that
+    /// the plant receives the error in time.
     pub fn set_silence_limit(&mut self, limit: Duration) {
         self.silence_limit = limit;
     }
 
-    /// Waits for whatever the board says by itself; `None` after `limit`.
+    /// Waits for a message that the board sends unasked; `None` after `limit`.
     ///
     /// # Errors
     /// [`BoardError::System`] if the port fails.
@@ -121,7 +122,7 @@ impl Serial {
         self.receive(limit, |_| true)
     }
 
-    /// Sends a request, again and again, ever more patient, until it is answered.
+    /// Sends a request, and repeats it with growing patience until it is answered.
     fn ask(
         &mut self,
         request: &Request<'_>,
@@ -145,7 +146,7 @@ impl Serial {
         }
     }
 
-    /// Waits for the response that `is_wanted`; others are skipped.
+    /// Waits for the response for which `is_wanted` holds; skips others.
     fn receive(
         &mut self,
         limit: Duration,
@@ -177,7 +178,7 @@ impl Serial {
         }
     }
 
-    /// The first response that `is_wanted` among the bytes that have come.
+    /// Returns the first response among the received bytes for which `is_wanted` holds.
     fn take(&mut self, is_wanted: impl Fn(&Response) -> bool) -> Option<Response> {
         let mut looked_at = 0;
         let mut found = None;
@@ -201,7 +202,7 @@ impl Serial {
     }
 }
 
-/// The board forgets its configuration, if the line still carries the request.
+/// Makes the board discard its configuration, if the line still carries the request.
 impl Drop for Serial {
     fn drop(&mut self) {
         let mut buffer = [0; MAXIMUM_LENGTH];

@@ -1,5 +1,5 @@
-//! The board's sensor drivers in the loop: the same run as without them, and no wrong reading with bit
-//! errors.
+//! The board's sensor drivers in the loop: the run is the same as without them, and bit errors give
+//! no wrong reading.
 
 #![allow(clippy::unwrap_used)]
 
@@ -24,7 +24,7 @@ fn with_drivers(scenario: &Scenario, bit_errors: f64) -> Result<LoopResult, Boar
 }
 
 #[test]
-fn every_built_in_scenario_runs_as_without_drivers() {
+fn every_built_in_scenario_gives_the_same_run_with_the_drivers() {
     let mut compared = 0;
     for name in built_in::names() {
         let scenario = Scenario::load(name, &[]).unwrap();
@@ -35,7 +35,7 @@ fn every_built_in_scenario_runs_as_without_drivers() {
                 assert_eq!(result.log_hash, native.log_hash, "{name}");
                 compared += 1;
             }
-            // Ideal converters resolve more than any part.
+            // Ideal converters have a higher resolution than any part.
             Err(BoardError::Parts { .. }) => assert_eq!(name, "paper-gains"),
             Err(error) => panic!("{name}: {error}"),
         }
@@ -43,7 +43,7 @@ fn every_built_in_scenario_runs_as_without_drivers() {
     assert_eq!(compared, built_in::names().count() - 1);
 }
 
-/// The same with the converters of the board where the scenario has ideal ones.
+/// A scenario with ideal converters, run with the board's converters.
 #[test]
 fn a_scenario_with_ideal_converters_runs_with_those_of_the_board() {
     let overrides = ["converters.encoder.bits=14", "converters.force.bits=13"];
@@ -54,9 +54,10 @@ fn a_scenario_with_ideal_converters_runs_with_those_of_the_board() {
     assert_eq!(result.log_hash, native.log_hash);
 }
 
-/// A lost reading leaves the torque as it was for one tick; a wrong one would throw the tip off the belt.
+/// A lost reading keeps the torque unchanged for one tick; a wrong one would throw the tip off the
+/// belt.
 #[test]
-fn with_bit_errors_the_run_goes_on() {
+fn runs_survive_bit_errors() {
     for name in ["hybrid-elbow-down", "hybrid-elbow-up", "edge"] {
         let scenario = Scenario::load(name, &[]).unwrap();
         let result = with_drivers(&scenario, 1e-4).unwrap();

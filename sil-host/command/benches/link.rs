@@ -1,9 +1,8 @@
-//! What the link alone costs, one sensor frame there and one actuator frame back
-//! between two processes, and beside it what a lockstep tick costs in all: the same
-//! exchange with the plant at one end and the controller at the other.
+//! Cost of the link: the exchange of a sensor frame and an actuator frame between two processes,
+//! alone and as part of a lockstep tick, with the plant at one end and the controller at the other.
 //!
-//! Besides criterion's time per round trip it prints round trips per second and
-//! their percentiles; the maximum is the scheduler's more than the link's.
+//! Besides criterion's time per round trip it prints round trips per second and their percentiles.
+//! The maximum depends on the scheduler more than on the link.
 
 use std::process::{Child, Command, ExitCode};
 use std::time::{Duration, Instant};
@@ -18,10 +17,10 @@ use painleve_plant::simulation::Simulation;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_system::interrupt::Interrupt;
 
-/// Set for the second process: the bus on which it answers.
+/// Environment variable of the second process: the bus on which it answers.
 const BUS: &str = "PAINLEVE_BENCH_BUS";
 const ROUND_TRIPS: u32 = 500_000;
-/// Covers criterion's analysis, during which no frames are sent.
+/// Long enough for criterion's analysis, during which no frames are sent.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
@@ -65,7 +64,7 @@ fn bench() -> Outcome<()> {
     }
 }
 
-/// The default scenario against the program's own controller process.
+/// Runs the default scenario against the program's own controller process.
 fn lockstep() -> Outcome<RoundTrips> {
     let scenario = Scenario::load(built_in::DEFAULT, &["run.duration_s=1000".into()])?;
     let bus = BusName::unique();
@@ -88,7 +87,7 @@ fn lockstep() -> Outcome<RoundTrips> {
     Ok(ticks)
 }
 
-/// The bare exchange of frames with a second process that only echoes them.
+/// The exchange of frames with a second process that echoes them.
 struct PingPong {
     plant: PlantEnd,
     echo: AnsweringProcess,
@@ -130,7 +129,7 @@ impl PingPong {
     }
 }
 
-/// The process that answers; killed if the bench fails.
+/// The answering process; killed if the bench fails.
 struct AnsweringProcess(Child);
 
 impl AnsweringProcess {
@@ -144,7 +143,7 @@ impl AnsweringProcess {
 
 impl Drop for AnsweringProcess {
     fn drop(&mut self) {
-        // Both fail only if it has already ended.
+        // Both calls fail only if the process has already ended.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -164,7 +163,7 @@ fn answer_all(bus: &str) -> Outcome<()> {
     Ok(())
 }
 
-/// Many round trips, each timed.
+/// The times of many round trips.
 struct RoundTrips {
     per_s: f64,
     latency_ns: Histogram<u32>,

@@ -1,4 +1,4 @@
-//! `painleve bridge`: the controller's image on a board, joined to the plant's bus.
+//! `painleve bridge`: connects the controller's image on a board to the plant's bus.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -26,31 +26,31 @@ pub struct BridgeArguments {
 
 #[derive(Debug, Subcommand)]
 enum BridgeTarget {
-    /// The image under QEMU: deterministic, with instruction counts.
+    /// Run the image under QEMU: deterministic, with instruction counts.
     Qemu {
         #[command(flatten)]
         bus: BusArguments,
         #[command(flatten)]
         image: ImageArguments,
     },
-    /// The board's sensor drivers in this process, over models of the sensors' chips.
+    /// Run the controller behind the board's sensor drivers, over models of the sensors' chips.
     Drivers {
         #[command(flatten)]
         bus: BusArguments,
         #[command(flatten)]
         lines: SensorLineArguments,
-        /// Write what every tick cost as JSON.
+        /// Write the cost of every tick as JSON.
         #[arg(long, value_name = "PATH")]
         timing: Option<PathBuf>,
     },
-    /// A flashed board behind a serial port.
+    /// Use a flashed board behind a serial port.
     Serial {
         #[command(flatten)]
         bus: BusArguments,
-        /// The port, as in /dev/ttyUSB0.
+        /// Serial port, for example /dev/ttyUSB0.
         #[arg(long, value_name = "PATH")]
         port: PathBuf,
-        /// Write what every tick cost as JSON.
+        /// Write the cost of every tick as JSON.
         #[arg(long, value_name = "PATH")]
         timing: Option<PathBuf>,
     },
@@ -58,18 +58,18 @@ enum BridgeTarget {
 
 #[derive(Debug, Args)]
 struct BusArguments {
-    /// Bus on which the plant is.
+    /// Bus of the plant.
     #[arg(long)]
     bus: BusName,
-    /// How long to wait for the plant, s.
+    /// Longest wait for the plant, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
     wait_s: f64,
-    /// What the plant runs, for the report.
+    /// Scenario of the plant, for the report.
     #[arg(long, hide = true, default_value = "")]
     scenario_name: String,
 }
 
-/// How the sensors' lines disturb what they carry.
+/// Disturbances of the sensor lines.
 #[derive(Clone, Debug, Default, Args)]
 pub struct SensorLineArguments {
     /// With --host drivers: probability that a bit on a sensor line is flipped.
@@ -80,31 +80,31 @@ pub struct SensorLineArguments {
 fn probability(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if (0.0..=0.1).contains(&value) => Ok(value),
-        _ => Err("give a probability from 0 to 0.1".into()),
+        _ => Err("expected a probability from 0 to 0.1".into()),
     }
 }
 
-/// Which image to run, and what to keep of it.
+/// The image to run, and which of its output to keep.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ImageArguments {
-    /// The controller's image; the workspace's own build by default.
+    /// The controller's image; by default the workspace's own build.
     #[arg(long, value_name = "PATH")]
     elf: Option<PathBuf>,
-    /// Print what the image says.
+    /// Print the image's log.
     #[arg(long)]
     pub log: bool,
-    /// Write what every tick cost as JSON.
+    /// Write the cost of every tick as JSON.
     #[arg(long, value_name = "PATH")]
     pub timing: Option<PathBuf>,
 }
 
 impl ImageArguments {
-    /// The image to run.
+    /// Returns the path of the image.
     pub fn path(&self) -> PathBuf {
         self.elf.clone().unwrap_or_else(emulator::default_image)
     }
 
-    /// The same as command-line arguments, for a child process.
+    /// Returns the same options as command-line arguments for a child process.
     pub fn to_arguments(&self) -> Vec<std::ffi::OsString> {
         let mut arguments = Vec::new();
         for (option, path) in [("--elf", &self.elf), ("--timing", &self.timing)] {
@@ -140,7 +140,7 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
     }
 }
 
-/// A board that is to keep time counts the ticks without a frame.
+/// Returns the board's source of frames: with real-time pacing it counts ticks without a frame.
 fn frame_source(pacing: Pacing) -> FrameSource {
     match pacing {
         Pacing::Lockstep => FrameSource::Lockstep,
@@ -194,7 +194,7 @@ fn carry_until<B: ConnectedBoard>(
         && line != LineHealth::default()
     {
         warn(format_args!(
-            "line: {} requests repeated, {} runs of garbage and {} wrong checksums from the board",
+            "line: {} requests repeated, {} unreadable byte sequences and {} wrong checksums from the board",
             line.repeated_requests, line.garbage, line.failed_checksums
         ));
     }

@@ -1,4 +1,4 @@
-//! `painleve controller`: the firmware's controller in a process of its own.
+//! `painleve controller`: the firmware's controller in its own process.
 
 use std::time::Duration;
 
@@ -16,10 +16,10 @@ use super::{CommandError, or_interrupted};
 /// Options of `painleve controller`.
 #[derive(Debug, Args)]
 pub struct ControllerArguments {
-    /// Bus on which the plant is.
+    /// Bus of the plant.
     #[arg(long)]
     bus: BusName,
-    /// How long to wait for the plant, s.
+    /// Longest wait for the plant, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
     wait_s: f64,
 }

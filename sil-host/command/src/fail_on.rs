@@ -1,23 +1,24 @@
-//! What a finished run may be failed for: `painleve run --fail-on fault,lift-off,missed-deadline`.
+//! Conditions under which a finished run counts as failed: `painleve run --fail-on
+//! fault,lift-off,missed-deadline`.
 
 use clap::ValueEnum;
 use painleve_record::report::RunReport;
 
 use super::CommandError;
 
-/// Something that a run reports and that a test may not want.
+/// A reported event that can fail a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum FailOn {
     /// The controller latched a fault.
     Fault,
-    /// The tip lifted off, be it at the start.
+    /// The tip lifted off, even at the start.
     LiftOff,
-    /// By the clock, a wake-up came later than a whole tick.
+    /// In real time, a wake-up came later than a whole tick.
     MissedDeadline,
 }
 
 impl FailOn {
-    /// What the report says of it, if it happened.
+    /// Returns the report's wording of this event, if it happened.
     fn found(self, report: &RunReport) -> Option<String> {
         match self {
             Self::Fault => report.fault.map(|fault| {
@@ -36,10 +37,10 @@ impl FailOn {
     }
 }
 
-/// Fails a run for what it was asked to.
+/// Fails a run in which any of the `asked` events happened.
 ///
 /// # Errors
-/// [`CommandError::FailedOn`] naming everything that happened.
+/// [`CommandError::FailedOn`], naming all of them.
 pub fn check(asked: &[FailOn], report: &RunReport) -> Result<(), CommandError> {
     let found: Vec<String> = asked.iter().filter_map(|one| one.found(report)).collect();
     if found.is_empty() {

@@ -1,4 +1,4 @@
-//! `painleve figures`: all of the paper's studies, and one page that sets them beside it.
+//! `painleve figures`: all of the paper's studies, on one page with a comparison to the paper.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ pub struct FiguresArguments {
     threads: Threads,
 }
 
-/// The simulations that the paper shows.
+/// The simulations shown in the paper.
 const RUNS: [&str; 4] = [
     "pid-elbow-down",
     "pid-elbow-up",
@@ -39,7 +39,7 @@ const RUNS: [&str; 4] = [
     "hybrid-elbow-up",
 ];
 
-/// Makes everything, study by study; the page comes last.
+/// Computes all studies, then writes the page.
 pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
     let folder = &arguments.out;
     let page_path = folder.join("index.html");
@@ -55,7 +55,8 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
             Box::new(move || bar.inc(1))
         },
     };
-    // Written when all of it is there: no old and new figures stand side by side after Ctrl-C.
+    // Written only when all files are ready, so that Ctrl-C cannot leave old figures beside new
+    // ones.
     let mut files = Vec::new();
     let mut sections = Vec::new();
     for study in STUDIES.iter() {
@@ -93,7 +94,7 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
     say(page_path.display())
 }
 
-/// The files beside the page with the data of a section's outcome.
+/// Returns the data files of a section's outcome, to be written beside the page.
 fn data(
     folder: &Path,
     section: &Section,
@@ -122,7 +123,7 @@ fn simulated(name: &str) -> Result<Section, CommandError> {
     Ok(figures::run::section(&scenario, &result, svg))
 }
 
-/// Draws a run while it goes on.
+/// Draws a run while it is simulated.
 struct Drawing(RunPlot);
 
 impl Monitor for Drawing {

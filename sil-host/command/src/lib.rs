@@ -1,4 +1,4 @@
-//! The `painleve` command: its subcommands, their options, their errors.
+//! The `painleve` command: subcommands, options and errors.
 
 mod bridge;
 mod controller;
@@ -34,7 +34,7 @@ use painleve_system::terminal::{self, warn};
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
 ///
-/// Without a subcommand, `run` is run.
+/// Without a subcommand, `run` is used.
 #[derive(Debug, Parser)]
 #[command(name = "painleve", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
@@ -46,89 +46,90 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Start plant and controller as two processes and report what happened.
+    /// Run plant and controller as two processes and print a report.
     Run(run::RunArguments),
     /// Simulate belt and arm, and wait for a controller on the bus.
     Plant(plant::PlantArguments),
     /// Run the controller for the plant on the bus.
     Controller(controller::ControllerArguments),
-    /// Run the controller's image on a board for the plant on the bus.
+    /// Connect the controller's image on a board to the plant's bus.
     Bridge(bridge::BridgeArguments),
-    /// What control ticks cost: instructions, cycles, or lateness, with the worst of all.
+    /// Report the cost of control ticks: instructions, cycles or wake-up latency, and the worst
+    /// tick.
     Timing(timing::TimingArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
     /// Compute one of the paper's studies as numbers, data files and figures.
     Study(study::StudyArguments),
-    /// Compute a study in shards, on many machines.
+    /// Compute a study in shards, on several machines.
     Sweep(sweep::SweepArguments),
-    /// Make all of the paper's studies, with one page that sets them beside the paper.
+    /// Compute all of the paper's studies, with one page that compares them with the paper.
     Figures(figures::FiguresArguments),
 }
 
 /// Exit code of a process whose peer is missing or has died.
 const PEER_FAILED: u8 = 3;
 
-/// Exit code after a panic that is our own.
+/// Exit code after a panic of this program.
 const INTERNAL_ERROR: u8 = 70;
 
 /// Exit code after Ctrl-C or a request to end.
 const INTERRUPTED: u8 = 130;
-/// Exit code of a run by the clock whose controller was too late too often.
+/// Exit code of a real-time run whose controller missed its deadlines too often.
 const DEADLINES_MISSED: u8 = 5;
 
-/// Exit code of a run in which something happened that it was asked to fail for.
+/// Exit code of a run that met a condition of --fail-on.
 const FAILED_ON: u8 = 6;
 
-/// Why a command failed. Every message is one sentence for the user.
+/// Failure of a command. Every message is one sentence for the user.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
-    /// The scenario is wrong.
+    /// The scenario is invalid.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The run ended early.
     #[error(transparent)]
     Loop(#[from] LoopError),
-    /// The peer is missing, gone or wrong.
+    /// The peer is missing, gone or incompatible.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The board that runs the controller is missing, gone or wrong.
+    /// The board that runs the controller is missing, gone or incompatible.
     #[error(transparent)]
     Board(#[from] BoardError),
-    /// An image that has no bound.
+    /// The cycles of an image cannot be bounded.
     #[error(transparent)]
     Bound(#[from] BoundError),
     /// A file cannot be written.
     #[error("{0}")]
     Output(String),
-    /// Record and figure would replace each other.
-    #[error("--record and --plot both name `{}`: give each a file of its own", .0.display())]
+    /// Record and figure have the same path.
+    #[error("--record and --plot both name `{}`: choose different files", .0.display())]
     SameFile(PathBuf),
-    /// A study has no outcome.
+    /// The study failed.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// There is no sweep, or not all of one.
+    /// The sweep does not exist or is incomplete.
     #[error(transparent)]
     Sweep(#[from] SweepError),
-    /// A process of the run cannot be started or has died.
+    /// A process of the run could not be started or has died.
     #[error("{0}")]
     Process(String),
-    /// A process of the run has failed and said why.
+    /// A process of the run failed and has already printed its error.
     #[error("")]
     Told {
         /// Its exit code.
         code: u8,
     },
-    /// Something happened that the run was asked to fail for.
+    /// The run met a condition of --fail-on.
     #[error("--fail-on: {0}")]
     FailedOn(String),
-    /// By the clock, ticks were late or lost too often in a row.
-    #[error("the controller missed its deadlines and took the torque off: {}", .0.description())]
+    /// In real time, too many consecutive ticks were late or lost.
+    #[error("the controller missed its deadlines and removed the torque: {}", .0.description())]
     DeadlinesMissed(Fault),
     /// Ctrl-C or a request to end.
     #[error("interrupted")]
     Interrupted,
-    /// Whoever reads standard output has had enough.
+    /// The reader of standard output has closed it.
     #[error("")]
     Unread,
 }
@@ -167,7 +168,7 @@ impl CommandError {
 }
 
 impl From<std::io::Error> for CommandError {
-    /// What the system refuses a process, outside files and links.
+    /// Converts an error of the operating system outside files and links.
     fn from(error: std::io::Error) -> Self {
         Self::Process(error.to_string())
     }
@@ -181,11 +182,11 @@ fn say(line: impl std::fmt::Display) -> Result<(), CommandError> {
     })
 }
 
-/// How long Ctrl-C may take from one process of a terminal to the next.
+/// Longest delay of Ctrl-C between two processes of a terminal.
 const CTRL_C_SPREAD: Duration = Duration::from_millis(50);
 
-/// A failure of a process whose peer is on the same terminal: Ctrl-C may have ended the peer
-/// before it was heard here.
+/// Replaces the failure of a process by [`CommandError::Interrupted`] if Ctrl-C arrives shortly
+/// after it: Ctrl-C may have ended the peer before it reached this process.
 fn or_interrupted<T>(
     result: Result<T, CommandError>,
     interrupt: &Interrupt,
@@ -202,30 +203,30 @@ fn or_interrupted<T>(
     result
 }
 
-/// A time in seconds on the command line.
+/// Parses a time in seconds.
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.0..=86_400.0).contains(&seconds) => Ok(seconds),
-        _ => Err("give a number of seconds from 0 to 86400".into()),
+        _ => Err("expected a number of seconds from 0 to 86400".into()),
     }
 }
 
-/// Runs the command line with laws of one's own; see [`main`].
+/// Runs the command line with user-defined laws; see [`main`].
 pub fn main_with<L: ScenarioLaws>() -> ExitCode {
     law_choice::install::<L>();
     main()
 }
 
-/// Runs the command line; the exit code is the process's.
+/// Runs the command line and returns the exit code of the process.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     panic::set_hook(Box::new(tell_panic));
-    // Nothing of what a panic may leave half-done is used afterwards.
+    // Values that a panic may have left inconsistent are not used afterwards.
     let result = panic::catch_unwind(AssertUnwindSafe(|| {
         ignore_file_size_limit()?;
         execute(cli.command.unwrap_or(Command::Run(cli.run)))
     }));
-    // A panic has been told where it happened.
+    // The panic hook has already reported the panic.
     let result = result.unwrap_or(Err(CommandError::Told {
         code: if PANIC_IN_ICEORYX2.load(Ordering::Relaxed) {
             PEER_FAILED
@@ -244,11 +245,11 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// A panic has come from iceoryx2: 0.9.3 does so when the system refuses what it does not expect
-/// to be refused, a file descriptor, say.
+/// Set by a panic in iceoryx2: version 0.9.3 panics when the system unexpectedly refuses a
+/// resource, for example a file descriptor.
 static PANIC_IN_ICEORYX2: AtomicBool = AtomicBool::new(false);
 
-/// One line instead of a trace of calls.
+/// Reports a panic in one line instead of a backtrace.
 fn tell_panic(panic: &PanicHookInfo) {
     let place = panic.location().map_or("", |location| location.file());
     let payload = panic.payload();
@@ -260,18 +261,18 @@ fn tell_panic(panic: &PanicHookInfo) {
     let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
     if place.contains("iceoryx2") {
         PANIC_IN_ICEORYX2.store(true, Ordering::Relaxed);
-        warn(format_args!("error: iceoryx2 cannot go on: {message}"));
+        warn(format_args!("error: iceoryx2 has failed: {message}"));
     } else {
         let line = panic.location().map_or(0, |location| location.line());
         warn(format_args!(
-            "error: this is a fault of painleve, please report it: {message} ({place}:{line})"
+            "error: this is a bug in painleve, please report it: {message} ({place}:{line})"
         ));
     }
 }
 
 fn execute(command: Command) -> Result<(), CommandError> {
     match &command {
-        // These have peers, files or boards to put in order.
+        // These commands clean up peers, files or boards themselves.
         Command::Run(_)
         | Command::Plant(_)
         | Command::Controller(_)

@@ -1,4 +1,4 @@
-//! Where a run's files go, and writing them while it runs.
+//! The output files of a run, written while it runs.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -16,25 +16,25 @@ use painleve_system::terminal::warn;
 
 use super::CommandError;
 
-/// Which files a run writes.
+/// The files that a run writes.
 #[derive(Clone, Debug, Args)]
 pub struct OutputArguments {
     /// Record of every tick, for Foxglove and PlotJuggler.
     #[arg(long, value_name = "PATH", default_value = "out/run.mcap")]
     record: PathBuf,
-    /// Write no record.
+    /// Do not write a record.
     #[arg(long, conflicts_with = "record")]
     no_record: bool,
     /// Figure of the run.
     #[arg(long, value_name = "PATH", default_value = "out/run.svg")]
     plot: PathBuf,
-    /// Write no figure.
+    /// Do not write a figure.
     #[arg(long, conflicts_with = "plot")]
     no_plot: bool,
 }
 
 impl OutputArguments {
-    /// The same as command-line arguments, for a child process.
+    /// Returns the same options as command-line arguments for a child process.
     pub fn to_arguments(&self) -> Vec<std::ffi::OsString> {
         let mut arguments = Vec::new();
         if self.no_record {
@@ -51,7 +51,7 @@ impl OutputArguments {
     }
 }
 
-/// Ticks between two looks at the clock for the progress bar.
+/// Ticks between two updates of the progress bar.
 const PROGRESS_TICKS: u64 = 256;
 
 /// Record, figure and progress bar of a run.
@@ -64,8 +64,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// Opens the files, so that a place that cannot be written is known before
-    /// anything runs.
+    /// Opens the files, so that an unwritable path is reported before anything runs.
     pub fn open(
         arguments: &OutputArguments,
         scenario: &Scenario,
@@ -114,7 +113,7 @@ impl Output {
         })
     }
 
-    /// Keeps what there is of the record of a run that has ended early, and says where.
+    /// Keeps the partial record of a run that ended early, and reports its path.
     pub fn keep_partial(self, reason: &str) {
         self.progress.finish_and_clear();
         if self.tick == 0 {
@@ -125,12 +124,14 @@ impl Output {
             .map(|recorder| recorder.finish_partial(reason))
         {
             None => {}
-            Some(Ok(path)) => warn(format_args!("the record so far is in {}", path.display())),
-            Some(Err(error)) => warn(format_args!("no record is kept: {error}")),
+            Some(Ok(path)) => warn(format_args!("the partial record is in {}", path.display())),
+            Some(Err(error)) => warn(format_args!(
+                "the partial record could not be kept: {error}"
+            )),
         }
     }
 
-    /// Completes the files; without this nothing appears under their names.
+    /// Completes the files; they have no final name before that.
     pub fn finish(self) -> Result<(), CommandError> {
         self.progress.finish_and_clear();
         if let Some(recorder) = self.recorder {
@@ -146,7 +147,7 @@ impl Output {
     }
 }
 
-/// A bar on stderr, where it is a terminal; nothing elsewhere.
+/// Returns a progress bar on stderr if it is a terminal, otherwise a hidden one.
 fn progress_bar(ticks: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(ticks), ProgressDrawTarget::stderr());
     let template = "{bar:40} {percent:>3} %  {pos}/{len} ticks  {eta} left";

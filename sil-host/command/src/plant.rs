@@ -1,4 +1,4 @@
-//! `painleve plant`: the simulated belt and arm in a process of its own.
+//! `painleve plant`: the simulated belt and arm in their own process.
 
 use std::time::{Duration, Instant};
 
@@ -34,16 +34,16 @@ pub struct PlantArguments {
     /// Print one JSON object instead of the table.
     #[arg(long)]
     json: bool,
-    /// How long to wait for the controller, s.
+    /// Longest wait for the controller, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
     wait_s: f64,
-    /// What to call the controller's host in the report.
+    /// Name of the controller's host in the report.
     #[arg(long, hide = true, default_value = "native")]
     host_name: String,
-    /// By the clock, but the clock is a board's: wait for its answers.
+    /// In real time, but paced by the board: wait for its answers.
     #[arg(long, hide = true)]
     board_keeps_time: bool,
-    /// Leave it to `painleve run` to say that the run was interrupted.
+    /// Leave the message about an interruption to `painleve run`.
     #[arg(long, hide = true)]
     started_by_run: bool,
 }
@@ -78,7 +78,7 @@ fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), Co
         Err(error) => {
             let error = or_interrupted(Err(error), interrupt);
             match &error {
-                // What cannot be written any more cannot be kept either.
+                // If the files cannot be written, the partial record cannot be kept either.
                 Ok(()) | Err(CommandError::Loop(LoopError::Monitor(_))) => {}
                 Err(reason) => output.keep_partial(&reason.to_string()),
             }
@@ -87,7 +87,7 @@ fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), Co
     }
 }
 
-/// Whether a fault says that ticks were late or lost, and nothing about the arm.
+/// Returns whether a fault reports late or lost ticks rather than a problem of the arm.
 fn is_of_deadlines(fault: Fault) -> bool {
     [Lapse::Overrun, Lapse::MissingFrame, Lapse::LostFrame]
         .into_iter()

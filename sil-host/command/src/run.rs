@@ -1,4 +1,4 @@
-//! `painleve run`: plant and controller as two processes, started, watched and ended together.
+//! `painleve run`: plant and controller as two processes, started, monitored and ended together.
 
 use std::ffi::OsString;
 use std::io::Read;
@@ -41,18 +41,18 @@ impl std::str::FromStr for Replay {
                 })
             })
             .ok_or_else(|| {
-                "give the campaign's seed and the run's number, SEED:INDEX, as in 1:42".into()
+                "expected the campaign's seed and the number of the run as SEED:INDEX, for example 1:42".into()
             })
     }
 }
 
-/// Which scenario to run, and how.
+/// The scenario and its pacing.
 #[derive(Clone, Debug, Args)]
 pub struct ScenarioArguments {
     /// Built-in scenario or TOML file.
     #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
     name: String,
-    /// The same as an option.
+    /// The same, as an option.
     #[arg(long = "scenario", value_name = "SCENARIO", conflicts_with = "name")]
     option: Option<String>,
     /// Run INDEX of `study robustness --seed SEED` instead of a scenario.
@@ -63,13 +63,13 @@ pub struct ScenarioArguments {
         allow_hyphen_values = true
     )]
     replay: Option<Replay>,
-    /// The arms of that study, if they were not the paper's.
+    /// Arms of that study, if not the paper's.
     #[arg(long, value_enum, default_value = "paper", requires = "replay")]
     arms: Arms,
-    /// Override one key, as in belt.friction=0.4; may be repeated.
+    /// Override one key, for example belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// As fast as it goes and deterministic, or by the clock.
+    /// As fast as possible and deterministic, or in real time.
     #[arg(long, value_enum, default_value = "lockstep")]
     pub pacing: Pacing,
 }
@@ -79,10 +79,10 @@ impl ScenarioArguments {
         self.option.as_deref().unwrap_or(&self.name)
     }
 
-    /// The scenario with its overrides, checked.
+    /// Returns the scenario with its overrides, after validation.
     ///
     /// # Errors
-    /// [`CommandError`] in one sentence for the user.
+    /// [`CommandError`] with one sentence for the user.
     pub fn load(&self) -> Result<Scenario, CommandError> {
         match self.replay {
             Some(Replay { seed, index }) => {
@@ -112,10 +112,10 @@ impl ScenarioArguments {
     }
 }
 
-/// What runs the controller.
+/// Host of the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Host {
-    /// The firmware's controller in a process of its own.
+    /// The firmware's controller in its own process.
     #[default]
     Native,
     /// The controller behind the board's sensor drivers, over models of the sensors' chips.
@@ -134,10 +134,10 @@ pub struct RunArguments {
     /// Bus on which plant and controller meet; unique by default.
     #[arg(long)]
     bus: Option<BusName>,
-    /// What runs the controller.
+    /// Host of the controller.
     #[arg(long, value_enum, default_value_t)]
     host: Host,
-    /// Serial port of the board, as in /dev/ttyUSB0.
+    /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH", required_if_eq("host", "serial"))]
     port: Option<PathBuf>,
     #[command(flatten)]
@@ -146,7 +146,7 @@ pub struct RunArguments {
     lines: SensorLineArguments,
     #[command(flatten)]
     output: OutputArguments,
-    /// End with code 6 if one of these happened; the report is complete all the same.
+    /// Exit with code 6 if one of these events happened; the report is still complete.
     #[arg(long, value_enum, value_name = "EVENTS", value_delimiter = ',')]
     fail_on: Vec<FailOn>,
     /// Print one JSON object on stdout instead of the table.
@@ -154,29 +154,30 @@ pub struct RunArguments {
     json: bool,
 }
 
-/// Children that are started here see each other come and go, so that they
-/// may take their time to start.
+/// Start-up time of a child, s. The processes of a run notice each other's end, so this can be
+/// generous.
 const START_WAIT_S: &str = "10";
 
-/// How often the children are looked at.
+/// Interval between two checks of the children.
 const WATCH: Duration = Duration::from_millis(10);
 
-/// How long the plant may take to notice and tell that the controller is gone.
-/// With stopping it by force, all are gone within 2 s.
+/// Time for the plant to notice and report that the controller is gone. Even with a forced stop
+/// after that, all processes end within 2 s.
 const PLANT_NOTICE: Duration = Duration::from_millis(1000);
 
-/// How long a child may be stopped. The peer's own word, after 1.5 s, comes first.
+/// Longest time for which a child may be stopped. Its peer reports the silence earlier, after
+/// 1.5 s.
 const STOPPED_LIMIT: Duration = Duration::from_millis(1700);
 
-/// How long the controller may take to end after the plant has.
+/// Time for the controller to end after the plant.
 const CONTROLLER_END: Duration = Duration::from_millis(1700);
 
-/// How long a bridge may take to end after the plant has missed it.
+/// Time for a bridge to end after the plant has reported it missing.
 const BRIDGE_END: Duration = Duration::from_millis(300);
 
 /// Runs a scenario as two processes and reports.
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
-    // Before anything is started, so that there is one message about it.
+    // Validate before any process starts, so that an error is reported once.
     arguments.scenario.load()?;
     if arguments.host == Host::Qemu {
         emulator::check(&arguments.image.path())?;
@@ -198,7 +199,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         plant_arguments.push("--board-keeps-time".into());
     }
     let mut plant = RunProcess::start(plant_arguments, &bus, Stdio::inherit())?;
-    // Its complaints matter only while the plant has none, a log at once.
+    // The controller's messages are shown only if the plant has none; a log is shown at once.
     let stderr = if arguments.image.log {
         Stdio::inherit()
     } else {
@@ -209,7 +210,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let status = watch(&mut plant, &mut controller, &interrupt)?;
     let deadlines_missed = status.code() == Some(i32::from(DEADLINES_MISSED));
     if !status.success() && !deadlines_missed {
-        // A plant that blames the controller does not know why a board stopped; its bridge does.
+        // If the plant reports the controller as failed, the bridge's message gives the actual
+        // cause.
         if status.code() == Some(i32::from(PEER_FAILED))
             && arguments.host != Host::Native
             && controller
@@ -249,7 +251,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     fail_on::check(&arguments.fail_on, &report)
 }
 
-/// Waits for the plant's end, and sees to it that one comes.
+/// Waits for the end of the plant, and stops it if necessary.
 fn watch(
     plant: &mut RunProcess,
     controller: &mut RunProcess,
@@ -265,14 +267,14 @@ fn watch(
             return Ok(status);
         }
         if interrupt.is_requested() {
-            // It may keep a part of its record, and say where.
+            // The plant may keep a partial record and report its path.
             plant.child.stop();
             return Err(CommandError::Interrupted);
         }
         if let Some(status) = controller.child.ended()?
             && !status.success()
         {
-            // The plant notices by itself and says so; if it does not, this does.
+            // The plant normally notices this and reports it; otherwise it is reported here.
             if !plant.child.is_stopped()
                 && let Some(plant_status) = plant.wait(PLANT_NOTICE)?
             {
@@ -285,7 +287,7 @@ fn watch(
         for (name, process) in [("plant", &mut *plant), ("controller", &mut *controller)] {
             if process.stopped_for(WATCH) >= STOPPED_LIMIT {
                 return Err(CommandError::Process(format!(
-                    "the {name} process ({}) is stopped: it has been ended",
+                    "the {name} process ({}) was stopped and has been killed",
                     process.child.id()
                 )));
             }
@@ -323,7 +325,7 @@ fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
     line
 }
 
-/// A child with all that it says.
+/// A child process with its output.
 struct RunProcess {
     child: Guarded,
     stdout: Reader,
@@ -366,8 +368,9 @@ impl RunProcess {
         Ok(None)
     }
 
-    /// How long the process has been stopped, when it is looked at every `interval`. Looks
-    /// are counted, not the clock: this process may be stopped along with its children.
+    /// Returns how long the process has been stopped, if it is checked every `interval`. The
+    /// function counts checks rather than time, because this process may be stopped together with
+    /// its children.
     fn stopped_for(&mut self, interval: Duration) -> Duration {
         self.stopped = if self.child.is_stopped() {
             self.stopped + interval
@@ -377,7 +380,7 @@ impl RunProcess {
         self.stopped
     }
 
-    /// What an ended process has said, to be put behind another message.
+    /// Returns the error output of an ended process, as a suffix of another message.
     fn complaint(&mut self) -> String {
         let text = self.stderr.text();
         let text = text.trim().trim_start_matches("error: ");
@@ -389,15 +392,14 @@ impl RunProcess {
     }
 }
 
-/// Reads a pipe while its process runs: one that is not read holds its writer up once it is
-/// full.
+/// Reads a pipe while its process runs: a pipe that is not read blocks its writer once it is full.
 struct Reader(Option<Receiver<Vec<u8>>>);
 
 impl Reader {
-    /// The most that is kept of a pipe, bytes; the rest is read and dropped.
+    /// Bytes of a pipe to keep; the rest is read and discarded.
     const KEPT: u64 = 4 << 20;
-    /// How long a pipe may stay open after its process has ended: on a machine with much
-    /// else to do, what was said takes a while to be read.
+    /// How long a pipe may stay open after its process has ended: on a busy machine, reading the
+    /// output takes a while.
     const PATIENCE: Duration = Duration::from_secs(3);
 
     fn start(pipe: Option<impl Read + Send + 'static>) -> std::io::Result<Self> {
@@ -407,7 +409,7 @@ impl Reader {
         let (sender, receiver) = channel();
         std::thread::Builder::new().spawn(move || {
             let mut text = Vec::new();
-            // What cannot be read is left out.
+            // Unreadable output is left out.
             let _ = pipe.by_ref().take(Self::KEPT).read_to_end(&mut text);
             let _ = std::io::copy(&mut pipe, &mut std::io::sink());
             let _ = sender.send(text);
@@ -415,7 +417,7 @@ impl Reader {
         Ok(Self(Some(receiver)))
     }
 
-    /// Everything that was said, once the process has ended; empty the second time.
+    /// Returns the whole output once the process has ended; empty on a second call.
     fn text(&mut self) -> String {
         let text = self
             .0
@@ -425,7 +427,8 @@ impl Reader {
     }
 }
 
-/// A plant that exits with a code has said why; one that was killed has not.
+/// Returns the error of an ended plant: one that exited with a code has printed its error, one that
+/// was killed has not.
 fn failure(status: ExitStatus) -> CommandError {
     match status.code().and_then(|code| u8::try_from(code).ok()) {
         Some(INTERRUPTED) => CommandError::Interrupted,
@@ -434,7 +437,7 @@ fn failure(status: ExitStatus) -> CommandError {
     }
 }
 
-/// Prints a report for programs or for people.
+/// Prints a report as JSON or as a table.
 pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
     let text = if json {
         serde_json::to_string(report).map_err(|error| CommandError::Output(error.to_string()))?

@@ -1,4 +1,4 @@
-//! `painleve scenarios`: what can be run.
+//! `painleve scenarios`: lists and prints scenarios.
 
 use clap::Args;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
@@ -12,15 +12,15 @@ use super::{CommandError, say};
 pub struct ScenariosArguments {
     /// Print this scenario (a name or a file) as TOML with every key, its range, unit and meaning.
     scenario: Option<String>,
-    /// Print a JSON Schema of scenario files, by which editors complete and check them.
+    /// Print a JSON Schema of scenario files, with which editors complete and check them.
     #[arg(long, conflicts_with = "scenario")]
     schema: bool,
-    /// Override one key of it, as in belt.friction=0.4; may be repeated.
+    /// Override one key, for example belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "scenario")]
     overrides: Vec<String>,
 }
 
-/// Lists the built-in scenarios, or prints one or what one may hold.
+/// Lists the built-in scenarios, or prints one of them or the schema.
 pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     if let Some(name) = &arguments.scenario {
         let scenario = Scenario::load(name, &arguments.overrides)?;
@@ -33,7 +33,7 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     table
         .load_style(UTF8_FULL_CONDENSED)
         .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_header(["scenario", "what it is"]);
+        .set_header(["scenario", "description"]);
     for name in built_in::names() {
         table.add_row([name, &Scenario::load(name, &[])?.description]);
     }

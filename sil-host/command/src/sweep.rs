@@ -1,4 +1,4 @@
-//! `painleve sweep`: a study in shards, on many machines.
+//! `painleve sweep`: a study in shards, on several machines.
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -26,21 +26,21 @@ pub struct SweepArguments {
 
 #[derive(Debug, Subcommand)]
 enum SweepCommand {
-    /// Deal the rows of a campaign out to shards and write the manifest.
+    /// Distribute the rows of a campaign over shards and write the manifest.
     Plan(PlanArguments),
-    /// Compute one shard, or all that are missing; finished ones are skipped.
+    /// Compute one shard, or all missing ones; finished shards are skipped.
     Run(ShardArguments),
     /// Show which shards are finished.
     Status(StatusArguments),
-    /// Print the shards that are not finished in array syntax, as in 3,7,9-12.
+    /// Print the missing shards in array syntax, for example 3,7,9-12.
     Missing(SweepFolder),
-    /// Put all shards together; refuses gaps and duplicates.
+    /// Merge all shards; fails if one is missing or duplicated.
     Merge(MergeArguments),
     /// Write a script that submits the missing shards to a scheduler.
     Submit(SubmitArguments),
 }
 
-/// Which sweep.
+/// Location of a sweep.
 #[derive(Debug, Args)]
 struct SweepFolder {
     /// Folder of the sweep: its manifest and its shards.
@@ -52,7 +52,7 @@ struct SweepFolder {
 struct PlanArguments {
     /// TOML file: study = "bifurcation" and its options, as on the command line.
     campaign: PathBuf,
-    /// How many shards; a few minutes of work each is a good size.
+    /// Number of shards; choose it so that each takes a few minutes.
     #[arg(long, value_name = "N")]
     shards: NonZeroUsize,
     #[command(flatten)]
@@ -61,11 +61,11 @@ struct PlanArguments {
 
 #[derive(Debug, Args)]
 struct ShardArguments {
-    /// Shard K of N, K from 0; by default what the scheduler says in SLURM_ARRAY_TASK_ID,
-    /// HQ_TASK_ID, JOB_COMPLETION_INDEX or OMPI_COMM_WORLD_RANK.
+    /// Shard K of N, K from 0; by default taken from SLURM_ARRAY_TASK_ID, HQ_TASK_ID,
+    /// JOB_COMPLETION_INDEX or OMPI_COMM_WORLD_RANK.
     #[arg(long, value_name = "K/N", allow_hyphen_values = true)]
     shard: Option<ShardOption>,
-    /// Compute all shards that are missing, one after the other.
+    /// Compute all missing shards, one after the other.
     #[arg(long, conflicts_with = "shard")]
     all: bool,
     #[command(flatten)]
@@ -85,7 +85,7 @@ struct StatusArguments {
 
 #[derive(Debug, Args)]
 struct MergeArguments {
-    /// The CSV file; merged.csv in the sweep's folder by default.
+    /// Path of the CSV file; by default merged.csv in the sweep's folder.
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
     /// The same rows as a Parquet file.
@@ -104,7 +104,7 @@ struct SubmitArguments {
 
 #[derive(Debug, Subcommand)]
 enum Scheduler {
-    /// Write sweep.sbatch, a job array of the missing shards; submitting it is up to you.
+    /// Write sweep.sbatch, a job array of the missing shards, but do not submit it.
     Slurm(SlurmArguments),
 }
 
@@ -113,10 +113,10 @@ struct SlurmArguments {
     /// Cores of each shard.
     #[arg(long, value_name = "N", default_value = "1")]
     cpus: NonZeroUsize,
-    /// A further option of sbatch, as in --option=--time=30; may be repeated.
+    /// Additional option of sbatch, for example --option=--time=30; may be repeated.
     #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]
     options: Vec<String>,
-    /// The script; sweep.sbatch in the sweep's folder by default.
+    /// Path of the script; by default sweep.sbatch in the sweep's folder.
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -157,7 +157,7 @@ fn plan(arguments: &PlanArguments) -> Result<(), CommandError> {
     ))
 }
 
-/// The manifest and the study that it describes.
+/// Returns the manifest and the study that it describes.
 fn load(folder: &Path) -> Result<(Manifest, Understood), SweepError> {
     let manifest = Manifest::load(folder)?;
     let understood = understand(&manifest.campaign).map_err(|message| SweepError::Manifest {
@@ -194,7 +194,7 @@ fn compute_shard(
     let name = format!("shard {shard}/{}", manifest.shards);
     if path.exists() {
         match shard_file::read(&path, manifest) {
-            Ok(found) if found.shard == shard => return say(format!("{name}: finished before")),
+            Ok(found) if found.shard == shard => return say(format!("{name}: already finished")),
             Ok(found) => warn(format_args!(
                 "{} holds shard {}: computed again",
                 path.display(),
@@ -203,7 +203,7 @@ fn compute_shard(
             Err(reason) => warn(format_args!("{} {reason}: computed again", path.display())),
         }
     } else {
-        // Whether it can be written is known before anything is computed.
+        // An unwritable path is reported before anything is computed.
         atomic_file::AtomicFile::create(&path).map_err(output)?;
     }
     let share = Share::new(understood.table.as_ref(), shard, manifest.shards);
@@ -278,7 +278,7 @@ fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
     let manifest = Manifest::load(folder)?;
     let array = array::syntax(&folder::missing(folder, &manifest)?);
     if array.is_empty() {
-        return say("every shard is finished: `painleve sweep merge` puts them together");
+        return say("every shard is finished; merge them with `painleve sweep merge`");
     }
     let job = Job {
         program: &std::env::current_exe()?,

@@ -1,4 +1,4 @@
-//! `painleve timing`: what control ticks cost, on every host of the controller.
+//! `painleve timing`: the cost of control ticks, on every host of the controller.
 
 use std::path::PathBuf;
 
@@ -25,23 +25,24 @@ use super::{CommandError, say};
 /// Options of `painleve timing`.
 #[derive(Debug, Args)]
 pub struct TimingArguments {
-    /// Built-in scenarios or TOML files; all that are built in by default.
+    /// Built-in scenarios or TOML files; by default all built-in ones.
     #[arg(value_name = "SCENARIO")]
     names: Vec<String>,
-    /// Override one key of all of them, as in run.tick_hz=10000; may be repeated.
+    /// Override one key in all of them, for example run.tick_hz=10000; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Instructions of the image under QEMU, cycles of a board, or wake-ups of this PC by the clock.
+    /// Count instructions of the image under QEMU, cycles of a board, or wake-up latencies of this
+    /// PC.
     #[arg(long, value_enum, default_value = "qemu")]
     host: Host,
-    /// Serial port of the board, as in /dev/ttyUSB0.
+    /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH", required_if_eq("host", "serial"))]
     port: Option<PathBuf>,
-    /// The controller's image; the workspace's own build by default.
+    /// The controller's image; by default the workspace's own build.
     #[arg(long, value_name = "PATH")]
     elf: Option<PathBuf>,
-    /// Bound the cycles of the flash image's control interrupt from its machine code, with the
-    /// path that attains it, instead of running anything; --elf takes another image.
+    /// Bound the cycles of the flash image's control interrupt from its machine code and show the
+    /// path that attains the bound, instead of running a scenario; --elf selects another image.
     #[arg(long, conflicts_with_all = ["names", "overrides", "host", "port", "svg"])]
     bound: bool,
     /// Print JSON on stdout instead of the table.
@@ -52,7 +53,7 @@ pub struct TimingArguments {
     svg: Option<PathBuf>,
 }
 
-/// Runs every scenario and reports what its ticks cost.
+/// Runs every scenario and reports the cost of its ticks.
 pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
     let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
     if arguments.bound {
@@ -69,7 +70,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         [] => built_in::names().collect(),
         names => names.iter().map(String::as_str).collect(),
     };
-    // Whatever is wrong is said before the first of them runs.
+    // All errors of the scenarios are reported before the first of them runs.
     let scenarios = names
         .iter()
         .map(|name| Scenario::load(name, &arguments.overrides))
@@ -173,7 +174,7 @@ fn out_of_range(scenario: &Scenario, source: painleve_shared::range::OutOfRange)
     }
 }
 
-/// Watches for nothing but a request to end.
+/// Monitors only requests to end.
 struct UntilAsked<'a>(&'a Interrupt);
 
 impl Monitor for UntilAsked<'_> {

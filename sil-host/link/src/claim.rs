@@ -200,8 +200,9 @@ impl Bus {
 
     /// Takes a role on the bus, after removing what killed processes left there.
     ///
-    /// # Errors [`LinkError::Folder`] if the folder cannot be used; [`LinkError::Held`] if another
-    /// process keeps it locked.
+    /// # Errors
+    /// [`LinkError::Folder`] if the folder cannot be used; [`LinkError::Held`] if another process
+    /// keeps it locked.
     pub(super) fn claim(&self, role: Role) -> Result<Result<Claim, Taken>, LinkError> {
         let gate = self.enter()?;
         if gate.0.is_held(role) {

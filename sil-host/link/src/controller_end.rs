@@ -159,7 +159,8 @@ impl ControllerEnd {
     /// nothing has arrived by then. If several frames have arrived, returns the newest; the
     /// discarded ones show as a jump of its `sequence`.
     ///
-    /// # Errors As [`ControllerEnd::receive`]; the silence limit keeps counting across calls.
+    /// # Errors
+    /// As [`ControllerEnd::receive`]; the silence limit keeps counting across calls.
     pub fn receive_newest(&mut self, deadline: Instant) -> Result<Option<Received>, LinkError> {
         let mut newest = self.receive_before(Some(deadline))?;
         while let (Some(Received::Frame(_)), Some(newer)) = (newest, self.take()?) {
@@ -207,8 +208,8 @@ impl ControllerEnd {
     ///
     /// Does not allocate.
     ///
-    /// # Errors [`LinkError::Transport`]. Only [`ControllerEnd::receive`] detects that the plant is
-    /// gone.
+    /// # Errors
+    /// [`LinkError::Transport`]. Only [`ControllerEnd::receive`] detects that the plant is gone.
     #[inline]
     pub fn send(&mut self, frame: &ActuatorFrame) -> Result<(), LinkError> {
         self.guardian

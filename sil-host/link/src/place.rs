@@ -66,8 +66,8 @@ fn is_own(metadata: &Metadata) -> bool {
 
 /// Creates a folder that only this user may enter, or checks that an existing one is private.
 ///
-/// # Errors [`LinkError::Folder`] if it belongs to another user, is not a folder, or cannot be
-/// created.
+/// # Errors
+/// [`LinkError::Folder`] if it belongs to another user, is not a folder, or cannot be created.
 pub(super) fn make_private(folder: &Path) -> Result<(), LinkError> {
     let refuse = |reason: String| LinkError::Folder {
         folder: folder.to_path_buf(),

@@ -134,7 +134,8 @@ impl PlantEnd {
 
     /// Waits until a controller has read the session and is ready for frames.
     ///
-    /// # Errors [`LinkError::ControllerMissing`] after `timeout`; the call may be repeated.
+    /// # Errors
+    /// [`LinkError::ControllerMissing`] after `timeout`; the call may be repeated.
     /// [`LinkError::ControllerSilent`] if a controller has joined but is not ready within the
     /// silence limit. [`LinkError::Interrupted`], [`LinkError::Transport`].
     pub fn wait_for_controller(&mut self, timeout: Duration) -> Result<(), LinkError> {

@@ -1,4 +1,5 @@
-//! Both ends together: threads for what is said, processes for what dies.
+//! Tests of both ends together: in threads for the exchange of messages, in processes for killed
+//! peers.
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ use super::*;
 const PATIENT: Duration = Duration::from_secs(20);
 const SHORT: Duration = Duration::from_millis(100);
 
-/// A bus in a place of its own, so that a test sees what it leaves.
+/// A bus in its own folder, so that a test can see which files remain.
 #[derive(Clone)]
 struct TestBus {
     name: BusName,
@@ -26,7 +27,7 @@ struct TestBus {
     files: Option<Arc<Files>>,
 }
 
-/// The files of a test, removed at its end even if it fails.
+/// The files of a test, removed at its end even if the test fails.
 struct Files {
     folder: tempfile::TempDir,
     prefix: String,
@@ -91,13 +92,13 @@ impl TestBus {
         Ok((controller, session))
     }
 
-    /// A controller in a thread that answers every frame, and its count of them.
+    /// Starts a controller in a thread; it answers every frame and returns their number.
     fn echo(&self) -> thread::JoinHandle<Result<u32, LinkError>> {
         let bus = self.clone();
         thread::spawn(move || answer_all(bus.controller(PATIENT)?.0))
     }
 
-    /// This test binary once more, as one end in a process of its own.
+    /// Starts this test binary again as one end in its own process.
     fn process(&self, role: &str) -> Process {
         let child = Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "tests::end_in_a_process"])
@@ -120,7 +121,7 @@ impl TestBus {
 }
 
 fn find(folder: &Path, prefix: &str, found: &mut Vec<PathBuf>) {
-    // Another run may remove its own meanwhile: what cannot be read is gone.
+    // Another run may be removing its files; an unreadable file counts as removed.
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
         if path.is_dir() {
@@ -131,13 +132,13 @@ fn find(folder: &Path, prefix: &str, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// What [`end_in_a_process`] says once its end is open.
+/// Line that [`end_in_a_process`] prints once its end is open.
 const OPEN: &str = "end is open";
 const ROLE: &str = "PAINLEVE_TEST_ROLE";
 const BUS: &str = "PAINLEVE_TEST_BUS";
 const FOLDER: &str = "PAINLEVE_TEST_FOLDER";
 
-/// Killed, as by SIGKILL, when dropped.
+/// Killed with SIGKILL when dropped.
 struct Process(Child);
 
 impl Process {
@@ -161,7 +162,7 @@ impl Drop for Process {
     }
 }
 
-/// Not a test: one end, in the process that [`TestBus::process`] starts.
+/// Not a test, but one end in the process that [`TestBus::process`] starts.
 #[test]
 #[ignore = "the other process of a test"]
 fn end_in_a_process() {
@@ -186,7 +187,7 @@ fn end_in_a_process() {
                 plant.exchange(&sensor(tick)).unwrap();
             }
         }
-        // A controller that holds the bus and says nothing.
+        // A controller that holds the bus but never answers.
         "mute" => {
             let _end = bus.controller(PATIENT).unwrap();
             println!("{OPEN}");
@@ -230,7 +231,7 @@ fn answer_all(mut controller: ControllerEnd) -> Result<u32, LinkError> {
 }
 
 #[test]
-fn every_tick_goes_there_and_back() {
+fn every_frame_is_answered() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let controller = bus.echo();
@@ -246,7 +247,7 @@ fn every_tick_goes_there_and_back() {
 }
 
 #[test]
-fn a_late_controller_learns_the_session_and_gets_the_frames_from_then_on() {
+fn a_late_controller_receives_the_session_and_all_further_frames() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     for tick in 0..10 {
@@ -292,7 +293,7 @@ fn frames_sent_in_a_burst_arrive_in_order_and_before_the_end() {
     }
     plant.end().unwrap();
     sent.send(()).unwrap();
-    // More than fit: the oldest six are lost.
+    // More than the buffer holds: the oldest six are dropped.
     assert_eq!(controller.join().unwrap(), (6..burst).collect::<Vec<_>>());
     bus.assert_nothing_left();
 }
@@ -320,7 +321,7 @@ fn answers_are_received_without_waiting() {
 }
 
 #[test]
-fn a_second_plant_is_refused_and_the_first_goes_on() {
+fn a_second_plant_is_refused_and_the_first_continues() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let error = bus.plant().err().unwrap();
@@ -336,7 +337,7 @@ fn a_second_plant_is_refused_and_the_first_goes_on() {
 }
 
 #[test]
-fn a_second_controller_is_refused_and_the_first_goes_on() {
+fn a_second_controller_is_refused_and_the_first_continues() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let controller = bus.echo();
@@ -351,7 +352,7 @@ fn a_second_controller_is_refused_and_the_first_goes_on() {
 }
 
 #[test]
-fn buses_side_by_side_never_meet() {
+fn simultaneous_buses_do_not_interfere() {
     let a = TestBus::new();
     let b = TestBus {
         name: BusName::unique(),
@@ -373,7 +374,7 @@ fn buses_side_by_side_never_meet() {
 }
 
 #[test]
-fn a_missing_plant_is_an_error_that_says_what_to_start() {
+fn the_error_about_a_missing_plant_names_the_command_to_start() {
     let bus = TestBus::new();
     let error = bus.controller(SHORT).err().unwrap();
     assert!(matches!(error, LinkError::PlantMissing { .. }));
@@ -383,7 +384,7 @@ fn a_missing_plant_is_an_error_that_says_what_to_start() {
 }
 
 #[test]
-fn a_missing_controller_is_an_error_that_says_what_to_start() {
+fn the_error_about_a_missing_controller_names_the_command_to_start() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let error = plant.wait_for_controller(SHORT).unwrap_err();
@@ -397,7 +398,7 @@ fn a_missing_controller_is_an_error_that_says_what_to_start() {
 }
 
 #[test]
-fn a_plant_that_leaves_without_ending_the_session_is_noticed() {
+fn a_plant_that_leaves_without_ending_the_session_is_detected() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let controller = bus.echo();
@@ -412,7 +413,7 @@ fn a_plant_that_leaves_without_ending_the_session_is_noticed() {
 }
 
 #[test]
-fn an_answer_to_another_tick_is_an_error() {
+fn an_answer_to_a_wrong_tick_is_an_error() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let controller = {
@@ -438,7 +439,7 @@ fn an_answer_to_another_tick_is_an_error() {
 }
 
 #[test]
-fn a_silent_controller_is_noticed_though_it_lives() {
+fn a_silent_live_controller_is_detected() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let _mute = bus.process("mute");
@@ -459,7 +460,7 @@ fn a_silent_controller_is_noticed_though_it_lives() {
 }
 
 #[test]
-fn a_silent_plant_is_noticed_though_it_lives() {
+fn a_silent_live_plant_is_detected() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let controller = {
@@ -478,14 +479,14 @@ fn a_silent_plant_is_noticed_though_it_lives() {
 }
 
 #[test]
-fn a_killed_controller_is_noticed_and_the_bus_can_be_used_again() {
+fn a_killed_controller_is_detected_and_the_bus_can_be_used_again() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let mut killed = bus.process("controller");
     plant.wait_for_controller(PATIENT).unwrap();
     plant.exchange(&sensor(0)).unwrap();
     killed.kill();
-    // Long before the silence limit, which would be another error.
+    // Well before the silence limit, which would give another error.
     assert!(matches!(
         plant.exchange(&sensor(1)),
         Err(LinkError::ControllerGone { .. })
@@ -499,7 +500,7 @@ fn a_killed_controller_is_noticed_and_the_bus_can_be_used_again() {
     };
     assert!(matches!(error, LinkError::ControllerGone { .. }));
 
-    // The surviving plant can go on with another controller...
+    // The surviving plant can continue with another controller...
     let controller = bus.echo();
     plant.wait_for_controller(PATIENT).unwrap();
     plant.exchange(&sensor(3)).unwrap();
@@ -509,7 +510,7 @@ fn a_killed_controller_is_noticed_and_the_bus_can_be_used_again() {
 }
 
 #[test]
-fn a_killed_plant_is_noticed_and_the_bus_can_be_used_again() {
+fn a_killed_plant_is_detected_and_the_bus_can_be_used_again() {
     let bus = TestBus::new();
     let mut killed = bus.process("plant");
     let (mut survivor, _) = bus.controller(PATIENT).unwrap();
@@ -520,7 +521,7 @@ fn a_killed_plant_is_noticed_and_the_bus_can_be_used_again() {
         survivor.send(&answer(&frame)).unwrap();
     }
     killed.kill();
-    // A new plant comes up while the survivor is still there.
+    // A new plant starts while the surviving controller is still there.
     let restarted = {
         let bus = bus.clone();
         thread::spawn(move || {
@@ -546,7 +547,7 @@ fn a_killed_plant_is_noticed_and_the_bus_can_be_used_again() {
 }
 
 #[test]
-fn what_two_killed_processes_leave_is_removed_by_the_next() {
+fn the_next_run_removes_the_files_of_two_killed_processes() {
     let bus = TestBus::new();
     let mut plant = bus.process("plant");
     let mut mute = bus.process("mute");
@@ -564,7 +565,7 @@ fn what_two_killed_processes_leave_is_removed_by_the_next() {
 }
 
 #[test]
-fn ctrl_c_is_left_alone() {
+fn the_link_installs_no_signal_handlers() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let controller = bus.echo();
@@ -581,8 +582,8 @@ fn ctrl_c_is_left_alone() {
     controller.join().unwrap().unwrap();
 }
 
-/// The place of a bus, and a controller that has died there in the middle of something: it has
-/// joined, and left a segment of size zero.
+/// The place of a bus on which a controller died after it had joined and created a segment of size
+/// zero.
 fn dead_controller(bus: &TestBus) -> PathBuf {
     let bus = claim::Bus {
         name: bus.name.clone(),
@@ -597,7 +598,7 @@ fn dead_controller(bus: &TestBus) -> PathBuf {
 }
 
 #[test]
-fn what_a_controller_left_that_died_while_it_joined_is_in_nobodys_way() {
+fn files_of_a_controller_that_died_while_joining_do_not_block_the_next() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
     let segment = dead_controller(&bus);
@@ -611,7 +612,7 @@ fn what_a_controller_left_that_died_while_it_joined_is_in_nobodys_way() {
 }
 
 #[test]
-fn a_call_that_a_dead_peers_segment_holds_up_ends_and_a_living_ones_stays() {
+fn a_dead_peers_half_made_segment_is_removed_and_a_live_peers_is_kept() {
     let test = TestBus::new();
     let bus = claim::Bus {
         name: test.name.clone(),
@@ -622,12 +623,12 @@ fn a_call_that_a_dead_peers_segment_holds_up_ends_and_a_living_ones_stays() {
     run.set_ready().unwrap();
     let guardian = guardian::Guardian::start(&claim).unwrap();
     let segment = dead_controller(&test);
-    // While a controller lives, nothing of it is touched: it may be making this right now.
+    // A live controller's segment stays, because the controller may still be creating it.
     let peer = bus.claim(claim::Role::Controller).unwrap().unwrap();
     guardian.during(|| thread::sleep(Duration::from_millis(1200)));
     assert!(segment.exists());
     drop(peer);
-    // As iceoryx2 waits: for ever, unless the name goes.
+    // Waits as iceoryx2 does: until the name disappears.
     guardian.during(|| {
         while segment.exists() {
             thread::sleep(Duration::from_millis(1));
@@ -636,7 +637,7 @@ fn a_call_that_a_dead_peers_segment_holds_up_ends_and_a_living_ones_stays() {
 }
 
 #[test]
-fn waiting_ends_when_it_is_asked_to() {
+fn an_interrupt_ends_a_wait() {
     let bus = TestBus::new();
     let interrupt = Interrupt::default();
     let mut plant =

@@ -1,12 +1,12 @@
 //! Output files that appear whole or not at all.
 //!
-//! An [`AtomicFile`] is written under a temporary name beside its target and takes
-//! the target's name in [`commit`](AtomicFile::commit), after the data is on the
-//! disk. Dropped before that, it leaves nothing; an older file stays as it was.
+//! An [`AtomicFile`] is written under a temporary name beside its target.
+//! [`commit`](AtomicFile::commit) gives it the target's name once the data is on the disk. If it is
+//! dropped before that, it is removed, and an older file stays unchanged.
 //!
-//! The temporary file is locked as long as its process lives. What killed processes have
-//! left, the next file of the same name removes. A symbolic link stays: the file that it
-//! names is replaced.
+//! The temporary file is locked while its process lives. The next file of the same name removes the
+//! temporary files of killed processes. A symbolic link is kept; the file that it points to is
+//! replaced.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -16,64 +16,64 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-/// Why an output file could not be written.
+/// Failure to write an output file.
 #[derive(Debug, thiserror::Error)]
 pub enum AtomicFileError {
     /// The path is a folder, a device, or has no file name.
     #[error("`{path}` cannot be an output file: give the path of a regular file in a folder")]
     NotAFile {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
     },
-    /// A folder on the way does not exist and cannot be made.
+    /// A parent folder does not exist and cannot be created.
     #[error(
         "cannot create the folder `{folder}` for `{path}`: {source}; choose a path that can be written"
     )]
     Folder {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
         /// Its folder.
         folder: PathBuf,
-        /// The operating system's reason.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// There is such a file already, and it was to be a new one.
-    #[error("`{path}` is there already")]
+    /// The file exists already, but a new one was requested.
+    #[error("`{path}` already exists")]
     Exists {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
     },
-    /// The folder, or the disk under it, does not take the file.
+    /// The folder or its disk does not accept the file.
     #[error("cannot write `{path}`: {source}; choose a path that can be written and has space")]
     Write {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
-        /// The operating system's reason.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
-/// A file that gets its name when it is complete.
+/// A file that receives its name when it is complete.
 #[derive(Debug)]
 pub struct AtomicFile {
-    /// As it was given, for messages.
+    /// The path as given, for messages.
     path: PathBuf,
     folder: PathBuf,
     target: PathBuf,
     temporary: NamedTempFile,
-    /// No file may be replaced.
+    /// Whether an existing file must not be replaced.
     is_new: bool,
-    /// Bytes that still fit, for tests of a disk that fills up.
+    /// Remaining bytes, for tests of a full disk.
     #[cfg(any(test, feature = "full-disk"))]
     pub room: usize,
 }
 
 impl AtomicFile {
-    /// Opens a temporary file beside `path`, making missing folders.
+    /// Opens a temporary file beside `path` and creates missing folders.
     ///
     /// # Errors
-    /// [`AtomicFileError`] if `path` is something other than a regular file, or its
-    /// folder cannot be made or written.
+    /// [`AtomicFileError`] if `path` is something other than a regular file, or its folder cannot
+    /// be created or written to.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self, AtomicFileError> {
         let path = path.into();
         let Some((folder, name)) = place(&path) else {
@@ -102,21 +102,21 @@ impl AtomicFile {
         }
     }
 
-    /// The name the file will have, as it was given.
+    /// Returns the final path of the file, as given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The name the file will have, symbolic links followed.
+    /// Returns the final path of the file, with symbolic links resolved.
     pub fn target(&self) -> &Path {
         &self.target
     }
 
-    /// Brings the data to the disk and gives the file its name.
+    /// Writes the data to the disk and gives the file its name.
     ///
     /// # Errors
-    /// [`AtomicFileError::Write`] if the disk is full or the name cannot be taken;
-    /// nothing is left then.
+    /// [`AtomicFileError::Write`] if the disk is full or the name is not available; the file is
+    /// then removed.
     pub fn commit(self) -> Result<(), AtomicFileError> {
         let Self {
             path,
@@ -145,8 +145,9 @@ impl AtomicFile {
         sync_folder(&folder).map_err(write)
     }
 
-    /// Brings what there is of the data to the disk, under a name that says so:
-    /// `run.partial.mcap` for `run.mcap`, which stays as it was. That name is returned.
+    /// Writes the data received up to now to the disk under a name that marks it as partial, for
+    /// example `run.partial.mcap` for `run.mcap`, and returns that path. An older `run.mcap` stays
+    /// unchanged.
     ///
     /// # Errors
     /// As [`AtomicFile::commit`].
@@ -188,9 +189,9 @@ impl Seek for AtomicFile {
     }
 }
 
-/// The folder and the name of a file to be; a symbolic link is followed. `None` if something
-/// else than a regular file is there: renaming onto a folder would fail only at the end, and
-/// onto a device would replace the device.
+/// Returns the folder and the name of a future file, with symbolic links resolved. `None` if the
+/// path is something other than a regular file: renaming onto a folder would fail only at the end,
+/// and renaming onto a device would replace the device.
 fn place(path: &Path) -> Option<(PathBuf, OsString)> {
     let followed = match fs::symlink_metadata(path) {
         Ok(metadata) if metadata.is_symlink() => fs::canonicalize(path).ok()?,
@@ -209,7 +210,7 @@ fn place(path: &Path) -> Option<(PathBuf, OsString)> {
     Some((folder.to_path_buf(), name))
 }
 
-/// A locked temporary file, after those of processes that have died are removed.
+/// Creates a locked temporary file, after removing those of dead processes.
 fn temporary(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
     let prefix = format!(".{}.", name.to_string_lossy());
     remove_abandoned(folder, &prefix);
@@ -217,12 +218,12 @@ fn temporary(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
         let temporary = tempfile::Builder::new()
             .prefix(&prefix)
             .suffix(SUFFIX)
-            // Temporary files are private by default; an output file is not.
+            // Temporary files are private by default; an output file must not be.
             .permissions(fs::Permissions::from_mode(0o666))
             .tempfile_in(folder)?;
-        // Where files cannot be locked they are not removed either.
+        // On a file system without locks, abandoned files are not removed either.
         let _ = temporary.as_file().try_lock();
-        // Another process may have taken it for an abandoned one before it was locked.
+        // Before it was locked, another process may have removed it as abandoned.
         let own = temporary.as_file().metadata()?.ino();
         if fs::symlink_metadata(temporary.path()).is_ok_and(|there| there.ino() == own) {
             return Ok(temporary);
@@ -245,17 +246,17 @@ fn remove_abandoned(folder: &Path, prefix: &str) {
     }
 }
 
-/// Brings a new name to the disk, too.
+/// Writes the new directory entry to the disk.
 fn sync_folder(folder: &Path) -> io::Result<()> {
     match File::open(folder).and_then(|folder| folder.sync_all()) {
-        // Not every file system can.
+        // Some file systems do not support this.
         Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
         other => other,
     }
 }
 
-/// Writes a whole file in one go, unless there is one of this name. Of several writers at
-/// once one succeeds.
+/// Writes a whole new file; fails if the path exists. If several processes write at once, one
+/// succeeds.
 ///
 /// # Errors
 /// [`AtomicFileError::Exists`], and those of [`AtomicFile`].
@@ -265,10 +266,10 @@ pub fn write_new(path: impl Into<PathBuf>, contents: &[u8]) -> Result<(), Atomic
     finish(file, contents)
 }
 
-/// Writes a whole file in one go.
+/// Writes a whole file.
 ///
 /// # Errors
-/// Those of [`AtomicFile`]; nothing is left then.
+/// Those of [`AtomicFile`]; the file is then removed.
 pub fn write(path: impl Into<PathBuf>, contents: &[u8]) -> Result<(), AtomicFileError> {
     finish(AtomicFile::create(path)?, contents)
 }
@@ -317,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_process_has_left_is_removed_and_what_is_being_written_is_not() {
+    fn files_of_killed_processes_are_removed_and_files_being_written_are_kept() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.svg");
         let writing = AtomicFile::create(&path).unwrap();
@@ -331,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_symbolic_link_stays_and_what_it_names_is_replaced() {
+    fn a_symbolic_link_is_kept_and_its_target_is_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let (file, link) = (folder.path().join("file"), folder.path().join("link"));
         fs::write(&file, "old").unwrap();
@@ -339,7 +340,7 @@ mod tests {
         write(&link, b"new").unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&file).unwrap(), b"new");
-        // One that leads nowhere cannot be followed.
+        // A link that leads nowhere cannot be resolved.
         fs::remove_file(&file).unwrap();
         assert!(matches!(
             AtomicFile::create(&link),
@@ -348,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn part_of_a_file_is_kept_under_a_name_that_says_so() {
+    fn a_partial_file_is_kept_under_a_partial_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         fs::write(&path, "old").unwrap();
@@ -381,19 +382,19 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn devices_are_refused_and_an_unwritable_folder_is_told_by_the_file_s_own_name() {
+    fn devices_are_refused_and_an_unwritable_folder_is_reported_with_the_name_of_the_file() {
         assert!(matches!(
             AtomicFile::create("/dev/null"),
             Err(AtomicFileError::NotAFile { .. })
         ));
-        // Nobody may make files there, not even root.
+        // No user may create files there, not even root.
         let error = write("/proc/run.svg", b"").unwrap_err().to_string();
         assert!(error.contains("cannot write `/proc/run.svg`"), "{error}");
     }
 
     #[cfg(unix)]
     #[test]
-    fn others_may_read_an_output_file_as_far_as_the_umask_lets_them() {
+    fn an_output_file_has_the_permissions_of_the_umask() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
         let plain = folder.path().join("plain");

@@ -1,4 +1,4 @@
-//! Text files from outside, read within bounds.
+//! Reads text files of limited size.
 
 use std::fs::OpenOptions;
 use std::io::{self, Read};
@@ -7,17 +7,17 @@ use std::path::Path;
 
 use nix::libc::O_NONBLOCK;
 
-/// The most that a text file of settings may hold, bytes. Real ones have a few thousand.
+/// Largest size of a settings file, bytes. Real ones have a few thousand.
 pub const MOST_BYTES: u64 = 16 << 20;
 
-/// Reads a regular file that holds at most [`MOST_BYTES`]. A pipe or a device could hold the
-/// process up, or give bytes without end.
+/// Reads a regular file of at most [`MOST_BYTES`]. Pipes and devices are refused, because they
+/// could block the process or never end.
 ///
 /// # Errors
-/// Those of the system, and [`io::ErrorKind::InvalidInput`] with the reason in words.
+/// Those of the system, and [`io::ErrorKind::InvalidInput`] with the reason.
 pub fn read(path: &Path) -> io::Result<String> {
     let refuse = |reason: String| Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
-    // Opening a pipe without a writer would wait for one.
+    // Opening a pipe without a writer would block.
     let file = OpenOptions::new()
         .read(true)
         .custom_flags(O_NONBLOCK)
@@ -41,7 +41,7 @@ mod tests {
     use std::fs::File;
 
     #[test]
-    fn regular_files_are_read_and_nothing_else_is_waited_for() {
+    fn regular_files_are_read_and_others_are_refused_without_blocking() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scenario.toml");
         std::fs::write(&path, "name = \"é\"").unwrap();

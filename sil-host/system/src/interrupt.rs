@@ -1,8 +1,8 @@
-//! Ctrl-C and requests to end: as a flag that loops look at, so that files and shared memory
-//! are left tidy, or as an orderly end for work that leaves nothing half-done.
+//! Ctrl-C and requests to end: either a flag that loops check, so that files and shared memory are
+//! left tidy, or an immediate exit for work that leaves nothing half-done.
 //!
-//! The handlers do nothing but what a signal handler may do. There is no thread that could
-//! fail to start, or hear of a signal late.
+//! The handlers make only async-signal-safe calls. There is no thread that could fail to start or
+//! react late.
 
 use std::io;
 use std::sync::Arc;
@@ -11,12 +11,12 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use nix::libc::{_exit, STDERR_FILENO, c_int, write};
 use nix::sys::signal::{SaFlags, SigAction, SigHandler, SigSet, Signal, sigaction};
 
-/// Requests to end.
+/// Signals that request an end.
 const REQUESTS: [Signal; 3] = [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP];
 
-/// A signal has come.
+/// Set when a signal arrives.
 static SIGNALLED: AtomicBool = AtomicBool::new(false);
-/// For [`exit_when_requested`].
+/// Exit code for [`exit_when_requested`].
 static EXIT_CODE: AtomicU8 = AtomicU8::new(1);
 const FAREWELL: &str = "error: interrupted\n";
 
@@ -31,7 +31,7 @@ impl Interrupt {
     /// Catches SIGINT, SIGTERM and SIGHUP from now on, unless they are ignored.
     ///
     /// # Errors
-    /// If the system refuses.
+    /// If the system refuses the handlers.
     pub fn catch() -> io::Result<Self> {
         handle(note)?;
         Ok(Self {
@@ -40,23 +40,23 @@ impl Interrupt {
         })
     }
 
-    /// Asks for an end as a signal does.
+    /// Requests an end, as a signal does.
     pub fn request(&self) {
         self.requested.store(true, Ordering::Relaxed);
     }
 
-    /// Whether a signal has come.
+    /// Returns whether a signal has arrived.
     pub fn is_requested(&self) -> bool {
         self.requested.load(Ordering::Relaxed)
             || self.hears_signals && SIGNALLED.load(Ordering::Relaxed)
     }
 }
 
-/// From now on SIGINT, SIGTERM and SIGHUP end the process at once with `code` and one
-/// message, unless they are ignored. For work that has nothing to put in order.
+/// Makes SIGINT, SIGTERM and SIGHUP end the process at once with `code` and one message, unless
+/// they are ignored. Use it for work that leaves nothing to clean up.
 ///
 /// # Errors
-/// If the system refuses.
+/// If the system refuses the handlers.
 pub fn exit_when_requested(code: u8) -> io::Result<()> {
     EXIT_CODE.store(code, Ordering::Relaxed);
     handle(exit)
@@ -68,7 +68,7 @@ extern "C" fn note(_: c_int) {
 
 #[allow(unsafe_code)]
 extern "C" fn exit(_: c_int) {
-    // SAFETY: both calls may be made in a signal handler; the text lives for ever.
+    // SAFETY: both calls are async-signal-safe; the text is static.
     unsafe {
         write(STDERR_FILENO, FAREWELL.as_ptr().cast(), FAREWELL.len());
         _exit(c_int::from(EXIT_CODE.load(Ordering::Relaxed)));
@@ -78,7 +78,7 @@ extern "C" fn exit(_: c_int) {
 fn handle(handler: extern "C" fn(c_int)) -> io::Result<()> {
     for signal in REQUESTS {
         let before = set(signal, SigHandler::Handler(handler))?;
-        // As under nohup.
+        // Ignored signals stay ignored, as under nohup.
         if matches!(before.handler(), SigHandler::SigIgn) {
             set(signal, SigHandler::SigIgn)?;
         }
@@ -86,11 +86,11 @@ fn handle(handler: extern "C" fn(c_int)) -> io::Result<()> {
     Ok(())
 }
 
-/// Makes a write beyond `ulimit -f` fail as one to a full disk does, instead of killing the
-/// process without a word.
+/// Makes a write beyond `ulimit -f` fail like a write to a full disk, instead of killing the
+/// process without a message.
 ///
 /// # Errors
-/// If the system refuses.
+/// If the system refuses the setting.
 pub fn ignore_file_size_limit() -> io::Result<()> {
     set(Signal::SIGXFSZ, SigHandler::SigIgn)?;
     Ok(())
@@ -99,6 +99,6 @@ pub fn ignore_file_size_limit() -> io::Result<()> {
 #[allow(unsafe_code)]
 fn set(signal: Signal, handler: SigHandler) -> io::Result<SigAction> {
     let action = SigAction::new(handler, SaFlags::SA_RESTART, SigSet::empty());
-    // SAFETY: the handlers of this module make only calls that a signal handler may make.
+    // SAFETY: the handlers of this module make only async-signal-safe calls.
     Ok(unsafe { sigaction(signal, &action) }?)
 }

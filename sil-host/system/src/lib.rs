@@ -1,9 +1,9 @@
-//! What the bench asks of the operating system.
+//! Operating-system services of the bench.
 //!
 //! - [`atomic_file`]: output files that appear whole or not at all
-//! - [`input_file`]: text files from outside, read within bounds
+//! - [`input_file`]: text files of limited size
 //! - [`realtime`]: absolute deadlines, real-time priority, locked memory
-//! - [`lifetime`]: child processes that never outlive whoever started them
+//! - [`lifetime`]: child processes that never outlive their parent
 //! - [`interrupt`]: Ctrl-C and requests to end
 //! - [`terminal`]: standard output and error that may be closed or full
 

@@ -1,4 +1,4 @@
-//! Child processes that never outlive whoever started them.
+//! Child processes that never outlive their parent.
 
 use std::io;
 use std::os::unix::process::CommandExt;
@@ -12,64 +12,64 @@ use nix::sys::signal::kill;
 use nix::sys::wait::{Id, WaitPidFlag, WaitStatus, waitid};
 use nix::unistd::{Pid, getpid, getppid};
 
-/// Makes the kernel send a command's process `signal` when the thread that starts it ends,
-/// however that ends: [`Signal::SIGKILL`] for a program that ignores requests to end.
+/// Makes the kernel send `signal` to a command's process when the thread that starts it ends,
+/// however it ends. Choose [`Signal::SIGKILL`] for a program that ignores requests to end.
 ///
-/// Starting the command fails if that thread is gone already. Which process inherits orphans
-/// does not matter: it is not always the first one.
+/// Starting the command fails if that thread has already ended. It does not matter which process
+/// inherits orphans; it is not always process 1.
 #[allow(unsafe_code)]
 pub fn end_with_parent(command: &mut Command, signal: Signal) -> &mut Command {
     let parent = getpid();
     let request = move || {
         set_pdeathsig(signal)?;
-        // A parent that ended before the request would never be noticed.
+        // Without this check, a parent that ended before the request would go unnoticed.
         if getppid() == parent {
             Ok(())
         } else {
             Err(io::Error::from_raw_os_error(Errno::ESRCH as i32))
         }
     };
-    // SAFETY: the closure runs between fork and exec, where only async-signal-safe
-    // calls are allowed; it makes two system calls and does not allocate.
+    // SAFETY: the closure runs between fork and exec, where only async-signal-safe calls are
+    // allowed; it makes two system calls and does not allocate.
     unsafe { command.pre_exec(request) }
 }
 
-/// A child that is ended, by force if need be, when this value goes.
+/// A child that is ended, by force if necessary, when this value is dropped.
 pub struct Guarded(Child);
 
-/// Time between asking a child to end and forcing it.
+/// Time between asking a child to end and killing it.
 const GRACE: Duration = Duration::from_millis(1000);
 
 impl Guarded {
-    /// Takes charge of a child.
+    /// Takes ownership of a child.
     pub fn new(child: Child) -> Self {
         Self(child)
     }
 
-    /// The child itself, for its pipes.
+    /// Returns the child, for its pipes.
     pub fn child(&mut self) -> &mut Child {
         &mut self.0
     }
 
-    /// Its process id.
+    /// Returns the child's process id.
     pub fn id(&self) -> u32 {
         self.0.id()
     }
 
-    /// How the child ended, if it has.
+    /// Returns the child's exit status, if it has ended.
     ///
     /// # Errors
-    /// If the system cannot tell.
+    /// If the system cannot report it.
     pub fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
         self.0.try_wait()
     }
 
-    /// Whether the child is stopped, as by SIGSTOP.
+    /// Returns whether the child is stopped, as by SIGSTOP.
     pub fn is_stopped(&self) -> bool {
         let Ok(id) = i32::try_from(self.0.id()) else {
             return false;
         };
-        // Only a look: how the child ends is for `ended` to find out.
+        // WNOWAIT leaves the exit status for `ended`.
         let look = WaitPidFlag::WSTOPPED | WaitPidFlag::WNOHANG | WaitPidFlag::WNOWAIT;
         matches!(
             waitid(Id::Pid(Pid::from_raw(id)), look),
@@ -77,20 +77,20 @@ impl Guarded {
         )
     }
 
-    /// Forces the child to end.
+    /// Kills the child.
     pub fn kill(&mut self) {
-        // Errors mean that it has just ended.
+        // An error means that the child has just ended.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 
-    /// Asks the child to end, waits a while, then forces it; how it ended.
+    /// Asks the child to end, waits, then kills it; returns its exit status.
     pub fn stop(&mut self) -> Option<ExitStatus> {
         if let Ok(Some(status)) = self.0.try_wait() {
             return Some(status);
         }
         if let Ok(id) = i32::try_from(self.0.id()) {
-            // An error means that it has just ended.
+            // An error means that the child has just ended.
             let _ = kill(Pid::from_raw(id), Signal::SIGTERM);
         }
         let asked = Instant::now();
@@ -99,7 +99,7 @@ impl Guarded {
                 return Some(status);
             }
             if self.is_stopped() {
-                // It cannot hear.
+                // A stopped child cannot react.
                 break;
             }
             std::thread::sleep(Duration::from_millis(5));

@@ -1,4 +1,4 @@
-//! Running by the clock: absolute deadlines, and what the system permits.
+//! Real-time pacing: absolute deadlines, and the privileges that the system grants.
 
 use std::fmt;
 use std::io;
@@ -16,20 +16,20 @@ use thread_priority::unix::{
 };
 use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
-/// Priority under `SCHED_FIFO`: above everything ordinary, just below the
-/// interrupt threads (50) of a real-time kernel, on which the wake-ups depend.
+/// Priority under `SCHED_FIFO`: above all ordinary threads, just below the interrupt threads (50)
+/// of a real-time kernel, on which the wake-ups depend.
 const FIFO_PRIORITY: u8 = 49;
 
-/// The monotonic clock cannot be waited on.
+/// Waiting on the monotonic clock failed.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot wait on the monotonic clock: {0}")]
 pub struct ClockError(#[from] io::Error);
 
-/// Wakes once a period at absolute deadlines of the monotonic clock, so that
-/// lateness never adds up.
+/// Wakes once per period at absolute deadlines of the monotonic clock, so that delays do not
+/// accumulate.
 ///
-/// A wake-up later than a period is followed by others without sleep until the
-/// deadlines are caught up; none is skipped.
+/// After a wake-up later than a period, the following ones come without sleep until the deadlines
+/// are caught up; none is skipped.
 #[derive(Debug)]
 pub struct Pacer {
     deadline: TimeSpec,
@@ -48,7 +48,7 @@ impl Pacer {
         })
     }
 
-    /// Sleeps until the next deadline; returns how late the wake-up was.
+    /// Sleeps until the next deadline; returns the latency of the wake-up.
     ///
     /// # Errors
     /// [`ClockError`]. A signal does not end the wait.
@@ -70,17 +70,17 @@ impl Pacer {
     }
 }
 
-/// Which of the real-time requests were permitted; printed as a one-line notice.
+/// Which real-time requests the system granted; printed as a one-line notice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RealtimeStatus {
-    /// `SCHED_FIFO` for this thread; the reason if refused.
+    /// Whether this thread has `SCHED_FIFO`; otherwise the reason.
     pub scheduling: Result<(), String>,
-    /// Memory of the process locked; the reason if refused.
+    /// Whether the memory of the process is locked; otherwise the reason.
     pub memory: Result<(), String>,
 }
 
 impl RealtimeStatus {
-    /// Whether everything was permitted.
+    /// Returns whether all requests were granted.
     pub fn is_complete(&self) -> bool {
         self.scheduling.is_ok() && self.memory.is_ok()
     }
@@ -106,12 +106,12 @@ impl fmt::Display for RealtimeStatus {
     }
 }
 
-/// Asks for `SCHED_FIFO` for the calling thread and locked memory for the
-/// process, and says what was permitted. Call it once everything is set up:
-/// where locked memory is limited, only what is mapped by then is locked.
+/// Requests `SCHED_FIFO` for the calling thread and locked memory for the process, and returns
+/// which requests were granted. Call it after all set-up: where locked memory is limited, only the
+/// memory mapped by then is locked.
 pub fn request_realtime() -> RealtimeStatus {
-    // Wake-ups without the 50 µs of slack of an ordinary thread: needs no
-    // permission, and is no loss where the kernel does not know it.
+    // Removes the 50 µs timer slack of an ordinary thread. This needs no permission; kernels
+    // without the setting ignore it.
     let _ = set_timerslack(1);
     RealtimeStatus {
         scheduling: request_fifo(),
@@ -133,7 +133,7 @@ fn request_fifo() -> Result<(), String> {
 }
 
 fn lock_memory() -> Result<(), String> {
-    // Under a limit, locking what is yet to come would let a later allocation fail.
+    // Under a limit, locking future memory would make a later allocation fail.
     let unlimited =
         getrlimit(Resource::RLIMIT_MEMLOCK).is_ok_and(|(soft, _)| soft == RLIM_INFINITY);
     let mut flags = MlockAllFlags::MCL_CURRENT;
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_tick_says_how_late_it_is_and_is_caught_up() {
+    fn a_late_tick_returns_its_latency_and_is_caught_up() {
         let period = Duration::from_millis(1);
         let mut pacer = Pacer::start(period).unwrap();
         std::thread::sleep(20 * period);
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn the_notice_is_one_line_and_says_what_was_refused() {
+    fn the_notice_is_one_line_and_names_the_refused_requests() {
         let granted = RealtimeStatus {
             scheduling: Ok(()),
             memory: Ok(()),
@@ -192,8 +192,8 @@ mod tests {
     }
 
     #[test]
-    fn asking_is_never_an_error() {
-        // In a thread of its own: the policy ends with it.
+    fn a_refused_request_is_not_an_error() {
+        // In its own thread, so that the policy ends with it.
         let status = std::thread::spawn(request_realtime).join().unwrap();
         assert_eq!(status.to_string().lines().count(), 1);
         munlockall().unwrap();

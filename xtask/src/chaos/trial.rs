@@ -283,7 +283,7 @@ pub fn judge(who: &str, code: Option<i32>, text: &Text, findings: &mut Vec<Findi
         other => findings.push((Flaw::ExitCode, format!("{who}: {other:?}, {errors}"))),
     }
     let mut lines: Vec<_> = errors.lines().collect();
-    lines.retain(|line| !line.starts_with("the record so far is in "));
+    lines.retain(|line| !line.starts_with("the partial record is in "));
     let wanted = usize::from(code != Some(0));
     if lines.len() != wanted || lines.iter().any(|line| !line.starts_with("error: ")) {
         findings.push((

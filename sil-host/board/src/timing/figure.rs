@@ -1,20 +1,20 @@
-//! What ticks cost: one histogram for each scenario, all over one axis of costs.
+//! Figure of tick costs: one histogram for each scenario, all with one axis of costs.
 
 use painleve_chart::style::{BLUE_INK, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
 
 use super::{TimingReport, Unit};
 
-/// Bars from the cheapest to the most expensive tick of all.
+/// Bars between the cheapest and the most expensive of all ticks.
 const BARS: usize = 120;
 
-/// Height of a bar without ticks, below that of a single one.
+/// Height of a bar without ticks, below the height of a single tick.
 const NONE: f64 = -0.3;
 
-/// The figure as SVG text. All reports are of one host.
+/// Returns the figure as SVG text. All reports must be of one host.
 ///
 /// # Errors
-/// [`PlotError::Draw`] if the drawing library refuses, which it has no reason to.
+/// [`PlotError::Draw`] if the drawing library fails.
 pub fn svg(reports: &[TimingReport]) -> Result<String, PlotError> {
     let scale = Scale::of(reports);
     let first = reports.first();
@@ -22,8 +22,8 @@ pub fn svg(reports: &[TimingReport]) -> Result<String, PlotError> {
     let what = first.map_or("tick", |first| first.measured.as_str());
     Chart {
         title: match what {
-            "wake-up" => "How late every control tick was woken".into(),
-            _ => "What every control tick cost".into(),
+            "wake-up" => "Wake-up latency of every control tick".into(),
+            _ => "Cost of every control tick".into(),
         },
         subtitle: format!("{host} host; dashed: median; red: the worst tick"),
         x_title: scale.title.clone(),
@@ -36,7 +36,7 @@ pub fn svg(reports: &[TimingReport]) -> Result<String, PlotError> {
 /// The axis of costs.
 struct Scale {
     title: String,
-    /// A count in units of the axis.
+    /// One unit of the axis, in counts.
     unit: f64,
     low: f64,
     high: f64,
@@ -85,7 +85,7 @@ fn panel(report: &TimingReport, scale: &Scale) -> Panel {
         bars[scale.bar(*cost)] += ticks;
     }
     let most = bars.iter().copied().max().unwrap_or(0).max(1);
-    // Rare ticks matter most: the height is the logarithm of their number.
+    // Rare ticks matter most, so the height is the logarithm of their number.
     let top = (most as f64).log10().ceil().max(1.0);
     let height = |ticks: u64| {
         if ticks == 0 {
@@ -140,7 +140,7 @@ mod tests {
     use painleve_shared::frame::ActuatorFrame;
 
     #[test]
-    fn every_report_is_a_panel_and_none_is_a_figure_too() {
+    fn every_report_gets_a_panel_and_no_reports_give_an_empty_figure() {
         let mut times = TickTimes::default();
         for tick in 0..100_u32 {
             let answer = ActuatorFrame {

@@ -1,4 +1,4 @@
-//! The controller in this process, woken at absolute deadlines as a microcontroller's timer would.
+//! The controller in this process, woken at absolute deadlines as by a microcontroller's timer.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use painleve_system::realtime::Pacer;
 
 use super::TickTimes;
 
-/// A controller that waits for the clock before every tick, and notes how late it was woken.
+/// A controller that waits for the clock before every tick and records the latency of each wake-up.
 pub struct Metronome {
     controller: InProcess,
     pacer: Pacer,
@@ -35,7 +35,8 @@ impl Metronome {
         })
     }
 
-    /// How late the wake-ups were, ns, and how many answers were not ready when the next tick was due.
+    /// Returns the latencies of the wake-ups in ns, and the number of answers that were not ready
+    /// when the next tick was due.
     pub fn finish(self) -> (TickTimes, u64) {
         (self.lateness_ns, self.missed_deadlines)
     }
@@ -61,7 +62,7 @@ mod tests {
     use painleve_plant::scenario::Scenario;
 
     #[test]
-    fn every_tick_is_waited_for_and_a_late_one_is_missed() {
+    fn every_tick_waits_for_its_deadline_and_a_late_one_is_missed() {
         let mut scenario = Scenario::default();
         scenario.run.tick_hz = 500;
         let configuration = scenario.controller_configuration();
@@ -77,7 +78,7 @@ mod tests {
             metronome.exchange(&frame).unwrap();
         }
         assert!(start.elapsed() >= Duration::from_millis(10));
-        // Whoever sleeps over deadlines is late for the next ones.
+        // Sleeping past several deadlines delays the following ticks.
         std::thread::sleep(Duration::from_millis(20));
         metronome.exchange(&SensorFrame::default()).unwrap();
         let (lateness_ns, missed) = metronome.finish();

@@ -1,8 +1,8 @@
-//! What control ticks cost, in one report for every host of the controller.
+//! The cost of control ticks, in one report for every host of the controller.
 //!
 //! - [`tick_times`]: exact percentiles, and the worst tick
 //! - [`report`]: the report, as JSON and as a table; [`figure`]: its figure
-//! - [`metronome`]: wake-ups against absolute deadlines on a PC
+//! - [`metronome`]: wake-ups at absolute deadlines on a PC
 
 pub mod figure;
 pub mod metronome;
@@ -17,7 +17,7 @@ pub use metronome::Metronome;
 pub use report::TimingReport;
 pub use tick_times::TickTimes;
 
-/// What a cost is counted in.
+/// Unit of a cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unit {
@@ -25,7 +25,7 @@ pub enum Unit {
     Instructions,
     /// Counts of a board's stopwatch.
     Cycles {
-        /// Counts a second.
+        /// Counts per second.
         hz: u32,
     },
     /// Nanoseconds of the monotonic clock.

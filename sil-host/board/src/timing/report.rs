@@ -1,4 +1,4 @@
-//! The report about ticks: for programs as JSON, for people as a table.
+//! The report of tick costs, as JSON and as a table.
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
@@ -9,16 +9,16 @@ use super::tick_times::WorstTick;
 use super::{TickTimes, Unit};
 use crate::{BoardError, ConnectedBoard, LineHealth};
 
-/// What the ticks of one scenario cost. The names are a contract: add to them, never rename.
+/// Tick costs of one scenario. The field names are a contract: add to them, never rename them.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TimingReport {
     /// The scenario.
     pub scenario: String,
     /// Control rate, Hz.
     pub tick_hz: u32,
-    /// What ran the controller.
+    /// Host of the controller.
     pub host: String,
-    /// What was measured: `tick` for the work of a tick, `wake-up` for its lateness.
+    /// Measured quantity: `tick` for the work of a tick, `wake-up` for its latency.
     pub measured: String,
     /// Unit of all costs.
     pub unit: Unit,
@@ -32,22 +32,22 @@ pub struct TimingReport {
     pub p999: u32,
     /// Most expensive tick.
     pub max: u32,
-    /// The same, with its circumstances.
+    /// The most expensive tick with its circumstances.
     pub worst: Option<WorstTick>,
-    /// Ticks that were not done when the next was due.
+    /// Ticks not finished when the next was due.
     pub missed_deadlines: u64,
-    /// Most stack ever used on a board, bytes.
+    /// Largest stack use on a board, bytes.
     pub stack_bytes: Option<u32>,
-    /// What a board has counted.
+    /// The board's counters.
     pub board: Option<Health>,
-    /// What the host has counted on a board's line.
+    /// The host's counters of a board's line.
     pub line: Option<LineHealth>,
-    /// Costs with the number of ticks that had them, ascending.
+    /// Costs with their numbers of ticks, ascending.
     pub histogram: Vec<(u32, u64)>,
 }
 
 impl TimingReport {
-    /// About the ticks of a board, which is asked what it has counted.
+    /// Makes the report of a board's ticks; reads the board's counters.
     ///
     /// # Errors
     /// [`BoardError`] if the board does not answer.
@@ -67,7 +67,7 @@ impl TimingReport {
         })
     }
 
-    /// About ticks on whatever `host`.
+    /// Makes the report of ticks on `host`.
     pub fn new(
         scenario: &str,
         tick_hz: u32,
@@ -97,7 +97,7 @@ impl TimingReport {
     }
 }
 
-/// Reports as a table, one row for each.
+/// Returns the reports as a table with one row each.
 pub fn table(reports: &[TimingReport]) -> String {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);

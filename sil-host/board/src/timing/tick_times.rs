@@ -8,24 +8,24 @@ use serde::{Deserialize, Serialize};
 /// The most expensive tick.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WorstTick {
-    /// Its number.
+    /// Number of the tick.
     pub tick: u32,
-    /// The supervisor's state in it.
+    /// State of the supervisor in that tick.
     pub state: String,
-    /// What it took.
+    /// Cost.
     pub cost: u32,
 }
 
-/// What the ticks of a run cost.
+/// Costs of the ticks of a run.
 #[derive(Clone, Debug, Default)]
 pub struct TickTimes {
-    /// Ticks by cost: there are few different costs.
+    /// Number of ticks by cost; there are few different costs.
     ticks_by_cost: BTreeMap<u32, u64>,
     worst: Option<WorstTick>,
 }
 
 impl TickTimes {
-    /// Takes in one tick, which gave `answer`.
+    /// Adds one tick, which gave `answer`.
     pub fn push(&mut self, answer: &ActuatorFrame, cost: u32) {
         *self.ticks_by_cost.entry(cost).or_default() += 1;
         if self.worst.as_ref().is_none_or(|worst| cost > worst.cost) {
@@ -40,12 +40,13 @@ impl TickTimes {
         }
     }
 
-    /// Ticks taken in.
+    /// Returns the number of ticks.
     pub fn ticks(&self) -> u64 {
         self.ticks_by_cost.values().sum()
     }
 
-    /// The smallest cost that `quantile` of all ticks do not exceed; 0 without ticks.
+    /// Returns the smallest cost that a fraction `quantile` of all ticks does not exceed; 0 without
+    /// ticks.
     pub fn at_quantile(&self, quantile: f64) -> u32 {
         let wanted = (self.ticks() as f64 * quantile).ceil().max(1.0) as u64;
         let mut ticks = 0;
@@ -58,12 +59,12 @@ impl TickTimes {
         0
     }
 
-    /// The most expensive tick, the first of them if there are several.
+    /// Returns the most expensive tick; the first, if there are several.
     pub fn worst(&self) -> Option<&WorstTick> {
         self.worst.as_ref()
     }
 
-    /// Costs with the number of ticks that had them, ascending.
+    /// Returns the costs with their numbers of ticks, ascending.
     pub fn histogram(&self) -> Vec<(u32, u64)> {
         self.ticks_by_cost.iter().map(|(c, n)| (*c, *n)).collect()
     }

@@ -1,4 +1,4 @@
-//! A campaign's options, read as if they stood on the command line of its study.
+//! Reads the options of a campaign as if they were on the command line of its study.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use painleve_plant::scenario::Scenario;
 use painleve_study::catalogue::{CatalogueEntry, STUDIES};
 use painleve_study::sweep::campaign::{Campaign, Understood};
 
-/// The study of a campaign.
+/// Returns the study of a campaign.
 ///
 /// # Errors
-/// What is wrong with it and what is allowed, in one sentence.
+/// One sentence about the mistake and the allowed values.
 pub fn understand(campaign: &Campaign) -> Result<Understood, String> {
     let name = campaign.study.as_str();
     let entry = CatalogueEntry::find(name)
@@ -42,7 +42,7 @@ pub fn understand(campaign: &Campaign) -> Result<Understood, String> {
     })
 }
 
-/// The campaign's options as a command line.
+/// Returns the campaign's options as a command line.
 fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, String> {
     study.build();
     let options: BTreeMap<&str, &clap::Arg> = study
@@ -60,7 +60,7 @@ fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, Str
                 known.join(", ")
             ));
         };
-        // `--set a --set b`, but `--mu a,b`.
+        // Repeated options become `--set a --set b`, lists become `--mu a,b`.
         let is_repeated = matches!(option.get_action(), ArgAction::Append)
             && option.get_value_delimiter().is_none();
         if is_repeated {
@@ -72,7 +72,7 @@ fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, Str
     Ok(line)
 }
 
-/// What clap says, without its hints for the command line.
+/// Returns clap's message without its hints for the command line.
 fn first_sentence(error: &clap::Error) -> String {
     let text = error.to_string();
     let sentence = text.lines().next().unwrap_or_default();
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_in_one_line() {
+    fn mistakes_are_reported_in_one_line() {
         let seed: (&str, &[&str]) = ("seed", &["-1"]);
         for (campaign, part) in [
             (campaign("regions", &[]), "cannot be computed in shards"),

@@ -1,5 +1,5 @@
-//! `painleve study`: the studies of the catalogue from the command line. [`campaign`] reads their
-//! options from a campaign file, [`outcome`] writes what they come to.
+//! `painleve study`: the studies of the catalogue on the command line. [`campaign`] reads their
+//! options from a campaign file, [`outcome`] writes their results.
 
 pub mod campaign;
 pub mod outcome;
@@ -17,7 +17,7 @@ pub struct StudyArguments {
     study: StudyCommand,
 }
 
-/// A study with its options, and where its outcome goes.
+/// A study with its options and its outputs.
 struct StudyCommand {
     options: Box<dyn AnyOptions>,
     outcome: OutcomeOptions,
@@ -64,7 +64,7 @@ impl FromArgMatches for StudyCommand {
     }
 }
 
-/// Computes a study and writes what it came to.
+/// Computes a study and writes its results.
 pub fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     let StudyCommand { options, outcome } = &arguments.study;
     outcome.make(&*options.study()?)

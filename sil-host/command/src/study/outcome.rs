@@ -1,4 +1,4 @@
-//! Where the outcome of a study goes, and how many threads compute it.
+//! Output files of a study, and the number of threads that compute it.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use painleve_system::atomic_file::{self, AtomicFile};
 
 use crate::{CommandError, say};
 
-/// Where the outcome of a study goes, and how many threads compute it.
+/// Output files of a study, and the number of threads that compute it.
 #[derive(Clone, Debug, Args)]
 pub struct OutcomeOptions {
     /// Print one JSON object on stdout instead of the table.
@@ -27,10 +27,10 @@ pub struct OutcomeOptions {
     threads: Threads,
 }
 
-/// How many threads compute.
+/// Number of threads.
 #[derive(Clone, Debug, Args)]
 pub struct Threads {
-    /// Threads that compute; all cores by default. The outcome does not depend on it.
+    /// Number of threads; all cores by default. The result does not depend on it.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
 }
@@ -39,7 +39,7 @@ impl Threads {
     /// Computes the rows of a study with a progress bar.
     ///
     /// # Errors
-    /// [`CommandError`] if one cannot be computed.
+    /// [`CommandError`] if a row cannot be computed.
     pub fn compute<S: Study>(&self, name: &str, study: &S) -> Result<Vec<S::Row>, CommandError> {
         let bar = progress_bar(name, study.len());
         let rows = self.in_pool(|| painleve_study::rows(study, || bar.inc(1)))?;
@@ -47,10 +47,10 @@ impl Threads {
         Ok(rows?)
     }
 
-    /// Runs something on the threads that were asked for.
+    /// Runs `work` on the requested number of threads.
     ///
     /// # Errors
-    /// [`CommandError::Process`] if they cannot be started.
+    /// [`CommandError::Process`] if the threads cannot be started.
     pub fn in_pool<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, CommandError> {
         let threads = self.threads.map_or(0, NonZeroUsize::get);
         let pool = rayon::ThreadPoolBuilder::new()
@@ -62,11 +62,11 @@ impl Threads {
 }
 
 impl OutcomeOptions {
-    /// Computes a study with a progress bar, writes the files and prints the outcome.
+    /// Computes a study with a progress bar, writes the files and prints the result.
     ///
     /// # Errors
-    /// [`CommandError`] if an output cannot be written, which is found out first, or the study
-    /// has no outcome.
+    /// [`CommandError`] if an output cannot be written, which is checked first, or if the study
+    /// fails.
     pub fn make(&self, study: &dyn AnyStudy) -> Result<(), CommandError> {
         self.check()?;
         let bar = progress_bar("", study.row_count());
@@ -75,7 +75,7 @@ impl OutcomeOptions {
         self.write(&*outcome)
     }
 
-    /// Finds out whether the files can be written.
+    /// Checks that the files can be written.
     fn check(&self) -> Result<(), CommandError> {
         for path in [&self.csv, &self.svg].into_iter().flatten() {
             AtomicFile::create(path).map_err(output)?;
@@ -98,12 +98,12 @@ impl OutcomeOptions {
     }
 }
 
-/// An output that cannot be written.
+/// Converts an error of an output file.
 pub fn output(error: impl std::fmt::Display) -> CommandError {
     CommandError::Output(error.to_string())
 }
 
-/// A bar on stderr, where it is a terminal; nothing elsewhere.
+/// Returns a progress bar on stderr if it is a terminal, otherwise a hidden one.
 pub fn progress_bar(name: &str, rows: usize) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(rows as u64), ProgressDrawTarget::stderr())
         .with_finish(ProgressFinish::AndClear);
