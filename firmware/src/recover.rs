@@ -14,6 +14,8 @@ use crate::law::LawOutput;
 
 /// Distance from the landing point within which the tip is lowered, m.
 const OVER_LANDING_PLACE_M: f32 = 2e-3;
+/// A contact that lasts this long is not a bounce, s.
+const LANDED_S: f32 = 0.05;
 /// Speed at which the tip is raised to its clearance, m/s.
 const RAISING_M_S: f32 = 0.1;
 /// Rate at which the height above the belt decays on the way down, 1/s.
@@ -60,6 +62,19 @@ impl RecoveryState {
     pub fn posture(&self) -> Option<Posture> {
         self.flight.map(|flight| flight.posture)
     }
+
+    /// Records a tick of `tick_s` (s) in contact. A contact that lasts ends the recovery; a tip that
+    /// bounces off earlier continues its descent.
+    pub fn touch(&mut self, tick_s: f32) {
+        let Some(flight) = &mut self.flight else {
+            return;
+        };
+        flight.path_rad = None;
+        flight.touched_s += tick_s;
+        if flight.touched_s > LANDED_S {
+            self.flight = None;
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +87,8 @@ struct Flight {
     posture: Posture,
     /// Link angles of the path at the previous tick, rad.
     path_rad: Option<LinkMotion<f32>>,
+    /// Duration of the present contact, s.
+    touched_s: f32,
 }
 
 impl Recovery {
@@ -104,7 +121,9 @@ impl Recovery {
             lands: false,
             posture: Posture::of(&model.theta_rad),
             path_rad: None,
+            touched_s: 0.0,
         });
+        flight.touched_s = 0.0;
         if let Some((lower, upper)) = edges_m {
             flight.landing_m = flight.landing_m.limited(lower, upper);
         }
@@ -153,6 +172,29 @@ mod tests {
     use super::*;
     use painleve_shared::{ArmParameters, GeneralisedTorque};
     use proptest::prelude::*;
+
+    #[test]
+    fn only_a_contact_that_lasts_ends_a_recovery() {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let theta = arm
+            .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
+            .unwrap();
+        let model = Model::new(
+            &arm,
+            theta,
+            LinkMotion::zeros(),
+            &GeneralisedTorque::zeros(),
+        );
+        let recovery = Recovery::new(&RecoverySettings::default(), 1e-3);
+        let mut state = RecoveryState::default();
+        for _ in 0..10 {
+            recovery.tick(&mut state, &arm, &model, None);
+            (0..40).for_each(|_| state.touch(1e-3));
+            assert_eq!(state.posture(), Some(Posture::ElbowDown));
+        }
+        (0..11).for_each(|_| state.touch(1e-3));
+        assert_eq!(state.posture(), None);
+    }
 
     proptest! {
         /// A free arm, integrated in small steps, comes down within the stretch, slowly.

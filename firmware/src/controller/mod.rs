@@ -252,7 +252,7 @@ impl<L: Law> Stages<L> {
                 self.recovery
                     .tick(&mut state.recovery, arm, &model, edges_m)
             } else {
-                state.recovery = RecoveryState::default();
+                state.recovery.touch(self.tick_s);
                 let starts = phase.arms || contact.lands;
                 let input = LawInput {
                     arm,

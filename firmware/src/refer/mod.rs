@@ -95,7 +95,10 @@ impl References {
         phase: &Phase,
         landing: Option<Posture>,
     ) -> Target {
-        let recovering = phase.recovers && contact.in_flight;
+        // The descent continues, and presses the tip gently, until contact is certain. The law's
+        // whole force while in doubt would be evidence that comes and goes with the law.
+        let descends = contact.in_flight || landing.is_some();
+        let recovering = phase.recovers && !contact.touches && descends;
         let tip_t_m = model.tip_m.x;
         if phase.arms {
             state.posture = Posture::of(&model.theta_rad);
@@ -111,7 +114,7 @@ impl References {
             // position has changed with the links' length.
             state.generator.start_from(tip_t_m);
         }
-        let minimum_p_ratio = if recovering {
+        let minimum_p_ratio = if recovering || landing.is_some() {
             self.landing_p_ratio
         } else {
             0.0

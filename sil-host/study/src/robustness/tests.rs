@@ -4,6 +4,7 @@ use crate::ablation::{Ablation, AblationStudy};
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::simulation::Simulation;
+use painleve_shared::status::Fault;
 
 use super::*;
 use crate::{Outcome, rows};
@@ -125,6 +126,26 @@ fn general_arms_succeed_too() {
     };
     let outcome = RobustnessOutcome::new(Arms::General, study.seed, rows(&study, || ()).unwrap());
     assert!(outcome.success.successes >= 97, "{}", outcome.table());
+}
+
+/// A stiff, well damped contact pushes the tip off before the contact decision has settled. The
+/// decision used to alternate with the force it caused, until arming was given up.
+#[test]
+fn a_stiff_damped_contact_is_found() {
+    let study = Robustness {
+        seed: HELD_OUT_SEED,
+        overrides: [
+            "contact.kind=compliant",
+            "contact.stiffness_n_m=1e6",
+            "contact.normal.kelvin-voigt.damping_ns_m=800",
+        ]
+        .map(String::from)
+        .into(),
+        ..campaign(20)
+    };
+    let found = rows(&study, || ()).unwrap();
+    let not_found = Some(Fault::ContactNotFound as u8);
+    assert!(found.iter().all(|row| row.fault != not_found));
 }
 
 #[test]
