@@ -1,4 +1,4 @@
-//! What a controller tick costs on this machine, in the loop with its plant.
+//! Cost of a controller tick on this machine, in the loop with its plant.
 
 use std::hint::black_box;
 
@@ -14,8 +14,8 @@ fn ticks(criterion: &mut Criterion) {
         let scenario = Scenario::load(name, &[]).expect("built in");
         let configuration = scenario.controller_configuration();
 
-        // Frames of a real run, played to and fro with running counters, so that no
-        // joint ever jumps.
+        // Frames of a real run, played forwards and backwards with running counters, so that no
+        // joint jumps.
         let mut simulation = Simulation::new(&scenario).expect("built in");
         let mut controller = Controller::new(&configuration).expect("built in");
         let mut frames = Vec::new();

@@ -1,4 +1,4 @@
-//! What the plant costs: simulated seconds per CPU second.
+//! Cost of the plant: simulated seconds per CPU second.
 //!
 //! One element of the throughput is one simulated second.
 
@@ -26,7 +26,8 @@ fn simulated_seconds(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("plant");
     group.throughput(Throughput::Elements(1));
 
-    // The bar: bouncing at v_belt = −0.4 m/s, relative tolerance 1e-9.
+    // The benchmark in the performance bar: bouncing at v_belt = −0.4 m/s,
+    // relative tolerance 1e-9.
     let mut bouncing = plant(32.0, 18.27);
     bouncing.advance(20.0, &mut ()).expect("bounces");
     group.bench_function("open-loop bouncing, 1 s", |bencher| {

@@ -12,22 +12,22 @@ use crate::sample::Sample;
 use crate::simulation::Simulation;
 use crate::statistics::Statistics;
 
-/// Time at the start of a run in which the normal force may still settle, s.
+/// Settling time at the start of a run, within which the normal force is not recorded, s.
 const SETTLING_S: f64 = 0.05;
 
-/// Longest round trip that is told apart from longer ones, ns.
+/// Upper bound of the histogram of round trips, ns.
 const LONGEST_ROUND_TRIP_NS: u64 = 60_000_000_000;
 
 /// Why a run ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum LoopError {
-    /// The plant cannot go on.
+    /// The plant cannot continue.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// The controller is gone.
+    /// The controller is no longer available.
     #[error(transparent)]
     Host(#[from] HostError),
-    /// The controller says something that no controller of this version says.
+    /// The controller's answer has a state or fault number unknown to this version.
     #[error(
         "the controller answers with state {state} and fault {fault}, of which this version knows \
          at least one not: use the same build on both sides"
@@ -46,14 +46,14 @@ pub enum LoopError {
     Interrupted,
 }
 
-/// Takes in a run tick by tick, and may end it.
+/// Observes a run tick by tick, and may end it.
 pub trait Monitor {
-    /// Whether [`Monitor::sample`] wants to be called at all.
+    /// Returns whether [`Monitor::sample`] should be called at all.
     fn wants_samples(&self) -> bool {
         true
     }
 
-    /// Takes in everything about one tick.
+    /// Receives the complete data of one tick.
     ///
     /// # Errors
     /// [`LoopError`] ends the run.
@@ -68,7 +68,7 @@ pub trait Monitor {
     }
 }
 
-/// Takes in nothing.
+/// Ignores everything.
 impl Monitor for () {
     fn wants_samples(&self) -> bool {
         false
@@ -79,7 +79,7 @@ impl Monitor for () {
     }
 }
 
-/// A simulation and a controller host, with what is counted about them.
+/// A simulation and its controller host, with the counts of the run.
 ///
 /// ```
 /// use painleve_plant::closed_loop::ClosedLoop;
@@ -111,8 +111,8 @@ pub struct ClosedLoop<H, P = BuiltInPlant> {
     drive_watchdog_tick: Option<u64>,
 }
 
-/// Hash of every sensor and actuator frame in order. Each field enters as
-/// little-endian bytes, so that the hash is the same on every host.
+/// Hash of all sensor and actuator frames in order. Each field enters as little-endian bytes, so
+/// that the hash is the same on every host.
 #[derive(Clone, Default)]
 struct LogHash(Xxh3);
 
@@ -153,12 +153,12 @@ impl LogHash {
     }
 }
 
-/// What was counted in a run.
+/// Results of a run.
 #[derive(Clone, Debug)]
 pub struct LoopResult {
     /// Ticks run.
     pub ticks: u64,
-    /// What the plant did.
+    /// Counts and extremes of the plant.
     pub statistics: Statistics,
     /// Tip position at the end, m.
     pub final_tip_t_m: f64,
@@ -168,7 +168,7 @@ pub struct LoopResult {
     pub saturated_ticks: u64,
     /// Ticks without an answer in time.
     pub stale_ticks: u64,
-    /// Tick at which the torque stages took the torque away, for want of commands.
+    /// Tick at which the torque stages removed the torque because commands were missing.
     pub drive_watchdog_tick: Option<u64>,
     /// Fault latched at the end.
     pub fault: Option<Fault>,
@@ -179,14 +179,14 @@ pub struct LoopResult {
 }
 
 impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
-    /// A loop at the start of its simulation.
+    /// Creates a loop at the start of its simulation.
     pub fn new(simulation: Simulation<P>, host: H) -> Self {
         Self {
             simulation,
             host,
             statistics: Statistics::new(SETTLING_S),
             log: LogHash::default(),
-            // Bounds are valid constants; three digits as everywhere.
+            // The bounds are valid constants; three significant digits, as everywhere.
             round_trips_ns: Histogram::new_with_max(LONGEST_ROUND_TRIP_NS, 3)
                 .unwrap_or_else(|_| unreachable!("constant histogram bounds")),
             last_answer: ActuatorFrame::default(),
@@ -199,7 +199,7 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
     /// Runs one control tick.
     ///
     /// # Errors
-    /// [`LoopError`] if plant, controller or monitor cannot go on.
+    /// [`LoopError`] if plant, controller or monitor cannot continue.
     pub fn tick(&mut self, monitor: &mut impl Monitor) -> Result<(), LoopError> {
         let sensor = self.simulation.sample(&mut self.statistics)?;
         self.log.sensor(&sensor);
@@ -237,7 +237,7 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
         monitor.tick()
     }
 
-    /// Ends the run.
+    /// Ends the run and returns its results.
     pub fn finish(self) -> (LoopResult, H) {
         let result = LoopResult {
             ticks: self.simulation.ticks(),
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_that_is_not_understood_ends_the_run() {
+    fn an_unknown_answer_ends_the_run() {
         let scenario = Scenario::load(built_in::DEFAULT, &[]).unwrap();
         for (state, fault, understood) in [(0, 0, true), (255, 0, false), (0, 255, false)] {
             let simulation = Simulation::new(&scenario).unwrap();

@@ -1,7 +1,7 @@
-//! Whatever runs the controller, as the closed loop sees it.
+//! The host of the controller, as the closed loop sees it.
 //!
-//! [`InProcess`] is a library call, for studies and tests. Hosts in other processes and on
-//! boards live in crates of their own.
+//! [`InProcess`] is a library call, for studies and tests. Hosts in other processes and on boards
+//! are in separate crates.
 
 use std::time::{Duration, Instant};
 
@@ -13,40 +13,40 @@ use crate::{Configuration, Controller};
 /// The answer to one sensor frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
-    /// The controller's frame; `None` if it did not come in time.
+    /// The controller's frame; `None` if it did not arrive in time.
     pub frame: Option<ActuatorFrame>,
-    /// Time from sending the sensor frame to having the answer.
+    /// Time from sending the sensor frame to receiving the answer.
     pub round_trip: Duration,
 }
 
-/// Why there are no answers any more: the reason of whatever runs the controller.
+/// Failure of a host, with the host's own error as the reason.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub struct HostError(Box<dyn std::error::Error + Send + Sync>);
 
 impl HostError {
-    /// The reason of a particular host.
+    /// Wraps the error of a particular host.
     pub fn new(reason: impl std::error::Error + Send + Sync + 'static) -> Self {
         Self(Box::new(reason))
     }
 }
 
-/// Something that answers sensor frames.
+/// A host of the controller, which answers sensor frames.
 pub trait ControllerHost {
     /// Sends one frame and waits for its answer or the end of the tick.
     ///
     /// # Errors
-    /// [`HostError`] if there is no controller to answer any more.
+    /// [`HostError`] if the controller is no longer available.
     fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError>;
 }
 
-/// The controller in this very process.
+/// The controller in this process.
 pub struct InProcess {
     controller: Controller,
 }
 
 impl InProcess {
-    /// A controller with this configuration.
+    /// Creates a controller with this configuration.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.

@@ -1,9 +1,9 @@
 //! The control law of a scenario, as data: one of a set of laws that the program was built with.
 //!
-//! Studies, sweeps and runs treat a law as any other setting. Which laws there are is a property of
-//! the program, like its version: [`install`] says so once, at its start, and whoever says nothing
-//! has the built-in ones. From then on a law is read, checked, written and run without a type
-//! parameter: a [`LawChoice`] is itself a [`Law`].
+//! Studies, sweeps and runs treat a law like any other setting. The set of available laws is a
+//! property of the program, like its version: [`install`] sets it once, at the start; without it,
+//! the set is that of the built-in laws. A law is then read, checked, written and run without a
+//! type parameter, because a [`LawChoice`] is itself a [`Law`].
 
 use std::any::Any;
 use std::fmt::Debug;
@@ -18,7 +18,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// The laws of this program.
 static LAWS: OnceLock<LawSet> = OnceLock::new();
 
-/// How a law of the program's set is made.
+/// Constructors of the laws in the program's set.
 #[derive(Clone, Copy)]
 struct LawSet {
     default: fn() -> LawChoice,
@@ -42,8 +42,8 @@ impl<L> ScenarioLaws for L where
 {
 }
 
-/// Makes `L` the set of laws of this program. Call it once, before the first scenario is read;
-/// afterwards it changes nothing.
+/// Installs `L` as the set of laws of this program. Call it before the first scenario is read;
+/// later calls have no effect.
 pub fn install<L: ScenarioLaws>() {
     let _ = LAWS.set(LawSet::of::<L>());
 }
@@ -66,23 +66,23 @@ impl LawSet {
 pub struct LawChoice(Arc<dyn AnyLaw>);
 
 impl LawChoice {
-    /// This law.
+    /// Wraps a law.
     pub fn new<L: ScenarioLaws>(law: L) -> Self {
         Self(Arc::new(law))
     }
 
-    /// Its name, as in files.
+    /// Returns the name of the law, as in files.
     pub fn name(&self) -> &'static str {
         self.0.name()
     }
 
-    /// The law as one of the set `L`; `None` if it is of another.
+    /// Returns the law as one of the set `L`; `None` if it belongs to another set.
     pub fn of_set<L: ScenarioLaws>(&self) -> Option<&L> {
         self.0.as_any().downcast_ref()
     }
 }
 
-/// A [`Law`] behind a pointer.
+/// A [`Law`] as a trait object.
 trait AnyLaw: Debug + Send + Sync + erased_serde::Serialize {
     fn as_any(&self) -> &dyn Any;
     fn name(&self) -> &'static str;
@@ -128,7 +128,7 @@ impl<L: ScenarioLaws> AnyLaw for L {
     }
 }
 
-/// The state of a [`LawChoice`]: that of the law behind it, allocated by [`Law::initial_state`].
+/// State of a [`LawChoice`]: the state of its law, allocated by [`Law::initial_state`].
 #[derive(Default)]
 pub struct LawChoiceState(Option<Box<dyn AnyState>>);
 
@@ -157,7 +157,7 @@ impl Debug for LawChoiceState {
     }
 }
 
-/// The state of a law behind a pointer.
+/// The state of a law as a trait object.
 trait AnyState: Debug + Send {
     fn inner(&self) -> &dyn Any;
     fn inner_mut(&mut self) -> &mut dyn Any;
@@ -203,7 +203,7 @@ impl Law for LawChoice {
 }
 
 impl Default for LawChoice {
-    /// The default of the program's set.
+    /// Returns the default law of the program's set.
     fn default() -> Self {
         (LawSet::installed().default)()
     }
@@ -216,7 +216,7 @@ impl PartialEq for LawChoice {
 }
 
 impl SettingValue for LawChoice {
-    /// Of the built-in laws: which others there are is known only once the program runs.
+    /// Shape of the built-in laws; other sets are known only at run time.
     const SHAPE: Shape = LawSettings::SHAPE;
 
     fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_choice_is_its_law() {
+    fn a_choice_behaves_as_its_law() {
         let choice = LawChoice::new(hybrid(8.0));
         assert_eq!(choice.of_set(), Some(&hybrid(8.0)));
         assert_eq!(choice, LawChoice::new(hybrid(8.0)));
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_written_as_the_law_is_and_read_back() {
+    fn it_is_serialised_like_its_law_and_read_back() {
         for name in built_in::names() {
             let law = Scenario::load(name, &[]).unwrap().controller.law;
             let typed: &LawSettings = law.of_set().unwrap();
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_out_of_range_is_named_by_its_whole_key() {
+    fn a_setting_out_of_range_is_named_with_its_full_key() {
         let set = "controller.law.hybrid.normal_force_n=-1".to_owned();
         let error = Scenario::load(built_in::DEFAULT, &[set]).unwrap_err();
         let message = error.to_string();

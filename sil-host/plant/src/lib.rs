@@ -1,14 +1,14 @@
-//! The simulated plant and the controller in a closed loop with it, in one process.
+//! The simulated plant, and the closed loop of plant and controller in one process.
 //!
-//! - [`plant`]: what a plant is to all the rest
+//! - [`plant`]: the interface of a plant
 //! - [`mechanics`]: the arm on its belt, as a hybrid rigid-body model
 //! - [`converters`]: encoders, force cell, torque stages and the link's losses
-//! - [`law_choice`]: the control law as data, of the set that the program was built with
-//! - [`scenario`]: everything that defines a run, as a TOML file
-//! - [`simulation`]: the plant as the controller's wires see it
-//! - [`controller_host`]: whatever runs the controller
+//! - [`law_choice`]: the control law as a setting, from the program's set of laws
+//! - [`scenario`]: the complete definition of a run, as a TOML file
+//! - [`simulation`]: the plant with its converters, tick by tick
+//! - [`controller_host`]: the host of the controller
 //! - [`closed_loop`]: sample, exchange, record, advance
-//! - [`sample`]: both frames of a tick and the truth behind them, for records
+//! - [`sample`]: both frames of a tick and the plant's true state, for records
 //! - [`statistics`]: counts and extremes of a run
 
 pub mod closed_loop;
@@ -30,6 +30,6 @@ pub type Controller = painleve_firmware::Controller<LawChoice>;
 /// Its configuration.
 pub type Configuration = painleve_firmware::Configuration<LawChoice>;
 
-/// Vectors of the plant's interface.
+/// Re-exported for the vectors in the plant's interface.
 pub use nalgebra;
 pub use plant::{ContactMode, Event, Plant, PlantError, Probe, Snapshot, State, Step};

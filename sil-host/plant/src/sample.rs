@@ -4,15 +4,15 @@ use painleve_shared::{ActuatorFrame, SensorFrame};
 
 use crate::plant::Snapshot;
 
-/// Both frames of a control tick and the truth behind them.
+/// Both frames of a control tick and the plant's true state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// The plant at the instant the sensors are read, before the answer acts.
+    /// The plant when the sensors are read, before the answer takes effect.
     pub plant: Snapshot,
-    /// What the controller was told.
+    /// Frame sent to the controller.
     pub sensor: SensorFrame,
-    /// What it answered.
+    /// Frame of the controller's answer.
     pub actuator: ActuatorFrame,
-    /// Reference z_t*, m; NaN while the controller follows none.
+    /// Reference z_t*, m; NaN while the controller follows no reference.
     pub reference_tip_t_m: f64,
 }

@@ -1,8 +1,8 @@
-//! The plant as the controller's wires see it: sample, command, sample, …
+//! The plant with its converters, tick by tick: sample, command, sample, …
 //!
-//! Between two ticks at most three things happen at given instants: the torque
-//! changes (a fraction of a tick after it), the encoders capture (a
-//! fraction of a tick before the next one), and the next tick.
+//! Up to three things happen from one tick to the next: the torque changes (a fraction of a tick
+//! after the tick), the encoders capture (a fraction of a tick before the next one), and the next
+//! tick begins.
 
 use painleve_shared::ActuatorFrame;
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
@@ -35,7 +35,7 @@ pub struct Simulation<P = BuiltInPlant> {
 }
 
 impl Simulation {
-    /// The scenario's own plant and converters at its start.
+    /// Creates the scenario's own plant and converters at their start.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
@@ -46,7 +46,7 @@ impl Simulation {
 }
 
 impl<P: Plant> Simulation<P> {
-    /// Any plant at its start, with the scenario's converters.
+    /// Creates a simulation of any plant at its start, with the scenario's converters.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
@@ -68,18 +68,18 @@ impl<P: Plant> Simulation<P> {
         })
     }
 
-    /// The plant.
+    /// Returns the plant.
     pub fn plant(&self) -> &P {
         &self.plant
     }
 
-    /// Ticks since the start.
+    /// Returns the number of ticks since the start.
     pub fn ticks(&self) -> u64 {
         self.tick
     }
 
-    /// What the controller is told at this tick. Called once per tick: noise
-    /// is drawn here.
+    /// Returns the frame for the controller at this tick. Call it once per tick, because it draws
+    /// noise.
     ///
     /// # Errors
     /// [`PlantError`] if the contact mode of the start cannot be decided.
@@ -88,7 +88,7 @@ impl<P: Plant> Simulation<P> {
         self.lost = self.link.draw();
         let (tangential_force, normal_force) = self.force_cell.read(&self.plant.contact_force_n());
         let enabled = self.plant.time_s() >= self.enable_at_s;
-        // The counters of the wire wrap.
+        // The counters on the wire wrap.
         let tick = self.first_tick.wrapping_add(self.tick as u32);
         Ok(SensorFrame {
             tick,
@@ -104,17 +104,17 @@ impl<P: Plant> Simulation<P> {
         })
     }
 
-    /// Whether the torque stages have given up, for want of commands.
+    /// Returns whether the watchdog of the torque stages has removed the torque.
     pub fn drive_watchdog_has_tripped(&self) -> bool {
         self.torque_stages.has_tripped()
     }
 
-    /// Whether the frame of this tick's sample is lost: the controller must not be given it.
+    /// Returns whether the frame of this tick's sample is lost; the controller must not receive it.
     pub fn sensor_frame_is_lost(&self) -> bool {
         self.lost.sensor
     }
 
-    /// Everything about this tick, for records.
+    /// Returns the complete data of this tick, for records.
     pub fn describe(&self, sensor: &SensorFrame, actuator: &ActuatorFrame) -> Sample {
         Sample {
             plant: self.plant.snapshot(),
@@ -124,11 +124,11 @@ impl<P: Plant> Simulation<P> {
         }
     }
 
-    /// Takes the controller's answer to this tick's sample, if there is one and it is not
-    /// lost, and goes on to the next tick.
+    /// Accepts the controller's answer to this tick's sample, if there is one and it is not lost,
+    /// and advances to the next tick.
     ///
     /// # Errors
-    /// [`PlantError`] if the plant cannot go on.
+    /// [`PlantError`] if the plant cannot continue.
     pub fn advance(
         &mut self,
         answer: Option<&ActuatorFrame>,
@@ -138,7 +138,7 @@ impl<P: Plant> Simulation<P> {
         self.torque_stages
             .command(arrived.map(|frame| frame.torques));
         let tick = self.tick as f64;
-        // From whole numbers, so that nothing accumulates.
+        // Computed from whole numbers, so that errors do not accumulate.
         let at = |ticks: f64| (tick + ticks) / self.tick_hz;
         let change = self.torque_stages.change_after_tick();
         let capture = 1.0 - self.encoders.capture_before_tick();
@@ -163,7 +163,7 @@ impl<P: Plant> Simulation<P> {
     }
 }
 
-/// The reference that the controller follows, m; NaN while it follows none.
+/// Returns the reference that the controller follows, m; NaN while it follows no reference.
 fn reference_m(actuator: &ActuatorFrame) -> f64 {
     match actuator.supervisor_state() {
         Some(SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff) => {

@@ -1,13 +1,13 @@
-//! What happened in a run, as plain numbers.
+//! Statistics of a run.
 
 use crate::plant::{ContactMode, Event, Probe, State, Step};
 
 /// Counts and extremes of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
-    /// Times that sliding or sticking ended in flight.
+    /// Number of transitions from sliding or sticking to flight.
     pub lift_offs: u64,
-    /// When this first happened, s.
+    /// Time of the first lift-off, s.
     pub first_lift_off_s: Option<f64>,
     /// Collisions with the belt.
     pub impacts: u64,
@@ -21,13 +21,13 @@ pub struct Statistics {
     pub peak_torque_nm: f64,
     /// Time in contact, s.
     pub contact_s: f64,
-    /// Time watched, s.
+    /// Observed time, s.
     pub total_s: f64,
     settling_s: f64,
 }
 
 impl Statistics {
-    /// Nothing has happened yet. The normal force is watched from `settling_s` on.
+    /// Starts empty statistics. The normal force is observed from `settling_s` on.
     pub fn new(settling_s: f64) -> Self {
         Self {
             lift_offs: 0,
@@ -43,7 +43,7 @@ impl Statistics {
         }
     }
 
-    /// Part of the time in contact, 0 … 1.
+    /// Returns the fraction of time in contact, 0 … 1.
     pub fn contact_fraction(&self) -> f64 {
         if self.total_s > 0.0 {
             self.contact_s / self.total_s
@@ -53,8 +53,8 @@ impl Statistics {
     }
 }
 
-/// The smaller force, NaN if either is. What rounding leaves at the instant of a lift-off is zero;
-/// a belt that pulls is told as it is.
+/// Returns the smaller force; NaN if either is. A rounding error at the instant of a lift-off
+/// counts as zero, but a larger pull is reported.
 fn smaller(least_n: f64, force_n: f64) -> f64 {
     const ROUNDING_N: f64 = 1e-6;
     let force_n = if (-ROUNDING_N..=0.0).contains(&force_n) {
@@ -106,7 +106,7 @@ mod tests {
     use super::smaller;
 
     #[test]
-    fn a_force_that_pulls_or_is_none_is_not_taken_for_zero() {
+    fn a_pulling_or_nan_force_is_not_reported_as_zero() {
         assert_eq!(smaller(10.0, -1e-9).to_bits(), 0.0_f64.to_bits());
         assert_eq!(smaller(10.0, -0.1), -0.1);
         assert!(smaller(10.0, f64::NAN).is_nan());

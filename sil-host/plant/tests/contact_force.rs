@@ -1,11 +1,12 @@
-//! The belt never pulls at the tip, and friction stays in its cone, in every built-in scenario.
+//! Checks that in every built-in scenario the belt never pulls at the tip and friction stays in its
+//! cone.
 
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Event, Plant, Probe, Snapshot, State, Step};
 use painleve_shared::frame::SensorFrame;
 
-/// Rounding of forces of some tens of newtons at the edges of contact, N.
+/// Rounding error of forces of some tens of newtons at the limits of contact, N.
 const ROUNDING_N: f64 = 1e-6;
 
 /// Checks the contact force at both ends of every step.
@@ -34,7 +35,7 @@ impl Probe for InCone {
 }
 
 #[test]
-fn the_contact_force_presses_and_is_in_the_friction_cone() {
+fn the_contact_force_never_pulls_and_stays_in_the_friction_cone() {
     for name in built_in::names() {
         let scenario = Scenario::load(name, &["run.duration_s=3".into()]).unwrap();
         let mut probe = InCone {

@@ -1,5 +1,5 @@
-//! Contact terms and impacts against an independent implementation: 400 random
-//! states with the tip at belt height (`data/contact_states.csv`).
+//! Comparison of contact terms and impacts with an independent implementation:
+//! 400 random states with the tip at belt height (`data/contact_states.csv`).
 
 use nalgebra::Vector2;
 use painleve_plant::mechanics::impact::{ImpactLaw, Restitution, collide};
@@ -40,7 +40,7 @@ fn every_reference_state_agrees() {
         let pose = Pose::new(&theta);
         let torque = JointTorque::new(column("u1"), column("u2")).to_links();
         let terms = arm.contact_terms(&theta, &theta_dot, &pose, &torque);
-        // The reference has 12 decimals; Q and b are of order 1 to 100, so that
+        // The reference has 12 decimals. Q and b are of order 1 to 100, so
         // values that cancel to nearly zero are compared on that scale.
         close("q11", terms.q.m11, 0.0);
         close("q12", terms.q.m12, 1e-1);

@@ -1,4 +1,4 @@
-//! The generated parts of the documentation are up to date.
+//! Checks that the generated parts of the documentation are up to date.
 //!
 //! A part begins with `<!-- generated: NAME -->` and ends with `<!-- end -->`.
 
@@ -12,7 +12,7 @@ use painleve_shared::frame::StatusFlags;
 use painleve_shared::lapse::Lapse;
 use painleve_shared::status::Fault;
 
-/// The sections of a scenario that are not the controller's.
+/// The sections of a scenario that do not belong to the controller.
 const SECTIONS: [&str; 10] = [
     "run",
     "arm",
@@ -40,7 +40,7 @@ fn faults() -> String {
     text
 }
 
-/// Compares a part of a page with what it should be, or writes it if `UPDATE_DOCUMENTATION` is set.
+/// Compares a part of a page with its expected text, or writes it if `UPDATE_DOCUMENTATION` is set.
 fn check(page: &str, name: &str, expected: &str) {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
         .join("../../docs")
@@ -59,12 +59,12 @@ fn check(page: &str, name: &str, expected: &str) {
         return;
     }
     panic!(
-        "docs/{page}: the part '{name}' is not up to date; to write it anew:\n\
+        "docs/{page}: the part '{name}' is not up to date; update it with:\n\
          UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant --test documentation"
     );
 }
 
-/// One test for all parts, so that two of one page are not written at once.
+/// One test for all parts, so that two parts of one page are not written at the same time.
 #[test]
 fn generated_parts_are_up_to_date() {
     check(

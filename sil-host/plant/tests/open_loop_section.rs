@@ -1,6 +1,6 @@
-//! The paper's Fig. 4 at μ = 0.6 against an independent implementation: the
-//! arm keeps bouncing from x0,a at exactly the reference's belt speeds, and
-//! from x0,d at none.
+//! Comparison of the paper's Fig. 4 at μ = 0.6 with an independent
+//! implementation: from x0,a the arm keeps bouncing at exactly the reference's
+//! belt speeds, and from x0,d at none.
 
 use painleve_plant::Event;
 use painleve_plant::State;
@@ -9,7 +9,7 @@ use painleve_plant::mechanics::{ArmOnBelt, ArmProbe, ArmStep, PlantParameters};
 
 const SECTION: &str = include_str!("data/open_loop_section_mu06.csv");
 
-/// Largest θ̇1 seen, rad/s.
+/// Largest observed θ̇1, rad/s.
 struct Fastest(f64);
 
 impl ArmProbe for Fastest {
@@ -22,7 +22,7 @@ impl ArmProbe for Fastest {
     }
 }
 
-/// Largest θ̇1 in the last 50 s of 300 s.
+/// Returns the largest θ̇1 in the last 50 s of 300 s.
 fn fastest(speed_m_s: f64, theta1_deg: f64, theta2_deg: f64) -> f64 {
     let parameters = PlantParameters {
         belt: BeltProfile::Constant { speed_m_s },
@@ -47,7 +47,7 @@ fn bouncing_persists_exactly_at_the_reference_speeds() {
         let [speed, from_a, from_d] = row[..] else {
             panic!("bad row {line}");
         };
-        // Quiet attractors have none at all, bouncing ones several rad/s.
+        // On quiet attractors θ̇1 is zero, on bouncing ones several rad/s.
         let bounces = |theta_dot: f64| theta_dot > 0.1;
         let ours = fastest(speed, 32.0, 18.27);
         assert_eq!(

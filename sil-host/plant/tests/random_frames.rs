@@ -1,7 +1,7 @@
-//! The controller against frames that no arm would send: whatever comes, its torque stays
-//! within the limit, its faults stay latched, and off means zero.
+//! Random frames that no arm would send: for any input, the controller's torque stays within the
+//! limit, its faults stay latched, and off means zero torque.
 //!
-//! `PAINLEVE_FUZZ_TICKS` sets how many ticks each scenario gets.
+//! `PAINLEVE_FUZZ_TICKS` sets the number of ticks per scenario.
 
 use painleve_plant::Controller;
 use painleve_plant::scenario::{Scenario, built_in};
@@ -12,22 +12,22 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 const TICKS: u64 = 100_000;
-/// Ticks between two changes of what kind of frames come.
+/// Ticks between two changes of the kind of frames.
 const PHASE: u64 = 200;
 
-/// More frames in a row that are not believed are a fault, by default.
+/// Default limit of consecutive rejected frames; more are a fault.
 const MOST_UNBELIEVED: u32 = 10;
 
-/// What kind of frames come for a while.
+/// Kind of frames sent for some time.
 #[derive(Clone, Copy, Debug)]
 enum FrameKind {
     /// Small steps from the last reading, as of an arm that moves.
     Walk,
-    /// The same readings again and again.
+    /// The same readings repeatedly.
     Stuck,
-    /// Any number in any field.
+    /// Arbitrary numbers in all fields.
     Wild,
-    /// A walk of which frames are lost, late or come twice.
+    /// A walk with lost, late and repeated frames.
     Lossy,
 }
 
@@ -76,7 +76,7 @@ impl Frames {
                 }
             }
         }
-        // Switches are moved now and then, by hand or by a loose wire.
+        // Switches change occasionally, by hand or because of a loose wire.
         if random.random_bool(0.02) {
             frame.inputs = DigitalInputs(random.random_range(0..4));
         }
@@ -89,7 +89,7 @@ impl Frames {
 }
 
 #[test]
-fn no_frame_brings_the_controller_out_of_its_limits() {
+fn no_frame_drives_the_controller_beyond_its_limits() {
     let ticks = std::env::var("PAINLEVE_FUZZ_TICKS")
         .ok()
         .and_then(|text| text.parse().ok())
@@ -124,7 +124,7 @@ fn no_frame_brings_the_controller_out_of_its_limits() {
                 state,
                 Some(SupervisorState::Idle | SupervisorState::Fault) | None
             );
-            // A frame with an old number is not believed in anything; so many in a row are a fault.
+            // A frame with an old number is rejected completely; too many in a row are a fault.
             let enabled = frame.inputs.contains(DigitalInputs::ENABLE);
             disabled = if enabled { 0 } else { disabled + 1 };
             if off || disabled > MOST_UNBELIEVED {
@@ -132,7 +132,7 @@ fn no_frame_brings_the_controller_out_of_its_limits() {
             }
             let latched = state == Some(SupervisorState::Fault);
             assert_eq!(latched, answer.fault != 0, "{}", context());
-            // The edge of RESET is that between frames that are believed; lost ones have none.
+            // The edge of RESET is that between accepted frames; lost frames have none.
             if before.fault != 0 && !frame.inputs.contains(DigitalInputs::RESET) {
                 assert_eq!(answer.fault, before.fault, "{}", context());
             }
@@ -140,7 +140,7 @@ fn no_frame_brings_the_controller_out_of_its_limits() {
             faults += u64::from(before.fault == 0 && answer.fault != 0);
             before = answer;
         }
-        // The frames get somewhere, or the test shows nothing.
+        // The frames must drive the arm, or the test shows nothing.
         let has_law = scenario.controller.law.name() != "off";
         assert!(
             !has_law || (driven > ticks / 1000 && faults > ticks / 10_000),

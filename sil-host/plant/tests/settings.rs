@@ -1,11 +1,12 @@
-//! Every setting of a scenario out of its range: the message names its key, value and range.
+//! Sets every setting of a scenario out of its range: the message must name its key, value and
+//! range.
 
 use painleve_plant::scenario::Scenario;
 use painleve_shared::range::Shortest;
 use painleve_shared::settings::{Field, Range, Settings, Shape, Variant};
 use toml::{Table, Value};
 
-/// A number of the plant that is out of range, and where it stands.
+/// An out-of-range number of the plant, and its key.
 struct Wrong {
     key: String,
     value: f64,
@@ -13,12 +14,12 @@ struct Wrong {
     file: Value,
 }
 
-/// A table with one entry.
+/// Returns a table with one entry.
 fn entry(key: &str, value: Value) -> Value {
     Value::Table(Table::from_iter([(key.to_string(), value)]))
 }
 
-/// A value within range.
+/// Returns a value within range.
 fn right(shape: &Shape, range: Option<Range>) -> Value {
     match shape {
         Shape::Switch => Value::Boolean(true),
@@ -31,7 +32,7 @@ fn right(shape: &Shape, range: Option<Range>) -> Value {
     }
 }
 
-/// Every wrong value of `shape` at `key`, each inside a file that `inside` makes of it.
+/// Collects every wrong value of `shape` at `key`; `inside` turns each into a file.
 fn wrong(
     key: &str,
     shape: &Shape,
@@ -46,12 +47,12 @@ fn wrong(
                 assert!(whole, "{key} has no range");
                 return Vec::new();
             };
-            // Exact in single precision, as the setting may be.
+            // Exact in single precision, since the setting may be single-precision.
             let above = f64::from((range.maximum + range.maximum.abs().max(1.0)) as f32);
             let below = f64::from((range.minimum - range.minimum.abs().max(1.0)) as f32);
             let mut values = vec![above];
             if whole {
-                // A type without a sign refuses what is below zero by itself.
+                // An unsigned type rejects negative values itself.
                 values.extend((below >= 0.0).then_some(below));
             } else {
                 values.extend([below, f64::INFINITY, f64::NAN]);
@@ -118,7 +119,7 @@ fn in_variant(
     }
 }
 
-/// Wrong values of every field, beside right ones of `others`.
+/// Collects wrong values of every field, with valid values of `others`.
 fn in_fields(
     key: &str,
     fields: &[Field],

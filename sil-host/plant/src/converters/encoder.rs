@@ -1,7 +1,7 @@
 //! Absolute single-turn joint encoders on θ1 and on the elbow, θ2 − θ1.
 //!
-//! Latency is exact: the plant is stopped at the instant of capture (the part of
-//! the latency below one tick), and whole ticks wait in a ring.
+//! Latency is exact: the plant stops at the instant of capture, which accounts for the part of the
+//! latency below one tick; whole ticks wait in a ring buffer.
 
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
 use painleve_shared::{LinkMotion, OutOfRange, check_setting, settings};
@@ -34,20 +34,20 @@ impl EncoderSettings {
     }
 }
 
-/// Both encoders with their noise and the readings on their way.
+/// Both encoders with their noise and the readings in transit.
 #[derive(Clone, Debug)]
 pub struct Encoders {
     scales: [EncoderScale; 2],
     noise: [Noise; 2],
     whole_ticks: usize,
     fraction: f64,
-    /// Ring of captured readings.
+    /// Ring buffer of captured readings.
     captured: [[EncoderCounts; 2]; MAXIMUM_LATENCY_TICKS],
     next: usize,
 }
 
 impl Encoders {
-    /// Encoders that have seen the arm at rest at link angles `theta_rad` for ever.
+    /// Creates encoders whose past readings all show the arm at rest at link angles `theta_rad`.
     pub fn new(settings: &EncoderSettings, seed: u64, theta_rad: &LinkMotion<f64>) -> Self {
         let mut encoders = Self {
             scales: settings.scales(),
@@ -64,7 +64,7 @@ impl Encoders {
         encoders
     }
 
-    /// How long before a tick the encoders capture for it, in ticks, 0 … 1.
+    /// Returns how long before a tick the encoders capture for it, in ticks, 0 … 1.
     pub fn capture_before_tick(&self) -> f64 {
         self.fraction
     }
@@ -81,7 +81,7 @@ impl Encoders {
         self.next = (self.next + 1) % MAXIMUM_LATENCY_TICKS;
     }
 
-    /// The readings that this tick's frame carries.
+    /// Returns the readings carried by this tick's frame.
     pub fn readings(&self) -> [EncoderCounts; 2] {
         let behind = self.whole_ticks + 1;
         let index = (self.next + MAXIMUM_LATENCY_TICKS - behind) % MAXIMUM_LATENCY_TICKS;
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn readings_are_of_the_elbow_and_late_by_whole_ticks() {
+    fn readings_show_the_elbow_angle_with_latency() {
         let settings = EncoderSettings {
             latency_ticks: 2.25,
             ..Default::default()

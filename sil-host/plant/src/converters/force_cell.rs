@@ -1,7 +1,7 @@
 //! Two-axis force cell under the tip: samples the contact force at the tick.
 //!
-//! The collisions of a rigid body last no time, so that no sample ever hits one: the cell
-//! sees the forces between them, as a cell with a good anti-spike filter would.
+//! A collision of rigid bodies takes no time, so no sample falls into one: the cell measures the
+//! forces between collisions, like a cell with a good anti-spike filter.
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{ForceCounts, LinearScale};
@@ -45,7 +45,7 @@ pub struct ForceCell {
 }
 
 impl ForceCell {
-    /// A force cell.
+    /// Creates a force cell.
     pub fn new(settings: &ForceCellSettings, seed: u64) -> Self {
         Self {
             scale: settings.scale(),
@@ -54,7 +54,7 @@ impl ForceCell {
         }
     }
 
-    /// Readings (f_t, f_n) of a contact force (f_t, f_n), N.
+    /// Returns the readings (f_t, f_n) of a contact force (f_t, f_n), N.
     pub fn read(&mut self, force_n: &Vector2<f64>) -> (ForceCounts, ForceCounts) {
         let (tangential, _) = self.scale.counts(force_n.x + self.tangential_noise.draw());
         let (normal, _) = self.scale.counts(force_n.y + self.normal_noise.draw());

@@ -1,14 +1,14 @@
-//! Frames that are lost between plant and controller, at random and repeatably.
+//! Random, repeatable loss of frames between plant and controller.
 //!
-//! Without the sensor frame the controller does not tick, and sees a gap in the sequence
-//! numbers at the next one; without the actuator frame it does, in vain. Either way the
-//! torque stages repeat their last command.
+//! If the sensor frame is lost, the controller does not tick, and sees a gap in the sequence
+//! numbers of the next frame. If the actuator frame is lost, the controller ticks but its answer
+//! does not arrive. In both cases the torque stages repeat their last command.
 
 use painleve_shared::settings;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Seed of the losses beside those of the noise channels.
+/// Random stream of the losses, separate from those of the noise channels.
 const STREAM: u64 = 0x4c6f_7373_6573_0001;
 
 settings! {
@@ -20,12 +20,12 @@ settings! {
     }
 }
 
-/// What is lost at a tick.
+/// Frames lost at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lost {
-    /// The sensor frame.
+    /// Whether the sensor frame is lost.
     pub sensor: bool,
-    /// The actuator frame.
+    /// Whether the actuator frame is lost.
     pub actuator: bool,
 }
 
@@ -37,7 +37,7 @@ pub struct LossyLink {
 }
 
 impl LossyLink {
-    /// Equal seeds lose equal frames on every host.
+    /// Creates the link. Equal seeds lose the same frames on every host.
     pub fn new(settings: &LinkSettings, seed: u64) -> Self {
         Self {
             frame_loss: settings.frame_loss,
@@ -45,7 +45,7 @@ impl LossyLink {
         }
     }
 
-    /// What is lost at the next tick; called once per tick.
+    /// Draws the losses of the next tick; called once per tick.
     pub fn draw(&mut self) -> Lost {
         if self.frame_loss == 0.0 {
             return Lost::default();
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_many_are_lost_as_asked_for_and_the_same_ones_again() {
+    fn losses_have_the_set_probability_and_are_repeatable() {
         let lost = |frame_loss, seed| {
             let mut link = LossyLink::new(&LinkSettings { frame_loss }, seed);
             (0..20_000).map(|_| link.draw()).collect::<Vec<_>>()

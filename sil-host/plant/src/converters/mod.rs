@@ -1,13 +1,13 @@
-//! What stands between the plant's quantities and the controller's integers.
+//! Converters between the plant's physical quantities and the controller's integers.
 //!
 //! - [`noise`]: seeded noise, one stream per channel
 //! - [`encoder`]: joint encoders with resolution, offset, noise and latency
 //! - [`force_cell`]: f_n and f_t with resolution, range and noise
 //! - [`torque_stage`]: torque with resolution, saturation, lag and transport delay
-//! - [`link_loss`]: frames that are lost on their way
+//! - [`link_loss`]: frames lost in transit
 //!
-//! Whatever crosses the link is an exact integer; the controller knows the
-//! scalings ([`ConverterSettings::scales`]), never the noise.
+//! All data on the link are exact integers. The controller knows the scalings
+//! ([`ConverterSettings::scales`]) but not the noise.
 
 pub mod encoder;
 pub mod force_cell;
@@ -40,7 +40,7 @@ settings! {
 }
 
 impl ConverterSettings {
-    /// What the controller is told about the converters.
+    /// Returns the scalings that the controller receives.
     pub fn scales(&self) -> Converters {
         Converters {
             encoders: self.encoder.scales(),
@@ -57,7 +57,7 @@ impl ConverterSettings {
 }
 
 impl EncoderSettings {
-    /// Scalings of both encoders.
+    /// Returns the scalings of both encoders.
     fn scales(&self) -> [EncoderScale; 2] {
         self.offset_counts.map(|offset| EncoderScale {
             bits: self.bits,

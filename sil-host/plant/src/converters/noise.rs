@@ -11,7 +11,7 @@ pub struct Noise {
     generator: Pcg64,
 }
 
-/// Channels that have noise of their own.
+/// Channels with independent noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// Encoder of θ1.
@@ -25,9 +25,10 @@ pub enum Channel {
 }
 
 impl Noise {
-    /// Noise of standard deviation `deviation` (in the channel's unit).
+    /// Creates noise with standard deviation `deviation`, in the channel's
+    /// unit.
     pub fn new(seed: u64, channel: Channel, deviation: f64) -> Self {
-        // The channel is spread over the bits so that seeds 1, 2, 3 … of
+        // Spreads the channel number over all bits, so that small seeds of
         // different channels never give the same stream.
         let stream = (channel as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         Self {
@@ -36,7 +37,7 @@ impl Noise {
         }
     }
 
-    /// The next value.
+    /// Returns the next value.
     pub fn draw(&mut self) -> f64 {
         if self.deviation == 0.0 {
             return 0.0;
@@ -59,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn the_deviation_is_the_one_asked_for() {
+    fn the_noise_has_the_set_deviation() {
         let mut noise = Noise::new(7, Channel::NormalForce, 0.5);
         let draws: Vec<f64> = (0..20_000).map(|_| noise.draw()).collect();
         let mean = draws.iter().sum::<f64>() / 2e4;

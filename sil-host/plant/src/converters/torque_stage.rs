@@ -1,5 +1,5 @@
-//! Torque stages of both joints: counts to torque, saturation, first-order lag,
-//! the transport delay from sample to torque, and a watchdog over the commands.
+//! Torque stages of both joints: conversion from counts, saturation, first-order lag, the transport
+//! delay from sample to torque, and a watchdog for missing commands.
 
 use painleve_shared::counts::{LinearScale, TorqueCounts};
 use painleve_shared::{JointTorque, settings};
@@ -19,8 +19,8 @@ settings! {
         lag_s: f64 = 0.0, 0.0..=1.0, "s";
         /// Time from the sample to the torque that answers it, in control ticks.
         delay_ticks: f64 = 1.0, 0.0..=MAXIMUM_DELAY_TICKS as f64 - 1.0, "ticks";
-        /// After so long without a command the stage gives no torque any more, for the rest of
-        /// the run. The first command arms this watchdog.
+        /// Without a command for this long, the stage removes its torque for the rest of the run.
+        /// The first command arms this watchdog.
         watchdog_ticks: u32 = 50, 1..=1_000_000, "ticks";
     }
 }
@@ -34,20 +34,20 @@ impl TorqueStageSettings {
     }
 }
 
-/// Both torque stages with the commands on their way.
+/// Both torque stages with the commands in transit.
 #[derive(Clone, Debug)]
 pub struct TorqueStages {
     scale: LinearScale<f64>,
     lag_s: f64,
     whole_ticks: usize,
     fraction: f64,
-    /// Ring of commanded torques, N·m.
+    /// Ring buffer of commanded torques, N·m.
     commands: [JointTorque<f64>; MAXIMUM_DELAY_TICKS],
     next: usize,
     watchdog: CommandWatchdog,
 }
 
-/// Takes the torque away when commands stop coming; latched.
+/// Removes the torque when commands stop arriving; latched.
 #[derive(Clone, Debug)]
 struct CommandWatchdog {
     limit_ticks: u32,
@@ -69,7 +69,7 @@ impl CommandWatchdog {
 }
 
 impl TorqueStages {
-    /// Stages that have been commanded zero torque for ever.
+    /// Creates stages whose past commands were all zero torque.
     pub fn new(settings: &TorqueStageSettings) -> Self {
         Self {
             scale: settings.scale(),
@@ -86,18 +86,18 @@ impl TorqueStages {
         }
     }
 
-    /// Time constant of the stages, s.
+    /// Returns the time constant of the stages, s.
     pub fn lag_s(&self) -> f64 {
         self.lag_s
     }
 
-    /// How long after a tick the torque changes, in ticks, 0 … 1.
+    /// Returns how long after a tick the torque changes, in ticks, 0 … 1.
     pub fn change_after_tick(&self) -> f64 {
         self.fraction
     }
 
-    /// Takes this tick's command, or repeats the last one if there is none;
-    /// called once per tick. Counts beyond the range saturate.
+    /// Accepts this tick's command, or repeats the last one if there is none; called once per tick.
+    /// Counts beyond the range saturate.
     pub fn command(&mut self, counts: Option<[TorqueCounts; 2]>) {
         let last = (self.next + MAXIMUM_DELAY_TICKS - 1) % MAXIMUM_DELAY_TICKS;
         self.commands[self.next] = match counts {
@@ -118,12 +118,12 @@ impl TorqueStages {
         }
     }
 
-    /// Whether commands have stayed away for so long that there is no torque any more.
+    /// Returns whether the watchdog has removed the torque.
     pub fn has_tripped(&self) -> bool {
         self.watchdog.tripped
     }
 
-    /// The torque commanded for the change within this tick, N·m.
+    /// Returns the torque commanded for the change within this tick, N·m.
     pub fn target_nm(&self) -> JointTorque<f64> {
         let behind = self.whole_ticks + 1;
         self.commands[(self.next + MAXIMUM_DELAY_TICKS - behind) % MAXIMUM_DELAY_TICKS]
@@ -154,21 +154,21 @@ mod tests {
     }
 
     #[test]
-    fn without_commands_the_torque_goes_and_stays_away() {
+    fn without_commands_the_torque_is_removed_for_good() {
         let mut stages = TorqueStages::new(&TorqueStageSettings {
             delay_ticks: 0.0,
             watchdog_ticks: 3,
             ..Default::default()
         });
         let full = Some([TorqueCounts(2047), TorqueCounts(2047)]);
-        // Nobody has commanded anything yet.
+        // No command has been sent yet, so the watchdog is not armed.
         (0..10).for_each(|_| stages.command(None));
         assert!(!stages.has_tripped());
         stages.command(full);
         stages.command(None);
         stages.command(None);
         assert!(stages.target_nm().first() > 4.9 && !stages.has_tripped());
-        // A command in time begins a new wait.
+        // A command in time restarts the watchdog.
         stages.command(full);
         stages.command(None);
         stages.command(None);

@@ -1,4 +1,4 @@
-//! The simulated arm on its belt: its state, and how it goes from one event to the next.
+//! The simulated arm on its belt: its state, and its motion from one event to the next.
 
 mod contact_change;
 
@@ -19,42 +19,42 @@ use super::probe::{ArmProbe, ArmStep};
 use super::torque::TorqueSegment;
 use super::transition;
 
-/// Why the plant cannot go on.
+/// Why the plant cannot continue.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MotionError {
-    /// The integrator needs steps below rounding of the time.
+    /// The integrator would need steps below the rounding error of the time.
     #[error("the plant's step size vanished at t = {time_s} s in mode {mode:?}")]
     StepVanished {
-        /// When, s.
+        /// Time, s.
         time_s: f64,
-        /// In which mode.
+        /// Contact mode.
         mode: ContactMode,
     },
-    /// Events follow each other without time passing.
+    /// Events follow one another without time passing.
     #[error("contact events without end at t = {time_s} s")]
     EventsWithoutEnd {
-        /// When, s.
+        /// Time, s.
         time_s: f64,
     },
     /// A collision has no solution.
     #[error("at t = {time_s} s: {source}")]
     EndlessImpact {
-        /// When, s.
+        /// Time, s.
         time_s: f64,
-        /// Which.
+        /// The unsolvable collision.
         source: impact::EndlessImpact,
     },
 }
 
-/// Longest step that is tried at order 5, s: at the default tolerance the estimate of a sliding
-/// arm reaches 1 at 2 ms.
+/// Longest step to try at order 5, s: at the default tolerance, the error estimate of a sliding arm
+/// reaches 1 at 2 ms.
 const LONGEST_SHORT_STEP_S: f64 = 4e-3;
 
-/// Corrections of an event's time that the first-order change of the state
-/// carries without loss, s.
+/// Largest correction of an event's time for which the first-order change of the state is exact to
+/// rounding, s.
 const FIRST_ORDER_S: f64 = 1e-8;
 
-/// More events than any motion has within the shortest time that matters.
+/// Upper limit of events within the shortest relevant time; no real motion has as many.
 const MAXIMUM_EVENTS_AT_ONE_TIME: u32 = 1000;
 
 /// The simulated arm on its belt.
@@ -69,22 +69,22 @@ pub struct ArmOnBelt {
     time_s: f64,
     state: State,
     mode: ContactMode,
-    /// Where the tip came to stick: time (s) and z_t (m).
+    /// Time (s) and z_t (m) at which the tip began to stick.
     stick_start: (f64, f64),
-    /// The torque or the belt has changed since the mode was decided.
+    /// Whether torque or belt have changed since the mode was decided.
     unsettled: bool,
     step_size_s: f64,
-    /// A step up to this long is first tried at order 5, s.
+    /// Steps up to this length are tried at order 5 first, s.
     short_size_s: f64,
-    /// The equations at the present state, where they are known; not after anything that
-    /// changes the state or the equations.
+    /// The equations evaluated at the present state, if known; cleared by any change of the state
+    /// or of the equations.
     evaluation: Option<Evaluation>,
     step: Box<Step<4>>,
 }
 
 impl ArmOnBelt {
-    /// A plant at time zero with zero torque. A tip within 0.1 mm over the belt or
-    /// 1 mm inside it is first put onto the belt.
+    /// Creates a plant at time zero with zero torque. A tip at most 0.1 mm above the belt or 1 mm
+    /// inside it is first moved onto the belt.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first parameter that is out of range.
@@ -134,32 +134,32 @@ impl ArmOnBelt {
         Ok(plant)
     }
 
-    /// The arm's model.
+    /// Returns the arm's model.
     pub fn arm(&self) -> &Arm<f64> {
         &self.arm
     }
 
-    /// Present time, s.
+    /// Returns the present time, s.
     pub fn time_s(&self) -> f64 {
         self.time_s
     }
 
-    /// Present state.
+    /// Returns the present state.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Present contact mode.
+    /// Returns the present contact mode.
     pub fn mode(&self) -> ContactMode {
         self.mode
     }
 
-    /// Joint torques applied now, N·m.
+    /// Returns the joint torques applied now, N·m.
     pub fn torque_nm(&self) -> JointTorque<f64> {
         self.torque.at(self.time_s)
     }
 
-    /// The equations of the present stretch of motion.
+    /// Returns the equations of the present stretch of motion.
     pub fn motion(&self) -> Motion<'_> {
         Motion {
             arm: &self.arm,
@@ -169,13 +169,13 @@ impl ArmOnBelt {
         }
     }
 
-    /// Contact force (f_t, f_n) on the tip now, N; impulses are not part of it.
+    /// Returns the contact force (f_t, f_n) on the tip now, N, without impulses.
     pub fn contact_force_n(&self) -> Vector2<f64> {
         self.evaluation().force_n
     }
 
-    /// Commands joint torques `target_nm` from now on, through a stage with
-    /// time constant `lag_s` (0 for none).
+    /// Commands joint torques `target_nm` from now on, through a first-order lag with time constant
+    /// `lag_s` (0 for none).
     pub fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64) {
         let next = self.torque.followed_by(self.time_s, target_nm, lag_s);
         if next.at(self.time_s) != self.torque.at(self.time_s) {
@@ -185,8 +185,7 @@ impl ArmOnBelt {
         self.torque = next;
     }
 
-    /// Decides the contact mode at the present time, so that forces are those
-    /// after the last command.
+    /// Decides the contact mode at the present time, so that the forces reflect the last command.
     ///
     /// # Errors
     /// [`MotionError`] if no mode is possible.
@@ -211,7 +210,7 @@ impl ArmOnBelt {
     /// Integrates to time `until_s`.
     ///
     /// # Errors
-    /// [`MotionError`]; the plant stands at the time of the error.
+    /// [`MotionError`]; the plant stays at the time of the error.
     pub fn advance(&mut self, until_s: f64, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
         while self.time_s < until_s {
             let corner = self.belt.next_corner_s(self.time_s).min(until_s);
@@ -252,7 +251,7 @@ impl ArmOnBelt {
         Ok(())
     }
 
-    /// Takes one good step, or goes to the first event in it and returns its time.
+    /// Takes one accepted step, or moves to the first event within it and returns the event's time.
     fn step_or_event(
         &mut self,
         until_s: f64,
@@ -302,7 +301,7 @@ impl ArmOnBelt {
             self.step
                 .take(&derivative, start_s, &start, &here.slope, size, &tolerance);
             if self.step.error <= 1.0 {
-                // A step cut short says nothing against a longer one.
+                // A truncated step is no reason against a longer one.
                 let proposed = self.step.proposed_size();
                 self.step_size_s = if size < wanted {
                     wanted.max(proposed)
@@ -328,10 +327,9 @@ impl ArmOnBelt {
 
         let mut event = transition::first_event_s(&motion, mode, &mut self.step, &here, &there);
         if let Some(event_s) = event.as_mut() {
-            // The polynomial that located the event is less accurate than a
-            // step. What a step leaves of the gap is removed by Newton's method in
-            // time, because putting the tip onto the belt by force would change
-            // the energy.
+            // The interpolating polynomial that located the event is less accurate than a step.
+            // Newton's method in time removes the gap that the step leaves, because moving the tip
+            // onto the belt by force would change the energy.
             for _ in 0..3 {
                 let size = *event_s - start_s;
                 self.step
@@ -382,8 +380,9 @@ impl ArmOnBelt {
         Ok(event)
     }
 
-    /// Tries to go to `until_s` in one step of order 5: the state and the equations there, if the
-    /// error is within the tolerance and no event is near, and up to which size to try again.
+    /// Tries to reach `until_s` in one step of order 5. Returns the state and the equations there
+    /// if the error is within the tolerance and no event is near, and the size up to which order 5
+    /// is worth another attempt.
     fn short_step(
         &self,
         motion: &Motion<'_>,
@@ -418,7 +417,8 @@ impl ArmOnBelt {
         (goes_on.then_some((end, there)), longest)
     }
 
-    /// The nearest state that the mode's constraint admits: integration leaves it by its error.
+    /// Returns the nearest state that satisfies the mode's constraint, from which integration
+    /// errors have moved `state`.
     fn onto_constraint(&self, motion: &Motion<'_>, t_s: f64, state: &State) -> State {
         match self.mode {
             ContactMode::Flight => *state,
@@ -459,9 +459,9 @@ impl Plant for ArmOnBelt {
     }
 }
 
-/// A tip closer to the belt than this at the start is taken to touch it, m: the
-/// paper gives its initial conditions to three digits.
+/// Height below which a tip counts as touching the belt at the start, m: the paper gives its
+/// initial conditions to three digits.
 pub(super) const CONTACT_AT_START_M: f64 = 1e-4;
 
-/// Deepest start inside the belt that still counts as rounding of a start on it, m.
+/// Deepest start inside the belt that is treated as a rounding error, m.
 pub(super) const INSIDE_AT_START_M: f64 = 1e-3;

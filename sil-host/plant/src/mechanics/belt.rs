@@ -39,7 +39,7 @@ settings! {
             to_m_s: f64, -100.0..=100.0, "m/s";
             /// Time at which the ramp starts.
             start_s: f64, 0.0..=1e7, "s";
-            /// How long the ramp takes.
+            /// Duration of the ramp.
             duration_s: f64, 1e-6..=1e7, "s";
         },
         /// A sine around a mean speed.
@@ -55,14 +55,14 @@ settings! {
 }
 
 impl Default for BeltProfile {
-    /// The paper's section III: −0.4 m/s.
+    /// Returns the profile of the paper's section III: −0.4 m/s.
     fn default() -> Self {
         Self::Constant { speed_m_s: -0.4 }
     }
 }
 
 impl BeltProfile {
-    /// Speed at time `t_s`, m/s.
+    /// Returns the speed at time `t_s`, m/s.
     pub fn speed_m_s(&self, t_s: f64) -> f64 {
         match *self {
             Self::Constant { speed_m_s } => speed_m_s,
@@ -97,7 +97,8 @@ impl BeltProfile {
         }
     }
 
-    /// Acceleration at time `t_s`, m/s²; at a corner that of the time after it.
+    /// Returns the acceleration at time `t_s`, m/s²; at a corner, the
+    /// acceleration just after it.
     pub fn acceleration_m_s2(&self, t_s: f64) -> f64 {
         match *self {
             Self::Constant { .. } | Self::Step { .. } => 0.0,
@@ -124,12 +125,12 @@ impl BeltProfile {
         }
     }
 
-    /// Distance the belt moves from `from_s` to `to_s`, m.
+    /// Returns the distance the belt moves from `from_s` to `to_s`, m.
     pub fn displacement_m(&self, from_s: f64, to_s: f64) -> f64 {
         self.position_m(to_s) - self.position_m(from_s)
     }
 
-    /// Integral of the speed from time zero, m.
+    /// Returns the integral of the speed from time zero, m.
     fn position_m(&self, t_s: f64) -> f64 {
         match *self {
             Self::Constant { speed_m_s } => speed_m_s * t_s,
@@ -160,8 +161,8 @@ impl BeltProfile {
         }
     }
 
-    /// The next time after `t_s` at which speed or acceleration jumps, s;
-    /// infinite if there is none.
+    /// Returns the next time after `t_s` at which speed or acceleration jumps,
+    /// s; infinite if there is none.
     pub fn next_corner_s(&self, t_s: f64) -> f64 {
         let corners = match *self {
             Self::Constant { .. } | Self::Sine { .. } => [f64::INFINITY; 2],

@@ -1,4 +1,4 @@
-//! The plants that are built in, as one: the arm on a rigid belt, or on one that gives.
+//! The built-in plants as one type: the arm on a rigid or on a compliant contact.
 
 use nalgebra::Vector2;
 use painleve_shared::{JointTorque, LinkMotion, OutOfRange};
@@ -8,21 +8,21 @@ use super::compliant::{CompliantArmOnBelt, ContactKind};
 use crate::plant::{Plant, PlantError, Probe, Snapshot};
 use crate::scenario::Scenario;
 
-/// The plant of a scenario, as its `contact.kind` chooses.
+/// The plant of a scenario, selected by its `contact.kind`.
 #[derive(Clone, Debug)]
 pub enum BuiltInPlant {
-    /// Rigid bodies.
+    /// Rigid contact.
     Rigid(ArmOnBelt),
-    /// A contact that gives.
+    /// Compliant contact.
     Compliant(CompliantArmOnBelt),
 }
 
 impl BuiltInPlant {
-    /// The scenario's plant at its start.
+    /// Creates the scenario's plant at its start.
     ///
     /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range, or an effect that a rigid contact
-    /// does not have.
+    /// [`OutOfRange`] naming the first key that is out of range, or an effect that requires a
+    /// compliant contact.
     pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
         let parameters = scenario.plant_parameters();
         let start = scenario.initial.state();

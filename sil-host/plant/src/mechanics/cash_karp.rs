@@ -1,9 +1,9 @@
-//! Cash and Karp's Runge–Kutta pair of order 5(4): the cheaper step where one is cut short.
+//! Cash and Karp's Runge–Kutta pair of order 5(4), the cheaper method for truncated steps.
 //!
-//! A controller changes the torque every millisecond or sooner. Error control would let
-//! [`dop853`](super::dop853) step ten times as far, so that most of the accuracy of its thirteen
-//! evaluations is thrown away. Six are enough there: at 1 ms in sliding this pair estimates
-//! 2 % of a tolerance of 1e-9 (`docs/benchmarks.md` shows the error against the cost).
+//! A controller changes the torque every millisecond or sooner. Error control would allow
+//! [`dop853`](super::dop853) steps ten times as long, so most of the accuracy of its thirteen
+//! evaluations is wasted. Six evaluations are enough: at 1 ms in sliding, this pair estimates an
+//! error of 2 % of a tolerance of 1e-9 (`docs/benchmarks.md` shows error against cost).
 //!
 //! Coefficients: Cash and Karp, *A variable order Runge–Kutta method for initial value problems
 //! with rapidly varying right-hand sides*, ACM Transactions on Mathematical Software 16 (1990).
@@ -12,18 +12,18 @@ use nalgebra::SVector;
 
 use super::dop853::Tolerance;
 
-/// Where a short step ends.
+/// Result of a short step.
 #[derive(Clone, Copy, Debug)]
 pub struct ShortStep<const N: usize> {
     /// State at the end, of order 5.
     pub end: SVector<f64, N>,
-    /// Error of the embedded solution of order 4 relative to the tolerance: the step is good if
+    /// Error of the embedded solution of order 4 relative to the tolerance: the step is accepted if
     /// this is at most 1.
     pub error: f64,
 }
 
 impl<const N: usize> ShortStep<N> {
-    /// Integrates from (`t`, `x`) over `h`; `slope` is the derivative there.
+    /// Integrates from (`t`, `x`) over `h`; `slope` is the derivative at (`t`, `x`).
     #[inline]
     pub fn take<F>(
         derivative: F,
@@ -95,7 +95,7 @@ mod tests {
         absolute: 1e-9,
     };
 
-    /// x̂ = cos t², a derivative that depends on time and state.
+    /// ẋ = cos t², a derivative that depends on time and state.
     fn slope(t: f64, x: &Vector2<f64>) -> Vector2<f64> {
         2.0 * t * Vector2::new(-x.y, x.x)
     }
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_nan_is_not_a_good_step() {
+    fn a_nan_step_is_rejected() {
         let x = Vector2::new(f64::NAN, 0.0);
         let error = ShortStep::take(slope, 0.0, &x, &x, 0.1, &TOLERANCE).error;
         assert!(error.is_nan());

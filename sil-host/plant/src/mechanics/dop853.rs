@@ -2,16 +2,15 @@
 //! (Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*,
 //! section II.10; coefficients of their `dop853.f`).
 //!
-//! One step is one function call on stack memory: no allocation, no dispatch.
-//! Compared before it was written (see `docs/plant.md`): `differential-equations`
-//! 0.7 (its event location gave wrong roots), `diffsol` 0.18 (right roots, but
-//! heap vectors in every step), `ode_solvers` 0.6 (no roots). What the plant
-//! needs is a step, an error estimate and a polynomial; locating contact events
-//! is its own subject, so that the rest of a solver library would be idle.
+//! One step is one function call on stack memory: no allocation, no dispatch. The libraries
+//! compared beforehand (see `docs/plant.md`) were `differential-equations` 0.7 (its event location
+//! gave wrong roots), `diffsol` 0.18 (right roots, but heap vectors in every step) and
+//! `ode_solvers` 0.6 (no roots). The plant needs a step, an error estimate and a polynomial; it
+//! locates contact events itself, so the rest of a solver library would be unused.
 
 use nalgebra::SVector;
 
-/// Error tolerance of one step: |error| ≤ absolute + relative·|x| in the root mean square.
+/// Error tolerance of one step: |error| ≤ absolute + relative·|x|, as a root mean square.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Relative to each component.
@@ -31,13 +30,13 @@ pub struct Step<const N: usize> {
     pub start: SVector<f64, N>,
     /// State at the end, of order 8.
     pub end: SVector<f64, N>,
-    /// Error relative to the tolerance: the step is good if this is at most 1.
+    /// Error relative to the tolerance: the step is accepted if this is at most 1.
     pub error: f64,
     stages: [SVector<f64, N>; 16],
 }
 
 impl<const N: usize> Step<N> {
-    /// An empty step, as memory for [`Step::take`].
+    /// Returns an empty step, as memory for [`Step::take`].
     pub fn empty() -> Self {
         Self {
             t: 0.0,
@@ -49,7 +48,7 @@ impl<const N: usize> Step<N> {
         }
     }
 
-    /// Integrates from (`t`, `x`) over `h`; `slope` is the derivative there.
+    /// Integrates from (`t`, `x`) over `h`; `slope` is the derivative at (`t`, `x`).
     pub fn take<F>(
         &mut self,
         derivative: &F,
@@ -190,24 +189,25 @@ impl<const N: usize> Step<N> {
         self.error = if weight > 0.0 {
             h.abs() * square_5 / (weight * N as f64).sqrt()
         } else {
-            // Also reached with NaN, which must not pass for a good step.
+            // Also reached with NaN, which must not count as an accepted step.
             weight
         };
     }
 
-    /// Size for the next step (after a good one) or for another try.
+    /// Returns the size for the next step (after an accepted one) or for another attempt.
     pub fn proposed_size(&self) -> f64 {
-        // error^(−1/8), by square roots, which are the same on every host.
+        // error^(−1/8), computed with square roots, which are the same on every host.
         let factor = 0.9 / self.error.sqrt().sqrt().sqrt();
         self.h * factor.clamp(0.2, 6.0)
     }
 
-    /// Keeps the derivative at the end of the step; the next step may start with it.
+    /// Keeps the derivative at the end of the step, with which the next step may start.
     pub fn finish(&mut self, end_slope: &SVector<f64, N>) {
         self.stages[12] = *end_slope;
     }
 
-    /// The polynomial through the step, after [`Step::finish`]; costs three evaluations.
+    /// Returns the polynomial through the step; call it after [`Step::finish`]. Costs three
+    /// evaluations.
     pub fn dense<F>(&mut self, derivative: &F) -> DenseStep<N>
     where
         F: Fn(f64, &SVector<f64, N>) -> SVector<f64, N>,
@@ -323,7 +323,7 @@ pub struct DenseStep<const N: usize> {
 }
 
 impl<const N: usize> DenseStep<N> {
-    /// The state at a time inside the step.
+    /// Returns the state at a time inside the step.
     pub fn at(&self, t: f64) -> SVector<f64, N> {
         let s = (t - self.t) / self.h;
         let r = 1.0 - s;
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_of_the_proposed_size_keep_the_tolerance() {
+    fn steps_of_the_proposed_size_meet_the_tolerance() {
         let mut x = Vector2::new(2.0, 0.0);
         let (mut t, mut h) = (0.0, 0.01);
         let mut step = Step::empty();
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn a_nan_is_not_a_good_step() {
+    fn a_nan_step_is_rejected() {
         let x = Vector2::new(f64::NAN, 0.0);
         let mut step = Step::empty();
         step.take(&oscillator, 0.0, &x, &oscillator(0.0, &x), 0.1, &TOLERANCE);

@@ -1,25 +1,25 @@
-//! Where inside a step something happens: the tip lands, slip dies, contact ends.
+//! Location of events inside a step: the tip lands, slip vanishes, contact ends.
 
 /// Resolution of event times, s.
 const RESOLUTION_S: f64 = 1e-15;
 
-/// Finds a time between `before` and `after` at which `margin` turns
-/// negative, up to rounding, by the ITP method (Oliveira and Takahashi 2020).
-/// Both are a time (s) with the margin there: not negative before, negative after. The
-/// returned time is on the negative side, so that the event has happened there.
+/// Finds a time between `before` and `after` at which `margin` turns negative, up to rounding, by
+/// the ITP method (Oliveira and Takahashi 2020). Both arguments are a time (s) with the margin at
+/// that time: not negative before, negative after. The returned time is on the negative side, so
+/// that the event has happened there.
 pub fn first_negative(before: (f64, f64), after: (f64, f64), margin: impl Fn(f64) -> f64) -> f64 {
     let (mut lower, mut at_lower) = before;
     let (mut upper, mut at_upper) = after;
     let slack = libm::log2(((upper - lower) / RESOLUTION_S).max(1.0)).ceil() as i32 + 1;
     let truncation = 0.2 / (upper - lower);
-    // The pace below ends after `slack` halvings; the bound is for rounding.
+    // The method ends after `slack` halvings; the higher bound allows for rounding.
     for iteration in 0..2 * slack {
         let width = upper - lower;
         if width <= RESOLUTION_S {
             break;
         }
         let middle = 0.5 * (lower + upper);
-        // Regula falsi, pushed towards the middle, kept within the bisection's pace.
+        // Regula falsi, pushed towards the middle, limited to the convergence of bisection.
         let falsi = (lower * at_upper - upper * at_lower) / (at_upper - at_lower);
         let towards_middle = (middle - falsi).signum();
         let push = (truncation * width * width).min((middle - falsi).abs());
@@ -45,9 +45,9 @@ pub fn first_negative(before: (f64, f64), after: (f64, f64), margin: impl Fn(f64
     upper
 }
 
-/// Whether a quantity stays above `threshold` within a step, judged by its
-/// values, slopes and curvatures at both ends: the quintic through
-/// them lies in the hull of its Bernstein coefficients.
+/// Returns whether a quantity stays above `threshold` within a step, judged by its values, slopes
+/// and curvatures at both ends: the quintic through them lies in the hull of its Bernstein
+/// coefficients.
 pub fn stays_above(threshold: f64, h: f64, start: [f64; 3], end: [f64; 3]) -> bool {
     let [g0, v0, a0] = start;
     let [g1, v1, a1] = end;
@@ -84,7 +84,7 @@ mod tests {
         }
 
         #[test]
-        fn a_quintic_that_dips_below_is_never_cleared(
+        fn a_quintic_that_dips_below_is_never_accepted(
             c in proptest::array::uniform6(-1.0_f64..3.0),
         ) {
             let value = |t: f64| c.iter().rev().fold(0.0, |sum, a| sum * t + a);

@@ -1,20 +1,19 @@
 //! Collision of the tip with the belt: Routh's impulse process.
 //!
-//! During the collision positions stand still and the normal impulse P takes
-//! the place of time. With slip direction s the tip velocity (v_r, v_n)
-//! relative to the belt changes as
+//! During the collision positions stay fixed and the normal impulse P takes the place of time. With
+//! slip direction s, the tip velocity (v_r, v_n) relative to the belt changes as
 //!
 //! ```text
 //! dv_r/dP = Q12 − μ s Q11     dv_n/dP = Q22 − μ s Q12 = p
 //! ```
 //!
-//! When slip dies the tip sticks if |Q12/Q11| ≤ μ (then dv_n/dP = Q22 −
-//! Q12²/Q11) and slips back otherwise. Compression ends at v_n = 0;
-//! restitution decides how much impulse follows. Everything is piecewise linear
-//! in P, so that the process is solved in closed form, phase by phase.
+//! When slip vanishes the tip sticks if |Q12/Q11| ≤ μ (then dv_n/dP = Q22 − Q12²/Q11) and slips
+//! back otherwise. Compression ends at v_n = 0; the restitution determines the impulse that
+//! follows. The velocities are piecewise linear in P, so the process is solved in closed form,
+//! phase by phase.
 //!
-//! The paper names no impact law. An impact without collision (Génot and
-//! Brogliato 1999) is the same process started at v_n = 0 with p < 0.
+//! The paper does not state an impact law. An impact without collision (Génot and Brogliato 1999)
+//! is the same process started at v_n = 0 with p < 0.
 
 use nalgebra::{Matrix2, Vector2};
 use painleve_shared::{Pose, Slip, settings};
@@ -23,11 +22,10 @@ use super::motion::{Motion, theta};
 use crate::plant::State;
 
 settings! {
-    /// How much of the compression comes back. Poisson with e = 0.10 reproduces the paper's
-    /// bouncing window.
+    /// Restitution of impacts. Poisson with e = 0.10 reproduces the paper's bouncing window.
     #[derive(Copy)]
     pub struct ImpactLaw {
-        /// What the coefficient of restitution relates.
+        /// Definition of the coefficient of restitution.
         law: Restitution = Restitution::Poisson;
         /// Coefficient of restitution e.
         restitution: f64 = 0.10, 0.0..=1.0;
@@ -45,22 +43,22 @@ settings! {
     }
 }
 
-/// What a collision did.
+/// Result of a collision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
-    /// Tip velocity relative to the belt afterwards, (v_r, v_n), m/s.
+    /// Tip velocity relative to the belt after the impact, (v_r, v_n), m/s.
     pub velocity_m_s: Vector2<f64>,
     /// Impulse on the tip, (P_t, P_n), N·s.
     pub impulse_ns: Vector2<f64>,
 }
 
-/// Why there is no end of a collision. It takes a Q that is singular: at full stretch the tip
-/// cannot give way to an impulse along the links.
+/// A collision without end. This requires a singular Q: at full stretch, an impulse along the links
+/// cannot move the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the impact process does not end: the arm is straight, and no impulse turns its tip")]
 pub struct EndlessImpact;
 
-/// The process at some impulse.
+/// The process at a given impulse.
 #[derive(Clone, Copy)]
 struct ImpactProcess<'a> {
     q: &'a Matrix2<f64>,
@@ -74,8 +72,8 @@ struct ImpactProcess<'a> {
     slip: Option<Slip>,
 }
 
-/// A phase without change of slip direction is over after at most two changes:
-/// slip dies, and then it sticks or reverses for good.
+/// Largest number of phases: the direction of slip changes at most twice, when slip vanishes and
+/// when it then sticks or reverses for good.
 const MAXIMUM_PHASES: usize = 4;
 
 impl<'a> ImpactProcess<'a> {
@@ -96,7 +94,7 @@ impl<'a> ImpactProcess<'a> {
         process
     }
 
-    /// Slip direction that starts from rest; `None` sticks.
+    /// Returns the slip direction that starts from rest; `None` if the tip sticks.
     fn slip_from_rest(&self) -> Option<Slip> {
         let (coupling, tangential) = (self.q.m12, self.q.m11);
         if coupling.abs() <= self.friction * tangential {
@@ -106,7 +104,7 @@ impl<'a> ImpactProcess<'a> {
         }
     }
 
-    /// Tangential impulse per normal impulse, f_t/f_n.
+    /// Returns the tangential impulse per normal impulse, f_t/f_n.
     fn friction_ratio(&self) -> f64 {
         match self.slip {
             Some(slip) => -self.friction * slip.sign::<f64>(),
@@ -114,7 +112,7 @@ impl<'a> ImpactProcess<'a> {
         }
     }
 
-    /// (dv_r/dP, dv_n/dP), 1/kg.
+    /// Returns (dv_r/dP, dv_n/dP), 1/kg.
     fn rates(&self) -> Vector2<f64> {
         let ratio = self.friction_ratio();
         Vector2::new(
@@ -123,7 +121,7 @@ impl<'a> ImpactProcess<'a> {
         )
     }
 
-    /// Impulse until slip dies, if it does.
+    /// Returns the impulse until slip vanishes, if it does.
     fn until_slip_dies(&self) -> f64 {
         let (Some(slip), rates) = (self.slip, self.rates()) else {
             return f64::INFINITY;
@@ -153,8 +151,8 @@ impl<'a> ImpactProcess<'a> {
         self.slip = self.slip_from_rest();
     }
 
-    /// Runs phase by phase until `finish` says how much impulse ends the process
-    /// within the present phase.
+    /// Runs phase by phase until `finish` returns the impulse that ends the process within the
+    /// present phase.
     fn run(mut self, finish: impl Fn(&Self) -> Option<f64>) -> Result<Self, EndlessImpact> {
         for _ in 0..MAXIMUM_PHASES {
             let until_slip_dies = self.until_slip_dies();
@@ -170,22 +168,22 @@ impl<'a> ImpactProcess<'a> {
         Err(EndlessImpact)
     }
 
-    /// Impulse until v_n = 0 in the present phase. Where p ≤ 0 compression
-    /// deepens and this phase cannot end it.
+    /// Returns the impulse until v_n = 0 in the present phase. For p ≤ 0 compression continues and
+    /// this phase cannot end it.
     fn until_compressed(&self) -> Option<f64> {
         let rate = self.rates().y;
         (rate > 0.0).then(|| (-self.velocity.y / rate).max(0.0))
     }
 
-    /// Impulse until the work has grown by `work` from `start` in the present phase.
+    /// Returns the impulse until the work has grown by `work` from `start` in the present phase.
     fn until_work(&self, start: f64, work: f64) -> Option<f64> {
-        // In this order nothing cancels while no work has been returned yet.
+        // This order avoids cancellation while no work has been returned yet.
         let missing = work - (self.work - start);
         let (speed, rate) = (self.velocity.y.max(0.0), self.rates().y);
         if missing <= 0.0 {
             Some(0.0)
         } else if rate > 0.0 || speed > 0.0 {
-            // speed P + rate P²/2 = missing, in the form that does not cancel.
+            // speed P + rate P²/2 = missing, in the form without cancellation.
             let root = speed * speed + 2.0 * rate * missing;
             (root >= 0.0).then(|| 2.0 * missing / (speed + root.sqrt()))
         } else {
@@ -197,7 +195,7 @@ impl<'a> ImpactProcess<'a> {
 /// Collision at tip velocity `velocity_m_s` = (v_r, v_n < 0) relative to the belt.
 ///
 /// # Errors
-/// [`EndlessImpact`] if compression never ends, which no positive definite Q does.
+/// [`EndlessImpact`] if compression never ends, which is impossible for a positive definite Q.
 pub fn collide(
     q: &Matrix2<f64>,
     friction: f64,
@@ -208,7 +206,7 @@ pub fn collide(
 }
 
 /// Impact without collision: the tip slides with `slip_m_s` ≠ 0 along the belt, p is zero or
-/// negative, and the contact force grows beyond bounds until slip has died.
+/// negative, and the contact force grows beyond all bounds until slip has vanished.
 ///
 /// # Errors
 /// As [`collide`].
@@ -227,16 +225,16 @@ pub fn throw(
     rebound(start, law)
 }
 
-/// How an impact comes about.
+/// Cause of an impact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImpactKind {
     /// The tip arrives with a normal velocity.
     Collision,
-    /// It has none, and is thrown off a contact that has become inconsistent.
+    /// The tip has no normal velocity and is thrown off an inconsistent contact.
     WithoutCollision,
 }
 
-/// The state after an impact of the tip at belt height.
+/// Returns the state after an impact of the tip at belt height.
 ///
 /// # Errors
 /// As [`collide`].
@@ -281,7 +279,7 @@ mod tests {
     use proptest::prelude::*;
 
     prop_compose! {
-        /// Any positive definite Q that is not too flat.
+        /// Random positive definite Q that is not too flat.
         fn mobility()(q11 in 0.5_f64..40.0, q22 in 0.5_f64..40.0, r in -0.98_f64..0.98) -> Matrix2<f64> {
             let q12 = r * (q11 * q22).sqrt();
             Matrix2::new(q11, q12, q12, q22)
@@ -339,7 +337,7 @@ mod tests {
         }
 
         #[test]
-        fn the_mirror_image_collides_as_the_mirror_image(
+        fn mirrored_collisions_have_mirrored_results(
             q in mobility(), law in law(), friction in 0.0_f64..1.5,
             v_r in -2.0_f64..2.0, v_n in -2.0_f64..-1e-6,
         ) {
@@ -352,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restitution_next_to_nothing_loses_no_digits() {
+    fn a_tiny_restitution_loses_no_digits() {
         let q = Matrix2::new(0.5, 0.0, 0.0, 0.5);
         let law = ImpactLaw {
             law: Restitution::Energetic,

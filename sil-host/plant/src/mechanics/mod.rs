@@ -1,18 +1,16 @@
 //! The plant: a two-link rigid arm whose tip meets a moving belt with Coulomb friction.
 //!
-//! A hybrid system. Between events the state follows the smooth equations of its
-//! contact mode ([`motion`]), integrated with adaptive steps ([`dop853`]), or with shorter and
-//! cheaper ones where a new torque ends them anyway ([`cash_karp`]). Events
-//! are located inside the step ([`event`]): the tip lands, slip dies, the normal
-//! force vanishes, the friction cone is left, p reaches zero. At an event the
-//! tip collides ([`impact`]) and the mode that follows is decided anew
-//! ([`transition`]). In contact the state is projected back onto the belt after
-//! every step, so that the constraint does not drift.
+//! It is a hybrid system. Between events the state follows the smooth equations of its contact mode
+//! ([`motion`]), integrated with adaptive steps ([`dop853`]), or with shorter and cheaper ones
+//! where a new torque truncates them anyway ([`cash_karp`]). Events are located inside the step
+//! ([`event`]): the tip lands, slip vanishes, the normal force vanishes, the force leaves the
+//! friction cone, p reaches zero. At an event the tip collides ([`impact`]) or the next mode is
+//! decided ([`transition`]). In contact the state is projected back onto the belt after every step,
+//! so that the constraint does not drift.
 //!
-//! Torque is held between commands ([`torque`]); the belt's speed is a function
-//! of time ([`belt`]). Nothing allocates after construction, nothing is random,
-//! and elementary functions come from `libm`, so that equal inputs give equal
-//! bits on every host.
+//! Torque is held between commands ([`torque`]); the belt's speed is a function of time ([`belt`]).
+//! Nothing allocates after construction, nothing is random, and elementary functions come from
+//! `libm`, so that equal inputs give equal bits on every host.
 
 mod arm_on_belt;
 pub mod belt;

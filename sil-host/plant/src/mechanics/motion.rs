@@ -1,4 +1,4 @@
-//! Equations of motion in each contact mode, and the contact force that goes with them.
+//! Equations of motion and contact force in each contact mode.
 
 use nalgebra::Vector2;
 use painleve_shared::{Arm, ContactTerms, LinkMotion, Pose, Slip};
@@ -8,13 +8,13 @@ use crate::plant::{ContactMode, Snapshot, State};
 use super::belt::BeltProfile;
 use super::torque::TorqueSegment;
 
-/// Link angles of a state, rad.
+/// Returns the link angles of a state, rad.
 #[inline]
 pub fn theta(state: &State) -> LinkMotion<f64> {
     LinkMotion::new(state[0], state[1])
 }
 
-/// Link rates of a state, rad/s.
+/// Returns the link rates of a state, rad/s.
 #[inline]
 pub fn theta_dot(state: &State) -> LinkMotion<f64> {
     LinkMotion::new(state[2], state[3])
@@ -23,7 +23,7 @@ pub fn theta_dot(state: &State) -> LinkMotion<f64> {
 /// Changes of the angles whose squares are below rounding, rad.
 const FIRST_ORDER_RAD: f64 = 1e-9;
 
-/// What the equations of a mode give at one state.
+/// The equations of a mode evaluated at one state.
 #[derive(Clone, Copy, Debug)]
 pub struct Evaluation {
     /// Time derivative of the state.
@@ -32,13 +32,13 @@ pub struct Evaluation {
     pub force_n: Vector2<f64>,
     /// Position of the tip along the belt, m.
     pub tip_t_m: f64,
-    /// Height of the tip over the belt (m), its rate (m/s) and its acceleration (m/s²).
+    /// Height of the tip above the belt (m), its rate (m/s) and its acceleration (m/s²).
     pub gap: [f64; 3],
-    /// Velocity of the tip along the belt relative to it (m/s), and its rate (m/s²).
+    /// Velocity of the tip along the belt relative to the belt (m/s), and its rate (m/s²).
     pub slip: [f64; 2],
     /// Free normal acceleration b, m/s².
     pub b_m_s2: f64,
-    /// p = Q22 − μ s Q21, 1/kg, for the mode's direction of slip, or that of the motion.
+    /// p = Q22 − μ s Q21, 1/kg, for the mode's direction of slip, or for that of the motion.
     pub p_per_kg: f64,
     /// Q22, 1/kg.
     pub q22_per_kg: f64,
@@ -58,7 +58,7 @@ pub struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// Contact terms at a state.
+    /// Returns the contact terms at a state.
     pub fn terms(&self, t_s: f64, state: &State) -> ContactTerms<f64> {
         let angles = theta(state);
         let torque = self.torque.at(t_s).to_links();
@@ -66,8 +66,8 @@ impl Motion<'_> {
             .contact_terms(&angles, &theta_dot(state), &Pose::new(&angles), &torque)
     }
 
-    /// Contact force (f_t, f_n), N, of a mode with given contact terms. In a
-    /// stick that the straight arm makes singular it is zero.
+    /// Returns the contact force (f_t, f_n), N, of a mode with given contact terms. It is zero for
+    /// a stick that the straight arm makes singular.
     pub fn force_n(&self, t_s: f64, mode: ContactMode, terms: &ContactTerms<f64>) -> Vector2<f64> {
         match mode {
             ContactMode::Flight => Vector2::zeros(),
@@ -85,12 +85,12 @@ impl Motion<'_> {
         }
     }
 
-    /// Everything about an instant.
+    /// Returns the snapshot of an instant.
     pub fn snapshot(&self, mode: ContactMode, t_s: f64, state: &State) -> Snapshot {
         self.snapshot_of(mode, t_s, state, &self.evaluate(mode, t_s, state))
     }
 
-    /// Everything about an instant at which the equations are evaluated.
+    /// Returns the snapshot of an instant at which the equations have been evaluated.
     #[inline]
     pub fn snapshot_of(
         &self,
@@ -118,13 +118,13 @@ impl Motion<'_> {
         }
     }
 
-    /// Time derivative of the state in a mode.
+    /// Returns the time derivative of the state in a mode.
     #[inline]
     pub fn derivative(&self, mode: ContactMode, t_s: f64, state: &State) -> State {
         self.evaluate(mode, t_s, state).slope
     }
 
-    /// The equations of a mode at a state.
+    /// Evaluates the equations of a mode at a state.
     ///
     /// A sliding tip needs no Q: with the edge of the friction cone d = (−μ s, 1), f = f_n d,
     /// p = j2 M⁻¹ Jᵀ d and θ̈ = M⁻¹ load + M⁻¹ Jᵀ d f_n, where f_n = −b/p.
@@ -186,18 +186,18 @@ impl Motion<'_> {
         }
     }
 
-    /// Tip velocity relative to the belt, (v_r, v_n), m/s.
+    /// Returns the tip velocity relative to the belt, (v_r, v_n), m/s.
     pub fn relative_velocity_m_s(&self, t_s: f64, state: &State) -> Vector2<f64> {
         let velocity = self.arm.jacobian(&Pose::new(&theta(state))) * theta_dot(state).vector();
         Vector2::new(velocity.x - self.belt.speed_m_s(t_s), velocity.y)
     }
 
-    /// Height of the tip over the belt, m.
+    /// Returns the height of the tip above the belt, m.
     pub fn gap_m(&self, state: &State) -> f64 {
         self.arm.gap_m(&Pose::new(&theta(state)))
     }
 
-    /// Position of the tip along the belt, m.
+    /// Returns the position of the tip along the belt, m.
     pub fn tip_t_m(&self, state: &State) -> f64 {
         self.arm.tip_m(&Pose::new(&theta(state))).x
     }
@@ -210,8 +210,8 @@ impl Motion<'_> {
         state + State::new(0.0, 0.0, change.x, change.y)
     }
 
-    /// The nearest state, in the metric of kinetic energy, with the tip on the
-    /// belt and no normal velocity. Removes what integration errors left.
+    /// Returns the nearest state, in the metric of kinetic energy, with the tip on the belt and no
+    /// normal velocity. Removes integration errors.
     pub fn onto_belt(&self, state: &State) -> State {
         let (mut angles, rates) = (theta(state), *theta_dot(state).vector());
         let [mut along, mut normal, mut direction, mut change] = self.towards_belt(&angles);
@@ -226,8 +226,8 @@ impl Motion<'_> {
         State::new(angles.first(), angles.second(), rates.x, rates.y)
     }
 
-    /// The Jacobian's rows along and normal to the belt, the direction M⁻¹ j2, and the change of
-    /// the angles along it that takes the tip to the belt, to first order.
+    /// Returns the Jacobian's rows along and normal to the belt, the direction M⁻¹ j2, and the
+    /// change of the angles along it that moves the tip onto the belt, to first order.
     #[inline]
     fn towards_belt(&self, angles: &LinkMotion<f64>) -> [Vector2<f64>; 4] {
         let pose = Pose::new(angles);
@@ -239,11 +239,11 @@ impl Motion<'_> {
         [along, normal, direction, change]
     }
 
-    /// The nearest state with the tip at belt height; velocities stay.
+    /// Returns the nearest state with the tip at belt height and unchanged velocities.
     pub fn lowered_onto_belt(&self, state: &State) -> State {
         let mut state = *state;
-        // Newton; two iterations reach rounding from any integration error,
-        // the rest serve initial conditions given by hand.
+        // Newton's method: two iterations remove any integration error to rounding; the others are
+        // for initial conditions set by the user.
         for _ in 0..8 {
             let pose = Pose::new(&theta(&state));
             let gap = self.arm.gap_m(&pose);
@@ -258,7 +258,7 @@ impl Motion<'_> {
         state
     }
 
-    /// The state with the tip at (`tip_t_m`, belt height), moving with the belt.
+    /// Returns the state with the tip at (`tip_t_m`, belt height), moving with the belt.
     pub fn onto_stick(&self, t_s: f64, tip_t_m: f64, state: &State) -> State {
         let mut state = *state;
         for _ in 0..4 {

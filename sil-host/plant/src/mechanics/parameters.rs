@@ -1,4 +1,4 @@
-//! What defines the plant's equations, and how accurately they are solved.
+//! Parameters of the plant's equations, and the accuracy of their solution.
 
 use painleve_shared::settings::Settings;
 use painleve_shared::{ArmParameters, OutOfRange, settings};
@@ -8,7 +8,7 @@ use super::impact::ImpactLaw;
 use super::transition::Indeterminate;
 use crate::plant::State;
 
-/// Everything that defines the plant's equations.
+/// All parameters of the plant's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantParameters {
     /// The arm.
@@ -17,14 +17,14 @@ pub struct PlantParameters {
     pub friction: f64,
     /// The belt's speed.
     pub belt: BeltProfile,
-    /// How the tip bounces.
+    /// Restitution of impacts.
     pub impact: ImpactLaw,
     /// Accuracy and conventions.
     pub solver: SolverSettings,
 }
 
 impl Default for PlantParameters {
-    /// The paper's section III: Table I, μ = 0.6, v_belt = −0.4 m/s.
+    /// Returns the parameters of the paper's section III: Table I, μ = 0.6, v_belt = −0.4 m/s.
     fn default() -> Self {
         Self {
             arm: ArmParameters::default(),
@@ -55,7 +55,7 @@ impl PlantParameters {
 }
 
 settings! {
-    /// Accuracy of the solution and conventions where the model leaves a choice.
+    /// Accuracy of the solution, and conventions for ambiguities of the model.
     #[derive(Copy)]
     pub struct SolverSettings {
         /// Error of one step relative to the state.
@@ -64,22 +64,22 @@ settings! {
         absolute_tolerance: f64 = 1e-10, 1e-14..=1e-3;
         /// Largest step.
         maximum_step_s: f64 = 0.05, 1e-5..=1.0, "s";
-        /// A rebound slower than this ends a series of bounces. By default the last bounces are
-        /// lower than 1e-13 m, below rounding of the gap. Bounces slower than the smallest speed
-        /// that is allowed end within that rounding and never settle.
+        /// A rebound slower than this ends a series of bounces. With the default, the last bounces
+        /// are lower than 1e-13 m, below the rounding error of the gap. Below the smallest allowed
+        /// speed, bounces end within that rounding error and never settle.
         chatter_speed_m_s: f64 = 1e-6, 1e-7..=1e-2, "m/s";
-        /// What follows where both sliding and flight are solutions.
+        /// What follows if both sliding and flight are solutions.
         indeterminate: Indeterminate = Indeterminate::Flight;
     }
 }
 
 settings! {
-    /// Where the arm starts; by default at the paper's x0,d.
+    /// Initial state of the arm; the default is the paper's x0,d.
     #[derive(Copy)]
     pub struct InitialState {
-        /// θ1 from the belt's inward normal.
+        /// θ1, measured from the belt's inward normal.
         theta1_deg: f64 = -11.4, -180.0..=180.0, "°";
-        /// θ2 from the belt's inward normal.
+        /// θ2, measured from the belt's inward normal.
         theta2_deg: f64 = -35.1, -180.0..=180.0, "°";
         /// θ̇1.
         theta1_dot_rad_s: f64 = 0.0, -314.0..=314.0, "rad/s";
@@ -89,7 +89,7 @@ settings! {
 }
 
 impl InitialState {
-    /// An arm at rest with these angles from the belt's inward normal, degrees.
+    /// Returns an arm at rest with these angles from the belt's inward normal, degrees.
     pub fn at_rest(theta1_deg: f64, theta2_deg: f64) -> Self {
         Self {
             theta1_deg,
@@ -99,7 +99,7 @@ impl InitialState {
         }
     }
 
-    /// As the plant's state.
+    /// Returns the plant's state.
     pub fn state(&self) -> State {
         State::new(
             self.theta1_deg.to_radians(),

@@ -1,4 +1,4 @@
-//! Seeing the motion of the arm on its belt, with the equations that gave it.
+//! Observation of the arm's motion on its belt together with its equations.
 
 use crate::plant::{ContactMode, Event, Probe, Snapshot, State, Step};
 
@@ -15,25 +15,25 @@ pub struct ArmStep<'a> {
     pub start_s: f64,
     /// State at the start.
     pub start: &'a State,
-    /// The equations there.
+    /// The equations evaluated at the start.
     pub at_start: &'a Evaluation,
     /// End time, s.
     pub end_s: f64,
     /// State at the end.
     pub end: &'a State,
-    /// The equations there, still those of this mode.
+    /// The equations evaluated at the end, still in this mode.
     pub at_end: &'a Evaluation,
 }
 
-/// Sees the motion of the arm on its belt together with its equations.
+/// Observes the motion of the arm on its belt together with its equations.
 pub trait ArmProbe {
     /// Called after every accepted step.
     fn step(&mut self, step: &ArmStep<'_>);
-    /// Called at every discontinuity; `state` is the one after it.
+    /// Called at every discontinuity; `state` is the state after it.
     fn event(&mut self, time_s: f64, event: Event, state: &State);
 }
 
-/// Whoever sees any plant sees this one, too.
+/// A probe for any plant also observes this one.
 impl<P: Probe> ArmProbe for P {
     fn step(&mut self, step: &ArmStep<'_>) {
         Probe::step(self, step);

@@ -2,15 +2,16 @@
 //! L-stable, stiffly accurate (*Solving Ordinary Differential Equations II*, section IV.7; coefficients
 //! of their `rodas.f`, method 1).
 //!
-//! For contacts that give: a stiffness of 10⁸ N/m decays within microseconds, and an explicit method
-//! would follow that for ever. A step costs one Jacobian by differences, one factorisation and six
-//! evaluations, on stack memory. `diffsol` 0.18 has such methods, too, with vectors on the heap in every
-//! step; the plant takes a step or two per control tick, so that this is most of its cost.
+//! It serves compliant contacts: at a stiffness of 10⁸ N/m, transients decay within microseconds,
+//! which would force an explicit method to take tiny steps throughout. A step costs one Jacobian by
+//! differences, one factorisation and six evaluations, on stack memory. `diffsol` 0.18 also has
+//! such methods, but with heap vectors in every step; as the plant takes only a step or two per
+//! control tick, this would be most of its cost.
 
 use nalgebra::{Const, DimMin, SMatrix, SVector, ToTypenum};
 
 const GAMMA: f64 = 0.25;
-/// Times of the stages, as parts of the step.
+/// Times of the stages, as fractions of the step.
 const ALPHA: [f64; 4] = [0.0, 0.386, 0.21, 0.63];
 /// Weights of h ∂f/∂t in the stages.
 const GAMMA_SUM: [f64; 4] = [0.25, -0.1043, 0.1035, -0.0362];
@@ -59,33 +60,33 @@ pub trait Equations<const N: usize> {
     /// Time derivative of the state `x` at `t_s`.
     fn derivative(&self, t_s: f64, x: &SVector<f64, N>) -> SVector<f64, N>;
 
-    /// Whether the derivative depends on the state only, so that ∂f/∂t need not be had.
+    /// Returns whether the derivative depends on the state only, so that ∂f/∂t is not needed.
     fn is_autonomous(&self) -> bool {
         false
     }
 }
 
-/// What a step leads to.
+/// Result of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Step<const N: usize> {
     /// State at the end, of order 4.
     pub end: SVector<f64, N>,
-    /// Error relative to the tolerance: the step is good if this is at most 1.
+    /// Error relative to the tolerance: the step is accepted if this is at most 1.
     pub error: f64,
 }
 
 impl<const N: usize> Step<N> {
-    /// Factor from this step's size to the next one's, or to that of another try.
+    /// Returns the factor from this step's size to that of the next step or attempt.
     pub fn growth(&self) -> f64 {
         if !self.error.is_finite() {
             return 0.1;
         }
-        // error^(−1/4), by square roots, which are the same on every host.
+        // error^(−1/4), computed with square roots, which are the same on every host.
         (0.9 / self.error.max(1e-12).sqrt().sqrt()).clamp(0.2, 6.0)
     }
 }
 
-/// Derivative and Jacobian at the start of a step; they serve several tries at it.
+/// Derivative and Jacobian at the start of a step, used for all attempts at it.
 #[derive(Clone, Debug)]
 pub struct Linearised<const N: usize> {
     t_s: f64,
@@ -105,7 +106,7 @@ where
         let mut jacobian = SMatrix::<f64, N, N>::zeros();
         let mut moved = *start;
         for column in 0..N {
-            // Half the digits of the state; near zero those of a millionth.
+            // Half the digits of the state; for values near zero, half the digits of 1e-3.
             let step = 1.5e-8 * start[column].abs().max(1e-3);
             moved[column] = start[column] + step;
             let exact = moved[column] - start[column];
@@ -129,8 +130,7 @@ where
         }
     }
 
-    /// Integrates over `h`, with the error of every component weighed against
-    /// `tolerance` · (1 + |x|).
+    /// Integrates over `h`, with the error of every component weighted by `tolerance` · (1 + |x|).
     pub fn step(&self, equations: &impl Equations<N>, h: f64, tolerance: f64) -> Step<N> {
         let failed = Step {
             end: self.start,
@@ -192,7 +192,7 @@ where
 mod tests {
     use super::*;
 
-    /// A damped oscillator, driven: x'' + 2 x' + 5 x = cos t, with its exact solution's start.
+    /// A damped, driven oscillator: x'' + 2 x' + 5 x = cos t, started on its exact solution.
     struct Driven;
 
     impl Equations<2> for Driven {
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stiff_transient_is_gone_after_one_long_step() {
+    fn a_stiff_transient_decays_in_one_long_step() {
         let stiff = Stiff(-1e8);
         let start = SVector::from([2.0]);
         let step = Linearised::new(&stiff, 0.0, &start).step(&stiff, 0.1, 1e-6);

@@ -63,7 +63,7 @@ fn conservative() -> PlantParameters {
 }
 
 #[test]
-fn x0_a_is_thrown_off_at_once() {
+fn x0_a_is_thrown_off_immediately() {
     let mut statistics = Statistics::new(0.05);
     let mut plant = plant(&PlantParameters::default(), x0_a());
     let terms = plant.motion().terms(0.0, plant.state());
@@ -76,8 +76,8 @@ fn x0_a_is_thrown_off_at_once() {
     assert!((speed - 0.0105).abs() < 5e-5, "thrown at {speed} m/s");
 }
 
-/// The rest position solves Jᵀ f = w with f_t = −μ f_n: z_t = −0.175689 m,
-/// f_n = 0.441238 N (root found outside this program).
+/// The rest position solves Jᵀ f = w with f_t = −μ f_n: z_t = −0.175689 m, f_n = 0.441238 N (root
+/// found with an independent program).
 #[test]
 fn x0_d_slides_to_the_quiet_attractor() {
     let mut plant = plant(&PlantParameters::default(), x0_d());
@@ -89,7 +89,7 @@ fn x0_d_slides_to_the_quiet_attractor() {
 }
 
 #[test]
-fn energy_is_kept_by_a_conservative_bouncing_arm() {
+fn a_conservative_bouncing_arm_conserves_energy() {
     let mut statistics = Statistics::new(0.0);
     let mut plant = plant(&conservative(), at_rest(40.0, 10.0));
     let energy = |p: &ArmOnBelt| p.arm().energy_j(&theta(p.state()), &theta_dot(p.state()));
@@ -103,9 +103,10 @@ fn energy_is_kept_by_a_conservative_bouncing_arm() {
     assert!(worst < 1e-8, "relative drift {worst:e}");
 }
 
-/// Steps of a millisecond go by a method of order 5; a tolerance of 1e-12 refuses that one.
+/// Steps of a millisecond use the method of order 5, except at a tolerance of 1e-12, which rejects
+/// it.
 #[test]
-fn short_steps_keep_the_tolerance() {
+fn short_steps_meet_the_tolerance() {
     let end = |relative_tolerance: f64| {
         let solver = SolverSettings {
             relative_tolerance,
@@ -204,9 +205,9 @@ fn a_start_deep_inside_the_belt_is_refused() {
     assert_eq!(error.key, "initial tip height over the belt in m");
 }
 
-/// The bars of accuracy: a second of bouncing hardly depends on the tolerance.
+/// Accuracy bar: a second of bouncing hardly depends on the tolerance.
 #[test]
-fn a_tighter_tolerance_does_not_move_a_second_of_bouncing() {
+fn a_tighter_tolerance_hardly_changes_a_second_of_bouncing() {
     let run = |relative_tolerance: f64| {
         let parameters = PlantParameters {
             solver: SolverSettings {
@@ -240,7 +241,7 @@ fn one_long_advance_equals_many_short_ones() {
     assert!((run(1) - run(1000)).amax() < 1e-5);
 }
 
-/// Bouncing dies out in finite time by infinitely many impacts.
+/// Bouncing ends in finite time after infinitely many impacts.
 #[test]
 fn chatter_ends_in_contact() {
     for restitution in [0.0, 0.1, 0.8] {
@@ -277,15 +278,15 @@ fn the_attractor_is_in_torque_balance() {
     assert_eq!(Posture::of(&angles), Posture::ElbowDown);
 }
 
-/// Whether a plant that cannot go on stands at full stretch, where Q is singular.
+/// Whether a plant that cannot continue is at full stretch, where Q is singular.
 fn is_at_full_stretch(plant: &ArmOnBelt) -> bool {
     let tip_t_m = plant.motion().tip_t_m(plant.state());
     (plant.arm().reach_on_belt_m() - tip_t_m.abs()).abs() < 1e-7
 }
 
-/// Where p = 0 meets the end of the reach, μ = 0.488, the tip is thrown against its own links.
+/// Where p = 0 meets the limit of reach, μ = 0.488, the tip is thrown against its own links.
 #[test]
-fn an_arm_that_jams_at_full_stretch_is_an_error_that_says_so() {
+fn an_arm_that_jams_at_full_stretch_is_reported_as_an_error() {
     let friction = 0.488;
     let parameters = PlantParameters {
         friction,
@@ -321,10 +322,10 @@ mod any_scenario {
     }
 
     proptest! {
-        /// Whatever the friction, the belt, the torque and the start: the
-        /// plant goes on, keeps the tip out of the belt and on it in contact.
+        /// For any friction, belt, torque and start, the plant continues, and its tip stays out of
+        /// the belt and, in contact, on it.
         #[test]
-        fn the_plant_always_goes_on(
+        fn the_plant_always_continues(
             friction in 0.0_f64..1.5, restitution in 0.0_f64..1.0, energetic: bool, belt in belts(),
             theta1 in -60.0_f64..60.0, theta2 in -60.0_f64..60.0,
             u1 in -1.0_f64..1.0, u2 in -1.0_f64..1.0,

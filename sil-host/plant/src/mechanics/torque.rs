@@ -2,8 +2,8 @@
 
 use painleve_shared::JointTorque;
 
-/// Joint torques (u1, u2) of a first-order stage after one command:
-/// u(t) = target + (start − target) exp(−(t − t0)/lag). Without lag the command holds at once.
+/// Joint torques (u1, u2) of a first-order stage after one command: u(t) = target + (start −
+/// target) exp(−(t − t0)/lag). Without lag the command takes effect at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueSegment {
     start_s: f64,
@@ -13,7 +13,7 @@ pub struct TorqueSegment {
 }
 
 impl TorqueSegment {
-    /// A constant torque.
+    /// Returns a constant torque.
     pub fn constant(torque_nm: JointTorque<f64>) -> Self {
         Self {
             start_s: 0.0,
@@ -23,7 +23,7 @@ impl TorqueSegment {
         }
     }
 
-    /// What follows at `t_s` when `target_nm` is commanded to a stage with time
+    /// Returns the segment that follows when `target_nm` is commanded at `t_s` to a stage with time
     /// constant `lag_s`.
     pub fn followed_by(&self, t_s: f64, target_nm: JointTorque<f64>, lag_s: f64) -> Self {
         Self {
@@ -34,12 +34,12 @@ impl TorqueSegment {
         }
     }
 
-    /// Whether the torque does not change until the next command.
+    /// Returns whether the torque is constant until the next command.
     pub fn is_constant(&self) -> bool {
         self.lag_s == 0.0 || self.start_nm == self.target_nm
     }
 
-    /// Joint torques at time `t_s`, N·m.
+    /// Returns the joint torques at time `t_s`, N·m.
     #[inline]
     pub fn at(&self, t_s: f64) -> JointTorque<f64> {
         if self.is_constant() {
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn without_lag_the_command_holds_at_once() {
+    fn without_lag_the_command_takes_effect_at_once() {
         let segment = TorqueSegment::constant(JointTorque::zeros()).followed_by(
             1.0,
             JointTorque::new(2.0, 1.0),

@@ -1,4 +1,4 @@
-//! Which contact mode follows, and when the present one ends.
+//! Decides the next contact mode and the end of the present one.
 
 use painleve_shared::{ContactTerms, Pose, Slip, SolutionMode, settings};
 
@@ -8,18 +8,17 @@ use super::motion::{Evaluation, Motion, theta, theta_dot};
 use crate::plant::{ContactMode, State};
 
 settings! {
-    /// What follows where p < 0 and b ≥ 0, so that sliding and flight both solve
-    /// the equations.
+    /// What follows if p < 0 and b ≥ 0, so that both sliding and flight solve the equations.
     #[derive(Copy, Eq)]
     pub enum Indeterminate {
         /// The tip leaves (the paper, after Elkaranshawy et al. 2017).
         "flight" => Flight,
-        /// The tip goes on sliding with f_n = −b/p.
+        /// The tip continues to slide with f_n = −b/p.
         "slide" => Slide,
     }
 }
 
-/// What follows from a tip on the belt without normal velocity.
+/// What follows for a tip on the belt without normal velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuation {
     /// Motion in this mode.
@@ -28,27 +27,27 @@ pub enum Continuation {
     Thrown,
 }
 
-/// Slip below which the tip is at rest on the belt, m/s: well above rounding,
-/// well below anything a tolerance resolves.
+/// Slip below which the tip is at rest on the belt, m/s: well above rounding errors and well below
+/// the resolution of any tolerance.
 const REST_SLIP_M_S: f64 = 1e-12;
 
 /// Below this fraction of Q22, p counts as zero: −b/p then exceeds any force.
 const P_GUARD: f64 = 1e-6;
 
-/// Clearance, m, below which a step is searched for contact: more than the
-/// quintic of [`stays_above`] can be wrong in one step.
+/// Clearance, m, below which a step is searched for contact; it exceeds the error of the quintic of
+/// [`stays_above`] within one step.
 const CLEARANCE_M: f64 = 1e-6;
 
 /// A tip that leaves the belt faster than this is thrown off, m/s.
 const TAKE_OFF_SPEED_M_S: f64 = 1e-7;
 
-/// Depth that a tip leaving the belt without normal velocity may reach by rounding, m.
+/// Rounding error of the depth of a tip that leaves the belt without normal velocity, m.
 const GRAZING_M: f64 = 1e-14;
 
-/// Parts of a step that are looked at one by one in a search.
+/// Number of parts into which a step is divided for a search.
 const SEARCH_PARTS: u32 = 8;
 
-/// b and p change little within a step this short, s; longer ones are searched.
+/// Step size, s, below which b and p change little; longer steps are searched.
 const SHORT_STEP_S: f64 = 5e-3;
 
 /// Decides what follows at time `t_s` from a state with the tip on the belt
@@ -88,8 +87,8 @@ fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Contin
     if cone_margin(motion, t_s, terms) >= 0.0 {
         return Continuation::Mode(ContactMode::Stick);
     }
-    // At the edge of the cone one direction has an acceleration of zero up to
-    // rounding and the other one against itself: take the better of the two.
+    // At the edge of the cone, one direction has zero acceleration up to rounding and the other an
+    // acceleration against itself: take the better of the two.
     let away = |slip: Slip| slip.sign::<f64>() * slip_acceleration(motion, t_s, terms, slip);
     [Slip::Positive, Slip::Negative]
         .into_iter()
@@ -100,22 +99,23 @@ fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Contin
         })
 }
 
-/// How far the force of sticking is inside the friction cone, N; negative outside.
+/// Returns the distance of the sticking force from the edge of the friction cone, N; negative
+/// outside.
 fn cone_margin(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> f64 {
     let force = motion.force_n(t_s, ContactMode::Stick, terms);
     motion.friction * force.y - force.x.abs()
 }
 
-/// Acceleration of the tip along the belt relative to it while sliding, m/s².
+/// Returns the acceleration of the tip along the belt relative to it while sliding, m/s².
 fn slip_acceleration(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>, slip: Slip) -> f64 {
     let force = motion.force_n(t_s, ContactMode::slide(slip), terms);
     terms.free_acceleration_m_s2.x + terms.q.row(0).transpose().dot(&force)
         - motion.belt.acceleration_m_s2(t_s)
 }
 
-/// Functions of the state of which one is zero where a mode ends: m for a flight's gap,
-/// m/s, m/s² and 1/kg for slip, b and p of a slide, N and m/s² for cone and b of a stick.
-/// What a mode lacks is infinite.
+/// Returns functions of the state that reach zero where a mode ends: the gap (m) in flight; slip
+/// (m/s), b (m/s²) and p (1/kg) in sliding; the distance to the edge of the cone (N) and b (m/s²)
+/// in sticking. Unused functions are infinite.
 pub fn event_functions(
     motion: &Motion<'_>,
     mode: ContactMode,
@@ -137,7 +137,7 @@ pub fn event_functions(
     ]
 }
 
-/// Whether the tip slides at a state, and goes on sliding the same way.
+/// Returns whether the tip slides at a state and continues in the same direction.
 pub fn slides_on(mode: ContactMode, here: &Evaluation) -> bool {
     mode.slip().is_some_and(|slip| {
         slip.sign::<f64>() * here.slip[0] > REST_SLIP_M_S
@@ -146,8 +146,8 @@ pub fn slides_on(mode: ContactMode, here: &Evaluation) -> bool {
     })
 }
 
-/// Whether a mode goes on through a step of `h` seconds, judged by its two ends; `false` asks for
-/// a search.
+/// Returns whether a mode lasts through a step of `h` seconds, judged by its two ends; `false`
+/// requests a search.
 pub fn goes_on(
     motion: &Motion<'_>,
     mode: ContactMode,
@@ -165,7 +165,7 @@ pub fn goes_on(
     let guarded_p = |at: &Evaluation| at.p_per_kg - P_GUARD * at.q22_per_kg;
     let side = side_of(guarded_p(start));
     let holds = side * -end.b_m_s2 >= 0.0 && side * guarded_p(end) >= 0.0;
-    // Slip can die and start again within a step; a cubic through both ends tells.
+    // Slip can vanish and restart within a step; a cubic through both ends detects this.
     let sign = slip.sign::<f64>();
     let [v0, a0] = start.slip.map(|x| sign * x);
     let [v1, a1] = end.slip.map(|x| sign * x);
@@ -174,12 +174,13 @@ pub fn goes_on(
     holds && slides && h <= SHORT_STEP_S
 }
 
-/// 1 in a determinate slide; −1 in an indeterminate one, where p and b are both on the other side.
+/// Returns 1 in a determinate slide; −1 in an indeterminate one, in which p and b both have the
+/// opposite sign.
 fn side_of(guarded_p: f64) -> f64 {
     if guarded_p > 0.0 { 1.0 } else { -1.0 }
 }
 
-/// Time of the first event in a finished step, s; the event has happened there.
+/// Returns the time of the first event in a finished step, s; the event has happened at that time.
 pub fn first_event_s(
     motion: &Motion<'_>,
     mode: ContactMode,
@@ -210,9 +211,9 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>, start: &Evaluation) 
     let start = start.gap;
     let (t, h) = (step.t, step.h);
     let dense = step.dense(&|t, x: &State| motion.derivative(ContactMode::Flight, t, x));
-    // A flight that starts on the belt has a root at its start. With a normal
-    // velocity it is divided out; without one the tip may graze the belt by
-    // less than rounding, which must not count as landing.
+    // A flight that starts on the belt has a root at its start. With a normal velocity that root is
+    // divided out; without one, the tip may graze the belt by less than the rounding error, which
+    // must not count as landing.
     let from_belt = start[0].abs() < 1e-12;
     let thrown = from_belt && start[1] > TAKE_OFF_SPEED_M_S;
     let slack = if from_belt && !thrown { GRAZING_M } else { 0.0 };
@@ -231,7 +232,7 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>, start: &Evaluation) 
         let (gap_at, speed_at) = gap_and_speed(at);
         let mut after = (at, gap_at, speed_at);
         if after.1 >= 0.0 && before.2 < 0.0 && after.2 > 0.0 {
-            // A dip between two looks.
+            // A dip between two samples.
             let lowest = first_negative((before.0, -before.2), (after.0, -after.2), |at| {
                 -gap_and_speed(at).1
             });
@@ -263,12 +264,12 @@ fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>, start: &Evaluation) 
     None
 }
 
-/// Times at which a step from `t` over `h` is looked at; the last is its end.
+/// Returns the times at which a step from `t` over `h` is sampled; the last is its end.
 fn looks(t: f64, h: f64) -> impl Iterator<Item = f64> {
     (1..=SEARCH_PARTS).map(move |part| t + h * (f64::from(part) / f64::from(SEARCH_PARTS)))
 }
 
-/// How much later than at `state` the tip of a flight meets the belt, s, to first order.
+/// Returns how much later than at `state` the tip of a flight meets the belt, s, to first order.
 pub fn landing_correction_s(motion: &Motion<'_>, mode: ContactMode, state: &State) -> f64 {
     if mode.is_contact() {
         return 0.0;
@@ -281,7 +282,7 @@ pub fn landing_correction_s(motion: &Motion<'_>, mode: ContactMode, state: &Stat
         .row(1)
         .transpose()
         .dot(theta_dot(state).vector());
-    // A landing at grazing speed has no corrections worth making.
+    // A landing at grazing speed needs no correction.
     if speed < -1e-6 && gap.abs() > 1e-16 {
         -gap / speed
     } else {
@@ -306,7 +307,7 @@ fn first_end_of_slide_s(
     first_in_parts(step, &dense, &margin)
 }
 
-/// First time in a step at which a margin is negative, looked for part by part.
+/// Returns the first time in a step at which a margin is negative, searched part by part.
 fn first_in_parts(
     step: &Step<4>,
     dense: &DenseStep<4>,

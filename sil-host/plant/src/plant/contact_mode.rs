@@ -1,9 +1,9 @@
-//! What holds the tip.
+//! Contact modes of the tip.
 
 use painleve_shared::Slip;
 use serde::{Deserialize, Serialize};
 
-/// What holds the tip.
+/// Contact mode of the tip.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
@@ -11,16 +11,16 @@ pub enum ContactMode {
     /// The tip is off the belt.
     #[default]
     Flight = 0,
-    /// It slides with ż_r > 0.
+    /// The tip slides with ż_r > 0.
     SlidePositive = 1,
-    /// It slides with ż_r < 0.
+    /// The tip slides with ż_r < 0.
     SlideNegative = 2,
-    /// It moves with the belt, the force inside the friction cone.
+    /// The tip moves with the belt; the force is inside the friction cone.
     Stick = 3,
 }
 
 impl ContactMode {
-    /// All modes, by number.
+    /// All modes in the order of their numbers.
     pub const ALL: [Self; 4] = [
         Self::Flight,
         Self::SlidePositive,
@@ -28,7 +28,7 @@ impl ContactMode {
         Self::Stick,
     ];
 
-    /// Sliding in one direction.
+    /// Returns the mode that slides in a direction.
     pub fn slide(slip: Slip) -> Self {
         match slip {
             Slip::Positive => Self::SlidePositive,
@@ -36,7 +36,7 @@ impl ContactMode {
         }
     }
 
-    /// The direction of sliding.
+    /// Returns the direction of sliding; `None` if the tip does not slide.
     pub fn slip(self) -> Option<Slip> {
         match self {
             Self::SlidePositive => Some(Slip::Positive),
@@ -45,12 +45,12 @@ impl ContactMode {
         }
     }
 
-    /// Whether the tip touches the belt.
+    /// Returns whether the tip touches the belt.
     pub fn is_contact(self) -> bool {
         self != Self::Flight
     }
 
-    /// The mode's name, as it is serialised.
+    /// Returns the name of the mode, as it is serialised.
     pub fn name(self) -> &'static str {
         match self {
             Self::Flight => "flight",

@@ -1,7 +1,7 @@
-//! What a plant is to the bench: something with two joints and a tip that reads torque and time.
+//! The interface of a plant: a machine with two joints and a tip that responds to torque over time.
 //!
-//! Converters, closed loop, records and closed-loop studies know a [`Plant`] only. The arm on its
-//! belt ([`crate::mechanics`]) is the one that is built in; `examples/own-plant` adds another.
+//! Converters, closed loop, records and closed-loop studies use only [`Plant`]. The arm on its belt
+//! ([`crate::mechanics`]) is built in; `examples/own-plant` adds another plant.
 
 mod contact_mode;
 mod probe;
@@ -51,54 +51,54 @@ pub type State = Vector4<f64>;
 /// assert!(plant.link_angles_rad().first() > 0.0);
 /// ```
 ///
-/// Time starts at 0 s and only moves in [`advance`](Self::advance). Equal calls must give equal
-/// bits, or runs cannot be repeated.
+/// Time starts at 0 s and changes only in [`advance`](Self::advance). Equal calls must give equal
+/// bits; otherwise runs are not repeatable.
 pub trait Plant {
-    /// Everything that can be known about the present, after the last torque command.
+    /// Returns the present state of the plant, after the last torque command.
     fn snapshot(&self) -> Snapshot;
 
-    /// Commands joint torques in N·m from now on. The torque reaches them as a
-    /// first-order lag with time constant `lag_s`, at once if that is zero. A plant without
-    /// such a lag may ignore it if its scenarios leave `converters.torque.lag_s` at zero.
+    /// Commands joint torques in N·m from now on. The torques follow with a first-order lag of time
+    /// constant `lag_s`; if it is zero, at once. A plant without such a lag may ignore it if its
+    /// scenarios leave `converters.torque.lag_s` at zero.
     fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64);
 
-    /// Moves on to time `until_s`, showing every step and every discontinuity to `probe`. To
-    /// advance to the present is to decide what the last command makes of the contact.
+    /// Advances to time `until_s`, and shows every step and every discontinuity to `probe`.
+    /// Advancing to the present time decides the contact mode after the last command.
     ///
     /// # Errors
     /// [`PlantError`] if the motion cannot be continued.
     fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError>;
 
-    /// Present time, s.
+    /// Returns the present time, s.
     fn time_s(&self) -> f64 {
         self.snapshot().time_s
     }
 
-    /// Angles of the links, rad, from which the encoders read those of the joints.
+    /// Returns the angles of the links, rad, from which the encoders derive those of the joints.
     fn link_angles_rad(&self) -> LinkMotion<f64> {
         self.snapshot().theta_rad.into()
     }
 
-    /// Force of the surface on the tip (f_t, f_n), N; impulses are not part of it.
+    /// Returns the force of the surface on the tip (f_t, f_n), N, without impulses.
     fn contact_force_n(&self) -> Vector2<f64> {
         let now = self.snapshot();
         Vector2::new(now.tangential_force_n, now.normal_force_n)
     }
 }
 
-/// Why a plant cannot go on: the reason of the particular plant.
+/// Failure of a plant, with the plant's own error as the reason.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub struct PlantError(Box<dyn std::error::Error + Send + Sync>);
 
 impl PlantError {
-    /// The reason of a particular plant.
+    /// Wraps the error of a particular plant.
     pub fn new(reason: impl std::error::Error + Send + Sync + 'static) -> Self {
         Self(Box::new(reason))
     }
 }
 
-/// A plant at an instant. What a plant does not have may stay at its default, zero.
+/// A plant at one instant. Quantities that a plant does not have may stay at their default, zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// Simulated time, s.
@@ -111,9 +111,9 @@ pub struct Snapshot {
     pub theta_ddot_rad_s2: [f64; 2],
     /// Position of the tip along the belt z_t, m.
     pub tip_t_m: f64,
-    /// Height of the tip over the belt, m.
+    /// Height of the tip above the belt, m.
     pub gap_m: f64,
-    /// Velocity at which that height grows, m/s.
+    /// Rate of that height, m/s.
     pub gap_rate_m_s: f64,
     /// Velocity of the tip relative to the belt ż_r, m/s.
     pub slip_velocity_m_s: f64,
@@ -129,6 +129,6 @@ pub struct Snapshot {
     pub p_per_kg: f64,
     /// Torques u1, u2 that act on the joints, N·m.
     pub torque_nm: [f64; 2],
-    /// What holds the tip.
+    /// Contact mode.
     pub mode: ContactMode,
 }

@@ -1,4 +1,4 @@
-//! Seeing the motion of a plant at its own resolution, between the ticks of the controller.
+//! Observation of a plant's motion at its own resolution, between the ticks of the controller.
 
 use super::{ContactMode, Snapshot, State};
 
@@ -10,7 +10,7 @@ pub enum Event {
         /// Normal velocity before, m/s.
         approach_m_s: f64,
     },
-    /// The tip was thrown off out of sliding although nothing collided.
+    /// The tip was thrown off while sliding, without a collision.
     ImpactWithoutCollision,
     /// The mode changed.
     ModeChange {
@@ -21,35 +21,35 @@ pub enum Event {
     },
 }
 
-/// A stretch of smooth motion in one contact mode. Values are computed when asked for.
+/// A stretch of smooth motion in one contact mode. Values are computed on request.
 pub trait Step {
-    /// Start time, s.
+    /// Returns the start time, s.
     fn start_s(&self) -> f64;
-    /// End time, s.
+    /// Returns the end time, s.
     fn end_s(&self) -> f64;
-    /// What held the tip.
+    /// Returns the contact mode during the step.
     fn mode(&self) -> ContactMode;
-    /// The plant at the start.
+    /// Returns the plant at the start.
     fn start(&self) -> Snapshot;
-    /// The plant at the end, before any discontinuity there.
+    /// Returns the plant at the end, before any discontinuity there.
     fn end(&self) -> Snapshot;
 }
 
-/// Sees the motion of a plant at the plant's own resolution.
+/// Observes the motion of a plant at the plant's own resolution.
 pub trait Probe {
     /// Called after every step.
     fn step(&mut self, step: &impl Step);
-    /// Called at every discontinuity; `state` is the one after it.
+    /// Called at every discontinuity; `state` is the state after it.
     fn event(&mut self, time_s: f64, event: Event, state: &State);
 }
 
-/// Sees nothing.
+/// Ignores everything.
 impl Probe for () {
     fn step(&mut self, _: &impl Step) {}
     fn event(&mut self, _: f64, _: Event, _: &State) {}
 }
 
-/// Two probes at once, the first one first.
+/// Two probes, called in order.
 impl<A: Probe, B: Probe> Probe for (&mut A, &mut B) {
     fn step(&mut self, step: &impl Step) {
         self.0.step(step);

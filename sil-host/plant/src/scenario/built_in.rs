@@ -1,4 +1,4 @@
-//! The scenarios that come with the program.
+//! The built-in scenarios.
 
 /// Name and text of every built-in scenario; the first is the default.
 const SCENARIOS: [(&str, &str); 8] = [
@@ -24,15 +24,15 @@ const SCENARIOS: [(&str, &str); 8] = [
     ("capture", include_str!("built_in/capture.toml")),
 ];
 
-/// Name of the scenario that runs when none is asked for.
+/// Name of the default scenario.
 pub const DEFAULT: &str = SCENARIOS[0].0;
 
-/// Names of all built-in scenarios.
+/// Returns the names of all built-in scenarios.
 pub fn names() -> impl Iterator<Item = &'static str> {
     SCENARIOS.iter().map(|(name, _)| *name)
 }
 
-/// TOML text of a built-in scenario.
+/// Returns the TOML text of a built-in scenario.
 pub fn text(name: &str) -> Option<&'static str> {
     SCENARIOS
         .iter()

@@ -10,16 +10,16 @@ use toml::{Table, Value};
 use super::{Scenario, built_in};
 use crate::mechanics::BuiltInPlant;
 
-/// More levels than the keys of any scenario have.
+/// Upper limit of the levels of a key; no scenario key has as many.
 const MOST_LEVELS: usize = 16;
 
-/// Why there is no scenario to run.
+/// Why a scenario cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
-    /// Neither a built-in name nor a file.
+    /// The name is neither a built-in scenario nor a file.
     #[error("no built-in scenario and no file is called '{name}'; built in are: {known}")]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
         /// The built-in names.
         known: String,
@@ -29,10 +29,10 @@ pub enum ScenarioError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         source: std::io::Error,
     },
-    /// The file holds nothing.
+    /// The file is empty.
     #[error("scenario file {} is empty", path.display())]
     Empty {
         /// The file.
@@ -43,7 +43,7 @@ pub enum ScenarioError {
     Syntax {
         /// File or scenario.
         origin: String,
-        /// What is wrong and where.
+        /// What is wrong, and where.
         message: String,
     },
     /// A key is unknown or has the wrong type.
@@ -53,31 +53,31 @@ pub enum ScenarioError {
         origin: String,
         /// Path of the key.
         key: String,
-        /// What is wrong and what is allowed.
+        /// What is wrong, and what is allowed.
         message: String,
     },
     /// An override is not of the form key=value.
-    #[error("--set '{text}' is not of the form key=value, as in --set belt.friction=0.4")]
+    #[error("--set '{text}' is not of the form key=value; example: --set belt.friction=0.4")]
     Override {
-        /// What was given.
+        /// The given text.
         text: String,
     },
-    /// An override's key has more levels than any scenario.
-    #[error("--set: a key has at most {MOST_LEVELS} levels, as belt.friction has two")]
+    /// An override's key has more levels than any key of a scenario.
+    #[error("--set: a key has at most {MOST_LEVELS} levels (belt.friction has two)")]
     TooDeep,
     /// A value is out of range.
     #[error("{origin}: {source}")]
     Range {
         /// File or scenario.
         origin: String,
-        /// Which and what is allowed.
+        /// The value and the allowed range.
         source: OutOfRange,
     },
 }
 
 impl Scenario {
-    /// The built-in scenario or file called `name`, with overrides `key=value`
-    /// applied in order, checked as a whole.
+    /// Loads the built-in scenario or file called `name`, applies the overrides `key=value` in
+    /// order and validates the result as a whole.
     ///
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
@@ -91,8 +91,8 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The same for studies that place the arm themselves: the start is not checked
-    /// against the belt.
+    /// Loads a scenario like [`load`](Self::load), but without checking the start against the belt,
+    /// for studies that place the arm themselves.
     ///
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
@@ -100,7 +100,8 @@ impl Scenario {
         from_table(&origin(name), read(name)?)?.with_overrides(&origin(name), overrides)
     }
 
-    /// The scenario of a TOML text, checked as a whole but for the start of the arm.
+    /// Reads a scenario from TOML text and validates it as a whole, except for the start of the
+    /// arm.
     ///
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
@@ -109,8 +110,8 @@ impl Scenario {
         from_table(origin, parse(origin, text)?)?.with_overrides(origin, &[])
     }
 
-    /// This scenario with overrides `key=value` applied in order, its numbers checked.
-    /// `origin` says in messages what they were applied to.
+    /// Returns this scenario with overrides `key=value` applied in order and its numbers validated.
+    /// Messages name `origin` as the scenario that was overridden.
     ///
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
@@ -130,7 +131,7 @@ impl Scenario {
     }
 }
 
-/// What a scenario's name stands for, in messages.
+/// Returns the description of a scenario's origin for messages.
 fn origin(name: &str) -> String {
     match built_in::text(name) {
         Some(_) => format!("scenario {name}"),
@@ -187,21 +188,21 @@ fn from_table(origin: &str, table: Table) -> Result<Scenario, ScenarioError> {
     })
 }
 
-/// The scenario with one key changed. The key must be one that the scenario has or, like
-/// `controller.belt.given_m_s`, may have.
+/// Returns the scenario with one key changed. The key must exist in the scenario or be optional,
+/// such as `controller.belt.given_m_s`.
 fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioError> {
     let wrong = || ScenarioError::Override { text: text.into() };
     let (key, value) = text.split_once('=').ok_or_else(wrong)?;
     let (key, value) = (key.trim(), value.trim());
-    // A line break would begin another key, which nobody looks at.
+    // A line break would start another key, which would not be checked.
     if key.is_empty() || value.is_empty() || value.contains(['\n', '\r']) {
         return Err(wrong());
     }
-    // Each level is a call or more in everything that goes through the values.
+    // Each level costs at least one recursive call in everything that visits the values.
     if key.split('.').count() > MOST_LEVELS {
         return Err(ScenarioError::TooDeep);
     }
-    // A bare word is a string, so that names need no quotes inside quotes.
+    // A bare word is a string, so that names need no nested quotes.
     let value = format!("value = {value}")
         .parse::<Table>()
         .ok()
@@ -213,7 +214,7 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
         message,
     };
     let mut root = Value::try_from(&scenario).map_err(|error| wrong_key(error.to_string()))?;
-    // What to say if a key that is not there turns out not to be an optional one.
+    // Error message in case the missing key turns out not to be an optional one.
     let mut missing = None;
     let mut place = &mut root;
     for part in key.split('.') {
@@ -221,7 +222,7 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
             Value::Table(table) => {
                 if !table.contains_key(part) && missing.is_none() {
                     let known = table.keys().cloned().collect::<Vec<_>>().join(", ");
-                    missing = Some(format!("there is no '{part}' here, only: {known}"));
+                    missing = Some(format!("unknown key '{part}'; known: {known}"));
                 }
                 let empty = || Value::Table(Table::new());
                 Ok(table.entry(part).or_insert_with(empty))
@@ -233,12 +234,12 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
                     .and_then(|index| array.get_mut(index))
                     .ok_or(format!("'{part}' is not one of its {count} items, from 0"))
             }
-            _ => Err(format!("'{part}' is inside a single value")),
+            _ => Err(format!("'{part}' would be inside a single value")),
         };
         place = next.map_err(wrong_key)?;
     }
     *place = match (&*place, value) {
-        // A whole number is a number.
+        // An integer is accepted as a number.
         (Value::Float(_), Value::Integer(integer)) => Value::Float(integer as f64),
         (_, value) => value,
     };
@@ -246,7 +247,7 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
         return Err(wrong());
     };
     from_table("--set", table).map_err(|error| match (missing, &error) {
-        // There is such a key, but not such a value.
+        // The key exists, but the value is invalid.
         (_, ScenarioError::Key { message, .. }) if message.starts_with("invalid ") => error,
         (Some(message), _) => wrong_key(message),
         (None, _) => error,
@@ -309,7 +310,7 @@ mod tests {
             (&["arm_model.lenght_m=0.2"], &["arm_model.lenght_m"]),
             (
                 &["controller.law.pid.integral_gain=1"],
-                &["no 'pid' here", "hybrid"],
+                &["unknown key 'pid'", "hybrid"],
             ),
             (&["belt.friction=nan"], &["belt.friction = NaN", "0 to 10"]),
             (&["belt.friction=inf"], &["belt.friction = inf", "0 to 10"]),

@@ -1,8 +1,7 @@
-//! A scenario: everything that defines a run, as a TOML file with units in the
-//! key names.
+//! A scenario: the complete definition of a run, as a TOML file with units in the key names.
 //!
-//! Every key has a default (the run of `hybrid-elbow-down`), unknown keys are
-//! refused, and every number is checked before anything starts.
+//! Every key has a default (the run of `hybrid-elbow-down`), unknown keys are rejected, and every
+//! number is checked before a run starts.
 
 pub mod built_in;
 pub mod describe;
@@ -24,14 +23,14 @@ pub use crate::mechanics::belt::BeltSettings;
 pub use load::ScenarioError;
 
 settings! {
-    /// Everything that defines a run. By default the paper's hybrid law from x0,d at hardware-like
-    /// quantisation.
+    /// The complete definition of a run. The default is the paper's hybrid law from x0,d with
+    /// quantisation as on hardware.
     pub struct Scenario {
         /// Short name, for reports and files.
         name: String = "unnamed".into();
         /// One sentence about the run.
         description: String = String::new();
-        /// How long, how fast, which seed.
+        /// Duration, control rate and seed.
         run: RunSettings = RunSettings::default();
         /// The arm of the plant.
         arm: ArmParameters<f64> = ArmParameters::default();
@@ -39,15 +38,15 @@ settings! {
         arm_model: Option<ArmParameters<f32>> = None;
         /// Friction and speed of the belt.
         belt: BeltSettings = BeltSettings::default();
-        /// How the tip bounces.
+        /// Restitution of impacts.
         impact: ImpactLaw = ImpactLaw::default();
         /// Rigid or compliant contact.
         contact: TipContact = TipContact::default();
-        /// What a rig has and the paper's arm has not.
+        /// Effects of a real rig that the paper's arm lacks.
         effects: Effects = Effects::default();
-        /// Accuracy of the plant.
+        /// Accuracy of the plant's solution.
         solver: SolverSettings = SolverSettings::default();
-        /// Where the arm starts.
+        /// Initial state of the arm.
         initial: InitialState = InitialState::default();
         /// Encoders, force cell and torque stages.
         converters: ConverterSettings = ConverterSettings::default();
@@ -58,31 +57,31 @@ settings! {
 }
 
 settings! {
-    /// How long, how fast, which seed.
+    /// Duration, control rate and seed.
     #[derive(Copy)]
     pub struct RunSettings {
         /// Simulated time.
         duration_s: f64 = 6.0, 1e-3..=1e7, "s";
         /// Control rate.
         tick_hz: u32 = 1000, 10..=100_000, "Hz";
-        /// When ENABLE rises.
+        /// Time at which ENABLE rises.
         enable_at_s: f64 = 0.0, 0.0..=1e7, "s";
         /// Seed of all noise.
         seed: u64 = 1;
-        /// Tick and sequence number of the first frame: near 2³² the counters wrap early.
+        /// Tick and sequence number of the first frame; near 2³² the counters wrap early.
         first_tick: u32 = 0;
     }
 }
 
 impl RunSettings {
-    /// Control ticks of the whole run.
+    /// Returns the number of control ticks of the whole run.
     pub fn ticks(&self) -> u64 {
         (self.duration_s * f64::from(self.tick_hz)).round() as u64
     }
 }
 
 impl Scenario {
-    /// The plant's part.
+    /// Returns the plant's parameters.
     pub fn plant_parameters(&self) -> PlantParameters {
         PlantParameters {
             arm: self.arm,
@@ -93,7 +92,7 @@ impl Scenario {
         }
     }
 
-    /// The controller's part, as it is sent to whatever runs the controller.
+    /// Returns the controller's configuration, as it is sent to the host of the controller.
     pub fn controller_configuration(&self) -> Configuration {
         Configuration {
             tick_hz: self.run.tick_hz as f32,
@@ -103,7 +102,7 @@ impl Scenario {
         }
     }
 
-    /// Checks what one part allows another.
+    /// Checks the limits that depend on several parts.
     fn relations(&self) -> Result<(), OutOfRange> {
         self.controller_configuration()
             .validate()
@@ -112,7 +111,8 @@ impl Scenario {
     }
 }
 
-/// An error of the controller's configuration with the key that the setting has in a scenario.
+/// Returns an error of the controller's configuration with the key that the setting has in a
+/// scenario.
 fn in_scenario(error: OutOfRange) -> OutOfRange {
     match error.key.parts().next() {
         Some("tick_hz") => error.inside("run"),

@@ -1,4 +1,4 @@
-//! What happens to the arm at an event: it lands, is thrown off, or goes on in another mode.
+//! Handling of contact events: the tip lands, is thrown off, or continues in another mode.
 
 use super::super::impact::{self, ImpactKind};
 use super::super::probe::ArmProbe;
@@ -7,7 +7,7 @@ use super::{ArmOnBelt, MotionError};
 use crate::plant::{ContactMode, Event};
 
 impl ArmOnBelt {
-    /// The tip has landed, or sliding or sticking cannot go on.
+    /// Handles a landing, or the end of sliding or sticking.
     pub(super) fn handle_event(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
         if self.mode.is_contact() {
             let motion = self.motion();
@@ -17,7 +17,7 @@ impl ArmOnBelt {
                 .slip()
                 .is_some_and(|s| s.sign::<f64>() * slip <= 0.0)
             {
-                // Slip has just died; what is left of it is the resolution of time.
+                // Slip has just vanished; the remainder is the resolution of the event's time.
                 self.state =
                     motion.onto_stick(self.time_s, motion.tip_t_m(&self.state), &self.state);
             }
@@ -39,10 +39,10 @@ impl ArmOnBelt {
         Ok(())
     }
 
-    /// The tip is on the belt without normal velocity: decides what follows.
+    /// Decides what follows for a tip on the belt without normal velocity.
     pub(super) fn enter_contact(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
-        // Each throw that does not lift the tip ends its slip, which leaves
-        // only sticking and sliding from rest.
+        // Each throw that does not lift the tip ends its slip, so only sticking and sliding from
+        // rest remain.
         self.evaluation = None;
         for _ in 0..4 {
             let motion = self.motion();

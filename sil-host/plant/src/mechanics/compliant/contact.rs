@@ -1,20 +1,21 @@
-//! The contact that gives: its normal force from penetration, its friction from bristles.
+//! The compliant contact: its normal force from penetration, its friction from bristles.
 //!
-//! **Normal.** Kelvin and Voigt: f_n = k δ + c δ̇; Hunt and Crossley: f_n = k δ (1 + d δ̇), whose damping grows
-//! with the penetration δ, so that nothing jumps at the touch. Neither ever pulls.
+//! **Normal.** Kelvin–Voigt: f_n = k δ + c δ̇. Hunt–Crossley: f_n = k δ (1 + d δ̇), where the
+//! damping grows with the penetration δ, so that the force does not jump at touchdown. Neither ever
+//! pulls.
 //!
-//! **Tangential.** LuGre (Canudas de Wit, Olsson, Åström, Lischinsky 1995), with the bristles' deflection
-//! divided by what it is when they all slide, y = σ₀ z:
-//! ẏ = σ₀ (v − |v| y/g), f_t = −f_n (y + σ₁ ẏ/σ₀ + σ₂ v), g = μ (1 + (r − 1) exp(−(v/v_s)²)),
-//! with r the ratio of static to kinetic friction and v_s Stribeck's speed.
+//! **Tangential.** LuGre (Canudas de Wit, Olsson, Åström, Lischinsky 1995), with the deflection z
+//! of the bristles scaled to y = σ₀ z, which is ±g in steady sliding: ẏ = σ₀ (v − |v| y/g), f_t =
+//! −f_n (y + σ₁ ẏ/σ₀ + σ₂ v), g = μ (1 + (r − 1) exp(−(v/v_s)²)), where r is the ratio of static to
+//! kinetic friction and v_s Stribeck's speed.
 
 use painleve_shared::settings;
 
 settings! {
-    /// Which contact there is between tip and belt.
+    /// Kind of contact between tip and belt.
     #[derive(Copy, Eq)]
     pub enum ContactKind {
-        /// Rigid bodies, Coulomb friction, impacts in an instant.
+        /// Rigid bodies, Coulomb friction, instantaneous impacts.
         "rigid" => Rigid,
         /// Spring and damper, bristle friction.
         "compliant" => Compliant,
@@ -22,7 +23,7 @@ settings! {
 }
 
 settings! {
-    /// How the normal force is damped.
+    /// Damping of the normal force.
     #[derive(Copy)]
     pub enum NormalDamping {
         /// f_n = k δ + c δ̇.
@@ -30,7 +31,7 @@ settings! {
             /// Damping c.
             damping_ns_m: f64, 0.0..=1e6, "N·s/m";
         },
-        /// The same with the damping that gives a mass a coefficient of restitution.
+        /// Kelvin–Voigt with the damping that gives a mass a coefficient of restitution.
         "restitution" => Restitution {
             /// Restitution e of a mass that falls on the contact.
             restitution: f64, 0.01..=1.0;
@@ -46,8 +47,9 @@ settings! {
 }
 
 settings! {
-    /// The contact between tip and belt. All keys but `kind` are those of the compliant one, by
-    /// default 10⁵ N/m with a damping ratio of 0.6 for 40 g: a restitution near the paper's.
+    /// The contact between tip and belt. All keys but `kind` apply to the compliant contact. The
+    /// default is 10⁵ N/m with a damping ratio of 0.6 for 40 g, which gives a restitution near the
+    /// paper's.
     #[derive(Copy)]
     pub struct TipContact {
         /// Rigid or compliant.
@@ -56,35 +58,35 @@ settings! {
         stiffness_n_m: f64 = 1e5, 1e3..=1e9, "N/m";
         /// Damping of the normal force.
         normal: NormalDamping = NormalDamping::KelvinVoigt { damping_ns_m: 76.0 };
-        /// Tangential stiffness σ₀ for each newton of normal force.
+        /// Tangential stiffness σ₀ per newton of normal force.
         bristle_stiffness_per_m: f64 = 1e4, 1.0..=1e8, "1/m";
-        /// Damping σ₁ of the bristles for each newton of normal force.
+        /// Damping σ₁ of the bristles per newton of normal force.
         bristle_damping_s_m: f64 = 0.0, 0.0..=1e3, "s/m";
         /// Static friction over kinetic friction, r.
         static_friction_ratio: f64 = 1.0, 1.0..=10.0;
         /// Stribeck's speed v_s.
         stribeck_speed_m_s: f64 = 0.01, 1e-4..=10.0, "m/s";
-        /// Viscous friction σ₂ for each newton of normal force.
+        /// Viscous friction σ₂ per newton of normal force.
         viscous_friction_s_m: f64 = 0.0, 0.0..=10.0, "s/m";
-        /// Error of one integration step: of angles (rad), rates (rad/s) and y, absolute and
-        /// relative.
+        /// Error tolerance of one integration step, absolute and relative: for angles (rad), rates
+        /// (rad/s) and y.
         local_error: f64 = 1e-6, 1e-12..=1e-3;
     }
 }
 
-/// The contact's law, with everything that does not change worked out.
+/// The contact's law, with its constants precomputed.
 #[derive(Clone, Copy, Debug)]
 pub struct CompliantContact {
     stiffness_n_m: f64,
-    /// c of Kelvin and Voigt, N·s/m.
+    /// Damping c of Kelvin–Voigt, N·s/m.
     damping_ns_m: f64,
-    /// d of Hunt and Crossley, s/m.
+    /// Dissipation d of Hunt–Crossley, s/m.
     dissipation_s_m: f64,
     settings: TipContact,
 }
 
 impl CompliantContact {
-    /// The law of checked settings.
+    /// Creates the law of validated settings.
     pub fn new(settings: &TipContact) -> Self {
         let (damping_ns_m, dissipation_s_m) = match settings.normal {
             NormalDamping::KelvinVoigt { damping_ns_m } => (damping_ns_m, 0.0),
@@ -105,7 +107,7 @@ impl CompliantContact {
         }
     }
 
-    /// Normal force, N, at a penetration δ (m) that grows with δ̇ (m/s).
+    /// Returns the normal force, N, at a penetration δ (m) with rate δ̇ (m/s).
     #[inline]
     pub fn normal_force_n(&self, depth_m: f64, depth_rate_m_s: f64) -> f64 {
         if depth_m <= 0.0 {
@@ -117,7 +119,7 @@ impl CompliantContact {
         force.max(0.0)
     }
 
-    /// Friction of a slip that lasts, over the normal force: g, for the coefficient μ.
+    /// Returns g, the ratio of friction to normal force in steady sliding, for the coefficient μ.
     #[inline]
     pub fn sliding_ratio(&self, friction: f64, slip_m_s: f64) -> f64 {
         let excess = self.settings.static_friction_ratio - 1.0;
@@ -128,15 +130,15 @@ impl CompliantContact {
         friction * (1.0 + excess * libm::exp(-relative * relative))
     }
 
-    /// ẏ, 1/s, of bristles deflected by y at a slip velocity (m/s).
+    /// Returns ẏ, 1/s, of bristles with deflection y at a slip velocity (m/s).
     #[inline]
     pub fn bristle_rate_per_s(&self, friction: f64, slip_m_s: f64, bristles: f64) -> f64 {
-        // Without friction nothing holds the bristles.
+        // Avoids a division by zero without friction.
         let ratio = self.sliding_ratio(friction, slip_m_s).max(1e-6);
         self.settings.bristle_stiffness_per_m * (slip_m_s - slip_m_s.abs() * bristles / ratio)
     }
 
-    /// f_t/f_n of bristles deflected by y, moving with ẏ (1/s), at a slip velocity (m/s).
+    /// Returns f_t/f_n of bristles with deflection y and rate ẏ (1/s) at a slip velocity (m/s).
     #[inline]
     pub fn friction_ratio(&self, slip_m_s: f64, bristles: f64, bristle_rate_per_s: f64) -> f64 {
         let settings = &self.settings;
@@ -145,14 +147,14 @@ impl CompliantContact {
     }
 }
 
-/// Damping ratio with which a mass that falls on a Kelvin–Voigt contact rebounds with the
-/// restitution e, its release being where the force ends (Schwager and Pöschel 2007).
+/// Returns the damping ratio with which a mass that falls on a Kelvin–Voigt contact rebounds with
+/// restitution e, where the contact ends when the force vanishes (Schwager and Pöschel 2007).
 fn damping_ratio(restitution: f64) -> f64 {
     let of = |ratio: f64| {
         if ratio < 1.0 {
             let root = (1.0 - ratio * ratio).sqrt();
             let angle = libm::atan2(2.0 * ratio * root, 1.0 - 2.0 * ratio * ratio);
-            // Where 2 ζ² passes 1 the angle goes on beyond π/2.
+            // Beyond 2 ζ² = 1 the angle exceeds π/2.
             libm::exp(-ratio / root * (core::f64::consts::PI - angle))
         } else {
             let root = (ratio * ratio - 1.0).sqrt().max(1e-9);
@@ -191,7 +193,7 @@ mod tests {
             prop_assert!(force >= 0.0 && (depth > 0.0 || force == 0.0));
         }
 
-        /// A mass on the contact alone, in small explicit steps, rebounds as asked for.
+        /// A mass on the contact alone, in small explicit steps, rebounds with the set restitution.
         #[test]
         fn the_damping_gives_the_restitution(restitution in 0.05_f64..0.95) {
             let settings = TipContact {

@@ -1,4 +1,4 @@
-//! Equations of motion of the arm on a contact that gives, with the effects that are switched on.
+//! Equations of motion of the arm on a compliant contact, with the enabled effects.
 
 use nalgebra::{SVector, Vector2};
 use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose};
@@ -10,15 +10,15 @@ use crate::mechanics::effects::friction::FrictionChange;
 use crate::mechanics::rosenbrock::Equations;
 use crate::mechanics::torque::TorqueSegment;
 
-/// States of an arm whose joints are rigid and free of friction: θ1, θ2 (rad), θ̇1, θ̇2 (rad/s) and the
-/// deflection y of the tip's bristles.
+/// Number of states of an arm with rigid, frictionless joints: θ1, θ2 (rad), θ̇1, θ̇2 (rad/s) and
+/// the deflection y of the tip's bristles.
 pub const PLAIN: usize = 5;
 
-/// With drives: also the rotors' angles (rad) and rates (rad/s) in the joints' coordinates θ1 and
-/// θ2 − θ1, and the deflections of the joints' bristles.
+/// Number of states with drives: also the rotors' angles (rad) and rates (rad/s) in the joints'
+/// coordinates θ1 and θ2 − θ1, and the deflections of the joints' bristles.
 pub const FULL: usize = 11;
 
-/// One stretch of motion.
+/// The equations of one stretch of motion.
 #[derive(Clone, Copy, Debug)]
 pub struct CompliantMotion<'a> {
     /// The arm.
@@ -29,29 +29,30 @@ pub struct CompliantMotion<'a> {
     pub friction: f64,
     /// The contact's law.
     pub contact: &'a CompliantContact,
-    /// Everything else.
+    /// The effects.
     pub effects: &'a Effects,
     /// Joint torques.
     pub torque: TorqueSegment,
 }
 
-/// What the tip feels.
+/// State of the contact at the tip.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
     /// Contact force (f_t, f_n), N.
     pub force_n: Vector2<f64>,
     /// Rate of the bristles, 1/s.
     pub bristle_rate_per_s: f64,
-    /// Velocity of the tip along the belt, relative to it, m/s.
+    /// Velocity of the tip along the belt, relative to the belt, m/s.
     pub slip_m_s: f64,
     /// Velocity at which tip and belt approach each other, m/s.
     pub closing_m_s: f64,
-    /// Height of the belt's surface over the flat belt, m.
+    /// Height of the belt's surface above the flat belt, m.
     pub surface_m: f64,
 }
 
 impl CompliantMotion<'_> {
-    /// The contact at a pose of the arm, with the tip's velocity (m/s) and the bristles' deflection.
+    /// Returns the contact at a pose of the arm, with the tip's velocity (m/s) and the bristles'
+    /// deflection.
     pub fn touch(
         &self,
         t_s: f64,
@@ -72,7 +73,7 @@ impl CompliantMotion<'_> {
         let friction = self.friction_at(t_s, self.arm.tip_m(pose).x);
         let depth_m = surface_m - self.arm.gap_m(pose);
         let normal = self.contact.normal_force_n(depth_m, closing_m_s);
-        // Nothing holds the bristles of a tip in the air: they spring back.
+        // In flight the bristles spring back.
         let rate = if normal > 0.0 {
             self.contact
                 .bristle_rate_per_s(friction, slip_m_s, bristles)
@@ -89,12 +90,13 @@ impl CompliantMotion<'_> {
         }
     }
 
-    /// Place of the belt, which moves with it, under a tip at `tip_t_m`, m.
+    /// Returns the position on the belt, in a frame that moves with it, under a tip at `tip_t_m`,
+    /// m.
     fn along_belt_m(&self, t_s: f64, tip_t_m: f64) -> f64 {
         tip_t_m - self.belt.displacement_m(0.0, t_s)
     }
 
-    /// Friction coefficient μ at an instant and a place of the tip along the belt, m.
+    /// Returns the friction coefficient μ at a time and a tip position along the belt, m.
     pub fn friction_at(&self, t_s: f64, tip_t_m: f64) -> f64 {
         match &self.effects.friction {
             FrictionChange::None => self.friction,
@@ -105,7 +107,7 @@ impl CompliantMotion<'_> {
         }
     }
 
-    /// The contact at a state.
+    /// Returns the contact at a state.
     pub fn touch_at<const N: usize>(&self, t_s: f64, x: &SVector<f64, N>) -> Touch {
         let pose = Pose::new(&LinkMotion::new(x[0], x[1]));
         let velocity = self.arm.jacobian(&pose) * Vector2::new(x[2], x[3]);
@@ -113,7 +115,7 @@ impl CompliantMotion<'_> {
     }
 }
 
-/// Rate at which the bristles of a tip in the air spring back, 1/s.
+/// Rate at which the bristles spring back in flight, 1/s.
 const BRISTLE_RECOVERY_PER_S: f64 = 1e3;
 
 impl<const N: usize> Equations<N> for CompliantMotion<'_> {

@@ -1,10 +1,11 @@
-//! The plant with a contact that gives: the same arm and belt as the rigid one, the tip held by a spring
-//! and a damper, friction by bristles ([`contact`]), and whatever [`effects`](super::effects) are on.
+//! The plant with a compliant contact: the same arm and belt as the rigid plant, but with a spring
+//! and a damper at the tip, friction by bristles ([`contact`]), and the enabled
+//! [`effects`](super::effects).
 //!
-//! No events and no impacts: a collision is a short stretch of motion like any other, and what the
-//! rigid plant calls Painlevé's paradox is an instability of the contact that ends with the tip's slip or its
-//! flight. Integrated with steps whose error is controlled ([`rosenbrock`](super::rosenbrock)), at any
-//! stiffness.
+//! It has no events and no impacts: a collision is a short stretch of ordinary motion. The
+//! situation that the rigid plant calls Painlevé's paradox is an instability of the contact, which
+//! ends when the tip stops slipping or lifts off. The steps have error control
+//! ([`rosenbrock`](super::rosenbrock)) and work at any stiffness.
 
 pub mod contact;
 mod equations;
@@ -27,12 +28,12 @@ use super::torque::TorqueSegment;
 use super::{InitialState, MotionError, PlantParameters};
 use crate::plant::{ContactMode, Event, Plant, PlantError, Probe, Snapshot, State};
 
-/// Longest step, s: a touch between two looks at the gap is that short.
+/// Longest step, s, so that no short touch falls between two checks of the gap.
 const MAXIMUM_STEP_S: f64 = 2e-3;
 /// Slip velocity below which a touching tip sticks, m/s.
 const STICK_M_S: f64 = 1e-3;
 
-/// The simulated arm on a belt that gives.
+/// The simulated arm on a compliant contact.
 #[derive(Clone, Debug)]
 pub struct CompliantArmOnBelt {
     arm: Arm<f64>,
@@ -44,15 +45,15 @@ pub struct CompliantArmOnBelt {
     torque: TorqueSegment,
     time_s: f64,
     state: SVector<f64, FULL>,
-    /// Whether the states of the drives count.
+    /// Whether the states of the drives are integrated.
     has_drives: bool,
     mode: ContactMode,
     step_size_s: f64,
 }
 
 impl CompliantArmOnBelt {
-    /// A plant at time zero with zero torque. A tip at most 0.1 mm over the belt or 1 mm inside it
-    /// is first put onto the belt, without force.
+    /// Creates a plant at time zero with zero torque. A tip at most 0.1 mm above the belt or 1 mm
+    /// inside it is first moved onto the belt, without force.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first parameter that is out of range.
@@ -108,7 +109,7 @@ impl CompliantArmOnBelt {
         Ok(plant)
     }
 
-    /// Present state of the arm.
+    /// Returns the present state of the arm.
     pub fn state(&self) -> State {
         self.state.fixed_rows::<4>(0).into_owned()
     }
@@ -116,7 +117,7 @@ impl CompliantArmOnBelt {
     /// Integrates to time `until_s`.
     ///
     /// # Errors
-    /// [`MotionError`]; the plant stands at the time of the error.
+    /// [`MotionError`]; the plant stays at the time of the error.
     pub fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), MotionError> {
         while self.time_s < until_s {
             let corner = self
@@ -170,7 +171,7 @@ impl CompliantArmOnBelt {
                 let step = linearised.step(&motion, tried, self.local_error);
                 let next = tried * step.growth();
                 if step.error <= 1.0 {
-                    // A step cut short says nothing against a longer one.
+                    // A truncated step is no reason against a longer one.
                     size = if tried < size { size.max(next) } else { next };
                     break (step.end, tried);
                 }
@@ -206,7 +207,8 @@ impl CompliantArmOnBelt {
         Ok(())
     }
 
-    /// Whether there is a contact force now, and which way the tip slips.
+    /// Returns the present contact mode: whether there is a contact force, and the direction of
+    /// slip.
     fn present_mode(&self) -> ContactMode {
         let touch = self.motion().touch_at(self.time_s, &self.state);
         if touch.force_n.y <= 0.0 {

@@ -1,4 +1,4 @@
-//! Instants and steps of the compliant plant as everybody else sees them.
+//! Instants and steps of the compliant plant in the interface of every plant.
 
 use nalgebra::SVector;
 use painleve_shared::{LinkMotion, Pose, Slip};
@@ -40,7 +40,7 @@ impl Step for CompliantStep<'_> {
 }
 
 impl<'a> CompliantMotion<'a> {
-    /// The same arm on a rigid belt, with the friction at an instant and a place of the tip along
+    /// Returns the same arm on a rigid belt, with the friction at a time and a tip position along
     /// the belt (m).
     pub(super) fn rigid(&self, t_s: f64, tip_t_m: f64) -> Motion<'a> {
         Motion {
@@ -51,8 +51,8 @@ impl<'a> CompliantMotion<'a> {
         }
     }
 
-    /// Everything about an instant. b and p are those of the contact terms, which know of neither
-    /// gears nor joint friction.
+    /// Returns the snapshot of an instant. Its b and p are those of the rigid contact, without
+    /// gears and joint friction.
     pub(super) fn snapshot(&self, mode: ContactMode, t_s: f64, x: &SVector<f64, FULL>) -> Snapshot {
         let state = State::new(x[0], x[1], x[2], x[3]);
         let pose = Pose::new(&LinkMotion::new(x[0], x[1]));

@@ -2,7 +2,7 @@ use super::*;
 use crate::mechanics::ArmOnBelt;
 use crate::mechanics::effects::push::Push;
 
-/// The paper's x0,a, which is inconsistent at the start, and x0,d on the belt.
+/// The paper's x0,a, which is inconsistent at the start; x0,d lies on the belt.
 const INCONSISTENT_DEG: (f64, f64) = (32.0, 18.27);
 const ON_BELT_DEG: (f64, f64) = (-11.4, -35.1);
 
@@ -10,8 +10,8 @@ fn start(degrees: (f64, f64)) -> State {
     State::new(degrees.0.to_radians(), degrees.1.to_radians(), 0.0, 0.0)
 }
 
-/// A contact of this stiffness with the damping ratio 0.6 for 40 g, tangentially as stiff as
-/// normally, at 10 N.
+/// A contact of this stiffness with damping ratio 0.6 for 40 g, and equal tangential stiffness at
+/// 10 N.
 fn contact(stiffness_n_m: f64, local_error: f64) -> TipContact {
     TipContact {
         kind: ContactKind::Compliant,
@@ -30,14 +30,14 @@ fn compliant(contact: &TipContact, effects: &Effects, degrees: (f64, f64)) -> Co
     CompliantArmOnBelt::new(&parameters, contact, effects, start(degrees)).unwrap()
 }
 
-/// A torque that keeps the tip pressed on the belt and moves it, a new one every millisecond.
+/// A torque that keeps the tip on the belt and moves it, with a new value every millisecond.
 fn torque_nm(tick: u32) -> JointTorque<f64> {
     let time_s = f64::from(tick) * 1e-3;
     JointTorque::new(0.002 * libm::sin(9.0 * time_s), 0.0)
 }
 
 #[test]
-fn a_sliding_tip_goes_where_the_rigid_one_goes_as_the_stiffness_grows() {
+fn a_sliding_tip_converges_to_the_rigid_motion_as_the_stiffness_grows() {
     let parameters = PlantParameters::default();
     let mut quiet = ArmOnBelt::new(&parameters, start(ON_BELT_DEG)).unwrap();
     quiet.advance(30.0, &mut ()).unwrap();
@@ -66,7 +66,7 @@ fn a_sliding_tip_goes_where_the_rigid_one_goes_as_the_stiffness_grows() {
 }
 
 #[test]
-fn the_same_motion_follows_from_a_tighter_tolerance_at_any_stiffness() {
+fn a_tighter_tolerance_gives_the_same_motion_at_any_stiffness() {
     for stiffness_n_m in [1e4, 1e5, 1e6] {
         let end = |local_error| {
             let contact = contact(stiffness_n_m, local_error);
@@ -83,10 +83,10 @@ fn the_same_motion_follows_from_a_tighter_tolerance_at_any_stiffness() {
     }
 }
 
-/// The rigid plant resolves the inconsistent start by an impact without collision that throws the
-/// tip at 10.5 mm/s; a contact that gives throws it, too, without any such rule.
+/// The rigid plant resolves the inconsistent start by an impact without collision, which throws the
+/// tip off at 10.5 mm/s. A compliant contact also throws it off, without any such rule.
 #[test]
-fn the_inconsistent_start_throws_the_tip_as_the_rigid_one_does() {
+fn the_inconsistent_start_throws_the_tip_off_as_on_the_rigid_belt() {
     for stiffness_n_m in [1e5, 1e6] {
         let contact = contact(stiffness_n_m, 1e-7);
         let mut plant = compliant(&contact, &Effects::default(), INCONSISTENT_DEG);
@@ -105,7 +105,7 @@ fn the_inconsistent_start_throws_the_tip_as_the_rigid_one_does() {
 }
 
 #[test]
-fn the_contact_never_pulls_and_holds_the_quiet_attractors_force() {
+fn the_contact_never_pulls_and_settles_at_the_force_of_the_quiet_attractor() {
     let contact = contact(1e5, 1e-6);
     let mut plant = compliant(&contact, &Effects::default(), ON_BELT_DEG);
     for step in 1..20_000 {
@@ -118,7 +118,7 @@ fn the_contact_never_pulls_and_holds_the_quiet_attractors_force() {
 }
 
 #[test]
-fn a_stiff_gear_and_no_joint_friction_change_nothing_that_counts() {
+fn a_stiff_gear_without_joint_friction_hardly_changes_the_motion() {
     let mut geared = Effects::default();
     geared.gear.elastic = true;
     geared.gear.stiffness_nm_rad = 1e5;

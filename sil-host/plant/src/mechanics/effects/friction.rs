@@ -2,16 +2,16 @@
 
 use painleve_shared::settings;
 
-/// Length over which one patch goes over into the next, m.
+/// Length of the transition between two patches, m.
 const SEAM_M: f64 = 1e-3;
 
 settings! {
-    /// What is added to the friction coefficient μ of the belt. μ itself never falls below zero.
+    /// Change of the belt's friction coefficient μ. The sum is limited to at least zero.
     #[derive(Copy)]
     pub enum FrictionChange by "kind" {
-        /// Nothing.
+        /// No change.
         "none" => None,
-        /// A change at once.
+        /// A sudden change.
         "step" => Step {
             /// Change of μ.
             change: f64, -2.0..=2.0;
@@ -20,35 +20,36 @@ settings! {
         },
         /// A change at a constant rate.
         "ramp" => Ramp {
-            /// Change of μ in the end.
+            /// Total change of μ.
             change: f64, -2.0..=2.0;
             /// Time at which the ramp starts.
             start_s: f64, 0.0..=1e7, "s";
-            /// How long the ramp takes.
+            /// Duration of the ramp.
             duration_s: f64, 1e-6..=1e7, "s";
         },
-        /// A sine over time.
+        /// A sinusoidal change over time.
         "sine" => Sine {
             /// Amplitude of μ.
             amplitude: f64, -2.0..=2.0;
             /// Frequency.
             frequency_hz: f64, 1e-6..=1e3, "Hz";
         },
-        /// Patches of the belt, all of one length, each with more friction or less by the same
+        /// Patches of equal length on the belt, on which μ is either raised or lowered by the same
         /// amount.
         "patches" => Patches {
             /// Amount of μ.
             amplitude: f64, -2.0..=2.0;
             /// Length of a patch.
             length_m: f64, 2e-3..=1e3, "m";
-            /// Decides which patches have more.
+            /// Determines which patches are raised.
             seed: u64;
         },
     }
 }
 
 impl FrictionChange {
-    /// Change of μ at time `t_s` and at the place `along_belt_m` of the belt, which moves with it.
+    /// Returns the change of μ at time `t_s` and position `along_belt_m` on the belt, which moves
+    /// with it.
     pub fn at(&self, t_s: f64, along_belt_m: f64) -> f64 {
         match *self {
             Self::None => 0.0,
@@ -88,7 +89,7 @@ impl FrictionChange {
     }
 }
 
-/// +1 or −1 for a patch, from the bits of its number.
+/// Returns +1 or −1 for a patch, from the bits of its number.
 fn sign(seed: u64, patch: f64) -> f64 {
     let mut bits = seed ^ (patch as i64).cast_unsigned();
     // The mixing steps of SplitMix64.
@@ -107,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn patches_are_as_many_up_as_down_and_the_same_again() {
+    fn patches_are_balanced_and_repeatable() {
         let patches = FrictionChange::Patches {
             amplitude: 0.1,
             length_m: 0.05,

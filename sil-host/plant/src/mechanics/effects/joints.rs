@@ -1,20 +1,20 @@
-//! Friction in the joints: Coulomb, static and viscous, by bristles as in the tip's contact, so that a joint
-//! can stand still under a torque.
+//! Friction in the joints: Coulomb, static and viscous, modelled by bristles as in the tip's
+//! contact, so that a joint can stand still under a torque.
 
 use painleve_shared::settings;
 
-/// Angle by which a joint gives before it slips, rad.
+/// Deflection of a joint's bristles before the joint slips, rad.
 const BRISTLE_RAD: f64 = 1e-3;
-/// Rate at which the excess of static friction has fallen to 1/e, rad/s.
+/// Rate at which the excess of static friction has decayed to 1/e, rad/s.
 const STRIBECK_RAD_S: f64 = 0.05;
 
 settings! {
-    /// Friction of both joints, beside the arm's dashpots.
+    /// Friction of both joints, in addition to the arm's viscous damping.
     #[derive(Copy)]
     pub struct JointFriction {
         /// Coulomb friction.
         coulomb_nm: f64 = 0.0, 0.0..=10.0, "N·m";
-        /// Static friction over Coulomb friction.
+        /// Ratio of static to Coulomb friction.
         static_ratio: f64 = 1.0, 1.0..=5.0;
         /// Viscous friction.
         viscous_nms_rad: f64 = 0.0, 0.0..=10.0, "N·m·s/rad";
@@ -22,13 +22,13 @@ settings! {
 }
 
 impl JointFriction {
-    /// Whether there is any.
+    /// Returns whether there is any friction.
     pub fn is_on(&self) -> bool {
         self.coulomb_nm != 0.0 || self.viscous_nms_rad != 0.0
     }
 
-    /// Rate (1/s) of a joint's bristles, deflected by y of what they are in a lasting slip, at a
-    /// joint rate (rad/s).
+    /// Returns the rate (1/s) of a joint's bristles at a joint rate (rad/s); `bristles` is their
+    /// deflection relative to that in steady slip.
     #[inline]
     pub fn bristle_rate_per_s(&self, rate_rad_s: f64, bristles: f64) -> f64 {
         let relative = rate_rad_s / STRIBECK_RAD_S;
@@ -36,7 +36,7 @@ impl JointFriction {
         (rate_rad_s - rate_rad_s.abs() * bristles / ratio) / BRISTLE_RAD
     }
 
-    /// Torque (N·m) on the joint.
+    /// Returns the torque (N·m) on the joint.
     #[inline]
     pub fn torque_nm(&self, rate_rad_s: f64, bristles: f64) -> f64 {
         -self.coulomb_nm * bristles - self.viscous_nms_rad * rate_rad_s

@@ -1,12 +1,14 @@
-//! What a rig has and the paper's arm has not, each effect off by default, all of them combinable.
+//! Effects of a real rig that the paper's arm lacks. Each is off by default, and they can be
+//! combined.
 //!
 //! - [`friction`]: friction that changes along the belt and over time
-//! - [`surface`]: a belt that is not flat or does not keep still
+//! - [`surface`]: a belt that is uneven or vibrates
 //! - [`joints`]: friction in the joints
-//! - [`gear`]: gears that give, with backlash, rotors of their own, encoders on either side
-//! - [`push`]: forces on the tip from outside
+//! - [`gear`]: elastic gears with backlash and separate rotors, encoders on either side
+//! - [`push`]: external forces on the tip
 //!
-//! They belong to the arm on a belt that gives ([`compliant`](super::compliant)); the rigid plant refuses them.
+//! They require the arm on a compliant contact ([`compliant`](super::compliant)); the rigid plant
+//! rejects them.
 
 pub mod friction;
 pub mod gear;
@@ -23,10 +25,10 @@ use push::Push;
 use surface::Surface;
 
 settings! {
-    /// All effects of the plant. They ask for a contact that gives.
+    /// Effects of the plant. They require a compliant contact.
     #[derive(Copy)]
     pub struct Effects {
-        /// How friction changes.
+        /// Changes of friction.
         friction: FrictionChange = FrictionChange::None;
         /// The belt's surface.
         surface: Surface = Surface::default();
@@ -40,7 +42,7 @@ settings! {
 }
 
 impl Effects {
-    /// Checks that nothing is on, for a plant that has none of them.
+    /// Checks that all effects are off, for a plant that does not support them.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first effect that is on.

@@ -1,12 +1,12 @@
-//! A belt that is not flat: waves along it, a seam, vibration. Slopes are small: the contact's normal
-//! stays upright.
+//! An uneven belt: waves along it, a seam, vibration. Slopes are small, so the contact's normal is
+//! taken as vertical.
 
 use core::f64::consts::TAU;
 
 use painleve_shared::settings;
 
 settings! {
-    /// The belt's surface: heights over the flat belt that does not move up and down.
+    /// The belt's surface: heights above a flat belt at rest.
     #[derive(Copy)]
     pub struct Surface {
         /// Amplitude of waves along the belt.
@@ -15,9 +15,9 @@ settings! {
         wave_length_m: f64 = 0.1, 1e-3..=1e3, "m";
         /// Height of the bump where the belt is joined.
         seam_height_m: f64 = 0.0, -0.01..=0.01, "m";
-        /// Length of that bump.
+        /// Length of the bump.
         seam_length_m: f64 = 0.02, 1e-3..=1.0, "m";
-        /// Length of the whole belt, in which the seam comes once.
+        /// Length of the whole belt, with one seam.
         belt_length_m: f64 = 1.0, 0.1..=1e3, "m";
         /// Amplitude of a vibration of the whole belt.
         vibration_m: f64 = 0.0, 0.0..=0.01, "m";
@@ -27,13 +27,13 @@ settings! {
 }
 
 impl Surface {
-    /// Whether the belt is flat and does not vibrate.
+    /// Returns whether the belt is flat and does not vibrate.
     pub fn is_flat(&self) -> bool {
         self.waviness_m == 0.0 && self.seam_height_m == 0.0 && self.vibration_m == 0.0
     }
 
-    /// Height (m), slope along the belt, and speed of its own (m/s) at time `t_s` and at the place
-    /// `along_belt_m` of the belt.
+    /// Returns the height (m), the slope along the belt, and the vertical speed (m/s) at time `t_s`
+    /// and position `along_belt_m` on the belt.
     pub fn at(&self, t_s: f64, along_belt_m: f64) -> (f64, f64, f64) {
         let (mut height, mut slope, mut speed) = (0.0, 0.0, 0.0);
         if self.waviness_m != 0.0 {
@@ -43,7 +43,7 @@ impl Surface {
             slope += self.waviness_m * number * libm::cos(phase);
         }
         if self.seam_height_m != 0.0 {
-            // In the middle of the belt's length, so that no run starts on it.
+            // The seam lies in the middle of the belt's length, so that no run starts on it.
             let turns = along_belt_m / self.belt_length_m;
             let place = (turns - libm::floor(turns) - 0.5) * self.belt_length_m;
             if place.abs() < 0.5 * self.seam_length_m {
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slope_and_speed_are_the_heights_derivatives() {
+    fn slope_and_speed_are_derivatives_of_the_height() {
         let surface = Surface {
             waviness_m: 1e-4,
             seam_height_m: 5e-4,

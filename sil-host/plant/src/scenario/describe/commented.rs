@@ -6,12 +6,12 @@ use toml::{Table, Value};
 use super::{allowed, group, table};
 use crate::scenario::Scenario;
 
-/// Longest line of a comment.
+/// Longest line of a comment, in characters.
 const WIDTH: usize = 100;
 
 impl Scenario {
-    /// The scenario as TOML: every key with its meaning, allowed range and unit as a comment.
-    /// Reading the text gives the same scenario.
+    /// Returns the scenario as TOML with the meaning, allowed range and unit of every key in
+    /// comments. Reading the text gives the same scenario.
     pub fn to_commented_toml(&self) -> String {
         let mut text = String::new();
         write_group(&mut text, "", &table(self), Self::FIELDS);
@@ -20,7 +20,7 @@ impl Scenario {
 }
 
 fn write_group(text: &mut String, path: &str, values: &Table, fields: &[Field]) {
-    // Keys of a table come before the tables inside it.
+    // Keys of a table precede the tables inside it.
     let is_table = |field: &&Field| matches!(values.get(field.key), Some(Value::Table(_)));
     for field in fields.iter().filter(|field| !is_table(field)) {
         let value = values.get(field.key);
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_optional_empty_or_awkward_survives_too() {
+    fn optional_empty_and_awkward_values_survive_too() {
         let overrides = [
             "arm_model.height_m=0.36",
             "arm.link_inertia_kg_m2=[0.001, 0.0005]",

@@ -8,8 +8,8 @@ use toml::Value;
 use super::{allowed, default_at, group};
 use crate::scenario::Scenario;
 
-/// A Markdown table of every setting in the groups `sections` of a scenario. Keys are full, or
-/// relative to the section if there is only one.
+/// Returns a Markdown table of all settings in the groups `sections` of a scenario. Keys are full,
+/// or relative to the section if there is only one.
 pub fn settings_table(sections: &[&str]) -> String {
     let mut text = "| key | default | allowed | meaning |\n|---|---|---|---|\n".to_string();
     for field in Scenario::FIELDS {
@@ -54,7 +54,7 @@ fn rows(text: &mut String, path: &mut Vec<&'static str>, hidden: usize, field: &
     variant_rows(text, path, hidden, &field.shape);
 }
 
-/// The settings that come with the variants of a choice, or of the choices in a list.
+/// Appends the settings of the variants of a choice, or of the choices in a list.
 fn variant_rows(text: &mut String, path: &mut Vec<&'static str>, hidden: usize, shape: &Shape) {
     match shape {
         Shape::Choice { variants, tag } => {
@@ -62,7 +62,7 @@ fn variant_rows(text: &mut String, path: &mut Vec<&'static str>, hidden: usize, 
                 let Some(Shape::Group(fields)) = variant.content else {
                     continue;
                 };
-                // Settings of a tagged variant stand beside its name.
+                // Settings of a tagged variant are at the same level as its name.
                 let name = tag.is_none().then_some(variant.key);
                 path.extend(name);
                 inner_rows(text, path, hidden, fields);
@@ -87,7 +87,7 @@ fn inner_rows(text: &mut String, path: &mut Vec<&'static str>, hidden: usize, fi
 }
 
 fn row(text: &mut String, path: &[&str], default: &str, allowed: &str, meaning: &str) {
-    // Writing to a string does not fail.
+    // Writing to a string cannot fail.
     let _ = writeln!(
         text,
         "| `{}` | {default} | {allowed} | {meaning} |",

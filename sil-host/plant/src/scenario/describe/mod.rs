@@ -1,4 +1,4 @@
-//! What can be set, told from the declarations of the settings.
+//! Descriptions of all settings, generated from their declarations.
 //!
 //! - [`Scenario::to_commented_toml`]: a scenario with every key, its meaning, unit and range
 //! - [`json_schema`]: the same for editors
@@ -19,13 +19,14 @@ use super::Scenario;
 pub use markdown::settings_table;
 pub use schema::json_schema;
 
-/// Any settings as a TOML table; single precision keeps the digits that it was written with.
+/// Returns settings as a TOML table; single-precision values keep the digits with which they were
+/// written.
 fn table<T: Serialize>(settings: &T) -> Table {
     let text = toml::to_string(settings).unwrap_or_default();
     text.parse().unwrap_or_default()
 }
 
-/// The allowed values of a setting in words; empty where its type says it all.
+/// Returns the allowed values of a setting in words; empty if its type says everything.
 fn allowed(field: &Field) -> String {
     let mut text = match (field.range, choice(&field.shape)) {
         (Some(range), _) => interval(&range),
@@ -64,7 +65,7 @@ fn bound(value: f64) -> String {
     }
 }
 
-/// The names of a choice's variants.
+/// Returns the names of a choice's variants.
 fn choice(shape: &Shape) -> Option<String> {
     match shape {
         Shape::Choice { variants, .. } => {
@@ -79,7 +80,7 @@ fn choice(shape: &Shape) -> Option<String> {
     }
 }
 
-/// The settings of a group, or of the group in an optional value.
+/// Returns the settings of a group, or of the group in an optional value.
 fn group(shape: &Shape) -> Option<&'static [Field]> {
     match shape {
         Shape::Group(fields) => Some(fields),
@@ -88,7 +89,7 @@ fn group(shape: &Shape) -> Option<&'static [Field]> {
     }
 }
 
-/// The default value at `path`, where a variant's name in the path chooses it.
+/// Returns the default value at `path`; variant names in the path select the variant.
 fn default_at(path: &[&str]) -> Option<Value> {
     let chosen = path.iter().rev().skip(1).fold(Table::new(), |inner, key| {
         Table::from_iter([((*key).to_string(), Value::Table(inner))])

@@ -1,4 +1,4 @@
-//! A JSON Schema of scenarios, by which editors complete and check TOML files.
+//! JSON Schema of scenarios, with which editors complete and check TOML files.
 
 use painleve_shared::settings::{Field, Range, Settings, Shape, Variant};
 use serde_json::{Map, Value, json};
@@ -6,8 +6,8 @@ use serde_json::{Map, Value, json};
 use super::{allowed, table};
 use crate::scenario::Scenario;
 
-/// The JSON Schema (draft 2020-12) of a scenario file. Ranges that depend on other settings are in
-/// the descriptions only.
+/// Returns the JSON Schema (draft 2020-12) of a scenario file. Ranges that depend on other settings
+/// appear only in the descriptions.
 pub fn json_schema() -> Value {
     let defaults = serde_json::to_value(table(&Scenario::default())).unwrap_or_default();
     let mut schema = object(Scenario::FIELDS, &defaults, &[]);
@@ -16,7 +16,7 @@ pub fn json_schema() -> Value {
     schema
 }
 
-/// A table of settings, `required` ones among them.
+/// Returns the schema of a table of settings, including the `required` ones.
 fn object(fields: &[Field], defaults: &Value, required: &[&str]) -> Value {
     let properties: Map<_, _> = fields
         .iter()
@@ -117,7 +117,7 @@ mod tests {
 
     const NAME: &str = "scenario.json";
 
-    /// Whether a scenario file with this text is valid.
+    /// Validates the text of a scenario file.
     fn validate(text: &str) -> Result<(), String> {
         let (mut schemas, mut compiler) = (Schemas::new(), Compiler::new());
         compiler.add_resource(NAME, json_schema()).unwrap();
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_refused() {
+    fn mistakes_are_rejected() {
         for text in [
             "[belt]\nfrction = 0.6",
             "[belt]\nfriction = -1",
