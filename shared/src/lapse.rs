@@ -84,6 +84,13 @@ macro_rules! lapses {
         }
 
         impl LapseCounts {
+            /// Returns the count of one kind.
+            pub const fn of(&self, lapse: Lapse) -> u32 {
+                match lapse {
+                    $($(Lapse::$lapse => self.$key),+),+
+                }
+            }
+
             /// Returns the counts that `count` gives for each kind.
             pub fn from_fn(count: impl Fn(Lapse) -> u32) -> Self {
                 Self { $($($key: count(Lapse::$lapse)),+),+ }

@@ -8,11 +8,15 @@ use serde::{Deserialize, Serialize};
 use crate::frame::{ActuatorFrame, SensorFrame};
 use crate::lapse::LapseCounts;
 
+/// Version of the messages' meaning: of [`Request`], [`Response`] and their encoding. New variants are
+/// added at the end, so that a host and a board of different versions can still compare this number.
+pub const PROTOCOL: u16 = 2;
+
 /// Longest encoded message, in bytes: a configuration with a full reference.
 pub const MAXIMUM_LENGTH: usize = 768;
 
 /// Longest encoded response, in bytes.
-pub const MAXIMUM_RESPONSE_LENGTH: usize = 80;
+pub const MAXIMUM_RESPONSE_LENGTH: usize = 96;
 
 /// A request from the host to the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,6 +40,11 @@ pub enum Request<'a> {
     /// Reports that the host is present; no response. With [`FrameSource::Sensors`] the board stops
     /// if these requests cease.
     Alive,
+    /// Asks for protocol and build; answered by [`Response::Identity`]. Changes nothing.
+    Identify,
+    /// Permits or forbids the drive to arm; answered by [`Response::Permission`]. The board's own switch
+    /// must close as well. Every configuration and every stop of the drive withdraws the permission.
+    PermitArming(bool),
 }
 
 /// Source of a controller's sensor frames.
@@ -47,6 +56,15 @@ pub enum FrameSource {
     Realtime,
     /// The board's own sensors, at every tick of its timer.
     Sensors,
+    /// The same with the torque stages off, whatever the controller requests.
+    DryRun,
+}
+
+impl FrameSource {
+    /// Returns whether the board reads its own sensors.
+    pub fn is_on_board(self) -> bool {
+        matches!(self, Self::Sensors | Self::DryRun)
+    }
 }
 
 /// A response from the board.
@@ -78,6 +96,24 @@ pub enum Response {
     },
     /// Counters.
     Health(Health),
+    /// The board's version.
+    Identity {
+        /// The board's [`PROTOCOL`].
+        protocol: u16,
+        /// Identifies the board's build.
+        build: u64,
+    },
+    /// Whether the drive may arm: false without a configuration for the board's own sensors.
+    Permission(bool),
+    /// One tick on the board's own sensors.
+    Tick {
+        /// The board's readings.
+        sensor: SensorFrame,
+        /// The controller's answer to them.
+        answer: ActuatorFrame,
+        /// Duration of the tick in counts of the board's stopwatch.
+        elapsed: u32,
+    },
 }
 
 /// Counters of a board since its configuration. Counters wrap.
@@ -122,6 +158,11 @@ mod tests {
         };
         let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
         for response in [
+            Response::Tick {
+                sensor: SensorFrame::LONGEST,
+                answer: frame,
+                elapsed,
+            },
             Response::Actuator { frame, elapsed },
             Response::Health(health),
         ] {

@@ -155,7 +155,11 @@ impl Drop for SerialLine {
 }
 
 /// A pseudo-terminal that passes every byte as it is: our end, the other end, its name.
-fn terminal() -> (File, OwnedFd, PathBuf) {
+/// A pseudo-terminal without processing: its near end, its far end kept open, the far end's path.
+///
+/// # Panics
+/// If the system has none.
+pub fn terminal() -> (File, OwnedFd, PathBuf) {
     let pair = openpty(None, None).unwrap_or_else(|error| panic!("no pseudo-terminal: {error}"));
     let raw = tcgetattr(&pair.slave).and_then(|mut settings| {
         cfmakeraw(&mut settings);

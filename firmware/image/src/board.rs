@@ -64,6 +64,13 @@ pub trait BoardDrive: Drive {
     /// Takes the newest frame from the link, for a plant that the host simulates.
     fn offer(&mut self, frame: SensorFrame);
 
+    /// Permits or forbids the drive to arm; returns whether it may. A board without torque stages never
+    /// permits it.
+    fn permit_arming(&mut self, permitted: bool) -> bool {
+        let _ = permitted;
+        false
+    }
+
     /// Returns the frequency of [`Drive::stopwatch`], Hz.
     fn stopwatch_hz(&self) -> u32;
 }

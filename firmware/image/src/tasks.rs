@@ -16,7 +16,7 @@ use painleve_firmware::law::Law;
 use painleve_firmware::supervise::lapses::Lapse;
 use painleve_firmware::{BUILD, Configuration};
 use painleve_shared::message::{
-    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, Request, Response,
+    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Request, Response,
 };
 use painleve_shared::wire::{self, Inbox, WireError};
 use rtic::Mutex;
@@ -66,7 +66,7 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
     fn note_silence(&mut self) {
         self.silent_ticks = self.silent_ticks.saturating_add(1);
         let limit_ms = match self.task.source() {
-            FrameSource::Sensors => SENSORS_SILENCE_MS,
+            FrameSource::Sensors | FrameSource::DryRun => SENSORS_SILENCE_MS,
             FrameSource::Lockstep | FrameSource::Realtime => FRAMES_SILENCE_MS,
         };
         // 32 bits hold 5 s at 100 kHz; dividing 64 would be a loop without a declared limit.
@@ -122,10 +122,22 @@ pub fn control<D: BoardDrive, L: Law>(
     reported: &mut Change,
 ) -> bool {
     control.note_silence();
-    let Some(Answered { frame, elapsed }) = control.task.tick() else {
+    let Some(Answered {
+        sensor,
+        frame,
+        elapsed,
+    }) = control.task.tick()
+    else {
         return false;
     };
-    let response = Response::Actuator { frame, elapsed };
+    let response = match sensor {
+        Some(sensor) if control.task.source().is_on_board() => Response::Tick {
+            sensor,
+            answer: frame,
+            elapsed,
+        },
+        _ => Response::Actuator { frame, elapsed },
+    };
     if answers.enqueue(response).is_err() {
         control.dropped_responses = control.dropped_responses.wrapping_add(1);
     }
@@ -214,6 +226,17 @@ pub fn link<D, L, P>(
                     Response::Health(health)
                 }
                 Ok(Request::Alive) => continue,
+                Ok(Request::Identify) => Response::Identity {
+                    protocol: PROTOCOL,
+                    build: BUILD,
+                },
+                Ok(Request::PermitArming(permitted)) => {
+                    Response::Permission(control.lock(|control| {
+                        let is_configured = control.task.lapse_counts().is_some();
+                        let drive = control.task.drive_mut();
+                        drive.permit_arming(permitted && is_configured)
+                    }))
+                }
                 Ok(Request::Stop) => {
                     control.lock(|control| control.task.stop());
                     Response::Stopped

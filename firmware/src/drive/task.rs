@@ -1,6 +1,6 @@
 //! The control task: one tick with sampling, actuation and monitoring.
 
-use painleve_shared::frame::ActuatorFrame;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::range::OutOfRange;
 
@@ -13,10 +13,11 @@ use crate::supervise::lapses::{Lapse, LapseMonitor};
 /// The answer to one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answered {
+    /// The sensor frame; `None` for an answer without one, sent because a fault has taken the torque off.
+    pub sensor: Option<SensorFrame>,
     /// The frame that takes effect.
     pub frame: ActuatorFrame,
-    /// Duration of the controller's tick in counts of [`Drive::stopwatch`]; 0 for an answer without
-    /// a frame, sent because a fault has taken the torque off.
+    /// Duration of the controller's tick in counts of [`Drive::stopwatch`]; 0 without a sensor frame.
     pub elapsed: u32,
 }
 
@@ -134,7 +135,11 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         let Some(frame) = frame else {
             let frame = stopped?;
             self.drive.actuate(&frame);
-            return Some(Answered { frame, elapsed: 0 });
+            return Some(Answered {
+                sensor: None,
+                frame,
+                elapsed: 0,
+            });
         };
         let start = self.drive.stopwatch();
         let mut answer = controller.tick(&frame);
@@ -148,6 +153,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
             answer = stopped;
         }
         Some(Answered {
+            sensor: Some(frame),
             frame: answer,
             elapsed,
         })
@@ -193,7 +199,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
 mod tests {
     use super::*;
     use painleve_shared::counts::{ForceCounts, TorqueCounts};
-    use painleve_shared::frame::{DigitalInputs, SensorFrame};
+    use painleve_shared::frame::DigitalInputs;
     use painleve_shared::status::{Fault, SupervisorState};
     use std::cell::Cell;
     use std::vec::Vec;

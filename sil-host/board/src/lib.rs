@@ -3,10 +3,12 @@
 //! - [`drivers`]: the board's sensor drivers on this PC, over models of the sensors' chips
 //! - [`emulator`]: the image under QEMU, in deterministic lockstep
 //! - [`serial`]: a flashed board behind a serial port
+//! - [`arm`]: a flashed board that drives a real arm by its own sensors
 //! - [`log`]: the image's log, decoded with the table in the image
 //! - [`on_board`]: a board of this process in a closed loop
 //! - [`timing`]: the cost of control ticks, on a board or on this machine
 
+pub mod arm;
 pub mod drivers;
 pub mod emulator;
 pub mod log;
@@ -135,6 +137,16 @@ pub enum BoardError {
         "the image refuses the configuration: it may be older than this program, see `cargo xtask build-fw`"
     )]
     Refused,
+    /// Image and program speak different protocols.
+    #[error(
+        "the image speaks protocol {board} and this program protocol {host}: build both from the same sources, see `cargo xtask build-fw`, and flash again"
+    )]
+    OtherProtocol {
+        /// The image's protocol.
+        board: u16,
+        /// This program's protocol.
+        host: u16,
+    },
     /// Image and program were built from different sources.
     #[error(
         "the image is of build {board:016x} and this program of build {host:016x}: build both from the same sources, see `cargo xtask build-fw`, and flash again"

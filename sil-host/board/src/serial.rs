@@ -19,7 +19,7 @@ use nix::sys::termios::{
 use painleve_firmware::BUILD;
 use painleve_plant::Configuration;
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
+use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, PROTOCOL, Request, Response};
 use painleve_shared::wire::{self, Inbox, WireError};
 
 use super::{BoardError, ConnectedBoard, LineHealth, SILENCE_LIMIT, TimedAnswer};
@@ -72,22 +72,67 @@ impl Serial {
         configuration: &Configuration,
         source: FrameSource,
     ) -> Result<Self, BoardError> {
-        let port = open(path)?;
-        let period = Duration::from_secs_f32(1.0 / configuration.tick_hz);
-        let mut serial = Self {
+        let mut serial = Self::connect(path)?;
+        serial.configure(configuration, source)?;
+        Ok(serial)
+    }
+
+    /// Opens the port; says nothing to the board yet.
+    ///
+    /// # Errors
+    /// [`BoardError::Port`] if it cannot be opened.
+    pub fn connect(path: &Path) -> Result<Self, BoardError> {
+        let mut port = open(path)?;
+        // Ends a message that the board may have received in part.
+        port.write_all(&[0])?;
+        Ok(Self {
             port,
             inbox: Inbox::new(),
             pending: Vec::new(),
             line: LineHealth::default(),
-            frame_patience: match source {
-                FrameSource::Lockstep => LOCKSTEP_PATIENCE.max(REALTIME_PATIENCE_TICKS * period),
-                FrameSource::Realtime | FrameSource::Sensors => REALTIME_PATIENCE_TICKS * period,
-            },
+            frame_patience: LOCKSTEP_PATIENCE,
             silence_limit: SILENCE_LIMIT,
             stopwatch_hz: 0,
+        })
+    }
+
+    /// Compares the board's protocol and build with this program's.
+    ///
+    /// # Errors
+    /// [`BoardError::OtherProtocol`] or [`BoardError::OtherBuild`] if they differ, and
+    /// [`BoardError::Silent`] if no board answers.
+    pub fn identify(&mut self) -> Result<(), BoardError> {
+        let is_identity = |response: &Response| matches!(response, Response::Identity { .. });
+        match self.ask(&Request::Identify, PATIENCE, is_identity)? {
+            Response::Identity { protocol, .. } if protocol != PROTOCOL => {
+                Err(BoardError::OtherProtocol {
+                    board: protocol,
+                    host: PROTOCOL,
+                })
+            }
+            Response::Identity { build, .. } if build != BUILD => {
+                Err(BoardError::other_build(build))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Gives the board a configuration, with frames from `source`.
+    ///
+    /// # Errors
+    /// [`BoardError::Silent`] if no board answers, [`BoardError::OtherBuild`] and
+    /// [`BoardError::Refused`].
+    pub fn configure(
+        &mut self,
+        configuration: &Configuration,
+        source: FrameSource,
+    ) -> Result<(), BoardError> {
+        let patience =
+            REALTIME_PATIENCE_TICKS * Duration::from_secs_f32(1.0 / configuration.tick_hz);
+        self.frame_patience = match source {
+            FrameSource::Lockstep => LOCKSTEP_PATIENCE.max(patience),
+            FrameSource::Realtime | FrameSource::Sensors | FrameSource::DryRun => patience,
         };
-        // Terminates a message of which the board may have received a part.
-        serial.port.write_all(&[0])?;
         let configuration = super::encode(configuration)?;
         let request = Request::Configure {
             build: BUILD,
@@ -100,12 +145,31 @@ impl Serial {
                 Response::Ready { .. } | Response::Refused | Response::OtherBuild { .. }
             )
         };
-        match serial.ask(&request, PATIENCE, is_wanted)? {
-            Response::Ready { stopwatch_hz } => serial.stopwatch_hz = stopwatch_hz,
+        match self.ask(&request, PATIENCE, is_wanted)? {
+            Response::Ready { stopwatch_hz } => self.stopwatch_hz = stopwatch_hz,
             Response::OtherBuild { build } => return Err(BoardError::other_build(build)),
             _ => return Err(BoardError::Refused),
         }
-        Ok(serial)
+        Ok(())
+    }
+
+    /// Sends a request without waiting for its response, which [`Serial::listen`] returns.
+    ///
+    /// # Errors
+    /// [`BoardError::System`] if the port fails.
+    pub fn send(&mut self, request: &Request<'_>) -> Result<(), BoardError> {
+        let mut buffer = [0; MAXIMUM_LENGTH];
+        let bytes = wire::encode(request, &mut buffer)?;
+        Ok(self.port.write_all(bytes)?)
+    }
+
+    /// Takes the torque off, and waits until the board has confirmed it.
+    ///
+    /// # Errors
+    /// [`BoardError::Silent`] if the board does not answer.
+    pub fn stop(&mut self) -> Result<(), BoardError> {
+        let is_stopped = |response: &Response| matches!(response, Response::Stopped);
+        self.ask(&Request::Stop, PATIENCE, is_stopped).map(|_| ())
     }
 
     /// Sets how long the board may be silent before that is an error; initially one second, so that

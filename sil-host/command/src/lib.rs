@@ -2,6 +2,7 @@
 
 mod bridge;
 mod controller;
+mod drive;
 mod fail_on;
 mod figures;
 mod output;
@@ -54,6 +55,8 @@ enum Command {
     Controller(controller::ControllerArguments),
     /// Connect the controller's image on a board to the plant's bus.
     Bridge(bridge::BridgeArguments),
+    /// Drive a real arm through its board: watch, permit arming, record, stop.
+    Drive(drive::DriveArguments),
     /// Report the cost of control ticks: instructions, cycles or wake-up latency, and the worst
     /// tick.
     Timing(timing::TimingArguments),
@@ -120,6 +123,9 @@ pub enum CommandError {
         /// Its exit code.
         code: u8,
     },
+    /// The arm's drive ended with a fault.
+    #[error("the drive has latched fault {}: {}", *.0 as u8, .0.description())]
+    Faulted(Fault),
     /// The run met a condition of --fail-on.
     #[error("--fail-on: {0}")]
     FailedOn(String),
@@ -151,7 +157,7 @@ impl CommandError {
             Self::Sweep(SweepError::Incomplete(_)) => 1,
             Self::Sweep(SweepError::Output(_)) => 4,
             Self::Sweep(_) => 2,
-            Self::Loop(LoopError::Plant(_)) => 1,
+            Self::Loop(LoopError::Plant(_)) | Self::Faulted(_) => 1,
             Self::Link(LinkError::Interrupted) => INTERRUPTED,
             Self::Loop(LoopError::Host(_) | LoopError::NotUnderstood { .. })
             | Self::Link(_)
@@ -277,6 +283,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Plant(_)
         | Command::Controller(_)
         | Command::Bridge(_)
+        | Command::Drive(_)
         | Command::Timing(_) => {}
         Command::Scenarios(_) | Command::Study(_) | Command::Sweep(_) | Command::Figures(_) => {
             exit_when_requested(INTERRUPTED)?;
@@ -287,6 +294,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Plant(arguments) => plant::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
         Command::Bridge(arguments) => bridge::run(&arguments),
+        Command::Drive(arguments) => drive::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),

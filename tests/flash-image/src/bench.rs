@@ -34,6 +34,8 @@ pub struct BoardBench {
     /// Whether the host says that it is there.
     pub host_is_there: bool,
     waits: u32,
+    /// Whether [`Bench::tick`] closes the switch of the safety chain after a while.
+    pub closes_switch: bool,
     /// The arm is held until it is first driven.
     is_held: bool,
 }
@@ -74,6 +76,24 @@ impl BoardBench {
     /// # Panics
     /// If the scenario is out of range, or the image refuses it.
     pub fn with_board(scenario: &Scenario, board: FlashedBoard) -> Self {
+        let mut bench = Self::without_configuration(scenario, board);
+        bench.host_is_there = true;
+        let response = bench
+            .board
+            .configure(FrameSource::Sensors, &encoded(scenario));
+        assert!(
+            matches!(response, Some(Response::Ready { .. })),
+            "{response:?}"
+        );
+        assert!(bench.board.permit_arming());
+        bench
+    }
+
+    /// The arm on a board that waits for its host.
+    ///
+    /// # Panics
+    /// If the scenario is out of range.
+    pub fn without_configuration(scenario: &Scenario, board: FlashedBoard) -> Self {
         let simulation = Simulation::new(scenario).unwrap_or_else(|error| panic!("{error}"));
         let mut bench = Self {
             board,
@@ -82,18 +102,12 @@ impl BoardBench {
             frame: SensorFrame::default(),
             period: 1_000_000 * MICROSECOND / u64::from(scenario.run.tick_hz),
             ticks: 0,
-            host_is_there: true,
+            host_is_there: false,
             waits: 0,
+            closes_switch: true,
             is_held: true,
         };
         bench.present();
-        let response = bench
-            .board
-            .configure(FrameSource::Sensors, &encoded(scenario));
-        assert!(
-            matches!(response, Some(Response::Ready { .. })),
-            "{response:?}"
-        );
         bench
     }
 
@@ -116,7 +130,7 @@ impl BoardBench {
     pub fn tick(&mut self) {
         self.wait_for_tick();
         self.ticks += 1;
-        if self.ticks == BEFORE_ENABLE {
+        if self.ticks == BEFORE_ENABLE && self.closes_switch {
             self.board.enable(true);
         }
         self.is_held &= self.board.torque().enabled != Some(true);
@@ -146,8 +160,8 @@ impl BoardBench {
         self.board.machine.run_for(self.period / 5 * 2);
         let mut answered = 0;
         while let Some(response) = self.board.response(0) {
-            if let Response::Actuator { frame, .. } = response {
-                answered = frame.tick;
+            if let Response::Tick { answer, .. } = response {
+                answered = answer.tick;
             }
         }
         answered

@@ -277,12 +277,25 @@ impl FlashedBoard {
         self.reply(20 * MILLISECOND)
     }
 
+    /// Lets the host permit the drive to arm; whether the board agrees.
+    pub fn permit_arming(&mut self) -> bool {
+        self.send(&Request::PermitArming(true));
+        self.reply(20 * MILLISECOND) == Some(Response::Permission(true))
+    }
+
+    /// Takes the bytes that the board has sent since the last call.
+    pub fn take_sent(&mut self) -> Vec<u8> {
+        let sent = self.machine.chip().usart.outgoing[self.heard..].to_vec();
+        self.heard += sent.len();
+        sent
+    }
+
     /// The next response that is not the answer to a tick, if it comes within `limit`.
     pub fn reply(&mut self, limit: Picoseconds) -> Option<Response> {
         let end = self.machine.now() + limit;
         loop {
             match self.response(end.saturating_sub(self.machine.now()))? {
-                Response::Actuator { .. } => {}
+                Response::Actuator { .. } | Response::Tick { .. } => {}
                 reply => return Some(reply),
             }
         }

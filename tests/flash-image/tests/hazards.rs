@@ -12,7 +12,8 @@ use painleve_flash_image::machine::Reset;
 use painleve_flash_image::{MICROSECOND, MILLISECOND};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
-use painleve_shared::message::{FrameSource, Request, Response};
+use painleve_shared::message::{FrameSource, PROTOCOL, Request, Response};
+use painleve_shared::status::SupervisorState;
 use painleve_shared::wire;
 
 const DEFAULT: &str = "hybrid-elbow-down";
@@ -219,12 +220,75 @@ fn a_host_that_is_gone_takes_the_torque_off() {
 }
 
 #[test]
+fn the_image_says_its_protocol_and_build_while_the_arm_is_driven() {
+    let mut bench = driven();
+    bench.board.send(&Request::Identify);
+    let identity = Response::Identity {
+        protocol: PROTOCOL,
+        build: BUILD,
+    };
+    assert_eq!(bench.board.reply(5 * MILLISECOND), Some(identity));
+    bench.tick();
+    assert_eq!(bench.board.torque().enabled, Some(true));
+}
+
+#[test]
 fn a_request_to_stop_takes_the_torque_off() {
     let mut bench = driven();
     bench.board.send(&Request::Stop);
     assert_eq!(bench.board.reply(5 * MILLISECOND), Some(Response::Stopped));
     assert!(bench.board.torque().is_off());
     bench.assert_stays_off(100);
+}
+
+#[test]
+fn nothing_arms_without_the_hosts_permission() {
+    let mut board = FlashedBoard::booted();
+    let response = board.configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
+    assert!(matches!(response, Some(Response::Ready { .. })));
+    for n in 0..300 {
+        if n % 50 == 0 {
+            board.send(&Request::Alive);
+        }
+        board.enable(n > 100);
+        board.machine.run_for(MILLISECOND);
+        assert!(board.torque().is_off());
+    }
+}
+
+/// A drive that has stopped needs a new permission: closing the switch again is not enough.
+#[test]
+fn a_drive_that_was_switched_off_needs_a_new_permission() {
+    let mut bench = driven();
+    bench.board.enable(false);
+    assert!(bench.time_until_off().is_some());
+    bench.assert_stays_off(20);
+    bench.board.enable(true);
+    bench.assert_stays_off(100);
+}
+
+#[test]
+fn a_dry_run_controls_with_the_stages_off() {
+    let BoardBench { mut board, .. } =
+        BoardBench::without_configuration(&scenario(DEFAULT), FlashedBoard::booted());
+    let response = board.configure(FrameSource::DryRun, &encoded(&scenario(DEFAULT)));
+    assert!(matches!(response, Some(Response::Ready { .. })));
+    assert!(board.permit_arming());
+    let mut was_armed = false;
+    for n in 0..300 {
+        if n % 50 == 0 {
+            board.send(&Request::Alive);
+        }
+        board.enable(n > 100);
+        board.machine.run_for(MILLISECOND);
+        assert!(board.torque().is_off());
+        while let Some(response) = board.response(0) {
+            if let Response::Tick { answer, .. } = response {
+                was_armed |= answer.supervisor_state() == Some(SupervisorState::Armed);
+            }
+        }
+    }
+    assert!(was_armed);
 }
 
 #[test]
@@ -254,6 +318,7 @@ fn the_switch_takes_the_torque_off_and_a_bounce_does_not_put_it_on() {
     let mut bench = driven();
     bench.board.enable(false);
     assert!(bench.time_until_off().is_some());
+    assert!(bench.board.permit_arming());
     for n in 0..40 {
         // It opens for two ticks at a time.
         bench.board.enable(n % 10 > 1);
@@ -315,6 +380,9 @@ fn nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before() {
         let response = board.configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
         assert!(matches!(response, Some(Response::Ready { .. })));
         for n in 0..600 {
+            if n % 100 == 0 {
+                assert!(board.permit_arming());
+            }
             // It is opened and closed, too.
             board.enable(n % 100 > 20);
             board.machine.run_for(MILLISECOND);

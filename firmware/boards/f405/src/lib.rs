@@ -187,6 +187,8 @@ impl Board for F405 {
             source: FrameSource::Lockstep,
             from_host: None,
             sequence: 0,
+            may_arm: false,
+            is_active: false,
         };
         drive.start_timer(IDLE_HZ);
         Ok(Parts { drive, bytes, port })
@@ -274,6 +276,10 @@ pub struct F405Drive {
     /// Newest frame from the host, if the host is the source of frames.
     from_host: Option<SensorFrame>,
     sequence: u32,
+    /// Whether the host permits the drive to arm.
+    may_arm: bool,
+    /// Whether the controller was armed at the last tick.
+    is_active: bool,
 }
 
 impl F405Drive {
@@ -301,8 +307,8 @@ impl F405Drive {
         let plausible = self
             .plausibility
             .tick(&readings, self.encoder_bits, self.force_bits);
-        if plausible.is_err() && !self.drives() {
-            // Do not arm on implausible readings.
+        if !self.may_arm || plausible.is_err() && !self.is_active {
+            // Do not arm without the host's permission or on implausible readings.
             inputs.remove(DigitalInputs::ENABLE);
         }
         self.sequence = self.sequence.wrapping_add(1);
@@ -314,10 +320,6 @@ impl F405Drive {
             tangential_force: forces[0].unwrap_or(NO_FORCE),
             inputs,
         }
-    }
-
-    fn drives(&self) -> bool {
-        self.enable.is_set_high()
     }
 
     /// Returns the DAC's code for a torque: offset binary of 12 bits.
@@ -345,16 +347,18 @@ impl Drive for F405Drive {
     fn sample(&mut self) -> Option<SensorFrame> {
         match self.source {
             FrameSource::Lockstep | FrameSource::Realtime => self.from_host.take(),
-            FrameSource::Sensors => Some(self.read_sensors()),
+            FrameSource::Sensors | FrameSource::DryRun => Some(self.read_sensors()),
         }
     }
 
     fn actuate(&mut self, answer: &ActuatorFrame) {
-        let drives = self.source == FrameSource::Sensors
-            && answer.supervisor_state().is_some_and(|state| {
-                !matches!(state, SupervisorState::Idle | SupervisorState::Fault)
-            });
-        if drives {
+        let is_active = answer
+            .supervisor_state()
+            .is_some_and(|state| !matches!(state, SupervisorState::Idle | SupervisorState::Fault));
+        // A drive that has stopped needs a new permission.
+        self.may_arm &= is_active || !self.is_active;
+        self.is_active = is_active;
+        if is_active && self.source == FrameSource::Sensors {
             let codes = answer.torques.map(|torque| self.code(torque));
             put_out(&self.converter, codes);
             self.enable.set_high();
@@ -377,6 +381,7 @@ impl BoardDrive for F405Drive {
         self.torque_bits = configuration.converters.torque.bits;
         self.source = source;
         self.from_host = None;
+        self.may_arm = false;
         // Require that the switch is opened and closed again and that the sensors are checked anew.
         self.switches = Switches::default();
         self.plausibility = Plausibility::default();
@@ -385,6 +390,11 @@ impl BoardDrive for F405Drive {
 
     fn offer(&mut self, frame: SensorFrame) {
         self.from_host = Some(frame);
+    }
+
+    fn permit_arming(&mut self, permitted: bool) -> bool {
+        self.may_arm = permitted && self.source.is_on_board();
+        self.may_arm
     }
 
     fn stopwatch_hz(&self) -> u32 {

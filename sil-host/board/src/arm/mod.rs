@@ -1,0 +1,146 @@
+//! A board that drives a real arm by its own sensors: the host watches, permits arming and stops it.
+//!
+//! The controller runs on the board. The host sends a heartbeat; the board stops when it has heard nothing
+//! for 200 ms, and the host reports a board that has sent nothing for [`SILENCE_LIMIT`].
+
+mod measured;
+
+pub use measured::Measured;
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use painleve_plant::Configuration;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::message::{FrameSource, Health, Request, Response};
+
+use crate::{BoardError, ConnectedBoard, LineHealth, Serial};
+
+/// Time between two heartbeats: three may be lost before the board stops.
+const HEARTBEAT: Duration = Duration::from_millis(50);
+
+/// How long a board at work may send nothing.
+pub const SILENCE_LIMIT: Duration = Duration::from_millis(500);
+
+/// What a board at work sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ArmEvent {
+    /// One control tick.
+    Tick {
+        /// The board's readings; `None` if a fault has taken the torque off without any.
+        sensor: Option<SensorFrame>,
+        /// The controller's answer.
+        answer: ActuatorFrame,
+    },
+    /// Whether the drive may arm.
+    Permission(bool),
+    /// The board's counters.
+    Health(Health),
+}
+
+/// A board with an arm. Dropping it stops the drive, if the line still carries the request.
+pub struct Arm {
+    serial: Serial,
+    /// When the last heartbeat was sent.
+    heartbeat: Instant,
+    /// When the board last sent anything.
+    heard: Instant,
+}
+
+impl Arm {
+    /// Connects, compares protocol and build, and configures the board. With `dry_run` the torque stages
+    /// stay off.
+    ///
+    /// # Errors
+    /// [`BoardError::Port`], [`BoardError::Silent`], [`BoardError::OtherProtocol`],
+    /// [`BoardError::OtherBuild`] or [`BoardError::Refused`].
+    pub fn open(
+        path: &Path,
+        configuration: &Configuration,
+        dry_run: bool,
+    ) -> Result<Self, BoardError> {
+        let mut serial = Serial::connect(path)?;
+        serial.identify()?;
+        let source = if dry_run {
+            FrameSource::DryRun
+        } else {
+            FrameSource::Sensors
+        };
+        serial.configure(configuration, source)?;
+        let now = Instant::now();
+        Ok(Self {
+            serial,
+            heartbeat: now,
+            heard: now,
+        })
+    }
+
+    /// Asks the board to permit or forbid arming; answered by [`ArmEvent::Permission`]. The drive arms when
+    /// its switch has been opened and closed as well.
+    ///
+    /// # Errors
+    /// [`BoardError::System`] if the port fails.
+    pub fn permit_arming(&mut self, permitted: bool) -> Result<(), BoardError> {
+        self.serial.send(&Request::PermitArming(permitted))
+    }
+
+    /// Asks for the board's counters; answered by [`ArmEvent::Health`].
+    ///
+    /// # Errors
+    /// [`BoardError::System`] if the port fails.
+    pub fn ask_for_health(&mut self) -> Result<(), BoardError> {
+        self.serial.send(&Request::Health)
+    }
+
+    /// Waits for what the board sends next, at most `limit`; sends heartbeats. `None` if nothing has come.
+    ///
+    /// # Errors
+    /// [`BoardError::Silent`] if the board has sent nothing for [`SILENCE_LIMIT`], and
+    /// [`BoardError::System`] if the port fails.
+    pub fn next_event(&mut self, limit: Duration) -> Result<Option<ArmEvent>, BoardError> {
+        let start = Instant::now();
+        loop {
+            if self.heartbeat.elapsed() >= HEARTBEAT {
+                self.heartbeat = Instant::now();
+                self.serial.send(&Request::Alive)?;
+            }
+            let left = limit.saturating_sub(start.elapsed()).min(HEARTBEAT);
+            let Some(response) = self.serial.listen(left)? else {
+                if self.heard.elapsed() > SILENCE_LIMIT {
+                    return Err(BoardError::Silent(self.heard.elapsed()));
+                }
+                if start.elapsed() >= limit {
+                    return Ok(None);
+                }
+                continue;
+            };
+            self.heard = Instant::now();
+            return Ok(Some(match response {
+                Response::Tick { sensor, answer, .. } => ArmEvent::Tick {
+                    sensor: Some(sensor),
+                    answer,
+                },
+                Response::Actuator { frame, .. } => ArmEvent::Tick {
+                    sensor: None,
+                    answer: frame,
+                },
+                Response::Permission(permitted) => ArmEvent::Permission(permitted),
+                Response::Health(health) => ArmEvent::Health(health),
+                _ => continue,
+            }));
+        }
+    }
+
+    /// Returns the disturbances of the line, as this host has counted them.
+    pub fn line(&self) -> LineHealth {
+        self.serial.line().unwrap_or_default()
+    }
+
+    /// Takes the torque off, and waits until the board has confirmed it.
+    ///
+    /// # Errors
+    /// [`BoardError::Silent`] if the board does not answer.
+    pub fn stop(&mut self) -> Result<(), BoardError> {
+        self.serial.stop()
+    }
+}

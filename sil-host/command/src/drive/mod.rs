@@ -1,0 +1,257 @@
+//! `painleve drive`: a real arm on a board's own sensors and torque stages.
+
+mod operator;
+mod view;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use painleve_board::BoardError;
+use painleve_board::arm::{Arm, ArmEvent, Measured};
+use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
+use painleve_record::mcap::Recorder;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_system::interrupt::Interrupt;
+use painleve_system::terminal::warn;
+use serde::Serialize;
+
+use self::operator::{Operator, Order};
+use self::view::View;
+use super::{CommandError, say};
+
+/// How long to wait for the board before looking at operator and signals again.
+const PATIENCE: Duration = Duration::from_millis(20);
+
+/// Time between two requests for the board's counters.
+const HEALTH_INTERVAL: Duration = Duration::from_secs(1);
+
+/// Options of `painleve drive`.
+#[derive(Debug, Args)]
+pub struct DriveArguments {
+    /// Built-in scenario or TOML file with the arm's configuration.
+    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
+    scenario: String,
+    /// Override one key, as in controller.torque_limit_nm=0.5; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Serial port of the board, as in /dev/ttyUSB0.
+    #[arg(long, value_name = "PATH")]
+    port: PathBuf,
+    /// Run the controller on the arm's sensors with the torque stages off.
+    #[arg(long)]
+    dry_run: bool,
+    /// Stop after this time on the board's clock; without it, on Ctrl-C or the order `stop`.
+    #[arg(long, value_name = "SECONDS", value_parser = super::seconds)]
+    duration: Option<f64>,
+    /// Record of every tick, for Foxglove and PlotJuggler.
+    #[arg(long, value_name = "PATH", default_value = "out/drive.mcap")]
+    record: PathBuf,
+    /// Write no record.
+    #[arg(long, conflicts_with = "record")]
+    no_record: bool,
+    /// Print one JSON object on stdout at the end instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Summary of a drive.
+#[derive(Debug, Default, Serialize)]
+struct DriveReport {
+    scenario: String,
+    dry_run: bool,
+    /// Ticks received.
+    ticks: u64,
+    /// Ticks that the line lost.
+    lost_ticks: u64,
+    /// Ticks in a state in which torque may be applied.
+    active_ticks: u64,
+    /// The supervisor's last state.
+    state: &'static str,
+    /// Number of the latched fault, 0 for none.
+    fault: u8,
+}
+
+/// Connects to the board, configures it, and watches it until the operator stops it.
+pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
+    let scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
+    let interrupt = Interrupt::catch()?;
+    let mut recorder = recorder(arguments, &scenario)?;
+    let mut drive = Drive::open(arguments, &scenario)?;
+    let watched = drive.watch(arguments, &interrupt, &mut recorder);
+    // Whatever has ended the drive, the torque goes off; a board that is gone stops by itself.
+    let stopped = drive.arm.stop();
+    drive.view.finish();
+    if let Err(error) = watched.and(stopped.map_err(CommandError::from)) {
+        keep_partial(recorder, &error.to_string());
+        return Err(error);
+    }
+    if let Some(recorder) = recorder {
+        recorder.finish().map_err(output)?;
+    }
+    let report = drive.report;
+    say(if arguments.json {
+        serde_json::to_string(&report).map_err(output)?
+    } else {
+        format!(
+            "{}: {} ticks, {} of them active, {} lost on the line; last state: {}",
+            report.scenario, report.ticks, report.active_ticks, report.lost_ticks, report.state
+        )
+    })?;
+    painleve_shared::status::Fault::from_code(report.fault)
+        .map_or(Ok(()), |fault| Err(CommandError::Faulted(fault)))
+}
+
+fn output(error: impl std::fmt::Display) -> CommandError {
+    CommandError::Output(error.to_string())
+}
+
+/// Opens the record, so that a path that cannot be written is known before anything moves.
+fn recorder(
+    arguments: &DriveArguments,
+    scenario: &Scenario,
+) -> Result<Option<Recorder>, CommandError> {
+    if arguments.no_record {
+        return Ok(None);
+    }
+    let metadata = BTreeMap::from([
+        ("scenario".into(), scenario.name.clone()),
+        (
+            "configuration".into(),
+            toml::to_string(scenario).map_err(output)?,
+        ),
+        ("version".into(), env!("CARGO_PKG_VERSION").into()),
+        ("source".into(), "arm".into()),
+    ]);
+    Recorder::create(&arguments.record, &metadata)
+        .map(Some)
+        .map_err(output)
+}
+
+fn keep_partial(recorder: Option<Recorder>, reason: &str) {
+    match recorder.map(|recorder| recorder.finish_partial(reason)) {
+        None => {}
+        Some(Ok(path)) => warn(format_args!("the record so far is in {}", path.display())),
+        Some(Err(error)) => warn(format_args!("no record is kept: {error}")),
+    }
+}
+
+/// A board at work and what is known about it.
+struct Drive {
+    arm: Arm,
+    measured: Measured,
+    view: View,
+    report: DriveReport,
+    last_sequence: Option<u32>,
+    tick_hz: f64,
+}
+
+impl Drive {
+    fn open(arguments: &DriveArguments, scenario: &Scenario) -> Result<Self, CommandError> {
+        let configuration = scenario.controller_configuration();
+        let measured = Measured::new(&configuration).map_err(|source| ScenarioError::Range {
+            origin: scenario.name.clone(),
+            source,
+        })?;
+        let arm = Arm::open(&arguments.port, &configuration, arguments.dry_run)?;
+        warn(format_args!(
+            "connected: build {:016x}, scenario {}{}; orders: arm, disarm, stop",
+            painleve_firmware::BUILD,
+            scenario.name,
+            if arguments.dry_run {
+                ", torque stages off"
+            } else {
+                ""
+            },
+        ));
+        Ok(Self {
+            arm,
+            measured,
+            view: View::new(),
+            report: DriveReport {
+                scenario: scenario.name.clone(),
+                dry_run: arguments.dry_run,
+                ..DriveReport::default()
+            },
+            last_sequence: None,
+            tick_hz: f64::from(configuration.tick_hz),
+        })
+    }
+
+    /// Passes orders to the board and records its ticks, until an order, a signal or the time ends it.
+    fn watch(
+        &mut self,
+        arguments: &DriveArguments,
+        interrupt: &Interrupt,
+        recorder: &mut Option<Recorder>,
+    ) -> Result<(), CommandError> {
+        let operator = Operator::listen()?;
+        let limit = arguments.duration.map(|limit_s| limit_s * self.tick_hz);
+        let mut health = Instant::now();
+        while !interrupt.is_requested() {
+            match operator.order() {
+                None => {}
+                Some(Order::Arm) => self.arm.permit_arming(true)?,
+                Some(Order::Disarm) => self.arm.permit_arming(false)?,
+                Some(Order::Stop) => return Ok(()),
+                Some(Order::Unknown(text)) => {
+                    warn(format_args!("unknown order {text:?}: arm, disarm or stop"));
+                }
+            }
+            if health.elapsed() >= HEALTH_INTERVAL {
+                health = Instant::now();
+                self.arm.ask_for_health()?;
+            }
+            match self.next_event()? {
+                None => {}
+                Some(ArmEvent::Permission(permitted)) => self.view.show_permission(permitted),
+                Some(ArmEvent::Health(health)) => self.view.show_health(&health, self.arm.line()),
+                Some(ArmEvent::Tick { sensor, answer }) => {
+                    self.take(sensor, &answer, recorder)?;
+                    if limit.is_some_and(|limit| self.report.ticks as f64 >= limit) {
+                        return Ok(());
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn next_event(&mut self) -> Result<Option<ArmEvent>, BoardError> {
+        self.arm.next_event(PATIENCE)
+    }
+
+    /// Counts, records and shows a tick.
+    fn take(
+        &mut self,
+        sensor: Option<SensorFrame>,
+        answer: &ActuatorFrame,
+        recorder: &mut Option<Recorder>,
+    ) -> Result<(), CommandError> {
+        if !answer.is_understood() {
+            return Err(CommandError::Process(format!(
+                "the board answers with state {} and fault {}, of which this version does not know at least one",
+                answer.state, answer.fault
+            )));
+        }
+        let state = answer.supervisor_state().unwrap_or_default();
+        self.report.state = state.name();
+        self.report.fault = answer.fault;
+        let Some(sensor) = sensor else {
+            self.view.show_answer(answer);
+            return Ok(());
+        };
+        let before = self.last_sequence.replace(sensor.sequence);
+        let step = before.map_or(1, |before| sensor.sequence.wrapping_sub(before));
+        self.report.ticks += 1;
+        self.report.lost_ticks += u64::from(step.saturating_sub(1));
+        self.report.active_ticks += u64::from(view::is_active(state));
+        let sample = self.measured.sample(&sensor, answer);
+        if let Some(recorder) = recorder {
+            recorder.push(&sample).map_err(output)?;
+        }
+        self.view.show(&sample);
+        Ok(())
+    }
+}

@@ -1,0 +1,72 @@
+//! The operator's orders: lines on standard input.
+
+use std::io::{self, BufRead};
+use std::sync::mpsc::{Receiver, channel};
+
+/// An order to the drive.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Permit the drive to arm.
+    Arm,
+    /// Withdraw the permission; the torque goes off.
+    Disarm,
+    /// Stop the drive and end.
+    Stop,
+    /// Anything else.
+    Unknown(String),
+}
+
+impl Order {
+    fn of(line: &str) -> Option<Self> {
+        match line.trim() {
+            "" => None,
+            "arm" => Some(Self::Arm),
+            "disarm" => Some(Self::Disarm),
+            "stop" => Some(Self::Stop),
+            other => Some(Self::Unknown(other.to_owned())),
+        }
+    }
+}
+
+/// Reads orders without holding up the drive.
+pub struct Operator(Receiver<Order>);
+
+impl Operator {
+    /// Reads standard input from now on. Its end is not an order: the drive goes on.
+    ///
+    /// # Errors
+    /// If the system refuses a thread.
+    pub fn listen() -> io::Result<Self> {
+        let (sender, receiver) = channel();
+        std::thread::Builder::new().spawn(move || {
+            for line in io::stdin().lock().lines() {
+                let Ok(line) = line else { return };
+                if let Some(order) = Order::of(&line)
+                    && sender.send(order).is_err()
+                {
+                    return;
+                }
+            }
+        })?;
+        Ok(Self(receiver))
+    }
+
+    /// Returns the next order, if one has been given.
+    pub fn order(&self) -> Option<Order> {
+        self.0.try_recv().ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_whole_word_is_an_order() {
+        assert_eq!(Order::of("arm\n"), Some(Order::Arm));
+        assert_eq!(Order::of(" stop "), Some(Order::Stop));
+        assert_eq!(Order::of("\n"), None);
+        assert_eq!(Order::of("armed"), Some(Order::Unknown("armed".into())));
+        assert_eq!(Order::of("ARM"), Some(Order::Unknown("ARM".into())));
+    }
+}
