@@ -4,6 +4,7 @@
 
 pub mod line;
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::OnceLock;
@@ -280,6 +281,37 @@ pub fn is_running(id: i32) -> bool {
             .next()
             .is_some_and(|rest| rest.starts_with(" Z"))
     })
+}
+
+/// Runs a command in namespaces of its own, as `unshare` makes them; `None`, with a word on
+/// standard error, where that is not permitted.
+///
+/// # Panics
+/// If the command cannot be started.
+pub fn unshared(namespaces: &[&str], command: &mut Command) -> Option<Output> {
+    let unshare = |program: &OsStr| {
+        let mut unshare = Command::new("unshare");
+        unshare.args(namespaces).arg(program);
+        unshare
+    };
+    let permitted = unshare(OsStr::new("true")).output();
+    if !permitted.is_ok_and(|output| output.status.success()) {
+        eprintln!("skipped: unshare {} is not permitted", namespaces.join(" "));
+        return None;
+    }
+    let mut unshare = unshare(command.get_program());
+    unshare.args(command.get_args());
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => unshare.env(name, value),
+            None => unshare.env_remove(name),
+        };
+    }
+    if let Some(folder) = command.get_current_dir() {
+        unshare.current_dir(folder);
+    }
+    let output = unshare.output();
+    Some(output.unwrap_or_else(|error| panic!("cannot start unshare: {error}")))
 }
 
 /// Standard error as text.

@@ -16,7 +16,7 @@ use nix::pty::openpty;
 use nix::sys::signal::Signal;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
-use painleve_board::Serial;
+use painleve_board::{SILENCE_LIMIT, Serial};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::message::FrameSource;
 use painleve_system::lifetime::{Guarded, end_with_parent};
@@ -129,8 +129,15 @@ impl SerialLine {
             child.unwrap_or_else(|error| panic!("cannot start QEMU: {error}")),
         ));
         let configuration = Scenario::default().controller_configuration();
-        let answers =
-            || Serial::open(&self.host_port, &configuration, FrameSource::Lockstep).is_ok();
+        let answers = || {
+            Serial::open(
+                &self.host_port,
+                &configuration,
+                FrameSource::Lockstep,
+                SILENCE_LIMIT,
+            )
+            .is_ok()
+        };
         assert!((0..20).any(|_| answers()), "the board says nothing");
         board
     }

@@ -17,13 +17,24 @@ use painleve_tests::line::{Direction, LineNoise, SerialLine};
 use serde_json::Value;
 
 const QUIET: [&str; 3] = ["--json", "--no-record", "--no-plot"];
+/// Longest silence of a board on a machine that is busy with other tests: every byte on the line
+/// wakes several threads.
+const BUSY: Duration = Duration::from_secs(20);
 const SHORT: [&str; 2] = ["--set", "run.duration_s=0.4"];
 
 /// Runs on the board at the end of `line`; the run's report and the board's.
 fn run(bench: &Bench, line: &SerialLine, more: &[&str]) -> (Value, Value) {
     let port = line.host_port.to_string_lossy();
     let serial = [
-        "run", "--host", "serial", "--port", &port, "--timing", "t.json",
+        "run",
+        "--host",
+        "serial",
+        "--port",
+        &port,
+        "--timing",
+        "t.json",
+        "--silence-limit-s",
+        "30",
     ];
     let report = bench.report(&[&serial[..], more, &QUIET].concat());
     let timing = std::fs::read_to_string(bench.path("t.json"));
@@ -85,9 +96,8 @@ fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
     let line = SerialLine::new(LineNoise::Steady);
     let _board = line.start_board();
     let configuration = Scenario::default().controller_configuration();
-    let mut serial = Serial::open(&line.host_port, &configuration, FrameSource::Lockstep).unwrap();
-    // Every byte wakes several threads, which takes a while on a busy machine.
-    serial.set_silence_limit(Duration::from_secs(20));
+    let serial =
+        Serial::open(&line.host_port, &configuration, FrameSource::Lockstep, BUSY).unwrap();
     let (noisy, host) = first_ticks(OnBoard::new(serial));
     let (native, _) = first_ticks(InProcess::new(&configuration).unwrap());
 
@@ -175,9 +185,9 @@ impl Pressing {
             tangential_force: ForceCounts(-614),
             ..Default::default()
         };
-        let board = Serial::open(&line.host_port, &configuration, FrameSource::Realtime);
-        let mut board = board.expect("a board on the line");
-        board.set_silence_limit(Duration::from_secs(20));
+        let source = FrameSource::Realtime;
+        let board = Serial::open(&line.host_port, &configuration, source, BUSY);
+        let board = board.expect("a board on the line");
         Self { board, frame }
     }
 

@@ -34,7 +34,7 @@ impl Both {
         let configuration: Configuration = scenario.controller_configuration();
         Self {
             native: Controller::new(&configuration).expect("built in"),
-            emulated: Emulator::start(image(), &configuration, false).expect("QEMU starts"),
+            emulated: Emulator::start(image(), &configuration, false, BUSY).expect("QEMU starts"),
             times: TickTimes::default(),
             scenario: scenario.name.clone(),
         }
@@ -132,7 +132,7 @@ fn overload_latches_a_fault_without_torque_in_the_same_tick_until_it_is_armed_ag
     let scenario = Scenario::default();
     let configuration = scenario.controller_configuration();
     let mut simulation = Simulation::new(&scenario).unwrap();
-    let mut board = Emulator::start(image(), &configuration, false).unwrap();
+    let mut board = Emulator::start(image(), &configuration, false, BUSY).unwrap();
     let mut tick = |inputs: DigitalInputs| -> ActuatorFrame {
         let mut frame = simulation.sample(&mut ()).unwrap();
         frame.inputs = inputs;
@@ -170,6 +170,8 @@ fn overload_latches_a_fault_without_torque_in_the_same_tick_until_it_is_armed_ag
     assert_eq!(board.health().unwrap().lapses.overruns, 3);
 }
 
+/// Longest silence of the image on a machine that is busy with other tests.
+const BUSY: Duration = Duration::from_secs(20);
 const SHORT: [&str; 2] = ["--set", "run.duration_s=1.0"];
 const QUIET: [&str; 3] = ["--json", "--no-record", "--no-plot"];
 

@@ -25,7 +25,7 @@ use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Res
 use painleve_shared::wire;
 use painleve_system::lifetime::{Guarded, end_with_parent};
 
-use super::{BoardError, ConnectedBoard, SILENCE_LIMIT, TimedAnswer, log};
+use super::{BoardError, ConnectedBoard, TimedAnswer, log};
 use crate::timing::Unit;
 
 /// The emulator's program.
@@ -82,13 +82,14 @@ pub struct Emulator {
     process: Guarded,
     requests: File,
     responses: File,
+    silence_limit: Duration,
     /// One instruction takes 2^shift ns of virtual time.
     shift: u32,
 }
 
 impl Emulator {
     /// Starts `image` and sends it its configuration. With `with_log`, prints the image's log on
-    /// stderr.
+    /// stderr. An image that is silent for longer than `silence_limit` is an error.
     ///
     /// # Errors
     /// Any [`BoardError`].
@@ -96,6 +97,7 @@ impl Emulator {
         image: &Path,
         configuration: &Configuration,
         with_log: bool,
+        silence_limit: Duration,
     ) -> Result<Self, BoardError> {
         check(image)?;
         // QEMU runs in its own folder.
@@ -132,6 +134,7 @@ impl Emulator {
             process: Guarded::new(child),
             requests,
             responses,
+            silence_limit,
             shift,
         };
         if let (Some(table), Some(output)) = (table, emulator.process.child().stdout.take()) {
@@ -180,7 +183,7 @@ impl Emulator {
             if let Some(status) = self.process.ended()? {
                 return Err(BoardError::Ended(status));
             }
-            if start.elapsed() > SILENCE_LIMIT {
+            if start.elapsed() > self.silence_limit {
                 return Err(BoardError::Silent(start.elapsed()));
             }
         }
@@ -239,7 +242,12 @@ mod tests {
     fn the_error_about_a_missing_image_names_it_and_the_build_command() {
         let configuration =
             painleve_plant::scenario::Scenario::default().controller_configuration();
-        let error = Emulator::start(Path::new("/nowhere/image"), &configuration, false);
+        let error = Emulator::start(
+            Path::new("/nowhere/image"),
+            &configuration,
+            false,
+            crate::SILENCE_LIMIT,
+        );
         let text = error
             .err()
             .map(|error| error.to_string())

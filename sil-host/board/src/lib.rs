@@ -43,9 +43,9 @@ pub struct TimedAnswer {
     pub cost: u32,
 }
 
-/// Longest silence of a board. It is shorter than the link's silence limit, so that the error names
+/// Longest silence of a board unless set otherwise. It is shorter than the link's silence limit, so that the error names
 /// the board.
-const SILENCE_LIMIT: Duration = Duration::from_millis(1000);
+pub const SILENCE_LIMIT: Duration = Duration::from_millis(1000);
 
 /// A configured board that answers sensor frames.
 pub trait ConnectedBoard {

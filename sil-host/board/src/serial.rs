@@ -62,7 +62,8 @@ pub struct Serial {
 
 impl Serial {
     /// Opens the port and sends the board its configuration. With [`FrameSource::Realtime`] the
-    /// board counts its ticks without a frame, and stops after too many.
+    /// board counts its ticks without a frame, and stops after too many. A board that is silent
+    /// for longer than `silence_limit` is an error.
     ///
     /// # Errors
     /// [`BoardError::Port`] if it cannot be opened, [`BoardError::Silent`] if no board
@@ -71,8 +72,10 @@ impl Serial {
         path: &Path,
         configuration: &Configuration,
         source: FrameSource,
+        silence_limit: Duration,
     ) -> Result<Self, BoardError> {
         let mut serial = Self::connect(path)?;
+        serial.silence_limit = silence_limit;
         serial.configure(configuration, source)?;
         Ok(serial)
     }
@@ -170,12 +173,6 @@ impl Serial {
     pub fn stop(&mut self) -> Result<(), BoardError> {
         let is_stopped = |response: &Response| matches!(response, Response::Stopped);
         self.ask(&Request::Stop, PATIENCE, is_stopped).map(|_| ())
-    }
-
-    /// Sets how long the board may be silent before that is an error; initially one second, so that
-    /// the plant receives the error in time.
-    pub fn set_silence_limit(&mut self, limit: Duration) {
-        self.silence_limit = limit;
     }
 
     /// Waits for a message that the board sends unasked; `None` after `limit`.

@@ -15,6 +15,7 @@ use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 
+use super::patience::PatienceArguments;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve bridge`.
@@ -64,6 +65,8 @@ struct BusArguments {
     /// Longest wait for the plant, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
     wait_s: f64,
+    #[command(flatten)]
+    patience: PatienceArguments,
     /// Scenario of the plant, for the report.
     #[arg(long, hide = true, default_value = "")]
     scenario_name: String,
@@ -124,7 +127,12 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
     match &arguments.target {
         BridgeTarget::Qemu { bus, image } => {
             carry(bus, image.timing.as_deref(), |configuration, _| {
-                Emulator::start(&image.path(), configuration, image.log)
+                Emulator::start(
+                    &image.path(),
+                    configuration,
+                    image.log,
+                    bus.patience.board(),
+                )
             })
         }
         BridgeTarget::Drivers { bus, lines, timing } => {
@@ -134,7 +142,12 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
         }
         BridgeTarget::Serial { bus, port, timing } => {
             carry(bus, timing.as_deref(), |configuration, pacing| {
-                Serial::open(port, configuration, frame_source(pacing))
+                Serial::open(
+                    port,
+                    configuration,
+                    frame_source(pacing),
+                    bus.patience.board(),
+                )
             })
         }
     }
@@ -165,6 +178,7 @@ fn carry_until<B: ConnectedBoard>(
 ) -> Result<(), CommandError> {
     let wait = Duration::from_secs_f64(bus.wait_s);
     let (mut end, session) = ControllerEnd::open(&bus.bus, wait, interrupt)?;
+    end.set_silence_limit(bus.patience.peer());
     let configuration: Configuration =
         postcard::from_bytes(&session.configuration).map_err(|error| {
             CommandError::Process(format!(

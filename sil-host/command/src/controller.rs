@@ -11,6 +11,7 @@ use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
 
+use super::patience::PatienceArguments;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve controller`.
@@ -22,6 +23,8 @@ pub struct ControllerArguments {
     /// Longest wait for the plant, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
     wait_s: f64,
+    #[command(flatten)]
+    patience: PatienceArguments,
 }
 
 /// Answers the plant's frames until its session ends.
@@ -35,7 +38,8 @@ fn answer_until(
     interrupt: &Interrupt,
 ) -> Result<(), CommandError> {
     let wait = Duration::from_secs_f64(arguments.wait_s);
-    let (end, session) = ControllerEnd::open(&arguments.bus, wait, interrupt)?;
+    let (mut end, session) = ControllerEnd::open(&arguments.bus, wait, interrupt)?;
+    end.set_silence_limit(arguments.patience.peer());
     let bad_session = |reason: String| {
         CommandError::Process(format!(
             "the plant on bus {} sent a configuration that this controller refuses: {reason}",

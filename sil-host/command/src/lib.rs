@@ -2,10 +2,12 @@
 
 mod bridge;
 mod controller;
+mod doctor;
 mod drive;
 mod fail_on;
 mod figures;
 mod output;
+mod patience;
 mod plant;
 mod run;
 mod scenarios;
@@ -31,6 +33,7 @@ use painleve_plant::scenario::ScenarioError;
 use painleve_study::StudyError;
 use painleve_study::sweep::SweepError;
 use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_size_limit};
+use painleve_system::memory_full::exit_when_shared_memory_is_full;
 use painleve_system::terminal::{self, warn};
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
@@ -60,6 +63,8 @@ enum Command {
     /// Report the cost of control ticks: instructions, cycles or wake-up latency, and the worst
     /// tick.
     Timing(timing::TimingArguments),
+    /// What earlier runs have left on this machine, and what the machine gives to runs.
+    Doctor(doctor::DoctorArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
     /// Compute one of the paper's studies as numbers, data files and figures.
@@ -279,12 +284,10 @@ fn tell_panic(panic: &PanicHookInfo) {
 fn execute(command: Command) -> Result<(), CommandError> {
     match &command {
         // These commands clean up peers, files or boards themselves.
-        Command::Run(_)
-        | Command::Plant(_)
-        | Command::Controller(_)
-        | Command::Bridge(_)
-        | Command::Drive(_)
-        | Command::Timing(_) => {}
+        Command::Plant(_) | Command::Controller(_) | Command::Bridge(_) => {
+            exit_when_shared_memory_is_full(PEER_FAILED)?;
+        }
+        Command::Run(_) | Command::Drive(_) | Command::Timing(_) | Command::Doctor(_) => {}
         Command::Scenarios(_) | Command::Study(_) | Command::Sweep(_) | Command::Figures(_) => {
             exit_when_requested(INTERRUPTED)?;
         }
@@ -296,6 +299,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Bridge(arguments) => bridge::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),

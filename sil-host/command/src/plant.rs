@@ -18,6 +18,7 @@ use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
 
 use super::output::{Output, OutputArguments};
+use super::patience::PatienceArguments;
 use super::run::ScenarioArguments;
 use super::{CommandError, INTERRUPTED, or_interrupted};
 
@@ -37,6 +38,8 @@ pub struct PlantArguments {
     /// Longest wait for the controller, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
     wait_s: f64,
+    #[command(flatten)]
+    patience: PatienceArguments,
     /// Name of the controller's host in the report.
     #[arg(long, hide = true, default_value = "native")]
     host_name: String,
@@ -108,6 +111,7 @@ fn simulate(
     let pacing = arguments.scenario.pacing;
     let session = session(scenario, pacing)?;
     let mut end = PlantEnd::create(&arguments.bus, &session, interrupt)?;
+    end.set_silence_limit(arguments.patience.peer());
     end.wait_for_controller(Duration::from_secs_f64(arguments.wait_s))?;
 
     let name = &arguments.host_name;

@@ -20,6 +20,7 @@ use painleve_system::terminal::warn;
 use super::bridge::{ImageArguments, SensorLineArguments};
 use super::fail_on::{self, FailOn};
 use super::output::OutputArguments;
+use super::patience::PatienceArguments;
 use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
 
 /// A run of the robustness campaign.
@@ -145,6 +146,8 @@ pub struct RunArguments {
     #[command(flatten)]
     lines: SensorLineArguments,
     #[command(flatten)]
+    patience: PatienceArguments,
+    #[command(flatten)]
     output: OutputArguments,
     /// Exit with code 6 if one of these events happened; the report is still complete.
     #[arg(long, value_enum, value_name = "EVENTS", value_delimiter = ',')]
@@ -165,9 +168,9 @@ const WATCH: Duration = Duration::from_millis(10);
 /// after that, all processes end within 2 s.
 const PLANT_NOTICE: Duration = Duration::from_millis(1000);
 
-/// Longest time for which a child may be stopped. Its peer reports the silence earlier, after
-/// 1.5 s.
-const STOPPED_LIMIT: Duration = Duration::from_millis(1700);
+/// Time beyond the silence limit for which a child may be stopped, so that its peer reports the
+/// silence first.
+const STOPPED_MARGIN: Duration = Duration::from_millis(200);
 
 /// Time for the controller to end after the plant.
 const CONTROLLER_END: Duration = Duration::from_millis(1700);
@@ -191,6 +194,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let mut plant_arguments: Vec<OsString> = vec!["plant".into()];
     plant_arguments.extend(arguments.scenario.to_arguments());
     plant_arguments.extend(arguments.output.to_arguments());
+    plant_arguments.extend(arguments.patience.to_arguments());
     plant_arguments.extend(["--json".into(), "--started-by-run".into()]);
     let host = arguments.host.to_possible_value();
     let host = host.as_ref().map_or("native", |host| host.get_name());
@@ -207,7 +211,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     };
     let mut controller = RunProcess::start(controller_arguments(arguments), &bus, stderr)?;
 
-    let status = watch(&mut plant, &mut controller, &interrupt)?;
+    let status = watch(
+        &mut plant,
+        &mut controller,
+        arguments.patience.peer(),
+        &interrupt,
+    )?;
     let deadlines_missed = status.code() == Some(i32::from(DEADLINES_MISSED));
     if !status.success() && !deadlines_missed {
         // If the plant reports the controller as failed, the bridge's message gives the actual
@@ -255,6 +264,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
 fn watch(
     plant: &mut RunProcess,
     controller: &mut RunProcess,
+    silence_limit: Duration,
     interrupt: &Interrupt,
 ) -> Result<ExitStatus, CommandError> {
     let ended_early = |status, complaint: String| {
@@ -285,7 +295,7 @@ fn watch(
             }
         }
         for (name, process) in [("plant", &mut *plant), ("controller", &mut *controller)] {
-            if process.stopped_for(WATCH) >= STOPPED_LIMIT {
+            if process.stopped_for(WATCH) >= silence_limit + STOPPED_MARGIN {
                 return Err(CommandError::Process(format!(
                     "the {name} process ({}) was stopped and has been killed",
                     process.child.id()
@@ -298,12 +308,14 @@ fn watch(
 
 fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
     let image = &arguments.image;
+    let patience = arguments.patience.to_arguments();
     let mut line: Vec<OsString> = match arguments.host {
-        Host::Native => return vec!["controller".into()],
+        Host::Native => return ["controller".into()].into_iter().chain(patience).collect(),
         Host::Drivers => vec!["bridge".into(), "drivers".into()],
         Host::Qemu => vec!["bridge".into(), "qemu".into()],
         Host::Serial => vec!["bridge".into(), "serial".into()],
     };
+    line.extend(patience);
     line.extend(["--scenario-name".into(), arguments.scenario.name().into()]);
     let paths: &[(&str, &Option<PathBuf>)] = match arguments.host {
         Host::Serial => &[("--port", &arguments.port), ("--timing", &image.timing)],

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
 use painleve_board::timing::{Metronome, TimingReport, Unit, report};
-use painleve_board::{ConnectedBoard, Drivers, OnBoard, Serial};
+use painleve_board::{ConnectedBoard, Drivers, OnBoard, SILENCE_LIMIT, Serial};
 use painleve_bound::report::Bound;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
@@ -106,7 +106,7 @@ fn measure(
     let configuration = scenario.controller_configuration();
     match (arguments.host, &arguments.port) {
         (Host::Serial, Some(port)) => {
-            let board = Serial::open(port, &configuration, FrameSource::Realtime)?;
+            let board = Serial::open(port, &configuration, FrameSource::Realtime, SILENCE_LIMIT)?;
             on_board(scenario, board, interrupt)
         }
         (Host::Drivers, _) => {
@@ -117,7 +117,7 @@ fn measure(
         (Host::Qemu | Host::Serial, _) => {
             let image = arguments.elf.clone();
             let image = image.unwrap_or_else(emulator::default_image);
-            let board = Emulator::start(&image, &configuration, false)?;
+            let board = Emulator::start(&image, &configuration, false, SILENCE_LIMIT)?;
             on_board(scenario, board, interrupt)
         }
     }

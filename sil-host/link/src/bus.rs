@@ -1,9 +1,8 @@
 //! Names of buses, which keep simultaneous runs apart.
 
 use std::fmt;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::str::FromStr;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::LinkError;
 
@@ -15,19 +14,12 @@ impl BusName {
     /// Longest name, in characters.
     pub const MAX_LENGTH: usize = 64;
 
-    /// Returns a name that no other run on this machine uses, made of process
-    /// id, time and a counter.
+    /// Returns a name that no other run on this machine uses, made of the process id and 64
+    /// random bits. The time would repeat after a step of the clock, and other PID namespaces
+    /// have the same ids.
     pub fn unique() -> Self {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let since_epoch = SystemTime::now()
-            .duration_since(UNIX_EPOCH)
-            .unwrap_or_default();
-        Self(format!(
-            "run-{}-{:x}-{}",
-            std::process::id(),
-            since_epoch.as_nanos(),
-            COUNT.fetch_add(1, Ordering::Relaxed)
-        ))
+        let random = RandomState::new().build_hasher().finish();
+        Self(format!("run-{}-{random:016x}", std::process::id()))
     }
 
     /// Returns the name as a string.

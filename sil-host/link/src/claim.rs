@@ -67,7 +67,7 @@ const GATE: i64 = 0;
 pub(super) struct LockFile(File);
 
 impl LockFile {
-    fn open(path: &Path, create: bool) -> io::Result<Self> {
+    pub(super) fn open(path: &Path, create: bool) -> io::Result<Self> {
         OpenOptions::new()
             .read(true)
             .write(true)
@@ -93,6 +93,16 @@ impl LockFile {
         }
     }
 
+    /// Returns whether a process of either role holds its lock.
+    pub(super) fn is_used(&self) -> bool {
+        self.is_held(Role::Plant) || self.is_held(Role::Controller)
+    }
+
+    /// Takes the lock of a role; returns `false` if another process holds it.
+    pub(super) fn try_hold(&self, role: Role) -> io::Result<bool> {
+        self.try_lock(role.byte())
+    }
+
     /// Takes a lock; returns `false` if another process holds it.
     fn try_lock(&self, byte: i64) -> io::Result<bool> {
         match fcntl(&self.0, FcntlArg::F_OFD_SETLK(&byte_lock(byte, F_WRLCK))) {
@@ -108,7 +118,7 @@ impl LockFile {
     }
 
     /// Returns whether the file still has its name; its folder may have been removed.
-    fn is_at(&self, path: &Path) -> bool {
+    pub(super) fn is_at(&self, path: &Path) -> bool {
         match (self.0.metadata(), fs::symlink_metadata(path)) {
             (Ok(own), Ok(there)) => own.ino() == there.ino() && own.dev() == there.dev(),
             _ => false,
@@ -239,12 +249,11 @@ impl Bus {
             return;
         };
         // Test without taking a lock first, so that a stopped process cannot block a bus in use.
-        let is_dead = || !file.is_held(Role::Plant) && !file.is_held(Role::Controller);
-        if !is_dead() || !matches!(file.try_lock(GATE), Ok(true)) {
+        if file.is_used() || !matches!(file.try_lock(GATE), Ok(true)) {
             return;
         }
         file.sign(GATE);
-        if file.is_at(&self.lock_path()) && is_dead() {
+        if file.is_at(&self.lock_path()) && !file.is_used() {
             // One rename frees the name, so that no other process has to wait any longer.
             let away = self.place.folder.join(away_name());
             if fs::rename(self.folder(), &away).is_ok() {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
-use super::claim::{Bus, Claim, Role, remove_dead};
+use super::claim::{Bus, Claim, LockFile, Role, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
 use super::place::Place;
@@ -56,6 +56,8 @@ struct Ports {
     _services: Services,
     presence: Presence,
     _left: CallMark,
+    /// Held while the run's shared memory is in use.
+    _in_use: LockFile,
 }
 
 /// Result of an attempt to join.
@@ -313,6 +315,7 @@ fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
     let Some(session) = end.wait_for_begin()? else {
         return Ok(Attempt::NotReady);
     };
+    run.reserve().map_err(refuse("reserve its shared memory"))?;
     run.set_answering().map_err(refuse("join its run"))?;
     Ok(Attempt::Joined(Box::new(end), session))
 }
@@ -320,6 +323,14 @@ fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
 impl Ports {
     /// Connects to the plant's services; `None` if the plant has just left.
     fn open(bus: &Bus, run: &RunFiles, guardian: &Guardian) -> Result<Option<Self>, LinkError> {
+        let in_use = match run.hold(Role::Controller) {
+            Ok(in_use) => in_use,
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(cause) => {
+                let action = "mark its shared memory as in use";
+                return Err(transport(&bus.name, action, cause));
+            }
+        };
         let presence = Presence::new(&bus.name, run)?;
         let services = match Services::open(&presence) {
             Ok(services) => services,
@@ -335,6 +346,7 @@ impl Ports {
             _services: services,
             presence,
             _left: left,
+            _in_use: in_use,
         }))
     }
 }

@@ -41,6 +41,7 @@ mod plant_end;
 mod run_files;
 mod services;
 mod session;
+mod survey;
 #[cfg(test)]
 mod tests;
 
@@ -52,3 +53,4 @@ pub use patience::DEFAULT_SILENCE_LIMIT;
 pub use plant_end::PlantEnd;
 pub use services::FRAME_BUFFER;
 pub use session::{CONFIGURATION_CAPACITY, Pacing, Session};
+pub use survey::{BusState, SegmentState, Segments, Survey};

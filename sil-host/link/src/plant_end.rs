@@ -7,7 +7,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use nix::sys::statvfs::statvfs;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
-use super::claim::{Bus, Claim, Role, Taken, remove_dead};
+use super::claim::{Bus, Claim, LockFile, Role, Taken, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
 use super::place::{Place, SHARED_MEMORY};
@@ -53,10 +53,15 @@ struct Ports {
     _services: Services,
     presence: Presence,
     _left: CallMark,
+    /// Held while the run's shared memory is in use.
+    _in_use: LockFile,
 }
 
 impl Ports {
     fn create(bus: &Bus, run: &RunFiles, guardian: &Guardian) -> Result<Self, LinkError> {
+        let in_use = run
+            .hold(Role::Plant)
+            .map_err(|cause| transport(&bus.name, "mark its shared memory as in use", cause))?;
         let presence = Presence::new(&bus.name, run)?;
         let services = Services::create(&presence)?;
         let (leaving, left) = guardian.marks();
@@ -68,6 +73,7 @@ impl Ports {
             _services: services,
             presence,
             _left: left,
+            _in_use: in_use,
         })
     }
 }
@@ -322,6 +328,8 @@ fn start_run(
         let ports = Ports::create(bus, &run, guardian)?;
         announce(&ports, *begin).map(|()| ports)
     })?;
+    run.reserve()
+        .map_err(|cause| transport(&bus.name, "reserve its shared memory", cause))?;
     run.set_ready().map_err(refuse)?;
     Ok((run, ports))
 }

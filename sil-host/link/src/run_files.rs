@@ -12,21 +12,33 @@
 //! | `joined`               | by the controller, before it touches anything         |
 //! | `answering`            | by the controller, when it is ready for frames        |
 //! | `nodes/`, `services/`  | by iceoryx2, with its segments in shared memory       |
+//!
+//! The first of the run's files in shared memory is `<prefix>lock`. Plant and controller hold
+//! a lock on it for as long as they use the run. Locks are visible to every process that sees
+//! the file, whatever PID namespace, container or runtime folder it has, so that segments
+//! whose folder is out of sight can still be told dead from alive (`survey`).
 
+use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::{Config, FileName, Path as IceoryxPath, SemanticString};
+use nix::fcntl::posix_fallocate;
 
 use super::LinkError;
-use super::claim::Bus;
+use super::claim::{Bus, LockFile, Role};
 use super::place::{Place, SHARED_MEMORY};
 
 const READY: &str = "ready";
 const JOINED: &str = "joined";
 const ANSWERING: &str = "answering";
+/// End of the name of the file in shared memory on which the users of a run hold locks.
+const LOCK: &str = "lock";
+/// Longest wait for a repair that removes the lock file. It takes milliseconds.
+const REPAIR_PATIENCE: Duration = Duration::from_secs(1);
 /// Length of a run's random name in letters and digits: 71 bits, which cannot be guessed.
 const NAME_LENGTH: usize = 12;
 
@@ -112,6 +124,40 @@ impl RunFiles {
         self.has(JOINED)
     }
 
+    fn lock_path(&self) -> PathBuf {
+        Path::new(SHARED_MEMORY).join(format!("{}{LOCK}", self.prefix))
+    }
+
+    /// Marks the run's shared memory as in use until the returned file is dropped. The plant
+    /// makes the file; for the controller it must be there.
+    pub(super) fn hold(&self, role: Role) -> io::Result<LockFile> {
+        let start = Instant::now();
+        loop {
+            let file = LockFile::open(&self.lock_path(), role == Role::Plant)?;
+            // A repair may have come between the two, and have removed the file.
+            if file.try_hold(role)? && file.is_at(&self.lock_path()) {
+                return Ok(file);
+            }
+            if start.elapsed() >= REPAIR_PATIENCE {
+                return Err(io::Error::other("another process holds its lock"));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Gives every segment of the run its memory now. Otherwise a segment gets it when it is
+    /// written, and with none left the kernel ends the writer with SIGBUS.
+    pub(super) fn reserve(&self) -> io::Result<()> {
+        for (path, metadata) in segments(&self.prefix)? {
+            let length = i64::try_from(metadata.len()).map_err(io::Error::other)?;
+            if length > 0 {
+                let segment = OpenOptions::new().read(true).write(true).open(path)?;
+                posix_fallocate(&segment, 0, length)?;
+            }
+        }
+        Ok(())
+    }
+
     fn has(&self, name: &str) -> bool {
         fs::exists(self.folder.join(name)).unwrap_or(false)
     }
@@ -119,9 +165,7 @@ impl RunFiles {
     /// Removes the run's folder and its segments.
     pub(super) fn remove(&self) -> io::Result<()> {
         // The folder goes last, because its name leads to the names of the segments.
-        for (path, _) in segments(&self.prefix)? {
-            tolerate_missing(fs::remove_file(path))?;
-        }
+        remove_segments(&self.prefix)?;
         tolerate_missing(fs::remove_dir_all(&self.folder))
     }
 
@@ -141,7 +185,7 @@ impl RunFiles {
         for run in all(&bus.folder(), &bus.place).unwrap_or_default() {
             for (path, metadata) in segments(&run.prefix).unwrap_or_default() {
                 let write_only = metadata.permissions().mode() & 0o777 == 0o200;
-                if metadata.len() == 0 || write_only {
+                if (metadata.len() == 0 || write_only) && path != run.lock_path() {
                     let _ = fs::remove_file(path);
                 }
             }
@@ -174,6 +218,40 @@ fn segments(prefix: &str) -> io::Result<Vec<(PathBuf, fs::Metadata)>> {
         }
     }
     Ok(segments)
+}
+
+/// Removes the segments with this prefix. The lock file goes last: a repair that finds segments
+/// without one leaves them alone.
+pub(super) fn remove_segments(prefix: &str) -> io::Result<()> {
+    let lock = format!("{prefix}{LOCK}");
+    let mut paths: Vec<_> = segments(prefix)?
+        .into_iter()
+        .map(|(path, _)| path)
+        .collect();
+    paths.sort_by_key(|path| path.ends_with(&lock));
+    paths
+        .into_iter()
+        .try_for_each(|path| tolerate_missing(fs::remove_file(path)))
+}
+
+/// The shared memory of runs of this user, by run: their prefixes.
+pub(super) fn prefixes(place: &Place) -> io::Result<BTreeSet<String>> {
+    let length = place.prefix.len() + NAME_LENGTH + 1;
+    let names = segments(&place.prefix)?
+        .into_iter()
+        .filter_map(|(path, _)| {
+            let name = path.file_name()?.to_str()?.to_owned();
+            name.get(..length)
+                .filter(|prefix| prefix.ends_with('_'))
+                .map(str::to_owned)
+        });
+    Ok(names.collect())
+}
+
+/// The lock file of the run with this prefix, if there is one.
+pub(super) fn lock_of(prefix: &str) -> Option<LockFile> {
+    let path = Path::new(SHARED_MEMORY).join(format!("{prefix}{LOCK}"));
+    LockFile::open(&path, false).ok()
 }
 
 fn tolerate_missing(removed: io::Result<()>) -> io::Result<()> {

@@ -4,6 +4,7 @@
 //! - [`input_file`]: text files of limited size
 //! - [`realtime`]: absolute deadlines, real-time priority, locked memory
 //! - [`lifetime`]: child processes that never outlive their parent
+//! - [`memory_full`]: the end of a process that finds shared memory full
 //! - [`interrupt`]: Ctrl-C and requests to end
 //! - [`terminal`]: standard output and error that may be closed or full
 
@@ -11,5 +12,6 @@ pub mod atomic_file;
 pub mod input_file;
 pub mod interrupt;
 pub mod lifetime;
+pub mod memory_full;
 pub mod realtime;
 pub mod terminal;

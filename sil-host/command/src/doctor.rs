@@ -1,0 +1,141 @@
+//! `painleve doctor`: what earlier runs have left, and what the machine gives to runs.
+
+use clap::Args;
+use comfy_table::Table;
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use nix::sys::resource::{Resource, getrlimit};
+use nix::sys::statvfs::statvfs;
+use nix::sys::utsname::uname;
+use painleve_board::emulator;
+use painleve_firmware::BUILD;
+use painleve_link::{BusState, LinkError, SegmentState, Survey};
+use painleve_system::realtime::request_realtime;
+
+use super::{CommandError, say};
+
+/// Options of `painleve doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArguments {
+    /// Remove what killed processes have left. What is in use, and what cannot be proved dead,
+    /// stays.
+    #[arg(long)]
+    repair: bool,
+}
+
+/// Surveys the machine, repairs first if asked to, and prints a table.
+pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
+    if arguments.repair {
+        Survey::repair()?;
+    }
+    let mut rows: Vec<[String; 2]> = Vec::new();
+    let mut row = |what: &str, state: String| rows.push([what.into(), state]);
+    row(
+        "version",
+        format!("{}, build {BUILD:016x}", env!("CARGO_PKG_VERSION")),
+    );
+    row("system", system());
+    row("emulator, image", image());
+    let survey = Survey::take();
+    match &survey {
+        Ok(survey) => {
+            row("folder of the buses", survey.folder.display().to_string());
+            for bus in &survey.buses {
+                row(&format!("bus {}", bus.name), users(bus).into());
+            }
+            for segments in &survey.segments {
+                let name = format!("/dev/shm/{}*", segments.prefix);
+                row(&name, state(segments.state).into());
+            }
+        }
+        Err(error) => row("folder of the buses", error.to_string()),
+    }
+    row("shared memory", free("/dev/shm"));
+    row(
+        "temporary files",
+        free(&std::env::temp_dir().to_string_lossy()),
+    );
+    for (what, resource, least) in LIMITS {
+        row(what, limit(resource, least));
+    }
+    row("scheduling", request_realtime().to_string());
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    table.set_header(["what", "state"]);
+    table.add_rows(rows);
+    say(table)?;
+    survey.map(|_| ()).map_err(LinkError::into)
+}
+
+fn users(bus: &BusState) -> &'static str {
+    match (bus.has_plant, bus.has_controller) {
+        (true, true) => "in use by plant and controller",
+        (true, false) => "in use by a plant",
+        (false, true) => "in use by a controller without its plant",
+        (false, false) => "dead: the next start or --repair removes it",
+    }
+}
+
+fn state(state: SegmentState) -> &'static str {
+    match state {
+        SegmentState::InUse => "in use",
+        SegmentState::Dead => "dead: --repair removes it",
+        SegmentState::Unknown => {
+            "has no lock file, so that nothing proves it dead: --repair leaves it; remove it \
+             yourself when no run is going on"
+        }
+    }
+}
+
+fn system() -> String {
+    match uname() {
+        Ok(name) => format!(
+            "{} {} {}",
+            name.sysname().to_string_lossy(),
+            name.release().to_string_lossy(),
+            name.machine().to_string_lossy()
+        ),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn image() -> String {
+    match emulator::check(&emulator::default_image()) {
+        Ok(()) => "ready for --host qemu".into(),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// Limits, and the least that is useful.
+const LIMITS: [(&str, Resource, u64); 4] = [
+    ("open files (ulimit -n)", Resource::RLIMIT_NOFILE, 64),
+    (
+        "file size (ulimit -f), bytes",
+        Resource::RLIMIT_FSIZE,
+        1 << 30,
+    ),
+    (
+        "locked memory (ulimit -l), bytes",
+        Resource::RLIMIT_MEMLOCK,
+        64 << 20,
+    ),
+    ("real-time priority (ulimit -r)", Resource::RLIMIT_RTPRIO, 1),
+];
+
+fn limit(resource: Resource, least: u64) -> String {
+    match getrlimit(resource) {
+        Ok((u64::MAX, _)) => "unlimited".into(),
+        Ok((most, _)) if most < least => format!("{most}: less than the {least} that are useful"),
+        Ok((most, _)) => most.to_string(),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn free(folder: &str) -> String {
+    match statvfs(folder) {
+        Ok(state) => format!(
+            "{folder}, {} MB free",
+            state.blocks_available() * state.fragment_size() / 1_000_000
+        ),
+        Err(error) => format!("{folder}: {error}"),
+    }
+}

@@ -1,0 +1,147 @@
+//! Too little shared memory, read-only disks, closed terminals, one core, a busy machine: a run
+//! gives the same bits, or ends with one message and a documented exit code.
+
+use std::process::{Command, Output};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use painleve_tests::{Bench, code, errors, program, unshared};
+
+const SHORT: &str = "--set run.duration_s=0.05 --no-plot --json";
+const SOON: Duration = Duration::from_secs(10);
+
+/// A shell line in which `$P` is the program, in a mount namespace of its own.
+fn with_own_mounts(bench: &Bench, line: &str) -> Option<Output> {
+    let mut shell = Command::new("bash");
+    shell
+        .args(["-c", line])
+        .env("P", program())
+        .current_dir(bench.path(""));
+    unshared(&["--mount"], &mut shell)
+}
+
+/// One line that begins as an error and contains `part`.
+fn assert_told(output: &Output, exit: i32, part: &str) {
+    let text = errors(output);
+    assert_eq!(code(output.status), exit, "{output:?}");
+    assert_eq!(text.trim().lines().count(), 1, "{text}");
+    assert!(text.starts_with("error: ") && text.contains(part), "{text}");
+}
+
+#[test]
+fn a_small_shared_memory_is_enough_or_is_told() {
+    let bench = Bench::new("small-shm");
+    let mut enough = 0;
+    for kib in [4, 48, 128, 248, 256, 264, 300, 340, 400, 512, 1024] {
+        let line =
+            format!("mount -t tmpfs -o size={kib}k tmpfs /dev/shm && $P run --no-record {SHORT}");
+        let start = Instant::now();
+        let Some(output) = with_own_mounts(&bench, &line) else {
+            return;
+        };
+        assert!(start.elapsed() < SOON, "{kib} KiB: {:?}", start.elapsed());
+        if code(output.status) == 0 {
+            enough += 1;
+        } else {
+            assert_eq!(enough, 0, "{kib} KiB is less than enough: {output:?}");
+            assert_told(&output, 3, "/dev/shm");
+        }
+    }
+    assert!(enough > 0, "even 1 MiB is too little");
+}
+
+/// Somebody else fills the memory after the plant has looked at what is left.
+#[test]
+fn a_shared_memory_that_fills_up_between_two_starts_ends_them() {
+    let bench = Bench::new("filled-shm");
+    let line = format!(
+        "mount -t tmpfs -o size=1m tmpfs /dev/shm
+         mkdir -m 700 runtime && export XDG_RUNTIME_DIR=$PWD/runtime
+         $P plant --bus full --wait-s 2 --no-record {SHORT} 2>plant & plant=$!
+         until ls runtime/painleve/full/*/ready; do sleep 0.01; done >/dev/null 2>&1
+         cat /dev/zero >/dev/shm/filler 2>/dev/null
+         $P controller --bus full; controller=$?
+         wait $plant; echo $controller $?"
+    );
+    let Some(output) = with_own_mounts(&bench, &line) else {
+        return;
+    };
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout),
+        "3 3\n",
+        "{output:?}"
+    );
+    assert_told(&output, 0, "/dev/shm");
+    // It misses its controller, or needs memory for the connection to it.
+    let plant = std::fs::read_to_string(bench.path("plant")).unwrap();
+    assert!(plant.starts_with("error: "), "{plant}");
+    assert_eq!(plant.trim().lines().count(), 1, "{plant}");
+}
+
+#[test]
+fn read_only_folders_are_told() {
+    let bench = Bench::new("read-only");
+    std::fs::create_dir(bench.path("disk")).unwrap();
+    let mounted = "mount -t tmpfs -o ro tmpfs disk && cd disk";
+    let Some(no_record) = with_own_mounts(&bench, &format!("{mounted} && $P run {SHORT}")) else {
+        return;
+    };
+    assert_told(&no_record, 4, "Read-only");
+    let line = format!(
+        "{mounted} && XDG_RUNTIME_DIR= && mount -t tmpfs -o ro tmpfs /tmp && \
+         if [ -d /run/user ]; then mount -t tmpfs -o ro tmpfs /run/user; fi && \
+         $P controller --bus b"
+    );
+    if let Some(no_bus) = with_own_mounts(&bench, &line) {
+        assert_told(&no_bus, 3, "Read-only");
+    }
+}
+
+/// The report of a run, by a shell line.
+#[allow(clippy::unwrap_used)]
+fn shell(bench: &Bench, line: &str) -> Output {
+    let mut shell = Command::new("bash");
+    shell.args(["-c", line]).env("P", program());
+    shell.current_dir(bench.path("")).output().unwrap()
+}
+
+#[test]
+fn closed_streams_do_not_disturb_a_run() {
+    let bench = Bench::new("closed");
+    let output = shell(&bench, &format!("$P run {SHORT} <&- >&- 2>&-"));
+    assert_eq!(code(output.status), 0, "{output:?}");
+    // Neither has anything that was meant for a stream got into a file.
+    let record = std::fs::read(bench.path("out/run.mcap")).unwrap();
+    let summary = mcap::Summary::read(&record).unwrap().unwrap();
+    assert!(summary.stats.unwrap().message_count > 0);
+}
+
+#[test]
+fn one_core_and_a_busy_machine_give_the_same_bits() {
+    let bench = Bench::new("one-core");
+    let run = format!("$P run --no-record {SHORT} --silence-limit-s 30");
+    let hash = |output: Output| {
+        assert_eq!(code(output.status), 0, "{output:?}");
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        report["log_hash"].clone()
+    };
+    let idle = shell(&bench, &run);
+    let over = AtomicBool::new(false);
+    let (busy, one_core) = std::thread::scope(|scope| {
+        for _ in 0..2 * std::thread::available_parallelism().map_or(2, usize::from) {
+            scope.spawn(|| {
+                while !over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
+        }
+        let outputs = (
+            shell(&bench, &run),
+            shell(&bench, &format!("taskset -c 0 {run}")),
+        );
+        over.store(true, Ordering::Relaxed);
+        outputs
+    });
+    let idle = hash(idle);
+    assert_eq!((hash(busy), hash(one_core)), (idle.clone(), idle));
+}
