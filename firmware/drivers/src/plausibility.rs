@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn cut_lines_shorted_selects_and_missing_magnets_are_not() {
+    fn cut_lines_shorted_selects_and_missing_magnets_are_implausible() {
         assert_eq!(after(TICKS, [0, 200], 0, true), Err(Implausible::DeadLine));
         assert_eq!(
             after(TICKS, [7, 16383], 0, true),

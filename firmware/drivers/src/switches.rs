@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn it_opens_at_once_and_a_short_break_does_not_close_it_again() {
+    fn a_switch_opens_at_once_and_a_short_break_does_not_close_it_again() {
         let mut switches = Switches::default();
         assert!(enabled(&mut switches, "0000011111"));
         assert!(!enabled(&mut switches, "0"));

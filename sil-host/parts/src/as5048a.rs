@@ -5,7 +5,8 @@ use crate::{BitErrors, Picoseconds, SpiPart, Transfer};
 /// Fastest clock, Hz.
 const FASTEST_HZ: u64 = 10_000_000;
 
-/// Select low to first edge, last edge to select high, and select high between two frames: 350 ns.
+/// Minimum times from select low to the first edge, from the last edge to select high, and of
+/// select high between two frames: 350 ns.
 const SETTLING: Picoseconds = 350_000;
 
 const ERROR_FLAG: u16 = 1 << 14;
@@ -23,13 +24,14 @@ const ANGLE: u16 = 0x3fff;
 /// One encoder.
 #[derive(Clone, Debug)]
 pub struct As5048a {
-    /// Its magnet's angle, counts.
+    /// Angle of the magnet, counts.
     pub angle: u16,
-    /// Magnet too weak (bit 11), too strong (10), overflow (9), compensation finished (8), gain.
+    /// Diagnostics: magnet too weak (bit 11), too strong (10), overflow (9), compensation finished
+    /// (8), gain.
     pub diagnostics: u16,
-    /// Its lines are cut and read low (`Some(false)`) or high.
+    /// Set if the lines are cut; they then read low (`Some(false)`) or high (`Some(true)`).
     pub dead: Option<bool>,
-    /// Errors on its wires, in both directions.
+    /// Bit errors on the wires, in both directions.
     pub bit_errors: BitErrors,
     violations: Vec<&'static str>,
     /// Errors since they were last read.
@@ -47,7 +49,7 @@ impl Default for As5048a {
     fn default() -> Self {
         Self {
             angle: 0,
-            // Offset compensation finished, gain in the middle.
+            // Offset compensation finished, gain at mid-scale.
             diagnostics: 0x0180,
             dead: None,
             bit_errors: BitErrors::default(),

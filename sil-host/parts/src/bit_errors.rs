@@ -1,17 +1,18 @@
 //! Bit errors on a wire.
 
-/// Flips bits at random, the same in every run.
+/// Flips bits at random but repeatably.
 #[derive(Clone, Debug, Default)]
 pub struct BitErrors {
     state: u64,
-    /// Of 2^32.
+    /// Probability of a flip, in units of 2⁻³².
     threshold: u32,
-    /// Bits flipped so far.
+    /// Number of bits flipped.
     pub count: u64,
 }
 
 impl BitErrors {
-    /// Every bit with this probability, from this seed.
+    /// Flips every bit with this probability; the random numbers start from
+    /// `seed`.
     pub fn new(probability: f64, seed: u64) -> Self {
         Self {
             state: seed.wrapping_mul(2).wrapping_add(1),
@@ -20,12 +21,12 @@ impl BitErrors {
         }
     }
 
-    /// What arrives of a bit.
+    /// Returns the bit that arrives.
     pub fn pass(&mut self, bit: bool) -> bool {
         if self.threshold == 0 {
             return bit;
         }
-        // Knuth's linear congruential generator; its upper half.
+        // Knuth's linear congruential generator; its upper half is used.
         self.state = self
             .state
             .wrapping_mul(6_364_136_223_846_793_005)

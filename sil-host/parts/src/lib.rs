@@ -1,7 +1,8 @@
-//! The sensors' chips, modelled from their data sheets down to the bits on their wires, timing included.
+//! Models of the sensors' chips from their data sheets, down to the bits on the wires and their
+//! timing.
 //!
-//! - [`As5048a`], [`Mcp3304`]: the parts, on a SPI bus
-//! - [`BitErrors`]: disturbs what they send and receive
+//! - [`As5048a`], [`Mcp3304`]: the parts, on an SPI bus
+//! - [`BitErrors`]: disturbs the bits on their wires
 //! - [`wires`]: the parts behind `embedded-hal`, for drivers that run on a PC
 
 mod as5048a;
@@ -19,34 +20,35 @@ pub type Picoseconds = u64;
 /// One second.
 pub const SECOND: Picoseconds = 1_000_000_000_000;
 
-/// One transfer on a SPI bus, seen from the master.
+/// One transfer on an SPI bus, as seen by the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Transfer {
-    /// What the master sends.
+    /// Word sent by the master.
     pub value: u16,
-    /// Its length.
+    /// Length of the word, bits.
     pub bits: u8,
     /// Clock on the wire, Hz.
     pub hz: u64,
-    /// Clock idles high.
+    /// Whether the clock idles high.
     pub idles_high: bool,
-    /// Data are taken at the clock's second edge.
+    /// Whether data are sampled at the clock's second edge.
     pub second_edge: bool,
-    /// When its first bit was clocked.
+    /// Time of the first clock edge.
     pub start: Picoseconds,
 }
 
 /// A part with a select line, low for selected.
 pub trait SpiPart {
-    /// The select line goes low.
+    /// Handles the falling edge of the select line.
     fn select(&mut self, now: Picoseconds);
 
-    /// The select line goes high.
+    /// Handles the rising edge of the select line.
     fn deselect(&mut self, now: Picoseconds);
 
-    /// Bits pass while selected; `now` is their end. What the part sends.
+    /// Transfers a word while the part is selected and returns the part's answer; `now` is the end
+    /// of the transfer.
     fn transfer(&mut self, transfer: &Transfer, now: Picoseconds) -> u16;
 
-    /// Limits of the data sheet that the master has broken.
+    /// Returns the data-sheet limits that the master has violated.
     fn violations(&self) -> &[&'static str];
 }

@@ -5,27 +5,27 @@ use crate::{BitErrors, Picoseconds, SpiPart, Transfer};
 /// Fastest clock at 5 V, Hz.
 const FASTEST_HZ: u64 = 2_100_000;
 
-/// Select low to first rising edge: 100 ns.
+/// Minimum time from select low to the first rising edge: 100 ns.
 const SELECT_SETUP: Picoseconds = 100_000;
 
-/// Select high between two conversions: 475 ns.
+/// Minimum time of select high between two conversions: 475 ns.
 const SELECT_HIGH: Picoseconds = 475_000;
 
 /// One converter.
 #[derive(Clone, Debug, Default)]
 pub struct Mcp3304 {
-    /// Voltages of its channels, counts of 1/4096 of the reference.
+    /// Voltages of the channels, counts of 1/4096 of the reference.
     pub channels: [i32; 8],
-    /// Its lines are cut and read low (`Some(false)`) or high.
+    /// Set if the lines are cut; they then read low (`Some(false)`) or high (`Some(true)`).
     pub dead: Option<bool>,
-    /// Errors on its wires, in both directions.
+    /// Bit errors on the wires, in both directions.
     pub bit_errors: BitErrors,
     violations: Vec<&'static str>,
-    /// Results since the start, the last sixteen of them.
+    /// The last sixteen results.
     pub conversions: Vec<i32>,
-    /// Bits of the command after its start bit.
+    /// Bits of the command after the start bit.
     command: u8,
-    /// Bits since the start bit, it included.
+    /// Number of bits since and including the start bit.
     clocked: u8,
     conversion: u16,
     selected: Option<Picoseconds>,
@@ -40,11 +40,11 @@ impl Mcp3304 {
         }
     }
 
-    /// 13 bits, two's complement, of the channel or pair that was asked for.
+    /// Returns the 13-bit two's complement result of the selected channel or pair.
     fn convert(&mut self) -> u16 {
         let channel = usize::from(self.command & 7);
         let value = if self.command & 8 != 0 {
-            // Single-ended: nothing below ground.
+            // Single-ended inputs cannot go below ground.
             self.channels[channel].clamp(0, 4095)
         } else {
             (self.channels[channel] - self.channels[channel ^ 1]).clamp(-4096, 4095)
@@ -98,7 +98,8 @@ impl SpiPart for Mcp3304 {
                     }
                     output = match clocks {
                         0..=5 => true,
-                        // Null bit, sign, twelve bits; then it repeats them backwards.
+                        // Null bit, sign, twelve bits; then the converter repeats them in reverse
+                        // order.
                         6 => false,
                         7..=19 => self.conversion >> (19 - clocks) & 1 != 0,
                         _ => false,

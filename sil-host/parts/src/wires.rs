@@ -10,17 +10,17 @@ use embedded_hal::spi::{self, SpiBus};
 
 use crate::{Picoseconds, SECOND, SpiPart, Transfer};
 
-/// A virtual clock; copies of it show the same time.
+/// A virtual clock; all copies show the same time.
 #[derive(Clone, Debug, Default)]
 pub struct Clock(Rc<Cell<Picoseconds>>);
 
 impl Clock {
-    /// Present time.
+    /// Returns the present time.
     pub fn now(&self) -> Picoseconds {
         self.0.get()
     }
 
-    /// Lets time pass.
+    /// Advances the clock.
     pub fn pass(&self, time: Picoseconds) {
         self.0.set(self.0.get() + time);
     }
@@ -32,16 +32,16 @@ impl DelayNs for Clock {
     }
 }
 
-/// A part that its owner and its wires share.
+/// A part shared by its owner and its wires.
 pub type SharedPart<P> = Rc<RefCell<P>>;
 
-/// A part and whether it is selected.
+/// A part, and whether it is selected.
 struct Slot<P> {
     part: SharedPart<P>,
     selected: Rc<Cell<bool>>,
 }
 
-/// A SPI bus with parts on it.
+/// An SPI bus with parts on it.
 pub struct ModelledBus<P> {
     clock: Clock,
     hz: u64,
@@ -50,7 +50,7 @@ pub struct ModelledBus<P> {
 }
 
 impl<P: SpiPart> ModelledBus<P> {
-    /// A bus that idles low, at this rate; `second_edge` for mode 1.
+    /// Creates a bus whose clock idles low, at this rate; `second_edge` for mode 1.
     pub fn new(clock: &Clock, hz: u64, second_edge: bool) -> Self {
         Self {
             clock: clock.clone(),
@@ -60,7 +60,7 @@ impl<P: SpiPart> ModelledBus<P> {
         }
     }
 
-    /// Puts a part on the bus; its select pin, high.
+    /// Connects a part to the bus and returns its select pin, which is high.
     pub fn attach(&mut self, part: &SharedPart<P>) -> SelectPin<P> {
         let selected = Rc::new(Cell::new(false));
         self.places.push(Slot {
@@ -85,7 +85,7 @@ impl<P: SpiPart> ModelledBus<P> {
         };
         self.clock.pass(8 * SECOND / self.hz);
         let now = self.clock.now();
-        // Nobody drives the line: it is pulled up.
+        // No part drives the line: it is pulled up.
         let selected = self.places.iter().filter(|it| it.selected.get());
         selected.fold(u8::MAX, |line, place| {
             line & place.part.borrow_mut().transfer(&transfer, now) as u8

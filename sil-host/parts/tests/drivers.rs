@@ -1,4 +1,5 @@
-//! The drivers read the parts: every value, within the data sheets' limits, disturbed or not.
+//! The drivers read every value from the chip models, within the limits of the data sheets, with
+//! and without disturbances.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -67,7 +68,7 @@ fn a_disturbed_encoder_is_read_again_in_the_same_tick() {
 }
 
 #[test]
-fn dead_lines_give_no_reading_or_one_that_is_known_as_dead() {
+fn dead_lines_give_no_reading_or_a_recognisably_dead_one() {
     let (mut driver, parts) = encoders();
     parts[0].borrow_mut().dead = Some(true);
     parts[1].borrow_mut().dead = Some(false);
@@ -81,7 +82,7 @@ fn dead_lines_give_no_reading_or_one_that_is_known_as_dead() {
 }
 
 #[test]
-fn a_missing_magnet_is_noticed() {
+fn a_missing_magnet_is_detected() {
     let (mut driver, parts) = encoders();
     for _ in 0..200 {
         let _ = driver.read(encoders::BITS);
@@ -99,9 +100,9 @@ fn a_missing_magnet_is_noticed() {
     assert!(!driver.diagnostics()[0].unwrap().is_healthy());
 }
 
-/// One bit in ten thousand is flipped, on the way to the parts and back.
+/// One bit in ten thousand is flipped, in both directions.
 #[test]
-fn with_bit_errors_a_reading_is_right_or_lost() {
+fn with_bit_errors_a_reading_is_correct_or_missing() {
     let (mut driver, parts) = encoders();
     let (mut force_driver, force_part) = force_cell();
     for (seed, part) in parts.iter().enumerate() {

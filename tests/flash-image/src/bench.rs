@@ -17,21 +17,21 @@ pub const FORCE_BITS: u8 = 13;
 /// Ticks before the switch is closed.
 const BEFORE_ENABLE: u32 = 100;
 
-/// Ticks from one sign of the host to the next.
+/// Ticks between two alive messages of the host.
 const ALIVE_TICKS: u32 = 50;
 
-/// A board that controls a simulated arm by its own sensors.
+/// A board that controls a simulated arm with its own sensors.
 pub struct BoardBench {
     /// The board.
     pub board: FlashedBoard,
     /// The arm.
     pub simulation: Simulation,
     statistics: Statistics,
-    /// What the sensors were last given.
+    /// Newest frame of the simulated sensors.
     pub frame: SensorFrame,
     period: Picoseconds,
     ticks: u32,
-    /// Whether the host says that it is there.
+    /// Whether the host sends alive messages.
     pub host_is_there: bool,
     waits: u32,
     /// Whether [`Bench::tick`] closes the switch of the safety chain after a while.
@@ -40,23 +40,23 @@ pub struct BoardBench {
     is_held: bool,
 }
 
-/// A bench at one instant.
+/// State of a bench at one instant.
 pub struct BenchSnapshot {
     board: BoardSnapshot,
     simulation: Simulation,
     frame: SensorFrame,
 }
 
-/// A built-in scenario for this board's converters.
+/// Loads a built-in scenario with this board's converters.
 ///
 /// # Panics
-/// If there is none of this name.
+/// If there is no scenario of this name.
 pub fn scenario(name: &str) -> Scenario {
     let overrides = [format!("converters.force.bits={FORCE_BITS}")];
     Scenario::load(name, &overrides).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A scenario's configuration as it is sent.
+/// Encodes a scenario's configuration for the board.
 ///
 /// # Panics
 /// If it cannot be encoded.
@@ -66,15 +66,16 @@ pub fn encoded(scenario: &Scenario) -> Vec<u8> {
 }
 
 impl BoardBench {
-    /// Booted and configured for the arm on the board's own sensors, not enabled.
+    /// Creates a bench with a board that is booted and configured for the arm on its own sensors,
+    /// but not enabled.
     pub fn new(scenario: &Scenario) -> Self {
         Self::with_board(scenario, FlashedBoard::booted())
     }
 
-    /// The same with a board that has booted.
+    /// Creates a bench with a board that has booted.
     ///
     /// # Panics
-    /// If the scenario is out of range, or the image refuses it.
+    /// If the scenario is out of range, or the image rejects it.
     pub fn with_board(scenario: &Scenario, board: FlashedBoard) -> Self {
         let mut bench = Self::without_configuration(scenario, board);
         bench.host_is_there = true;
@@ -125,8 +126,8 @@ impl BoardBench {
         wiring.force.channels[3] = middle;
     }
 
-    /// Lets the image control one tick. The switch is closed after a while; the arm is held until it is
-    /// first driven.
+    /// Runs one control tick of the image. Closes the switch after a while; holds the arm until it
+    /// is first driven.
     pub fn tick(&mut self) {
         self.wait_for_tick();
         self.ticks += 1;
@@ -153,10 +154,10 @@ impl BoardBench {
         self.present();
     }
 
-    /// Number of the last tick that the image has answered; waits for the next one.
+    /// Waits for the next tick and returns the number of the last tick that the image has answered.
     pub fn ticks_answered(&mut self) -> u32 {
         self.wait_for_tick();
-        // Long enough for its answer on the line.
+        // Long enough for the answer on the line.
         self.board.machine.run_for(self.period / 5 * 2);
         let mut answered = 0;
         while let Some(response) = self.board.response(0) {
@@ -167,13 +168,13 @@ impl BoardBench {
         answered
     }
 
-    /// Whether the switch of the safety chain was closed by [`BoardBench::tick`].
+    /// Returns whether [`BoardBench::tick`] has closed the switch of the safety chain.
     pub fn switch_is_closed(&self) -> bool {
         self.ticks >= BEFORE_ENABLE
     }
 
-    /// Runs until half a period after the next interrupt of the control timer, or two periods. The host
-    /// says now and then that it is there.
+    /// Runs until half a period after the next interrupt of the control timer, or for two periods.
+    /// The host sends alive messages meanwhile.
     pub fn wait_for_tick(&mut self) {
         self.waits += 1;
         if self.host_is_there && self.waits.is_multiple_of(ALIVE_TICKS) {
@@ -185,7 +186,7 @@ impl BoardBench {
         machine.run_for(next + self.period / 2 - machine.now());
     }
 
-    /// Runs ticks until the arm is driven and the torque is not zero.
+    /// Runs ticks until the arm is driven with a non-zero torque.
     ///
     /// # Panics
     /// If that does not happen within 200 ticks.
@@ -203,7 +204,8 @@ impl BoardBench {
         panic!("the arm is not driven: {:?}", self.board.torque());
     }
 
-    /// Time until the torque is off, if it is by the end of the second tick that begins from now on.
+    /// Returns the time until the torque is off; `None` if it is still on at the end of the second
+    /// tick from now.
     pub fn time_until_off(&mut self) -> Option<Picoseconds> {
         let start = self.board.machine.now();
         let next = self.board.machine.chip().next_tick();
@@ -217,7 +219,7 @@ impl BoardBench {
         Some(self.board.machine.now() - start)
     }
 
-    /// Whether the torque stays off for so many ticks.
+    /// Returns whether the torque stays off for this number of ticks.
     pub fn stays_off(&mut self, ticks: u32) -> bool {
         (0..ticks).all(|_| {
             self.wait_for_tick();
@@ -225,7 +227,7 @@ impl BoardBench {
         })
     }
 
-    /// Checks that the torque stays off for so many ticks.
+    /// Checks that the torque stays off for this number of ticks.
     ///
     /// # Panics
     /// If it does not.
@@ -233,7 +235,7 @@ impl BoardBench {
         assert!(self.stays_off(ticks), "{:?}", self.board.torque());
     }
 
-    /// Everything, to come back to.
+    /// Returns the complete state.
     pub fn snapshot(&self) -> BenchSnapshot {
         BenchSnapshot {
             board: self.board.snapshot(),
@@ -242,7 +244,7 @@ impl BoardBench {
         }
     }
 
-    /// Comes back to a snapshot.
+    /// Restores a snapshot.
     pub fn restore(&mut self, snapshot: &BenchSnapshot) {
         self.board.restore(&snapshot.board);
         self.simulation = snapshot.simulation.clone();
@@ -254,7 +256,7 @@ impl BoardBench {
         self.board.machine.chip_mut().drive_pin(pin, level);
     }
 
-    /// Runs this many milliseconds without the arm moving.
+    /// Runs for this many milliseconds while the arm stays fixed.
     pub fn run_ms(&mut self, milliseconds: u64) {
         self.board.machine.run_for(milliseconds * MILLISECOND);
     }

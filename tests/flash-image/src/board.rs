@@ -1,4 +1,4 @@
-//! The board as it is wired, seen from outside: sensors, switches, torque stages, serial line.
+//! The wired board as seen from outside: sensors, switches, torque stages, serial line.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ pub const RESET: Pin = (2, 1);
 const ENCODER_SELECTS: [Pin; 2] = [(1, 6), (1, 7)];
 const FORCE_SELECT: Pin = (1, 12);
 
-/// Time of a byte on the serial line.
+/// Duration of a byte on the serial line.
 const BYTE: Picoseconds = 10 * SECOND / 921_600;
 
 /// The parts on the pins.
@@ -32,7 +32,7 @@ pub struct Wiring {
     /// Converter of the force cell.
     pub force: Mcp3304,
     selected: [bool; 3],
-    /// When the pin of the torque stages last went low or was let go, and is still so.
+    /// Level at which the image drives the torque stages' pin; `None` while the pin floats.
     pub stages: Option<bool>,
 }
 
@@ -44,7 +44,7 @@ impl Wiring {
         }
     }
 
-    /// Data-sheet limits that the image has broken.
+    /// Returns the data-sheet limits that the image has violated.
     pub fn violations(&self) -> Vec<&'static str> {
         let encoders = self.encoders.iter().flat_map(|it| it.violations());
         encoders.chain(self.force.violations()).copied().collect()
@@ -87,23 +87,23 @@ impl Outside for Wiring {
     }
 }
 
-/// What the torque stages get.
+/// Inputs of the torque stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Torque {
-    /// Whether the stages are enabled; a pin that nothing drives is `None`.
+    /// Whether the stages are enabled; `None` for a floating pin.
     pub enabled: Option<bool>,
-    /// The converter's codes, less the one without torque.
+    /// Codes of the converter, relative to the code for zero torque.
     pub counts: [i32; 2],
 }
 
 impl Torque {
-    /// Whether the image holds the stages off.
+    /// Returns whether the image holds the stages off.
     pub fn is_off(&self) -> bool {
         self.enabled == Some(false)
     }
 }
 
-/// A board at one instant.
+/// State of a board at one instant.
 pub struct BoardSnapshot {
     machine: MachineSnapshot<Stm32f4<Wiring>>,
     inbox: Inbox,
@@ -111,25 +111,25 @@ pub struct BoardSnapshot {
     line_free: Picoseconds,
 }
 
-/// A board with the image in its flash, powered, on a bench.
+/// A powered board on a bench with the image in its flash.
 pub struct FlashedBoard {
     /// The microcontroller.
     pub machine: Machine<Stm32f4<Wiring>>,
     inbox: Inbox,
     heard: usize,
-    /// The line to the board is busy until then.
+    /// Time until which the line to the board is busy.
     line_free: Picoseconds,
 }
 
-/// The library, from `PAINLEVE_UNICORN` or where `cargo xtask setup` puts it.
+/// Returns the path of the library: `PAINLEVE_UNICORN`, or where `cargo xtask setup` installs it.
 ///
 /// # Panics
-/// If it is not there.
+/// If it is not installed.
 pub fn library() -> PathBuf {
     if let Some(path) = std::env::var_os("PAINLEVE_UNICORN") {
         return path.into();
     }
-    // One folder is named after Python's version.
+    // One folder is named after the version of Python.
     let versions = std::fs::read_dir(workspace().join("target/unicorn/lib"));
     let mut libraries = versions.into_iter().flatten().flatten().map(|version| {
         let packages = version.path().join("site-packages");
@@ -140,7 +140,7 @@ pub fn library() -> PathBuf {
         .unwrap_or_else(|| panic!("Unicorn is not installed: run `cargo xtask setup`"))
 }
 
-/// The image, from `PAINLEVE_F405` or where `cargo xtask build-fw` puts it.
+/// Returns the path of the image: `PAINLEVE_F405`, or where `cargo xtask build-fw` writes it.
 pub fn image() -> PathBuf {
     std::env::var_os("PAINLEVE_F405").map_or_else(
         || workspace().join("target/thumbv7em-none-eabihf/firmware/painleve-f405"),
@@ -159,7 +159,7 @@ impl Default for FlashedBoard {
 }
 
 impl FlashedBoard {
-    /// Powered, with a healthy arm that is not enabled; nothing has been executed yet.
+    /// Creates a powered board with a healthy arm that is not enabled; nothing has been executed.
     pub fn with_oscillator(watchdog_hz: u64) -> Self {
         let mut chip = Stm32f4::new(Wiring::default(), watchdog_hz);
         chip.drive_pin(ENABLE, Some(false));
@@ -172,7 +172,7 @@ impl FlashedBoard {
         }
     }
 
-    /// Powered, booted and idle.
+    /// Creates a powered board that has booted and is idle.
     ///
     /// # Panics
     /// If the image was reset meanwhile.
@@ -183,12 +183,12 @@ impl FlashedBoard {
         board
     }
 
-    /// The parts on the pins.
+    /// Returns the parts on the pins.
     pub fn wiring(&mut self) -> &mut Wiring {
         &mut self.machine.chip_mut().outside
     }
 
-    /// What the torque stages get.
+    /// Returns the inputs of the torque stages.
     pub fn torque(&self) -> Torque {
         let chip = self.machine.chip();
         let enabled = match chip.pin(STAGES) {
@@ -201,7 +201,7 @@ impl FlashedBoard {
         }
     }
 
-    /// Everything, to come back to.
+    /// Returns the complete state.
     pub fn snapshot(&self) -> BoardSnapshot {
         BoardSnapshot {
             machine: self.machine.snapshot(),
@@ -211,7 +211,7 @@ impl FlashedBoard {
         }
     }
 
-    /// Comes back to a snapshot.
+    /// Restores a snapshot.
     pub fn restore(&mut self, snapshot: &BoardSnapshot) {
         self.machine.restore(&snapshot.machine);
         self.inbox = snapshot.inbox.clone();
@@ -224,7 +224,7 @@ impl FlashedBoard {
         self.machine.chip_mut().drive_pin(ENABLE, Some(closed));
     }
 
-    /// Why the microcontroller was reset since power came up.
+    /// Returns the causes of all resets since power-up.
     pub fn resets(&self) -> Vec<Reset> {
         self.machine
             .resets
@@ -234,7 +234,7 @@ impl FlashedBoard {
             .collect()
     }
 
-    /// Puts bytes on the line to the board, behind those on their way.
+    /// Queues bytes on the line to the board.
     pub fn send_bytes(&mut self, bytes: &[u8]) {
         let start = self.machine.now().max(self.line_free);
         let usart = &mut self.machine.chip_mut().usart;
@@ -246,7 +246,7 @@ impl FlashedBoard {
         self.line_free = at;
     }
 
-    /// Puts bytes on the line with so much time from one to the next.
+    /// Queues bytes on the line with a given pause between them.
     pub fn send_slowly(&mut self, bytes: &[u8], apart: Picoseconds) {
         let mut at = self.machine.now().max(self.line_free);
         for byte in bytes {
@@ -267,7 +267,7 @@ impl FlashedBoard {
         self.send_bytes(bytes);
     }
 
-    /// Sends a configuration; the bytes come from postcard.
+    /// Sends a configuration encoded with postcard.
     pub fn configure(&mut self, source: FrameSource, configuration: &[u8]) -> Option<Response> {
         self.send(&Request::Configure {
             build: BUILD,
@@ -301,7 +301,7 @@ impl FlashedBoard {
         }
     }
 
-    /// The next response, if it comes within `limit`.
+    /// Returns the next response, if it arrives within `limit`.
     pub fn response(&mut self, limit: Picoseconds) -> Option<Response> {
         let end = self.machine.now() + limit;
         loop {
@@ -320,7 +320,7 @@ impl FlashedBoard {
         }
     }
 
-    /// Sends a frame; the answer, if it comes within three milliseconds.
+    /// Sends a frame and returns the answer, if it arrives within three milliseconds.
     pub fn exchange(&mut self, frame: &SensorFrame) -> Option<ActuatorFrame> {
         self.send(&Request::Sensor(*frame));
         match self.response(3 * MILLISECOND) {

@@ -1,13 +1,14 @@
-//! Runs the very image that is flashed, instruction by instruction, on a modelled board.
+//! Runs the image that is flashed, unchanged and instruction by instruction, on a modelled board.
 //!
 //! - [`unicorn`]: executes instructions
 //! - [`machine`]: exceptions, sleep, resets, time
-//! - [`stm32f4`]: the microcontroller's peripherals; the sensors on its buses are [`painleve_parts`]
+//! - [`stm32f4`]: the microcontroller's peripherals; the sensors on its buses are in
+//!   [`painleve_parts`]
 //! - [`board`]: the board's wiring, the host's end of its serial line, the arm's torques
 //! - [`bench`]: the board with the simulated arm on its sensors and stages
 //!
-//! Time is counted in instructions: each takes [`machine::CYCLES_PER_INSTRUCTION`] of the clock that the
-//! image has set up. It is no measure of how long the image takes on silicon.
+//! Time is counted in instructions: each takes [`machine::CYCLES_PER_INSTRUCTION`] of the clock
+//! that the image has configured. It does not measure the time on silicon.
 
 pub mod bench;
 pub mod board;

@@ -10,59 +10,59 @@ use crate::Picoseconds;
 use crate::system_control::{Exception, HARD_FAULT, SystemControl};
 use crate::unicorn::{Processor, Register, Surroundings, Unicorn};
 
-/// What an instruction takes, in cycles of the processor's clock: on the safe side for code in flash
-/// behind the accelerator. Nothing that a test asserts depends on its exact value.
+/// Cycles per instruction, a conservative value for code in flash behind the accelerator. No
+/// assertion depends on its exact value.
 pub const CYCLES_PER_INSTRUCTION: u64 = 2;
 
 /// Return address of an exception whose frame holds floating-point registers.
 const RETURN_TO_HANDLER: u32 = 0xffff_ffe1;
 const RETURN_TO_THREAD: u32 = 0xffff_ffe9;
 
-/// No memory is up here: who jumps there returns from an exception.
+/// There is no memory at these addresses: a jump to them returns from an exception.
 const EXCEPTION_RETURN: u32 = 0xffff_ff00;
 
-/// Words of such a frame.
+/// Number of words of such a frame.
 const FRAME_WORDS: usize = 26;
 
-/// The microcontroller's peripherals, with what is on its pins.
+/// The microcontroller's peripherals, with the parts on its pins.
 pub trait Chip: Clone {
     /// Start and length of its flash.
     const FLASH: (u32, usize);
     /// Start and length of its RAM.
     const RAM: (u32, usize);
 
-    /// Everything as after a reset, for this reason.
+    /// Resets the peripherals for the given cause.
     fn reset(&mut self, reset: Reset, now: Picoseconds);
 
-    /// A load from a peripheral.
+    /// Returns the value of a load from a peripheral.
     fn read(&mut self, address: u32, size: u32, now: Picoseconds) -> u32;
 
-    /// A store to a peripheral.
+    /// Performs a store to a peripheral.
     fn write(&mut self, address: u32, size: u32, value: u32, now: Picoseconds);
 
-    /// Lets happen what is due, with access to memory for DMA.
+    /// Performs all due events, with access to memory for DMA.
     fn advance(&mut self, now: Picoseconds, memory: &Processor);
 
-    /// When something happens next by itself.
+    /// Returns the time of the next event.
     fn next_event(&self) -> Picoseconds;
 
-    /// Interrupt lines, one bit each.
+    /// Returns the interrupt lines, one bit each.
     fn interrupt_lines(&self) -> u128;
 
-    /// Takes the wish for a non-maskable interrupt.
+    /// Takes a pending non-maskable interrupt.
     fn take_nmi(&mut self) -> bool;
 
-    /// Whether it is to be reset.
+    /// Returns whether a reset is pending.
     fn wants_reset(&self) -> bool;
 
-    /// Takes the wish for a reset.
+    /// Takes a pending reset.
     fn take_reset(&mut self) -> Option<Reset>;
 
-    /// The processor's clock, Hz; 0 if it stands still.
+    /// Returns the processor's clock, Hz; 0 if it has stopped.
     fn core_hz(&self) -> u64;
 }
 
-/// Why a microcontroller was reset.
+/// Cause of a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reset {
     /// Power came up.
@@ -71,7 +71,7 @@ pub enum Reset {
     BrownOut,
     /// The independent watchdog was not fed.
     Watchdog,
-    /// The program asked for it.
+    /// The program requested it.
     Software,
     /// The reset pin was low.
     Pin,
@@ -86,7 +86,7 @@ enum Stop {
     Look,
 }
 
-/// Everything of the machine but registers and memory.
+/// The state of the machine except registers and memory.
 #[derive(Clone)]
 struct Core<C> {
     chip: C,
@@ -99,13 +99,13 @@ struct Core<C> {
     next_event: Picoseconds,
     limit: Picoseconds,
     instruction_limit: u64,
-    /// Instructions left of a conditional block, which is not interrupted: Unicorn does not keep the
-    /// block's state.
+    /// Remaining instructions of a conditional block, which is not interrupted because Unicorn does
+    /// not keep the block's state.
     conditional: u32,
     stop: Option<Stop>,
-    /// Addresses of the instructions of a handler, from its first one on, while somebody asks.
+    /// Addresses of the instructions of a traced handler, starting with its first.
     trace: Option<Trace>,
-    /// Something may have changed which exception comes next.
+    /// Whether the next exception may have changed.
     is_dirty: bool,
     candidate: bool,
 }
@@ -114,7 +114,7 @@ struct Core<C> {
 #[derive(Clone, Debug)]
 struct Trace {
     handler: u32,
-    /// The stack pointer before the handler's first instruction, while it runs.
+    /// The stack pointer before the handler's first instruction, while the handler runs.
     stack: Option<u32>,
     now: Vec<u32>,
     done: Vec<Vec<u32>>,
@@ -126,7 +126,8 @@ impl Trace {
         if address == self.handler {
             self.stack = Some(stack);
         } else if self.stack.is_some_and(|before| stack >= before) {
-            // The handler has unwound its frame: what was interrupted, or a handler after it.
+            // The handler has removed its frame: the interrupted program or a tail-chained handler
+            // follows.
             self.stack = None;
             self.done.push(std::mem::take(&mut self.now));
         }
@@ -231,7 +232,7 @@ impl<C: Chip> Surroundings for Core<C> {
     }
 }
 
-/// A machine at one instant.
+/// State of a machine at one instant.
 #[derive(Clone)]
 pub struct MachineSnapshot<C> {
     core: Core<C>,
@@ -241,9 +242,9 @@ pub struct MachineSnapshot<C> {
 }
 
 impl<C> MachineSnapshot<C> {
-    /// Where the program was.
+    /// Returns the program counter.
     pub fn program_counter(&self) -> u32 {
-        // Behind the thirteen numbered registers, stack pointer and link register.
+        // After the thirteen numbered registers, the stack pointer and the link register.
         self.registers[15]
     }
 }
@@ -252,11 +253,11 @@ impl<C> MachineSnapshot<C> {
 pub struct Machine<C: Chip> {
     unicorn: Unicorn<Core<C>>,
     symbols: Vec<(String, u32)>,
-    /// Resets since power came up, the first of them included.
+    /// Resets since power-up, including the first.
     pub resets: Vec<(Picoseconds, Reset)>,
-    /// Hard faults so far.
+    /// Number of hard faults.
     pub hard_faults: u32,
-    /// Where the last one was, and what Unicorn said.
+    /// Address of the last hard fault, and Unicorn's error.
     pub last_fault: Option<(u32, String)>,
 }
 
@@ -278,7 +279,7 @@ fn registers() -> impl Iterator<Item = Register> {
 }
 
 impl<C: Chip> Machine<C> {
-    /// Programs an image and brings the power up; nothing has been executed yet.
+    /// Programs an image and powers the machine up; nothing has been executed.
     ///
     /// # Panics
     /// If image or library cannot be used.
@@ -289,7 +290,7 @@ impl<C: Chip> Machine<C> {
         let mut flash = vec![0xff; C::FLASH.1];
         for segment in elf.segments() {
             let bytes = segment.data().unwrap_or_default();
-            // Initial values lie in flash, behind the code, and are copied by the image.
+            // Initial values are in flash, after the code; the image copies them.
             let at = physical_address(&elf, &segment).wrapping_sub(u64::from(C::FLASH.0)) as usize;
             if let Some(place) = flash.get_mut(at..at + bytes.len()) {
                 place.copy_from_slice(bytes);
@@ -338,29 +339,29 @@ impl<C: Chip> Machine<C> {
         machine
     }
 
-    /// The peripherals.
+    /// Returns the peripherals.
     pub fn chip(&self) -> &C {
         &self.unicorn.surroundings().chip
     }
 
-    /// The peripherals, to change what they see.
+    /// Returns the peripherals, to change their surroundings.
     pub fn chip_mut(&mut self) -> &mut C {
         let core = self.unicorn.surroundings_mut();
         core.is_dirty = true;
         &mut core.chip
     }
 
-    /// Time since power came up.
+    /// Returns the time since power-up.
     pub fn now(&self) -> Picoseconds {
         self.unicorn.surroundings().now
     }
 
-    /// Instructions executed since power came up.
+    /// Returns the number of instructions executed since power-up.
     pub fn instructions(&self) -> u64 {
         self.unicorn.surroundings().instructions
     }
 
-    /// Keeps the addresses of the instructions of a handler from now on.
+    /// Starts recording the addresses of the instructions of a handler.
     pub fn trace(&mut self, handler: u32) {
         self.unicorn.surroundings_mut().trace = Some(Trace {
             handler: handler & !1,
@@ -370,18 +371,18 @@ impl<C: Chip> Machine<C> {
         });
     }
 
-    /// The executions of the traced handler since the last call.
+    /// Returns the executions of the traced handler since the last call.
     pub fn take_traces(&mut self) -> Vec<Vec<u32>> {
         let trace = self.unicorn.surroundings_mut().trace.as_mut();
         trace.map_or_else(Vec::new, |trace| std::mem::take(&mut trace.done))
     }
 
-    /// The program counter.
+    /// Returns the program counter.
     pub fn program_counter(&self) -> u32 {
         self.unicorn.get(Register::PC)
     }
 
-    /// The symbol that contains an address, for messages.
+    /// Returns the symbol that contains an address, for messages.
     pub fn symbol_at(&self, address: u32) -> &str {
         let below = self.symbols.iter().filter(|(_, it)| it & !1 <= address);
         below
@@ -389,7 +390,7 @@ impl<C: Chip> Machine<C> {
             .map_or("?", |(name, _)| name)
     }
 
-    /// Resets the microcontroller; memory keeps what it holds.
+    /// Resets the microcontroller; memory keeps its contents.
     pub fn reset(&mut self, reset: Reset) {
         let core = self.unicorn.surroundings_mut();
         core.chip.reset(reset, core.now);
@@ -414,7 +415,7 @@ impl<C: Chip> Machine<C> {
             .set(Register::PC, u32::from_le_bytes([e, f, g, h]));
     }
 
-    /// Everything, to come back to.
+    /// Returns the complete state.
     pub fn snapshot(&self) -> MachineSnapshot<C> {
         let mut ram = vec![0; C::RAM.1];
         self.unicorn.processor().read_memory(C::RAM.0, &mut ram);
@@ -426,7 +427,7 @@ impl<C: Chip> Machine<C> {
         }
     }
 
-    /// Comes back to a snapshot.
+    /// Restores a snapshot.
     pub fn restore(&mut self, snapshot: &MachineSnapshot<C>) {
         *self.unicorn.surroundings_mut() = snapshot.core.clone();
         self.resets.clone_from(&snapshot.resets);
@@ -438,12 +439,12 @@ impl<C: Chip> Machine<C> {
         }
     }
 
-    /// Runs for this long.
+    /// Runs for a given time.
     pub fn run_for(&mut self, time: Picoseconds) {
         self.run(self.now() + time, u64::MAX);
     }
 
-    /// Runs this many instructions, or until `limit`, if the processor sleeps.
+    /// Runs a number of instructions, or until `limit` if the processor sleeps.
     pub fn run_instructions(&mut self, count: u64, limit: Picoseconds) {
         self.run(self.now() + limit, self.instructions() + count);
     }
@@ -455,8 +456,8 @@ impl<C: Chip> Machine<C> {
         core.is_dirty = true;
     }
 
-    /// Whether an interrupt of this priority (upper bits of a byte, as in its register) would be taken
-    /// now.
+    /// Returns whether an interrupt of this priority (upper bits of a byte, as in its register)
+    /// would be taken now.
     pub fn would_take(&self, interrupt: usize) -> bool {
         let core = self.unicorn.surroundings();
         let mut system = core.system.clone();
@@ -466,22 +467,22 @@ impl<C: Chip> Machine<C> {
         core.conditional == 0 && system.next(primask, basepri, false) == Some(interrupt + 16)
     }
 
-    /// Raises a hard fault, as an instruction that cannot be executed would.
+    /// Raises a hard fault, as an invalid instruction would.
     pub fn hard_fault(&mut self) {
         self.hard_faults += 1;
         let address = self.program_counter();
         self.enter(HARD_FAULT, address);
     }
 
-    /// Raises an exception whatever the interrupt controller says, as a disturbed one would.
+    /// Raises an exception regardless of the interrupt controller, as a disturbance would.
     pub fn raise(&mut self, exception: Exception) {
         let address = self.program_counter();
         self.enter(exception, address);
     }
 
-    /// Leaves the program in an endless loop without interrupts.
+    /// Puts the program into an endless loop without interrupts.
     pub fn hang(&mut self) {
-        // A branch to itself, in memory that nobody uses.
+        // A branch to itself, in unused memory.
         let place = C::RAM.0 + C::RAM.1 as u32 / 2;
         self.unicorn.processor().write_memory(place, &[0xfe, 0xe7]);
         self.unicorn.surroundings_mut().conditional = 0;
@@ -489,7 +490,7 @@ impl<C: Chip> Machine<C> {
         self.unicorn.set(Register::PC, place);
     }
 
-    /// Address of a symbol.
+    /// Returns the address of a symbol.
     pub fn symbol(&self, name: &str) -> Option<u32> {
         let found = self.symbols.iter().find(|(it, _)| it == name);
         found.map(|(_, address)| *address)
@@ -546,7 +547,7 @@ impl<C: Chip> Machine<C> {
         }
     }
 
-    /// Waits for an interrupt; whether it came before the limit.
+    /// Waits for an interrupt; returns whether it came before the limit.
     fn sleep(&mut self) -> bool {
         loop {
             let core = self.unicorn.surroundings_mut();
@@ -566,7 +567,8 @@ impl<C: Chip> Machine<C> {
         }
     }
 
-    /// Without an instruction; whether the limit has not been reached.
+    /// Lets time pass without executing instructions; returns whether the limit has not been
+    /// reached.
     fn pass_time_to_next_event(&mut self) -> bool {
         let (core, processor) = self.unicorn.split();
         let until = core.next_event.min(core.limit).max(core.now);
@@ -651,7 +653,7 @@ impl<C: Chip> Machine<C> {
     }
 }
 
-/// Where a segment is programmed.
+/// Returns the physical address of a segment.
 fn physical_address(elf: &object::File<'_>, segment: &object::Segment<'_, '_>) -> u64 {
     use object::read::elf::ProgramHeader;
     let object::File::Elf32(file) = elf else {

@@ -1,6 +1,6 @@
-//! The processor's own peripherals: interrupt controller, system control block, cycle counter.
+//! The core peripherals: interrupt controller, system control block, cycle counter.
 
-/// Interrupts beyond the sixteen exceptions.
+/// Number of interrupts, in addition to the sixteen exceptions.
 pub const INTERRUPTS: usize = 96;
 
 /// Number of an exception: 2 NMI, 3 hard fault, 15 SysTick, 16 and up interrupts.
@@ -14,7 +14,7 @@ pub const HARD_FAULT: Exception = 3;
 /// Implemented bits of a priority, from the top of its byte.
 const PRIORITY_MASK: u8 = 0xf0;
 
-/// Registers of the processor's own peripherals.
+/// Registers of the core peripherals.
 #[derive(Clone)]
 pub struct SystemControl {
     enabled: u128,
@@ -24,13 +24,13 @@ pub struct SystemControl {
     system_priorities: [u8; 16],
     /// Exceptions being handled, the innermost last.
     pub active: Vec<Exception>,
-    /// The non-maskable interrupt has been raised.
+    /// Whether a non-maskable interrupt is pending.
     pub nmi_pending: bool,
     /// Address of the vector table.
     pub vector_table: u32,
-    /// A reset was asked for.
+    /// Whether a reset has been requested.
     pub reset_requested: bool,
-    /// Cycle counter: enabled, and cycles at which it was 0.
+    /// Whether the cycle counter is enabled, and the cycle at which it was 0.
     cycle_counter_enabled: bool,
     cycle_counter_zero: u64,
     trace: u32,
@@ -40,7 +40,7 @@ pub struct SystemControl {
 }
 
 impl SystemControl {
-    /// As after a reset.
+    /// Creates the registers in their reset state.
     pub fn new(vector_table: u32) -> Self {
         Self {
             enabled: 0,
@@ -61,13 +61,13 @@ impl SystemControl {
         }
     }
 
-    /// Takes note of the peripherals' interrupt lines.
+    /// Records the peripherals' interrupt lines.
     pub fn set_lines(&mut self, lines: u128) {
         self.latched |= lines & !self.lines;
         self.lines = lines;
     }
 
-    /// Raises an interrupt as a peripheral would, whatever its line says.
+    /// Raises an interrupt as a peripheral would, regardless of its line.
     pub fn pend(&mut self, interrupt: usize) {
         self.latched |= 1 << interrupt;
     }
@@ -78,7 +78,7 @@ impl SystemControl {
         self.enabled & (self.latched | (self.lines & !active))
     }
 
-    /// Whether something would wake the processor.
+    /// Returns whether any exception would wake the processor.
     pub fn wakes(&self) -> bool {
         self.nmi_pending || self.pending() != 0
     }
@@ -92,13 +92,13 @@ impl SystemControl {
         }
     }
 
-    /// Priority at which the processor runs, masks left out: 256 for none.
+    /// Returns the priority at which the processor runs, without masks; 256 for none.
     pub fn present_priority(&self) -> i32 {
         let active = self.active.iter().map(|it| self.priority(*it));
         active.min().unwrap_or(256)
     }
 
-    /// The exception to be taken, if masks and present priority allow it.
+    /// Returns the next exception, if masks and present priority allow it.
     pub fn next(&self, primask: bool, basepri: u8, faultmask: bool) -> Option<Exception> {
         if self.nmi_pending && self.present_priority() > -2 {
             return Some(NMI);
@@ -124,7 +124,7 @@ impl SystemControl {
         (priority < self.present_priority().min(mask)).then_some(exception)
     }
 
-    /// Begins an exception.
+    /// Enters an exception.
     pub fn enter(&mut self, exception: Exception) {
         if exception == NMI {
             self.nmi_pending = false;
@@ -135,12 +135,12 @@ impl SystemControl {
         self.active.push(exception);
     }
 
-    /// Ends the innermost exception.
+    /// Leaves the innermost exception.
     pub fn leave(&mut self) -> Option<Exception> {
         self.active.pop()
     }
 
-    /// A load of a word.
+    /// Handles a load of a word.
     pub fn read(&self, address: u32, cycles: u64) -> u32 {
         let word = |bits: u128, first: u32| (bits >> ((address - first) * 8)) as u32;
         match address {
@@ -181,7 +181,7 @@ impl SystemControl {
         }
     }
 
-    /// A store of a word; of a byte for priorities.
+    /// Handles a store of a word, or of a byte for priorities.
     pub fn write(&mut self, address: u32, size: u32, value: u32, cycles: u64) {
         let bits = |first: u32| u128::from(value) << ((address - first) * 8);
         match address {
@@ -189,7 +189,7 @@ impl SystemControl {
                 self.cycle_counter_enabled = value & 1 != 0;
             }
             0xe000_1004 => self.cycle_counter_zero = cycles.wrapping_sub(value.into()),
-            // Lock of the trace unit: none on this processor.
+            // The lock of the trace unit, which this processor lacks.
             0xe000_1fb0 => {}
             0xe000_e100..0xe000_e110 => self.enabled |= bits(0xe000_e100),
             0xe000_e180..0xe000_e190 => self.enabled &= !bits(0xe000_e180),

@@ -1,13 +1,13 @@
 //! The part of [Unicorn](https://www.unicorn-engine.org)'s C interface that runs a Cortex-M4F.
 //!
-//! Unicorn is QEMU's instruction translator without QEMU's machines; it knows neither interrupts nor
-//! peripherals of a Cortex-M, which are modelled in [`machine`](crate::machine).
+//! Unicorn is QEMU's instruction translator without QEMU's machines. It models neither interrupts
+//! nor peripherals of a Cortex-M; [`machine`](crate::machine) does.
 //!
-//! What was weighed: the crate `unicorn-engine` builds QEMU's translator in C with every build of the
-//! workspace and links code under the GPL into a test. The Python package comes prebuilt, but a callback
-//! into Python per instruction is some hundred times slower, and the native controller would be out of
-//! reach. So the library of the Python package is loaded while a test runs: nothing of it is compiled,
-//! linked or shipped, and a build without it succeeds.
+//! Alternatives: the crate `unicorn-engine` builds QEMU's translator in C with every build of the
+//! workspace and links GPL code into a test. With the prebuilt Python package, a callback into
+//! Python per instruction is several hundred times slower, and the native controller is out of
+//! reach. The library of the Python package is therefore loaded while a test runs: none of it is
+//! compiled, linked or shipped, and a build without it succeeds.
 
 #![allow(unsafe_code)] // foreign functions and their callbacks
 
@@ -22,15 +22,15 @@ use libloading::Library;
 type Handle = *mut c_void;
 type Status = i32;
 
-/// What runs beside the processor, called in the middle of an instruction.
+/// The surroundings of the processor, called in the middle of an instruction.
 pub trait Surroundings {
-    /// Called before every instruction; `false` stops in front of it.
+    /// Called before every instruction; `false` stops the run before it.
     fn before_instruction(&mut self, address: u32, processor: &Processor) -> bool;
 
-    /// A load of `size` bytes from a peripheral.
+    /// Returns the value of a load of `size` bytes from a peripheral.
     fn read(&mut self, address: u32, size: u32, processor: &Processor) -> u32;
 
-    /// A store of `size` bytes to a peripheral.
+    /// Performs a store of `size` bytes to a peripheral.
     fn write(&mut self, address: u32, size: u32, value: u32, processor: &Processor);
 }
 
@@ -49,11 +49,11 @@ impl Register {
     pub const FPSCR: Self = Self(6);
     /// Flags, exception number and state of a conditional block.
     pub const XPSR: Self = Self(120);
-    /// 1 while no interrupt is taken.
+    /// 1 while interrupts are masked.
     pub const PRIMASK: Self = Self(123);
-    /// Interrupts of this priority and below wait.
+    /// Masks interrupts of this priority and below.
     pub const BASEPRI: Self = Self(124);
-    /// 1 while not even a hard fault is taken.
+    /// 1 while even hard faults are masked.
     pub const FAULTMASK: Self = Self(126);
     /// Rn, 0 ≤ n ≤ 12.
     pub const fn r(n: i32) -> Self {
@@ -67,7 +67,7 @@ impl Register {
     const FPEXC: Self = Self(4);
 }
 
-/// Why Unicorn does not go on.
+/// Error that stopped Unicorn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnicornError(Status);
 
@@ -99,7 +99,7 @@ type HookAdd = unsafe extern "C" fn(
     ...
 ) -> Status;
 
-/// The functions that are used.
+/// The library's functions in use.
 struct Functions {
     open: unsafe extern "C" fn(i32, i32, *mut Handle) -> Status,
     close: unsafe extern "C" fn(Handle) -> Status,
@@ -113,7 +113,7 @@ struct Functions {
     stop: unsafe extern "C" fn(Handle) -> Status,
     register_read: unsafe extern "C" fn(Handle, i32, *mut c_void) -> Status,
     register_write: unsafe extern "C" fn(Handle, i32, *const c_void) -> Status,
-    /// Unloaded last.
+    /// Declared last, so that it is unloaded last.
     _library: Library,
 }
 
@@ -142,24 +142,24 @@ impl Functions {
     }
 }
 
-/// Registers and memory, also in the middle of a run.
+/// Registers and memory, accessible even during a run.
 pub struct Processor {
     functions: Functions,
     handle: Handle,
 }
 
 impl Processor {
-    /// A register's value.
+    /// Returns a register's value.
     pub fn get(&self, register: Register) -> u32 {
         let mut value = 0_u32;
         let place = (&raw mut value).cast();
-        // SAFETY: every register asked for has four bytes.
+        // SAFETY: all registers in use have four bytes.
         let status = unsafe { (self.functions.register_read)(self.handle, register.0, place) };
         assert_eq!(status, 0, "{register:?}");
         value
     }
 
-    /// Copies memory; `false` if there is none.
+    /// Copies memory; returns `false` for unmapped addresses.
     pub fn read_memory(&self, address: u32, bytes: &mut [u8]) -> bool {
         let (place, length) = (bytes.as_mut_ptr().cast(), bytes.len() as u64);
         // SAFETY: the buffer has this length.
@@ -168,7 +168,7 @@ impl Processor {
         status == 0
     }
 
-    /// Writes memory; `false` if there is none.
+    /// Writes memory; returns `false` for unmapped addresses.
     pub fn write_memory(&self, address: u32, bytes: &[u8]) -> bool {
         let (place, length) = (bytes.as_ptr().cast(), bytes.len() as u64);
         // SAFETY: the buffer has this length.
@@ -178,12 +178,12 @@ impl Processor {
     }
 }
 
-/// What the callbacks reach.
+/// Context of the callbacks.
 struct CallbackContext<S> {
     processor: Processor,
     surroundings: S,
     regions: Vec<Region>,
-    /// What a callback panicked with: nothing unwinds through Unicorn.
+    /// Payload of a panic in a callback; no panic may unwind through Unicorn.
     panic: Option<Box<dyn Any + Send>>,
 }
 
@@ -195,13 +195,13 @@ struct Region {
 
 /// A Cortex-M4F with memory and [`Surroundings`].
 pub struct Unicorn<S> {
-    /// Owned; a raw pointer, because the callbacks use it during a run.
+    /// Owned; a raw pointer because the callbacks use it during a run.
     shared: *mut CallbackContext<S>,
 }
 
 const MODE_THUMB_AND_MCLASS: i32 = 16 | 32;
 const CORTEX_M4: i32 = 9;
-/// Write one argument: the processor's model.
+/// Control code that sets the processor's model.
 const SET_CPU_MODEL: u32 = 7 | 1 << 26 | 1 << 30;
 const HOOK_CODE: i32 = 4;
 
@@ -210,13 +210,13 @@ fn check(status: Status) {
 }
 
 impl<S: Surroundings> Unicorn<S> {
-    /// A processor without memory.
+    /// Creates a processor without memory.
     ///
     /// # Errors
     /// If the library cannot be loaded.
     ///
     /// # Panics
-    /// If it is not Unicorn 2.
+    /// If the library is not Unicorn 2.
     pub fn new(library: &Path, surroundings: S) -> Result<Self, libloading::Error> {
         let functions = Functions::load(library)?;
         let mut handle = std::ptr::null_mut();
@@ -248,7 +248,8 @@ impl<S: Surroundings> Unicorn<S> {
             check(status);
         }
         let mut unicorn = Self { shared };
-        // Full access to the floating-point unit; a program that forgets to ask for it is not found out.
+        // Grants full access to the floating-point unit; a program that fails to request access is
+        // not detected.
         unicorn.set(Register::COPROCESSOR_ACCESS, 0x00f0_0000);
         unicorn.set(Register::FPEXC, 0x4000_0000);
         Ok(unicorn)
@@ -260,10 +261,10 @@ impl<S: Surroundings> Unicorn<S> {
         unsafe { &*self.shared }
     }
 
-    /// Maps memory from which may be executed.
+    /// Maps executable memory.
     pub fn map(&mut self, address: u32, length: usize) {
         let parts = self.parts();
-        // SAFETY: maps memory of its own.
+        // SAFETY: Unicorn allocates the memory.
         check(unsafe {
             (parts.processor.functions.memory_map)(
                 parts.processor.handle,
@@ -274,10 +275,10 @@ impl<S: Surroundings> Unicorn<S> {
         });
     }
 
-    /// Sends loads and stores of a stretch of addresses to the [`Surroundings`].
+    /// Directs loads and stores of address ranges to the [`Surroundings`].
     pub fn map_peripherals(&mut self, regions: &[(u32, u32)]) {
         let shared = self.shared;
-        // SAFETY: see `parts`; the regions are set once and stay where they are.
+        // SAFETY: see `parts`; the regions are set once and never move.
         let parts = unsafe { &mut *shared };
         assert!(parts.regions.is_empty(), "peripherals are mapped once");
         parts.regions = regions
@@ -304,12 +305,12 @@ impl<S: Surroundings> Unicorn<S> {
         }
     }
 
-    /// Registers and memory.
+    /// Returns registers and memory.
     pub fn processor(&self) -> &Processor {
         &self.parts().processor
     }
 
-    /// A register's value.
+    /// Returns a register's value.
     pub fn get(&self, register: Register) -> u32 {
         self.processor().get(register)
     }
@@ -317,25 +318,25 @@ impl<S: Surroundings> Unicorn<S> {
     /// Sets a register.
     pub fn set(&mut self, register: Register, value: u32) {
         let processor = &self.parts().processor;
-        // Eight bytes, for the registers that Unicorn takes for longer.
+        // Eight bytes, because Unicorn treats some registers as 64-bit.
         let value = u64::from(value);
         let place = (&raw const value).cast();
-        // SAFETY: no register that is set is longer than eight bytes.
+        // SAFETY: no register in use is longer than eight bytes.
         check(unsafe { (processor.functions.register_write)(processor.handle, register.0, place) });
     }
 
-    /// What runs beside the processor, and the processor.
+    /// Returns the surroundings and the processor.
     pub fn split(&mut self) -> (&mut S, &Processor) {
-        // SAFETY: see `parts`; two fields.
+        // SAFETY: see `parts`; two separate fields.
         unsafe { (&mut (*self.shared).surroundings, &(*self.shared).processor) }
     }
 
-    /// What runs beside the processor.
+    /// Returns the surroundings.
     pub fn surroundings(&self) -> &S {
         &self.parts().surroundings
     }
 
-    /// What runs beside the processor.
+    /// Returns the surroundings, mutably.
     pub fn surroundings_mut(&mut self) -> &mut S {
         // SAFETY: see `parts`.
         unsafe { &mut (*self.shared).surroundings }
@@ -344,15 +345,15 @@ impl<S: Surroundings> Unicorn<S> {
     /// Runs from `address` until [`Surroundings::before_instruction`] stops it.
     ///
     /// # Errors
-    /// [`UnicornError`] for what would be a fault.
+    /// [`UnicornError`] for an instruction that would fault.
     pub fn run(&mut self, address: u32) -> Result<(), UnicornError> {
         // SAFETY: only fields are read here; the callbacks use the same pointer.
         let (start, handle) = unsafe {
             let processor = &(*self.shared).processor;
             (processor.functions.start, processor.handle)
         };
-        // SAFETY: callbacks get pointers that live as long as the engine. The low bit says Thumb; no
-        // program gets to `until`.
+        // SAFETY: callbacks receive pointers that live as long as the engine. The low bit selects
+        // Thumb; no program reaches `until`.
         let status = unsafe { start(handle, u64::from(address | 1), 0xffff_fffe, 0, 0) };
         // SAFETY: as in `surroundings_mut`.
         if let Some(panic) = unsafe { (*self.shared).panic.take() } {
@@ -368,7 +369,7 @@ impl<S: Surroundings> Unicorn<S> {
 
 impl<S> Drop for Unicorn<S> {
     fn drop(&mut self) {
-        // SAFETY: made in `new`; the engine is closed before what its callbacks use is freed.
+        // SAFETY: created in `new`; the engine is closed before the callbacks' data is freed.
         unsafe {
             let processor = &(*self.shared).processor;
             (processor.functions.close)(processor.handle);
@@ -377,16 +378,16 @@ impl<S> Drop for Unicorn<S> {
     }
 }
 
-/// Calls the surroundings; a panic stops the run, whose caller goes on with it.
+/// Calls the surroundings; a panic stops the run and is resumed by the caller of the run.
 ///
 /// # Safety
-/// `shared` is what [`Unicorn::new`] has made, and nothing else uses it.
+/// `shared` comes from [`Unicorn::new`], and nothing else uses it.
 unsafe fn call<S, R>(
     shared: *mut CallbackContext<S>,
     otherwise: R,
     work: impl FnOnce(&mut S, &Processor) -> R,
 ) -> R {
-    // SAFETY: the caller's.
+    // SAFETY: guaranteed by the caller.
     let shared = unsafe { &mut *shared };
     let processor = &shared.processor;
     let surroundings = &mut shared.surroundings;
@@ -407,7 +408,7 @@ unsafe extern "C" fn on_code<S: Surroundings>(
     _: u32,
     context: *mut c_void,
 ) {
-    // SAFETY: `context` is what `new` gave; nothing else uses it during a run.
+    // SAFETY: `context` comes from `new`; nothing else uses it during a run.
     unsafe {
         call(
             context.cast::<CallbackContext<S>>(),

@@ -1,5 +1,5 @@
 #![allow(clippy::unwrap_used)]
-//! The image starts on the modelled board and controls a simulated arm as a PC does.
+//! The image starts on the modelled board and controls a simulated arm as on a PC.
 
 use painleve_flash_image::bench::{encoded, scenario};
 use painleve_flash_image::board::FlashedBoard;
@@ -14,7 +14,7 @@ fn the_image_boots_and_waits_with_the_stages_off() {
     assert!(board.torque().is_off());
 }
 
-/// The board's own compiler, arithmetic and serial driver: the same bits.
+/// The board's compiler output, arithmetic and serial driver give the same bits.
 #[test]
 fn frames_over_the_serial_line_are_answered_as_on_a_pc() {
     let scenario = scenario("hybrid-elbow-down");

@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used)]
-//! No tick that is executed costs more than the bound on the control interrupt, by the same model:
-//! closed loops, random frames, and frames searched for the worst tick.
+//! No executed tick exceeds the bound on the control interrupt under the same cost model: in closed
+//! loops, with random frames, and with frames found by a search for the worst tick.
 //!
-//! `PAINLEVE_TICKS` sets how many random frames and how many tries of the search there are.
+//! `PAINLEVE_TICKS` sets the number of random frames and of search steps.
 
 use painleve_bound::image::Image;
 use painleve_bound::loops::Limit;
@@ -17,7 +17,7 @@ use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::message::FrameSource;
 
-/// A generator of numbers that are random enough: SplitMix64 (Steele, Lea, Flood 2014).
+/// SplitMix64 (Steele, Lea, Flood 2014), a simple random number generator.
 struct Random(u64);
 
 impl Random {
@@ -39,7 +39,7 @@ fn tries(otherwise: u64) -> u64 {
     asked.and_then(|it| it.parse().ok()).unwrap_or(otherwise)
 }
 
-/// Executed interrupts against their bound.
+/// Compares executed interrupts with their bound.
 struct BoundCheck<'a> {
     bound: &'a Bound,
     tracer: Tracer<'a>,
@@ -57,7 +57,7 @@ impl<'a> BoundCheck<'a> {
         }
     }
 
-    /// The worst of the interrupts that were executed since the last call.
+    /// Returns the worst of the interrupts executed since the last call.
     fn look(&mut self, board: &mut FlashedBoard) -> Executed {
         let mut worst = Executed::default();
         for addresses in board.machine.take_traces() {
@@ -87,7 +87,7 @@ fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
     let mut watch = BoundCheck::new(&image, &bound);
     run(&mut watch);
     println!(
-        "{} interrupts, worst {} instructions, {} cycles by the model; bound {} cycles, {:.2} times as much",
+        "{} interrupts, worst {} instructions, {} cycles by the model; bound {} cycles, which is {:.2} times as much",
         watch.ticks,
         watch.worst.instructions,
         watch.worst.cycles,
@@ -111,7 +111,7 @@ fn configured(scenario: &Scenario) -> FlashedBoard {
     traced(board)
 }
 
-/// Built-in scenarios, the arm simulated, frames over the line.
+/// Built-in scenarios with a simulated arm and frames over the serial line.
 #[test]
 fn scenarios_stay_below_the_bound() {
     with_bound(|watch| {
@@ -172,7 +172,7 @@ fn mutated(frame: &SensorFrame, random: &mut Random) -> SensorFrame {
     frame
 }
 
-/// Frames of a closed loop, disturbed at random.
+/// Frames of a closed loop with random disturbances.
 #[test]
 fn random_frames_stay_below_the_bound() {
     with_bound(|watch| {
@@ -204,9 +204,10 @@ fn random_frames_stay_below_the_bound() {
     });
 }
 
-/// Hill climbing: from the state before the worst tick of a closed loop, frames that cost more.
+/// Hill climbing: starts in the state before the worst tick of a closed loop and searches for more
+/// expensive frames.
 #[test]
-fn the_worst_frames_that_a_search_finds_stay_below_the_bound() {
+fn the_worst_frames_found_by_a_search_stay_below_the_bound() {
     with_bound(|watch| {
         let mut random = Random(2);
         for name in ["edge", "pid-elbow-down", "capture"] {
@@ -227,7 +228,7 @@ fn the_worst_frames_that_a_search_finds_stay_below_the_bound() {
                     start = (before, frame, cycles);
                 }
             }
-            // A sequence of frames from there: each try disturbs one of them.
+            // A sequence of frames from that state; each attempt disturbs one of them.
             let mut best = vec![start.1; 6];
             for (place, frame) in best.iter_mut().enumerate() {
                 frame.tick = frame.tick.wrapping_add(place as u32);

@@ -1,5 +1,5 @@
-//! The image controls the simulated arm by its own sensors and stages: the same torques as the controller on
-//! a PC that is given the same counts.
+//! The image controls the simulated arm with its own sensors and stages and gives the same torques
+//! as the controller on a PC with the same counts.
 
 #![allow(clippy::unwrap_used)]
 
@@ -10,7 +10,7 @@ use painleve_shared::frame::SensorFrame;
 use painleve_shared::status::SupervisorState;
 
 #[test]
-fn torques_by_the_boards_own_sensors_are_those_of_a_pc() {
+fn the_board_with_its_own_sensors_gives_the_torques_of_a_pc() {
     for name in ["hybrid-elbow-down", "edge"] {
         let scenario = scenario(name);
         let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();

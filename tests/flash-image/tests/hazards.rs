@@ -1,5 +1,5 @@
-//! What can fail on the board, and what takes the torque off: every row of the table of hazards in
-//! docs/flashing.md, executed on the image that is flashed.
+//! Hazards of the board: executes every row of the hazard table in docs/flashing.md on the image
+//! that is flashed.
 
 #![allow(clippy::unwrap_used)]
 
@@ -27,7 +27,8 @@ fn driven() -> BoardBench {
     bench
 }
 
-/// The torque is off by the end of the second tick from now, and stays off, although the switch stays closed.
+/// Checks that the torque is off by the end of the second tick from now and stays off, although the
+/// switch stays closed.
 fn assert_off_in_time(mut bench: BoardBench) {
     let off = bench.time_until_off();
     assert!(off.is_some(), "{:?}", bench.board.torque());
@@ -53,15 +54,16 @@ fn a_simulated_plant_never_switches_the_stages_on() {
         assert!(board.torque().is_off());
         assert_eq!(board.torque().counts, [0; 2]);
     }
-    // Frames stop.
+    // No more frames.
     board.machine.run_for(5000 * MILLISECOND);
     assert!(board.torque().is_off());
     assert_eq!(board.torque().counts, [0; 2]);
 }
 
-/// A tick of the control timer at every instruction of the reconfiguration at which it can come.
+/// Runs a tick of the control timer at every instruction of the reconfiguration at which one is
+/// possible.
 #[test]
-fn a_refused_configuration_leaves_the_torque_off_wherever_a_tick_comes() {
+fn a_refused_configuration_leaves_the_torque_off_at_any_time_of_a_tick() {
     const THREADS: usize = 4;
     let results = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..THREADS)
@@ -76,12 +78,12 @@ fn a_refused_configuration_leaves_the_torque_off_wherever_a_tick_comes() {
     assert!(on.is_empty(), "{on:?}");
 }
 
-/// Tries every `of`-th instant from `share` on; how many these are, and the functions in which a tick left
-/// the torque on.
+/// Tests every `of`-th instant, starting with `share`. Returns their number, and the functions in
+/// which a tick left the torque on.
 fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
     let mut bench = driven();
     let mut bytes = encoded(&scenario(DEFAULT));
-    // The control rate is the first of the configuration.
+    // The control rate is the first field of the configuration.
     bytes[..4].copy_from_slice(&f32::NAN.to_le_bytes());
     let board = &mut bench.board;
     while board.response(0).is_some() {}
@@ -124,11 +126,11 @@ fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
 }
 
 #[test]
-fn the_first_act_is_to_switch_the_stages_off() {
+fn the_first_instructions_switch_the_stages_off() {
     let mut board = FlashedBoard::default();
     board.machine.run_instructions(40, MILLISECOND);
     assert!(board.torque().is_off(), "{:?}", board.torque());
-    // From then on the pin is never high, and never floats for long.
+    // From then on the pin is never high, and floats only briefly.
     let mut floating = 0;
     for _ in 0..100_000 {
         board.machine.run_instructions(1, MILLISECOND);
@@ -163,7 +165,7 @@ fn an_unexpected_interrupt_takes_the_torque_off() {
     assert_off_in_time(bench);
 }
 
-/// Over the whole range of the independent watchdog's oscillator.
+/// Tested over the whole range of the independent watchdog's oscillator.
 #[test]
 fn a_control_timer_that_stops_takes_the_torque_off() {
     for oscillator_hz in [17_000, 32_000, 47_000] {
@@ -203,14 +205,18 @@ fn a_low_supply_takes_the_torque_off() {
     }
 }
 
-/// The host's process has ended, its cable is out.
+/// The host's process has ended, or its cable is disconnected.
 #[test]
-fn a_host_that_is_gone_takes_the_torque_off() {
+fn a_lost_host_takes_the_torque_off() {
     let mut bench = driven();
     for _ in 0..600 {
         bench.tick();
     }
-    assert_eq!(bench.board.torque().enabled, Some(true), "it is there");
+    assert_eq!(
+        bench.board.torque().enabled,
+        Some(true),
+        "the host is there"
+    );
     bench.host_is_there = false;
     for _ in 0..210 {
         bench.wait_for_tick();
@@ -320,7 +326,7 @@ fn the_switch_takes_the_torque_off_and_a_bounce_does_not_put_it_on() {
     assert!(bench.time_until_off().is_some());
     assert!(bench.board.permit_arming());
     for n in 0..40 {
-        // It opens for two ticks at a time.
+        // The switch opens for two ticks at a time.
         bench.board.enable(n % 10 > 1);
         bench.wait_for_tick();
         assert!(bench.board.torque().is_off());
@@ -342,7 +348,7 @@ fn sensors_that_die_take_the_torque_off() {
 }
 
 #[test]
-fn the_image_keeps_the_sensors_data_sheets() {
+fn the_image_respects_the_limits_of_the_data_sheets() {
     let mut bench = driven();
     for _ in 0..200 {
         bench.tick();
@@ -389,7 +395,7 @@ fn nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before() {
             assert!(board.torque().is_off());
         }
     }
-    // Healthy sensors, but the switch was closed all the time.
+    // Healthy sensors, but a switch that has been closed from the start.
     let mut board = FlashedBoard::default();
     board.enable(true);
     board.machine.run_for(20 * MILLISECOND);
@@ -402,7 +408,7 @@ fn nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before() {
 }
 
 #[test]
-fn a_configuration_gets_through_while_the_arm_is_driven() {
+fn a_configuration_is_accepted_while_the_arm_is_driven() {
     let mut bench = driven();
     let response = bench
         .board
@@ -415,12 +421,12 @@ fn a_configuration_gets_through_while_the_arm_is_driven() {
     assert_off_in_time(bench);
 }
 
-/// A debugger has attached to the log, and is gone.
+/// A debugger has attached to the log and then disconnected.
 #[test]
-fn a_log_that_nobody_reads_holds_nothing_up() {
+fn an_unread_log_does_not_block_the_image() {
     let mut bench = driven();
     let control_block = bench.board.machine.symbol("_SEGGER_RTT").unwrap();
-    // Flags of the first channel: block when full.
+    // Flags of the first channel: block if full.
     bench.board.machine.write_word(control_block + 44, 2);
     for n in 0..3000_u32 {
         if n % 10 == 0 {

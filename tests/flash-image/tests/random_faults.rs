@@ -1,9 +1,9 @@
-//! A thousand random faults at random instructions.
+//! Injects a thousand random faults at random instructions.
 
 use painleve_flash_image::bench::{BoardBench, scenario};
 use painleve_parts::BitErrors;
 
-/// Faults drawn.
+/// Number of faults.
 const FAULTS: u32 = 1000;
 
 /// Marsaglia's xorshift.
@@ -48,7 +48,7 @@ impl InjectedFault {
         Self::ForceCellDies,
     ];
 
-    /// Whether the arm has to go on.
+    /// Returns whether the arm must continue.
     fn is_survived(self) -> bool {
         matches!(self, Self::BitErrors | Self::SerialNoise)
     }
@@ -72,7 +72,7 @@ impl InjectedFault {
             }
             Self::ResetPin => board.machine.chip_mut().reset_pin(),
             Self::EnableGlitch => {
-                // Long enough that the switch is looked at.
+                // Long enough for the switch to be sampled.
                 board.enable(false);
                 board.machine.run_for(1_100_000_000);
                 board.enable(true);
@@ -95,7 +95,8 @@ impl InjectedFault {
     }
 }
 
-/// Off by the end of the second tick for what ends the drive, and off for good; on for what does not.
+/// The torque is off within two ticks, and stays off, for faults that end the drive; it stays on
+/// for others.
 #[test]
 fn a_thousand_random_faults_take_the_torque_off_or_are_survived() {
     let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));

@@ -1,6 +1,6 @@
 //! The flash target: an STM32F405 with an 8 MHz crystal, at 168 MHz.
 //!
-//! | pin        | what                                                     |
+//! | pin        | function                                                 |
 //! |------------|----------------------------------------------------------|
 //! | PA4, PA5   | torque u1, u2: DAC, 1.65 V is zero                       |
 //! | PB0        | torque stages enabled (high)                             |

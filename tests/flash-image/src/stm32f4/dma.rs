@@ -24,13 +24,13 @@ pub struct Dma {
     streams: [Stream; 8],
 }
 
-/// Place of a stream's flags in its status register.
+/// Returns the position of a stream's flags in its status register.
 fn shift(stream: usize) -> u32 {
     [0, 6, 16, 22][stream % 4]
 }
 
 impl Dma {
-    /// A load.
+    /// Handles a load.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
             0x00 | 0x04 => {
@@ -52,7 +52,7 @@ impl Dma {
         }
     }
 
-    /// A store.
+    /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32) {
         match offset {
             0x08 | 0x0c => {
@@ -81,7 +81,8 @@ impl Dma {
         }
     }
 
-    /// The stream that serves a peripheral's data register in a direction, if one is enabled.
+    /// Returns the stream that serves a peripheral's data register in a direction, if one is
+    /// enabled.
     fn serving(&mut self, data: u32, to_memory: bool) -> Option<usize> {
         let direction = if to_memory { 0 } else { 1 };
         self.streams.iter().position(|it| {
@@ -92,7 +93,7 @@ impl Dma {
         })
     }
 
-    /// Whether a peripheral's requests are served.
+    /// Returns whether a peripheral's requests are served.
     pub fn serves(&mut self, data: u32, to_memory: bool) -> bool {
         self.serving(data, to_memory).is_some()
     }
@@ -131,7 +132,7 @@ impl Dma {
         Some(place)
     }
 
-    /// Streams whose interrupt line is high.
+    /// Returns whether a stream's interrupt line is high.
     pub fn interrupts(&self, stream: usize) -> bool {
         let control = self.streams[stream].control;
         let flags = self.flags[stream];

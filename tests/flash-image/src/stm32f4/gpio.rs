@@ -11,12 +11,13 @@ pub struct Gpio {
     pull: u32,
     output: u32,
     alternate: [u32; 2],
-    /// Pins that their surroundings drive high or low.
+    /// Levels at which external parts drive the pins.
     pub external: [Option<bool>; 16],
 }
 
 impl Gpio {
-    /// As after a reset: the debugger's pins of ports A and B are alternate functions.
+    /// Creates the port in its reset state: the debugger's pins of ports A and B are alternate
+    /// functions.
     pub fn new(port: usize) -> Self {
         let (mode, speed, pull) = match port {
             0 => (0xa800_0000, 0x0c00_0000, 0x6400_0000),
@@ -34,7 +35,7 @@ impl Gpio {
         }
     }
 
-    /// What a pin is.
+    /// Returns the mode of a pin.
     pub fn pin(&self, pin: usize) -> PinMode {
         match self.mode >> (2 * pin) & 3 {
             0 => PinMode::Input,
@@ -44,7 +45,7 @@ impl Gpio {
         }
     }
 
-    /// A load.
+    /// Handles a load.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
             0x00 => self.mode,
@@ -59,7 +60,7 @@ impl Gpio {
         }
     }
 
-    /// A store.
+    /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32) {
         match offset {
             0x00 => self.mode = value,
@@ -79,7 +80,7 @@ impl Gpio {
             (PinMode::Output(level), _) => level,
             (PinMode::Analog, _) => false,
             (_, Some(level)) => level,
-            // Nothing drives it: its own pull decides.
+            // Not driven: its own pull resistor decides.
             (_, None) => self.pull >> (2 * pin) & 3 == 1,
         };
         (0..16).fold(0, |bits, pin| bits | u32::from(level(pin)) << pin)

@@ -1,4 +1,4 @@
-//! The STM32F405's peripherals, as far as the image uses them (RM0090). An access to anything else ends
+//! The STM32F405's peripherals that the image uses (RM0090). An access to any other address ends
 //! the test.
 
 mod dma;
@@ -36,7 +36,7 @@ const USART1_DATA: u32 = 0x4001_1004;
 /// A pin: port (0 for A) and number.
 pub type Pin = (usize, usize);
 
-/// What a pin is set up as.
+/// Mode of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PinMode {
     /// Drives nothing.
@@ -45,16 +45,16 @@ pub enum PinMode {
     Output(bool),
     /// Driven by the peripheral of this number.
     Alternate(u8),
-    /// Drives nothing, or is a converter's.
+    /// Not driven, or an analogue output.
     Analog,
 }
 
-/// What is on the pins.
+/// The parts on the pins.
 pub trait Outside: Clone {
-    /// A pin is now driven high or low, or no more.
+    /// Called when the microcontroller starts or stops driving a pin.
     fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds);
 
-    /// A transfer on a SPI bus (0 for SPI1) has ended; what came back.
+    /// Called at the end of a transfer on an SPI bus (0 for SPI1); returns the answer.
     fn transfer(&mut self, bus: usize, transfer: Transfer, now: Picoseconds) -> u16;
 }
 
@@ -66,10 +66,10 @@ struct Dac {
     writes: u64,
 }
 
-/// The chip with what is on its pins.
+/// The chip with the parts on its pins.
 #[derive(Clone)]
 pub struct Stm32f4<O> {
-    /// What is on the pins.
+    /// The parts on the pins.
     pub outside: O,
     /// Clocks.
     pub rcc: Rcc,
@@ -86,7 +86,7 @@ pub struct Stm32f4<O> {
     dac: Dac,
     dma: [Dma; 2],
     power: [u32; 2],
-    /// Supply, mV.
+    /// Supply voltage, mV.
     supply_mv: u32,
     flash_control: [u32; 8],
     syscfg: [u32; 16],
@@ -95,7 +95,7 @@ pub struct Stm32f4<O> {
 }
 
 impl<O: Outside> Stm32f4<O> {
-    /// The chip without power; `oscillator_hz` is the watchdog's, 17 to 47 kHz.
+    /// Creates the chip without power; `oscillator_hz` is that of the watchdog, 17 to 47 kHz.
     pub fn new(outside: O, oscillator_hz: u64) -> Self {
         Self {
             outside,
@@ -117,17 +117,18 @@ impl<O: Outside> Stm32f4<O> {
         }
     }
 
-    /// What a pin is set up as.
+    /// Returns the mode of a pin.
     pub fn pin(&self, (port, number): Pin) -> PinMode {
         self.ports[port].pin(number)
     }
 
-    /// Drives a pin from outside, or lets it go.
+    /// Drives a pin from outside, or releases it.
     pub fn drive_pin(&mut self, (port, number): Pin, level: Option<bool>) {
         self.ports[port].external[number] = level;
     }
 
-    /// Voltage that a channel of the converter puts out, in parts of the supply; `None` while off.
+    /// Returns the voltage of a converter's channel as a fraction of the supply; `None` while it is
+    /// off.
     pub fn dac_output(&self, channel: usize) -> Option<f64> {
         let control = self.dac.control >> (16 * channel);
         if control & 1 == 0 {
@@ -140,22 +141,22 @@ impl<O: Outside> Stm32f4<O> {
         Some(fraction.clamp(margin, 1.0 - margin))
     }
 
-    /// Whether an output buffer cuts the converter's range.
+    /// Returns whether an output buffer limits the converter's range.
     pub fn dac_is_buffered(&self) -> bool {
         self.dac.control & 0x0002_0002 != 0x0002_0002
     }
 
-    /// The converter's codes.
+    /// Returns the converter's codes.
     pub fn dac_codes(&self) -> [u32; 2] {
         self.dac.codes
     }
 
-    /// How often codes were written.
+    /// Returns how often codes were written.
     pub fn dac_writes(&self) -> u64 {
         self.dac.writes
     }
 
-    /// The supply changes. Below the threshold of the brown-out reset the chip is reset.
+    /// Changes the supply. The chip is reset below the brown-out threshold.
     pub fn set_supply(&mut self, millivolts: u32) {
         self.supply_mv = millivolts;
         let level = self.flash_control[5] >> 2 & 3;
@@ -168,19 +169,19 @@ impl<O: Outside> Stm32f4<O> {
         }
     }
 
-    /// What the supply supervisor says.
+    /// Returns the state of the supply supervisor.
     fn supply_is_low(&self) -> bool {
         let thresholds = [2000, 2100, 2300, 2500, 2600, 2700, 2800, 2900];
         let threshold = thresholds[(self.power[0] >> 5 & 7) as usize];
         self.power[0] & 1 << 4 != 0 && self.supply_mv < threshold
     }
 
-    /// When the control timer's next interrupt is due.
+    /// Returns the time of the control timer's next interrupt.
     pub fn next_tick(&self) -> Picoseconds {
         self.timer.next_event(self.rcc.slow_timer_hz())
     }
 
-    /// Pulls the reset pin down for a moment.
+    /// Pulls the reset pin low for a moment.
     pub fn reset_pin(&mut self) {
         self.reset = Some(Reset::Pin);
     }
@@ -195,7 +196,7 @@ impl<O: Outside> Stm32f4<O> {
             0x4000_3000 => self.watchdog.read(offset),
             0x4000_3800 if self.rcc.is_on(0x40, 14) => self.spis[1].read(offset),
             0x4000_7000 if self.rcc.is_on(0x40, 28) => match offset {
-                // Voltage scaling is ready at once.
+                // Voltage scaling is always ready.
                 0x04 => self.power[1] | 0x4000 | u32::from(self.supply_is_low()) << 2,
                 _ => self.power[0],
             },
@@ -222,10 +223,10 @@ impl<O: Outside> Stm32f4<O> {
             0x4002_3c00 => self.flash_control[((offset / 4) & 7) as usize],
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].read(offset),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].read(offset),
-            // A peripheral without its clock.
+            // A peripheral whose clock is off.
             0x4000_0000 | 0x4000_2c00 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000
             | 0x4001_3000 | 0x4002_6000 | 0x4002_6400 => 0,
-            // Unique number and size of flash.
+            // Unique identifier and flash size.
             0x1fff_7800 => 0x1234_5678,
             _ => panic!("load from {address:#010x}, which is not modelled"),
         }
@@ -305,7 +306,7 @@ impl<O: Outside> Stm32f4<O> {
         }
     }
 
-    /// Keys unlock the option bytes, which hold the brown-out level.
+    /// Handles the keys that unlock the option bytes, which hold the brown-out level.
     fn store_flash(&mut self, offset: u32, value: u32) {
         match (offset, value) {
             (0x08, 0x0819_2a3b) => self.flash_control[2] = 1,
@@ -369,7 +370,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
             let before = self.load(word, now);
             return self.store(word, before & !(1 << bit) | (value & 1) << bit, now);
         }
-        // A narrow store to a peripheral writes the register with the bytes it has.
+        // A narrow store to a peripheral writes only its own bytes of the register.
         assert!(address & 3 == 0 || size == 4, "store to {address:#010x}");
         self.store(address, value, now);
     }
@@ -444,7 +445,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
     }
 }
 
-/// The word and the bit that an address of the bit-band alias stands for.
+/// Returns the word and the bit for an address of the bit-band alias.
 fn bit_band(address: u32) -> (u32, u32) {
     let bit = (address - 0x4200_0000) / 4;
     (0x4000_0000 + bit / 32 * 4, bit % 32)

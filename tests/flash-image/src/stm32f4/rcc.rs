@@ -9,13 +9,13 @@ const SECURITY_ON: u32 = 1 << 19;
 const PLL_ON: u32 = 1 << 24;
 const PLL_READY: u32 = 1 << 25;
 
-/// Rate of the internal oscillator, Hz.
+/// Frequency of the internal oscillator, Hz.
 const INTERNAL_HZ: u64 = 16_000_000;
 
-/// Rate of the crystal, Hz.
+/// Frequency of the crystal, Hz.
 const CRYSTAL_HZ: u64 = 8_000_000;
 
-/// Time that a crystal takes to start.
+/// Start-up time of the crystal.
 const CRYSTAL_START: Picoseconds = 2 * MILLISECOND;
 
 /// Registers of the clock control.
@@ -28,14 +28,14 @@ pub struct Rcc {
     registers: [u32; 32],
     flags: u32,
     hse_ready_at: Picoseconds,
-    /// Whether the crystal oscillates once switched on.
+    /// Whether the crystal oscillates when switched on.
     pub crystal_works: bool,
-    /// The clock security has seen the crystal stop.
+    /// Set when the clock security system has detected a stopped crystal.
     pub nmi: bool,
 }
 
 impl Rcc {
-    /// As after the first reset.
+    /// Creates the registers in their state after the first reset.
     pub fn new() -> Self {
         Self {
             control: 0x83,
@@ -50,7 +50,7 @@ impl Rcc {
         }
     }
 
-    /// Everything as after a reset; the reasons of resets add up until they are cleared.
+    /// Resets the registers; the reset causes accumulate until they are cleared.
     pub fn reset(&mut self, reset: Reset) {
         let reason = match reset {
             Reset::Power => 0x0e00_0000,
@@ -66,7 +66,8 @@ impl Rcc {
         };
     }
 
-    /// Whether a peripheral's clock is on: offset of its enable register, bit.
+    /// Returns whether a peripheral's clock is on, given the offset of its enable register and the
+    /// bit.
     pub fn is_on(&self, register: u32, bit: u32) -> bool {
         self.registers[(register / 4) as usize] & 1 << bit != 0
     }
@@ -75,7 +76,7 @@ impl Rcc {
         self.crystal_works && self.control & HSE_ON != 0 && now >= self.hse_ready_at
     }
 
-    /// A load.
+    /// Handles a load.
     pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
         match offset {
             0x00 => {
@@ -100,7 +101,7 @@ impl Rcc {
         }
     }
 
-    /// A store.
+    /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32, now: Picoseconds) {
         match offset {
             0x00 => {
@@ -128,7 +129,8 @@ impl Rcc {
         }
     }
 
-    /// The crystal stops; with the clock security on the processor goes on from the internal oscillator.
+    /// Stops the crystal; with the clock security system on, the processor continues on the
+    /// internal oscillator.
     pub fn stop_crystal(&mut self) {
         self.crystal_works = false;
         if self.control & SECURITY_ON != 0 && self.control & HSE_ON != 0 {
@@ -151,7 +153,7 @@ impl Rcc {
         input / divisor * multiplier / output
     }
 
-    /// The system clock before its dividers, Hz; 0 if it stands still.
+    /// Returns the system clock before its dividers, Hz; 0 if it has stopped.
     fn system_hz(&self) -> u64 {
         match self.configuration & 3 {
             0 => INTERNAL_HZ,
@@ -161,7 +163,7 @@ impl Rcc {
         }
     }
 
-    /// The processor's clock, Hz.
+    /// Returns the processor's clock, Hz.
     pub fn core_hz(&self) -> u64 {
         let divisor = match self.configuration >> 4 & 15 {
             small @ 0..8 => u64::from(small / 8 + 1),
@@ -175,17 +177,17 @@ impl Rcc {
         if bits & 4 == 0 { 1 } else { 2 << (bits & 3) }
     }
 
-    /// Clock of the slow peripherals' bus, Hz.
+    /// Returns the clock of the slow peripherals' bus, Hz.
     pub fn slow_bus_hz(&self) -> u64 {
         self.core_hz() / Self::bus_divisor(self.configuration >> 10 & 7)
     }
 
-    /// Clock of the fast peripherals' bus, Hz.
+    /// Returns the clock of the fast peripherals' bus, Hz.
     pub fn fast_bus_hz(&self) -> u64 {
         self.core_hz() / Self::bus_divisor(self.configuration >> 13 & 7)
     }
 
-    /// Clock of the timers on the slow bus, Hz.
+    /// Returns the clock of the timers on the slow bus, Hz.
     pub fn slow_timer_hz(&self) -> u64 {
         let divisor = Self::bus_divisor(self.configuration >> 10 & 7);
         self.slow_bus_hz() * if divisor == 1 { 1 } else { 2 }

@@ -1,4 +1,4 @@
-//! A SPI master (RM0090, section 28), polled or with its interrupts off.
+//! An SPI master (RM0090, section 28), polled or with its interrupts off.
 
 use painleve_parts::Transfer;
 
@@ -10,7 +10,7 @@ const EMPTY: u32 = 1 << 1;
 const OVERRUN: u32 = 1 << 6;
 const BUSY: u32 = 1 << 7;
 
-/// Registers of a SPI.
+/// Registers of an SPI.
 #[derive(Clone, Debug)]
 pub struct Spi {
     control: [u32; 2],
@@ -33,7 +33,7 @@ impl Default for Spi {
 }
 
 impl Spi {
-    /// A load.
+    /// Handles a load.
     pub fn read(&mut self, offset: u32) -> u32 {
         match offset {
             0x00 => self.control[0],
@@ -48,7 +48,7 @@ impl Spi {
         }
     }
 
-    /// A store, while the bus' clock runs at `clock_hz`.
+    /// Handles a store, while the bus's clock runs at `clock_hz`.
     pub fn write(&mut self, offset: u32, value: u32, clock_hz: u64, now: Picoseconds) {
         match offset {
             0x00 => self.control[0] = value,
@@ -82,19 +82,20 @@ impl Spi {
         self.flags |= EMPTY;
     }
 
-    /// When the present transfer ends.
+    /// Returns the end of the present transfer.
     pub fn next_event(&self) -> Picoseconds {
         self.shifting.map_or(Picoseconds::MAX, |(_, ends)| ends)
     }
 
-    /// The transfer that has just ended; answer it with [`Spi::complete`].
+    /// Returns the transfer that has just ended; answer it with
+    /// [`Spi::complete`].
     pub fn ended(&self, now: Picoseconds) -> Option<Transfer> {
         self.shifting
             .filter(|(_, ends)| *ends <= now)
             .map(|(transfer, _)| transfer)
     }
 
-    /// What came back.
+    /// Stores the answer to a transfer.
     pub fn complete(&mut self, received: u16, clock_hz: u64) {
         let ends = self.shifting.take().map_or(0, |(_, ends)| ends);
         if self.flags & RECEIVED != 0 {

@@ -2,7 +2,7 @@
 
 use crate::{Picoseconds, SECOND};
 
-/// Registers of a timer with 32 bits.
+/// Registers of a 32-bit timer.
 #[derive(Clone, Debug)]
 pub struct Timer {
     control: u32,
@@ -13,7 +13,7 @@ pub struct Timer {
     /// Count at `since`.
     count: u64,
     since: Picoseconds,
-    /// Updates so far.
+    /// Number of updates.
     pub updates: u64,
 }
 
@@ -37,13 +37,13 @@ impl Timer {
         self.control & 1 != 0
     }
 
-    /// Time until the next update, from a count of `count`.
+    /// Returns the time until the next update, from a count of `count`.
     fn count_ps(&self, counts: u64, hz: u64) -> Picoseconds {
         let counts = u128::from(counts) * u128::from(self.prescaler + 1);
         (counts * u128::from(SECOND) / u128::from(hz.max(1))) as u64
     }
 
-    /// A load.
+    /// Handles a load.
     pub fn read(&self, offset: u32, hz: u64, now: Picoseconds) -> u32 {
         match offset {
             0x00 => self.control,
@@ -60,7 +60,7 @@ impl Timer {
         }
     }
 
-    /// A store.
+    /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32, hz: u64, now: Picoseconds) {
         match offset {
             0x00 => {
@@ -85,7 +85,7 @@ impl Timer {
         }
     }
 
-    /// When it next counts over.
+    /// Returns the time of the next overflow.
     pub fn next_event(&self, hz: u64) -> Picoseconds {
         if self.runs() && hz > 0 {
             let left = (u64::from(self.reload) + 1).saturating_sub(self.count);
@@ -95,7 +95,7 @@ impl Timer {
         }
     }
 
-    /// Lets happen what is due.
+    /// Performs due events.
     pub fn advance(&mut self, hz: u64, now: Picoseconds) {
         while self.next_event(hz) <= now {
             self.since = self.next_event(hz);
@@ -105,7 +105,7 @@ impl Timer {
         }
     }
 
-    /// Whether the interrupt line is high.
+    /// Returns whether the interrupt line is high.
     pub fn interrupts(&self) -> bool {
         self.flags & self.interrupts & 1 != 0
     }

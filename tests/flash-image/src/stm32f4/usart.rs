@@ -18,16 +18,16 @@ pub struct Usart {
     baud: u32,
     control: [u32; 3],
     received: u32,
-    /// The flags have been read, so that reading the data clears them.
+    /// Whether the flags have been read, so that reading the data clears them.
     armed: bool,
     waiting: Option<u8>,
     shifting: Option<(u8, Picoseconds)>,
     line_idle_at: Option<Picoseconds>,
-    /// Bytes on their way from the host, with the time at which they arrive.
+    /// Bytes in transit from the host, with their arrival times.
     pub incoming: VecDeque<(Picoseconds, u8)>,
-    /// Bytes that the host has received.
+    /// Bytes received by the host.
     pub outgoing: Vec<u8>,
-    /// Bytes lost because the one before had not been taken.
+    /// Bytes lost because the previous byte had not been read.
     pub overruns: u32,
 }
 
@@ -50,7 +50,7 @@ impl Default for Usart {
 }
 
 impl Usart {
-    /// Registers as after a reset; what is on the line stays there.
+    /// Resets the registers; the bytes on the line stay.
     pub fn reset(&mut self) {
         *self = Self {
             incoming: std::mem::take(&mut self.incoming),
@@ -64,12 +64,12 @@ impl Usart {
         self.control[0] & 1 << 13 != 0
     }
 
-    /// Time of a byte on the line.
+    /// Returns the duration of a byte on the line.
     fn byte(&self, clock_hz: u64) -> Picoseconds {
         10 * SECOND * u64::from(self.baud.max(1)) / clock_hz.max(1)
     }
 
-    /// A load.
+    /// Handles a load.
     pub fn read(&mut self, offset: u32) -> u32 {
         match offset {
             0x00 => {
@@ -91,7 +91,7 @@ impl Usart {
         }
     }
 
-    /// A store.
+    /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32, clock_hz: u64, now: Picoseconds) {
         match offset {
             0x00 => self.flags &= value | !(RECEIVED | COMPLETE),
@@ -114,7 +114,7 @@ impl Usart {
         }
     }
 
-    /// What happens next.
+    /// Returns the time of the next event.
     pub fn next_event(&self) -> Picoseconds {
         let receives = self.incoming.front().map(|(at, _)| *at);
         let sends = self.shifting.map(|(_, at)| at);
@@ -125,7 +125,7 @@ impl Usart {
             .unwrap_or(Picoseconds::MAX)
     }
 
-    /// Lets happen what is due.
+    /// Performs due events.
     pub fn advance(&mut self, clock_hz: u64, now: Picoseconds) {
         if let Some((byte, at)) = self.shifting
             && at <= now
@@ -158,33 +158,33 @@ impl Usart {
                 self.received = byte.into();
                 self.flags |= RECEIVED;
             }
-            // One at a time, so that DMA can take it.
+            // One byte at a time, so that DMA can read it.
             break;
         }
     }
 
-    /// Whether DMA should take a byte.
+    /// Returns whether DMA should read a byte.
     pub fn wants_reading(&self) -> bool {
         self.control[2] & 1 << 6 != 0 && self.flags & RECEIVED != 0
     }
 
-    /// Whether DMA should bring a byte.
+    /// Returns whether DMA should write a byte.
     pub fn wants_writing(&self) -> bool {
         self.control[2] & 1 << 7 != 0 && self.flags & EMPTY != 0 && self.is_enabled()
     }
 
-    /// DMA takes a byte.
+    /// Returns a byte to DMA.
     pub fn take(&mut self) -> u8 {
         self.flags &= !RECEIVED;
         self.received as u8
     }
 
-    /// DMA brings a byte.
+    /// Accepts a byte from DMA.
     pub fn bring(&mut self, byte: u8, clock_hz: u64, now: Picoseconds) {
         self.send(byte, clock_hz, now);
     }
 
-    /// Whether the interrupt line is high.
+    /// Returns whether the interrupt line is high.
     pub fn interrupts(&self) -> bool {
         let [control, _, third] = self.control;
         let enabled = self.flags & control & (IDLE | RECEIVED | COMPLETE | EMPTY) != 0;

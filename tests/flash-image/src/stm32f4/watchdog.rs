@@ -1,23 +1,23 @@
-//! The watchdogs: the independent one (RM0090, section 21) runs from an oscillator between 17 and 47 kHz,
-//! the window watchdog (section 22) from the slow peripherals' clock.
+//! The watchdogs: the independent one (RM0090, section 21) runs on an oscillator of 17 to 47 kHz,
+//! the window watchdog (section 22) on the slow peripherals' clock.
 
 use crate::{Picoseconds, SECOND};
 
-/// Registers of the watchdog.
+/// Registers of the independent watchdog.
 #[derive(Clone, Debug)]
 pub struct Watchdog {
-    /// Its oscillator, Hz.
+    /// Frequency of the watchdog's oscillator, Hz.
     pub oscillator_hz: u64,
     prescaler: u32,
     reload: u32,
     is_open: bool,
     expires: Picoseconds,
-    /// When it was last fed.
+    /// Time of the last feeding.
     pub fed: Picoseconds,
 }
 
 impl Watchdog {
-    /// Not started, on an oscillator of this rate.
+    /// Creates a stopped watchdog with an oscillator of this frequency.
     pub fn new(oscillator_hz: u64) -> Self {
         Self {
             oscillator_hz,
@@ -29,7 +29,7 @@ impl Watchdog {
         }
     }
 
-    /// A load.
+    /// Handles a load.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
             0x04 => self.prescaler,
@@ -38,7 +38,7 @@ impl Watchdog {
         }
     }
 
-    /// A store.
+    /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32, now: Picoseconds) {
         match (offset, value) {
             (0x00, 0x5555) => self.is_open = true,
@@ -65,13 +65,13 @@ impl Watchdog {
         }
     }
 
-    /// When it resets the microcontroller.
+    /// Returns when the watchdog resets the microcontroller.
     pub fn expires(&self) -> Picoseconds {
         self.expires
     }
 }
 
-/// Registers of the window watchdog; no window is modelled.
+/// Registers of the window watchdog; the window is not modelled.
 #[derive(Clone, Debug, Default)]
 pub struct WindowWatchdog {
     control: u32,
@@ -80,7 +80,7 @@ pub struct WindowWatchdog {
 }
 
 impl WindowWatchdog {
-    /// A load.
+    /// Handles a load.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
             0x00 => self.control,
@@ -89,11 +89,11 @@ impl WindowWatchdog {
         }
     }
 
-    /// A store.
+    /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32, clock_hz: u64, now: Picoseconds) {
         match offset {
             0x00 => {
-                // Once on, it stays on.
+                // Once enabled, it stays enabled.
                 self.control = value & 0x7f | (self.control | value) & 0x80;
                 if self.control & 0x80 != 0 {
                     let counts = u64::from(self.control & 0x3f) + 1;
@@ -106,7 +106,7 @@ impl WindowWatchdog {
         }
     }
 
-    /// When it resets the microcontroller.
+    /// Returns when the watchdog resets the microcontroller.
     pub fn expires(&self) -> Picoseconds {
         self.expires.unwrap_or(Picoseconds::MAX)
     }
