@@ -31,7 +31,7 @@ fn is_refused(bench: &Bench, arguments: &[&str], expected: &[&str]) {
 #[test]
 fn wrong_keys_and_values_are_named_and_nothing_is_written() {
     let bench = Bench::new("campaign-keys");
-    for study in ["robustness", "ablation", "capture", "lift-off"] {
+    for study in ["robustness", "ablation", "effects", "capture", "lift-off"] {
         for (wrong, expected) in [
             (
                 "controller.guard.enabld=true",
@@ -54,7 +54,7 @@ fn wrong_keys_and_values_are_named_and_nothing_is_written() {
 #[test]
 fn numbers_of_runs_are_from_one_to_ten_million() {
     let bench = Bench::new("campaign-runs");
-    for study in ["robustness", "ablation", "capture", "lift-off"] {
+    for study in ["robustness", "ablation", "effects", "capture", "lift-off"] {
         for runs in ["0", "-3", "10000001", "1.5", "many", ""] {
             let expected = [&format!("'{runs}'"), "--runs", "1 to 10000000"];
             is_refused(&bench, &["study", study, "--runs", runs], &expected);
@@ -62,13 +62,15 @@ fn numbers_of_runs_are_from_one_to_ten_million() {
     }
     let unknown = ["study", "robustness", "--runs", "1", "--without", "brakes"];
     is_refused(&bench, &unknown, &["'brakes'", "--without"]);
+    let unknown = ["study", "effects", "--runs", "1", "--effect", "rain"];
+    is_refused(&bench, &unknown, &["'rain'", "--effect"]);
 }
 
 #[test]
 fn files_that_cannot_be_written_are_told_before_anything_is_computed() {
     let bench = Bench::new("campaign-unwritable");
     std::fs::write(bench.path("file"), "").unwrap_or_default();
-    for study in ["robustness", "ablation", "capture", "lift-off"] {
+    for study in ["robustness", "ablation", "effects", "capture", "lift-off"] {
         // With so many runs it would take hours to find out afterwards.
         let line = ["study", study, "--runs", "10000000", "--csv", "file/a.csv"];
         let output = bench.run(&line);

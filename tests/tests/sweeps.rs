@@ -69,6 +69,10 @@ fn campaigns_of_random_runs_are_merged_too() {
         ),
         ("capture", &[("runs", "5"), ("set", "run.tick_hz=500")]),
         ("lift-off", &[("runs", "4"), ("slide-s", "0.3")]),
+        (
+            "effects",
+            &[("runs", "1"), ("effect", "joint-damping,force-resolution")],
+        ),
     ] {
         let alone = Bench::new("sweep-random");
         let mut line = vec!["study".into(), study.into(), "--csv".into(), "a.csv".into()];

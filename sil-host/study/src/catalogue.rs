@@ -11,7 +11,7 @@ use crate::outcome::{self, Figure, Outcome};
 use crate::tabular::{self, Tabular};
 use crate::{
     Study, StudyError, ablation, admissible, bifurcation, capture, closed_loop_bifurcation,
-    lift_off, poincare, regions, robustness, rows, sliding_range,
+    effects, lift_off, poincare, regions, robustness, rows, sliding_range,
 };
 
 /// Every study, in the order of the command's help and of the page.
@@ -25,6 +25,7 @@ pub static STUDIES: LazyLock<Vec<CatalogueEntry>> = LazyLock::new(|| {
         CatalogueEntry::of::<closed_loop_bifurcation::Options>(),
         CatalogueEntry::of::<robustness::Options>(),
         CatalogueEntry::of::<ablation::Options>(),
+        CatalogueEntry::of::<effects::Options>(),
         CatalogueEntry::of::<capture::Options>(),
         CatalogueEntry::of::<lift_off::Options>(),
     ]

@@ -8,6 +8,7 @@
 //! - [`sliding_range`]: Z_t,sliding, how far a controller slides
 //! - [`closed_loop_bifurcation`]: Fig. 12, bifurcation over the belt speed with the controller in the loop
 //! - [`robustness`]: random arms, belts and converters; [`ablation`]: the contribution of each part of the controller
+//! - [`effects`]: success against the level of each effect of a real rig, on rigid and compliant contact
 //! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
 //! - [`contact_probe`], [`distribution`], [`proportion`]: contact, distributions and success rates of many runs
 //! - [`case`], [`trial`]: closed loops to study, and their execution in this process
@@ -40,6 +41,7 @@ pub mod chaos;
 pub mod closed_loop_bifurcation;
 pub mod contact_probe;
 pub mod distribution;
+pub mod effects;
 pub mod figures;
 pub mod grid;
 pub mod initial;

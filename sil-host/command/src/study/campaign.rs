@@ -82,6 +82,7 @@ fn first_sentence(error: &clap::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use painleve_study::effects::{EFFECTS, RigEffect};
 
     fn campaign(study: &str, options: &[(&str, &[&str])]) -> Campaign {
         let owned = |values: &[&str]| values.iter().map(ToString::to_string).collect();
@@ -94,6 +95,14 @@ mod tests {
         }
     }
 
+    /// Levels of all effects on the contacts that have them.
+    fn levels() -> usize {
+        let contacts = |effect: &&RigEffect| if effect.compliant_only { 1 } else { 2 };
+        let all = EFFECTS.iter();
+        all.map(|effect| effect.levels.len() * contacts(&effect))
+            .sum()
+    }
+
     #[test]
     fn every_study_with_rows_can_be_a_campaign() {
         for (study, rows) in [
@@ -104,6 +113,7 @@ mod tests {
             ("robustness", 10_000),
             ("capture", 1000),
             ("lift-off", 2400),
+            ("effects", 100 * levels()),
         ] {
             let understood = understand(&campaign(study, &[])).unwrap();
             assert_eq!(understood.table.len(), rows, "{study}");

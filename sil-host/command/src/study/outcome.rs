@@ -4,6 +4,8 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
+use comfy_table::ContentArrangement;
+use comfy_table::presets::ASCII_MARKDOWN;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use painleve_study::Study;
 use painleve_study::catalogue::{AnyOutcome, AnyStudy};
@@ -17,6 +19,9 @@ pub struct OutcomeOptions {
     /// Print one JSON object on stdout instead of the table.
     #[arg(long)]
     json: bool,
+    /// Print the table as Markdown.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
     /// Write the rows as a CSV file.
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
@@ -92,6 +97,12 @@ impl OutcomeOptions {
         }
         if self.json {
             say(outcome.json().map_err(output)?)
+        } else if self.markdown {
+            let mut table = outcome.table();
+            table
+                .load_style(ASCII_MARKDOWN)
+                .set_content_arrangement(ContentArrangement::Disabled);
+            say(table)
         } else {
             say(outcome.table())
         }

@@ -9,6 +9,7 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 use super::Arms;
+use super::judge::CAPTURE_LIMIT_S;
 use crate::StudyError;
 use crate::belt_line::{BeltLine, positive_stretches};
 use crate::case::{self, Reference};
@@ -80,38 +81,76 @@ pub fn scenario(arms: Arms, seed: u64, index: u64) -> Result<Scenario, StudyErro
         Posture::ElbowUp
     };
     let arm = Arm::new(scenario.arm)?;
-    let slip = Slip::of(-speed_m_s);
-    let first = |stretches: Vec<Range<f64>>| {
-        let none = || StudyError::Option("the arm has no admissible tip position".into());
-        stretches.into_iter().next().ok_or_else(none)
-    };
-    let start_m = draw(first(admissible_m(
-        &arm,
+    let journey = Journey {
+        arm: &arm,
         posture,
+        slip: Slip::of(-speed_m_s),
         friction,
-        slip,
-        START_P_RATIO,
-    ))?);
-    let mut stretches = admissible_m(&arm, posture, friction, slip, 0.0);
-    stretches.retain(|stretch| stretch.contains(&start_m));
-    let stretch = first(stretches)?;
-    let beyond = draw(0.0..1.0) < 0.5;
-    let target_m = if !beyond {
-        draw(stretch.start..stretch.end)
-    } else if draw(0.0..1.0) < 0.5 {
-        stretch.start - draw(0.0..BEYOND_M)
-    } else {
-        stretch.end + draw(0.0..BEYOND_M)
+        target_p_ratio: 0.0,
+        farthest_m: arms.farthest_m(arm.reach_on_belt_m()),
     };
-    let duration_s = draw(2.0..4.0) as f32;
-    let reference = if draw(0.0..1.0) < 0.5 {
-        Reference::MinimumJerk(duration_s)
-    } else {
-        Reference::Ramp(duration_s)
-    };
-    let farthest_m = arms.farthest_m(arm.reach_on_belt_m());
-    scenario.controller.reference = reference.to(target_m.clamp(-farthest_m, farthest_m));
-    scenario.run.duration_s = reference.duration_s() + super::CAPTURE_LIMIT_S + REST_S;
-    scenario.initial = case::at_rest_on_belt(&arm, start_m, posture)?;
+    journey.draw(&mut scenario, &mut draw)?;
     Ok(scenario)
+}
+
+/// A start and a reference to draw at random.
+pub(crate) struct Journey<'a> {
+    /// The arm.
+    pub arm: &'a Arm<f64>,
+    /// Its posture.
+    pub posture: Posture,
+    /// Direction of slip.
+    pub slip: Slip,
+    /// Largest friction coefficient of the run.
+    pub friction: f64,
+    /// Smallest p at the target as a fraction of Q22; if it is zero, half of the targets are up to
+    /// 20 mm beyond the edge.
+    pub target_p_ratio: f64,
+    /// Farthest target, m.
+    pub farthest_m: f64,
+}
+
+impl Journey<'_> {
+    /// Draws the start, the reference and with it the duration of a scenario.
+    ///
+    /// # Errors
+    /// [`StudyError`] if no tip position is admissible.
+    pub fn draw(
+        &self,
+        scenario: &mut Scenario,
+        draw: &mut impl FnMut(Range<f64>) -> f64,
+    ) -> Result<(), StudyError> {
+        let stretches =
+            |ratio| admissible_m(self.arm, self.posture, self.friction, self.slip, ratio);
+        let first = |stretches: Vec<Range<f64>>| {
+            let none = || StudyError::Option("the arm has no admissible tip position".into());
+            stretches.into_iter().next().ok_or_else(none)
+        };
+        let start_m = draw(first(stretches(START_P_RATIO))?);
+        let mut around = stretches(self.target_p_ratio);
+        around.retain(|stretch| stretch.contains(&start_m));
+        let stretch = first(around)?;
+        let beyond = draw(0.0..1.0) < 0.5;
+        let mut target_m = if !beyond {
+            draw(stretch.start..stretch.end)
+        } else if draw(0.0..1.0) < 0.5 {
+            stretch.start - draw(0.0..BEYOND_M)
+        } else {
+            stretch.end + draw(0.0..BEYOND_M)
+        };
+        if self.target_p_ratio > 0.0 {
+            target_m = target_m.clamp(stretch.start, stretch.end);
+        }
+        let duration_s = draw(2.0..4.0) as f32;
+        let reference = if draw(0.0..1.0) < 0.5 {
+            Reference::MinimumJerk(duration_s)
+        } else {
+            Reference::Ramp(duration_s)
+        };
+        let target_m = target_m.clamp(-self.farthest_m, self.farthest_m);
+        scenario.controller.reference = reference.to(target_m);
+        scenario.run.duration_s = reference.duration_s() + CAPTURE_LIMIT_S + REST_S;
+        scenario.initial = case::at_rest_on_belt(self.arm, start_m, self.posture)?;
+        Ok(())
+    }
 }

@@ -8,6 +8,7 @@ mod arms;
 mod draw;
 mod false_alarms;
 mod figure;
+pub(crate) mod judge;
 mod options;
 mod outcome;
 mod part;
@@ -15,40 +16,21 @@ mod row;
 
 use std::collections::BTreeMap;
 
-use painleve_firmware::refer::reference::Segment;
-use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::frame::StatusFlags;
-use painleve_shared::{Arm, Posture, Slip};
 
-use super::belt_line::BeltLine;
-use super::contact_probe::ContactProbe;
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
 
 pub use arms::Arms;
+pub(crate) use draw::Journey;
 pub use draw::{admissible_m, scenario};
 pub use false_alarms::FalseAlarms;
+pub use judge::LiftOffRule;
 pub use options::Options;
 pub use outcome::RobustnessOutcome;
 pub use part::Part;
 pub use row::{Ending, Row};
-
-/// Shortest contact that counts as a capture, s.
-pub const CAPTURE_S: f64 = 0.1;
-/// Latest completion of the capture, s after enabling.
-pub const CAPTURE_LIMIT_S: f64 = 0.5;
-/// Final interval of a run in which the tip must be at its target or governed edge, s.
-const WATCHED_S: f64 = 0.1;
-/// Largest final distance from target or governed edge, beyond the encoders' resolution, m.
-const WITHIN_M: f64 = 1e-3;
-/// Largest distance before the true edge at which a governed reference may be held, m.
-const SHORT_M: f64 = 0.01;
-/// Largest p, as a fraction of Q22, at which a governed reference may be held farther from the
-/// edge: where p hardly changes along the belt, a small change of friction moves
-/// the edge far.
-const SHORT_P_RATIO: f64 = 0.1;
 
 /// Settings of the campaign.
 #[derive(Clone, Debug)]
@@ -100,112 +82,7 @@ impl Study for Robustness {
 /// # Errors
 /// [`StudyError`] if the scenario is invalid.
 pub fn run(index: usize, scenario: &Scenario) -> Result<Row, StudyError> {
-    let end_s = scenario.run.duration_s;
-    let arm = Arm::new(scenario.arm)?;
-    let posture = Posture::of(&theta(&scenario.initial.state()));
-    let v_belt_m_s = scenario.belt.profile.speed_m_s(0.0);
-    let target_m = target_m(scenario);
-    let enabled_s = scenario.run.enable_at_s;
-    let mut trial = Trial::new(scenario)?;
-    let start_m = trial.tip_t_m();
-    let mut contact = ContactProbe::new(enabled_s, CAPTURE_S);
-    let mut alarms = FalseAlarms::default();
-    let (mut of_target_m, mut of_governed_m) = (0.0_f64, 0.0_f64);
-    let mut solved = true;
-    for _ in 0..scenario.run.ticks() {
-        if trial.tick(&mut contact).is_err() {
-            solved = false;
-            break;
-        }
-        alarms.tick(&trial, &contact);
-        if trial.time_s() > end_s - WATCHED_S {
-            let tip_m = trial.tip_t_m();
-            let governed_m = trial.answer().reference_tip.to_metres();
-            of_target_m = of_target_m.max((tip_m - target_m).abs());
-            of_governed_m = of_governed_m.max((tip_m - governed_m).abs());
-        }
-    }
-    let bits = i32::from(scenario.converters.encoder.bits);
-    let count_rad = libm::ldexp(core::f64::consts::TAU, -bits);
-    let tolerance_m =
-        WITHIN_M + count_rad * (scenario.arm.height_m + scenario.arm.link_length_m[1]);
-    let slip = Slip::of(-v_belt_m_s);
-    let friction = scenario.belt.friction;
-    let mut stretches = admissible_m(&arm, posture, friction, slip, 0.0);
-    stretches.retain(|stretch| stretch.contains(&start_m));
-    let stretch = stretches.pop().unwrap_or(start_m..start_m);
-    let line = BeltLine::new(&arm, posture);
-    let p_ratio = line.tau(trial.tip_t_m()).map_or(f64::NAN, |tau| {
-        line.p(tau, friction, slip) / line.p(tau, 0.0, slip)
-    });
-    let to_edge_m = if target_m > start_m {
-        stretch.end - trial.tip_t_m()
-    } else {
-        trial.tip_t_m() - stretch.start
-    };
-    let at_edge = trial.answer().flags.contains(StatusFlags::AT_EDGE);
-    let captured = contact
-        .captured_s
-        .is_some_and(|start_s| start_s + CAPTURE_S <= enabled_s + CAPTURE_LIMIT_S);
-    let ending = if !solved {
-        Ending::Unsolved
-    } else if trial.fault().is_some() {
-        Ending::Fault
-    } else if !captured {
-        Ending::NotCaptured
-    } else if contact.lift_offs > 0 {
-        Ending::LiftOff
-    } else if of_target_m <= tolerance_m {
-        Ending::Reached
-    } else if at_edge && of_governed_m <= tolerance_m {
-        if to_edge_m > SHORT_M && p_ratio > SHORT_P_RATIO {
-            Ending::StoppedEarly
-        } else {
-            Ending::AtEdge
-        }
-    } else {
-        Ending::NotReached
-    };
-    let converters = scenario.converters;
-    Ok(Row {
-        index,
-        ending,
-        fault: trial.fault().map(|fault| fault as u8),
-        capture_s: contact.captured_s.map(|start_s| start_s - enabled_s),
-        lift_offs: contact.lift_offs,
-        first_lift_off_s: contact.first_lift_off_s,
-        error_m: if at_edge {
-            of_target_m.min(of_governed_m)
-        } else {
-            of_target_m
-        },
-        tolerance_m,
-        to_edge_m,
-        p_ratio,
-        false_alarms: alarms.count,
-        slid_s: contact
-            .captured_s
-            .map_or(0.0, |start_s| trial.time_s() - start_s),
-        tip_t_m: trial.tip_t_m(),
-        target_m,
-        posture,
-        mu: scenario.belt.friction,
-        v_belt_m_s,
-        tick_hz: scenario.run.tick_hz,
-        encoder_bits: converters.encoder.bits,
-        torque_bits: converters.torque.bits,
-        torque_lag_s: converters.torque.lag_s,
-        delay_ticks: converters.torque.delay_ticks,
-        force_noise_n: converters.force.noise_n,
-        frame_loss: converters.link.frame_loss,
-        link_length_m: scenario.arm.link_length_m[0],
-        link_2_length_m: scenario.arm.link_length_m[1],
-        link_mass_kg: scenario.arm.link_mass_kg[0],
-        link_2_mass_kg: scenario.arm.link_mass_kg[1],
-        stiffness_nm_rad: scenario.arm.stiffness_nm_rad[1],
-        height_m: scenario.arm.height_m,
-        belt_tilt_rad: scenario.arm.belt_tilt_rad,
-    })
+    judge::run(scenario, index, LiftOffRule::Fail)
 }
 
 impl Tabular for Robustness {
@@ -218,18 +95,6 @@ impl Tabular for Robustness {
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         Ok(BTreeMap::from([("runs".into(), self.seed)]))
     }
-}
-
-/// Returns the target of a scenario's last reference, m; NaN without a reference.
-fn target_m(scenario: &Scenario) -> f64 {
-    let segments = scenario.controller.reference.segments.iter();
-    let mut targets = segments.filter_map(|segment| match segment {
-        Segment::MinimumJerk { target_m, .. }
-        | Segment::Ramp { target_m, .. }
-        | Segment::Step { target_m, .. } => Some(f64::from(*target_m)),
-        _ => None,
-    });
-    targets.next_back().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Tables of runs made by hand, so that a change of the controller does not change the snapshots.
 
+use painleve_shared::Posture;
+
 use super::*;
 use crate::ablation::{Ablation, AblationStudy};
 use crate::outcome::plain;

@@ -1,0 +1,79 @@
+//! One effect of the study: what a level of it sets.
+
+use serde::Serialize;
+
+use crate::robustness::LiftOffRule;
+
+/// An effect and its levels.
+pub struct RigEffect {
+    /// Name on the command line and in rows.
+    pub name: &'static str,
+    /// The key that a level sets; further keys may go with it.
+    pub key: &'static str,
+    /// Unit of a level; empty for a ratio.
+    pub unit: &'static str,
+    /// Levels from harmless to harmful, with the typical one among them.
+    pub levels: &'static [f64],
+    /// Level of an ordinary rig.
+    pub typical: f64,
+    /// Whether only the compliant plant has the effect.
+    pub compliant_only: bool,
+    /// How lift-offs are judged.
+    pub lift_offs: LiftOffRule,
+    /// The largest friction coefficient in a run, from the level and the belt's μ, of effects that
+    /// change it. Their targets are where p is at least a fifth of Q22 at that friction.
+    pub largest_friction: Option<fn(f64, f64) -> f64>,
+    /// The overrides of a level, from the level and what is drawn for the run.
+    pub overrides: fn(f64, &Drawn) -> Vec<String>,
+}
+
+/// Random values of a run that effects use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drawn {
+    /// Friction coefficient μ of the belt, 0.3 … 0.9.
+    pub friction: f64,
+    /// Speed of the belt, 0.1 … 1 m/s in either direction.
+    pub speed_m_s: f64,
+    /// An instant while the tip moves, s.
+    pub at_s: f64,
+    /// A number from 0 to 1.
+    pub share: f64,
+    /// A phase, rad.
+    pub phase_rad: f64,
+    /// Seed of what is random along the belt.
+    pub seed: u64,
+}
+
+/// The contact of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Contact {
+    /// Rigid bodies.
+    Rigid,
+    /// The compliant contact with its default stiffness and damping.
+    Compliant,
+}
+
+impl RigEffect {
+    /// Whether the plant with this contact has the effect.
+    pub fn acts_on(&self, contact: Contact) -> bool {
+        contact == Contact::Compliant || !self.compliant_only
+    }
+
+    /// Returns a level relative to the typical one, so that more is worse.
+    pub fn severity(&self, level: f64) -> f64 {
+        if self.unit == "bits" {
+            libm::exp2(self.typical - level)
+        } else if self.levels.last() < self.levels.first() {
+            self.typical / level
+        } else {
+            level / self.typical
+        }
+    }
+}
+
+/// Returns the text of overrides: a key, an equals sign and a value each.
+macro_rules! set {
+    ($($text:literal),+ $(,)?) => { vec![$(format!($text)),+] };
+}
+pub(super) use set;

@@ -1,0 +1,172 @@
+//! Success against the level of each effect that a rig has and the paper's arm has not.
+//!
+//! Every cell (controller, contact, effect, level) runs the same random closed loops: the arm known
+//! exactly, friction 0.3 … 0.9, belt 0.1 … 1 m/s, either posture, 1 kHz, encoders of 14 bits, force and
+//! torque of 12 bits, one sample of delay, half of the targets up to 20 mm beyond the edge. Each run is
+//! judged as in the [`robustness`](crate::robustness) campaign.
+
+mod draw;
+mod effect;
+mod figure;
+mod list;
+mod options;
+mod outcome;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use painleve_shared::Posture;
+use serde::Serialize;
+
+use super::case::ControllerChoice;
+use super::robustness::{Ending, judge};
+use super::tabular::Tabular;
+use super::{Study, StudyError};
+
+pub use effect::{Contact, RigEffect};
+pub use list::{EFFECTS, find};
+pub use options::Options;
+pub use outcome::{EffectsOutcome, LevelSuccess};
+
+/// Settings of the study.
+#[derive(Clone, Debug)]
+pub struct EffectsStudy {
+    /// The controllers.
+    pub controllers: Vec<ControllerChoice>,
+    /// The contacts.
+    pub contacts: Vec<Contact>,
+    /// The names of the effects; no effect at all comes first.
+    pub effects: Vec<&'static str>,
+    /// Seed of all runs.
+    pub seed: u64,
+    /// Runs of each cell.
+    pub runs: usize,
+    /// Overrides applied to every scenario after those of the effect.
+    pub overrides: Vec<String>,
+}
+
+/// Controller, contact, effect and level of one cell.
+#[derive(Clone, Copy)]
+pub struct Place<'a> {
+    /// The controller.
+    pub controller: &'a ControllerChoice,
+    /// The contact.
+    pub contact: Contact,
+    /// The effect.
+    pub effect: &'static RigEffect,
+    /// Its level.
+    pub level: f64,
+}
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// The controller.
+    pub controller: String,
+    /// The contact.
+    pub contact: Contact,
+    /// The effect.
+    pub effect: &'static str,
+    /// Its level, in the effect's unit.
+    pub level: f64,
+    /// Number of the run in its cell; runs of equal numbers have equal arms, belts and references.
+    pub run: usize,
+    /// Ending of the run.
+    pub ending: Ending,
+    /// Number of the latched fault.
+    pub fault: Option<u8>,
+    /// Number of lift-offs after the capture.
+    pub lift_offs: u64,
+    /// Largest final distance from target or governed edge, m.
+    pub error_m: f64,
+    /// p at the final tip position as a fraction of Q22.
+    pub p_ratio: f64,
+    /// Final tip position, m.
+    pub tip_t_m: f64,
+    /// Target of the reference, m.
+    pub target_m: f64,
+    /// Initial posture.
+    pub posture: Posture,
+    /// Friction coefficient μ of the belt.
+    pub mu: f64,
+    /// Belt speed, m/s.
+    pub v_belt_m_s: f64,
+}
+
+impl EffectsStudy {
+    /// Returns every cell, in the order of the rows.
+    pub fn cells(&self) -> Vec<Place<'_>> {
+        let mut cells = Vec::new();
+        for controller in &self.controllers {
+            for &contact in &self.contacts {
+                for effect in self.effects.iter().filter_map(|name| find(name)) {
+                    let levels = effect.levels.iter().filter(|_| effect.acts_on(contact));
+                    cells.extend(levels.map(|&level| Place {
+                        controller,
+                        contact,
+                        effect,
+                        level,
+                    }));
+                }
+            }
+        }
+        cells
+    }
+
+    /// Builds the first run of every cell, so that an invalid override is reported before any run starts.
+    ///
+    /// # Errors
+    /// [`StudyError`] if one cannot be built.
+    pub fn check(&self) -> Result<(), StudyError> {
+        for place in self.cells() {
+            crate::trial::Trial::new(&self.scenario(place, 0)?)?;
+        }
+        Ok(())
+    }
+}
+
+impl Study for EffectsStudy {
+    type Row = Row;
+
+    fn len(&self) -> usize {
+        crate::combinations(&[self.cells().len(), self.runs])
+    }
+
+    fn row(&self, index: usize) -> Result<Row, StudyError> {
+        let cells = self.cells();
+        let (cell, run) = (index / self.runs, index % self.runs);
+        let place = cells[cell];
+        let scenario = self.scenario(place, run)?;
+        let judged = judge::run(&scenario, run, place.effect.lift_offs)?;
+        Ok(Row {
+            controller: place.controller.to_string(),
+            contact: place.contact,
+            effect: place.effect.name,
+            level: place.level,
+            run,
+            ending: judged.ending,
+            fault: judged.fault,
+            lift_offs: judged.lift_offs,
+            error_m: judged.error_m,
+            p_ratio: judged.p_ratio,
+            tip_t_m: judged.tip_t_m,
+            target_m: judged.target_m,
+            posture: judged.posture,
+            mu: judged.mu,
+            v_belt_m_s: judged.v_belt_m_s,
+        })
+    }
+}
+
+impl Tabular for EffectsStudy {
+    type Line = Row;
+
+    fn lines(row: &Row) -> Vec<Row> {
+        vec![row.clone()]
+    }
+
+    fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
+        Ok(BTreeMap::from([("runs".into(), self.seed)]))
+    }
+}

@@ -1,0 +1,121 @@
+//! Small studies of effects, and their table from rows made by hand.
+
+use super::outcome::Fall;
+use super::*;
+use crate::outcome::{Figure, plain};
+use crate::rows;
+
+fn study(effects: &[&'static str], runs: usize) -> EffectsStudy {
+    EffectsStudy {
+        controllers: vec![ControllerChoice::Hybrid],
+        contacts: vec![Contact::Rigid, Contact::Compliant],
+        effects: effects.to_vec(),
+        seed: 1,
+        runs,
+        overrides: Vec::new(),
+    }
+}
+
+#[test]
+fn every_effect_at_every_level_is_a_valid_scenario_of_its_own() {
+    let all: Vec<_> = EFFECTS.iter().map(|effect| effect.name).collect();
+    let study = study(&all, 1);
+    study.check().unwrap();
+    for place in study.cells() {
+        let none = Place {
+            effect: &EFFECTS[0],
+            level: 0.0,
+            ..place
+        };
+        let (with, without) = (study.scenario(place, 0), study.scenario(none, 0));
+        let is_none = place.level == 0.0 || place.level == 1.0;
+        let unnamed =
+            |scenario: painleve_plant::scenario::Scenario| painleve_plant::scenario::Scenario {
+                name: String::new(),
+                ..scenario
+            };
+        let equal = unnamed(with.unwrap()) == unnamed(without.unwrap());
+        assert!(is_none || !equal, "{} {}", place.effect.name, place.level);
+    }
+}
+
+#[test]
+fn names_are_unique_and_levels_go_from_harmless_to_harmful() {
+    for (index, effect) in EFFECTS.iter().enumerate() {
+        assert!(
+            EFFECTS[..index]
+                .iter()
+                .all(|other| other.name != effect.name)
+        );
+        if index > 0 {
+            assert!(effect.levels.contains(&effect.typical), "{}", effect.name);
+        }
+        let severities: Vec<f64> = effect
+            .levels
+            .iter()
+            .map(|&level| effect.severity(level))
+            .collect();
+        assert!(severities.is_sorted(), "{}", effect.name);
+    }
+}
+
+#[test]
+fn rows_do_not_depend_on_threads_and_more_effect_is_worse() {
+    let study = study(&["none", "force-noise"], 2);
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| rows(&study, || ()).unwrap())
+    };
+    let found = on(1);
+    assert_eq!(found, on(3));
+    assert_eq!(found.len(), study.cells().len() * 2);
+    let outcome = EffectsOutcome::new(&study, found);
+    let rigid = &outcome.effects[0];
+    assert_eq!(
+        (rigid.effect, rigid.cells[0].success.successes),
+        ("none", 2)
+    );
+}
+
+/// Rows made by hand, so that a change of the controller does not change the snapshots.
+#[test]
+fn the_table_interpolates_between_levels() {
+    let study = study(&["none", "joint-friction", "gear-stiffness"], 4);
+    let success = |place: &Place<'_>, run: usize| match place.effect.name {
+        "joint-friction" => place.level * (run + 1) as f64 <= 0.2,
+        "gear-stiffness" => place.level >= 1000.0 || run < 2,
+        _ => true,
+    };
+    let mut rows = Vec::new();
+    for place in study.cells() {
+        rows.extend((0..4).map(|run| Row {
+            controller: place.controller.to_string(),
+            contact: place.contact,
+            effect: place.effect.name,
+            level: place.level,
+            run,
+            ending: if success(&place, run) {
+                Ending::Reached
+            } else {
+                Ending::LiftOff
+            },
+            fault: None,
+            lift_offs: 0,
+            error_m: 1e-4,
+            p_ratio: 0.5,
+            tip_t_m: 0.1,
+            target_m: 0.1,
+            posture: Posture::ElbowUp,
+            mu: 0.6,
+            v_belt_m_s: 0.4,
+        }));
+    }
+    let outcome = EffectsOutcome::new(&study, rows);
+    insta::assert_snapshot!(plain(&outcome));
+    let gear = outcome.effects.last().unwrap();
+    let [most, some, half] = gear.falls_below;
+    assert!(matches!(most, Fall::At(level) if (500.0..1000.0).contains(&level)));
+    assert!(matches!(some, Fall::At(level) if (500.0..900.0).contains(&level)));
+    assert_eq!(half, Fall::Beyond);
+    assert!(outcome.svg().unwrap().contains("gear-stiffness"));
+}
