@@ -4,6 +4,7 @@ mod bridge;
 mod controller;
 mod doctor;
 mod drive;
+mod export;
 mod fail_on;
 mod figures;
 mod output;
@@ -65,6 +66,8 @@ enum Command {
     Timing(timing::TimingArguments),
     /// What earlier runs have left on this machine, and what the machine gives to runs.
     Doctor(doctor::DoctorArguments),
+    /// Write the ticks of a record as a table.
+    Export(export::ExportArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
     /// Compute one of the paper's studies as numbers, data files and figures.
@@ -110,9 +113,17 @@ pub enum CommandError {
     /// A file cannot be written.
     #[error("{0}")]
     Output(String),
-    /// Record and figure have the same path.
-    #[error("--record and --plot both name `{}`: choose different files", .0.display())]
-    SameFile(PathBuf),
+    /// A file or option given is of no use.
+    #[error("{0}")]
+    Input(String),
+    /// Two files would replace each other.
+    #[error("--{} and --{} both name `{}`: choose different files", options[0], options[1], path.display())]
+    SameFile {
+        /// The options that name them.
+        options: [&'static str; 2],
+        /// The path.
+        path: PathBuf,
+    },
     /// The study failed.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -150,7 +161,7 @@ impl CommandError {
     /// 4: an output cannot be written; 5: deadlines missed; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Scenario(_) | Self::SameFile(_) | Self::Bound(_) => 2,
+            Self::Scenario(_) | Self::SameFile { .. } | Self::Input(_) | Self::Bound(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Scenario(_)
                 | StudyError::Option(_)
@@ -288,7 +299,11 @@ fn execute(command: Command) -> Result<(), CommandError> {
             exit_when_shared_memory_is_full(PEER_FAILED)?;
         }
         Command::Run(_) | Command::Drive(_) | Command::Timing(_) | Command::Doctor(_) => {}
-        Command::Scenarios(_) | Command::Study(_) | Command::Sweep(_) | Command::Figures(_) => {
+        Command::Export(_)
+        | Command::Scenarios(_)
+        | Command::Study(_)
+        | Command::Sweep(_)
+        | Command::Figures(_) => {
             exit_when_requested(INTERRUPTED)?;
         }
     }
@@ -300,6 +315,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Drive(arguments) => drive::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),

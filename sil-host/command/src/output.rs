@@ -1,15 +1,20 @@
 //! The output files of a run, written while it runs.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use painleve_plant::Event;
 use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
-use painleve_record::RunPlot;
-use painleve_record::mcap::Recorder;
+use painleve_record::csv_table::CsvTable;
+use painleve_record::mcap_log::Source;
+use painleve_record::plot::PlotFile;
+use painleve_record::recorder::Sinks;
+use painleve_record::{McapLog, RecordError, Recorder, RunPlot};
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
@@ -31,82 +36,108 @@ pub struct OutputArguments {
     /// Do not write a figure.
     #[arg(long, conflicts_with = "plot")]
     no_plot: bool,
+    /// Table of every tick.
+    #[arg(long, value_name = "PATH")]
+    csv: Option<PathBuf>,
 }
 
 impl OutputArguments {
     /// Returns the same options as command-line arguments for a child process.
-    pub fn to_arguments(&self) -> Vec<std::ffi::OsString> {
+    pub fn to_arguments(&self) -> Vec<OsString> {
         let mut arguments = Vec::new();
-        if self.no_record {
-            arguments.push("--no-record".into());
-        } else {
-            arguments.extend(["--record".into(), self.record.clone().into()]);
+        for (option, path) in self.files() {
+            arguments.extend([format!("--{option}").into(), path.into()]);
         }
-        if self.no_plot {
-            arguments.push("--no-plot".into());
-        } else {
-            arguments.extend(["--plot".into(), self.plot.clone().into()]);
+        for (option, given) in [("--no-record", self.no_record), ("--no-plot", self.no_plot)] {
+            arguments.extend(given.then(|| option.into()));
         }
         arguments
     }
+
+    /// Returns the files to write, each with its option.
+    fn files(&self) -> Vec<(&'static str, &Path)> {
+        let wanted: [(_, Option<&PathBuf>); 3] = [
+            ("record", (!self.no_record).then_some(&self.record)),
+            ("plot", (!self.no_plot).then_some(&self.plot)),
+            ("csv", self.csv.as_ref()),
+        ];
+        wanted
+            .into_iter()
+            .filter_map(|(option, path)| Some((option, path?.as_path())))
+            .collect()
+    }
+
+    /// Creates the files.
+    fn sinks(&self, scenario: &Scenario) -> Result<Sinks, CommandError> {
+        let mut options = BTreeMap::new();
+        let mut sinks: Sinks = Vec::new();
+        for (option, path) in self.files() {
+            let file = AtomicFile::create(path)
+                .map_err(|error| CommandError::Output(error.to_string()))?;
+            if let Some(first) = options.insert(file.target().to_path_buf(), option) {
+                return Err(CommandError::SameFile {
+                    options: [first, option],
+                    path: path.to_path_buf(),
+                });
+            }
+            sinks.push(match option {
+                "record" => {
+                    Box::new(McapLog::to(file, scenario, Source::Simulation).map_err(output_error)?)
+                }
+                "csv" => Box::new(CsvTable::to(file).map_err(output_error)?),
+                _ => Box::new(PlotFile {
+                    plot: figure(scenario),
+                    file,
+                }),
+            });
+        }
+        Ok(sinks)
+    }
+}
+
+/// Returns the empty figure of a run of this scenario.
+fn figure(scenario: &Scenario) -> RunPlot {
+    let subtitle = format!(
+        "law: {} · {} Hz · μ = {} · seed {}",
+        scenario.controller.law.name(),
+        scenario.run.tick_hz,
+        scenario.belt.friction,
+        scenario.run.seed,
+    );
+    RunPlot::new(&scenario.name, subtitle)
 }
 
 /// Ticks between two updates of the progress bar.
 const PROGRESS_TICKS: u64 = 256;
 
-/// Record, figure and progress bar of a run.
+/// The files of a run and its progress bar.
 pub struct Output {
+    /// `None` if the run writes no file.
     recorder: Option<Recorder>,
-    plot: Option<(RunPlot, PathBuf)>,
     progress: ProgressBar,
     interrupt: Interrupt,
     tick: u64,
 }
 
 impl Output {
-    /// Opens the files, so that an unwritable path is reported before anything runs.
+    /// Creates the files, so that an unwritable path is reported before anything runs.
+    ///
+    /// # Errors
+    /// [`CommandError::Output`] or [`CommandError::SameFile`].
     pub fn open(
         arguments: &OutputArguments,
         scenario: &Scenario,
         interrupt: Interrupt,
     ) -> Result<Self, CommandError> {
-        let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
-        let recorder = if arguments.no_record {
+        let sinks = arguments.sinks(scenario)?;
+        let recorder = if sinks.is_empty() {
             None
         } else {
-            let text = toml::to_string(scenario).map_err(|error| output(&error))?;
-            let metadata = BTreeMap::from([
-                ("scenario".into(), scenario.name.clone()),
-                ("configuration".into(), text),
-                ("version".into(), env!("CARGO_PKG_VERSION").into()),
-            ]);
-            Some(Recorder::create(&arguments.record, &metadata).map_err(|error| output(&error))?)
-        };
-        let plot = if arguments.no_plot {
-            None
-        } else {
-            let plot = AtomicFile::create(&arguments.plot).map_err(|error| output(&error))?;
-            if recorder
-                .as_ref()
-                .is_some_and(|recorder| recorder.is_same_file(&plot))
-            {
-                return Err(CommandError::SameFile(arguments.plot.clone()));
-            }
-            let subtitle = format!(
-                "law: {} · {} Hz · μ = {} · seed {}",
-                scenario.controller.law.name(),
-                scenario.run.tick_hz,
-                scenario.belt.friction,
-                scenario.run.seed,
-            );
-            Some((
-                RunPlot::new(&scenario.name, &subtitle),
-                arguments.plot.clone(),
-            ))
+            let configuration = scenario.controller_configuration();
+            Some(Recorder::start(&configuration, sinks).map_err(output_error)?)
         };
         Ok(Self {
             recorder,
-            plot,
             progress: progress_bar(scenario.run.ticks()),
             interrupt,
             tick: 0,
@@ -124,7 +155,11 @@ impl Output {
             .map(|recorder| recorder.finish_partial(reason))
         {
             None => {}
-            Some(Ok(path)) => warn(format_args!("the partial record is in {}", path.display())),
+            Some(Ok(paths)) => {
+                for path in paths {
+                    warn(format_args!("the partial record is in {}", path.display()));
+                }
+            }
             Some(Err(error)) => warn(format_args!(
                 "the partial record could not be kept: {error}"
             )),
@@ -134,20 +169,16 @@ impl Output {
     /// Completes the files; they have no final name before that.
     pub fn finish(self) -> Result<(), CommandError> {
         self.progress.finish_and_clear();
-        if let Some(recorder) = self.recorder {
-            recorder
-                .finish()
-                .map_err(|error| CommandError::Output(error.to_string()))?;
-        }
-        if let Some((plot, path)) = self.plot {
-            plot.write(path)
-                .map_err(|error| CommandError::Output(error.to_string()))?;
-        }
-        Ok(())
+        self.recorder
+            .map_or(Ok(()), |recorder| recorder.finish().map_err(output_error))
     }
 }
 
-/// Returns a progress bar on stderr if it is a terminal, otherwise a hidden one.
+fn output_error(error: RecordError) -> CommandError {
+    CommandError::Output(error.to_string())
+}
+
+/// A bar on stderr, where it is a terminal; nothing elsewhere.
 fn progress_bar(ticks: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(ticks), ProgressDrawTarget::stderr());
     let template = "{bar:40} {percent:>3} %  {pos}/{len} ticks  {eta} left";
@@ -159,7 +190,7 @@ fn progress_bar(ticks: u64) -> ProgressBar {
 
 impl Monitor for Output {
     fn wants_samples(&self) -> bool {
-        self.recorder.is_some() || self.plot.is_some()
+        self.recorder.is_some()
     }
 
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
@@ -168,10 +199,13 @@ impl Monitor for Output {
                 .push(sample)
                 .map_err(|error| LoopError::Monitor(Box::new(error)))?;
         }
-        if let Some((plot, _)) = &mut self.plot {
-            plot.push(sample);
-        }
         Ok(())
+    }
+
+    fn event(&mut self, time_s: f64, event: Event) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.push_event(time_s, event);
+        }
     }
 
     fn tick(&mut self) -> Result<(), LoopError> {

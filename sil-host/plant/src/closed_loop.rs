@@ -7,7 +7,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::controller_host::{Answer, ControllerHost, HostError};
 use crate::mechanics::BuiltInPlant;
-use crate::plant::{Plant, PlantError};
+use crate::plant::{Event, Plant, PlantError, Probe, State, Step};
 use crate::sample::Sample;
 use crate::simulation::Simulation;
 use crate::statistics::Statistics;
@@ -59,6 +59,9 @@ pub trait Monitor {
     /// [`LoopError`] ends the run.
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError>;
 
+    /// Receives every discontinuity of the plant's motion, in order of time.
+    fn event(&mut self, _time_s: f64, _event: Event) {}
+
     /// Called at the end of every tick.
     ///
     /// # Errors
@@ -76,6 +79,24 @@ impl Monitor for () {
 
     fn sample(&mut self, _: &Sample) -> Result<(), LoopError> {
         Ok(())
+    }
+}
+
+/// Passes the plant's motion to the statistics, and its discontinuities to the monitor as well.
+struct Watched<'a, M> {
+    statistics: &'a mut Statistics,
+    monitor: &'a mut M,
+}
+
+impl<M: Monitor> Probe for Watched<'_, M> {
+    #[inline]
+    fn step(&mut self, step: &impl Step) {
+        self.statistics.step(step);
+    }
+
+    fn event(&mut self, time_s: f64, event: Event, state: &State) {
+        self.statistics.event(time_s, event, state);
+        self.monitor.event(time_s, event);
     }
 }
 
@@ -201,7 +222,11 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
     /// # Errors
     /// [`LoopError`] if plant, controller or monitor cannot continue.
     pub fn tick(&mut self, monitor: &mut impl Monitor) -> Result<(), LoopError> {
-        let sensor = self.simulation.sample(&mut self.statistics)?;
+        let mut probe = Watched {
+            statistics: &mut self.statistics,
+            monitor: &mut *monitor,
+        };
+        let sensor = self.simulation.sample(&mut probe)?;
         self.log.sensor(&sensor);
         let frame = if self.simulation.sensor_frame_is_lost() {
             None
@@ -227,10 +252,16 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             None => self.stale_ticks += 1,
         }
         if monitor.wants_samples() {
-            monitor.sample(&self.simulation.describe(&sensor, &self.last_answer))?;
+            monitor.sample(&Sample {
+                answered: frame.is_some_and(|answer| answer.tick == sensor.tick),
+                ..self.simulation.describe(&sensor, &self.last_answer)
+            })?;
         }
-        self.simulation
-            .advance(frame.as_ref(), &mut self.statistics)?;
+        let mut probe = Watched {
+            statistics: &mut self.statistics,
+            monitor: &mut *monitor,
+        };
+        self.simulation.advance(frame.as_ref(), &mut probe)?;
         if self.simulation.drive_watchdog_has_tripped() && self.drive_watchdog_tick.is_none() {
             self.drive_watchdog_tick = Some(self.simulation.ticks());
         }

@@ -15,4 +15,8 @@ pub struct Sample {
     pub actuator: ActuatorFrame,
     /// Reference z_t*, m; NaN while the controller follows no reference.
     pub reference_tip_t_m: f64,
+    /// Whether the controller received the sensor frame.
+    pub delivered: bool,
+    /// Whether the controller answered in time; otherwise `actuator` is its last answer.
+    pub answered: bool,
 }

@@ -114,13 +114,15 @@ impl<P: Plant> Simulation<P> {
         self.lost.sensor
     }
 
-    /// Returns the complete data of this tick, for records.
+    /// Returns the complete data of this tick, for records. `answered` stays false: only the caller knows it.
     pub fn describe(&self, sensor: &SensorFrame, actuator: &ActuatorFrame) -> Sample {
         Sample {
             plant: self.plant.snapshot(),
             sensor: *sensor,
             actuator: *actuator,
             reference_tip_t_m: reference_m(actuator),
+            delivered: !self.lost.sensor,
+            answered: false,
         }
     }
 

@@ -88,7 +88,7 @@ impl Probe for Statistics {
     fn event(&mut self, time_s: f64, event: Event, _: &State) {
         match event {
             Event::Impact { .. } => self.impacts += 1,
-            Event::ImpactWithoutCollision => self.impacts_without_collision += 1,
+            Event::ImpactWithoutCollision { .. } => self.impacts_without_collision += 1,
             Event::ModeChange {
                 to: ContactMode::Flight,
                 ..

@@ -1,11 +1,23 @@
 //! Records of a run.
 //!
-//! - [`mcap`]: every tick as a log file for Foxglove, PlotJuggler and scripts
+//! - [`recorder`]: the thread that passes ticks and events of a run to its [`Sink`]s
+//! - [`mcap_log`]: every tick as an MCAP file for Foxglove, PlotJuggler and scripts
+//! - [`csv_table`]: every tick as a row of a CSV file
 //! - [`plot`]: the run over time as a figure
 //! - [`report`]: the results of the run as JSON and as a table
+//! - [`export`]: columns of a recorded MCAP file as CSV
 
-pub mod mcap;
+pub mod csv_table;
+pub mod events;
+pub mod export;
+pub mod fields;
+pub mod mcap_log;
 pub mod plot;
+pub mod recorder;
+pub mod replica;
 pub mod report;
+pub mod scene;
 
+pub use mcap_log::McapLog;
 pub use plot::RunPlot;
+pub use recorder::{RecordError, Recorder, Sink, Tick};

@@ -5,6 +5,7 @@
 
 mod panels;
 
+use std::io::Write;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -17,9 +18,11 @@ use painleve_chart::style::{
 };
 use painleve_plant::ContactMode;
 use painleve_plant::sample::Sample;
-use painleve_system::atomic_file;
+use painleve_system::atomic_file::{self, AtomicFile};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
+
+use crate::recorder::{RecordError, Sink, Tick};
 
 use self::panels::{
     B_PANEL, Curve, FORCE_PANEL, P_PANEL, SignalPanel, TIP_PANEL, TORQUE_PANEL, signal,
@@ -122,6 +125,33 @@ impl RunPlot {
         top += HEADER_HEIGHT + PANEL_HEIGHT + GAP;
         figure.draw_panel(&P_PANEL, top)?;
         figure.draw_time_axis(top + HEADER_HEIGHT + PANEL_HEIGHT)
+    }
+}
+
+/// A figure with the file that it is written to.
+pub struct PlotFile {
+    /// The figure.
+    pub plot: RunPlot,
+    /// The file.
+    pub file: AtomicFile,
+}
+
+impl Sink for PlotFile {
+    fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError> {
+        self.plot.push(tick.sample);
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<(), RecordError> {
+        let svg = self
+            .plot
+            .svg()
+            .map_err(|error| RecordError::Draw(error.to_string()))?;
+        let path = self.file.path().to_path_buf();
+        self.file
+            .write_all(svg.as_bytes())
+            .map_err(|error| RecordError::write(&path, error))?;
+        Ok(self.file.commit()?)
     }
 }
 

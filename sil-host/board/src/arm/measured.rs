@@ -41,6 +41,8 @@ impl Measured {
             sensor: *sensor,
             actuator: *answer,
             reference_tip_t_m,
+            delivered: true,
+            answered: answer.tick == sensor.tick,
         }
     }
 

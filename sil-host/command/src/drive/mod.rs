@@ -3,7 +3,6 @@
 mod operator;
 mod view;
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -11,7 +10,8 @@ use clap::Args;
 use painleve_board::BoardError;
 use painleve_board::arm::{Arm, ArmEvent, Measured};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
-use painleve_record::mcap::Recorder;
+use painleve_record::mcap_log::Source;
+use painleve_record::{McapLog, Recorder};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
@@ -115,16 +115,9 @@ fn recorder(
     if arguments.no_record {
         return Ok(None);
     }
-    let metadata = BTreeMap::from([
-        ("scenario".into(), scenario.name.clone()),
-        (
-            "configuration".into(),
-            toml::to_string(scenario).map_err(output)?,
-        ),
-        ("version".into(), env!("CARGO_PKG_VERSION").into()),
-        ("source".into(), "arm".into()),
-    ]);
-    Recorder::create(&arguments.record, &metadata)
+    let log = McapLog::create(&arguments.record, scenario, Source::Arm).map_err(output)?;
+    let configuration = scenario.controller_configuration();
+    Recorder::start(&configuration, vec![Box::new(log)])
         .map(Some)
         .map_err(output)
 }
@@ -132,7 +125,11 @@ fn recorder(
 fn keep_partial(recorder: Option<Recorder>, reason: &str) {
     match recorder.map(|recorder| recorder.finish_partial(reason)) {
         None => {}
-        Some(Ok(path)) => warn(format_args!("the record so far is in {}", path.display())),
+        Some(Ok(paths)) => {
+            for path in paths {
+                warn(format_args!("the partial record is in {}", path.display()));
+            }
+        }
         Some(Err(error)) => warn(format_args!("no record is kept: {error}")),
     }
 }

@@ -234,7 +234,7 @@ pub enum ImpactKind {
     WithoutCollision,
 }
 
-/// Returns the state after an impact of the tip at belt height.
+/// Returns the state after an impact of the tip at belt height, and the impulse on the tip, (P_t, P_n), N·s.
 ///
 /// # Errors
 /// As [`collide`].
@@ -244,14 +244,15 @@ pub fn state_after(
     time_s: f64,
     state: &State,
     kind: ImpactKind,
-) -> Result<State, EndlessImpact> {
+) -> Result<(State, Vector2<f64>), EndlessImpact> {
     let velocity = motion.relative_velocity_m_s(time_s, state);
     let q = motion.arm.inverse_tip_inertia(&Pose::new(&theta(state)));
     let impact = match kind {
         ImpactKind::Collision => collide(&q, motion.friction, law, velocity),
         ImpactKind::WithoutCollision => throw(&q, motion.friction, law, velocity.x),
     }?;
-    Ok(motion.apply_impulse(state, &impact.impulse_ns))
+    let after = motion.apply_impulse(state, &impact.impulse_ns);
+    Ok((after, impact.impulse_ns))
 }
 
 /// The rest of a collision: compression to its end, then restitution.

@@ -9,9 +9,14 @@ pub enum Event {
     Impact {
         /// Normal velocity before, m/s.
         approach_m_s: f64,
+        /// Impulse of the belt on the tip, (P_t, P_n), N·s.
+        impulse_ns: [f64; 2],
     },
     /// The tip was thrown off while sliding, without a collision.
-    ImpactWithoutCollision,
+    ImpactWithoutCollision {
+        /// Impulse of the belt on the tip, (P_t, P_n), N·s.
+        impulse_ns: [f64; 2],
+    },
     /// The mode changed.
     ModeChange {
         /// Mode before.

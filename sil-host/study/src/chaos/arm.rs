@@ -131,7 +131,7 @@ fn jump(
             state = motion.onto_belt(&state);
         }
         // The plant has completed this impact, and so do its neighbours.
-        state = state_after(motion, law, time_s, &state, kind).unwrap_or(state);
+        state = state_after(motion, law, time_s, &state, kind).map_or(state, |(state, _)| state);
     }
     onto_manifold(motion, time_s, mode, &state)
 }
@@ -171,7 +171,7 @@ impl ArmProbe for ArmTangent {
     fn event(&mut self, _: f64, event: Event, _: &State) {
         match event {
             Event::Impact { .. } => self.impacts.push(ImpactKind::Collision),
-            Event::ImpactWithoutCollision => self.impacts.push(ImpactKind::WithoutCollision),
+            Event::ImpactWithoutCollision { .. } => self.impacts.push(ImpactKind::WithoutCollision),
             Event::ModeChange { .. } => {}
         }
     }

@@ -55,7 +55,10 @@ impl Probe for FirstFlight {
     }
 
     fn event(&mut self, time_s: f64, event: Event, _: &State) {
-        let touch = matches!(event, Event::Impact { .. } | Event::ImpactWithoutCollision);
+        let touch = matches!(
+            event,
+            Event::Impact { .. } | Event::ImpactWithoutCollision { .. }
+        );
         if touch && self.start_s.is_some_and(|start_s| start_s < time_s) {
             self.end_s.get_or_insert(time_s);
         }

@@ -28,7 +28,12 @@ impl ArmOnBelt {
         let approach_m_s = motion.relative_velocity_m_s(self.time_s, &state).y;
         self.state = state;
         if approach_m_s < 0.0 {
-            self.collide(probe, Event::Impact { approach_m_s })?;
+            let impulse_ns = self.collide(ImpactKind::Collision)?;
+            let event = Event::Impact {
+                approach_m_s,
+                impulse_ns,
+            };
+            probe.event(self.time_s, event, &self.state);
         }
         let motion = self.motion();
         let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
@@ -59,7 +64,9 @@ impl ArmOnBelt {
                     return Ok(());
                 }
                 Continuation::Thrown => {
-                    self.collide(probe, Event::ImpactWithoutCollision)?;
+                    let impulse_ns = self.collide(ImpactKind::WithoutCollision)?;
+                    let event = Event::ImpactWithoutCollision { impulse_ns };
+                    probe.event(self.time_s, event, &self.state);
                     let motion = self.motion();
                     let rebound = motion.relative_velocity_m_s(self.time_s, &self.state).y;
                     if rebound >= self.solver.chatter_speed_m_s {
@@ -75,20 +82,18 @@ impl ArmOnBelt {
         })
     }
 
-    fn collide(&mut self, probe: &mut impl ArmProbe, event: Event) -> Result<(), MotionError> {
+    /// Carries out an impact and returns its impulse on the tip, (P_t, P_n), N·s.
+    fn collide(&mut self, kind: ImpactKind) -> Result<[f64; 2], MotionError> {
         let motion = self.motion();
-        let kind = if event == Event::ImpactWithoutCollision {
-            ImpactKind::WithoutCollision
-        } else {
-            ImpactKind::Collision
-        };
-        self.state = impact::state_after(&motion, &self.impact, self.time_s, &self.state, kind)
-            .map_err(|source| MotionError::EndlessImpact {
-                time_s: self.time_s,
-                source,
-            })?;
-        probe.event(self.time_s, event, &self.state);
-        Ok(())
+        let (state, impulse_ns) =
+            impact::state_after(&motion, &self.impact, self.time_s, &self.state, kind).map_err(
+                |source| MotionError::EndlessImpact {
+                    time_s: self.time_s,
+                    source,
+                },
+            )?;
+        self.state = state;
+        Ok(impulse_ns.into())
     }
 
     fn change_mode(&mut self, mode: ContactMode, probe: &mut impl ArmProbe) {

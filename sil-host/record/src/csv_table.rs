@@ -1,0 +1,94 @@
+//! A run as a CSV file: one row per control tick, one column per quantity.
+//!
+//! The first column is `time_s`; the others are named as the topics and fields of the MCAP file,
+//! `plant.tip_t_m` for example. A cell is empty where its quantity is not finite or not known.
+
+use std::path::PathBuf;
+
+use painleve_system::atomic_file::AtomicFile;
+
+use crate::fields::{Read, TOPICS};
+use crate::recorder::{RecordError, Sink, Tick};
+
+/// Returns the header of the table.
+pub fn header() -> Vec<String> {
+    let columns = TOPICS.iter().flat_map(|topic| {
+        let name = |field: &crate::fields::Field| format!("{}.{}", topic.name, field.name);
+        topic.fields.iter().map(name)
+    });
+    std::iter::once("time_s".to_owned())
+        .chain(columns)
+        .collect()
+}
+
+/// Returns the row of a tick.
+pub fn row(tick: &Tick<'_>) -> Vec<String> {
+    let mut row = vec![decimal(tick.sample.plant.time_s)];
+    for topic in TOPICS {
+        let known = tick.estimates.is_some() || !topic.needs_estimates;
+        row.extend(topic.fields.iter().map(|field| match field.read {
+            _ if !known => String::new(),
+            Read::Number(read) => decimal(read(tick)),
+            Read::Single(read) => decimal(read(tick)),
+            Read::Whole(read) => read(tick).to_string(),
+            Read::Text(read) => read(tick).to_owned(),
+            Read::Truth(read) => read(tick).to_string(),
+        }));
+    }
+    row
+}
+
+/// Returns the shortest decimal that gives the same number; nothing if it is not finite.
+pub(crate) fn decimal(value: impl serde::Serialize) -> String {
+    match serde_json::to_string(&value) {
+        Ok(text) if text != "null" => text,
+        _ => String::new(),
+    }
+}
+
+/// Writes a run to a CSV file that appears once it is complete.
+pub struct CsvTable {
+    path: PathBuf,
+    writer: csv::Writer<AtomicFile>,
+}
+
+impl CsvTable {
+    /// Writes to a file that has been created.
+    ///
+    /// # Errors
+    /// [`RecordError`] if it cannot be written.
+    pub fn to(file: AtomicFile) -> Result<Self, RecordError> {
+        let mut table = Self {
+            path: file.path().to_path_buf(),
+            writer: csv::Writer::from_writer(file),
+        };
+        table.write(header())?;
+        Ok(table)
+    }
+
+    fn write(&mut self, row: Vec<String>) -> Result<(), RecordError> {
+        self.writer
+            .write_record(row)
+            .map_err(|error| RecordError::write(&self.path, error.into()))
+    }
+
+    fn complete(self) -> Result<AtomicFile, RecordError> {
+        self.writer
+            .into_inner()
+            .map_err(|error| RecordError::write(&self.path, error.into_error()))
+    }
+}
+
+impl Sink for CsvTable {
+    fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError> {
+        self.write(row(tick))
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), RecordError> {
+        Ok(self.complete()?.commit()?)
+    }
+
+    fn finish_partial(self: Box<Self>, _reason: &str) -> Result<Option<PathBuf>, RecordError> {
+        Ok(Some(self.complete()?.commit_partial()?))
+    }
+}

@@ -1,0 +1,297 @@
+//! The thread that records a run, and the [`Sink`]s that it feeds.
+//!
+//! The control loop only copies a [`Sample`] into a buffer. Full buffers go to the recording thread
+//! and come back empty. When no buffer is empty the loop waits, so no sample is lost and memory is
+//! bounded. The thread recomputes the controller's estimates ([`Replica`]) and finds the controller's
+//! events, so that neither costs the loop anything.
+
+use std::io;
+use std::mem;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use painleve_firmware::telemetry::Telemetry;
+use painleve_plant::sample::Sample;
+use painleve_plant::{Configuration, Event};
+use painleve_system::atomic_file::AtomicFileError;
+
+use crate::events::{ControllerEvents, EventKind, RunEvent};
+use crate::replica::Replica;
+
+/// Entries passed to the recording thread at once: one second of a run at 1 kHz.
+const ENTRIES_PER_BUFFER: usize = 1024;
+/// Number of buffers in circulation, about 1 MB together.
+const BUFFERS: usize = 4;
+
+/// Why a run could not be recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file cannot be created or renamed.
+    #[error(transparent)]
+    File(#[from] AtomicFileError),
+    /// Writing failed during the recording, for example because the disk is full.
+    #[error(
+        "cannot record to `{path}`: {source}; choose a path with enough space or run without recording"
+    )]
+    Write {
+        /// The requested path.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// A figure or page cannot be drawn, which is not expected.
+    #[error("cannot draw the run: {0}")]
+    Draw(String),
+    /// The recording thread cannot be started.
+    #[error("cannot start the recording thread: {0}; end other processes or run without recording")]
+    Thread(io::Error),
+    /// A call after the error that ended the recording.
+    #[error("the recording has already failed; start a new one")]
+    Ended,
+}
+
+impl RecordError {
+    /// A [`RecordError::Write`] to the file requested at `path`.
+    pub fn write(path: &Path, source: io::Error) -> Self {
+        Self::Write {
+            path: path.to_path_buf(),
+            source,
+        }
+    }
+}
+
+/// Everything about one control tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Tick<'a> {
+    /// Both frames and the plant's state.
+    pub sample: &'a Sample,
+    /// The controller's internal state after the tick; `None` if it is not known.
+    pub estimates: Option<&'a Telemetry>,
+}
+
+/// A file, or part of one, made from the ticks of a run.
+pub trait Sink: Send {
+    /// Takes in one control tick.
+    ///
+    /// # Errors
+    /// [`RecordError`] ends the recording.
+    fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError>;
+
+    /// Takes in an event; events and ticks come in order of time.
+    ///
+    /// # Errors
+    /// [`RecordError`] ends the recording.
+    fn event(&mut self, _event: &RunEvent) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    /// Completes the file and gives it its name. Without this call no file is left.
+    ///
+    /// # Errors
+    /// [`RecordError`] if the file cannot be written.
+    fn finish(self: Box<Self>) -> Result<(), RecordError>;
+
+    /// Keeps the file of a run that ended early under a name that marks it as partial, which is
+    /// returned; `None` if such a file is of no use.
+    ///
+    /// # Errors
+    /// [`RecordError`] if the file cannot be written.
+    fn finish_partial(self: Box<Self>, _reason: &str) -> Result<Option<PathBuf>, RecordError> {
+        Ok(None)
+    }
+}
+
+/// The sinks of a recording.
+pub type Sinks = Vec<Box<dyn Sink>>;
+
+/// An entry of the recording, as the control loop passes it on.
+#[derive(Clone, Copy, Debug)]
+enum Entry {
+    Tick(Sample),
+    Plant { time_s: f64, event: Event },
+}
+
+/// Passes the ticks of a run to a thread that records them.
+#[derive(Debug)]
+pub struct Recorder {
+    buffer: Vec<Entry>,
+    /// `None` after the recording ended.
+    thread: Option<RecordingThread>,
+}
+
+#[derive(Debug)]
+struct RecordingThread {
+    full: SyncSender<Vec<Entry>>,
+    empty: Receiver<Vec<Entry>>,
+    thread: JoinHandle<Result<Sinks, RecordError>>,
+}
+
+impl Recorder {
+    /// Starts a recording of a run whose controller has this configuration.
+    ///
+    /// The thread inherits the caller's scheduling: start the recorder before raising a priority.
+    ///
+    /// # Errors
+    /// [`RecordError::Thread`].
+    pub fn start(configuration: &Configuration, sinks: Sinks) -> Result<Self, RecordError> {
+        let (full, full_buffers) = sync_channel(BUFFERS);
+        let (empty_buffers, empty) = sync_channel(BUFFERS);
+        for _ in 1..BUFFERS {
+            // Cannot fail: the channel has room and its receiver exists.
+            let _ = empty_buffers.send(new_buffer());
+        }
+        let recording = Recording {
+            replica: Replica::new(configuration),
+            events: ControllerEvents::default(),
+            sinks,
+        };
+        let thread = thread::Builder::new()
+            .name("recorder".to_owned())
+            .spawn(move || recording.run(&full_buffers, &empty_buffers))
+            .map_err(RecordError::Thread)?;
+        Ok(Self {
+            buffer: new_buffer(),
+            thread: Some(RecordingThread {
+                full,
+                empty,
+                thread,
+            }),
+        })
+    }
+
+    /// Adds a copy of a sample. Waits only when the sinks are behind by several thousand samples.
+    ///
+    /// # Errors
+    /// [`RecordError`] if writing earlier samples failed; the recording has then ended.
+    #[inline]
+    pub fn push(&mut self, sample: &Sample) -> Result<(), RecordError> {
+        self.buffer.push(Entry::Tick(*sample));
+        if self.buffer.len() >= ENTRIES_PER_BUFFER {
+            self.hand_over()?;
+        }
+        Ok(())
+    }
+
+    /// Adds a discontinuity of the plant's motion.
+    pub fn push_event(&mut self, time_s: f64, event: Event) {
+        self.buffer.push(Entry::Plant { time_s, event });
+    }
+
+    /// Records the remaining samples and completes every file.
+    ///
+    /// # Errors
+    /// [`RecordError`] if anything could not be written; that file is not left then.
+    pub fn finish(mut self) -> Result<(), RecordError> {
+        self.hand_over()?;
+        self.end()?.into_iter().try_for_each(Sink::finish)
+    }
+
+    /// Keeps the recorded part of a run that ended early, and returns the files' names. Earlier
+    /// records stay.
+    ///
+    /// # Errors
+    /// See [`Recorder::finish`].
+    pub fn finish_partial(mut self, reason: &str) -> Result<Vec<PathBuf>, RecordError> {
+        self.hand_over()?;
+        let mut kept = Vec::new();
+        for sink in self.end()? {
+            kept.extend(sink.finish_partial(reason)?);
+        }
+        Ok(kept)
+    }
+
+    #[cold]
+    fn hand_over(&mut self) -> Result<(), RecordError> {
+        let handed_over = self.thread.as_ref().and_then(|thread| {
+            let empty = thread.empty.recv().ok()?;
+            let full = mem::replace(&mut self.buffer, empty);
+            thread.full.send(full).ok()
+        });
+        if handed_over.is_some() {
+            return Ok(());
+        }
+        // A closed channel means that the thread has stopped: its result holds the reason.
+        self.buffer.clear();
+        self.end().and(Err(RecordError::Ended))
+    }
+
+    /// Stops the thread and takes back the sinks.
+    fn end(&mut self) -> Result<Sinks, RecordError> {
+        let Some(RecordingThread { full, thread, .. }) = self.thread.take() else {
+            return Err(RecordError::Ended);
+        };
+        drop(full);
+        thread.join().unwrap_or(Err(RecordError::Ended))
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        // Dropping unfinished sinks removes their temporary files.
+        let _ = self.end();
+    }
+}
+
+fn new_buffer() -> Vec<Entry> {
+    // Some room for events, which are handed over with the next tick.
+    Vec::with_capacity(ENTRIES_PER_BUFFER + ENTRIES_PER_BUFFER / 8)
+}
+
+/// State of the recording thread.
+struct Recording {
+    replica: Option<Replica>,
+    events: ControllerEvents,
+    sinks: Sinks,
+}
+
+impl Recording {
+    /// Runs until the recorder closes its channel.
+    fn run(
+        mut self,
+        full: &Receiver<Vec<Entry>>,
+        empty: &SyncSender<Vec<Entry>>,
+    ) -> Result<Sinks, RecordError> {
+        for mut buffer in full {
+            for entry in &buffer {
+                match entry {
+                    Entry::Tick(sample) => self.tick(sample)?,
+                    Entry::Plant { time_s, event } => {
+                        self.event(&RunEvent::of_plant(*time_s, *event))?;
+                    }
+                }
+            }
+            buffer.clear();
+            // Fails only when the recorder is ending and takes no more buffers.
+            let _ = empty.send(buffer);
+        }
+        Ok(self.sinks)
+    }
+
+    fn tick(&mut self, sample: &Sample) -> Result<(), RecordError> {
+        if let Some(replica) = &mut self.replica
+            && !replica.follow(sample)
+        {
+            self.replica = None;
+            self.event(&RunEvent {
+                time_s: sample.plant.time_s,
+                kind: EventKind::EstimatesEnd,
+            })?;
+        }
+        for kind in self.events.take_in(sample).into_iter().flatten() {
+            self.event(&RunEvent {
+                time_s: sample.plant.time_s,
+                kind,
+            })?;
+        }
+        let tick = Tick {
+            sample,
+            estimates: self.replica.as_ref().map(Replica::telemetry),
+        };
+        self.sinks.iter_mut().try_for_each(|sink| sink.tick(&tick))
+    }
+
+    fn event(&mut self, event: &RunEvent) -> Result<(), RecordError> {
+        self.sinks.iter_mut().try_for_each(|sink| sink.event(event))
+    }
+}
