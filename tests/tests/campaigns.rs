@@ -124,7 +124,11 @@ fn what_cannot_be_replayed_is_refused() {
         "1.5:2",
         "1:99999999999999999999",
     ] {
-        let expected = [&format!("'{text}'"), "--replay", "SEED:INDEX, as in 1:42"];
+        let expected = [
+            &format!("'{text}'"),
+            "--replay",
+            "SEED:INDEX, for example 1:42",
+        ];
         is_refused(&bench, &["run", "--replay", text], &expected);
     }
     let both = ["run", "hybrid-elbow-down", "--replay", "1:2"];

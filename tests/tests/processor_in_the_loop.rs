@@ -98,7 +98,7 @@ fn assert_equal_within_budget(name: &str, overrides: &[String], key: &str) {
     };
     assert_eq!(health, nothing_else, "{name}");
     let most = budget[key][name].as_u64();
-    let most = most.unwrap_or_else(|| panic!("budget.json says nothing of {name}"));
+    let most = most.unwrap_or_else(|| panic!("budget.json has no limit for {name}"));
     assert!(
         u64::from(report.max) <= most,
         "{name}: more than the {most} instructions of budget.json: {:?}",

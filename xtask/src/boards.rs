@@ -1,5 +1,5 @@
-//! The boards that images are built for: one folder each in `firmware/boards`, whose `Cargo.toml`
-//! says in `[package.metadata.board]` what is to be known about the board.
+//! The boards for which images are built: one folder each in `firmware/boards`, described by the
+//! section `[package.metadata.board]` of its `Cargo.toml`.
 
 use std::path::Path;
 use std::process::Command;
@@ -10,22 +10,22 @@ use crate::command::{ChoreError, cargo, workspace};
 
 /// A board, as its `Cargo.toml` describes it.
 pub struct BoardPackage {
-    /// Its crate.
+    /// Name of its crate.
     pub package: String,
-    /// Its images: the crate's programs.
+    /// Names of its images, which are the crate's programs.
     pub images: Vec<String>,
     /// The chip, as probe-rs names it; `None` for a board that cannot be flashed.
     pub chip: Option<String>,
-    /// Most flash that an image may take for code and constants, bytes.
+    /// Largest flash use of an image for code and constants, bytes.
     pub flash_bytes: u64,
-    /// Most static RAM that an image may take, bytes.
+    /// Largest static RAM use of an image, bytes.
     pub ram_bytes: u64,
 }
 
-/// All boards, by the names of their folders.
+/// Returns all boards, sorted by folder name.
 ///
 /// # Errors
-/// If cargo cannot read the workspace, or a board does not say what it must.
+/// If cargo cannot read the workspace, or a board's description is incomplete.
 pub fn all() -> Result<Vec<BoardPackage>, ChoreError> {
     let packages = packages(&workspace().join("Cargo.toml"))?;
     let mut boards: Vec<_> = packages
@@ -36,7 +36,7 @@ pub fn all() -> Result<Vec<BoardPackage>, ChoreError> {
     boards.into_iter().map(board).collect()
 }
 
-/// The packages of the workspace with this manifest, as `cargo metadata` describes them.
+/// Returns the packages of the workspace with this manifest, as described by `cargo metadata`.
 ///
 /// # Errors
 /// If cargo cannot read the workspace.

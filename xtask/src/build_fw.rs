@@ -15,7 +15,7 @@ const PROFILE: &str = "firmware";
 /// Debian's own compiler, from the packages `rustc-web` and `rust-web-src`.
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
-/// How the target's core library is had.
+/// Source of the target's core library.
 enum Toolchain {
     /// Installed with this toolchain.
     Installed,
@@ -55,14 +55,14 @@ pub fn build(
             run_with(&cargo(), &build, &[])
         }
         Toolchain::Debian => {
-            // A target folder of its own: objects of two compilers do not mix.
+            // A separate target folder, because objects of two compilers cannot be mixed.
             let folder = workspace().join("target/debian");
             let folder = folder.to_string_lossy();
             let build = [&build[..], &["-Zbuild-std=core", "--target-dir", &folder]].concat();
             let environment = [
                 ("RUSTC", DEBIAN_RUSTC),
                 ("RUSTC_BOOTSTRAP", "1"),
-                // Debian's compiler comes without the linker that the target names.
+                // Debian's compiler lacks the linker that the target specifies.
                 ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld"),
             ];
             run_with("/usr/bin/cargo", &build, &environment)?;
@@ -76,12 +76,12 @@ pub fn build(
     }
 }
 
-/// Where an image is once built.
+/// Returns the path of a built image.
 pub fn image(name: &str) -> PathBuf {
     workspace().join(format!("target/{TARGET}/{PROFILE}/{name}"))
 }
 
-/// Whether `rustc` has the target's core library.
+/// Returns whether `rustc` has the target's core library.
 pub fn target_is_installed() -> bool {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
     let Ok(output) = Command::new(rustc)
@@ -99,7 +99,7 @@ pub fn target_is_installed() -> bool {
     })
 }
 
-/// Whether Debian's compiler and the sources of its core library are there.
+/// Returns whether Debian's compiler and the sources of its core library are installed.
 pub fn debian_can_build() -> bool {
     let sysroot = Command::new(DEBIAN_RUSTC)
         .args(["--print", "sysroot"])

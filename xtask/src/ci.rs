@@ -3,10 +3,10 @@
 use crate::command::{ChoreError, run_cargo};
 use crate::test;
 
-/// Runs what continuous integration runs.
+/// Runs the steps of continuous integration.
 ///
 /// # Errors
-/// The first command that fails.
+/// If a step fails; later steps are not run.
 pub fn run() -> Result<(), ChoreError> {
     run_cargo(&["fmt", "--all", "--check"])?;
     run_cargo(&[

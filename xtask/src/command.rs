@@ -1,4 +1,4 @@
-//! Running other programs, with every command line shown.
+//! Runs other programs and prints every command line.
 
 use std::env;
 use std::fmt;
@@ -19,20 +19,20 @@ impl fmt::Display for ChoreError {
 /// Writes a line to standard output.
 ///
 /// # Errors
-/// If that is closed.
+/// If standard output is closed.
 pub fn say(line: &str) -> Result<(), ChoreError> {
     writeln!(std::io::stdout(), "{line}")
         .map_err(|cause| ChoreError(format!("cannot write to stdout: {cause}")))
 }
 
-/// The workspace's folder.
+/// Returns the workspace's folder.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .map_or_else(|| PathBuf::from("."), Path::to_path_buf)
 }
 
-/// The cargo that runs this program.
+/// Returns the cargo that runs this program.
 pub fn cargo() -> String {
     env::var("CARGO").unwrap_or_else(|_| "cargo".into())
 }
@@ -45,7 +45,8 @@ pub fn run(program: &str, arguments: &[&str]) -> Result<(), ChoreError> {
     run_with(program, arguments, &[])
 }
 
-/// Runs a program in the workspace's folder with more environment variables.
+/// Runs a program in the workspace's folder with additional environment
+/// variables.
 ///
 /// # Errors
 /// As [`run`].

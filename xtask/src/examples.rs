@@ -1,4 +1,5 @@
-//! `cargo xtask examples`: builds, runs and tests every example, each a crate outside the workspace.
+//! `cargo xtask examples`: builds, runs and tests every example; each is a crate outside the
+//! workspace.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,14 +7,14 @@ use std::path::{Path, PathBuf};
 use crate::command::{ChoreError, run_cargo, workspace};
 use crate::{boards, build_fw};
 
-/// The examples' own target folder, one for all of them: they share most dependencies.
+/// A common target folder of all examples, because they share most dependencies.
 const TARGET: &str = "target/examples";
 
-/// Runs every folder of `examples/` that has a `Cargo.toml`, in the order of their names: builds the
-/// image that `[package.metadata] image` names, runs the program, then its tests.
+/// Handles every folder of `examples/` that has a `Cargo.toml`, sorted by name: builds the image
+/// named by `[package.metadata] image`, runs the program, then its tests.
 ///
 /// # Errors
-/// The first example that does not build, ends with an error, or fails a test.
+/// If an example does not build, ends with an error, or fails a test.
 pub fn run() -> Result<(), ChoreError> {
     for manifest in manifests()? {
         let manifest_path = manifest.to_string_lossy();
@@ -29,7 +30,7 @@ pub fn run() -> Result<(), ChoreError> {
     Ok(())
 }
 
-/// The images that an example has for a microcontroller.
+/// Returns the microcontroller images of an example.
 fn images(manifest: &Path) -> Result<Vec<String>, ChoreError> {
     let packages = boards::packages(manifest)?;
     let image =

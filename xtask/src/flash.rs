@@ -8,7 +8,7 @@ use crate::setup::starts;
 /// Builds, flashes and starts the image, and shows its log.
 ///
 /// # Errors
-/// If the build fails, probe-rs is missing or there is no board.
+/// If the build fails, probe-rs is missing or no board is connected.
 pub fn run() -> Result<(), ChoreError> {
     if !starts("probe-rs") {
         return Err(ChoreError(

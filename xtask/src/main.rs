@@ -1,4 +1,4 @@
-//! The workspace's chores, as `cargo xtask …`: one local command equals CI.
+//! Chores of the workspace, as `cargo xtask …`; one local command equals CI.
 
 mod boards;
 mod build_fw;
@@ -26,23 +26,23 @@ struct Xtask {
 
 #[derive(Debug, Subcommand)]
 enum Chore {
-    /// Install what the tests need and run every test.
+    /// Install the tools that the tests require and run every test.
     Test,
     /// Install the microcontroller's Rust target and QEMU.
     Setup,
     /// Build the controller's images for the microcontroller.
     BuildFw,
-    /// Flash, RAM and stack of the images, with their limits.
+    /// Print flash, RAM and stack use of the images, with their limits.
     Size,
     /// Build the image for the STM32F405 and flash it with probe-rs.
     Flash,
     /// Build and run every example.
     Examples,
-    /// Disturb plant and controller at every system call, and count what goes wrong.
+    /// Disturb plant and controller at every system call and count the flaws.
     Chaos(chaos::ChaosArguments),
-    /// A simulated day of lockstep operation with counters that wrap; not part of CI.
+    /// Run a simulated day in lockstep with wrapping counters; not part of CI.
     Soak(soak::SoakArguments),
-    /// What continuous integration does: formatting, clippy, every test.
+    /// Run the steps of continuous integration: formatting, clippy, every test.
     Ci,
 }
 

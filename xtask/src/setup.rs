@@ -1,17 +1,17 @@
-//! `cargo xtask setup`: what building, emulating and testing the images needs.
+//! `cargo xtask setup`: installs the tools for building, emulating and testing the images.
 
 use std::process::{Command, Stdio};
 
 use crate::build_fw::{TARGET, debian_can_build, target_is_installed};
 use crate::command::{ChoreError, run_with, workspace};
 
-/// Executes the image for the board in tests; see `tests/flash-image`.
+/// Executes the board's image in tests; see `tests/flash-image`.
 const UNICORN: &str = "unicorn==2.1.4";
 
-/// Adds the Rust target and installs QEMU and Unicorn, unless they are there.
+/// Installs the Rust target, QEMU and Unicorn, if missing.
 ///
 /// # Errors
-/// If neither rustup nor Debian has the target, or an emulator cannot be installed.
+/// If neither rustup nor Debian provides the target, or an emulator cannot be installed.
 pub fn run() -> Result<(), ChoreError> {
     if !target_is_installed()
         && run_with("rustup", &["target", "add", TARGET], &[]).is_err()
@@ -28,7 +28,7 @@ pub fn run() -> Result<(), ChoreError> {
     Ok(())
 }
 
-/// Installs Unicorn from PyPI, prebuilt, in an environment of its own under `target/`.
+/// Installs the prebuilt Unicorn from PyPI into an environment under `target/`.
 fn install_unicorn() -> Result<(), ChoreError> {
     let environment = workspace().join("target/unicorn");
     let installed = environment.join("installed");
@@ -48,7 +48,7 @@ fn install_unicorn() -> Result<(), ChoreError> {
         .map_err(|cause| ChoreError(format!("cannot write {}: {cause}", installed.display())))
 }
 
-/// Whether a program is there.
+/// Returns whether a program can be started.
 pub fn starts(program: &str) -> bool {
     Command::new(program)
         .arg("--version")
@@ -58,12 +58,12 @@ pub fn starts(program: &str) -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Installs Debian packages, with sudo unless this is root.
+/// Installs Debian packages, with sudo unless run as root.
 fn install(packages: &[&str]) -> Result<(), ChoreError> {
     let names = packages.join(" ");
     if !starts("apt-get") {
         return Err(ChoreError(format!(
-            "this is no Debian: install what its packages {names} hold"
+            "apt-get not found; install the equivalents of the Debian packages {names}"
         )));
     }
     let apt = |arguments: &[&str]| {

@@ -1,4 +1,4 @@
-//! `cargo xtask size`: what the images take of the microcontroller, and what they may.
+//! `cargo xtask size`: memory use of the images, and its limits.
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
 
@@ -10,16 +10,16 @@ use crate::boards;
 use crate::build_fw;
 use crate::command::{ChoreError, run_cargo, say, workspace};
 
-/// What the images may take besides, which the end-to-end tests hold them to as well.
+/// Further limits, which the end-to-end tests check as well.
 const BUDGET: &str = include_str!("../../tests/budget.json");
 
-/// How many of the largest symbols to show.
+/// Number of largest symbols to print.
 const LARGEST: usize = 12;
 
 /// Builds the images, prints their sizes, and runs one to measure its stack.
 ///
 /// # Errors
-/// If the build or the measurement fails, or an image is larger than it may be.
+/// If the build or the measurement fails, or an image exceeds a limit.
 pub fn run() -> Result<(), ChoreError> {
     build_fw::run()?;
     run_cargo(&["build", "--release", "--package", "painleve-command"])?;
@@ -48,12 +48,12 @@ pub fn run() -> Result<(), ChoreError> {
             say(&format!("  {:>7}  {name:#}", symbol.size()))?;
         }
     }
-    say("painleve-qemu, most of every built-in scenario")?;
+    say("painleve-qemu, maximum over all built-in scenarios")?;
     let budget: Value = serde_json::from_str(BUDGET)
         .map_err(|cause| ChoreError(format!("tests/budget.json: {cause}")))?;
     let stack_limit = budget["stack_bytes"]
         .as_u64()
-        .ok_or_else(|| ChoreError("tests/budget.json says nothing of the stack".into()))?;
+        .ok_or_else(|| ChoreError("tests/budget.json has no limit for the stack".into()))?;
     over.extend(check(
         "painleve-qemu",
         "stack",
@@ -67,7 +67,7 @@ pub fn run() -> Result<(), ChoreError> {
     }
 }
 
-/// Prints a size against its limit; says so if it is over.
+/// Prints a size and its limit; returns a message if it exceeds the limit.
 fn check(name: &str, what: &str, size: u64, limit: u64) -> Result<Option<String>, ChoreError> {
     let share = 100.0 * size as f64 / limit as f64;
     say(&format!(
@@ -76,8 +76,8 @@ fn check(name: &str, what: &str, size: u64, limit: u64) -> Result<Option<String>
     Ok((size > limit).then(|| format!("{name} takes {size} of {limit} bytes of {what}")))
 }
 
-/// Most stack that any scenario takes, measured on the emulated board. It is taken while the
-/// configuration is decoded and in the first ticks.
+/// Returns the largest stack use of any scenario, measured on the emulated board. It occurs while
+/// the configuration is decoded and in the first ticks.
 fn stack_bytes() -> Result<u64, ChoreError> {
     let program = workspace().join("target/release/painleve");
     let arguments = ["timing", "--json", "--set", "run.duration_s=0.1"];
@@ -89,16 +89,16 @@ fn stack_bytes() -> Result<u64, ChoreError> {
         .output()
         .map_err(|cause| error(&format!("does not start: {cause}")))?;
     let reports: Value =
-        serde_json::from_slice(&output.stdout).map_err(|_| error("gives no report"))?;
+        serde_json::from_slice(&output.stdout).map_err(|_| error("printed no report"))?;
     let reports = reports.as_array().map(Vec::as_slice).unwrap_or_default();
     let stacks = reports.iter().map(|report| report["stack_bytes"].as_u64());
     stacks
         .collect::<Option<Vec<_>>>()
         .and_then(|stacks| stacks.into_iter().max())
-        .ok_or_else(|| error("says nothing of the stack"))
+        .ok_or_else(|| error("does not report the stack"))
 }
 
-/// Everything that is programmed: code, constants, and initial values.
+/// Returns the programmed bytes: code, constants, and initial values.
 fn flash_bytes(image: &object::File<'_>) -> u64 {
     image
         .sections()
@@ -113,7 +113,7 @@ fn flash_bytes(image: &object::File<'_>) -> u64 {
         .sum()
 }
 
-/// Variables with and without initial values.
+/// Returns the bytes of variables with and without initial values.
 fn ram_bytes(image: &object::File<'_>) -> u64 {
     let names = [".data", ".bss", ".uninit"];
     names

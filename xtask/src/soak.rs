@@ -25,7 +25,7 @@ const TICKS_BEFORE_WRAP: u32 = 10_000;
 /// Runs the soak.
 ///
 /// # Errors
-/// If a run fails, or says anything but what it must.
+/// If a run fails, or a value in its report differs from the expected one.
 pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
     run_cargo(&["build", "--release", "--package", "painleve-command"])?;
     soak("native", 3600.0 * arguments.hours)?;
@@ -37,7 +37,7 @@ pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
 
 fn soak(host: &str, duration_s: f64) -> Result<(), ChoreError> {
     let program = workspace().join("target/release/painleve");
-    eprintln!("soaking the {host} host for {duration_s} simulated seconds");
+    eprintln!("soak test of the {host} host: {duration_s} simulated seconds");
     let output = Command::new(&program)
         .args(["run", "--json", "--no-record", "--no-plot", "--host", host])
         .args(["--set", &format!("run.duration_s={duration_s}")])

@@ -1,16 +1,16 @@
-//! `cargo xtask test`: everything that must hold.
+//! `cargo xtask test`: all tests.
 
 use crate::command::{ChoreError, run_cargo};
 use crate::{chaos, examples, setup, size};
 
-/// Installs the ARM target and QEMU, builds image and program as users run them, then
-/// runs every test of the workspace, every example, and the short part of chaos.
+/// Installs the ARM target and QEMU, builds images and programs as users do, then runs every test
+/// of the workspace, every example, and the short part of chaos.
 ///
 /// # Errors
-/// The first command that fails.
+/// If a step fails; later steps are not run.
 pub fn run() -> Result<(), ChoreError> {
     setup::run()?;
-    // Builds images and program: the end-to-end tests start the released ones.
+    // Builds images and programs: the end-to-end tests start the release builds.
     size::run()?;
     run_cargo(&["test", "--workspace"])?;
     examples::run()?;

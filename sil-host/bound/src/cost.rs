@@ -1,4 +1,4 @@
-//! What a block costs: its instructions, the flash lines they lie in, and what they wait for.
+//! Cost of a basic block: its instructions, the reads of its flash lines, and its memory waits.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use crate::cycles::{
 use crate::graph::{Block, Graph};
 use crate::instruction::{Effect, Instruction, PROGRAM_COUNTER};
 
-/// Registers whose values are constants.
+/// Registers with known constant values.
 pub type Constants = BTreeMap<u16, u32>;
 
-/// Constants at the start of every block, by data flow from the entry.
+/// Returns the constants at the start of every block, found by data flow from the entry.
 pub fn constants(graph: &Graph) -> BTreeMap<u32, Constants> {
     let mut at: BTreeMap<u32, Constants> = BTreeMap::from([(graph.entry, Constants::new())]);
     let mut open = vec![graph.entry];
@@ -25,7 +25,8 @@ pub fn constants(graph: &Graph) -> BTreeMap<u32, Constants> {
             follow(&mut now, instruction);
         }
         if block.call.is_some() {
-            // The callee may change what the calling convention gives it; here, everything.
+            // The callee may change the registers that the calling convention allows; here all are
+            // assumed changed.
             now.clear();
         }
         for (to, _) in &block.successors {
@@ -68,16 +69,17 @@ fn follow(now: &mut Constants, instruction: &Instruction) {
     }
 }
 
-/// What one pass through a block costs.
+/// Cost of one pass through a block.
 #[derive(Clone, Copy, Debug)]
 pub struct BlockCost {
-    /// Cycles, without the functions it calls.
+    /// Cycles, without called functions.
     pub cycles: u32,
-    /// Cycles at its end since the flash began to read the line that follows.
+    /// Cycles at the end of the block since the flash began to read the following line.
     pub reading: u32,
 }
 
-/// What one pass through a block costs once its first line is there, without the functions it calls.
+/// Returns the cost of one pass through a block after its first line has been read, without called
+/// functions.
 pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
     let mut walk = Walk::from(constants.clone());
     for (place, instruction) in block.instructions.iter().enumerate() {
@@ -89,23 +91,23 @@ pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
     }
 }
 
-/// Instructions one after the other.
+/// The cost of consecutive instructions.
 ///
-/// While a line is executed the accelerator reads the next one (RM0090, section 3.5.2, prefetch). A
-/// line therefore takes as long as its instructions or as the read, whichever is longer. Both
-/// grow with what the instructions cost, so that upper bounds of these give an upper bound.
+/// While a line is executed, the accelerator reads the next one (RM0090, section 3.5.2, prefetch).
+/// A line therefore takes as long as its instructions or as the read, whichever is longer. Both
+/// grow with the cost of the instructions, so upper bounds of these give an upper bound.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
-    /// Cycles so far.
+    /// Cycles.
     pub cycles: u32,
     constants: Constants,
     line: Option<u32>,
-    /// Cycles since the flash began to read the line after this one.
+    /// Cycles since the flash began to read the next line.
     reading: u32,
 }
 
 impl Walk {
-    /// A walk that starts in a line that is there.
+    /// Starts a walk in a line that has been read.
     pub fn from(constants: Constants) -> Self {
         Self {
             constants,
@@ -113,7 +115,7 @@ impl Walk {
         }
     }
 
-    /// Executes an instruction; `next` is the one that is executed after it, if that is known.
+    /// Executes an instruction; `next` is the instruction executed after it, if known.
     pub fn step(&mut self, instruction: &Instruction, next: Option<&Instruction>) {
         let last_byte = instruction.address + instruction.size - 1;
         for touched in [instruction.address, last_byte].map(|at| at / FLASH_LINE_BYTES) {
@@ -143,7 +145,7 @@ impl Walk {
         match wait(instruction, &self.constants) {
             Some(FLASH_DATA_WAIT) => {
                 self.cycles += FLASH_DATA_WAIT;
-                // The flash reads data first and begins with the next line afterwards.
+                // The flash reads the data first, then begins with the next line.
                 self.reading = 0;
             }
             Some(cycles) => self.cycles += cycles,
@@ -152,7 +154,7 @@ impl Walk {
         follow(&mut self.constants, instruction);
     }
 
-    /// Takes a branch: the pipeline is refilled from a line that is read anew.
+    /// Takes a branch: the pipeline is refilled from a line that has to be read.
     pub fn branch(&mut self) {
         self.cycles += PIPELINE_REFILL + FLASH_WAIT_STATES;
         self.line = None;
@@ -160,7 +162,7 @@ impl Walk {
     }
 }
 
-/// What the memory of a load or store adds.
+/// Returns the additional wait of a load or store for its memory.
 fn wait(instruction: &Instruction, now: &Constants) -> Option<u32> {
     if instruction.kind == InstructionKind::TableBranch {
         return Some(FLASH_DATA_WAIT);
@@ -176,8 +178,9 @@ fn wait(instruction: &Instruction, now: &Constants) -> Option<u32> {
     }
 }
 
-/// What it costs to arrive at a block: by a taken branch the pipeline is refilled from a line that
-/// is read anew; from above a line may end just there, which is being read meanwhile.
+/// Returns the cost of entering a block. A taken branch refills the pipeline from a line that has
+/// to be read. Without a branch, a line may end at the block's start; the next one is then being
+/// read already.
 pub fn of_edge(from: &BlockCost, to: &Block, taken: bool) -> u32 {
     if taken {
         return PIPELINE_REFILL + FLASH_WAIT_STATES;

@@ -1,4 +1,4 @@
-//! The control-flow graph of one function: what follows the instructions from its entry.
+//! Control-flow graph of one function.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,14 +6,14 @@ use crate::BoundError;
 use crate::image::Image;
 use crate::instruction::{Decoder, Flow, Instruction};
 
-/// Instructions that are executed one after the other.
+/// Instructions that are executed in sequence.
 #[derive(Clone, Debug)]
 pub struct Block {
     /// The instructions; at least one.
     pub instructions: Vec<Instruction>,
-    /// Where it goes, and whether by a taken branch.
+    /// The following blocks, and whether they are reached by a taken branch.
     pub successors: Vec<(u32, bool)>,
-    /// Whether the function may end here.
+    /// Whether the function may return here.
     pub returns: bool,
     /// The function that the last instruction calls.
     pub call: Option<u32>,
@@ -29,11 +29,11 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// The graph of the function at `entry`. A branch into another function, which then returns to
-    /// this one's caller, is followed.
+    /// Builds the graph of the function at `entry`. A branch into another function, which then
+    /// returns to this function's caller, is followed.
     ///
     /// # Errors
-    /// [`BoundError`] at what cannot be decoded.
+    /// [`BoundError`] for an instruction that cannot be decoded.
     pub fn of(image: &Image, decoder: &Decoder, entry: u32) -> Result<Self, BoundError> {
         let mut instructions: BTreeMap<u32, Instruction> = BTreeMap::new();
         let mut leaders = BTreeSet::from([entry]);
@@ -101,7 +101,7 @@ fn table(image: &Image, branch: &Instruction) -> Result<Vec<u32>, BoundError> {
     let mut targets = Vec::new();
     let mut first = u32::MAX;
     for (place, entry) in bytes.chunks_exact(width).enumerate() {
-        // A table may be padded; the code it leads to does not start within it.
+        // A table may be padded; its targets do not lie within it.
         if start + (place * width) as u32 >= first {
             break;
         }

@@ -1,4 +1,4 @@
-//! The image's code and where it comes from.
+//! The image's code and its source locations.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,20 +11,20 @@ use crate::BoundError;
 pub struct Image {
     sections: Vec<(u32, Vec<u8>)>,
     functions: BTreeMap<u32, String>,
-    /// Where code and data alternate: true for code.
+    /// Addresses at which code and data alternate: true for code.
     marks: BTreeMap<u32, bool>,
-    /// None for code without an ELF file.
+    /// `None` for code without an ELF file.
     lines: Option<addr2line::Loader>,
 }
 
-/// A function of the source that an instruction comes from.
+/// The source function of an instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// Its name.
+    /// Name of the function.
     pub function: String,
-    /// Its file.
+    /// File of the function.
     pub file: String,
-    /// The line in it, from 1; 0 where the compiler merged several.
+    /// Line in the file, from 1; 0 if the compiler merged several lines.
     pub line: u32,
 }
 
@@ -73,7 +73,7 @@ impl Image {
         })
     }
 
-    /// Code of one function, without an ELF file.
+    /// Creates an image of one function's code, without an ELF file.
     pub fn of_code(address: u32, code: &[u8], function: &str) -> Self {
         Self {
             sections: vec![(address, code.to_vec())],
@@ -83,7 +83,7 @@ impl Image {
         }
     }
 
-    /// The bytes from an address on, if it is code or constant data.
+    /// Returns the bytes from an address on, if it is code or constant data.
     pub fn bytes(&self, address: u32) -> Option<&[u8]> {
         self.sections.iter().find_map(|(start, bytes)| {
             let offset = address.checked_sub(*start)? as usize;
@@ -91,7 +91,7 @@ impl Image {
         })
     }
 
-    /// Where the data that starts at `address` ends.
+    /// Returns the end of the data that starts at `address`.
     pub fn end_of_data(&self, address: u32) -> Option<u32> {
         let is_data = self.marks.range(..=address).next_back()?.1;
         if *is_data {
@@ -101,20 +101,20 @@ impl Image {
         later.find(|(_, is_code)| **is_code).map(|(at, _)| *at)
     }
 
-    /// The address of a function.
+    /// Returns the address of a function.
     pub fn function(&self, name: &str) -> Option<u32> {
         let mut all = self.functions.iter();
         all.find(|(_, found)| *found == name).map(|(at, _)| *at)
     }
 
-    /// The name of the function that holds an address.
+    /// Returns the name of the function that contains an address.
     pub fn name(&self, address: u32) -> &str {
         let before = self.functions.range(..=address).next_back();
         before.map_or("?", |(_, name)| name)
     }
 
-    /// Where an instruction comes from, the innermost inlined function first; without lines, the
-    /// function that holds it.
+    /// Returns the source functions of an instruction, the innermost inlined one first; without
+    /// line information, the function that contains it.
     pub fn frames(&self, address: u32) -> Vec<Frame> {
         let mut all = Vec::new();
         let Some(lines) = &self.lines else {
@@ -145,7 +145,7 @@ impl Image {
     }
 }
 
-/// A path without the folders of the machine that built the image.
+/// Returns a path without the folders of the machine that built the image.
 fn short(path: &str) -> String {
     for (marker, keep) in [("/firmware/", 1), ("/shared/", 1), ("/library/", 1)] {
         if let Some(at) = path.rfind(marker) {

@@ -1,8 +1,8 @@
-//! Instructions of the image, decoded for their cost and for where they go.
+//! Decoded instructions of the image, with their cost and control flow.
 //!
-//! The decoder is capstone: it knows all of Thumb-2 and the floating-point unit's instructions, and
-//! its operands say what is read and written. `yaxpeax-arm` is lighter and has no floating point;
-//! LLVM's tools would have to be installed and their text parsed.
+//! The decoder is capstone: it supports all of Thumb-2 and the floating-point instructions, and its
+//! operands show which registers are read and written. `yaxpeax-arm` is lighter but lacks floating
+//! point; LLVM's tools would have to be installed and their text parsed.
 
 use capstone::RegId;
 use capstone::arch::arm::{ArmCC, ArmInsn, ArmOperand, ArmOperandType, ArmReg};
@@ -12,76 +12,76 @@ use crate::BoundError;
 use crate::cycles::InstructionKind;
 use crate::image::Image;
 
-/// Where an instruction goes.
+/// Control flow after an instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Flow {
-    /// To the next one.
+    /// Continues with the next instruction.
     Next,
-    /// To an address; to the next one as well if it has a condition.
+    /// Branches to an address; a conditional branch may also continue.
     Branch {
-        /// Where to.
+        /// Target address.
         target: u32,
-        /// Whether it may also go on.
+        /// Whether execution may also continue with the next instruction.
         conditional: bool,
     },
-    /// To a function, then to the next one.
+    /// Calls a function, then continues with the next instruction.
     Call(u32),
-    /// Back to the caller; to the next one as well if it has a condition.
+    /// Returns to the caller; a conditional return may also continue.
     Return {
-        /// Whether it may also go on.
+        /// Whether execution may also continue with the next instruction.
         conditional: bool,
     },
-    /// To one of the entries of the table that follows it.
+    /// Branches to an entry of the table after it.
     Table,
-    /// Nowhere: an undefined instruction, on purpose.
+    /// Stops: an intentionally undefined instruction.
     Trap,
 }
 
-/// What an instruction does to one register that matters to addresses.
+/// Effect of an instruction on a register that is used for addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
-    /// The register holds this constant from now on.
+    /// The register is set to a constant.
     Set(u16, u32),
-    /// Its upper half does.
+    /// The register's upper half is set to a constant.
     SetUpper(u16, u32),
-    /// It holds the sum of another register and a constant.
+    /// The register is set to the sum of another register and a constant.
     Add(u16, u16, i32),
 }
 
 /// One decoded instruction.
 #[derive(Clone, Debug)]
 pub struct Instruction {
-    /// Its address.
+    /// Address.
     pub address: u32,
-    /// Bytes: 2 or 4.
+    /// Length in bytes: 2 or 4.
     pub size: u32,
-    /// What it costs.
+    /// Kind, which determines the cost.
     pub kind: InstructionKind,
-    /// Where it goes.
+    /// Control flow.
     pub flow: Flow,
-    /// Base register and offset of the memory that it reads or writes.
+    /// Base register and offset of its memory access.
     pub memory: Option<(u16, i32)>,
-    /// What is known of a register after it.
+    /// Its effect on a register used for addresses.
     pub effect: Option<Effect>,
-    /// Registers it reads.
+    /// Registers read.
     pub reads: Vec<u16>,
-    /// Registers it writes.
+    /// Registers written.
     pub writes: Vec<u16>,
-    /// As text.
+    /// Disassembly.
     pub text: String,
 }
 
 /// Decodes the instructions of an image.
 pub struct Decoder(Capstone);
 
-/// The program counter's number.
+/// Number of the program counter.
 pub const PROGRAM_COUNTER: u16 = ArmReg::ARM_REG_PC as u16;
 
 impl Decoder {
-    /// A decoder for the Cortex-M4F.
+    /// Creates a decoder for the Cortex-M4F.
     ///
     /// # Errors
-    /// [`BoundError::Decoder`] if the library refuses.
+    /// [`BoundError::Decoder`] if the library fails.
     pub fn new() -> Result<Self, BoundError> {
         let decoder = Capstone::new()
             .arm()
@@ -92,11 +92,11 @@ impl Decoder {
         decoder.map(Self).map_err(BoundError::Decoder)
     }
 
-    /// The instruction at an address. `conditional` says whether an IT instruction before it makes
-    /// it so.
+    /// Decodes the instruction at an address. `conditional` states whether a preceding IT
+    /// instruction makes it conditional.
     ///
     /// # Errors
-    /// [`BoundError`] if there is none, or none whose cost is known.
+    /// [`BoundError`] if there is no instruction, or none of known cost.
     pub fn at(
         &self,
         image: &Image,
@@ -276,7 +276,7 @@ impl Decoder {
     }
 }
 
-/// Mnemonics of one cycle, by how they begin (TRM, tables 3-1 and 3-2).
+/// Prefixes of the mnemonics of one-cycle instructions (TRM, tables 3-1 and 3-2).
 const SIMPLE: [&str; 65] = [
     "add", "adc", "sub", "sbc", "rsb", "mov", "mvn", "and", "orr", "orn", "eor", "bic", "cmp",
     "cmn", "tst", "teq", "lsl", "lsr", "asr", "ror", "rrx", "mul", "mla", "mls", "smul", "umul",
@@ -290,7 +290,7 @@ fn is_double(register: u16) -> bool {
     (ArmReg::ARM_REG_D0 as u16..=ArmReg::ARM_REG_D31 as u16).contains(&register)
 }
 
-/// What is known of a register after an instruction, of those that make addresses.
+/// Returns the effect of an instruction on a register used for addresses.
 fn effect(
     name: &str,
     operands: &[ArmOperand],

@@ -1,11 +1,11 @@
-//! A bound on the cycles of the image's control interrupt, from its machine code.
+//! An upper bound on the cycles of the image's control interrupt, derived from its machine code.
 //!
-//! The image is decoded ([`instruction`]) into a control-flow graph for each function ([`graph`]);
-//! every block costs what the cycle model says at most ([`cycles`], [`cost`]); loops have declared
-//! limits ([`loops`]); and a linear programme finds the most expensive way through ([`worst`]).
-//! [`report`] prints it with source lines.
+//! The image is decoded ([`instruction`]) into a control-flow graph for each function ([`graph`]).
+//! The cycle model bounds the cost of every block ([`cycles`], [`cost`]), loops have declared
+//! limits ([`loops`]), and a linear programme finds the most expensive path ([`worst`]). [`report`]
+//! prints it with source lines.
 //!
-//! The bound holds for every configuration and every frame, because it asks for neither.
+//! The bound holds for every configuration and every frame, because it depends on neither.
 
 pub mod cost;
 pub mod cycles;
@@ -19,52 +19,52 @@ pub mod worst;
 
 use std::path::PathBuf;
 
-/// Why there is no bound.
+/// Why a bound cannot be found.
 #[derive(Debug, thiserror::Error)]
 pub enum BoundError {
     /// The image cannot be read.
     #[error("{path}: {reason}")]
     Image {
-        /// Which.
+        /// Path of the image.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// The decoder fails.
+    /// The decoder failed.
     #[error("decoder: {0}")]
     Decoder(capstone::Error),
-    /// An instruction whose cost or destination is not known.
-    #[error("at 0x{address:08x}: nothing is known of the cost of \"{text}\"")]
+    /// The cost or destination of an instruction is unknown.
+    #[error("at 0x{address:08x}: the cost of \"{text}\" is unknown")]
     UnknownInstruction {
-        /// Where.
+        /// Address.
         address: u32,
-        /// Which.
+        /// Disassembly.
         text: String,
     },
-    /// A function calls itself.
+    /// A function is recursive.
     #[error("the function at 0x{address:08x} calls itself")]
     Recursion {
-        /// Which.
+        /// Address.
         address: u32,
     },
-    /// A loop with several entries.
+    /// A loop has several entries.
     #[error("the loop at 0x{address:08x} has several entries")]
     Irreducible {
-        /// Where.
+        /// Address.
         address: u32,
     },
-    /// A loop that nothing is declared of.
+    /// A loop has no declared limit.
     #[error("the loop at 0x{address:08x}, in {place}, has no declared limit")]
     Unbounded {
-        /// Where.
+        /// Address.
         address: u32,
-        /// In which functions' source.
+        /// Source functions of the loop.
         place: String,
     },
-    /// The interrupt has no way out.
+    /// The interrupt never returns.
     #[error("the function at 0x{address:08x} never returns")]
     NeverReturns {
-        /// Which.
+        /// Address.
         address: u32,
     },
     /// The linear programme has no solution.

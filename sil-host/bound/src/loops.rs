@@ -1,22 +1,22 @@
-//! How long loops go on: declared, because machine code does not say it.
+//! Limits of loops. They are declared, because the machine code does not contain them.
 
 use std::collections::BTreeSet;
 
 use crate::graph::Graph;
 use crate::image::Image;
 
-/// Points of the belt that the governor looks at in a tick (`firmware/src/refer/governor`).
+/// Points of the belt that the governor checks per tick (`firmware/src/refer/governor`).
 const POINTS_IN_A_HURRY: u32 = 2;
 
 /// Segments of a reference (`firmware/src/refer/reference.rs`).
 const MAXIMUM_SEGMENTS: u32 = 16;
 
-/// How long a loop goes on once it is entered.
+/// Limit of a loop, counted from its entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// At most so many rounds.
+    /// A number of iterations.
     Times(u32),
-    /// At most so many cycles: it waits for the hardware.
+    /// A number of cycles, for a loop that waits for hardware.
     Cycles(u32),
 }
 
@@ -27,7 +27,7 @@ pub struct Declared {
     pub function: &'static str,
     /// Its limit.
     pub limit: Limit,
-    /// Why that is so.
+    /// Reason for the limit.
     pub because: &'static str,
 }
 
@@ -36,7 +36,7 @@ pub struct Declared {
 pub struct Limits(pub Vec<Declared>);
 
 impl Limits {
-    /// Those of the control interrupt.
+    /// Returns the declarations for the control interrupt.
     pub fn of_control() -> Self {
         let declare = |function, limit, because| Declared {
             function,
@@ -47,22 +47,22 @@ impl Limits {
             declare(
                 "EdgeGovernor::search",
                 Limit::Times(POINTS_IN_A_HURRY + 1),
-                "two points of the belt a tick, and the look that finds no third",
+                "two points of the belt per tick, and the check that ends the loop",
             ),
             declare(
                 "ReferenceGenerator::next_tick",
                 Limit::Times(MAXIMUM_SEGMENTS + 1),
-                "sixteen segments that take no time, and the look that finds no further one",
+                "sixteen segments without duration, and the check that ends the loop",
             ),
             declare(
                 "check_send",
                 Limit::Times(1),
-                "the byte before has been read, so that there is room for the next",
+                "the previous byte has been read, so there is room for the next",
             ),
             declare(
                 "asm::delay",
                 Limit::Cycles(5 * (475 * 168 / 1000 + 2)),
-                "475 ns, the longest pause of the sensors' drivers, in rounds of at most five cycles",
+                "475 ns, the longest pause of the sensors' drivers, in iterations of at most five cycles",
             ),
             declare(
                 "ForceCell",
@@ -78,19 +78,19 @@ impl Limits {
             declare(
                 "div_rem",
                 Limit::Times(64),
-                "a division of 64 bits: at least a bit of the quotient a round",
+                "a division of 64 bits: at least one bit of the quotient per iteration",
             ),
             declare("set_bytes", Limit::Times(4), "a word's bytes at either end"),
             declare(
                 "__aeabi_mem",
                 Limit::Times(8),
-                "sixteen bytes a round: no more than 128 are cleared or moved in a tick",
+                "sixteen bytes per iteration: at most 128 are cleared or moved per tick",
             ),
         ])
     }
 
-    /// The limit of a loop that consists of these blocks: the first declaration whose function is
-    /// among those, inlined or not, that the loop's instructions come from.
+    /// Returns the limit of a loop that consists of these blocks: that of the first declaration
+    /// whose function is a source function, inlined or not, of the loop's instructions.
     pub fn of(&self, image: &Image, graph: &Graph, blocks: &BTreeSet<u32>) -> Option<Limit> {
         let mut all = Vec::new();
         for address in blocks {

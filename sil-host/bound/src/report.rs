@@ -1,4 +1,4 @@
-//! The bound of the control interrupt with the path that attains it.
+//! The bound of the control interrupt and the path that attains it.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -12,7 +12,7 @@ use crate::image::Image;
 use crate::loops::Limits;
 use crate::worst::{Analysis, Loop, Visit};
 
-/// The handler of the control timer.
+/// Handler of the control timer.
 pub const CONTROL_INTERRUPT: &str = "TIM2";
 
 /// The core's clock, Hz.
@@ -23,39 +23,39 @@ pub const CORE_HZ: f64 = 168e6;
 pub struct Bound {
     /// Cycles from the request of the interrupt to the return from it.
     pub cycles: u32,
-    /// Cycles of these in the sensors' drivers, most of them waits for their buses.
+    /// Cycles of these in the sensors' drivers, mostly waits for their buses.
     pub sensor_cycles: u32,
-    /// All cycles at the core's clock, µs.
+    /// The same bound at the core's clock, µs.
     pub microseconds: f64,
-    /// The highest control rate at which the interrupt ends before the next, Hz.
+    /// Highest control rate at which the interrupt ends before the next one, Hz.
     pub proves_hz: u32,
     /// Instructions on the worst path.
     pub instructions: u32,
     /// The path, in order of execution.
     pub path: Vec<PathStretch>,
-    /// Loops of the interrupt and of what it calls.
+    /// Loops of the interrupt and of the functions that it calls.
     #[serde(skip)]
     pub loops: Vec<Loop>,
 }
 
-/// A stretch of the path that comes from one function of the source.
+/// A part of the path within one source function.
 #[derive(Clone, Debug, Serialize)]
 pub struct PathStretch {
     /// The innermost function of the project.
     pub function: String,
-    /// Its file.
+    /// File of the function.
     pub file: String,
-    /// Lines that the compiler names.
+    /// Source lines named by the compiler.
     pub lines: BTreeSet<u32>,
-    /// Cycles, with the functions called.
+    /// Cycles, including called functions.
     pub cycles: u32,
 }
 
 impl Bound {
-    /// The bound of an image.
+    /// Computes the bound of an image.
     ///
     /// # Errors
-    /// [`BoundError`] naming the file or the code that has no bound.
+    /// [`BoundError`] naming the file or the code that cannot be bounded.
     pub fn of(path: &Path) -> Result<Self, BoundError> {
         let image = Image::read(path)?;
         let limits = Limits::of_control();
@@ -86,7 +86,7 @@ impl Bound {
         })
     }
 
-    /// As text.
+    /// Returns the report as text.
     pub fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -101,12 +101,12 @@ impl Bound {
             };
         }
         let around = EXCEPTION_ENTRY + LAZY_FLOAT_STACKING + EXCEPTION_EXIT;
-        let _ = writeln!(text, "{around:>7}  into the interrupt and out of it");
+        let _ = writeln!(text, "{around:>7}  entry to and exit from the interrupt");
         let _ = write!(
             text,
             "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz; proves control rates up to {} Hz.\n\
-             {} of the cycles read the sensors; without them {:.1} µs.\n\
-             Not a measurement: cycles by the documents of ARM and ST, every flash line a miss. Tasks of lower \
+             {} of these cycles read the sensors; without them {:.1} µs.\n\
+             Not a measurement: cycles from the documents of ARM and ST, with a miss for every flash line. Tasks of lower \
              priority that mask the interrupt come on top.",
             self.cycles,
             self.microseconds,
@@ -129,7 +129,7 @@ fn stretches(image: &Image, path: &[Visit]) -> Vec<PathStretch> {
             .find(|frame| frame.function.contains("painleve"));
         let function = plain(ours.map_or(CONTROL_INTERRUPT, |frame| &frame.function));
         let (file, line) = ours.map_or(("", 0), |frame| (frame.file.as_str(), frame.line));
-        // Whole cycles that add up to the sum.
+        // Whole cycles that add up to the total.
         let exact = visit.cycles + rest;
         let cycles = exact.round();
         rest = exact - cycles;
@@ -150,7 +150,7 @@ fn stretches(image: &Image, path: &[Visit]) -> Vec<PathStretch> {
     all
 }
 
-/// A function's name without crate and type parameters of the project.
+/// Returns a function's name without the project's crate and type parameters.
 fn plain(name: &str) -> String {
     name.replace("painleve_firmware::", "")
         .replace("painleve_shared::", "")

@@ -1,5 +1,5 @@
-//! The cycle model over ticks that were executed: the bound must lie above every one of them, and
-//! no loop may go round more often than is declared.
+//! The cycle model applied to executed ticks: none may exceed the bound, and no loop may exceed its
+//! declared limit.
 
 use std::collections::BTreeMap;
 
@@ -10,16 +10,16 @@ use crate::image::Image;
 use crate::instruction::{Decoder, Instruction};
 use crate::worst::Loop;
 
-/// What an executed interrupt cost.
+/// Cost of an executed interrupt.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Executed {
-    /// Cycles by the model, every line a miss, with entry and exit.
+    /// Cycles under the model, with a miss for every line, including entry and exit.
     pub cycles: u32,
     /// Instructions.
     pub instructions: u32,
 }
 
-/// Follows executed instructions of one image.
+/// Computes the cost of executed instructions of one image.
 pub struct Tracer<'a> {
     image: &'a Image,
     decoder: Decoder,
@@ -27,7 +27,7 @@ pub struct Tracer<'a> {
 }
 
 impl<'a> Tracer<'a> {
-    /// For an image.
+    /// Creates a tracer for an image.
     ///
     /// # Errors
     /// [`BoundError::Decoder`].
@@ -39,10 +39,10 @@ impl<'a> Tracer<'a> {
         })
     }
 
-    /// What an interrupt cost whose instructions were at these addresses, in order.
+    /// Returns the cost of an interrupt from the addresses of its instructions in order.
     ///
     /// # Errors
-    /// [`BoundError`] at an instruction of unknown cost.
+    /// [`BoundError`] for an instruction of unknown cost.
     pub fn cost(&mut self, addresses: &[u32]) -> Result<Executed, BoundError> {
         for address in addresses {
             if !self.decoded.contains_key(address) {
@@ -66,7 +66,8 @@ impl<'a> Tracer<'a> {
     }
 }
 
-/// Most rounds that a loop went in executed instructions, of all the times it was entered.
+/// Returns the largest number of iterations of a loop among all its entries in the executed
+/// instructions.
 pub fn rounds(one: &Loop, addresses: &[u32]) -> u32 {
     let (mut most, mut now, mut before) = (0, 0, None);
     for address in addresses {

@@ -1,9 +1,10 @@
-//! The worst path: how often every edge of the graph can be taken so that the cost is greatest.
+//! The worst path: execution counts of the graph's edges that maximise the cost.
 //!
-//! Implicit path enumeration (Li and Malik, *Performance analysis of embedded software using
-//! implicit path enumeration*, DAC 1995): what enters a block leaves it, a loop goes round no more
-//! often than is declared, and a linear programme finds the most expensive counts. Its relaxation to
-//! real numbers can only be larger than the true maximum, so that it is a bound.
+//! The method is implicit path enumeration (Li and Malik, *Performance analysis of embedded
+//! software using implicit path enumeration*, DAC 1995): every block is left as often as it is
+//! entered, a loop iterates no more often than declared, and a linear programme finds the most
+//! expensive counts. Its relaxation to real numbers can only exceed the true maximum, so the result
+//! is a bound.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,50 +20,50 @@ use crate::image::{Frame, Image};
 use crate::instruction::Decoder;
 use crate::loops::{Limit, Limits};
 
-/// Smaller counts are rounding of the linear programme.
+/// Smaller counts are rounding errors of the linear programme.
 const LEAST_FLOW: f64 = 1e-6;
 
 /// The worst case of a function.
 #[derive(Clone, Debug)]
 pub struct Worst {
-    /// Where it starts.
+    /// Address of the first instruction.
     pub entry: u32,
-    /// Cycles from its first instruction to its return, calls included.
+    /// Cycles from the first instruction to the return, including calls.
     pub cycles: u32,
     /// The worst path in the order of execution.
     pub path: Vec<Visit>,
-    /// Instructions on that path, calls included.
+    /// Instructions on that path, including calls.
     pub instructions: u32,
-    /// Loops in it.
+    /// Loops of the function.
     pub loops: Vec<Loop>,
 }
 
 /// A block of the worst path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Visit {
-    /// Where it starts.
+    /// Address of the block.
     pub block: u32,
-    /// How often it is executed.
+    /// Number of executions.
     pub times: f64,
-    /// Cycles of all times, with the functions it calls and the ways in.
+    /// Cycles of all executions, including called functions and the entries to the block.
     pub cycles: f64,
 }
 
 /// A loop of the machine code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loop {
-    /// Its first instruction.
+    /// Address of the first instruction.
     pub header: u32,
-    /// The blocks it consists of.
+    /// Blocks of the loop.
     pub blocks: BTreeSet<u32>,
-    /// First and last instruction of each.
+    /// First and last instruction of each block.
     pub addresses: Vec<(u32, u32)>,
-    /// How long it goes on.
+    /// Limit of the loop.
     pub limit: Limit,
 }
 
 impl Loop {
-    /// Whether an instruction is part of it; those of functions that it calls are not.
+    /// Returns whether an instruction is part of the loop; those of called functions are not.
     pub fn contains(&self, address: u32) -> bool {
         let mut all = self.addresses.iter();
         all.any(|(first, last)| (*first..=*last).contains(&address))
@@ -75,12 +76,12 @@ pub struct Analysis<'a> {
     decoder: Decoder,
     limits: &'a Limits,
     known: BTreeMap<u32, Option<Worst>>,
-    /// Blocks that are never executed together, by pairs.
+    /// Pairs of blocks that are never executed together.
     excluded: Vec<(u32, u32)>,
 }
 
 impl<'a> Analysis<'a> {
-    /// An analysis of an image.
+    /// Creates an analysis of an image.
     ///
     /// # Errors
     /// [`BoundError::Decoder`].
@@ -94,15 +95,15 @@ impl<'a> Analysis<'a> {
         })
     }
 
-    /// The functions that have been looked at.
+    /// Returns the analysed functions.
     pub fn functions(&self) -> impl Iterator<Item = &Worst> {
         self.known.values().flatten()
     }
 
-    /// The worst case of the function at `entry`; `None` if it never returns.
+    /// Returns the worst case of the function at `entry`; `None` if it never returns.
     ///
     /// # Errors
-    /// [`BoundError`] at code that has no bound.
+    /// [`BoundError`] for code that cannot be bounded.
     pub fn of(&mut self, entry: u32) -> Result<Option<Worst>, BoundError> {
         match self.known.get(&entry) {
             Some(worst) => return Ok(worst.clone()),
@@ -140,14 +141,14 @@ impl<'a> Analysis<'a> {
             let known = constants.get(address).cloned().unwrap_or_default();
             let call = block.call.and_then(|callee| calls[&callee]);
             let call = call.map_or(0, |(cycles, _)| {
-                // Into the function and back, each time to a line that is read anew.
+                // Call and return, each to a line that has to be read.
                 cycles + 2 * (PIPELINE_REFILL + FLASH_WAIT_STATES)
             });
             let own = cost::of_block(block, &known);
             costs.insert(*address, own.cycles + call);
             ends_at.insert(*address, own);
         }
-        // A wait for the hardware costs its time and two more rounds, however often it goes round.
+        // A wait for hardware costs its time plus two iterations, however often it iterates.
         let mut entered: BTreeMap<u32, u32> = BTreeMap::new();
         for one in &loops {
             if let Limit::Cycles(cycles) = one.limit {
@@ -188,7 +189,7 @@ impl<'a> Analysis<'a> {
                     .any(|one| one.header == *to && one.blocks.contains(from));
                 let mut cycles = costs[to];
                 if !(waits.contains(from) && waits.contains(to)) {
-                    // Into a function and back is counted with the call.
+                    // The cost of the call includes the way into the function and back.
                     let taken = *taken && block.call.is_none();
                     cycles += cost::of_edge(&ends_at[from], &graph.blocks[to], taken);
                 }
@@ -208,7 +209,7 @@ impl<'a> Analysis<'a> {
             let mut balance = LinearExpr::empty();
             let into: Vec<_> = incoming.get(address).into_iter().flatten().collect();
             let out: Vec<_> = outgoing.get(address).into_iter().flatten().collect();
-            // A block that follows itself enters and leaves by the same edge.
+            // A block that follows itself is entered and left by the same edge.
             for edge in into.iter().filter(|edge| !out.contains(edge)) {
                 balance.add(**edge, 1.0);
             }
@@ -218,7 +219,7 @@ impl<'a> Analysis<'a> {
             problem.add_constraint(balance, ComparisonOp::Eq, 0.0);
         }
         for one in &loops {
-            // Rounds after the first for each entry.
+            // Iterations after the first, for each entry.
             let again = match one.limit {
                 Limit::Times(times) => f64::from(times.saturating_sub(1)),
                 Limit::Cycles(_) => 1.0,
@@ -300,7 +301,8 @@ impl<'a> Analysis<'a> {
         Ok(Some(worst))
     }
 
-    /// The loops of a function with their limits: for each header of a strongly connected part.
+    /// Returns the loops of a function with their limits, one for each header of a strongly
+    /// connected component.
     fn loops(&self, graph: &Graph) -> Result<Vec<Loop>, BoundError> {
         let mut loops = Vec::new();
         let mut parts = vec![graph.blocks.keys().copied().collect::<BTreeSet<u32>>()];
@@ -362,13 +364,13 @@ impl<'a> Analysis<'a> {
     }
 }
 
-/// Blocks in the order in which a path first comes to them.
+/// Returns the blocks in the order in which a path first reaches them.
 fn in_order(
     entry: u32,
     next: &BTreeMap<u32, Vec<u32>>,
     visits: &BTreeMap<u32, Visit>,
 ) -> Vec<Visit> {
-    // The reverse of the order in which a depth-first search leaves them.
+    // The reverse of the order in which a depth-first search finishes them.
     let (mut seen, mut left) = (BTreeSet::new(), Vec::new());
     let mut stack = vec![(entry, false)];
     while let Some((at, done)) = stack.pop() {
@@ -384,14 +386,15 @@ fn in_order(
     left
 }
 
-/// Strongly connected parts of more than one block, or of one that follows itself, within `part`.
+/// Returns the strongly connected components within `part` that have more than one block, or one
+/// that follows itself.
 fn strongly_connected(graph: &Graph, part: &BTreeSet<u32>) -> Vec<BTreeSet<u32>> {
     let successors = |from: u32| {
         let block = graph.blocks.get(&from);
         let all = block.into_iter().flat_map(|block| &block.successors);
         all.map(|(to, _)| *to).filter(|to| part.contains(to))
     };
-    // Kosaraju: the order in which a search ends, then searches against the arrows.
+    // Kosaraju's algorithm: the finishing order of one search, then searches along reversed edges.
     let (mut seen, mut order) = (BTreeSet::new(), Vec::new());
     for root in part {
         let mut stack = vec![(*root, false)];

@@ -10,17 +10,17 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// What a call returns.
+// Return value of a call.
 typedef enum {
-  // Done.
+  // Success.
   PAINLEVE_STATUS_OK = 0,
   // A pointer is null, or a text is not UTF-8.
   PAINLEVE_STATUS_INVALID_ARGUMENT = 1,
-  // The scenario is wrong.
+  // The scenario is invalid.
   PAINLEVE_STATUS_INVALID_SCENARIO = 2,
   // The plant's motion cannot be continued.
   PAINLEVE_STATUS_PLANT_FAILED = 3,
-  // A defect of this library; the object must only be freed.
+  // A bug in this library; the object must only be freed.
   PAINLEVE_STATUS_PANIC = 4,
 } PainleveStatus;
 
@@ -30,7 +30,7 @@ typedef struct PainleveController PainleveController;
 // A plant with its converters.
 typedef struct PainlevePlant PainlevePlant;
 
-// What the controller is told at a tick.
+// Sensor frame of one tick.
 typedef struct {
   // Tick; wraps at 2^32.
   uint32_t tick;
@@ -46,11 +46,11 @@ typedef struct {
   uint32_t inputs;
 } PainleveSensorFrame;
 
-// What the controller answers.
+// The controller's answer.
 typedef struct {
-  // Tick of the sensor frame that is answered.
+  // Tick of the answered sensor frame.
   uint32_t tick;
-  // Number of the sensor frame that is answered.
+  // Number of the answered sensor frame.
   uint32_t sequence;
   // Torques of both joints, counts.
   int32_t torques[2];
@@ -66,7 +66,7 @@ typedef struct {
   uint16_t flags;
 } PainleveActuatorFrame;
 
-// The plant at an instant.
+// The plant at one instant.
 typedef struct {
   // Simulated time, s.
   double time_s;
@@ -76,7 +76,7 @@ typedef struct {
   double theta_dot_rad_s[2];
   // Position of the tip along the belt, m.
   double tip_t_m;
-  // Height of the tip over the belt, m.
+  // Height of the tip above the belt, m.
   double gap_m;
   // Velocity of the tip relative to the belt, m/s.
   double slip_velocity_m_s;
@@ -88,7 +88,7 @@ typedef struct {
   double tangential_force_n;
   // Torques that act on the joints, N m.
   double torque_nm[2];
-  // What holds the tip: 0 nothing, 1 and 2 it slides forwards and backwards, 3 it sticks.
+  // Contact mode: 0 flight, 1 and 2 sliding forwards and backwards, 3 sticking.
   uint8_t contact_mode;
 } PainleveSnapshot;
 
@@ -96,21 +96,21 @@ typedef struct {
 extern "C" {
 #endif // __cplusplus
 
-// The message of the last call of this thread that failed, in one sentence; empty if none has.
-// Valid until the next call of this thread that fails.
+// Returns the message of this thread's last failed call, in one sentence; empty if no call has
+// failed. It is valid until this thread's next failed call.
 const char *painleve_last_error(void);
 
-// Makes the controller of a scenario.
+// Creates the controller of a scenario.
 //
 // # Safety
-// `scenario_toml` is a string that ends with a zero byte; `controller` can be written.
+// `scenario_toml` is a null-terminated string; `controller` can be written.
 PainleveStatus painleve_controller_new(const char *scenario_toml, PainleveController **controller);
 
-// Runs one tick: takes a sensor frame, and writes the answer.
+// Runs one tick: reads a sensor frame and writes the answer.
 //
 // # Safety
-// `controller` is from [`painleve_controller_new`] and not freed, `sensor` can be read and
-// `actuator` written, and no other thread uses the controller meanwhile.
+// `controller` comes from [`painleve_controller_new`] and has not been freed, `sensor` can be read
+// and `actuator` written, and no other thread uses the controller at the same time.
 PainleveStatus painleve_controller_tick(PainleveController *controller,
                                         const PainleveSensorFrame *sensor,
                                         PainleveActuatorFrame *actuator);
@@ -118,44 +118,44 @@ PainleveStatus painleve_controller_tick(PainleveController *controller,
 // Frees a controller; does nothing with null.
 //
 // # Safety
-// `controller` is null or from [`painleve_controller_new`], and is not used again.
+// `controller` is null or comes from [`painleve_controller_new`], and is not used again.
 void painleve_controller_free(PainleveController *controller);
 
-// Makes the plant of a scenario, at time 0.
+// Creates the plant of a scenario, at time 0.
 //
 // # Safety
-// `scenario_toml` is a string that ends with a zero byte; `plant` can be written.
+// `scenario_toml` is a null-terminated string; `plant` can be written.
 PainleveStatus painleve_plant_new(const char *scenario_toml, PainlevePlant **plant);
 
-// Reads the sensors at this tick; to be called once per tick, before
-// [`painleve_plant_advance`]. `is_lost` says whether the scenario loses this frame on its way:
-// the controller must not be given it then.
+// Reads the sensors at this tick; call it once per tick, before [`painleve_plant_advance`]. Sets
+// `is_lost` if the scenario loses this frame in transit; the controller must then not receive it.
 //
 // # Safety
-// `plant` is from [`painleve_plant_new`] and not freed, `sensor` and `is_lost` can be written,
-// and no other thread uses the plant meanwhile.
+// `plant` comes from [`painleve_plant_new`] and has not been freed, `sensor` and `is_lost` can be
+// written, and no other thread uses the plant at the same time.
 PainleveStatus painleve_plant_sample(PainlevePlant *plant,
                                      PainleveSensorFrame *sensor,
                                      bool *is_lost);
 
-// Takes the answer to this tick's sample, null if there is none, and goes on to the next tick.
+// Accepts the answer to this tick's sample, or null if there is none, and advances to the next
+// tick.
 //
 // # Safety
-// `plant` is from [`painleve_plant_new`] and not freed, `actuator` is null or can be read, and no
-// other thread uses the plant meanwhile.
+// `plant` comes from [`painleve_plant_new`] and has not been freed, `actuator` is null or can be
+// read, and no other thread uses the plant at the same time.
 PainleveStatus painleve_plant_advance(PainlevePlant *plant, const PainleveActuatorFrame *actuator);
 
-// Writes everything about the present.
+// Writes the present state of the plant.
 //
 // # Safety
-// `plant` is from [`painleve_plant_new`] and not freed, `snapshot` can be written, and no other
-// thread uses the plant meanwhile.
+// `plant` comes from [`painleve_plant_new`] and has not been freed, `snapshot` can be written, and
+// no other thread uses the plant at the same time.
 PainleveStatus painleve_plant_snapshot(const PainlevePlant *plant, PainleveSnapshot *snapshot);
 
 // Frees a plant; does nothing with null.
 //
 // # Safety
-// `plant` is null or from [`painleve_plant_new`], and is not used again.
+// `plant` is null or comes from [`painleve_plant_new`], and is not used again.
 void painleve_plant_free(PainlevePlant *plant);
 
 #ifdef __cplusplus

@@ -10,20 +10,20 @@ use crate::status::{CallError, PainleveStatus, call, give, put, scenario, take_b
 /// A controller with its state.
 pub struct PainleveController(Controller);
 
-/// Makes the controller of a scenario.
+/// Creates the controller of a scenario.
 ///
 /// # Safety
-/// `scenario_toml` is a string that ends with a zero byte; `controller` can be written.
+/// `scenario_toml` is a null-terminated string; `controller` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn painleve_controller_new(
     scenario_toml: *const c_char,
     controller: *mut *mut PainleveController,
 ) -> PainleveStatus {
     call(|| {
-        // SAFETY: by this function's contract.
+        // SAFETY: guaranteed by this function's contract.
         let scenario = unsafe { scenario(scenario_toml) }?;
         let configuration = scenario.controller_configuration();
-        // SAFETY: by this function's contract.
+        // SAFETY: guaranteed by this function's contract.
         unsafe {
             give(controller, || {
                 Ok(PainleveController(Controller::new(&configuration)?))
@@ -32,11 +32,11 @@ pub unsafe extern "C" fn painleve_controller_new(
     })
 }
 
-/// Runs one tick: takes a sensor frame, and writes the answer.
+/// Runs one tick: reads a sensor frame and writes the answer.
 ///
 /// # Safety
-/// `controller` is from [`painleve_controller_new`] and not freed, `sensor` can be read and
-/// `actuator` written, and no other thread uses the controller meanwhile.
+/// `controller` comes from [`painleve_controller_new`] and has not been freed, `sensor` can be read
+/// and `actuator` written, and no other thread uses the controller at the same time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn painleve_controller_tick(
     controller: *mut PainleveController,
@@ -61,9 +61,9 @@ pub unsafe extern "C" fn painleve_controller_tick(
 /// Frees a controller; does nothing with null.
 ///
 /// # Safety
-/// `controller` is null or from [`painleve_controller_new`], and is not used again.
+/// `controller` is null or comes from [`painleve_controller_new`], and is not used again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn painleve_controller_free(controller: *mut PainleveController) {
-    // SAFETY: by this function's contract.
+    // SAFETY: guaranteed by this function's contract.
     unsafe { take_back(controller) }
 }

@@ -1,10 +1,10 @@
-//! What plant and controller exchange, as structs of C. Counts are those of the converters.
+//! The frames between plant and controller as C structs. Counts are those of the converters.
 
 use painleve_plant::Snapshot;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 
-/// What the controller is told at a tick.
+/// Sensor frame of one tick.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PainleveSensorFrame {
@@ -22,13 +22,13 @@ pub struct PainleveSensorFrame {
     pub inputs: u32,
 }
 
-/// What the controller answers.
+/// The controller's answer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PainleveActuatorFrame {
-    /// Tick of the sensor frame that is answered.
+    /// Tick of the answered sensor frame.
     pub tick: u32,
-    /// Number of the sensor frame that is answered.
+    /// Number of the answered sensor frame.
     pub sequence: u32,
     /// Torques of both joints, counts.
     pub torques: [i32; 2],
@@ -44,7 +44,7 @@ pub struct PainleveActuatorFrame {
     pub flags: u16,
 }
 
-/// The plant at an instant.
+/// The plant at one instant.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PainleveSnapshot {
@@ -56,7 +56,7 @@ pub struct PainleveSnapshot {
     pub theta_dot_rad_s: [f64; 2],
     /// Position of the tip along the belt, m.
     pub tip_t_m: f64,
-    /// Height of the tip over the belt, m.
+    /// Height of the tip above the belt, m.
     pub gap_m: f64,
     /// Velocity of the tip relative to the belt, m/s.
     pub slip_velocity_m_s: f64,
@@ -68,7 +68,7 @@ pub struct PainleveSnapshot {
     pub tangential_force_n: f64,
     /// Torques that act on the joints, N m.
     pub torque_nm: [f64; 2],
-    /// What holds the tip: 0 nothing, 1 and 2 it slides forwards and backwards, 3 it sticks.
+    /// Contact mode: 0 flight, 1 and 2 sliding forwards and backwards, 3 sticking.
     pub contact_mode: u8,
 }
 

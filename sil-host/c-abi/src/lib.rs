@@ -1,15 +1,15 @@
-//! Controller and plant behind a C interface, `include/painleve.h`.
+//! C interface of controller and plant, `include/painleve.h`.
 //!
-//! Both are opaque: made from a scenario as TOML text, freed by their own function, and used by
-//! one thread at a time. Every call that can fail returns a [`PainleveStatus`]; the sentence that
-//! goes with it is [`painleve_last_error`]. No panic crosses the border: it is caught and becomes
-//! [`PainleveStatus::Panic`], after which the object must only be freed.
+//! Both are opaque: they are created from a scenario as TOML text, freed by their own function, and
+//! used by one thread at a time. Every call that can fail returns a [`PainleveStatus`];
+//! [`painleve_last_error`] returns the corresponding message. No panic crosses the C boundary: it
+//! is caught and becomes [`PainleveStatus::Panic`], after which the object must only be freed.
 //!
-//! - [`status`]: what a call returns
-//! - [`frames`]: what plant and controller exchange, as plain structs
+//! - [`status`]: return values of calls
+//! - [`frames`]: the frames between plant and controller, as plain structs
 //! - [`controller`], [`plant`]: the functions
 
-// Pointers of C cannot be used without; every use says why it is sound.
+// C pointers require unsafe code; every use states why it is sound.
 #![allow(unsafe_code)]
 
 pub mod controller;

@@ -1,4 +1,5 @@
-//! The simulated arm on its belt, seen through encoders, force cell and torque stages.
+//! The simulated arm on its belt, as measured by encoders and force cell and driven by torque
+//! stages.
 
 use std::ffi::c_char;
 
@@ -11,30 +12,29 @@ use crate::status::{CallError, PainleveStatus, call, give, put, scenario, take_b
 /// A plant with its converters.
 pub struct PainlevePlant(Simulation);
 
-/// Makes the plant of a scenario, at time 0.
+/// Creates the plant of a scenario, at time 0.
 ///
 /// # Safety
-/// `scenario_toml` is a string that ends with a zero byte; `plant` can be written.
+/// `scenario_toml` is a null-terminated string; `plant` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn painleve_plant_new(
     scenario_toml: *const c_char,
     plant: *mut *mut PainlevePlant,
 ) -> PainleveStatus {
     call(|| {
-        // SAFETY: by this function's contract.
+        // SAFETY: guaranteed by this function's contract.
         let scenario = unsafe { scenario(scenario_toml) }?;
-        // SAFETY: by this function's contract.
+        // SAFETY: guaranteed by this function's contract.
         unsafe { give(plant, || Ok(PainlevePlant(Simulation::new(&scenario)?))) }
     })
 }
 
-/// Reads the sensors at this tick; to be called once per tick, before
-/// [`painleve_plant_advance`]. `is_lost` says whether the scenario loses this frame on its way:
-/// the controller must not be given it then.
+/// Reads the sensors at this tick; call it once per tick, before [`painleve_plant_advance`]. Sets
+/// `is_lost` if the scenario loses this frame in transit; the controller must then not receive it.
 ///
 /// # Safety
-/// `plant` is from [`painleve_plant_new`] and not freed, `sensor` and `is_lost` can be written,
-/// and no other thread uses the plant meanwhile.
+/// `plant` comes from [`painleve_plant_new`] and has not been freed, `sensor` and `is_lost` can be
+/// written, and no other thread uses the plant at the same time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn painleve_plant_sample(
     plant: *mut PainlevePlant,
@@ -56,11 +56,12 @@ pub unsafe extern "C" fn painleve_plant_sample(
     })
 }
 
-/// Takes the answer to this tick's sample, null if there is none, and goes on to the next tick.
+/// Accepts the answer to this tick's sample, or null if there is none, and advances to the next
+/// tick.
 ///
 /// # Safety
-/// `plant` is from [`painleve_plant_new`] and not freed, `actuator` is null or can be read, and no
-/// other thread uses the plant meanwhile.
+/// `plant` comes from [`painleve_plant_new`] and has not been freed, `actuator` is null or can be
+/// read, and no other thread uses the plant at the same time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn painleve_plant_advance(
     plant: *mut PainlevePlant,
@@ -75,11 +76,11 @@ pub unsafe extern "C" fn painleve_plant_advance(
     })
 }
 
-/// Writes everything about the present.
+/// Writes the present state of the plant.
 ///
 /// # Safety
-/// `plant` is from [`painleve_plant_new`] and not freed, `snapshot` can be written, and no other
-/// thread uses the plant meanwhile.
+/// `plant` comes from [`painleve_plant_new`] and has not been freed, `snapshot` can be written, and
+/// no other thread uses the plant at the same time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn painleve_plant_snapshot(
     plant: *const PainlevePlant,
@@ -97,9 +98,9 @@ pub unsafe extern "C" fn painleve_plant_snapshot(
 /// Frees a plant; does nothing with null.
 ///
 /// # Safety
-/// `plant` is null or from [`painleve_plant_new`], and is not used again.
+/// `plant` is null or comes from [`painleve_plant_new`], and is not used again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn painleve_plant_free(plant: *mut PainlevePlant) {
-    // SAFETY: by this function's contract.
+    // SAFETY: guaranteed by this function's contract.
     unsafe { take_back(plant) }
 }

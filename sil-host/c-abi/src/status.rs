@@ -1,4 +1,4 @@
-//! What a call returns, and the message that goes with it.
+//! Return values of calls, and their error messages.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
@@ -8,19 +8,19 @@ use painleve_plant::PlantError;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_shared::range::OutOfRange;
 
-/// What a call returns.
+/// Return value of a call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PainleveStatus {
-    /// Done.
+    /// Success.
     Ok = 0,
     /// A pointer is null, or a text is not UTF-8.
     InvalidArgument = 1,
-    /// The scenario is wrong.
+    /// The scenario is invalid.
     InvalidScenario = 2,
     /// The plant's motion cannot be continued.
     PlantFailed = 3,
-    /// A defect of this library; the object must only be freed.
+    /// A bug in this library; the object must only be freed.
     Panic = 4,
 }
 
@@ -53,16 +53,17 @@ thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::default();
 }
 
-/// The message of the last call of this thread that failed, in one sentence; empty if none has.
-/// Valid until the next call of this thread that fails.
+/// Returns the message of this thread's last failed call, in one sentence; empty if no call has
+/// failed. It is valid until this thread's next failed call.
 #[unsafe(no_mangle)]
 pub extern "C" fn painleve_last_error() -> *const c_char {
     LAST_ERROR.with_borrow(|message| message.as_ptr())
 }
 
-/// Does the work of a call, keeping its message if it fails.
+/// Runs a call, and keeps its message if it fails.
 pub(crate) fn call(work: impl FnOnce() -> Result<(), CallError>) -> PainleveStatus {
-    // What a panic leaves half done is behind a pointer that is only freed from then on.
+    // Values that a panic leaves inconsistent are behind a pointer that may only be freed
+    // afterwards.
     let (status, message) = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return PainleveStatus::Ok,
         Ok(Err(error)) => (error.status(), error.to_string()),
@@ -84,7 +85,7 @@ pub(crate) fn call(work: impl FnOnce() -> Result<(), CallError>) -> PainleveStat
 /// Reads a scenario from a C string.
 ///
 /// # Safety
-/// `text` is null or points to a string that ends with a zero byte.
+/// `text` is null or points to a null-terminated string.
 pub(crate) unsafe fn scenario(text: *const c_char) -> Result<Scenario, CallError> {
     if text.is_null() {
         return Err(CallError::Null("scenario_toml"));
@@ -97,7 +98,7 @@ pub(crate) unsafe fn scenario(text: *const c_char) -> Result<Scenario, CallError
     Ok(Scenario::from_toml(text)?)
 }
 
-/// Hands an object to the caller.
+/// Passes ownership of an object to the caller.
 ///
 /// # Safety
 /// `place` is null or can be written.
@@ -130,12 +131,12 @@ pub(crate) unsafe fn put<T>(place: *mut T, name: &'static str, value: T) -> Resu
 /// Takes an object back and drops it.
 ///
 /// # Safety
-/// `object` is null or was handed out by [`give`] and not taken back since.
+/// `object` is null or comes from [`give`] and has not been taken back.
 pub(crate) unsafe fn take_back<T>(object: *mut T) {
     if !object.is_null() {
         // SAFETY: from `Box::into_raw` in `give`, once, by this function's contract.
         let object = unsafe { Box::from_raw(object) };
-        // A panic in a drop would have nobody to be told to.
+        // A panic in a destructor cannot be reported to a caller.
         let _ = catch_unwind(AssertUnwindSafe(|| drop(object)));
     }
 }
@@ -147,7 +148,7 @@ mod tests {
     use std::ptr;
 
     fn last_error() -> String {
-        // SAFETY: a string of this thread that ends with a zero byte.
+        // SAFETY: a null-terminated string of this thread.
         let text = unsafe { CStr::from_ptr(painleve_last_error()) };
         text.to_string_lossy().into_owned()
     }
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn null_and_wrong_texts_are_refused_and_freeing_nothing_is_fine() {
+    fn null_and_invalid_texts_are_refused_and_null_can_be_freed() {
         let mut plant = ptr::null_mut();
         for (text, status, part) in [
             (
@@ -181,7 +182,7 @@ mod tests {
             assert!(last_error().contains(part), "{}", last_error());
             assert!(plant.is_null());
         }
-        // SAFETY: a C string, and no place for the plant; then nothing to free.
+        // SAFETY: a C string, and a null output pointer; freeing null is allowed.
         unsafe {
             let status = painleve_plant_new(c"".as_ptr(), ptr::null_mut());
             assert_eq!(status, PainleveStatus::InvalidArgument);

@@ -1,4 +1,4 @@
-//! The header is that of the functions, and a program in C works with both.
+//! The header matches the functions, and a C program works with both.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,7 +9,7 @@ fn folder() -> &'static Path {
 
 /// Set `PAINLEVE_WRITE_HEADER` to write the header instead of comparing it.
 #[test]
-fn the_header_is_that_of_the_functions() {
+fn the_header_matches_the_functions() {
     let config = cbindgen::Config::from_file(folder().join("cbindgen.toml")).unwrap();
     let sources = ["status", "frames", "controller", "plant"];
     let mut builder = cbindgen::Builder::new().with_config(config);
@@ -31,7 +31,7 @@ fn the_header_is_that_of_the_functions() {
 
 #[test]
 fn a_program_in_c_closes_the_loop() {
-    // Cargo puts the shared library beside the tests.
+    // Cargo writes the shared library beside the tests.
     let libraries = std::env::current_exe().unwrap();
     let libraries = libraries.parent().unwrap();
     let example = folder().join("../../examples/c/closed_loop.c");

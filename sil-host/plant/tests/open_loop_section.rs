@@ -30,9 +30,11 @@ fn fastest(speed_m_s: f64, theta1_deg: f64, theta2_deg: f64) -> f64 {
     };
     let initial = State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0);
     let mut plant = ArmOnBelt::new(&parameters, initial).expect("the paper's arm is valid");
-    plant.advance(250.0, &mut ()).expect("goes on");
+    plant.advance(250.0, &mut ()).expect("the plant continues");
     let mut fastest = Fastest(f64::NEG_INFINITY);
-    plant.advance(300.0, &mut fastest).expect("goes on");
+    plant
+        .advance(300.0, &mut fastest)
+        .expect("the plant continues");
     fastest.0
 }
 

@@ -76,7 +76,7 @@ fn csv(threads: usize) -> Vec<u8> {
     let rows = pool.expect("threads").install(|| rows(&study, || ()));
     let rows = rows.expect("every cell can be computed");
     // A row can be computed alone.
-    assert_eq!(study.row(13).expect("goes on"), rows[13]);
+    assert_eq!(study.row(13).expect("the row is computed"), rows[13]);
     outcome::csv(&BifurcationDiagram::new(&study, rows)).expect("flat rows")
 }
 
@@ -105,7 +105,7 @@ fn periodic_and_chaotic_bouncing_are_distinguished() {
         cells: cells(&[0.6], &speeds, &[Initial::A]),
     };
     for (index, (v_belt, regime, period)) in expected.into_iter().enumerate() {
-        let row = study.row(index).expect("goes on");
+        let row = study.row(index).expect("the row is computed");
         let judged = (row.v_belt_m_s, row.regime, row.period);
         assert_eq!(judged, (v_belt, regime, period), "{:?}", row.exponent_per_s);
         assert_eq!(row.theta1_rad.is_empty(), regime == Regime::Quiet);

@@ -1,5 +1,5 @@
-//! One trial with a system call that fails: no space, no memory, no descriptors, a bad disk,
-//! or an interruption. `strace` makes it fail.
+//! One trial with a failing system call: no space, no memory, no descriptors, a bad disk, or an
+//! interruption, injected by `strace`.
 
 use std::fs;
 use std::process::Command;
@@ -10,12 +10,12 @@ use super::trial::{
     ChaosRole, Expected, Flaw, TrialOutcome, TrialProcess, command, judge, next_run, orphans, other,
 };
 
-/// A traced start, and two seconds of waiting for a peer that may have failed.
+/// Time for a traced start, plus two seconds of waiting for a peer that may have failed.
 const START: Duration = Duration::from_secs(5);
 /// Exit code of a program that the dynamic loader cannot load.
 const NOT_LOADED: i32 = 127;
 
-/// A system call, and the error it fails with.
+/// A system call and the error with which it fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InjectedFault {
     pub call: &'static str,
@@ -26,7 +26,7 @@ const fn fault(error: &'static str, call: &'static str) -> InjectedFault {
     InjectedFault { call, error }
 }
 
-/// What disks, memory and signals do to the calls that plant and controller make.
+/// Errors that disks, memory and signals can cause in the system calls of plant and controller.
 pub const FAULTS: [InjectedFault; 22] = [
     fault("ENOSPC", "write"),
     fault("ENOSPC", "openat"),
@@ -52,7 +52,7 @@ pub const FAULTS: [InjectedFault; 22] = [
     fault("EACCES", "unlink"),
 ];
 
-/// Runs one trial in which the victim's call `number` of its kind fails.
+/// Runs one trial in which the victim's `number`-th call of this kind fails.
 pub fn run(
     place: &ChaosFolder,
     bus: &str,
@@ -87,7 +87,7 @@ pub fn run(
     let deadline = Instant::now() + START + expected.end;
     for (name, process) in [("victim", &mut victim), ("peer", &mut peer)] {
         if !process.wait(deadline)? {
-            findings.push((Flaw::Hang, format!("the {name} goes on")));
+            findings.push((Flaw::Hang, format!("the {name} does not end")));
             continue;
         }
         let (code, text) = process.outcome();

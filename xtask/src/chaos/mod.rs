@@ -1,9 +1,9 @@
-//! `cargo xtask chaos`: plant and controller, disturbed at every system call.
+//! `cargo xtask chaos`: disturbs plant and controller at every system call.
 //!
-//! A trial starts plant and controller on a bus, sends one of them a signal at the start of
-//! its n-th system call, and asserts that within 5 s all have ended with a documented exit
-//! code and one message, that no process, file or segment stays after the next start, and
-//! that the next run on the same bus gives the right log hash.
+//! A trial starts plant and controller on a bus and sends one of them a signal at the start of its
+//! n-th system call. It then asserts that within 5 s all have ended with a documented exit code and
+//! one message, that no process, file or segment remains after the next start, and that the next
+//! run on the same bus gives the correct log hash.
 
 mod fault;
 mod place;
@@ -32,35 +32,35 @@ pub struct ChaosArguments {
     /// Last system call.
     #[arg(long, default_value_t = 300)]
     last: u32,
-    /// Only so many trials, drawn from all with --seed.
+    /// Number of trials, drawn from all with --seed.
     #[arg(long)]
     trials: Option<usize>,
     /// Seed of the draw.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Instead of signals, make the first so many calls of each kind fail: no space, a bad
-    /// disk, no descriptors, no memory, an interruption. Needs strace.
+    /// Instead of sending signals, make the first N calls of each kind fail: no space, a bad disk,
+    /// no descriptors, no memory, an interruption. Requires strace.
     #[arg(long, value_name = "N", default_value_t = 0)]
     faults: u32,
-    /// After a disturbance all must have ended within so many seconds. Longer than the 5 s that
-    /// are promised only where other work keeps the machine from running them.
+    /// Seconds within which all processes must have ended after a disturbance. Exceed the
+    /// guaranteed 5 s only where other work keeps the machine busy.
     #[arg(long, default_value_t = 5)]
     end_s: u64,
-    /// Trials at a time.
+    /// Number of parallel trials.
     #[arg(long, default_value_t = 4)]
     jobs: usize,
-    /// So many more plants and controllers on the bus of every trial.
+    /// Number of additional plants and controllers on the bus of every trial.
     #[arg(long, default_value_t = 0)]
     crowd: u32,
 }
 
-/// Segments that others make at this moment are given time to go.
+/// Time for other processes to remove their present segments.
 const OTHERS: Duration = Duration::from_secs(10);
 
-/// The part of `cargo xtask test`: about a minute.
+/// Runs the part that belongs to `cargo xtask test`: about a minute.
 ///
 /// # Errors
-/// If anything is found.
+/// If a flaw is found.
 pub fn short() -> Result<(), ChoreError> {
     run(&ChaosArguments {
         first: 1,
@@ -70,7 +70,7 @@ pub fn short() -> Result<(), ChoreError> {
         jobs: 4,
         crowd: 0,
         faults: 0,
-        // Tests share their machine.
+        // Tests share their machine with other work.
         end_s: 20,
     })
 }
@@ -78,15 +78,15 @@ pub fn short() -> Result<(), ChoreError> {
 /// Runs the trials and prints a table of counts.
 ///
 /// # Errors
-/// If anything is found.
+/// If a flaw is found.
 pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     run_cargo(&["build", "--release", "--package", "painleve-command"])?;
     let system = |error: std::io::Error| ChoreError(format!("chaos: {error}"));
-    // A copy: the trials take a while, and the program may be built again meanwhile.
+    // A copy, because the program may be rebuilt during the trials.
     let programs = tempfile::tempdir().map_err(system)?;
     let program = programs.path().join("painleve");
     std::fs::copy(workspace().join("target/release/painleve"), &program).map_err(system)?;
-    // Orphans come to this process, as under systemd or in a container.
+    // This process adopts orphans, as systemd or a container would.
     set_child_subreaper(true).map_err(|error| system(error.into()))?;
     let runtime = tempfile::tempdir().map_err(system)?;
     let segments_before = unused_segments()?;
@@ -150,12 +150,12 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     table.print(start.elapsed(), &segments)?;
     let found = table.findings + segments.len();
     if found > 0 {
-        return Err(ChoreError(format!("chaos has found {found} flaws")));
+        return Err(ChoreError(format!("chaos found {found} flaws")));
     }
     Ok(())
 }
 
-/// The log hash of a run that nobody disturbs.
+/// Returns the log hash of an undisturbed run.
 fn undisturbed(place: &ChaosFolder, bus: &str) -> std::io::Result<String> {
     let arguments = [
         "run",
@@ -170,8 +170,9 @@ fn undisturbed(place: &ChaosFolder, bus: &str) -> std::io::Result<String> {
     let mut run = TrialProcess::start(&mut place.command(&arguments))?;
     run.wait(Instant::now() + Duration::from_secs(20))?;
     let (_, text) = run.outcome();
-    trial::log_hash(&text.stdout)
-        .ok_or_else(|| std::io::Error::other(format!("no undisturbed run: {}", text.stderr)))
+    trial::log_hash(&text.stdout).ok_or_else(|| {
+        std::io::Error::other(format!("the undisturbed run failed: {}", text.stderr))
+    })
 }
 
 /// One trial.
@@ -182,7 +183,7 @@ enum ChaosTrial {
 }
 
 impl ChaosTrial {
-    /// Its line in the table.
+    /// Returns the name of its line in the table.
     fn kind(&self) -> String {
         match self {
             Self::Signal(plan) => format!("{:?} {:?}", plan.victim, plan.disturbance),
@@ -194,7 +195,7 @@ impl ChaosTrial {
     }
 }
 
-/// Every system call of every role with every disturbance, or a draw of them.
+/// Returns every system call of every role with every disturbance, or a random selection of them.
 fn plans(arguments: &ChaosArguments) -> Vec<ChaosTrial> {
     let mut plans = Vec::new();
     for call in arguments.first..=arguments.last {
@@ -219,7 +220,7 @@ fn plans(arguments: &ChaosArguments) -> Vec<ChaosTrial> {
             plans.extend((1..=arguments.faults).map(|n| ChaosTrial::Fault(victim, fault, n)));
         }
     }
-    // Shuffled, so that long waits spread over the workers and a draw is a fair one.
+    // Shuffled, so that long waits spread over the workers and a selection is representative.
     let mut random = SplitMix(arguments.seed);
     for last in (1..plans.len()).rev() {
         let other = (random.next() % (last as u64 + 1)) as usize;
@@ -229,7 +230,7 @@ fn plans(arguments: &ChaosArguments) -> Vec<ChaosTrial> {
     plans
 }
 
-/// Steele, Lea and Flood's generator, enough to shuffle.
+/// SplitMix64 (Steele, Lea and Flood), sufficient for shuffling.
 struct SplitMix(u64);
 
 impl SplitMix {

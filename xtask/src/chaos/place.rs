@@ -1,4 +1,4 @@
-//! Where a trial runs: folders of its own, and what it leaves there.
+//! The folders of a trial, and what remains in them.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -7,11 +7,11 @@ use std::process::{Command, Stdio};
 
 use crate::command::ChoreError;
 
-/// Marks every process of a chaos run in its environment, with the name of its place.
+/// Environment variable that marks every process of a chaos run with the name of its place.
 const MARK: &str = "PAINLEVE_CHAOS";
 const SHARED_MEMORY: &str = "/dev/shm";
 
-/// A folder to work in, and one for the buses.
+/// A working folder, and one for the buses.
 pub struct ChaosFolder {
     program: PathBuf,
     mark: String,
@@ -20,7 +20,7 @@ pub struct ChaosFolder {
 }
 
 impl ChaosFolder {
-    /// New folders; `runtime` may be shared with other places.
+    /// Creates the folders; `runtime` may be shared with other places.
     pub fn new(program: &Path, mark: String, runtime: &Path) -> std::io::Result<Self> {
         Ok(Self {
             program: program.to_path_buf(),
@@ -30,7 +30,7 @@ impl ChaosFolder {
         })
     }
 
-    /// The program with arguments.
+    /// Returns a command that runs the program with arguments.
     pub fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(&self.program);
         command.args(arguments);
@@ -38,7 +38,7 @@ impl ChaosFolder {
         command
     }
 
-    /// Makes any command run here.
+    /// Makes any command run in these folders.
     pub fn equip<'a>(&self, command: &'a mut Command) -> &'a mut Command {
         command
             .current_dir(self.work.path())
@@ -49,12 +49,12 @@ impl ChaosFolder {
             .stderr(Stdio::piped())
     }
 
-    /// A path in the working folder.
+    /// Returns a path in the working folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.work.path().join(name)
     }
 
-    /// The processes of this place that still run.
+    /// Returns the running processes of this place.
     pub fn processes(&self) -> Vec<i32> {
         let mark = format!("{MARK}={}", self.mark);
         let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
@@ -69,7 +69,7 @@ impl ChaosFolder {
             .collect()
     }
 
-    /// What is left in the folders: everything but the outputs of runs that went well.
+    /// Returns the remaining files, except the outputs of successful runs.
     pub fn left(&self, bus: &str) -> Vec<PathBuf> {
         let mut left = Vec::new();
         list(self.work.path(), &mut left);
@@ -93,7 +93,7 @@ fn list(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Names of painleve's shared memory that no process uses.
+/// Returns the names of painleve's shared memory that no process uses.
 ///
 /// # Errors
 /// If shared memory cannot be listed.

@@ -1,4 +1,4 @@
-//! A process that is stopped at each of its system calls until the one that is asked for.
+//! A process that stops at each of its system calls up to a given one.
 
 use std::io;
 use std::os::unix::process::CommandExt;
@@ -10,16 +10,16 @@ use nix::sys::signal::{Signal, kill};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 
-/// What became of a traced process.
+/// Result of tracing a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traced {
     /// The signal was sent at the system call.
     Injected,
-    /// The process ended before; this was its exit code, if it had one.
+    /// The process ended before, with this exit code if it had one.
     Ended(Option<i32>),
 }
 
-/// A process whose main thread is traced. Only the thread that starts it can trace it.
+/// A process whose main thread is traced. Only the thread that starts the process can trace it.
 pub struct Victim {
     pub child: Child,
     id: Pid,
@@ -44,8 +44,8 @@ impl Victim {
         Ok(victim)
     }
 
-    /// Lets the process run up to the start of its system call `number`, counted from 1, sends
-    /// it `signal` there and lets go of it. Gives up after `limit`.
+    /// Runs the process up to the start of its system call `number`, counted from 1, sends it
+    /// `signal` there and detaches from it. Gives up after `limit`.
     pub fn signal_at(
         &mut self,
         number: u32,
@@ -60,7 +60,7 @@ impl Victim {
             match self.next_stop(deadline)? {
                 WaitStatus::PtraceSyscall(_) => {
                     stops += 1;
-                    // Every call stops the process twice, where it begins and where it ends.
+                    // Every call stops the process twice: on entry and on exit.
                     if stops == 2 * number - 1 {
                         kill(self.id, signal)?;
                         if signal != Signal::SIGKILL {
@@ -85,9 +85,9 @@ impl Victim {
             }
             if Instant::now() >= deadline {
                 kill(self.id, Signal::SIGKILL)?;
-                return Err(io::Error::other("a traced process does not go on"));
+                return Err(io::Error::other("a traced process does not continue"));
             }
-            // Most system calls are over at once.
+            // Most system calls return at once.
             std::thread::yield_now();
         }
     }

@@ -1,4 +1,4 @@
-//! One trial: start plant and controller, disturb one of them, and look at all that follows.
+//! One trial: starts plant and controller, disturbs one of them, and checks the consequences.
 
 use std::io::Read;
 use std::path::PathBuf;
@@ -13,15 +13,15 @@ use serde_json::Value;
 use super::place::ChaosFolder;
 use super::tracer::{Traced, Victim};
 
-/// How long a traced process may take to get to its system call.
+/// Time for a traced process to reach its system call.
 const REACH: Duration = Duration::from_secs(30);
-/// How long a peer waits for the other, s: not longer than [`END`].
+/// Longest wait of a peer for the other, s; not longer than [`END`].
 const WAIT_S: &str = "2";
-/// Exit codes that the documentation knows; 130 after SIGINT and SIGTERM.
+/// Documented exit codes; 130 after SIGINT and SIGTERM.
 const DOCUMENTED: [i32; 6] = [0, 1, 2, 3, 4, 130];
 const QUICK: [&str; 4] = ["--set", "run.duration_s=0.05", "--no-plot", "--json"];
 
-/// The process that is disturbed.
+/// The disturbed process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChaosRole {
     Plant,
@@ -30,12 +30,12 @@ pub enum ChaosRole {
     Run,
 }
 
-/// What is done to it.
+/// Kind of disturbance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Disturbance {
     Kill,
     Stop,
-    /// Stopped, and continued while its peer still waits.
+    /// The process is stopped, and continued while its peer still waits.
     Pause,
     Terminate,
     Interrupt,
@@ -60,27 +60,27 @@ impl Disturbance {
     }
 }
 
-/// Who is disturbed, how, and at which of its system calls.
+/// Disturbed process, kind of disturbance, and system call.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     pub victim: ChaosRole,
     pub disturbance: Disturbance,
     pub call: u32,
-    /// The victim's peer starts first.
+    /// Whether the victim's peer starts first.
     pub peer_first: bool,
-    /// So many more plants and controllers are on the bus at the same time.
+    /// Number of additional plants and controllers on the bus at the same time.
     pub crowd: u32,
 }
 
-/// What must follow.
+/// Expected consequences.
 pub struct Expected {
     /// Log hash of an undisturbed run.
     pub log_hash: String,
-    /// After a disturbance everything must have ended within this.
+    /// Time within which everything must have ended after a disturbance.
     pub end: Duration,
 }
 
-/// What was wrong.
+/// Kind of flaw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Flaw {
     Hang,
@@ -92,17 +92,17 @@ pub enum Flaw {
     Message,
 }
 
-/// A flaw with what was seen.
+/// A flaw with details.
 pub type Finding = (Flaw, String);
 
-/// What a trial has found.
+/// Result of a trial.
 pub struct TrialOutcome {
-    /// Whether the victim got as far as the system call.
+    /// Whether the victim reached the system call.
     pub reached: bool,
     pub findings: Vec<Finding>,
 }
 
-/// Runs one trial on `bus`; `expected` says what must follow.
+/// Runs one trial on `bus` and compares it with `expected`.
 pub fn run(
     place: &ChaosFolder,
     bus: &str,
@@ -162,12 +162,12 @@ pub fn run(
             let (code, text) = peer.outcome();
             judge("peer", code, &text, &mut findings);
         } else {
-            findings.push((Flaw::Hang, "the peer goes on".into()));
+            findings.push((Flaw::Hang, "the peer does not end".into()));
         }
     }
     if reached && plan.disturbance == Disturbance::Stop {
         if plan.victim == ChaosRole::Run {
-            // Nobody watches over the parent: its children finish what they do.
+            // The parent is dead, so its children finish on their own.
             std::thread::sleep(Duration::from_millis(200));
         }
         continue_process(&victim.child);
@@ -175,19 +175,19 @@ pub fn run(
     let limit = Instant::now().max(disturbed) + end;
     if victim.wait(limit)? {
         let (code, text) = victim.outcome();
-        // A signal before its handler is set ends the process without a word.
+        // A signal that arrives before its handler is installed ends the process without a message.
         if code.is_some() || !reached {
             judge("victim", code, &text, &mut findings);
         }
     } else {
-        findings.push((Flaw::Hang, "the victim goes on".into()));
+        findings.push((Flaw::Hang, "the victim does not end".into()));
     }
     for other in &mut crowd {
         if other.wait(Instant::now().max(disturbed) + end)? {
             let (code, text) = other.outcome();
             judge("another", code, &text, &mut findings);
         } else {
-            findings.push((Flaw::Hang, "another on the bus goes on".into()));
+            findings.push((Flaw::Hang, "another process on the bus does not end".into()));
         }
     }
     orphans(place, disturbed + end, &mut findings);
@@ -195,7 +195,7 @@ pub fn run(
     Ok(TrialOutcome { reached, findings })
 }
 
-/// Whom a role meets.
+/// Returns the peer of a role.
 pub fn other(role: ChaosRole) -> ChaosRole {
     match role {
         ChaosRole::Plant => ChaosRole::Controller,
@@ -203,7 +203,7 @@ pub fn other(role: ChaosRole) -> ChaosRole {
     }
 }
 
-/// The command of a role.
+/// Returns the command of a role.
 pub fn command(place: &ChaosFolder, role: ChaosRole, bus: &str, record: &str) -> Command {
     let recorded = ["--record", record];
     let unrecorded = ["--no-record"];
@@ -222,7 +222,7 @@ pub fn command(place: &ChaosFolder, role: ChaosRole, bus: &str, record: &str) ->
     }
 }
 
-/// Whatever is left: processes whose parent has gone must go, too.
+/// Checks that processes whose parent has died end, too.
 pub fn orphans(place: &ChaosFolder, deadline: Instant, findings: &mut Vec<Finding>) {
     loop {
         let left = place.processes();
@@ -230,7 +230,7 @@ pub fn orphans(place: &ChaosFolder, deadline: Instant, findings: &mut Vec<Findin
             return;
         }
         if Instant::now() >= deadline {
-            findings.push((Flaw::Orphan, format!("processes {left:?} go on")));
+            findings.push((Flaw::Orphan, format!("processes {left:?} do not end")));
             for id in left {
                 let _ = kill(Pid::from_raw(id), Signal::SIGKILL);
             }
@@ -240,7 +240,7 @@ pub fn orphans(place: &ChaosFolder, deadline: Instant, findings: &mut Vec<Findin
     }
 }
 
-/// The next run on the same bus must go as if nothing had been, and leave nothing.
+/// Checks that the next run on the same bus is undisturbed and leaves nothing.
 pub fn next_run(
     place: &ChaosFolder,
     bus: &str,
@@ -266,13 +266,13 @@ pub fn next_run(
     Ok(())
 }
 
-/// The hash of all frames in a report.
+/// Returns the hash of all frames in a report.
 pub fn log_hash(report: &str) -> Option<String> {
     let report: Value = serde_json::from_str(report).ok()?;
     Some(report["log_hash"].as_str()?.to_owned())
 }
 
-/// Exit code and messages of an ended process.
+/// Checks the exit code and the messages of an ended process.
 pub fn judge(who: &str, code: Option<i32>, text: &Text, findings: &mut Vec<Finding>) {
     let errors = text.stderr.trim();
     if errors.contains("panicked") {
@@ -295,12 +295,12 @@ pub fn judge(who: &str, code: Option<i32>, text: &Text, findings: &mut Vec<Findi
 
 fn continue_process(child: &Child) {
     if let Ok(id) = i32::try_from(child.id()) {
-        // An error means that it has ended meanwhile.
+        // An error means that the process has ended meanwhile.
         let _ = kill(Pid::from_raw(id), Signal::SIGCONT);
     }
 }
 
-/// What a process has said.
+/// Output of a process.
 #[derive(Default)]
 pub struct Text {
     pub stdout: String,
@@ -339,7 +339,7 @@ fn read(pipe: Option<impl Read + Send + 'static>) -> std::io::Result<Receiver<St
     Ok(receiver)
 }
 
-/// A process of a trial; killed when this value goes.
+/// A process of a trial; killed when dropped.
 pub struct TrialProcess {
     child: Child,
     said: Said,
@@ -357,7 +357,7 @@ impl TrialProcess {
         })
     }
 
-    /// Waits for the end; `false` if it does not come, and the process is killed then.
+    /// Waits for the end of the process; after the deadline, kills it and returns `false`.
     pub fn wait(&mut self, deadline: Instant) -> std::io::Result<bool> {
         while self.ended.is_none() {
             if let Some(status) = self.child.try_wait()? {
@@ -373,7 +373,7 @@ impl TrialProcess {
         Ok(true)
     }
 
-    /// Exit code, none after a signal, and what was said.
+    /// Returns the exit code (`None` after a signal) and the output.
     pub fn outcome(&self) -> (Option<i32>, Text) {
         (self.ended.flatten(), self.said.text())
     }

@@ -1,4 +1,4 @@
-//! Worst cases of code that is short enough to count by hand.
+//! Worst cases of code short enough to count by hand.
 
 use super::*;
 use crate::loops::Declared;
@@ -21,14 +21,14 @@ fn worst(code: &[u16], limits: &[(&'static str, Limit)]) -> Result<Option<Worst>
 const COUNT_DOWN: [u16; 4] = [0x2003, 0x3801, 0xd1fd, 0x4770];
 
 #[test]
-fn a_loop_costs_its_rounds() {
+fn a_loop_costs_its_iterations() {
     let cycles = |times| {
         let worst = worst(&COUNT_DOWN, &[("kernel", Limit::Times(times))]);
         let worst = worst.unwrap().unwrap();
         assert_eq!(worst.instructions, 2 + 2 * times);
         worst.cycles
     };
-    // Subtract, branch, refill, line read anew.
+    // Subtract, branch, refill, read of the line.
     assert_eq!(
         cycles(3) - cycles(2),
         1 + 1 + PIPELINE_REFILL + FLASH_WAIT_STATES
@@ -37,7 +37,7 @@ fn a_loop_costs_its_rounds() {
 }
 
 #[test]
-fn a_loop_that_waits_costs_its_time_and_two_rounds() {
+fn a_waiting_loop_costs_its_time_and_two_iterations() {
     let worst = worst(&COUNT_DOWN, &[("kernel", Limit::Cycles(1000))]);
     let cycles = worst.unwrap().unwrap().cycles;
     assert!((1002..1060).contains(&cycles), "{cycles}");
@@ -50,7 +50,7 @@ fn a_loop_without_a_limit_is_refused_by_name() {
 }
 
 #[test]
-fn the_more_expensive_way_is_taken() {
+fn the_more_expensive_path_is_taken() {
     // cmp r0, #0; beq end; vdiv.f32 s0, s0, s1; end: bx lr
     let code = [0x2800, 0xd001, 0xee80, 0x0a20, 0x4770];
     let worst = worst(&code, &[]).unwrap().unwrap();
@@ -59,7 +59,7 @@ fn the_more_expensive_way_is_taken() {
 }
 
 #[test]
-fn what_is_used_at_once_and_what_lies_in_a_peripheral_waits() {
+fn immediately_used_results_and_peripheral_accesses_cost_waits() {
     // vadd.f32 s0, s0, s1; vadd.f32 s0, s0, s1 (then s2, s2); bx lr
     let used = worst(&[0xee30, 0x0a20, 0xee30, 0x0a20, 0x4770], &[]);
     let free = worst(&[0xee30, 0x0a20, 0xee31, 0x1a21, 0x4770], &[]);
