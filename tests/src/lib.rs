@@ -1,4 +1,4 @@
-//! Starting the `painleve` program from end-to-end tests, and looking at what it leaves.
+//! Starts the `painleve` program in end-to-end tests and inspects what it leaves.
 //!
 //! - [`line`]: a serial line that can be disturbed, with the image at its end
 
@@ -14,7 +14,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 
-/// The released program; built if it is not there yet or out of date.
+/// Returns the path of the release program, which is built if missing or out of date.
 ///
 /// # Panics
 /// If it cannot be built.
@@ -40,7 +40,8 @@ pub fn program() -> &'static Path {
     })
 }
 
-/// The controller's image for the emulated board in lockstep; built if it is out of date.
+/// Returns the path of the controller's image for the emulated board in lockstep, which is built if
+/// out of date.
 ///
 /// # Panics
 /// If it cannot be built.
@@ -49,7 +50,7 @@ pub fn image() -> &'static Path {
     IMAGE.get_or_init(|| built_image("painleve-qemu"))
 }
 
-/// The same with the flash target's serial port as its link.
+/// Returns the path of the image that uses the flash target's serial port as its link.
 ///
 /// # Panics
 /// If it cannot be built.
@@ -58,7 +59,7 @@ pub fn serial_image() -> &'static Path {
     IMAGE.get_or_init(|| built_image("painleve-qemu-serial"))
 }
 
-/// The image that is flashed.
+/// Returns the path of the image that is flashed.
 ///
 /// # Panics
 /// If it cannot be built.
@@ -85,7 +86,7 @@ fn built_image(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// A folder to run the program in, and the bus that is used there.
+/// A working folder for the program, with its bus.
 pub struct Bench {
     folder: tempfile::TempDir,
     /// Name of a bus that no other test uses.
@@ -93,22 +94,22 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// An empty folder and a new bus.
+    /// Creates an empty folder and a new bus.
     ///
     /// # Panics
-    /// If the folder cannot be made.
+    /// If the folder cannot be created.
     pub fn new(name: &str) -> Self {
         let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("no folder: {error}"));
         let bus = format!("test-{name}-{}", std::process::id());
         Self { folder, bus }
     }
 
-    /// A path inside the folder.
+    /// Returns a path inside the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// All files below the folder, relative to it.
+    /// Returns all files below the folder, relative to it.
     pub fn files(&self) -> Vec<String> {
         let mut found = Vec::new();
         let mut folders = vec![self.folder.path().to_path_buf()];
@@ -126,7 +127,7 @@ impl Bench {
         found
     }
 
-    /// The program with arguments, to be run in the folder.
+    /// Returns a command that runs the program with arguments in the folder.
     pub fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(program());
         command.args(arguments).current_dir(self.folder.path());
@@ -143,7 +144,7 @@ impl Bench {
             .unwrap_or_else(|error| panic!("cannot start painleve: {error}"))
     }
 
-    /// Runs the program and reads the one JSON object that it must print.
+    /// Runs the program and parses its standard output, which must be one JSON object.
     ///
     /// # Panics
     /// If it fails or prints anything else.
@@ -155,7 +156,7 @@ impl Bench {
         serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error} in {text}"))
     }
 
-    /// Starts the program and leaves it running.
+    /// Starts the program without waiting for its end.
     ///
     /// # Panics
     /// If it cannot be started.
@@ -169,8 +170,8 @@ impl Bench {
         Running(Some(child))
     }
 
-    /// Shared memory of the program that stays, whoever left it. What other
-    /// tests have there at the moment is given time to go.
+    /// Returns the program's shared memory that remains, whichever process left it. Shared memory
+    /// of other running tests gets time to disappear.
     pub fn leftovers(&self) -> Vec<String> {
         let mut names = shared_memory();
         let start = Instant::now();
@@ -183,7 +184,7 @@ impl Bench {
     }
 }
 
-/// Names of the program's files in shared memory. iceoryx2 keeps one of 16 bytes for
+/// Returns the names of the program's files in shared memory. iceoryx2 keeps one of 16 bytes for
 /// each user, its node counter.
 fn shared_memory() -> Vec<String> {
     let entries = std::fs::read_dir("/dev/shm")
@@ -196,11 +197,11 @@ fn shared_memory() -> Vec<String> {
         .collect()
 }
 
-/// A running program; killed when this value goes.
+/// A running program; killed when dropped.
 pub struct Running(Option<Child>);
 
 impl Running {
-    /// Process id.
+    /// Returns the process id.
     ///
     /// # Panics
     /// After [`Running::end`].
@@ -210,10 +211,10 @@ impl Running {
             .unwrap_or_else(|| panic!("the program has ended"))
     }
 
-    /// Waits for the end, at most `limit`; the output and how long it took.
+    /// Waits up to `limit` for the end; returns the output and the time taken.
     ///
     /// # Panics
-    /// If the program is still running then.
+    /// If the program is still running after `limit`.
     pub fn end(mut self, limit: Duration) -> (Output, Duration) {
         let start = Instant::now();
         while start.elapsed() < limit {
@@ -248,8 +249,8 @@ pub fn signal(id: i32, signal: Signal) {
     kill(Pid::from_raw(id), signal).unwrap_or_else(|error| panic!("signal to {id}: {error}"));
 }
 
-/// Ids of the child processes of `parent` whose first argument is `subcommand`,
-/// waiting a while for one to appear.
+/// Returns the id of the child process of `parent` whose first argument is `subcommand`; waits for
+/// it to appear.
 pub fn child_of(parent: i32, subcommand: &str) -> i32 {
     let start = Instant::now();
     while start.elapsed() < Duration::from_secs(5) {
@@ -273,7 +274,7 @@ pub fn child_of(parent: i32, subcommand: &str) -> i32 {
     panic!("{parent} has no child '{subcommand}'");
 }
 
-/// Whether a process still runs; one that has ended and waits for its parent does not.
+/// Returns whether a process is running; a zombie is not.
 pub fn is_running(id: i32) -> bool {
     std::fs::read_to_string(format!("/proc/{id}/stat")).is_ok_and(|stat| {
         !stat
@@ -319,7 +320,7 @@ pub fn errors(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Exit code of a status; −1 after a signal.
+/// Returns the exit code of a status; −1 after a signal.
 pub fn code(status: ExitStatus) -> i32 {
     status.code().unwrap_or(-1)
 }

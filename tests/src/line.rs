@@ -1,5 +1,5 @@
-//! A serial line of 921,600 baud between two pseudo-terminals: bytes take their time, and may be
-//! disturbed on the way. At its far end QEMU can run the image with the flash target's driver.
+//! A serial line of 921,600 baud between two pseudo-terminals, with realistic transmission times
+//! and optional disturbances. QEMU can run the image with the flash target's driver at its far end.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -23,35 +23,35 @@ use painleve_system::lifetime::{Guarded, end_with_parent};
 
 use crate::serial_image;
 
-/// Start bit, eight bits, stop bit at 921,600 baud.
+/// Duration of a byte: start bit, eight bits, stop bit at 921,600 baud.
 const BYTE: Duration = Duration::from_nanos(10_851);
 
-/// Bytes that are carried at once, a third of a millisecond.
+/// Bytes that are forwarded together, a third of a millisecond.
 const CHUNK: usize = 32;
 
-/// Messages that pass untouched at first, with the configuration among them.
+/// Undisturbed messages at the start, including the configuration.
 const QUIET_MESSAGES: u64 = 20;
 
-/// How a line disturbs what it carries.
+/// Disturbances of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineNoise {
-    /// Not at all.
+    /// No disturbances.
     None,
-    /// In each direction, of every twelve messages one has a flipped bit, one is followed by garbage
-    /// and one runs together with garbage.
+    /// Of every twelve messages in each direction, one has a flipped bit, one is followed by
+    /// garbage and one is merged with garbage.
     Steady,
 }
 
-/// The two directions.
+/// Directions of the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Requests.
+    /// From host to board: requests.
     ToBoard = 0,
-    /// Responses.
+    /// From board to host: responses.
     ToHost = 1,
 }
 
-/// A line; gone with this value.
+/// A serial line; removed when dropped.
 pub struct SerialLine {
     /// The port at the host's end.
     pub host_port: PathBuf,
@@ -60,12 +60,12 @@ pub struct SerialLine {
     disturbances: [Arc<AtomicU64>; 2],
     is_over: Arc<AtomicBool>,
     carriers: Vec<JoinHandle<()>>,
-    /// Kept open, so that either end may come and go.
+    /// Kept open, so that either end may disconnect and reconnect.
     _ends: [OwnedFd; 2],
 }
 
 impl SerialLine {
-    /// Lays a line.
+    /// Creates a line.
     ///
     /// # Panics
     /// If the system has no pseudo-terminals.
@@ -100,15 +100,15 @@ impl SerialLine {
         }
     }
 
-    /// How many messages have been spoilt or made up so far.
+    /// Returns the number of messages disturbed or added.
     pub fn disturbances(&self, direction: Direction) -> u64 {
         self.disturbances[direction as usize].load(Ordering::SeqCst)
     }
 
-    /// Starts the image at the line's end, in QEMU, and waits until it answers.
+    /// Starts the image in QEMU at the end of the line and waits until it answers.
     ///
     /// # Panics
-    /// If QEMU cannot be started, or its image says nothing.
+    /// If QEMU cannot be started, or its image does not answer.
     pub fn start_board(&self) -> SerialBoard {
         let mut command = Command::new("qemu-system-arm");
         command
@@ -117,8 +117,8 @@ impl SerialLine {
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-chardev")
             .arg(format!("serial,id=line,path={}", self.board_port.display()))
-            // 64 ns an instruction, however busy the machine is: no tick takes longer for it.
-            // While it waits, the board goes by the host's clock.
+            // 64 ns per instruction, however busy the machine is, so no tick takes longer. While it
+            // waits, the board follows the host's clock.
             .args(["-icount", "shift=6,sleep=on"])
             .args(["-serial", "chardev:line", "-kernel"])
             .arg(serial_image())
@@ -143,7 +143,7 @@ impl SerialLine {
     }
 }
 
-/// An emulated board on a line; unplugged when this value goes.
+/// An emulated board on a line; disconnected when dropped.
 pub struct SerialBoard(Guarded);
 
 impl Drop for SerialBoard {
@@ -199,11 +199,11 @@ fn carry(mut from: File, mut to: File, mut disturber: Disturber, is_over: &Atomi
     }
 }
 
-/// Decides what is disturbed, the same in every run. Holds a message until it is complete.
+/// Selects disturbances, the same in every run. Holds a message until it is complete.
 struct Disturber {
     noise: LineNoise,
     message: Vec<u8>,
-    /// Messages seen.
+    /// Number of messages.
     messages: u64,
     random: u32,
     count: Arc<AtomicU64>,
@@ -236,14 +236,14 @@ impl Disturber {
                 self.garbage();
                 self.message.push(0);
             }
-            // It runs together with the next message.
+            // It merges with the next message.
             8 => self.garbage(),
             _ => return,
         }
         self.count.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Flips a bit in the middle of the message, which makes or removes no end.
+    /// Flips a bit in the middle of the message without creating or removing a delimiter.
     fn flip(&mut self) {
         let at = self.message.len() / 2;
         if let Some(byte) = self.message.get_mut(at) {
@@ -251,7 +251,7 @@ impl Disturber {
         }
     }
 
-    /// Up to 60 bytes, none of them an end; sometimes more than the longest message has.
+    /// Returns up to 60 bytes without a delimiter; sometimes more than the longest message.
     fn garbage(&mut self) {
         let length = match self.next() % 16 {
             0 => 900,

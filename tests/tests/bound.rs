@@ -1,5 +1,5 @@
-//! The bound on the cycles of the control interrupt, from the machine code of the image that is
-//! flashed: it exists, and lies within the budget.
+//! The cycle bound of the control interrupt, computed from the machine code of the flashed image,
+//! exists and is within the budget.
 
 use painleve_bound::report::Bound;
 use painleve_tests::flash_image;

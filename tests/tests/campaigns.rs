@@ -1,5 +1,5 @@
-//! `painleve study robustness`, `ablation`, `capture` and `lift-off` from the command line, and the
-//! replay of one run of them.
+//! `painleve study robustness`, `ablation`, `capture` and `lift-off` on the command line, and the
+//! replay of one of their runs.
 
 use painleve_tests::{Bench, code, errors};
 use serde_json::Value;
@@ -15,7 +15,7 @@ fn list(value: &Value) -> &[Value] {
     array.unwrap_or_else(|| panic!("no array: {value}"))
 }
 
-/// One message, of one line besides where help is to be had, and no output.
+/// Checks for a single one-line message, apart from a pointer to the help, and no output.
 fn is_refused(bench: &Bench, arguments: &[&str], expected: &[&str]) {
     let output = bench.run(arguments);
     let message = errors(&output);
@@ -67,7 +67,7 @@ fn numbers_of_runs_are_from_one_to_ten_million() {
 }
 
 #[test]
-fn files_that_cannot_be_written_are_told_before_anything_is_computed() {
+fn files_that_cannot_be_written_are_reported_before_anything_is_computed() {
     let bench = Bench::new("campaign-unwritable");
     std::fs::write(bench.path("file"), "").unwrap_or_default();
     for study in ["robustness", "ablation", "effects", "capture", "lift-off"] {
@@ -95,13 +95,13 @@ fn a_replayed_run_ends_where_it_did_in_its_campaign() {
             let line = [&["run", "--replay", &replay, "--json"], changes].concat();
             let run = bench.report(&line);
             let apart_m = number(&run["final_tip_t_m"]) - number(&row["tip_t_m"]);
-            // What is left is rounding of the last digit as text.
+            // The difference is rounding of the last printed digit.
             assert!(apart_m.abs() < 1e-12, "{run} is not {row}");
             assert_eq!(run["tick_hz"], row["tick_hz"]);
             assert_eq!(run["fault"], row["fault"]);
         }
     }
-    // Of another seed it is another run.
+    // Another seed gives another run.
     let other = bench.report(&["run", "--replay", "4:1", "--json"]);
     let this = bench.report(&["run", "--replay", "3:1", "--json"]);
     assert_ne!(other["final_tip_t_m"], this["final_tip_t_m"]);
@@ -109,7 +109,7 @@ fn a_replayed_run_ends_where_it_did_in_its_campaign() {
 }
 
 #[test]
-fn what_cannot_be_replayed_is_refused() {
+fn an_invalid_replay_is_refused() {
     let bench = Bench::new("replay-wrong");
     for text in [
         "1",
@@ -168,7 +168,7 @@ fn an_ablation_has_a_line_for_each_part() {
 }
 
 #[test]
-fn captures_and_lift_offs_keep_their_contract() {
+fn the_reports_of_capture_and_lift_off_keep_their_contract() {
     let bench = Bench::new("captures");
     let report = bench.report(&["study", "capture", "--runs", "4", "--json"]);
     let rows = list(&report["rows"]);

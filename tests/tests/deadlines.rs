@@ -1,5 +1,5 @@
-//! A native controller that goes by the clock latches what a board does: overruns, frames that do
-//! not come and frames that are lost.
+//! A native controller in real time latches the same faults as a board: overruns, missing frames
+//! and lost frames.
 
 #![allow(clippy::unwrap_used)]
 
@@ -18,11 +18,11 @@ use serde_json::Value;
 const ON: DigitalInputs = DigitalInputs::ENABLE;
 const NO_TORQUE: [TorqueCounts; 2] = [TorqueCounts(0); 2];
 
-/// A rate that a busy machine keeps.
+/// A control rate that even a busy machine achieves.
 const SLOW: [&str; 2] = ["run.tick_hz=50", "controller.estimator.bandwidth_rad_s=100"];
 
 #[test]
-fn a_controller_that_is_held_up_ends_the_run_with_a_fault_and_its_exit_code() {
+fn a_delayed_controller_ends_the_run_with_a_fault_and_its_exit_code() {
     let bench = Bench::new("held-up");
     let mut arguments = vec!["run", "--pacing", "realtime", "--bus", &bench.bus];
     arguments.extend(["--json", "--no-record", "--no-plot"]);
@@ -31,7 +31,7 @@ fn a_controller_that_is_held_up_ends_the_run_with_a_fault_and_its_exit_code() {
     let run = bench.start(&arguments);
     let controller = child_of(run.id(), "controller");
     std::thread::sleep(Duration::from_millis(800));
-    // Some twenty ticks of the plant.
+    // About twenty ticks of the plant.
     signal(controller, Signal::SIGSTOP);
     std::thread::sleep(Duration::from_millis(400));
     signal(controller, Signal::SIGCONT);
@@ -77,8 +77,8 @@ impl Pressing {
         }
     }
 
-    /// The answer to the next frame. It is sent at once: the controller begins a tick when a frame
-    /// comes, early or not.
+    /// Sends the next frame and returns its answer. Frames are sent at once, because the controller
+    /// begins a tick whenever a frame arrives.
     fn tick(&mut self, inputs: DigitalInputs) -> ActuatorFrame {
         self.frame.tick += 1;
         self.frame.sequence += 1;
@@ -87,7 +87,7 @@ impl Pressing {
         self.answer(self.frame.tick)
     }
 
-    /// Waits for an answer to this tick.
+    /// Waits for the answer to this tick.
     fn answer(&mut self, tick: u32) -> ActuatorFrame {
         let start = Instant::now();
         loop {
@@ -101,7 +101,7 @@ impl Pressing {
 }
 
 #[test]
-fn ticks_that_last_too_long_and_frames_that_do_not_come_latch_as_on_a_board() {
+fn overruns_and_missing_frames_latch_a_fault_as_on_a_board() {
     let bench = Bench::new("too-long");
     let mut arm = Pressing::new(&bench.bus);
     let controller = bench.start(&["controller", "--bus", &bench.bus, "--wait-s", "20"]);
@@ -115,18 +115,18 @@ fn ticks_that_last_too_long_and_frames_that_do_not_come_latch_as_on_a_board() {
     );
     assert_ne!(answers[14].torques, NO_TORQUE);
 
-    // One tick that lasts until the next one is due is survived, two in a row are not.
+    // One tick that overruns is tolerated; two in a row are not.
     let overload = ON | DigitalInputs::OVERLOAD;
     assert_eq!(arm.tick(overload).latched_fault(), None);
     assert_eq!(arm.tick(ON).latched_fault(), None);
     assert_eq!(arm.tick(overload).latched_fault(), None);
-    // The answer that went out in time is withdrawn.
+    // The answer already sent is withdrawn.
     arm.tick(overload);
     let withdrawn = arm.answer(arm.frame.tick);
     assert_eq!(withdrawn.latched_fault(), Some(Fault::Overrun));
     assert_eq!(withdrawn.torques, NO_TORQUE);
 
-    // Armed again, and then silent.
+    // Arm again, then fall silent.
     let start_again = [ON | DigitalInputs::RESET, DigitalInputs::default(), ON];
     let armed = start_again.map(|inputs| arm.tick(inputs))[2];
     assert_eq!(armed.supervisor_state(), Some(SupervisorState::Armed));

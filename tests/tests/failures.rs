@@ -1,15 +1,15 @@
-//! What goes wrong ends with one message, an exit code, and nothing left behind.
+//! Every failure ends with one message, an exit code, and no leftovers.
 
 use std::time::Duration;
 
 use nix::sys::signal::Signal;
 use painleve_tests::{Bench, child_of, code, errors, is_running, signal};
 
-/// Peers notice each other's end within 2 s; the rest is for a machine that is
-/// busy with other tests. What must never happen is a hang.
+/// A peer detects the end of the other within 2 s; the margin is for a machine busy with other
+/// tests. The process must never hang.
 const NOTICE: Duration = Duration::from_secs(6);
 
-/// A run that is still going on when the test interferes.
+/// A run that is still active when the test interferes.
 const LONG: [&str; 4] = ["run", "--set", "run.duration_s=100000", "--json"];
 
 fn assert_refused(bench: &Bench, arguments: &[&str], exit: i32, parts: &[&str]) {
@@ -116,7 +116,7 @@ fn a_second_plant_on_a_bus_is_refused() {
     assert!(is_running(plant), "the first plant must not suffer");
 }
 
-/// Kills one process of a run and looks at what becomes of the others.
+/// Kills one process of a run and checks that the others end.
 fn kill_and_watch(name: &str, victim: &str, with: Signal) {
     let bench = Bench::new(name);
     let run = bench.start(&[&LONG[..], &["--bus", &bench.bus]].concat());
@@ -147,7 +147,7 @@ fn kill_and_watch(name: &str, victim: &str, with: Signal) {
     let visible = visible.iter().filter(|file| !file.contains(".part"));
     assert_eq!(visible.count(), 0, "half-written: {:?}", bench.files());
 
-    // Whatever was left does not stop the next run on the same bus.
+    // The leftovers do not prevent the next run on the same bus.
     let next = bench.report(&[
         "run",
         "--bus",
@@ -178,7 +178,7 @@ fn a_stopped_controller_ends_the_run() {
 }
 
 #[test]
-fn a_killed_run_takes_its_processes_along() {
+fn killing_a_run_ends_its_processes() {
     kill_and_watch("kill-run", "run", Signal::SIGKILL);
 }
 

@@ -1,5 +1,6 @@
-//! The host of a board behind a serial port, against the flash target's own serial driver in QEMU:
-//! what it answers, what a disturbed line does to it, and when it takes the torque off by itself.
+//! The host of a board behind a serial port, tested with the flash target's own serial driver in
+//! QEMU: the board's answers, the effect of line disturbances, and when it removes the torque on
+//! its own.
 
 use std::time::{Duration, Instant};
 
@@ -22,7 +23,7 @@ const QUIET: [&str; 3] = ["--json", "--no-record", "--no-plot"];
 const BUSY: Duration = Duration::from_secs(20);
 const SHORT: [&str; 2] = ["--set", "run.duration_s=0.4"];
 
-/// Runs on the board at the end of `line`; the run's report and the board's.
+/// Runs a scenario on the board at the end of `line`; returns the run's report and the board's.
 fn run(bench: &Bench, line: &SerialLine, more: &[&str]) -> (Value, Value) {
     let port = line.host_port.to_string_lossy();
     let serial = [
@@ -47,7 +48,7 @@ fn count(report: &Value, path: &str) -> u64 {
     value.unwrap_or_else(|| panic!("{path} is no count in {report}"))
 }
 
-/// Everything about a run that does not depend on how often frames had to be repeated.
+/// Returns everything in the report that does not depend on repeated frames.
 fn course(report: &Value) -> Vec<&Value> {
     [
         "ticks",
@@ -75,13 +76,13 @@ fn a_run_over_the_line_is_the_native_run() {
     assert_eq!(timing["unit"]["cycles"]["hz"], 1_000_000_000);
     assert_eq!(count(&timing, "/board/lapses/failed_checksums"), 0);
     assert_eq!(count(&timing, "/line/failed_checksums"), 0);
-    // A repeated frame, on a machine that is very busy, is answered with another sequence number.
+    // On a very busy machine, a repeated frame is answered with a different sequence number.
     if count(&timing, "/line/repeated_requests") == 0 {
         assert_eq!(report["log_hash"], native["log_hash"]);
     }
 }
 
-/// The first 400 ticks of the default scenario with the controller on `host`.
+/// Runs the first 400 ticks of the default scenario with the controller on `host`.
 fn first_ticks<H: ControllerHost>(host: H) -> (LoopResult, H) {
     let simulation = Simulation::new(&Scenario::default()).expect("valid");
     let mut closed_loop = ClosedLoop::new(simulation, host);
@@ -92,7 +93,7 @@ fn first_ticks<H: ControllerHost>(host: H) -> (LoopResult, H) {
 }
 
 #[test]
-fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
+fn line_noise_is_discarded_and_counted_at_both_ends_without_ending_the_run() {
     let line = SerialLine::new(LineNoise::Steady);
     let _board = line.start_board();
     let configuration = Scenario::default().controller_configuration();
@@ -101,7 +102,7 @@ fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
     let (noisy, host) = first_ticks(OnBoard::new(serial));
     let (native, _) = first_ticks(InProcess::new(&configuration).unwrap());
 
-    // No torque is different from what it is without noise.
+    // All torques equal those without noise.
     let course = |result: &LoopResult| {
         let statistics = &result.statistics;
         (
@@ -128,7 +129,7 @@ fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
         ),
     ] {
         assert!(garbage > 0 && checksums > 0, "{health:?} {line_health:?}");
-        // What comes after the last look at the counters is not in them.
+        // Disturbances after the last reading of the counters are missing in them.
         let (all, counted) = (line.disturbances(direction), garbage + checksums);
         assert!(
             counted <= all && counted + 3 >= all,
@@ -139,7 +140,7 @@ fn noise_on_the_line_is_dropped_and_counted_at_both_ends_and_the_run_goes_on() {
 }
 
 #[test]
-fn by_the_clock_the_board_keeps_the_time() {
+fn in_real_time_the_board_sets_the_pace() {
     let bench = Bench::new("board-clock");
     let line = SerialLine::new(LineNoise::None);
     let _board = line.start_board();
@@ -159,7 +160,7 @@ fn by_the_clock_the_board_keeps_the_time() {
     assert!(report["wall_s"].as_f64().unwrap() >= 0.47, "{report}");
 }
 
-/// The arm at rest, pressing with 10 N, at 50 Hz: ticks that a busy machine keeps.
+/// The arm at rest, pressing with 10 N, at 50 Hz, a rate that even a busy machine achieves.
 struct Pressing {
     board: Serial,
     frame: SensorFrame,
@@ -204,7 +205,7 @@ const ON: DigitalInputs = DigitalInputs::ENABLE;
 const NO_TORQUE: [TorqueCounts; 2] = [TorqueCounts(0); 2];
 
 #[test]
-fn silence_latches_a_fault_without_torque_until_it_is_armed_again() {
+fn silence_latches_a_fault_without_torque_until_rearming() {
     let line = SerialLine::new(LineNoise::None);
     let _board = line.start_board();
     let mut arm = Pressing::start(&line);
@@ -213,7 +214,7 @@ fn silence_latches_a_fault_without_torque_until_it_is_armed_again() {
     assert_eq!(last.supervisor_state(), Some(SupervisorState::Tracking));
     assert_ne!(last.torques, NO_TORQUE);
 
-    // The host says nothing more. The board tells by itself, once, that it has stopped.
+    // The host falls silent. The board reports once, unasked, that it has stopped.
     let start = Instant::now();
     let told = loop {
         let response = arm.board.listen(Duration::from_secs(1)).unwrap();
@@ -226,11 +227,11 @@ fn silence_latches_a_fault_without_torque_until_it_is_armed_again() {
     assert_eq!(told.torques, NO_TORQUE);
     assert_eq!(
         told.tick, last.tick,
-        "the answer to the last frame, withdrawn"
+        "the answer to the last frame is withdrawn"
     );
     assert!(arm.board.health().unwrap().lapses.missing_frames > 100);
 
-    // Frames that come again change nothing, and neither does a reset alone.
+    // New frames change nothing, and neither does a reset alone.
     for inputs in [ON, ON, ON | DigitalInputs::RESET, ON] {
         let answer = arm.tick(inputs);
         assert_eq!(answer.torques, NO_TORQUE);
@@ -254,11 +255,11 @@ fn a_board_that_is_gone_ends_the_run_with_a_message() {
     let running = bench.start(&[&serial[..], &long, &QUIET].concat());
     std::thread::sleep(Duration::from_millis(800));
     drop(board);
-    // It takes well under 2 s; the rest is for a busy machine.
+    // This normally takes well under 2 s; the margin is for a busy machine.
     let (output, _) = running.end(Duration::from_secs(6));
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(3), "{text}");
-    // On a busy machine the plant may miss the bridge before that misses the board.
+    // On a busy machine the plant may miss the bridge before the bridge misses the board.
     assert!(text.contains("has not answered for"), "{text}");
 }
 

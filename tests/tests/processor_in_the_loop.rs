@@ -1,8 +1,8 @@
-//! The controller's image on the emulated microcontroller against the same
-//! controller on this machine: equal to the last bit, in every run, and within the
-//! budget of instructions and stack in `budget.json`.
+//! The controller's image on the emulated microcontroller gives exactly the same counts as the
+//! controller on this machine, in every run and within the budget of instructions and stack in
+//! `budget.json`.
 
-// Helpers of tests may panic as tests do.
+// Helper functions of tests may panic as tests do.
 #![allow(clippy::unwrap_used)]
 
 use std::time::{Duration, Instant};
@@ -21,7 +21,7 @@ use painleve_shared::message::Health;
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_tests::{Bench, child_of, image, is_running, signal};
 
-/// Gives every frame to both controllers and compares what they answer.
+/// Sends every frame to both controllers and compares their answers.
 struct Both {
     native: Controller,
     emulated: Emulator,
@@ -76,7 +76,7 @@ fn budget() -> serde_json::Value {
     serde_json::from_str(include_str!("../budget.json")).expect("valid JSON")
 }
 
-/// Runs a scenario on both: equal to the last count, and within what the budget has under `key`.
+/// Runs a scenario on both and checks for equal counts within the budget for `key`.
 fn assert_equal_within_budget(name: &str, overrides: &[String], key: &str) {
     let budget = budget();
     let scenario = Scenario::load(name, overrides).unwrap();
@@ -118,7 +118,7 @@ fn the_image_answers_every_built_in_scenario_with_the_same_counts_within_budget(
 }
 
 #[test]
-fn the_image_tells_contact_from_the_encoders_with_the_same_counts_within_budget() {
+fn the_image_detects_contact_from_the_encoders_with_the_same_counts_within_budget() {
     let encoders = ["controller.contact.evidence=encoders".to_string()];
     for name in ["edge", "capture"] {
         let key = "worst_tick_instructions_from_encoders";
@@ -126,9 +126,9 @@ fn the_image_tells_contact_from_the_encoders_with_the_same_counts_within_budget(
     }
 }
 
-/// Two ticks that last until the next is due, in the middle of a run.
+/// Two consecutive overruns in the middle of a run.
 #[test]
-fn overload_latches_a_fault_without_torque_in_the_same_tick_until_it_is_armed_again() {
+fn overload_latches_a_fault_without_torque_in_the_same_tick_until_rearming() {
     let scenario = Scenario::default();
     let configuration = scenario.controller_configuration();
     let mut simulation = Simulation::new(&scenario).unwrap();
@@ -146,7 +146,7 @@ fn overload_latches_a_fault_without_torque_in_the_same_tick_until_it_is_armed_ag
     for _ in 0..50 {
         assert_eq!(tick(on).latched_fault(), None);
     }
-    // One is survived, and a good one starts over.
+    // One overrun is tolerated, and a tick in time restarts the count.
     for inputs in [overload, on, overload] {
         let answer = tick(inputs);
         assert_eq!(answer.supervisor_state(), Some(SupervisorState::Tracking));
@@ -176,7 +176,7 @@ const SHORT: [&str; 2] = ["--set", "run.duration_s=1.0"];
 const QUIET: [&str; 3] = ["--json", "--no-record", "--no-plot"];
 
 #[test]
-fn runs_as_processes_agree_and_repeat_themselves_to_the_instruction() {
+fn runs_as_processes_agree_and_repeat_to_the_instruction() {
     let bench = Bench::new("pil");
     let image = image().to_string_lossy();
     let native = bench.report(&[&["run"], &SHORT[..], &QUIET[..]].concat());
@@ -195,7 +195,7 @@ fn runs_as_processes_agree_and_repeat_themselves_to_the_instruction() {
 }
 
 #[test]
-fn timing_is_one_report_for_every_host() {
+fn timing_gives_the_same_report_for_every_host() {
     let bench = Bench::new("timing");
     let image = image().to_string_lossy();
     let short = ["--set", "run.duration_s=0.1", "--svg", "t.svg", "--json"];
@@ -230,7 +230,7 @@ fn timing_is_one_report_for_every_host() {
 }
 
 #[test]
-fn a_missing_image_is_an_error_that_says_how_to_build_one() {
+fn the_error_about_a_missing_image_names_the_build_command() {
     let bench = Bench::new("no-image");
     let qemu = ["run", "--host", "qemu", "--elf", "/nowhere/image"];
     let output = bench.run(&[&qemu[..], &QUIET[..]].concat());
@@ -258,7 +258,7 @@ fn killing_emulator_bridge_or_plant_ends_the_others() {
             _ => plant,
         };
         signal(id, Signal::SIGKILL);
-        // They take well under 2 s; the rest is for a busy machine.
+        // They normally take well under 2 s; the margin is for a busy machine.
         let (output, _) = running.end(Duration::from_secs(6));
         assert!(!output.status.success());
         assert!(!output.stderr.is_empty(), "{victim}: no message");
@@ -269,7 +269,7 @@ fn killing_emulator_bridge_or_plant_ends_the_others() {
                 std::thread::sleep(Duration::from_millis(10));
             }
         }
-        // Whatever the killed one left does not stop the next run, which clears it.
+        // The leftovers of the killed process do not prevent the next run, which removes them.
         let next = ["run", "--bus", &bench.bus];
         let report = bench.report(&[&next[..], &SHORT, &QUIET].concat());
         assert_eq!(report["ticks"], 1000);

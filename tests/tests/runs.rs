@@ -1,4 +1,4 @@
-//! The main job, end to end: two processes over shared memory, and what they leave.
+//! The main use case, end to end: two processes over shared memory, and their output files.
 
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
@@ -46,7 +46,7 @@ fn the_elbow_up_run_slides_to_its_limit_too() {
 }
 
 #[test]
-fn a_run_fails_for_what_it_is_asked_to_and_for_nothing_else() {
+fn a_run_fails_on_the_requested_events_only() {
     let bench = Bench::new("fail-on");
     let run = |name: &str, events: &str| {
         let arguments = [
@@ -112,7 +112,7 @@ fn the_papers_own_gains_work_with_ideal_converters() {
     );
 }
 
-/// Names that programs rely on. Add to the report, never rename.
+/// Names that other programs rely on. Add to the report, never rename.
 #[test]
 fn the_report_keeps_its_contract() {
     let report = Bench::new("contract").report(&["run", "--set", "run.duration_s=0.2", "--json"]);
@@ -151,7 +151,7 @@ fn the_report_keeps_its_contract() {
     assert_eq!(report["host"], "native");
 }
 
-/// One process or two, once or twice: the same frames.
+/// One process or two, first run or second: the same frames.
 #[test]
 fn every_scenario_gives_the_same_frames_in_one_process_and_in_two() {
     let bench = Bench::new("hash");
@@ -176,7 +176,7 @@ fn every_scenario_gives_the_same_frames_in_one_process_and_in_two() {
 }
 
 #[test]
-fn another_seed_is_another_run() {
+fn another_seed_gives_another_run() {
     let bench = Bench::new("seed");
     let hash = |seed: &str| {
         let seed = format!("run.seed={seed}");
@@ -221,7 +221,7 @@ fn counters_that_wrap_change_nothing() {
 }
 
 #[test]
-fn runs_side_by_side_do_not_meet() {
+fn simultaneous_runs_do_not_interfere() {
     let bench = Bench::new("side");
     let arguments = [
         "run",
@@ -242,10 +242,10 @@ fn runs_side_by_side_do_not_meet() {
 }
 
 #[test]
-fn by_the_clock_a_run_takes_its_time() {
+fn a_realtime_run_takes_as_long_as_its_simulated_time() {
     let bench = Bench::new("clock");
     let mut arguments = vec!["run", "--pacing", "realtime", "--json", QUIET[0], QUIET[1]];
-    // Other tests may hold this run up for longer than a controller puts up with.
+    // Other tests may delay this run beyond the controller's limits.
     for key in [
         "run.duration_s=0.5",
         "controller.lapses.overruns=100",
@@ -262,7 +262,7 @@ fn by_the_clock_a_run_takes_its_time() {
 }
 
 #[test]
-fn the_table_and_the_list_are_for_people() {
+fn the_table_and_the_list_are_readable() {
     let bench = Bench::new("people");
     let output = bench.run(&["run", "--set", "run.duration_s=0.2"]);
     let text = String::from_utf8_lossy(&output.stdout);
@@ -273,7 +273,7 @@ fn the_table_and_the_list_are_for_people() {
     let list = bench.run(&["scenarios"]);
     let text = String::from_utf8_lossy(&list.stdout);
     assert!(built_in::names().all(|name| text.contains(name)), "{text}");
-    // What is printed is a scenario file again.
+    // The printed text is a valid scenario file.
     let printed = bench.run(&["scenarios", "paper-gains"]).stdout;
     std::fs::write(bench.path("printed.toml"), printed).unwrap();
     let path = bench.path("printed.toml");

@@ -1,4 +1,4 @@
-//! `painleve study …` and `painleve figures` from the command line: contracts, files, mistakes.
+//! `painleve study …` and `painleve figures` on the command line: contracts, files, mistakes.
 
 use painleve_tests::{Bench, code, errors};
 use serde_json::Value;
@@ -58,7 +58,7 @@ fn table_two_keeps_its_contract_and_its_values() {
 }
 
 #[test]
-fn the_arm_may_be_changed_and_the_outcome_goes_to_files_too() {
+fn the_arm_can_be_changed_and_the_results_are_written_to_files() {
     let bench = Bench::new("changed");
     let arguments = [
         "study",
@@ -72,7 +72,7 @@ fn the_arm_may_be_changed_and_the_outcome_goes_to_files_too() {
         "t.svg",
     ];
     let report = bench.report(&arguments);
-    // Of another arm the paper says nothing.
+    // The paper has no values for another arm.
     assert_eq!(report["elbow_up"]["paper_m"], Value::Null);
     assert!(numbers(&report["elbow_up"]["intervals_m"][0])[0] < -0.29);
     assert_eq!(bench.files(), ["deep/t.csv", "t.svg"]);
@@ -83,7 +83,7 @@ fn the_arm_may_be_changed_and_the_outcome_goes_to_files_too() {
 }
 
 #[test]
-fn regions_are_numbers_of_every_cell_and_exact_lines() {
+fn regions_have_a_number_for_every_cell_and_exact_lines() {
     let bench = Bench::new("regions");
     let arguments = [
         "study",
@@ -109,7 +109,7 @@ fn regions_are_numbers_of_every_cell_and_exact_lines() {
 }
 
 #[test]
-fn sliding_ranges_keep_their_contract_whatever_the_number_of_threads() {
+fn sliding_ranges_keep_their_contract_for_any_number_of_threads() {
     let bench = Bench::new("sliding");
     let run = |threads: &str| {
         let mut arguments = SLIDING.to_vec();
@@ -156,7 +156,7 @@ fn sliding_ranges_keep_their_contract_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn the_closed_loop_keeps_its_contract_whatever_the_number_of_threads() {
+fn the_closed_loop_keeps_its_contract_for_any_number_of_threads() {
     let bench = Bench::new("loop");
     let run = |threads: &str| {
         let mut arguments = CLOSED_LOOP.to_vec();
@@ -199,7 +199,7 @@ fn the_closed_loop_keeps_its_contract_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn a_scenario_file_is_a_controller_too() {
+fn a_scenario_file_can_be_the_controller() {
     let bench = Bench::new("file");
     let file = "[controller.law.hybrid]\nnormal_force_n = 6.0\n";
     std::fs::write(bench.path("gentle.toml"), file).unwrap_or_default();
@@ -225,9 +225,9 @@ fn a_scenario_file_is_a_controller_too() {
     assert!(row["z_sliding_m"].as_f64() > Some(0.1), "{report}");
 }
 
-/// What was there stays, and nothing is added.
+/// Existing files stay, and none are added.
 #[test]
-fn mistakes_are_told_in_one_line_and_overwrite_nothing() {
+fn mistakes_are_reported_in_one_line_and_overwrite_nothing() {
     let bench = Bench::new("mistakes");
     std::fs::write(bench.path("old.csv"), "old").unwrap_or_default();
     for (arguments, expected) in [
@@ -328,7 +328,7 @@ fn mistakes_are_told_in_one_line_and_overwrite_nothing() {
 }
 
 #[test]
-fn an_output_that_cannot_be_written_is_told_before_anything_is_computed() {
+fn an_output_that_cannot_be_written_is_reported_before_anything_is_computed() {
     let bench = Bench::new("unwritable");
     std::fs::write(bench.path("file"), "").unwrap_or_default();
     for study in [
@@ -345,7 +345,7 @@ fn an_output_that_cannot_be_written_is_told_before_anything_is_computed() {
 }
 
 #[test]
-fn the_page_of_all_figures_needs_nothing_but_itself() {
+fn the_page_of_all_figures_is_self_contained() {
     let bench = Bench::new("figures");
     let output = bench.run(&["figures", "--draft", "--out", "page"]);
     assert!(output.status.success(), "{output:?}");
@@ -380,7 +380,7 @@ fn the_page_of_all_figures_needs_nothing_but_itself() {
             assert!(files.contains(&format!("page/{name}.json")), "{files:?}");
         }
     }
-    // Names of XML, not places on the network.
+    // These are XML namespaces, not network addresses.
     let without_names = html.replace("http://www.w3.org/2000/svg", "");
     assert!(!without_names.contains("http:") && !without_names.contains("https:"));
     assert!(!html.contains("<script") && !html.contains("<img"));

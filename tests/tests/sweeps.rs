@@ -8,7 +8,7 @@ use nix::sys::signal::Signal;
 use painleve_tests::{Bench, code, errors, signal};
 use serde_json::Value;
 
-/// 24 rows, of which most bounce.
+/// 24 rows, most of which bounce.
 const CAMPAIGN: &str = "study = 'bifurcation'\nmu = [0.4, 0.6]\nv-belt = '-0.5:-0.3:0.04'\n\
     initial = ['a', 'random:1']\nseed = 7\ntransient-s = 2\nrecord-s = 1\n";
 
@@ -42,7 +42,7 @@ fn merged(bench: &Bench) -> Vec<u8> {
 }
 
 #[test]
-fn any_number_of_shards_and_threads_merges_to_what_the_study_writes() {
+fn any_number_of_shards_and_threads_merges_to_the_output_of_the_study() {
     let alone = Bench::new("sweep-alone");
     let study = "study bifurcation --mu 0.4,0.6 --v-belt=-0.5:-0.3:0.04 --initial a,random:1 \
         --seed 7 --transient-s 2 --record-s 1 --csv alone.csv";
@@ -118,7 +118,7 @@ fn a_sweep_killed_at_any_moment_completes_with_the_same_bytes() {
         signal(running.id(), Signal::SIGKILL);
         let (output, _) = running.end(Duration::from_secs(10));
         kills += usize::from(code(output.status) == -1);
-        // Whatever is there under its name is complete.
+        // Every file with its final name is complete.
         let status = bench.report(&["sweep", "status", "--json"]);
         assert_eq!(status["unusable"], Value::Array(Vec::new()), "{status}");
     }
@@ -160,7 +160,7 @@ fn finished_shards_are_skipped_and_broken_ones_computed_again() {
         assert!(errors(&output).contains("computed again"), "{output:?}");
         assert_eq!(read(&bench, "out/sweep/shard-2.csv"), whole);
     }
-    // Gaps, and then a shard that is there twice.
+    // A missing shard, then a duplicate one.
     let refused = |part: &str| {
         let output = bench.run(&["sweep", "merge"]);
         assert_eq!(code(output.status), 1, "{output:?}");
@@ -181,7 +181,7 @@ fn finished_shards_are_skipped_and_broken_ones_computed_again() {
 }
 
 #[test]
-fn schedulers_say_which_shard() {
+fn schedulers_select_the_shard() {
     let bench = planned("sweep-scheduler", CAMPAIGN, "4");
     let run = |variables: &[(&str, &str)]| {
         let mut command = bench.command(&["sweep", "run"]);
@@ -226,7 +226,7 @@ fn schedulers_say_which_shard() {
     ] {
         assert!(script.lines().any(|one| one == line), "{script}");
     }
-    // What Slurm would do with it.
+    // Runs the script as Slurm would.
     let mut task = std::process::Command::new("sh");
     task.arg(bench.path("out/sweep/sweep.sbatch"));
     let output = task.env("SLURM_ARRAY_TASK_ID", "3").output();
@@ -234,7 +234,7 @@ fn schedulers_say_which_shard() {
 }
 
 #[test]
-fn mistakes_are_told_and_nothing_is_written() {
+fn mistakes_are_reported_and_nothing_is_written() {
     let bench = Bench::new("sweep-mistakes");
     let refused = |arguments: &[&str], part: &str| {
         let before = bench.files();
@@ -307,7 +307,7 @@ fn mistakes_are_told_and_nothing_is_written() {
 }
 
 #[test]
-fn a_scenario_that_has_changed_since_is_noticed() {
+fn a_scenario_changed_since_planning_is_detected() {
     let campaign = format!("{CAMPAIGN}scenario = 'mine.toml'\n");
     let bench = Bench::new("sweep-scenario");
     write(

@@ -1,5 +1,5 @@
-//! A control law of one's own: an impedance controller. The tip behaves as if a spring and a damper
-//! held it to its reference along the belt, and presses on the belt with a constant force.
+//! A user-defined control law: an impedance controller. The tip behaves as if a spring and a damper
+//! tied it to its reference along the belt, and presses on the belt with a constant force.
 
 #![no_std]
 
@@ -37,7 +37,7 @@ impl Law for ImpedanceSettings {
             0.0
         };
         let contact_force_n = Vector2::new(friction_n, self.normal_force_n);
-        // What holds the arm still, presses, and pulls the tip along.
+        // Terms that hold the arm still, press on the belt, and pull the tip along it.
         let wanted_n = contact_force_n - Vector2::new(spring_n + damper_n, 0.0);
         LawOutput {
             torque_nm: input
@@ -49,13 +49,13 @@ impl Law for ImpedanceSettings {
 }
 
 painleve_firmware::law_set! {
-    /// The built-in laws and ours.
+    /// The built-in laws and our own.
     pub enum OurLaws = Hybrid, states OurLawStates {
         /// The paper's PID on the joints.
         "pid" => Pid(PidSettings),
         /// The paper's hybrid force/motion law.
         "hybrid" => Hybrid(HybridSettings),
-        /// Spring and damper along the belt, constant force on it.
+        /// Spring and damper along the belt, constant normal force.
         "impedance" => Impedance(ImpedanceSettings),
     }
 }

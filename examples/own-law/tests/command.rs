@@ -1,5 +1,5 @@
-//! The whole command works with a law of one's own: runs, studies, error messages, and the image in
-//! QEMU, whose torque counts are those of the native controller to the last bit.
+//! The whole command works with a user-defined law: runs, studies, error messages, and the image in
+//! QEMU, whose torque counts equal those of the native controller exactly.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -23,7 +23,7 @@ fn run(more: &[&str]) -> Value {
 }
 
 #[test]
-fn it_slides_to_the_papers_limit() {
+fn the_law_slides_to_the_papers_limit() {
     let report = run(&[]);
     assert_eq!(report["controller"], "impedance");
     assert_eq!(report["lift_offs"], 0);
@@ -43,7 +43,7 @@ fn the_emulated_board_gives_the_same_bits() {
 }
 
 #[test]
-fn a_study_takes_it() {
+fn a_study_runs_with_the_law() {
     let study = [
         "study",
         "sliding-range",

@@ -1,5 +1,5 @@
-//! A plant of one's own behind the controller: a point mass on a spring, pressed on the moving
-//! belt by an arm without mass.
+//! A user-defined plant behind the controller: a point mass on a spring, pressed on the moving belt
+//! by a massless arm.
 
 use std::error::Error;
 use std::io;

@@ -5,6 +5,6 @@
 #[cfg(target_os = "none")]
 painleve_qemu_board::image!(own_law::OurLaws);
 
-/// Nothing runs on a PC.
+/// Does nothing on a PC.
 #[cfg(not(target_os = "none"))]
 fn main() {}
