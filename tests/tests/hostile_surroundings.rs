@@ -1,5 +1,5 @@
-//! Closed pipes, full disks, foreign folders, signals at the wrong time, files that are none:
-//! one message, the right exit code, and nothing left.
+//! Closed pipes, full disks, folders of other users, signals at inconvenient times and special
+//! files give one message, the correct exit code and no leftovers.
 
 use std::fs::{self, File};
 use std::io::Write;
@@ -22,7 +22,7 @@ const SHORT: [&str; 5] = [
     "--json",
 ];
 
-/// The output of a shell line in which `$P` is the program.
+/// Runs a shell command in which `$P` is the program and returns its output.
 #[allow(clippy::unwrap_used)]
 fn shell(bench: &Bench, line: &str) -> std::process::Output {
     Command::new("bash")
@@ -34,7 +34,7 @@ fn shell(bench: &Bench, line: &str) -> std::process::Output {
 }
 
 #[test]
-fn nobody_reading_is_no_error_and_a_full_disk_is_one() {
+fn a_closed_pipe_is_not_an_error_but_a_full_disk_is() {
     let bench = Bench::new("stdout");
     for arguments in ["scenarios", "run --set run.duration_s=0.05 --json"] {
         let unread = shell(
@@ -47,14 +47,14 @@ fn nobody_reading_is_no_error_and_a_full_disk_is_one() {
         assert_eq!(code(full.status), 4, "{arguments}: {full:?}");
         assert!(errors(&full).contains("stdout"), "{full:?}");
     }
-    // A log that cannot be written must not end a run.
+    // An unwritable log must not end a run.
     let line = format!("$P run --pacing realtime {} 2>/dev/full", SHORT.join(" "));
     let unlogged = shell(&bench, &line);
     assert_eq!(code(unlogged.status), 0, "{unlogged:?}");
 }
 
 #[test]
-fn a_limit_on_file_sizes_is_told_like_a_full_disk() {
+fn a_file_size_limit_is_reported_like_a_full_disk() {
     let bench = Bench::new("fsize");
     let output = shell(&bench, "ulimit -f 64; $P run --no-plot");
     assert_eq!(code(output.status), 4, "{output:?}");
@@ -64,7 +64,7 @@ fn a_limit_on_file_sizes_is_told_like_a_full_disk() {
 }
 
 #[test]
-fn signals_are_heard_while_a_process_waits_for_its_peer() {
+fn signals_are_handled_while_a_process_waits_for_its_peer() {
     for role in ["plant", "controller"] {
         for sent in [Signal::SIGINT, Signal::SIGTERM] {
             let bench = Bench::new("waiting");
@@ -81,7 +81,7 @@ fn signals_are_heard_while_a_process_waits_for_its_peer() {
 }
 
 #[test]
-fn a_process_stopped_while_it_starts_is_noticed() {
+fn a_process_stopped_during_its_start_is_detected() {
     for (role, option) in [("controller", ""), ("plant", "")] {
         let bench = Bench::new("stopped");
         let long = ["run", "--bus", &bench.bus, "--set", "run.duration_s=100000"];
@@ -91,7 +91,7 @@ fn a_process_stopped_while_it_starts_is_noticed() {
         let start = Instant::now();
         let (output, _) = running.end(SOON);
         assert_eq!(code(output.status), 3, "{output:?}{option}");
-        // 2 s to notice, one to put things in order.
+        // Two seconds for detection, one for cleaning up.
         assert!(
             start.elapsed() < Duration::from_secs(4),
             "{:?}",
@@ -102,7 +102,7 @@ fn a_process_stopped_while_it_starts_is_noticed() {
 }
 
 #[test]
-fn children_may_say_more_than_a_pipe_holds() {
+fn child_output_may_exceed_the_capacity_of_a_pipe() {
     let bench = Bench::new("pipe");
     let name = "x".repeat(70_000);
     let report = bench.report(&[&["--set", &format!("name={name}")], &SHORT[..]].concat());
@@ -160,7 +160,7 @@ fn settings_beyond_all_bounds_are_refused_at_once() {
 }
 
 #[test]
-fn of_two_sweeps_planned_at_once_one_is_refused() {
+fn one_of_two_simultaneously_planned_sweeps_is_refused() {
     let bench = Bench::new("plans");
     for mu in ["0.4", "0.6"] {
         let campaign = format!("study = \"bifurcation\"\nmu = \"{mu}\"\nv-belt = \"-0.4\"\n");
@@ -182,7 +182,7 @@ fn of_two_sweeps_planned_at_once_one_is_refused() {
 }
 
 #[test]
-fn studies_and_figures_end_with_their_own_code_and_leave_nothing() {
+fn interrupted_studies_and_figures_end_with_their_exit_code_and_leave_nothing() {
     let bench = Bench::new("batch");
     for arguments in [
         &[
@@ -206,9 +206,9 @@ fn studies_and_figures_end_with_their_own_code_and_leave_nothing() {
 }
 
 #[test]
-fn a_runtime_folder_of_somebody_else_is_not_used() {
+fn a_runtime_folder_of_another_user_is_not_used() {
     let bench = Bench::new("foreign");
-    // Everybody may write there: it is passed over.
+    // A world-writable folder is skipped.
     let open = bench.path("open");
     fs::create_dir(&open).unwrap();
     fs::set_permissions(&open, fs::Permissions::from_mode(0o777)).unwrap();
@@ -217,7 +217,7 @@ fn a_runtime_folder_of_somebody_else_is_not_used() {
     assert_eq!(code(output.status), 0, "{output:?}");
     assert_eq!(fs::read_dir(&open).unwrap().count(), 0);
 
-    // What should be the program's own folder is a file.
+    // A file is in place of the program's own folder.
     let blocked = bench.path("blocked");
     fs::create_dir(&blocked).unwrap();
     fs::set_permissions(&blocked, fs::Permissions::from_mode(0o700)).unwrap();
@@ -235,9 +235,9 @@ fn a_runtime_folder_of_somebody_else_is_not_used() {
 }
 
 #[test]
-fn a_watchdog_takes_the_torque_of_a_plant_without_commands() {
+fn the_watchdog_removes_the_torque_of_a_plant_without_commands() {
     let bench = Bench::new("watchdog");
-    // So many frames are lost that 10 ticks soon pass without a command.
+    // With this frame loss, 10 ticks without a command soon occur.
     let report = bench.report(&[
         "run",
         "--json",
