@@ -100,7 +100,7 @@ def main():
     # One thread each, as painleve has.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
-    print("| program | simulated s per CPU s | painleve is faster by | touches per s | apex | largest θ̇₁ | the paradox |")
+    print("| program | simulated s per CPU s | painleve is faster by | impacts per s | apex | largest θ̇₁ | the paradox |")
     print("|---|---|---|---|---|---|---|")
     ours, notes = None, []
     for name, measure in {"painleve": painleve, "SciPy": scipy, "MuJoCo": mujoco, "Siconos": siconos}.items():
