@@ -8,9 +8,9 @@
 //!
 //! The modules follow the order of one tick: [`controller`] checks the frame; [`estimate`] converts
 //! counts to angles, rates, contact and friction; [`supervise`] decides which actions are allowed;
-//! [`refer`] gives the target position of the tip; [`law`] computes torques, or [`recover`] returns
-//! a thrown tip to the belt; [`guard`] keeps the tip pressed on the belt. [`telemetry`] exposes the
-//! internal state.
+//! [`refer`] gives the target position of the tip; [`demand`] computes torques, with the [`law`] or,
+//! to return a thrown tip to the belt, with [`recover`]; [`drive`] outputs them, limited and, by
+//! [`guard`], such that the tip stays pressed. [`telemetry`] exposes the internal state.
 
 #![no_std]
 
@@ -19,6 +19,7 @@ extern crate std;
 
 pub mod configuration;
 pub mod controller;
+pub mod demand;
 pub mod drive;
 pub mod estimate;
 pub mod guard;

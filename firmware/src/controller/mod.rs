@@ -1,9 +1,9 @@
 //! One control tick, from sensor counts to torque counts, as a pipeline of stages:
 //!
 //! ```text
-//! frame ─ arrive ─ estimate ─ supervise ─ refer ─ law or recovery ─ torque stages ─ answer
-//!                     ↑                                                  │
-//!                     └──────────────── last command ────────────────────┘
+//! frame ─ arrive ─ estimate ─ supervise ─ refer ─ demand ─ torque output ─ answer
+//!                     ↑                             ↑            │
+//!                     └──────── last command ───────┴────────────┘
 //! ```
 //!
 //! Each stage consists of constant settings and a state of its own; the stages' signatures show the
@@ -22,12 +22,11 @@ use painleve_shared::status::Fault;
 
 use self::arrival::{Arrival, ArrivalState, Lapses, arrive};
 use crate::configuration::{Configuration, Converters};
+use crate::demand::{DemandInput, DemandState, TorqueDemand};
 use crate::drive::torque::{LastCommand, NotFinite, TorqueOutput};
 use crate::estimate::joints::EncoderJump;
 use crate::estimate::{EstimatesState, Estimators, Readings};
-use crate::law::LawInput;
 use crate::law::{Law, LawSettings};
-use crate::recover::{Recovery, RecoveryState};
 use crate::refer::{References, ReferencesState};
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::{Supervision, Supervisor};
@@ -45,12 +44,10 @@ pub struct Controller<L: Law = LawSettings> {
 #[derive(Clone, Debug)]
 struct Stages<L> {
     converters: Converters,
-    tick_s: f32,
     estimators: Estimators,
     supervisor: Supervisor,
     references: References,
-    law: L,
-    recovery: Recovery,
+    demand: TorqueDemand<L>,
     torques: TorqueOutput,
 }
 
@@ -62,8 +59,7 @@ struct State<L: Law> {
     estimates: EstimatesState,
     supervision: Supervision,
     references: ReferencesState,
-    law: L::State,
-    recovery: RecoveryState,
+    demand: DemandState<L>,
     command: LastCommand,
 }
 
@@ -77,12 +73,10 @@ impl<L: Law> Controller<L> {
         let settings = &configuration.settings;
         let stages = Stages {
             converters: configuration.converters,
-            tick_s: configuration.tick_s(),
             estimators: Estimators::new(configuration),
             supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
             references: References::new(configuration),
-            law: settings.law.clone(),
-            recovery: Recovery::new(&settings.recovery, configuration.tick_s()),
+            demand: TorqueDemand::new(configuration),
             torques: TorqueOutput::new(
                 &settings.guard,
                 configuration.converters.torque,
@@ -92,11 +86,10 @@ impl<L: Law> Controller<L> {
         let state = State {
             arrivals: ArrivalState::default(),
             monitor: LapseMonitor::new(settings.lapses),
-            estimates: stages.estimators.start(configuration, arm),
+            estimates: stages.estimators.start(arm),
             supervision: Supervision::default(),
             references: stages.references.start(&arm),
-            law: settings.law.initial_state(),
-            recovery: RecoveryState::default(),
+            demand: stages.demand.start(),
             command: LastCommand::default(),
         };
         Ok(Self {
@@ -235,7 +228,7 @@ impl<L: Law> Stages<L> {
             &mut state.supervision,
             readings.frame.inputs,
             contact.touches,
-            self.law.is_on(),
+            self.demand.is_on(),
         );
         let arm = &state.estimates.arm;
         let target = self.references.tick(
@@ -244,34 +237,18 @@ impl<L: Law> Stages<L> {
             &model,
             &contact,
             &phase,
-            state.recovery.posture(),
+            state.demand.landing_posture(),
         );
         if phase.drives() {
-            let output = if target.recovering {
-                let edges_m = target.fresh_edges_m;
-                self.recovery
-                    .tick(&mut state.recovery, arm, &model, edges_m)
-            } else {
-                state.recovery.touch(self.tick_s);
-                let starts = phase.arms || contact.lands;
-                let input = LawInput {
-                    arm,
-                    model: &model,
-                    posture: target.posture,
-                    force_n: contact.force_n,
-                    friction: contact.friction,
-                    p_per_kg: contact.p_per_kg,
-                    contact: contact.touches,
-                    saturated: state.command.is_constrained() && !starts,
-                    reference: target.reference,
-                    torque_limit_nm: self.torques.limit_nm(),
-                    tick_s: self.tick_s,
-                };
-                if starts {
-                    self.law.reset(&mut state.law, &input);
-                }
-                self.law.tick(&mut state.law, &input)
+            let input = DemandInput {
+                arm,
+                model: &model,
+                contact: &contact,
+                phase: &phase,
+                target: &target,
+                last: &state.command,
             };
+            let output = self.demand.tick(&mut state.demand, &input);
             let torques = self
                 .torques
                 .tick(&mut state.command, &output, &model, &contact);
@@ -302,7 +279,7 @@ impl<L: Law> State<L> {
     /// Takes the torque off and cancels a recovery in progress.
     fn release(&mut self) {
         self.command = LastCommand::default();
-        self.recovery = RecoveryState::default();
+        self.demand.cancel_recovery();
     }
 }
 

@@ -39,7 +39,7 @@ impl LastCommand {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotFinite;
 
-/// The torque stages and the limits on their torques.
+/// Limits torques and converts them to counts of the torque stages.
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueOutput {
     guard: GuardSettings,
@@ -48,18 +48,13 @@ pub struct TorqueOutput {
 }
 
 impl TorqueOutput {
-    /// Makes stages with this scale, of which ±`limit_nm` (N·m) is used.
+    /// Makes an output with this scale, of which ±`limit_nm` (N·m) is used.
     pub fn new(guard: &GuardSettings, scale: LinearScale<f32>, limit_nm: f32) -> Self {
         Self {
             guard: *guard,
             scale,
             limit_nm,
         }
-    }
-
-    /// Returns the largest torque on either joint, N·m.
-    pub fn limit_nm(&self) -> f32 {
-        self.limit_nm
     }
 
     /// Converts a law's answer at one tick to a command.

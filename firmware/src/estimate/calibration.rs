@@ -4,7 +4,7 @@
 //! sum therefore gives l₁, and l₂ in proportion; it improves the longer the tip slides. Without calibration, an
 //! arm 5 % longer than its data sheet states would miss its references by a centimetre and its edges by more.
 
-use painleve_shared::{Real, settings};
+use painleve_shared::{Arm, Real, settings};
 
 /// Fraction of a reading's error that averaging does not remove: successive roundings are not independent.
 const LASTING_ERROR: f32 = 0.1;
@@ -22,63 +22,27 @@ settings! {
     }
 }
 
-/// The calibration with its running mean.
+/// Calibrates the links' length from the gaps measured while the tip is on the belt.
 #[derive(Clone, Copy, Debug)]
-pub struct LengthCalibration {
-    settings: CalibrationSettings,
-    height_m: f32,
+pub struct LengthCalibrator {
+    enabled: bool,
     nominal_m: f32,
-    length_m: f32,
-    /// Mean of cos θ₁ + cos θ₂.
-    mean: f32,
-    /// Number of readings in the mean.
-    readings: f32,
+    /// Largest deviation from the nominal length, m.
+    deviation_m: f32,
+    /// Number of readings beyond which old ones are forgotten.
     most_readings: f32,
 }
 
-impl LengthCalibration {
-    /// Starts without readings: nominal length of link 1 and height above the belt in m.
-    pub fn new(settings: &CalibrationSettings, nominal_m: f32, height_m: f32, tick_s: f32) -> Self {
-        Self {
-            settings: *settings,
-            height_m,
-            nominal_m,
-            length_m: nominal_m,
-            mean: 0.0,
-            readings: 0.0,
-            most_readings: (settings.averaging_s / tick_s).at_least(1.0),
-        }
-    }
+/// Running mean of a [`LengthCalibrator`]; without readings by default.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CalibrationState {
+    /// Mean of cos θ₁ + ρ cos θ₂.
+    mean: f32,
+    /// Number of readings in the mean.
+    readings: f32,
+}
 
-    /// Updates the mean with the gap (m) that one tick's readings give for the present length while the tip is
-    /// on the belt; returns the length of link 1, m.
-    pub fn update(&mut self, measured_gap_m: f32) -> f32 {
-        if !self.settings.enabled {
-            return self.length_m;
-        }
-        let sum = (self.height_m - measured_gap_m) / self.length_m;
-        self.readings = (self.readings + 1.0).at_most(self.most_readings);
-        self.mean += (sum - self.mean) / self.readings;
-        let length = self.height_m / self.mean;
-        // Rejects non-finite lengths as well.
-        if (length - self.nominal_m).abs() <= self.settings.tolerance * self.nominal_m {
-            self.length_m = length;
-        }
-        self.length_m
-    }
-
-    /// Restarts the mean at this measured gap (m): the tip is assumed on the belt, because it cannot be below
-    /// it. Returns the length of link 1, m.
-    pub fn restart(&mut self, measured_gap_m: f32) -> f32 {
-        self.readings = 0.0;
-        self.update(measured_gap_m)
-    }
-
-    /// Returns whether the calibration is enabled but has no reading yet.
-    pub fn is_open(&self) -> bool {
-        self.settings.enabled && self.readings == 0.0
-    }
-
+impl CalibrationState {
     /// Returns the largest error (m) of a gap whose readings are wrong by at most `reading_error_m`, including
     /// the error of the length, which is averaged from such readings.
     pub fn gap_error_m(&self, reading_error_m: f32) -> f32 {
@@ -90,14 +54,96 @@ impl LengthCalibration {
     }
 }
 
+impl LengthCalibrator {
+    /// Makes a calibrator of arms whose link 1 has the nominal length `nominal_m`, called every `tick_s`.
+    pub fn new(settings: &CalibrationSettings, nominal_m: f32, tick_s: f32) -> Self {
+        Self {
+            enabled: settings.enabled,
+            nominal_m,
+            deviation_m: settings.tolerance * nominal_m,
+            most_readings: (settings.averaging_s / tick_s).at_least(1.0),
+        }
+    }
+
+    /// Updates the mean with the gap (m) that one tick's readings give for the arm's present length while the
+    /// tip is on the belt, and scales the arm to the length that follows.
+    #[inline]
+    pub fn update(&self, state: &mut CalibrationState, arm: &mut Arm<f32>, measured_gap_m: f32) {
+        let [present_m, _] = arm.link_length_m();
+        arm.scale_to(self.length_m(state, present_m, arm.height_m(), measured_gap_m));
+    }
+
+    /// Restarts the mean at this measured gap (m): the tip is assumed on the belt, because it cannot be below
+    /// it.
+    #[cold]
+    #[inline(never)]
+    pub fn restart(&self, state: &mut CalibrationState, arm: &mut Arm<f32>, measured_gap_m: f32) {
+        state.readings = 0.0;
+        self.update(state, arm, measured_gap_m);
+    }
+
+    /// Returns whether the calibration is enabled but has no reading yet.
+    pub fn is_open(&self, state: &CalibrationState) -> bool {
+        self.enabled && state.readings == 0.0
+    }
+
+    /// Returns the length of link 1 after one more reading, m.
+    fn length_m(
+        &self,
+        state: &mut CalibrationState,
+        present_m: f32,
+        height_m: f32,
+        measured_gap_m: f32,
+    ) -> f32 {
+        if !self.enabled {
+            return present_m;
+        }
+        let sum = (height_m - measured_gap_m) / present_m;
+        state.readings = (state.readings + 1.0).at_most(self.most_readings);
+        state.mean += (sum - state.mean) / state.readings;
+        let length_m = height_m / state.mean;
+        // Rejects non-finite lengths as well.
+        if (length_m - self.nominal_m).abs() <= self.deviation_m {
+            length_m
+        } else {
+            present_m
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use painleve_shared::ArmParameters;
 
     const HEIGHT_M: f32 = 0.3775;
 
-    fn calibration() -> LengthCalibration {
-        LengthCalibration::new(&CalibrationSettings::default(), 0.21, HEIGHT_M, 1e-3)
+    /// A calibrator with its state and its arm.
+    struct Calibration {
+        calibrator: LengthCalibrator,
+        state: CalibrationState,
+        arm: Arm<f32>,
+    }
+
+    impl Calibration {
+        fn update(&mut self, gap_m: f32) -> f32 {
+            self.calibrator
+                .update(&mut self.state, &mut self.arm, gap_m);
+            self.arm.link_length_m()[0]
+        }
+    }
+
+    fn calibration() -> Calibration {
+        let parameters = ArmParameters {
+            link_length_m: [0.21; 2],
+            height_m: HEIGHT_M,
+            ..ArmParameters::default()
+        };
+        Calibration {
+            calibrator: LengthCalibrator::new(&CalibrationSettings::default(), 0.21, 1e-3),
+            state: CalibrationState::default(),
+            arm: Arm::new(parameters).unwrap(),
+        }
     }
 
     /// Returns the gap that readings give for the length in use, while the tip is on the belt.
@@ -129,23 +175,34 @@ mod tests {
     #[test]
     fn a_restart_discards_earlier_readings() {
         let mut calibration = calibration();
-        assert!(calibration.is_open());
+        let is_open = |of: &Calibration| of.calibrator.is_open(&of.state);
+        assert!(is_open(&calibration));
         let mut length_m = 0.21;
         for _ in 0..10 {
             length_m = calibration.update(gap_m(0.2205, length_m));
         }
-        assert!(!calibration.is_open());
-        length_m = calibration.restart(gap_m(0.205, length_m));
+        assert!(!is_open(&calibration));
+        let Calibration {
+            calibrator,
+            state,
+            arm,
+        } = &mut calibration;
+        calibrator.restart(state, arm, gap_m(0.205, length_m));
+        length_m = arm.link_length_m()[0];
         assert!((length_m - 0.205).abs() < 1e-6, "{length_m}");
     }
 
     #[test]
     fn the_gap_error_falls_with_the_number_of_readings() {
         let mut calibration = calibration();
-        assert_eq!(calibration.gap_error_m(50e-6), 50e-6, "without readings");
+        assert_eq!(
+            calibration.state.gap_error_m(50e-6),
+            50e-6,
+            "without readings"
+        );
         let errors_m: [f32; 100] = core::array::from_fn(|_| {
             calibration.update(0.0);
-            calibration.gap_error_m(50e-6)
+            calibration.state.gap_error_m(50e-6)
         });
         assert!((errors_m[0] - 105e-6).abs() < 1e-9 && (errors_m[99] - 60e-6).abs() < 1e-9);
         assert!(errors_m.is_sorted_by(|before, after| before > after));

@@ -21,7 +21,7 @@ use painleve_shared::counts::LinearScale;
 use painleve_shared::frame::SensorFrame;
 
 use self::belt::{BeltEstimator, BeltState};
-use self::calibration::LengthCalibration;
+use self::calibration::{CalibrationState, LengthCalibrator};
 use self::contact::{ContactDetector, ContactState, EncoderReading, Evidence};
 use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceState};
 use self::friction::{FrictionEstimate, FrictionEstimator, FrictionState};
@@ -72,6 +72,7 @@ pub struct Estimators {
     friction: FrictionEstimator,
     belt: BeltEstimator,
     disturbance: DisturbanceEstimator,
+    calibrator: LengthCalibrator,
 }
 
 /// State of the [`Estimators`] between ticks.
@@ -84,7 +85,7 @@ pub struct EstimatesState {
     friction: FrictionState,
     belt: BeltState,
     disturbance: DisturbanceState,
-    calibration: LengthCalibration,
+    calibration: CalibrationState,
 }
 
 impl EstimatesState {
@@ -120,11 +121,16 @@ impl Estimators {
             ),
             belt: BeltEstimator::new(&configuration.settings.belt, tick_s),
             disturbance: DisturbanceEstimator::new(&configuration.settings.disturbance, tick_s),
+            calibrator: LengthCalibrator::new(
+                &configuration.settings.calibration,
+                configuration.arm.link_length_m[0],
+                tick_s,
+            ),
         }
     }
 
     /// Starts without readings of this arm.
-    pub fn start<L: Law>(&self, configuration: &Configuration<L>, arm: Arm<f32>) -> EstimatesState {
+    pub fn start(&self, arm: Arm<f32>) -> EstimatesState {
         EstimatesState {
             arm,
             joints: JointState::default(),
@@ -132,12 +138,7 @@ impl Estimators {
             friction: self.friction.start(),
             belt: BeltState::default(),
             disturbance: DisturbanceState::default(),
-            calibration: LengthCalibration::new(
-                &configuration.settings.calibration,
-                configuration.arm.link_length_m[0],
-                configuration.arm.height_m,
-                self.tick_s,
-            ),
+            calibration: CalibrationState::default(),
         }
     }
 
@@ -196,7 +197,7 @@ impl Estimators {
                 .update_from_force(&mut state.contact, force_n.y),
             Evidence::Encoders => {
                 let mut encoders = self.encoder_reading(state, model, gap_m, last);
-                find_belt(state, &mut encoders);
+                self.find_belt(state, &mut encoders);
                 self.contact
                     .update_from_encoders(&mut state.contact, &encoders)
             }
@@ -212,8 +213,8 @@ impl Estimators {
             }
             // An unchanged reading would gain weight merely with time.
             if certain && state.joints.has_moved() {
-                let length = state.calibration.update(gap_m);
-                state.arm.scale_to(length);
+                self.calibrator
+                    .update(&mut state.calibration, &mut state.arm, gap_m);
             }
         } else if touched {
             self.explain_throw(&mut state.friction, model);
@@ -288,17 +289,18 @@ impl Estimators {
             self.friction.thrown(state, critical);
         }
     }
-}
 
-/// With contact from the encoders, the belt is assumed at the lowest tip position so far: initially
-/// the start position, then every lower one.
-fn find_belt(state: &mut EstimatesState, encoders: &mut EncoderReading) {
-    let starts = state.calibration.is_open();
-    if starts || encoders.is_below_belt() {
-        let length = state.calibration.restart(encoders.gap_m);
-        state.arm.scale_to(length);
-    }
-    if starts {
-        encoders.gap_m = 0.0;
+    /// With contact from the encoders, the belt is assumed at the lowest tip position so far: initially
+    /// the start position, then every lower one.
+    fn find_belt(&self, state: &mut EstimatesState, encoders: &mut EncoderReading) {
+        let starts = self.calibrator.is_open(&state.calibration);
+        if starts || encoders.is_below_belt() {
+            let gap_m = encoders.gap_m;
+            self.calibrator
+                .restart(&mut state.calibration, &mut state.arm, gap_m);
+        }
+        if starts {
+            encoders.gap_m = 0.0;
+        }
     }
 }
