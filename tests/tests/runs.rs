@@ -31,7 +31,10 @@ fn the_default_run_slides_to_the_papers_limit_without_lift_off() {
         "{report}"
     );
     assert_eq!(number(&report, "final_reference_m"), 0.148);
-    assert_eq!(bench.files(), ["out/run.mcap", "out/run.svg"]);
+    assert_eq!(
+        bench.files(),
+        ["out/run.html", "out/run.mcap", "out/run.svg"]
+    );
 }
 
 #[test]

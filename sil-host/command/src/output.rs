@@ -19,6 +19,8 @@ use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 
+use painleve_view::PageFile;
+
 use super::CommandError;
 
 /// The files that a run writes.
@@ -33,8 +35,14 @@ pub struct OutputArguments {
     /// Figure of the run.
     #[arg(long, value_name = "PATH", default_value = "out/run.svg")]
     plot: PathBuf,
-    /// Do not write a figure.
-    #[arg(long, conflicts_with = "plot")]
+    /// Page of the run for the browser: it moves, and needs no network.
+    #[arg(long, value_name = "PATH", default_value = "out/run.html")]
+    html: PathBuf,
+    /// Do not write a page.
+    #[arg(long, conflicts_with = "html")]
+    no_html: bool,
+    /// Write neither figure nor page.
+    #[arg(long, conflicts_with_all = ["plot", "html"])]
     no_plot: bool,
     /// Table of every tick.
     #[arg(long, value_name = "PATH")]
@@ -48,7 +56,11 @@ impl OutputArguments {
         for (option, path) in self.files() {
             arguments.extend([format!("--{option}").into(), path.into()]);
         }
-        for (option, given) in [("--no-record", self.no_record), ("--no-plot", self.no_plot)] {
+        for (option, given) in [
+            ("--no-record", self.no_record),
+            ("--no-html", self.no_html && !self.no_plot),
+            ("--no-plot", self.no_plot),
+        ] {
             arguments.extend(given.then(|| option.into()));
         }
         arguments
@@ -56,9 +68,13 @@ impl OutputArguments {
 
     /// Returns the files to write, each with its option.
     fn files(&self) -> Vec<(&'static str, &Path)> {
-        let wanted: [(_, Option<&PathBuf>); 3] = [
+        let wanted: [(_, Option<&PathBuf>); 4] = [
             ("record", (!self.no_record).then_some(&self.record)),
             ("plot", (!self.no_plot).then_some(&self.plot)),
+            (
+                "html",
+                (!self.no_html && !self.no_plot).then_some(&self.html),
+            ),
             ("csv", self.csv.as_ref()),
         ];
         wanted
@@ -85,6 +101,7 @@ impl OutputArguments {
                     Box::new(McapLog::to(file, scenario, Source::Simulation).map_err(output_error)?)
                 }
                 "csv" => Box::new(CsvTable::to(file).map_err(output_error)?),
+                "html" => Box::new(PageFile::new(file, scenario)),
                 _ => Box::new(PlotFile {
                     plot: figure(scenario),
                     file,

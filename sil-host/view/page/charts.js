@@ -1,0 +1,155 @@
+"use strict";
+// Strip charts on one time axis, drawn by uPlot. The playhead is an element of its own, so that
+// playing does not draw the curves again.
+
+const CHARTS = [
+  { title: "Tip along the belt", unit: "mm", curves: [["reference_m", "reference", "--orange", 1e3, false, 5], ["tip_m", "tip", "--ink", 1e3], ["lower_edge_m", "edges", "--red", 1e3, true], ["upper_edge_m", "", "--red", 1e3, true]] },
+  { title: "Gap", unit: "mm", curves: [["gap_m", "", "--red", 1e3]], zero: true, least: 0.01 },
+  { title: "Contact force", unit: "N", curves: [["fn_n", "normal", "--blue", 1], ["ft_n", "tangential", "--orange", 1]], zero: true, most: 60 },
+  { title: "Joint torques", unit: "N·m", curves: [["u1_nm", "u1", "--ink", 1], ["u2_nm", "u2", "--orange", 1]], zero: true },
+  { title: "Friction coefficient", unit: "", curves: [["friction", "estimate", "--purple", 1], ["friction_low", "± one deviation", "--purple", 1, true], ["friction_high", "", "--purple", 1, true]], band: [3, 2] },
+  { title: "Free normal acceleration b", unit: "m/s²", note: "lift-off where b ≥ 0", curves: [["b_m_s2", "", "--blue", 1]], zero: true },
+  { title: "Contact coefficient p", unit: "1/kg", note: "paradox where p ≤ 0", curves: [["p_per_kg", "", "--green", 1]], zero: true },
+];
+
+class Charts {
+  constructor(parent, columns, seek, zoomed) {
+    Object.assign(this, { parent, columns, seek, zoomed, plots: [], range: null });
+  }
+
+  /** Whether a curve has anything to show. A chart without such a curve is left out. */
+  has(name) {
+    const values = this.columns[name], { length } = this.columns;
+    for (let i = 0; i < length; i++) if (Number.isFinite(values[i]) && values[i] !== 0) return true;
+    return false;
+  }
+
+  build(all = false) {
+    for (const { plot } of this.plots) plot.destroy();
+    this.parent.replaceChildren();
+    this.plots = CHARTS.filter((chart) => all || chart.curves.some(([name]) => this.has(name))).map((chart) => this.chart(chart, all));
+    this.update();
+  }
+
+  chart(chart, all) {
+    const box = document.createElement("div");
+    box.className = "chart";
+    const title = document.createElement("h2");
+    title.textContent = chart.unit ? `${chart.title} (${chart.unit})` : chart.title;
+    for (const [column, label, colour, , dashed] of chart.curves) {
+      if (!label || !(all || this.has(column))) continue;
+      const name = document.createElement("span"), swatch = document.createElement("i");
+      swatch.className = "swatch";
+      swatch.style.background = `var(${colour})`;
+      if (dashed) swatch.style.height = "3px";
+      name.append(swatch, label);
+      title.append(name);
+    }
+    if (chart.note) {
+      const note = document.createElement("span");
+      note.textContent = chart.note;
+      title.append(note);
+    }
+    const holder = document.createElement("div");
+    holder.setAttribute("role", "img");
+    holder.setAttribute("aria-label", `${title.textContent} over time in seconds`);
+    box.append(title, holder);
+    this.parent.append(box);
+    const axis = { stroke: ink("--faint"), grid: { stroke: ink("--line"), width: 1 }, ticks: { stroke: ink("--line"), width: 1 }, font: "12px system-ui, 'DejaVu Sans', sans-serif" };
+    const plot = new uPlot({
+      width: Math.max(holder.clientWidth, 200),
+      height: 130,
+      legend: { show: false },
+      cursor: { sync: { key: "run" }, drag: { x: true, y: false }, points: { size: 6 } },
+      scales: { x: { time: false }, y: { range: (_, low, high) => span(low, high, chart) } },
+      axes: [{ ...axis, size: 30 }, { ...axis, size: 58 }],
+      series: [{}, ...chart.curves.map(([, , colour, , dashed, width]) => ({ stroke: ink(colour), width: width ?? (dashed ? 1 : 1.5), dash: dashed ? [5, 4] : undefined, spanGaps: false, points: { show: false } }))],
+      bands: chart.band ? [{ series: chart.band, fill: ink("--purple") + "33" }] : [],
+      hooks: {
+        drawClear: [(u) => this.shadeFlights(u)],
+        setScale: [(u, key) => { if (key === "x") this.synchronise(u); }],
+        init: [(u) => u.over.addEventListener("click", () => { if (u.select.width < 2) this.seek(u.posToVal(u.cursor.left, "x")); })],
+      },
+    }, this.data(chart), holder);
+    const playhead = document.createElement("div");
+    playhead.className = "playhead";
+    plot.over.append(playhead);
+    return { chart, plot, playhead, holder };
+  }
+
+  data(chart) {
+    const c = this.columns;
+    return [c.t.subarray(0, c.length), ...chart.curves.map(([name, , , scale]) => c.chart(name, scale))];
+  }
+
+  /** Draws the present columns. */
+  update(window_s = null) {
+    this.updating = true;
+    for (const { chart, plot } of this.plots) {
+      plot.setData(this.data(chart), false);
+      const { start, end } = this.columns;
+      const [from, to] = this.range ?? [window_s ? Math.max(end - window_s, start) : start, end];
+      plot.setScale("x", { min: from, max: to > from ? to : from + 1 });
+    }
+    this.updating = false;
+  }
+
+  /** All charts show the stretch of time that one of them was zoomed to. */
+  synchronise(source) {
+    if (this.updating) return;
+    this.updating = true;
+    const { min, max } = source.scales.x, { start, end } = this.columns;
+    this.range = min <= start && max >= end ? null : [min, max];
+    for (const { plot } of this.plots) if (plot !== source) plot.setScale("x", { min, max });
+    this.updating = false;
+    this.zoomed();
+  }
+
+  zoom(factor, centre) {
+    const { start, end } = this.columns, [from, to] = this.range ?? [start, end];
+    const half = 0.5 * (to - from) * factor;
+    this.range = factor === 0 || 2 * half >= end - start ? null : [Math.max(centre - half, start), Math.min(centre + half, end)];
+    this.update();
+    this.zoomed();
+  }
+
+  get shown() { return this.range ?? [this.columns.start, this.columns.end]; }
+
+  shadeFlights(u) {
+    const c = this.columns, { left, top, height, width } = u.bbox;
+    u.ctx.save();
+    u.ctx.fillStyle = ink("--flight");
+    u.ctx.beginPath(); u.ctx.rect(left, top, width, height); u.ctx.clip();
+    const last = c.index(u.scales.x.max);
+    for (let i = c.index(u.scales.x.min); i <= last && i < c.length; i++) {
+      if (c.mode[i] !== 0) continue;
+      let j = i;
+      while (j < last && c.mode[j] === 0) j++;
+      const from = u.valToPos(c.t[i], "x", true), to = u.valToPos(c.t[j], "x", true);
+      u.ctx.fillRect(from, top, Math.max(to - from, 2), height);
+      i = j;
+    }
+    u.ctx.restore();
+  }
+
+  now(time) {
+    for (const { plot, playhead } of this.plots) {
+      const at = plot.valToPos(time, "x");
+      playhead.style.transform = `translateX(${at}px)`;
+      playhead.hidden = !(at >= 0 && at <= plot.over.clientWidth);
+    }
+  }
+
+  resize() {
+    for (const { plot, holder } of this.plots) plot.setSize({ width: Math.max(holder.clientWidth, 200), height: 130 });
+  }
+}
+
+/** The range of values of a chart: never empty, with zero where it matters, without spikes beyond `most`. */
+function span(low, high, { zero, least = 1e-6, most = Infinity }) {
+  if (low == null) return [0, 1];
+  if (zero) { low = Math.min(low, 0); high = Math.max(high, 0); }
+  low = Math.max(low, -most); high = Math.min(high, most);
+  const margin = Math.max(0.06 * (high - low), 0.5 * (least - (high - low)), 1e-9);
+  return [low - margin, high + margin];
+}

@@ -1,0 +1,75 @@
+// Operates the page of a recorded run in headless Chromium: node page.mjs CHROMIUM RUN.html
+// Prints what it checked; ends with 1 at the first thing that is wrong.
+
+import { pathToFileURL } from "node:url";
+import { Chromium, pause } from "./chromium.mjs";
+
+const [program, file] = process.argv.slice(2);
+
+function check(holds, what) {
+  if (!holds) throw new Error(what);
+  console.log(`ok: ${what}`);
+}
+
+const browser = await Chromium.start(program, { width: 1200, height: 900, dark: false });
+try {
+  await browser.open(pathToFileURL(file).href);
+  await browser.until("typeof page !== 'undefined' && page.charts.plots.length > 0");
+  const time = () => browser.evaluate("page.time");
+  const end = await browser.evaluate("page.columns.end");
+  check((await browser.evaluate("document.title")).endsWith("painleve"), "the page has a title");
+  check(end > 0, "the run has a duration");
+
+  const drawing = () => browser.evaluate("document.querySelector('#arm').toDataURL()");
+  await browser.key("Home");
+  await pause(100);
+  const first = await drawing();
+  check(await time() === 0, "Home goes to the start");
+  await browser.click("#play");
+  await browser.until("page.time > 0.2", "the run plays");
+  await browser.click("#play");
+  await pause(100);
+  const stopped = await time();
+  await pause(200);
+  check(await time() === stopped, "a second click pauses");
+  check(await drawing() !== first, "arm and belt have moved");
+  check(await browser.evaluate("document.querySelector('#time').textContent") === `${stopped.toFixed(3)} s`, "the time is shown");
+
+  await browser.click("#forward");
+  check(await time() > stopped, "a step goes forward");
+  await browser.key("ArrowLeft");
+  await browser.key("ArrowLeft");
+  check(await time() < stopped, "← goes back");
+  await browser.key("End");
+  check(Math.abs(await time() - end) < 1e-9, "End goes to the end");
+  await browser.evaluate("(() => { const s = document.querySelector('#scrub'); s.value = 0.5 * page.columns.end; s.dispatchEvent(new Event('input')); })()");
+  check(Math.abs(await time() - 0.5 * end) < 1e-3, "the slider moves through the run");
+
+  const box = await browser.evaluate("(() => { scrollTo(0, 0); const b = page.charts.plots[0].plot.over.getBoundingClientRect(); return { x: b.x, y: b.y, width: b.width, height: b.height }; })()");
+  const mouse = (type, part) => browser.send("Input.dispatchMouseEvent", { type, x: box.x + part * box.width, y: box.y + 0.5 * box.height, button: "left", buttons: 1, clickCount: 1 });
+  await mouse("mouseMoved", 0.4);
+  await mouse("mousePressed", 0.4);
+  await mouse("mouseMoved", 0.5);
+  await mouse("mouseMoved", 0.6);
+  await mouse("mouseReleased", 0.6);
+  await browser.until("page.charts.range !== null", "dragging zooms");
+  const shown = await browser.evaluate("page.charts.plots.map(({ plot }) => [plot.scales.x.min, plot.scales.x.max])");
+  check(shown.every(([from, to]) => from === shown[0][0] && to === shown[0][1] && to - from < 0.3 * end), "all charts show the stretch");
+  await browser.key("0");
+  check(await browser.evaluate("page.charts.range === null"), "0 shows the whole run");
+
+  await browser.click("#theme");
+  check(await browser.evaluate("document.documentElement.dataset.theme") === "dark", "the theme changes");
+  await browser.click("#events li:last-child button");
+  check(Math.abs(await time() - await browser.evaluate("page.events.at(-1)[0]")) < 1e-3, "an event is a place to go to");
+
+  await browser.evaluate("page.seek(0), page.play(true)");
+  const frames = await browser.evaluate("new Promise((done) => { let n = 0; const t = performance.now(); const f = (now) => { n++; now - t > 2000 ? done(n / ((now - t) / 1000)) : requestAnimationFrame(f); }; requestAnimationFrame(f); })");
+  console.log(`frames a second while playing: ${frames.toFixed(1)}`);
+  await browser.resize(400, 800);
+  await pause(300);
+  check(await browser.evaluate("document.documentElement.scrollWidth <= 400"), "nothing is wider than a narrow screen");
+  check(browser.problems.length === 0, `the console is empty ${browser.problems.join("; ")}`);
+} finally {
+  await browser.close();
+}

@@ -1,0 +1,60 @@
+//! The page of a run in headless Chromium, if the machine has Node and Chromium.
+
+use std::path::Path;
+use std::process::Command;
+
+use painleve_tests::Bench;
+
+/// Returns the name of the first program that starts; says what is skipped if there is none.
+fn program(names: &[&'static str]) -> Option<&'static str> {
+    let starts = |name: &&&str| {
+        let version = Command::new(name).arg("--version").output();
+        version.is_ok_and(|output| output.status.success())
+    };
+    let found = names.iter().find(starts).copied();
+    if found.is_none() {
+        eprintln!("SKIPPED: {names:?} not found; on Debian: apt-get install nodejs chromium");
+    }
+    found
+}
+
+/// Runs a script of `browser/` and shows what it printed if it fails.
+fn run_script(name: &str, arguments: &[&str]) {
+    let chromium = program(&["chromium", "chromium-browser", "google-chrome"]);
+    let (Some(node), Some(chromium)) = (program(&["node"]), chromium) else {
+        return;
+    };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("browser")
+        .join(name);
+    let output = Command::new(node)
+        .arg(script)
+        .arg(chromium)
+        .args(arguments)
+        .output()
+        .unwrap_or_else(|error| panic!("cannot start {node}: {error}"));
+    let [stdout, stderr] =
+        [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(output.status.success(), "{stdout}\n{stderr}");
+    println!("{stdout}");
+}
+
+#[test]
+fn the_page_of_a_run_plays_zooms_and_has_no_error() {
+    let bench = Bench::new("page");
+    for scenario in ["edge", "open-loop-bounce"] {
+        let file = format!("{scenario}.html");
+        let path = bench.path(&file);
+        bench.report(&["run", scenario, "--json", "--no-record", "--html", &file]);
+        run_script("page.mjs", &[path.to_str().unwrap()]);
+    }
+}
+
+#[test]
+fn the_page_of_a_long_run_is_small() {
+    let bench = Bench::new("long-page");
+    let options = ["run", "--set", "run.duration_s=60", "--json", "--no-record"];
+    bench.report(&options);
+    let bytes = std::fs::metadata(bench.path("out/run.html")).unwrap().len();
+    assert!(bytes < 2_000_000, "{bytes}");
+}
