@@ -35,7 +35,7 @@ fn wrong_keys_and_values_are_named_and_nothing_is_written() {
         for (wrong, expected) in [
             (
                 "controller.guard.enabld=true",
-                &["controller.guard.enabld", "only: enabled"][..],
+                &["controller.guard.enabld", "known: enabled"][..],
             ),
             (
                 "converters.link.frame_loss=2",

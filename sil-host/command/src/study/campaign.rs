@@ -55,7 +55,7 @@ fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, Str
         let Some(option) = options.get(key.as_str()) else {
             let known: Vec<&str> = options.keys().copied().collect();
             return Err(format!(
-                "there is no '{key}' in a campaign of the study {}, only: {}",
+                "unknown option '{key}' in a campaign of the study {}; known: {}",
                 campaign.study,
                 known.join(", ")
             ));
@@ -149,7 +149,7 @@ mod tests {
             (campaign("bifurcation", &[("json", &["1"])]), "'json'"),
             (
                 campaign("bifurcation", &[("csv", &["x"])]),
-                "only: initial, mu",
+                "known: initial, mu",
             ),
             (campaign("bifurcation", &[seed]), "--seed"),
             (campaign("bifurcation", &[("mu", &["0:1:0"])]), "step 0"),
