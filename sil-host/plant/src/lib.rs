@@ -6,6 +6,7 @@
 //! - [`law_choice`]: the control law as a setting, from the program's set of laws
 //! - [`scenario`]: the complete definition of a run, as a TOML file
 //! - [`simulation`]: the plant with its converters, tick by tick
+//! - `tick_clock`: the instants of the control ticks
 //! - [`controller_host`]: the host of the controller
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`sample`]: both frames of a tick and the plant's true state, for records
@@ -21,6 +22,7 @@ pub mod sample;
 pub mod scenario;
 pub mod simulation;
 pub mod statistics;
+mod tick_clock;
 
 use law_choice::LawChoice;
 

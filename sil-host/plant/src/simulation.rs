@@ -18,6 +18,7 @@ use crate::mechanics::BuiltInPlant;
 use crate::plant::{Plant, PlantError, Probe};
 use crate::sample::Sample;
 use crate::scenario::Scenario;
+use crate::tick_clock::TickClock;
 
 /// A plant with its converters at a control rate.
 #[derive(Clone, Debug)]
@@ -28,8 +29,7 @@ pub struct Simulation<P = BuiltInPlant> {
     torque_stages: TorqueStages,
     link: LossyLink,
     lost: Lost,
-    tick_hz: f64,
-    tick: u64,
+    clock: TickClock,
     first_tick: u32,
     enable_at_s: f64,
 }
@@ -54,14 +54,21 @@ impl<P: Plant> Simulation<P> {
         scenario.validate()?;
         let converters = &scenario.converters;
         let seed = scenario.run.seed;
+        let tick_hz = f64::from(scenario.run.tick_hz);
+        let (faults, tick_s) = (&converters.faults, 1.0 / tick_hz);
         Ok(Self {
-            encoders: Encoders::new(&converters.encoder, seed, &plant.link_angles_rad()),
-            force_cell: ForceCell::new(&converters.force, seed),
-            torque_stages: TorqueStages::new(&converters.torque),
+            encoders: Encoders::new(
+                &converters.encoder,
+                faults,
+                tick_s,
+                seed,
+                &plant.link_angles_rad(),
+            ),
+            force_cell: ForceCell::new(&converters.force, faults, tick_s, seed),
+            torque_stages: TorqueStages::new(&converters.torque, faults, tick_s, seed),
             link: LossyLink::new(&converters.link, seed),
             lost: Lost::default(),
-            tick_hz: f64::from(scenario.run.tick_hz),
-            tick: 0,
+            clock: TickClock::new(tick_hz, scenario.run.tick_jitter, seed),
             first_tick: scenario.run.first_tick,
             enable_at_s: scenario.run.enable_at_s,
             plant,
@@ -75,7 +82,7 @@ impl<P: Plant> Simulation<P> {
 
     /// Returns the number of ticks since the start.
     pub fn ticks(&self) -> u64 {
-        self.tick
+        self.clock.tick()
     }
 
     /// Returns the frame for the controller at this tick. Call it once per tick, because it draws
@@ -86,14 +93,16 @@ impl<P: Plant> Simulation<P> {
     pub fn sample(&mut self, probe: &mut impl Probe) -> Result<SensorFrame, PlantError> {
         self.plant.advance(self.plant.time_s(), probe)?;
         self.lost = self.link.draw();
-        let (tangential_force, normal_force) = self.force_cell.read(&self.plant.contact_force_n());
-        let enabled = self.plant.time_s() >= self.enable_at_s;
+        let time_s = self.plant.time_s();
+        let force_n = self.plant.contact_force_n();
+        let (tangential_force, normal_force) = self.force_cell.read(&force_n, time_s);
+        let enabled = time_s >= self.enable_at_s;
         // The counters on the wire wrap.
-        let tick = self.first_tick.wrapping_add(self.tick as u32);
+        let tick = self.first_tick.wrapping_add(self.clock.tick() as u32);
         Ok(SensorFrame {
             tick,
             sequence: tick,
-            joints: self.encoders.readings(),
+            joints: self.encoders.readings(time_s),
             normal_force,
             tangential_force,
             inputs: if enabled {
@@ -137,31 +146,34 @@ impl<P: Plant> Simulation<P> {
         probe: &mut impl Probe,
     ) -> Result<(), PlantError> {
         let arrived = answer.filter(|_| !self.lost.actuator);
-        self.torque_stages
-            .command(arrived.map(|frame| frame.torques));
-        let tick = self.tick as f64;
-        // Computed from whole numbers, so that errors do not accumulate.
-        let at = |ticks: f64| (tick + ticks) / self.tick_hz;
-        let change = self.torque_stages.change_after_tick();
-        let capture = 1.0 - self.encoders.capture_before_tick();
+        let torques = arrived.map(|frame| frame.torques);
+        self.torque_stages.command(torques, self.plant.time_s());
+        let change_s = self.clock.after_s(self.torque_stages.change_after_tick());
+        let capture_s = self
+            .clock
+            .before_next_s(self.encoders.capture_before_tick());
 
-        let mut captured = false;
-        if capture < change {
-            self.plant.advance(at(capture), probe)?;
+        let captures_first = capture_s < change_s;
+        if captures_first {
+            self.plant.advance(capture_s, probe)?;
             self.encoders.capture(&self.plant.link_angles_rad());
-            captured = true;
         }
-        if change > 0.0 {
-            self.plant.advance(at(change), probe)?;
+        if self.torque_stages.change_after_tick() > 0.0 {
+            self.plant.advance(change_s, probe)?;
         }
+        let joints_rad = self.plant.link_angles_rad().to_joints();
+        let torque_nm = self
+            .torque_stages
+            .target_nm(&joints_rad, self.plant.time_s());
         self.plant
-            .command_torque(self.torque_stages.target_nm(), self.torque_stages.lag_s());
-        if !captured {
-            self.plant.advance(at(capture), probe)?;
+            .command_torque(torque_nm, self.torque_stages.lag_s());
+        if !captures_first {
+            self.plant.advance(capture_s, probe)?;
             self.encoders.capture(&self.plant.link_angles_rad());
         }
-        self.tick += 1;
-        self.plant.advance(at(1.0), probe)
+        let next_s = self.clock.before_next_s(0.0);
+        self.clock.advance();
+        self.plant.advance(next_s, probe)
     }
 }
 

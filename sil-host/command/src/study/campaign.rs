@@ -97,9 +97,9 @@ mod tests {
 
     /// Levels of all effects on the contacts that have them.
     fn levels() -> usize {
-        let contacts = |effect: &&RigEffect| if effect.compliant_only { 1 } else { 2 };
+        let contacts = |effect: &RigEffect| if effect.compliant_only { 1 } else { 2 };
         let all = EFFECTS.iter();
-        all.map(|effect| effect.levels.len() * contacts(&effect))
+        all.map(|effect| effect.levels.len() * contacts(effect))
             .sum()
     }
 

@@ -3,9 +3,12 @@
 //! Latency is exact: the plant stops at the instant of capture, which accounts for the part of the
 //! latency below one tick; whole ticks wait in a ring buffer.
 
+use core::f64::consts::PI;
+
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
 use painleve_shared::{LinkMotion, OutOfRange, check_setting, settings};
 
+use super::fault::{ChannelFaults, FaultyChannel};
 use super::noise::{Channel, Noise};
 
 /// Longest latency, in whole ticks.
@@ -23,6 +26,12 @@ settings! {
         noise_rad: f64 = 0.0, 0.0..=0.1, "rad";
         /// Time from capture to the frame that carries it, in control ticks.
         latency_ticks: f64 = 0.0, 0.0..=MAXIMUM_LATENCY_TICKS as f64 - 1.0, "ticks";
+        /// Constant error of each joint angle, unknown to the controller.
+        mounting_error_rad: [f64; 2] = [0.0; 2], -0.5..=0.5, "rad";
+        /// Amplitude of the error, once around in a turn, of a disc that is mounted off its centre.
+        eccentricity_rad: [f64; 2] = [0.0; 2], 0.0..=0.1, "rad";
+        /// Phase of this error: the sine's argument at joint angle zero.
+        eccentricity_phase_rad: [f64; 2] = [0.0; 2], -PI..=PI, "rad";
     }
     check Self::relations;
 }
@@ -32,11 +41,22 @@ impl EncoderSettings {
         let [scale, _] = self.scales();
         check_setting!(self.offset_counts, 0, scale.modulus() - 1)
     }
+
+    /// Returns the error of the encoder of joint 0 or 1 at a joint angle, rad.
+    fn error_rad(&self, joint: usize, angle_rad: f64) -> f64 {
+        let amplitude_rad = self.eccentricity_rad[joint];
+        if amplitude_rad == 0.0 {
+            return self.mounting_error_rad[joint];
+        }
+        let phase_rad = self.eccentricity_phase_rad[joint];
+        self.mounting_error_rad[joint] + amplitude_rad * libm::sin(angle_rad + phase_rad)
+    }
 }
 
 /// Both encoders with their noise and the readings in transit.
 #[derive(Clone, Debug)]
 pub struct Encoders {
+    settings: EncoderSettings,
     scales: [EncoderScale; 2],
     noise: [Noise; 2],
     whole_ticks: usize,
@@ -44,12 +64,23 @@ pub struct Encoders {
     /// Ring buffer of captured readings.
     captured: [[EncoderCounts; 2]; MAXIMUM_LATENCY_TICKS],
     next: usize,
+    channels: [FaultyChannel; 2],
 }
 
 impl Encoders {
     /// Creates encoders whose past readings all show the arm at rest at link angles `theta_rad`.
-    pub fn new(settings: &EncoderSettings, seed: u64, theta_rad: &LinkMotion<f64>) -> Self {
+    pub fn new(
+        settings: &EncoderSettings,
+        faults: &ChannelFaults,
+        tick_s: f64,
+        seed: u64,
+        theta_rad: &LinkMotion<f64>,
+    ) -> Self {
+        let turn = i64::from(settings.scales()[0].modulus());
+        let channel = |fault, index| FaultyChannel::new(fault, turn, tick_s, seed, index);
         let mut encoders = Self {
+            settings: *settings,
+            channels: [channel(&faults.encoder_1, 0), channel(&faults.encoder_2, 1)],
             scales: settings.scales(),
             noise: [Channel::Encoder1, Channel::Encoder2]
                 .map(|channel| Noise::new(seed, channel, settings.noise_rad)),
@@ -74,7 +105,8 @@ impl Encoders {
         let joints: [f64; 2] = theta_rad.to_joints().into();
         let mut readings = [EncoderCounts(0); 2];
         for (joint, reading) in readings.iter_mut().enumerate() {
-            let angle = joints[joint] + self.noise[joint].draw();
+            let error_rad = self.settings.error_rad(joint, joints[joint]);
+            let angle = joints[joint] + error_rad + self.noise[joint].draw();
             *reading = self.scales[joint].reading(angle);
         }
         self.captured[self.next] = readings;
@@ -82,16 +114,53 @@ impl Encoders {
     }
 
     /// Returns the readings carried by this tick's frame.
-    pub fn readings(&self) -> [EncoderCounts; 2] {
+    /// `time_s` is the time of the tick; called once per tick.
+    pub fn readings(&mut self, time_s: f64) -> [EncoderCounts; 2] {
         let behind = self.whole_ticks + 1;
         let index = (self.next + MAXIMUM_LATENCY_TICKS - behind) % MAXIMUM_LATENCY_TICKS;
-        self.captured[index]
+        let mut readings = self.captured[index];
+        for (joint, reading) in readings.iter_mut().enumerate() {
+            let passed = self.channels[joint].pass(time_s, i64::from(reading.0));
+            let turn = i64::from(self.scales[joint].modulus());
+            reading.0 = passed.rem_euclid(turn) as u32;
+        }
+        readings
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    fn encoders(settings: &EncoderSettings, theta_rad: &LinkMotion<f64>) -> Encoders {
+        Encoders::new(settings, &ChannelFaults::default(), 1e-3, 1, theta_rad)
+    }
+
+    proptest! {
+        #[test]
+        fn errors_are_a_constant_and_a_sine_of_the_joint_angle(
+            mounting in -0.1_f64..0.1, eccentricity in 0.0_f64..0.01, phase in -3.0_f64..3.0,
+            first in -1.0_f64..1.0, elbow in -1.0_f64..1.0,
+        ) {
+            let errors = EncoderSettings {
+                bits: 24,
+                mounting_error_rad: [mounting, 0.0],
+                eccentricity_rad: [0.0, eccentricity],
+                eccentricity_phase_rad: [0.0, phase],
+                ..Default::default()
+            };
+            let mut encoders = encoders(&errors, &LinkMotion::new(first, first + elbow));
+            let readings = encoders.readings(0.0);
+            let expected = [first + mounting, elbow + eccentricity * libm::sin(elbow + phase)];
+            for ((scale, reading), angle) in
+                encoders.scales.iter().zip(readings).zip(expected)
+            {
+                let apart = reading.0.abs_diff(scale.reading(angle).0);
+                prop_assert!(apart <= 1, "{} counts", apart);
+            }
+        }
+    }
 
     #[test]
     fn readings_show_the_elbow_angle_with_latency() {
@@ -99,13 +168,13 @@ mod tests {
             latency_ticks: 2.25,
             ..Default::default()
         };
-        let mut encoders = Encoders::new(&settings, 1, &LinkMotion::zeros());
+        let mut encoders = encoders(&settings, &LinkMotion::zeros());
         assert_eq!(encoders.capture_before_tick(), 0.25);
         for tick in 1..=5 {
             encoders.capture(&LinkMotion::new(0.1 * f64::from(tick), 0.5));
         }
         let scale = encoders.scales[0];
         let expected = [scale.reading(0.3), scale.reading(0.5 - 0.3)];
-        assert_eq!(encoders.readings(), expected);
+        assert_eq!(encoders.readings(0.0), expected);
     }
 }

@@ -10,6 +10,8 @@ use rand_pcg::Pcg64;
 
 /// Random stream of the losses, separate from those of the noise channels.
 const STREAM: u64 = 0x4c6f_7373_6573_0001;
+/// Random stream of the gaps.
+const GAP_STREAM: u64 = 0x4761_7073_0000_0001;
 
 settings! {
     /// Settings of the link.
@@ -17,6 +19,10 @@ settings! {
     pub struct LinkSettings {
         /// Probability that a frame is lost, for each frame in either direction.
         frame_loss: f64 = 0.0, 0.0..=1.0;
+        /// Probability that a gap begins at a tick: while it lasts, no frame arrives in either direction.
+        gap_probability: f64 = 0.0, 0.0..=1.0;
+        /// Duration of a gap.
+        gap_ticks: u32 = 5, 1..=1_000_000, "ticks";
     }
 }
 
@@ -32,25 +38,45 @@ pub struct Lost {
 /// A link that loses frames.
 #[derive(Clone, Debug)]
 pub struct LossyLink {
-    frame_loss: f64,
+    settings: LinkSettings,
     generator: Pcg64,
+    gap_generator: Pcg64,
+    /// Ticks until the present gap ends.
+    gap_left: u32,
 }
 
 impl LossyLink {
     /// Creates the link. Equal seeds lose the same frames on every host.
     pub fn new(settings: &LinkSettings, seed: u64) -> Self {
         Self {
-            frame_loss: settings.frame_loss,
+            settings: *settings,
             generator: Pcg64::seed_from_u64(seed ^ STREAM),
+            gap_generator: Pcg64::seed_from_u64(seed ^ GAP_STREAM),
+            gap_left: 0,
         }
     }
 
     /// Draws the losses of the next tick; called once per tick.
     pub fn draw(&mut self) -> Lost {
-        if self.frame_loss == 0.0 {
-            return Lost::default();
+        let LinkSettings {
+            frame_loss,
+            gap_probability,
+            gap_ticks,
+        } = self.settings;
+        self.gap_left = self.gap_left.saturating_sub(1);
+        if gap_probability > 0.0 && self.gap_left == 0 {
+            let begins = self.gap_generator.random::<f64>() < gap_probability;
+            self.gap_left = if begins { gap_ticks } else { 0 };
         }
-        let [sensor, actuator] = [(); 2].map(|()| self.generator.random::<f64>() < self.frame_loss);
+        let is_gap = self.gap_left > 0;
+        if frame_loss == 0.0 {
+            return Lost {
+                sensor: is_gap,
+                actuator: is_gap,
+            };
+        }
+        let [sensor, actuator] =
+            [(); 2].map(|()| self.generator.random::<f64>() < frame_loss || is_gap);
         Lost { sensor, actuator }
     }
 }
@@ -62,7 +88,13 @@ mod tests {
     #[test]
     fn losses_have_the_set_probability_and_are_repeatable() {
         let lost = |frame_loss, seed| {
-            let mut link = LossyLink::new(&LinkSettings { frame_loss }, seed);
+            let mut link = LossyLink::new(
+                &LinkSettings {
+                    frame_loss,
+                    ..Default::default()
+                },
+                seed,
+            );
             (0..20_000).map(|_| link.draw()).collect::<Vec<_>>()
         };
         let one_percent = lost(0.01, 1);
@@ -73,5 +105,26 @@ mod tests {
         assert_ne!(one_percent, lost(0.01, 2));
         assert!(lost(0.0, 1).iter().all(|lost| *lost == Lost::default()));
         assert!(lost(1.0, 1).iter().all(|lost| lost.sensor && lost.actuator));
+    }
+
+    #[test]
+    fn a_gap_lasts_for_its_ticks_in_both_directions() {
+        let settings = LinkSettings {
+            gap_probability: 0.01,
+            gap_ticks: 4,
+            ..Default::default()
+        };
+        let mut link = LossyLink::new(&settings, 1);
+        let lost: Vec<Lost> = (0..100_000).map(|_| link.draw()).collect();
+        assert!(lost.iter().all(|lost| lost.sensor == lost.actuator));
+        let lengths: Vec<usize> = lost
+            .chunk_by(|one, other| one == other)
+            .filter(|chunk| chunk[0].sensor)
+            .map(<[Lost]>::len)
+            .collect();
+        // A gap may follow another one at once.
+        assert!(lengths.iter().all(|length| length % 4 == 0), "{lengths:?}");
+        // Of 104 ticks, 100 are without a gap on average.
+        assert!((870..1060).contains(&lengths.len()), "{}", lengths.len());
     }
 }

@@ -3,16 +3,19 @@
 //! - [`noise`]: seeded noise, one stream per channel
 //! - [`encoder`]: joint encoders with resolution, offset, noise and latency
 //! - [`force_cell`]: f_n and f_t with resolution, range and noise
-//! - [`torque_stage`]: torque with resolution, saturation, lag and transport delay
+//! - [`torque_stage`]: torque with resolution, saturation, lag and transport delay; [`torque_error`]: gain, ripple, cogging, pulses
 //! - [`link_loss`]: frames lost in transit
+//! - [`fault`]: timed faults of single channels
 //!
 //! All data on the link are exact integers. The controller knows the scalings
 //! ([`ConverterSettings::scales`]) but not the noise.
 
 pub mod encoder;
+pub mod fault;
 pub mod force_cell;
 pub mod link_loss;
 pub mod noise;
+pub mod torque_error;
 pub mod torque_stage;
 
 use painleve_firmware::configuration::Converters;
@@ -20,6 +23,7 @@ use painleve_shared::counts::{EncoderCounts, EncoderScale, LinearScale};
 use painleve_shared::settings;
 
 use encoder::EncoderSettings;
+use fault::ChannelFaults;
 use force_cell::ForceCellSettings;
 use link_loss::LinkSettings;
 use torque_stage::TorqueStageSettings;
@@ -36,6 +40,8 @@ settings! {
         torque: TorqueStageSettings = TorqueStageSettings::default();
         /// The link to the controller and back.
         link: LinkSettings = LinkSettings::default();
+        /// Timed faults of single channels.
+        faults: ChannelFaults = ChannelFaults::default();
     }
 }
 

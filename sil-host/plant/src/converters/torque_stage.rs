@@ -2,7 +2,10 @@
 //! delay from sample to torque, and a watchdog for missing commands.
 
 use painleve_shared::counts::{LinearScale, TorqueCounts};
-use painleve_shared::{JointTorque, settings};
+use painleve_shared::{JointMotion, JointTorque, settings};
+
+use super::fault::{ChannelFaults, FaultyChannel};
+use super::torque_error::TorqueErrorSettings;
 
 /// Longest delay, in whole ticks.
 const MAXIMUM_DELAY_TICKS: usize = 16;
@@ -22,6 +25,8 @@ settings! {
         /// Without a command for this long, the stage removes its torque for the rest of the run.
         /// The first command arms this watchdog.
         watchdog_ticks: u32 = 50, 1..=1_000_000, "ticks";
+        /// Errors of stages and motors.
+        error: TorqueErrorSettings = TorqueErrorSettings::default();
     }
 }
 
@@ -45,6 +50,10 @@ pub struct TorqueStages {
     commands: [JointTorque<f64>; MAXIMUM_DELAY_TICKS],
     next: usize,
     watchdog: CommandWatchdog,
+    error: TorqueErrorSettings,
+    channels: [FaultyChannel; 2],
+    /// Last commands that arrived, counts.
+    last_counts: [i64; 2],
 }
 
 /// Removes the torque when commands stop arriving; latched.
@@ -69,10 +78,21 @@ impl CommandWatchdog {
 }
 
 impl TorqueStages {
-    /// Creates stages whose past commands were all zero torque.
-    pub fn new(settings: &TorqueStageSettings) -> Self {
+    /// Creates stages whose past commands were all zero torque, commanded every `tick_s` seconds.
+    pub fn new(
+        settings: &TorqueStageSettings,
+        faults: &ChannelFaults,
+        tick_s: f64,
+        seed: u64,
+    ) -> Self {
+        let scale = settings.scale();
+        let full_scale = i64::from(scale.maximum_counts());
+        let channel = |fault, index| FaultyChannel::new(fault, full_scale, tick_s, seed, index);
         Self {
-            scale: settings.scale(),
+            scale,
+            error: settings.error,
+            channels: [channel(&faults.torque_1, 4), channel(&faults.torque_2, 5)],
+            last_counts: [0; 2],
             lag_s: settings.lag_s,
             whole_ticks: settings.delay_ticks as usize,
             fraction: settings.delay_ticks.fract(),
@@ -97,20 +117,19 @@ impl TorqueStages {
     }
 
     /// Accepts this tick's command, or repeats the last one if there is none; called once per tick.
-    /// Counts beyond the range saturate.
-    pub fn command(&mut self, counts: Option<[TorqueCounts; 2]>) {
-        let last = (self.next + MAXIMUM_DELAY_TICKS - 1) % MAXIMUM_DELAY_TICKS;
-        self.commands[self.next] = match counts {
-            Some(counts) => {
-                let maximum = self.scale.maximum_counts();
-                let [one, two] = counts.map(|count| {
-                    let limited = count.0.clamp(-maximum - 1, maximum);
-                    self.scale.value(limited)
-                });
-                JointTorque::new(one, two)
-            }
-            None => self.commands[last],
-        };
+    /// Counts beyond the range saturate. `time_s` is the time of the tick.
+    pub fn command(&mut self, counts: Option<[TorqueCounts; 2]>, time_s: f64) {
+        if let Some(counts) = counts {
+            self.last_counts = counts.map(|count| i64::from(count.0));
+        }
+        let maximum = self.scale.maximum_counts();
+        let mut torques_nm = [0.0; 2];
+        for (joint, torque_nm) in torques_nm.iter_mut().enumerate() {
+            let passed = self.channels[joint].pass(time_s, self.last_counts[joint]);
+            let limited = passed.clamp(i64::from(-maximum - 1), i64::from(maximum));
+            *torque_nm = self.scale.value(limited as i32);
+        }
+        self.commands[self.next] = torques_nm.into();
         self.next = (self.next + 1) % MAXIMUM_DELAY_TICKS;
         self.watchdog.tick(counts.is_some());
         if self.watchdog.tripped {
@@ -124,9 +143,16 @@ impl TorqueStages {
     }
 
     /// Returns the torque commanded for the change within this tick, N·m.
-    pub fn target_nm(&self) -> JointTorque<f64> {
+    pub fn commanded_nm(&self) -> JointTorque<f64> {
         let behind = self.whole_ticks + 1;
         self.commands[(self.next + MAXIMUM_DELAY_TICKS - behind) % MAXIMUM_DELAY_TICKS]
+    }
+
+    /// Returns the torque to which the joints' torque changes within this tick, N·m, with the errors at these joint
+    /// angles (rad) and this time (s).
+    pub fn target_nm(&self, joints_rad: &JointMotion<f64>, time_s: f64) -> JointTorque<f64> {
+        self.error
+            .applied_nm(self.commanded_nm(), joints_rad, time_s)
     }
 }
 
@@ -134,8 +160,12 @@ impl TorqueStages {
 mod tests {
     use super::*;
 
+    fn new(settings: &TorqueStageSettings) -> TorqueStages {
+        TorqueStages::new(settings, &ChannelFaults::default(), 1e-3, 1)
+    }
+
     fn stages(delay_ticks: f64) -> TorqueStages {
-        TorqueStages::new(&TorqueStageSettings {
+        new(&TorqueStageSettings {
             delay_ticks,
             ..Default::default()
         })
@@ -145,47 +175,47 @@ mod tests {
     fn commands_arrive_after_the_delay() {
         let mut stages = stages(1.5);
         assert_eq!(stages.change_after_tick(), 0.5);
-        stages.command(Some([TorqueCounts(1024), TorqueCounts(-2048)]));
-        assert_eq!(stages.target_nm(), JointTorque::zeros());
-        stages.command(None);
-        assert_eq!(stages.target_nm(), JointTorque::new(2.5, -5.0));
-        stages.command(None);
-        assert_eq!(stages.target_nm(), JointTorque::new(2.5, -5.0));
+        stages.command(Some([TorqueCounts(1024), TorqueCounts(-2048)]), 0.0);
+        assert_eq!(stages.commanded_nm(), JointTorque::zeros());
+        stages.command(None, 0.0);
+        assert_eq!(stages.commanded_nm(), JointTorque::new(2.5, -5.0));
+        stages.command(None, 0.0);
+        assert_eq!(stages.commanded_nm(), JointTorque::new(2.5, -5.0));
     }
 
     #[test]
     fn without_commands_the_torque_is_removed_for_good() {
-        let mut stages = TorqueStages::new(&TorqueStageSettings {
+        let mut stages = new(&TorqueStageSettings {
             delay_ticks: 0.0,
             watchdog_ticks: 3,
             ..Default::default()
         });
         let full = Some([TorqueCounts(2047), TorqueCounts(2047)]);
         // No command has been sent yet, so the watchdog is not armed.
-        (0..10).for_each(|_| stages.command(None));
+        (0..10).for_each(|_| stages.command(None, 0.0));
         assert!(!stages.has_tripped());
-        stages.command(full);
-        stages.command(None);
-        stages.command(None);
-        assert!(stages.target_nm().first() > 4.9 && !stages.has_tripped());
+        stages.command(full, 0.0);
+        stages.command(None, 0.0);
+        stages.command(None, 0.0);
+        assert!(stages.commanded_nm().first() > 4.9 && !stages.has_tripped());
         // A command in time restarts the watchdog.
-        stages.command(full);
-        stages.command(None);
-        stages.command(None);
+        stages.command(full, 0.0);
+        stages.command(None, 0.0);
+        stages.command(None, 0.0);
         assert!(!stages.has_tripped());
-        stages.command(None);
+        stages.command(None, 0.0);
         assert!(stages.has_tripped());
-        assert_eq!(stages.target_nm(), JointTorque::zeros());
-        stages.command(full);
-        assert_eq!(stages.target_nm(), JointTorque::zeros());
+        assert_eq!(stages.commanded_nm(), JointTorque::zeros());
+        stages.command(full, 0.0);
+        assert_eq!(stages.commanded_nm(), JointTorque::zeros());
         assert!(stages.has_tripped());
     }
 
     #[test]
     fn counts_beyond_the_range_saturate() {
         let mut stages = stages(0.0);
-        stages.command(Some([TorqueCounts(100_000), TorqueCounts(-100_000)]));
+        stages.command(Some([TorqueCounts(100_000), TorqueCounts(-100_000)]), 0.0);
         let lsb = 5.0 / 2048.0;
-        assert_eq!(stages.target_nm(), JointTorque::new(2047.0 * lsb, -5.0));
+        assert_eq!(stages.commanded_nm(), JointTorque::new(2047.0 * lsb, -5.0));
     }
 }

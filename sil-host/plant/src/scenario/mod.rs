@@ -70,6 +70,8 @@ settings! {
         seed: u64 = 1;
         /// Tick and sequence number of the first frame; near 2³² the counters wrap early.
         first_tick: u32 = 0;
+        /// Largest lateness of a tick, in tick periods; each tick's is drawn uniformly from zero to this.
+        tick_jitter: f64 = 0.0, 0.0..=0.9, "ticks";
     }
 }
 

@@ -44,6 +44,20 @@ pub struct Drawn {
     pub seed: u64,
 }
 
+impl Drawn {
+    /// Returns a value twice, each with a random sign.
+    pub fn signs(&self, value: f64) -> [f64; 2] {
+        let one = self.share - 0.5;
+        let other = self.phase_rad - core::f64::consts::PI;
+        [value.copysign(one), value.copysign(other)]
+    }
+
+    /// Returns the name for joint 1 or for joint 2, at random.
+    pub fn joint<'a>(&self, first: &'a str, second: &'a str) -> &'a str {
+        if self.share < 0.5 { first } else { second }
+    }
+}
+
 /// The contact of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]

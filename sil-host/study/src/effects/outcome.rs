@@ -144,7 +144,7 @@ impl Series {
 
     /// Returns the effect.
     pub(super) fn effect(&self) -> &'static RigEffect {
-        find(self.effect).unwrap_or(&EFFECTS[0])
+        find(self.effect).unwrap_or(EFFECTS[0])
     }
 }
 

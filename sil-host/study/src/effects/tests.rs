@@ -23,7 +23,7 @@ fn every_effect_at_every_level_is_a_valid_scenario_of_its_own() {
     study.check().unwrap();
     for place in study.cells() {
         let none = Place {
-            effect: &EFFECTS[0],
+            effect: EFFECTS[0],
             level: 0.0,
             ..place
         };

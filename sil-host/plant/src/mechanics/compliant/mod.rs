@@ -13,7 +13,9 @@ mod step;
 
 use nalgebra::{Const, DimMin, SVector, ToTypenum, Vector2};
 use painleve_shared::settings::Settings;
-use painleve_shared::{Arm, JointMotion, JointTorque, LinkMotion, OutOfRange, Slip, range};
+use painleve_shared::{
+    Arm, ArmParameters, JointMotion, JointTorque, LinkMotion, OutOfRange, Slip, range,
+};
 
 pub use contact::{CompliantContact, ContactKind, NormalDamping, TipContact};
 use equations::{CompliantMotion, FULL, PLAIN};
@@ -37,6 +39,8 @@ const STICK_M_S: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct CompliantArmOnBelt {
     arm: Arm<f64>,
+    /// The arm with the payload that it will pick up.
+    loaded_arm: Option<Box<Arm<f64>>>,
     belt: BeltProfile,
     friction: f64,
     contact: CompliantContact,
@@ -71,12 +75,18 @@ impl CompliantArmOnBelt {
         InitialState::from(&initial)
             .validate()
             .map_err(inside("initial"))?;
+        let loaded = ArmParameters {
+            tip_mass_kg: parameters.arm.tip_mass_kg + effects.payload.mass_kg,
+            ..parameters.arm
+        };
+        let loaded = Arm::new(loaded)?;
         let mut plant = Self {
             arm,
+            loaded_arm: effects.payload.is_on().then(|| Box::new(loaded)),
             belt: parameters.belt,
             friction: parameters.friction,
             contact: CompliantContact::new(contact),
-            effects: *effects,
+            effects: effects.clone(),
             local_error: contact.local_error,
             torque: TorqueSegment::constant(JointTorque::zeros()),
             time_s: 0.0,
@@ -120,10 +130,17 @@ impl CompliantArmOnBelt {
     /// [`MotionError`]; the plant stays at the time of the error.
     pub fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), MotionError> {
         while self.time_s < until_s {
+            let payload = &self.effects.payload;
+            if self.time_s >= payload.at_s
+                && let Some(loaded) = self.loaded_arm.take()
+            {
+                self.arm = *loaded;
+            }
             let corner = self
                 .belt
                 .next_corner_s(self.time_s)
                 .min(self.effects.push.next_corner_s(self.time_s))
+                .min(payload.next_corner_s(self.time_s))
                 .min(until_s);
             if self.has_drives {
                 self.advance_smoothly::<FULL>(corner, probe)?;

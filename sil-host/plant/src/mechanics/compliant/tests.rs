@@ -1,5 +1,6 @@
 use super::*;
 use crate::mechanics::ArmOnBelt;
+use crate::mechanics::effects::payload::Payload;
 use crate::mechanics::effects::push::Push;
 
 /// The paper's x0,a, which is inconsistent at the start; x0,d lies on the belt.
@@ -163,6 +164,43 @@ fn a_push_changes_the_tips_velocity_by_its_impulse() {
 }
 
 #[test]
+fn a_payload_changes_the_arm_once_it_is_picked_up_and_no_velocity_with_it() {
+    let at_s = 0.0025;
+    let payload = Payload {
+        mass_kg: 0.03,
+        at_s,
+    };
+    let effects = Effects {
+        payload,
+        ..Default::default()
+    };
+    let contact = contact(1e5, 1e-9);
+    let mut picked = compliant(&contact, &effects, (0.0, 40.0));
+    let mut free = compliant(&contact, &Effects::default(), (0.0, 40.0));
+    for plant in [&mut picked, &mut free] {
+        plant.advance(at_s, &mut ()).unwrap();
+    }
+    assert_eq!(picked.state(), free.state());
+    // From here on it moves as an arm that had the mass from the start.
+    picked.advance(at_s + 1e-6, &mut ()).unwrap();
+    let parameters = PlantParameters {
+        arm: painleve_shared::ArmParameters {
+            tip_mass_kg: 0.03,
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    let effects = Effects::default();
+    let mut heavy = CompliantArmOnBelt::new(&parameters, &contact, &effects, free.state()).unwrap();
+    // In flight: an impact would magnify the errors of integration.
+    heavy.advance(0.002, &mut ()).unwrap();
+    picked.advance(at_s + 0.002, &mut ()).unwrap();
+    free.advance(at_s + 0.002, &mut ()).unwrap();
+    assert!((picked.state() - heavy.state()).norm() < 1e-6);
+    assert!((picked.state() - free.state()).norm() > 1e-3);
+}
+
+#[test]
 fn the_rigid_plant_refuses_every_effect_by_its_key() {
     for (key, value) in [
         (
@@ -173,6 +211,7 @@ fn the_rigid_plant_refuses_every_effect_by_its_key() {
         ("effects.joints", "effects.joints.coulomb_nm=0.1"),
         ("effects.gear", "effects.gear.elastic=true"),
         ("effects.push", "effects.push.impulse_ns=[0.0, 0.1]"),
+        ("effects.payload", "effects.payload.mass_kg=0.1"),
     ] {
         let load = |more: &[&str]| {
             let set: Vec<String> = more.iter().map(ToString::to_string).collect();

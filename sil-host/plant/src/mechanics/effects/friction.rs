@@ -2,12 +2,13 @@
 
 use painleve_shared::settings;
 
+use super::friction_file::FrictionFile;
+
 /// Length of the transition between two patches, m.
 const SEAM_M: f64 = 1e-3;
 
 settings! {
     /// Change of the belt's friction coefficient μ. The sum is limited to at least zero.
-    #[derive(Copy)]
     pub enum FrictionChange by "kind" {
         /// No change.
         "none" => None,
@@ -44,6 +45,12 @@ settings! {
             /// Determines which patches are raised.
             seed: u64;
         },
+        /// Changes from a CSV file with the columns `time_s,change` or `along_belt_m,change`,
+        /// interpolated.
+        "file" => File {
+            /// Path of the file.
+            path: FrictionFile;
+        },
     }
 }
 
@@ -53,6 +60,7 @@ impl FrictionChange {
     pub fn at(&self, t_s: f64, along_belt_m: f64) -> f64 {
         match *self {
             Self::None => 0.0,
+            Self::File { ref path } => path.at(t_s, along_belt_m),
             Self::Step { change, at_s } => {
                 if t_s < at_s {
                     0.0

@@ -2,17 +2,20 @@
 //! combined.
 //!
 //! - [`friction`]: friction that changes along the belt and over time
+//!   ([`friction_file`]: from a CSV file)
 //! - [`surface`]: a belt that is uneven or vibrates
 //! - [`joints`]: friction in the joints
 //! - [`gear`]: elastic gears with backlash and separate rotors, encoders on either side
-//! - [`push`]: external forces on the tip
+//! - [`push`]: external forces on the tip; [`payload`]: a mass that it picks up
 //!
 //! They require the arm on a compliant contact ([`compliant`](super::compliant)); the rigid plant
 //! rejects them.
 
 pub mod friction;
+pub mod friction_file;
 pub mod gear;
 pub mod joints;
+pub mod payload;
 pub mod push;
 pub mod surface;
 
@@ -21,12 +24,12 @@ use painleve_shared::{OutOfRange, range, settings};
 use friction::FrictionChange;
 use gear::GearSettings;
 use joints::JointFriction;
+use payload::Payload;
 use push::Push;
 use surface::Surface;
 
 settings! {
     /// Effects of the plant. They require a compliant contact.
-    #[derive(Copy)]
     pub struct Effects {
         /// Changes of friction.
         friction: FrictionChange = FrictionChange::None;
@@ -38,6 +41,8 @@ settings! {
         gear: GearSettings = GearSettings::default();
         /// A push on the tip.
         push: Push = Push::default();
+        /// A mass that the tip picks up.
+        payload: Payload = Payload::default();
     }
 }
 
@@ -61,6 +66,10 @@ impl Effects {
             self.joints.is_on(),
         )?;
         off("effects.gear with contact.kind = rigid", self.gear.elastic)?;
-        off("effects.push with contact.kind = rigid", self.push.is_on())
+        off("effects.push with contact.kind = rigid", self.push.is_on())?;
+        off(
+            "effects.payload with contact.kind = rigid",
+            self.payload.is_on(),
+        )
     }
 }

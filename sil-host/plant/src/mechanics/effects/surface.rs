@@ -1,9 +1,12 @@
 //! An uneven belt: waves along it, a seam, vibration. Slopes are small, so the contact's normal is
 //! taken as vertical.
 
-use core::f64::consts::TAU;
+use core::f64::consts::{PI, TAU};
 
 use painleve_shared::settings;
+
+/// Length over which the belt rises by its step, m.
+const STEP_M: f64 = 5e-3;
 
 settings! {
     /// The belt's surface: heights above a flat belt at rest.
@@ -17,6 +20,9 @@ settings! {
         seam_height_m: f64 = 0.0, -0.01..=0.01, "m";
         /// Length of the bump.
         seam_length_m: f64 = 0.02, 1e-3..=1.0, "m";
+        /// Height by which the belt rises at its joint, as on an overlap; it falls back evenly along
+        /// the rest of the belt.
+        step_height_m: f64 = 0.0, -0.01..=0.01, "m";
         /// Length of the whole belt, with one seam.
         belt_length_m: f64 = 1.0, 0.1..=1e3, "m";
         /// Amplitude of a vibration of the whole belt.
@@ -29,7 +35,10 @@ settings! {
 impl Surface {
     /// Returns whether the belt is flat and does not vibrate.
     pub fn is_flat(&self) -> bool {
-        self.waviness_m == 0.0 && self.seam_height_m == 0.0 && self.vibration_m == 0.0
+        self.waviness_m == 0.0
+            && self.seam_height_m == 0.0
+            && self.step_height_m == 0.0
+            && self.vibration_m == 0.0
     }
 
     /// Returns the height (m), the slope along the belt, and the vertical speed (m/s) at time `t_s`
@@ -52,6 +61,19 @@ impl Surface {
                 slope -= 0.5 * self.seam_height_m * number * libm::sin(number * place);
             }
         }
+        if self.step_height_m != 0.0 {
+            let turns = along_belt_m / self.belt_length_m - 0.5;
+            let place = (turns - libm::floor(turns)) * self.belt_length_m;
+            if place < STEP_M {
+                let number = PI / STEP_M;
+                height += 0.5 * self.step_height_m * (1.0 - libm::cos(number * place));
+                slope += 0.5 * self.step_height_m * number * libm::sin(number * place);
+            } else {
+                let fall = self.step_height_m / (self.belt_length_m - STEP_M);
+                height += self.step_height_m - fall * (place - STEP_M);
+                slope -= fall;
+            }
+        }
         if self.vibration_m != 0.0 {
             let rate = TAU * self.vibration_hz;
             height += self.vibration_m * libm::sin(rate * t_s);
@@ -70,10 +92,17 @@ mod tests {
         let surface = Surface {
             waviness_m: 1e-4,
             seam_height_m: 5e-4,
+            step_height_m: -3e-4,
             vibration_m: 2e-4,
             ..Default::default()
         };
-        for (t, x) in [(0.1, 0.02), (0.33, 0.497), (1.7, 0.505), (2.0, -0.5)] {
+        for (t, x) in [
+            (0.1, 0.02),
+            (0.33, 0.497),
+            (1.7, 0.503),
+            (2.0, -0.498),
+            (2.5, 1.2),
+        ] {
             let (_, slope, speed) = surface.at(t, x);
             let height = |t: f64, x: f64| surface.at(t, x).0;
             let by_place = (height(t, x + 1e-7) - height(t, x - 1e-7)) / 2e-7;
