@@ -3,23 +3,27 @@
 //! A trial starts plant and controller on a bus and sends one of them a signal at the start of its
 //! n-th system call. It then asserts that within 5 s all have ended with a documented exit code and
 //! one message, that no process, file or segment remains after the next start, and that the next
-//! run on the same bus gives the correct log hash.
+//! run on the same bus gives the correct log hash. The controller is a native process, or the image
+//! under QEMU, directly or behind a serial line.
 
 mod fault;
+mod host;
 mod place;
 mod tracer;
 mod trial;
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use nix::sys::prctl::set_child_subreaper;
 
+use crate::build_fw;
 use crate::command::{ChoreError, run_cargo, say, workspace};
 use fault::{FAULTS, InjectedFault};
+use host::{ChaosHost, ControllerHost};
 use place::{ChaosFolder, unused_segments};
 use trial::{ChaosRole, Disturbance, Expected, Flaw, Plan, TrialProcess};
 
@@ -52,6 +56,12 @@ pub struct ChaosArguments {
     /// Number of additional plants and controllers on the bus of every trial.
     #[arg(long, default_value_t = 0)]
     crowd: u32,
+    /// What runs the controller.
+    #[arg(long, value_enum, default_value = "native")]
+    host: ChaosHost,
+    /// So many threads keep the machine busy meanwhile.
+    #[arg(long, default_value_t = 0)]
+    load: usize,
 }
 
 /// Time for other processes to remove their present segments.
@@ -70,6 +80,8 @@ pub fn short() -> Result<(), ChoreError> {
         jobs: 4,
         crowd: 0,
         faults: 0,
+        host: ChaosHost::Native,
+        load: 0,
         // Tests share their machine with other work.
         end_s: 20,
     })
@@ -81,6 +93,9 @@ pub fn short() -> Result<(), ChoreError> {
 /// If a flaw is found.
 pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     run_cargo(&["build", "--release", "--package", "painleve-command"])?;
+    if arguments.host != ChaosHost::Native {
+        build_fw::run()?;
+    }
     let system = |error: std::io::Error| ChoreError(format!("chaos: {error}"));
     // A copy, because the program may be rebuilt during the trials.
     let programs = tempfile::tempdir().map_err(system)?;
@@ -95,21 +110,34 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     let next = AtomicUsize::new(0);
     let table = Mutex::new(TrialTable::default());
     let start = Instant::now();
+    let is_over = AtomicBool::new(false);
     std::thread::scope(|scope| {
+        for _ in 0..arguments.load {
+            scope.spawn(|| {
+                while !is_over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
+        }
         let workers: Vec<_> = (0..arguments.jobs)
             .map(|worker| {
                 let (plans, next, table) = (&plans, &next, &table);
                 let (program, runtime) = (&program, runtime.path());
+                let host = arguments.host;
                 scope.spawn(move || {
                     let mark = format!("{}-{worker}", std::process::id());
                     let bus = format!("chaos-{worker}");
-                    let place = ChaosFolder::new(program, mark, runtime)?;
+                    let place =
+                        ChaosFolder::new(program, mark, runtime, ControllerHost::start(host)?)?;
                     let expected = Expected {
-                        log_hash: undisturbed(&place, &bus)?,
+                        course: undisturbed(&place, &bus)?,
                         end: Duration::from_secs(arguments.end_s),
                     };
                     while let Some(&plan) = plans.get(next.fetch_add(1, Ordering::Relaxed)) {
                         let outcome = match plan {
+                            ChaosTrial::Signal(plan) if plan.victim == ChaosRole::Emulator => {
+                                host::disturb_emulator(&place, &bus, plan, &expected)?
+                            }
                             ChaosTrial::Signal(plan) => trial::run(&place, &bus, plan, &expected)?,
                             ChaosTrial::Fault(victim, fault, number) => {
                                 fault::run(&place, &bus, (victim, fault, number), &expected)?
@@ -123,11 +151,15 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                 })
             })
             .collect();
-        workers.into_iter().try_for_each(|worker| {
+        let ended = workers.into_iter().map(|worker| {
             worker
                 .join()
                 .unwrap_or_else(|_| Err(std::io::Error::other("a worker has panicked")))
-        })
+        });
+        // All of them, or the load would go on.
+        let ended: Vec<_> = ended.collect();
+        is_over.store(true, Ordering::Relaxed);
+        ended.into_iter().collect::<Result<(), _>>()
     })
     .map_err(system)?;
 
@@ -155,22 +187,12 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     Ok(())
 }
 
-/// Returns the log hash of an undisturbed run.
+/// Returns the course of an undisturbed run.
 fn undisturbed(place: &ChaosFolder, bus: &str) -> std::io::Result<String> {
-    let arguments = [
-        "run",
-        "--bus",
-        bus,
-        "--set",
-        "run.duration_s=0.05",
-        "--no-record",
-        "--no-plot",
-        "--json",
-    ];
-    let mut run = TrialProcess::start(&mut place.command(&arguments))?;
+    let mut run = TrialProcess::start(&mut trial::command(place, ChaosRole::Run, bus, ""))?;
     run.wait(Instant::now() + Duration::from_secs(20))?;
     let (_, text) = run.outcome();
-    trial::log_hash(&text.stdout).ok_or_else(|| {
+    place.host.course(&text.stdout).ok_or_else(|| {
         std::io::Error::other(format!("the undisturbed run failed: {}", text.stderr))
     })
 }
@@ -210,6 +232,17 @@ fn plans(arguments: &ChaosArguments) -> Vec<ChaosTrial> {
                     crowd: arguments.crowd,
                 }));
             }
+        }
+        if arguments.host == ChaosHost::Qemu {
+            plans.extend([Disturbance::Kill, Disturbance::Stop].map(|disturbance| {
+                ChaosTrial::Signal(Plan {
+                    victim: ChaosRole::Emulator,
+                    disturbance,
+                    call,
+                    peer_first: false,
+                    crowd: 0,
+                })
+            }));
         }
     }
     if arguments.faults > 0 {

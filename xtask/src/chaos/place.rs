@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use super::host::ControllerHost;
 use crate::command::ChoreError;
 
 /// Environment variable that marks every process of a chaos run with the name of its place.
@@ -17,16 +18,24 @@ pub struct ChaosFolder {
     mark: String,
     work: tempfile::TempDir,
     runtime: PathBuf,
+    /// What runs the controller.
+    pub host: ControllerHost,
 }
 
 impl ChaosFolder {
     /// Creates the folders; `runtime` may be shared with other places.
-    pub fn new(program: &Path, mark: String, runtime: &Path) -> std::io::Result<Self> {
+    pub fn new(
+        program: &Path,
+        mark: String,
+        runtime: &Path,
+        host: ControllerHost,
+    ) -> std::io::Result<Self> {
         Ok(Self {
             program: program.to_path_buf(),
             mark,
             work: tempfile::tempdir()?,
             runtime: runtime.to_path_buf(),
+            host,
         })
     }
 

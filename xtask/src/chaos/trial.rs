@@ -6,12 +6,10 @@ use std::process::{Child, Command};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
-use serde_json::Value;
-
 use super::place::ChaosFolder;
 use super::tracer::{Traced, Victim};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 
 /// Time for a traced process to reach its system call.
 const REACH: Duration = Duration::from_secs(30);
@@ -21,6 +19,9 @@ const WAIT_S: &str = "2";
 const DOCUMENTED: [i32; 6] = [0, 1, 2, 3, 4, 130];
 const QUICK: [&str; 4] = ["--set", "run.duration_s=0.05", "--no-plot", "--json"];
 
+/// Beginnings of lines that are not errors.
+const REMARKS: [&str; 2] = ["the partial record is in ", "line: "];
+
 /// The disturbed process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChaosRole {
@@ -28,6 +29,8 @@ pub enum ChaosRole {
     Controller,
     /// The parent of both.
     Run,
+    /// The emulator that runs the image.
+    Emulator,
 }
 
 /// Kind of disturbance.
@@ -74,8 +77,8 @@ pub struct Plan {
 
 /// Expected consequences.
 pub struct Expected {
-    /// Log hash of an undisturbed run.
-    pub log_hash: String,
+    /// [Course](super::host::ControllerHost::course) of an undisturbed run.
+    pub course: String,
     /// Time within which everything must have ended after a disturbance.
     pub end: Duration,
 }
@@ -199,7 +202,7 @@ pub fn run(
 pub fn other(role: ChaosRole) -> ChaosRole {
     match role {
         ChaosRole::Plant => ChaosRole::Controller,
-        ChaosRole::Controller | ChaosRole::Run => ChaosRole::Plant,
+        ChaosRole::Controller | ChaosRole::Run | ChaosRole::Emulator => ChaosRole::Plant,
     }
 }
 
@@ -217,8 +220,14 @@ pub fn command(place: &ChaosFolder, role: ChaosRole, bus: &str, record: &str) ->
             let wait = ["plant", "--bus", bus, "--wait-s", WAIT_S];
             place.command(&[&wait, &QUICK[..], record].concat())
         }
-        ChaosRole::Controller => place.command(&["controller", "--bus", bus, "--wait-s", WAIT_S]),
-        ChaosRole::Run => place.command(&[&["run", "--bus", bus], &QUICK[..], record].concat()),
+        ChaosRole::Controller => {
+            let wait = ["--bus", bus, "--wait-s", WAIT_S];
+            place.command(&[&place.host.controller()[..], &wait].concat())
+        }
+        ChaosRole::Run | ChaosRole::Emulator => {
+            let run = place.host.run();
+            place.command(&[&run[..], &["--bus", bus], &QUICK[..], record].concat())
+        }
     }
 }
 
@@ -247,16 +256,15 @@ pub fn next_run(
     expected: &Expected,
     findings: &mut Vec<Finding>,
 ) -> std::io::Result<()> {
-    let run = ["run", "--bus", bus, "--record", "out/run.mcap"];
-    let mut next = TrialProcess::start(&mut place.command(&[&run, &QUICK[..]].concat()))?;
+    let mut next = TrialProcess::start(&mut command(place, ChaosRole::Run, bus, "out/run.mcap"))?;
     if !next.wait(Instant::now() + expected.end)? {
         findings.push((Flaw::UnusableBus, "the next run does not end".into()));
     }
     let (code, text) = next.outcome();
-    let hash = log_hash(&text.stdout);
-    if code != Some(0) || hash.as_ref() != Some(&expected.log_hash) {
+    let course = place.host.course(&text.stdout);
+    if code != Some(0) || course.as_ref() != Some(&expected.course) {
         let errors = text.stderr.trim();
-        let text = format!("the next run ended with {code:?} and hash {hash:?}: {errors}");
+        let text = format!("the next run ended with {code:?} and {course:?}: {errors}");
         findings.push((Flaw::UnusableBus, text));
     }
     let left: Vec<PathBuf> = place.left(bus);
@@ -264,12 +272,6 @@ pub fn next_run(
         findings.push((Flaw::Leak, format!("{left:?} stay")));
     }
     Ok(())
-}
-
-/// Returns the hash of all frames in a report.
-pub fn log_hash(report: &str) -> Option<String> {
-    let report: Value = serde_json::from_str(report).ok()?;
-    Some(report["log_hash"].as_str()?.to_owned())
 }
 
 /// Checks the exit code and the messages of an ended process.
@@ -283,7 +285,7 @@ pub fn judge(who: &str, code: Option<i32>, text: &Text, findings: &mut Vec<Findi
         other => findings.push((Flaw::ExitCode, format!("{who}: {other:?}, {errors}"))),
     }
     let mut lines: Vec<_> = errors.lines().collect();
-    lines.retain(|line| !line.starts_with("the partial record is in "));
+    lines.retain(|line| !REMARKS.iter().any(|remark| line.starts_with(remark)));
     let wanted = usize::from(code != Some(0));
     if lines.len() != wanted || lines.iter().any(|line| !line.starts_with("error: ")) {
         findings.push((

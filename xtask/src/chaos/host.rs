@@ -1,0 +1,196 @@
+//! The host of the controller during chaos: a native process, the image under QEMU, or the image
+//! behind a serial line.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufRead, BufReader};
+use std::os::fd::AsFd;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use clap::ValueEnum;
+use nix::fcntl::OFlag;
+use nix::sys::signal::{Signal, kill};
+use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use nix::unistd::Pid;
+use serde_json::Value;
+
+use super::place::ChaosFolder;
+use super::trial::{
+    ChaosRole, Disturbance, Expected, Flaw, Plan, TrialOutcome, TrialProcess, command, judge,
+    next_run, orphans,
+};
+use crate::build_fw;
+
+const EMULATOR: &str = "qemu-system-arm";
+
+/// Kind of host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ChaosHost {
+    /// The controller in a process of its own.
+    Native,
+    /// The image under QEMU.
+    Qemu,
+    /// The image under QEMU behind a serial line.
+    Serial,
+}
+
+/// A host that commands can name.
+pub struct ControllerHost {
+    kind: ChaosHost,
+    /// Path of the image, or of the port.
+    path: String,
+    _board: Option<SerialBoard>,
+}
+
+impl ControllerHost {
+    /// Starts what the host needs.
+    ///
+    /// # Errors
+    /// If there is no emulator.
+    pub fn start(kind: ChaosHost) -> io::Result<Self> {
+        let (path, board) = match kind {
+            ChaosHost::Native => (String::new(), None),
+            ChaosHost::Qemu => {
+                let image = build_fw::image("painleve-qemu");
+                (image.to_string_lossy().into_owned(), None)
+            }
+            ChaosHost::Serial => {
+                let board = SerialBoard::start()?;
+                (board.port.clone(), Some(board))
+            }
+        };
+        Ok(Self {
+            kind,
+            path,
+            _board: board,
+        })
+    }
+
+    /// Arguments that start the controller's process.
+    pub fn controller(&self) -> Vec<&str> {
+        match self.kind {
+            ChaosHost::Native => vec!["controller"],
+            ChaosHost::Qemu => vec!["bridge", "qemu", "--elf", &self.path],
+            ChaosHost::Serial => vec!["bridge", "serial", "--port", &self.path],
+        }
+    }
+
+    /// Arguments that start a run.
+    pub fn run(&self) -> Vec<&str> {
+        match self.kind {
+            ChaosHost::Native => vec!["run"],
+            ChaosHost::Qemu => vec!["run", "--host", "qemu", "--elf", &self.path],
+            ChaosHost::Serial => vec!["run", "--host", "serial", "--port", &self.path],
+        }
+    }
+
+    /// What must be the same in every undisturbed run: the hash of all frames. Over a serial line
+    /// a repeated request has a sequence number of its own, so there it is what the arm did.
+    pub fn course(&self, report: &str) -> Option<String> {
+        let report: Value = serde_json::from_str(report).ok()?;
+        if self.kind != ChaosHost::Serial {
+            return Some(report["log_hash"].as_str()?.to_owned());
+        }
+        let keys = ["ticks", "fault", "final_tip_t_m", "peak_torque_nm"];
+        Some(keys.map(|key| report[key].to_string()).join(" "))
+    }
+}
+
+/// The image at the end of a serial line, for all trials of a worker.
+struct SerialBoard {
+    emulator: Child,
+    port: String,
+    /// Kept open: with nobody at this end the emulator drops what the board sends.
+    _end: File,
+}
+
+impl SerialBoard {
+    fn start() -> io::Result<Self> {
+        let mut emulator = Command::new(EMULATOR)
+            .args(["-machine", "netduinoplus2", "-display", "none"])
+            .args(["-monitor", "none", "-nodefaults"])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .args(["-icount", "shift=6,sleep=on"])
+            .args(["-chardev", "pty,id=line", "-serial", "chardev:line"])
+            .arg("-kernel")
+            .arg(build_fw::image("painleve-qemu-serial"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()?;
+        let output = emulator.stdout.take();
+        let mut output = BufReader::new(output.ok_or_else(|| io::Error::other("no pipe"))?);
+        let mut line = String::new();
+        output.read_line(&mut line)?;
+        let port = line
+            .split_whitespace()
+            .find(|word| word.starts_with("/dev/"));
+        let port = port.ok_or_else(|| io::Error::other(format!("{EMULATOR}: {line}")))?;
+        let port = port.to_owned();
+        // What the image logs must not fill the pipe.
+        std::thread::spawn(move || io::copy(&mut output, &mut io::sink()));
+        let end = open(Path::new(&port))?;
+        Ok(Self {
+            emulator,
+            port,
+            _end: end,
+        })
+    }
+}
+
+impl Drop for SerialBoard {
+    fn drop(&mut self) {
+        let _ = self.emulator.kill();
+        let _ = self.emulator.wait();
+    }
+}
+
+fn open(port: &Path) -> io::Result<File> {
+    use std::os::unix::fs::OpenOptionsExt;
+    let end = OpenOptions::new()
+        .read(true)
+        .write(true)
+        .custom_flags(OFlag::O_NOCTTY.bits())
+        .open(port)?;
+    let mut settings = tcgetattr(end.as_fd())?;
+    cfmakeraw(&mut settings);
+    tcsetattr(end.as_fd(), SetArg::TCSANOW, &settings)?;
+    Ok(end)
+}
+
+/// Disturbs the emulator of a run, `plan.call` milliseconds after it has come up.
+pub fn disturb_emulator(
+    place: &ChaosFolder,
+    bus: &str,
+    plan: Plan,
+    expected: &Expected,
+) -> io::Result<TrialOutcome> {
+    let mut findings = Vec::new();
+    let mut run = TrialProcess::start(&mut command(place, ChaosRole::Run, bus, "out/run.mcap"))?;
+    let start = Instant::now();
+    let mut emulator = None;
+    while emulator.is_none() && start.elapsed() < expected.end {
+        emulator = place.processes().into_iter().find(|id| is_emulator(*id));
+    }
+    std::thread::sleep(Duration::from_millis(u64::from(plan.call)));
+    let signal = match plan.disturbance {
+        Disturbance::Kill => Signal::SIGKILL,
+        _ => Signal::SIGSTOP,
+    };
+    let reached = emulator.is_some_and(|id| kill(Pid::from_raw(id), signal).is_ok());
+    let disturbed = Instant::now();
+    if run.wait(disturbed + expected.end)? {
+        let (code, text) = run.outcome();
+        judge("the run", code, &text, &mut findings);
+    } else {
+        findings.push((Flaw::Hang, "the run goes on".into()));
+    }
+    orphans(place, disturbed + expected.end, &mut findings);
+    next_run(place, bus, expected, &mut findings)?;
+    Ok(TrialOutcome { reached, findings })
+}
+
+fn is_emulator(id: i32) -> bool {
+    fs::read_link(format!("/proc/{id}/exe")).is_ok_and(|program| program.ends_with(EMULATOR))
+}
