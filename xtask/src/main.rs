@@ -40,7 +40,7 @@ enum Chore {
     Examples,
     /// Disturb plant and controller at every system call and count the flaws.
     Chaos(chaos::ChaosArguments),
-    /// Run a simulated day in lockstep with wrapping counters; not part of CI.
+    /// Simulate a day with a fault in every minute, after which every counter must be exact.
     Soak(soak::SoakArguments),
     /// Run the steps of continuous integration: formatting, clippy, every test.
     Ci,

@@ -153,6 +153,14 @@ impl Emulator {
         // The folder is removed here: both sides have opened their pipes.
     }
 
+    /// Sends bytes as they are, as a disturbed link delivers them; nothing is received.
+    ///
+    /// # Errors
+    /// [`BoardError::System`] if the emulator's pipe fails.
+    pub fn send_raw(&mut self, bytes: &[u8]) -> Result<(), BoardError> {
+        Ok(self.requests.write_all(bytes)?)
+    }
+
     fn request(&mut self, request: &Request<'_>) -> Result<Response, BoardError> {
         let mut buffer = [0; MAXIMUM_LENGTH];
         let bytes = wire::encode(request, &mut buffer)?;
