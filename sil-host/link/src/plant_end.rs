@@ -154,6 +154,10 @@ impl PlantEnd {
                     self.restart()?;
                     silence = Silence::default();
                 } else if self.run.is_answering() {
+                    // Without a connection, answers of a controller that leaves would be lost.
+                    self.guardian
+                        .during(|| self.ports.actuator.update_connections())
+                        .map_err(|cause| self.transport("connect to the controller", cause))?;
                     self.silence = Silence::default();
                     return Ok(());
                 } else if let AfterPause::GiveUp(silence) = silence.grow(self.silence_limit) {

@@ -15,6 +15,8 @@ use painleve_system::interrupt::Interrupt;
 use super::place::{Place, SHARED_MEMORY};
 use super::*;
 
+mod session_model;
+
 /// Longer than any pause of a busy test machine.
 const PATIENT: Duration = Duration::from_secs(20);
 const SHORT: Duration = Duration::from_millis(100);
