@@ -1,0 +1,132 @@
+//! Checks that relative links in the README and in `docs/` lead to existing files and headings, and that
+//! the names of settings and tests in these pages occur in the source.
+
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .canonicalize()
+        .unwrap()
+}
+
+/// Returns the README and all pages of the documentation.
+fn pages() -> Vec<PathBuf> {
+    let mut pages = vec![workspace().join("README.md")];
+    for entry in fs::read_dir(workspace().join("docs")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "md") {
+            pages.push(path);
+        }
+    }
+    pages
+}
+
+/// Returns the text of a page without its code blocks.
+fn prose(page: &Path) -> String {
+    let text = fs::read_to_string(page).unwrap();
+    text.split("```").step_by(2).collect()
+}
+
+/// Returns the anchors of a page's headings, as GitHub makes them.
+fn anchors(page: &Path) -> BTreeSet<String> {
+    prose(page)
+        .lines()
+        .filter_map(|line| {
+            line.trim_start_matches('#')
+                .strip_prefix(' ')
+                .filter(|_| line.starts_with('#'))
+        })
+        .map(|heading| {
+            let kept = heading.trim().to_lowercase();
+            kept.chars()
+                .filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'))
+                .map(|c| if c == ' ' { '-' } else { c })
+                .collect()
+        })
+        .collect()
+}
+
+#[test]
+fn relative_links_lead_to_existing_files_and_headings() {
+    let mut broken = Vec::new();
+    for page in pages() {
+        let text = prose(&page);
+        for part in text.split("](").skip(1) {
+            let target = part.split(')').next().unwrap();
+            if target.contains("://") {
+                continue;
+            }
+            let (path, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let file = if path.is_empty() {
+                page.clone()
+            } else {
+                page.parent().unwrap().join(path)
+            };
+            let is_found = file.exists()
+                && (anchor.is_empty()
+                    || !path.ends_with(".md") && !path.is_empty()
+                    || anchors(&file).contains(anchor));
+            if !is_found {
+                broken.push(format!("{}: {target}", page.display()));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "broken links: {broken:#?}");
+}
+
+/// Collects the text of all source files below a folder.
+fn source(folder: &Path, text: &mut String) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            if name != "target" && !name.starts_with('.') {
+                source(&path, text);
+            }
+        } else if [".rs", ".toml", ".json", ".py", ".c", ".sh"]
+            .iter()
+            .any(|extension| name.ends_with(extension))
+        {
+            text.push_str(&fs::read_to_string(&path).unwrap_or_default());
+        }
+    }
+}
+
+/// A name is a word of at least three parts in backticks, as `lift_off_limit_s`; a table may shorten the
+/// name of a test with an ellipsis.
+#[test]
+fn names_in_the_pages_occur_in_the_source() {
+    let mut text = String::new();
+    for folder in [
+        "shared", "firmware", "sil-host", "tests", "xtask", "examples",
+    ] {
+        source(&workspace().join(folder), &mut text);
+    }
+    let words: BTreeSet<&str> = text
+        .split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
+        .collect();
+    let mut unknown = Vec::new();
+    for page in pages() {
+        for name in prose(&page).split('`').skip(1).step_by(2) {
+            let start = name.trim_end_matches('…').trim_end_matches('_');
+            let is_name = start.matches('_').count() >= 2
+                && start
+                    .chars()
+                    .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+            let is_known = if name.ends_with('…') {
+                words.iter().any(|word| word.starts_with(start))
+            } else {
+                words.contains(start)
+            };
+            if is_name && !is_known {
+                unknown.push(format!("{}: {name}", page.display()));
+            }
+        }
+    }
+    assert!(unknown.is_empty(), "not in the source: {unknown:#?}");
+}
