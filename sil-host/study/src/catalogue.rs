@@ -9,32 +9,38 @@ use crate::figures::Section;
 use crate::figures::page_maker::PageMaker;
 use crate::outcome::{self, Figure, Outcome};
 use crate::tabular::{self, Tabular};
-use crate::{
-    Study, StudyError, ablation, admissible, bifurcation, capture, closed_loop_bifurcation,
-    effects, lift_off, poincare, regions, robustness, rows, sliding_range,
-};
+use crate::{Study, StudyError, rows};
 
-/// Every study, in the order of the command's help and of the page.
-pub static STUDIES: LazyLock<Vec<CatalogueEntry>> = LazyLock::new(|| {
-    vec![
-        CatalogueEntry::of::<admissible::Options>(),
-        CatalogueEntry::of::<regions::Options>(),
-        CatalogueEntry::of::<bifurcation::Options>(),
-        CatalogueEntry::of::<poincare::Options>(),
-        CatalogueEntry::of::<sliding_range::Options>(),
-        CatalogueEntry::of::<closed_loop_bifurcation::Options>(),
-        CatalogueEntry::of::<robustness::Options>(),
-        CatalogueEntry::of::<ablation::Options>(),
-        CatalogueEntry::of::<effects::Options>(),
-        CatalogueEntry::of::<capture::Options>(),
-        CatalogueEntry::of::<lift_off::Options>(),
-    ]
+inventory::collect!(CatalogueEntry);
+
+/// Every study, in the order of the command's help and of the page. Each registers itself beside its
+/// options, with [`register_study!`](crate::register_study!).
+pub static STUDIES: LazyLock<Vec<&'static CatalogueEntry>> = LazyLock::new(|| {
+    let mut all: Vec<_> = inventory::iter::<CatalogueEntry>().collect();
+    all.sort_by_key(|entry| (entry.order, entry.name));
+    all
 });
+
+/// Adds a study to the catalogue, given the type of its options. Works in any crate that is linked to
+/// the command.
+#[macro_export]
+macro_rules! register_study {
+    ($options:ty) => {
+        $crate::catalogue::inventory::submit! {
+            $crate::catalogue::CatalogueEntry::of::<$options>()
+        }
+    };
+}
+
+#[doc(hidden)]
+pub use inventory;
 
 /// A study as its options define it. The doc comment of the type is its line in the command's help.
 pub trait StudyOptions: Args + Sync + 'static {
     /// The study's name on the command line.
     const NAME: &'static str;
+    /// Place in the command's help and on the page of figures: the lower, the earlier.
+    const ORDER: u32;
     /// The study.
     type Study: Study + 'static;
     /// The outcome of its rows.
@@ -83,6 +89,8 @@ pub fn in_shards<S: Tabular + 'static>(study: S) -> Option<Box<dyn tabular::Tabl
 pub struct CatalogueEntry {
     /// Its name on the command line.
     pub name: &'static str,
+    /// Its place in the list.
+    order: u32,
     /// Adds the study's options and its help line to a command.
     pub augment: fn(Command) -> Command,
     /// Whether a sweep can compute the study in shards.
@@ -100,9 +108,11 @@ pub struct CatalogueEntry {
 }
 
 impl CatalogueEntry {
-    fn of<O: StudyOptions>() -> Self {
+    /// Makes the entry of a study.
+    pub const fn of<O: StudyOptions>() -> Self {
         Self {
             name: O::NAME,
+            order: O::ORDER,
             augment: O::augment_args,
             has_shards: O::HAS_SHARDS,
             read: |matches| Ok(Box::new(O::from_arg_matches(matches)?)),
@@ -112,7 +122,7 @@ impl CatalogueEntry {
 
     /// Returns the study with this name.
     pub fn find(name: &str) -> Option<&'static Self> {
-        STUDIES.iter().find(|entry| entry.name == name)
+        STUDIES.iter().copied().find(|entry| entry.name == name)
     }
 
     /// Returns the study as a subcommand.

@@ -11,7 +11,8 @@
 //! - [`effects`]: success against the level of each effect of a real rig, on rigid and compliant contact
 //! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
 //! - [`contact_probe`], [`distribution`], [`proportion`]: contact, distributions and success rates of many runs
-//! - [`case`], [`trial`]: closed loops to study, and their execution in this process
+//! - [`case`], [`trial`]: closed loops to study, and their execution in this process;
+//!   [`loop_study`]: the same with a plant of one's own
 //! - [`bifurcation`]: Fig. 4, where over μ × v_belt the arm keeps bouncing
 //! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: the long-term motion of one
 //! - [`poincare`]: Fig. 5, periodic and chaotic bouncing
@@ -46,6 +47,7 @@ pub mod figures;
 pub mod grid;
 pub mod initial;
 pub mod lift_off;
+pub mod loop_study;
 pub mod options;
 pub mod outcome;
 pub mod paper;

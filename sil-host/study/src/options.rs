@@ -1,10 +1,15 @@
 //! Options that several studies share.
+//!
+//! A study flattens them into its own options; where its default or help differs, it changes the
+//! argument with `mut_arg`.
 
 use clap::{Args, ValueEnum};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
 
-use crate::StudyError;
+use crate::case::{self, ControllerChoice, ConverterChoice};
+use crate::initial::Initials;
+use crate::{Grid, StudyError};
 
 /// The built-in scenario without a controller.
 const OPEN_LOOP: &str = "open-loop-bounce";
@@ -69,6 +74,128 @@ impl Overrides {
         }
         Ok(())
     }
+}
+
+/// Runs drawn at random.
+#[derive(Clone, Debug, Args)]
+pub struct RandomRuns {
+    /// Seed of all runs.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Number of runs.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1000,
+        value_parser = runs,
+        allow_negative_numbers = true
+    )]
+    pub runs: usize,
+    #[command(flatten)]
+    overrides: Overrides,
+}
+
+impl RandomRuns {
+    /// Returns the changes to every drawn scenario.
+    pub fn overrides(&self) -> Vec<String> {
+        self.overrides.overrides.clone()
+    }
+}
+
+/// Friction coefficients of a study.
+#[derive(Clone, Debug, Args)]
+pub struct FrictionGrid {
+    /// Friction coefficients μ, FROM:TO:STEP or a list.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "0.6",
+        allow_hyphen_values = true
+    )]
+    pub mu: Grid,
+}
+
+/// Belt speeds of a study.
+#[derive(Clone, Debug, Args)]
+pub struct BeltSpeedGrid {
+    /// Belt speeds, m/s.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "-1:-0.1:0.005",
+        allow_hyphen_values = true
+    )]
+    pub v_belt: Grid,
+}
+
+/// Initial conditions of a study.
+#[derive(Clone, Debug, Args)]
+pub struct InitialOptions {
+    /// Initial conditions: the paper's a, d and u, and random ones as random:N, for example a,d,random:8.
+    #[arg(long, value_name = "LIST", default_value = "a")]
+    pub initial: Initials,
+    /// Seed of the random initial conditions.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// How long each cell of a diagram runs.
+#[derive(Clone, Debug, Args)]
+pub struct RecordingOptions {
+    /// Transient of each cell before recording starts, s; 250 in the paper.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 250.0,
+        value_parser = seconds,
+        allow_negative_numbers = true
+    )]
+    pub transient_s: f64,
+    /// Recording time of each cell, s; 50 in the paper.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 50.0,
+        value_parser = seconds,
+        allow_negative_numbers = true
+    )]
+    pub record_s: f64,
+}
+
+/// Controllers of a closed-loop study.
+#[derive(Clone, Debug, Args)]
+pub struct ControllerOptions {
+    /// Controllers: pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same
+    /// with known friction), hybrid (as built in), or any scenario or file.
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        default_value = "hybrid"
+    )]
+    pub controller: Vec<ControllerChoice>,
+}
+
+impl ControllerOptions {
+    /// Returns the names of the scenarios and files that controllers are taken from.
+    pub fn scenarios(&self) -> Vec<String> {
+        let own = case::own_scenarios(&self.controller);
+        own.into_iter().map(str::to_owned).collect()
+    }
+}
+
+/// Converters of a closed-loop study.
+#[derive(Clone, Debug, Args)]
+pub struct ConverterOptions {
+    /// Converters: ideal (as in the paper), hardware, or the scenario's own.
+    #[arg(
+        long,
+        value_name = "SETS",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "hardware"
+    )]
+    pub converters: Vec<ConverterChoice>,
 }
 
 /// A posture on the command line.

@@ -8,6 +8,7 @@ use painleve_plant::simulation::Simulation;
 use painleve_plant::{Plant, PlantError, Probe};
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::range::OutOfRange;
+use painleve_shared::settings::Settings;
 use painleve_shared::status::Fault;
 
 /// A closed loop that can be stopped as soon as its outcome is known.
@@ -23,18 +24,20 @@ impl Trial {
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
-        Self::of(Simulation::new(scenario)?, scenario)
+        scenario.validate()?;
+        Self::on(BuiltInPlant::new(scenario)?, scenario)
     }
 }
 
 impl<P: Plant> Trial<P> {
-    /// Creates a closed loop of any plant with the scenario's controller.
+    /// Creates a closed loop of any plant, in its initial state, with the scenario's converters and
+    /// controller.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first key that is out of range.
-    pub fn of(simulation: Simulation<P>, scenario: &Scenario) -> Result<Self, OutOfRange> {
+    pub fn on(plant: P, scenario: &Scenario) -> Result<Self, OutOfRange> {
         Ok(Self {
-            simulation,
+            simulation: Simulation::of(plant, scenario)?,
             controller: Controller::new(&scenario.controller_configuration())?,
             answer: ActuatorFrame::default(),
         })

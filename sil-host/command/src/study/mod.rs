@@ -31,7 +31,7 @@ impl std::fmt::Debug for StudyCommand {
 
 impl Subcommand for StudyCommand {
     fn augment_subcommands(command: Command) -> Command {
-        let study = |entry: &CatalogueEntry| entry.augment_with::<OutcomeOptions>();
+        let study = |entry: &&CatalogueEntry| entry.augment_with::<OutcomeOptions>();
         command
             .subcommand_required(true)
             .arg_required_else_help(true)

@@ -4,6 +4,12 @@ mod figure;
 mod options;
 mod outcome;
 
+use painleve_plant::Plant;
+use painleve_plant::mechanics::BuiltInPlant;
+use painleve_plant::scenario::Scenario;
+use painleve_shared::range::OutOfRange;
+
+use crate::loop_study::LoopStudy;
 use crate::robustness::{Part, Robustness, Row};
 use crate::{Study, StudyError};
 
@@ -27,12 +33,22 @@ impl Study for AblationStudy {
     }
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {
+        self.row_on(index, &BuiltInPlant::new)
+    }
+}
+
+impl LoopStudy for AblationStudy {
+    fn row_on<P: Plant>(
+        &self,
+        index: usize,
+        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
+    ) -> Result<Row, StudyError> {
         let mut campaign = self.campaign.clone();
         let part = index / campaign.runs;
         if let Some(part) = part.checked_sub(1).and_then(|part| self.parts.get(part)) {
             let keys = part.without().iter().map(ToString::to_string);
             campaign.overrides.extend(keys);
         }
-        campaign.row(index % campaign.runs)
+        campaign.row_on(index % campaign.runs, plant)
     }
 }

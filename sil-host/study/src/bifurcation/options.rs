@@ -3,44 +3,36 @@
 use clap::Args;
 
 use super::{Bifurcation, BifurcationDiagram, Row, page};
+use crate::StudyError;
 use crate::catalogue::{PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
+use crate::register_study;
 use crate::tabular::Table;
-use crate::{Grid, StudyError};
 
 use crate::cell_options::CellOptions;
 
+const MU_HELP: &str =
+    "Friction coefficients μ, FROM:TO:STEP or a list; a single value draws a section";
+
 /// Fig. 4: friction and belt speeds at which the arm keeps bouncing.
 #[derive(Debug, Args)]
+#[command(mut_arg("mu", |mu| mu.default_value("0.1:1:0.1").help(MU_HELP)))]
 pub struct Options {
-    /// Friction coefficients μ, FROM:TO:STEP or a list; a single value draws a section.
-    #[arg(
-        long,
-        value_name = "GRID",
-        default_value = "0.1:1:0.1",
-        allow_hyphen_values = true
-    )]
-    mu: Grid,
-    /// Belt speeds, m/s.
-    #[arg(
-        long,
-        value_name = "GRID",
-        default_value = "-1:-0.1:0.005",
-        allow_hyphen_values = true
-    )]
-    v_belt: Grid,
     #[command(flatten)]
     cells: CellOptions,
 }
 
+register_study!(Options);
+
 impl StudyOptions for Options {
     const NAME: &'static str = "bifurcation";
+    const ORDER: u32 = 30;
     const HAS_SHARDS: bool = true;
     type Study = Bifurcation;
     type Outcome = BifurcationDiagram;
 
     fn study(&self) -> Result<Bifurcation, StudyError> {
-        let cells = self.cells.cells(&self.mu, &self.v_belt)?;
+        let cells = self.cells.cells()?;
         Ok(Bifurcation { cells })
     }
 

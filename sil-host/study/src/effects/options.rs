@@ -5,22 +5,17 @@ use clap::builder::PossibleValuesParser;
 
 use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
 use crate::StudyError;
-use crate::case::{ControllerChoice, own_scenarios};
 use crate::catalogue::{StudyOptions, in_shards};
-use crate::options::{self, Overrides};
+use crate::options::{ControllerOptions, RandomRuns};
+use crate::register_study;
 use crate::tabular::Table;
 
 /// Success against the level of each effect of a real rig, on rigid and on compliant contact.
 #[derive(Debug, Args)]
+#[command(mut_arg("runs", |runs| runs.default_value("100").help("Number of runs of each level")))]
 pub struct Options {
-    /// Controllers: hybrid, hybrid-paper, hybrid-paper-model, pid, a built-in scenario or a TOML file.
-    #[arg(
-        long,
-        value_name = "NAMES",
-        value_delimiter = ',',
-        default_value = "hybrid"
-    )]
-    controller: Vec<ControllerChoice>,
+    #[command(flatten)]
+    controllers: ControllerOptions,
     /// Contacts.
     #[arg(
         long,
@@ -38,24 +33,15 @@ pub struct Options {
         value_parser = PossibleValuesParser::new(EFFECTS.iter().map(|effect| effect.name)),
     )]
     effect: Vec<String>,
-    /// Seed of all runs.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    seed: u64,
-    /// Runs of each level.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 100,
-        value_parser = options::runs,
-        allow_negative_numbers = true
-    )]
-    runs: usize,
     #[command(flatten)]
-    overrides: Overrides,
+    runs: RandomRuns,
 }
+
+register_study!(Options);
 
 impl StudyOptions for Options {
     const NAME: &'static str = "effects";
+    const ORDER: u32 = 90;
     const HAS_SHARDS: bool = true;
     type Study = EffectsStudy;
     type Outcome = EffectsOutcome;
@@ -74,12 +60,12 @@ impl StudyOptions for Options {
             );
         }
         let study = EffectsStudy {
-            controllers: self.controller.clone(),
+            controllers: self.controllers.controller.clone(),
             contacts: self.contact.clone(),
             effects,
-            seed: self.seed,
-            runs: self.runs,
-            overrides: self.overrides.overrides.clone(),
+            seed: self.runs.seed,
+            runs: self.runs.runs,
+            overrides: self.runs.overrides(),
         };
         study.check()?;
         Ok(study)
@@ -94,7 +80,6 @@ impl StudyOptions for Options {
     }
 
     fn scenarios(&self) -> Vec<String> {
-        let own = own_scenarios(&self.controller);
-        own.into_iter().map(Into::into).collect()
+        self.controllers.scenarios()
     }
 }

@@ -5,25 +5,17 @@ use clap::Args;
 use super::{LiftOff, LiftOffs, Row};
 use crate::StudyError;
 use crate::catalogue::{StudyOptions, in_shards};
+use crate::register_study;
 use crate::tabular::Table;
 
-use crate::options::{self, Overrides};
+use crate::options::{self, RandomRuns};
 
 /// How soon a lift-off is detected, with the force cell and without.
 #[derive(Debug, Args)]
+#[command(mut_arg("runs", |runs| runs.default_value("1200").help("Number of runs with each kind of evidence")))]
 pub struct Options {
-    /// Seed of all runs.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    seed: u64,
-    /// Number of runs with each kind of evidence.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 1200,
-        value_parser = options::runs,
-        allow_negative_numbers = true
-    )]
-    runs: usize,
+    #[command(flatten)]
+    runs: RandomRuns,
     /// Sliding time before the tip is led over the edge, s.
     #[arg(
         long,
@@ -33,22 +25,23 @@ pub struct Options {
         allow_negative_numbers = true
     )]
     slide_s: f64,
-    #[command(flatten)]
-    overrides: Overrides,
 }
+
+register_study!(Options);
 
 impl StudyOptions for Options {
     const NAME: &'static str = "lift-off";
+    const ORDER: u32 = 110;
     const HAS_SHARDS: bool = true;
     type Study = LiftOff;
     type Outcome = LiftOffs;
 
     fn study(&self) -> Result<LiftOff, StudyError> {
         let study = LiftOff {
-            seed: self.seed,
-            runs: self.runs,
+            seed: self.runs.seed,
+            runs: self.runs.runs,
             slide_s: self.slide_s,
-            overrides: self.overrides.overrides.clone(),
+            overrides: self.runs.overrides(),
         };
         study.check()?;
         Ok(study)

@@ -3,44 +3,38 @@
 use clap::Args;
 
 use super::{Poincare, PoincareDiagram, Row, page};
+use crate::StudyError;
 use crate::catalogue::{PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
+use crate::register_study;
 use crate::tabular::Table;
-use crate::{Grid, StudyError};
 
 use crate::cell_options::CellOptions;
 
+const MU_HELP: &str = "Friction coefficients μ, FROM:TO:STEP or a list; the figure shows the first";
+
 /// Fig. 5: θ1 at each upward zero of θ̇1, and whether the motion is periodic or chaotic.
 #[derive(Debug, Args)]
+#[command(
+    mut_arg("mu", |mu| mu.help(MU_HELP)),
+    mut_arg("v_belt", |v_belt| v_belt.default_value("-0.6:-0.28:0.001"))
+)]
 pub struct Options {
-    /// Friction coefficients μ, FROM:TO:STEP or a list; the figure shows the first.
-    #[arg(
-        long,
-        value_name = "GRID",
-        default_value = "0.6",
-        allow_hyphen_values = true
-    )]
-    mu: Grid,
-    /// Belt speeds, m/s.
-    #[arg(
-        long,
-        value_name = "GRID",
-        default_value = "-0.6:-0.28:0.001",
-        allow_hyphen_values = true
-    )]
-    v_belt: Grid,
     #[command(flatten)]
     cells: CellOptions,
 }
 
+register_study!(Options);
+
 impl StudyOptions for Options {
     const NAME: &'static str = "poincare";
+    const ORDER: u32 = 40;
     const HAS_SHARDS: bool = true;
     type Study = Poincare;
     type Outcome = PoincareDiagram;
 
     fn study(&self) -> Result<Poincare, StudyError> {
-        let cells = self.cells.cells(&self.mu, &self.v_belt)?;
+        let cells = self.cells.cells()?;
         Ok(Poincare { cells })
     }
 

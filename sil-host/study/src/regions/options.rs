@@ -7,6 +7,7 @@ use super::{Map, Regions, RegionsStudy, Theta2, page};
 use crate::catalogue::{PageSection, StudyOptions};
 use crate::figures::page_maker::PageMaker;
 use crate::options::BaseOptions;
+use crate::register_study;
 use crate::{Grid, StudyError, paper};
 
 /// A slip direction on the command line.
@@ -62,8 +63,11 @@ pub struct Options {
     base: BaseOptions,
 }
 
+register_study!(Options);
+
 impl StudyOptions for Options {
     const NAME: &'static str = "regions";
+    const ORDER: u32 = 20;
     type Study = RegionsStudy;
     type Outcome = Regions;
 

@@ -1,5 +1,6 @@
 //! False alarms: contact that the controller takes for flight.
 
+use painleve_plant::Plant;
 use painleve_shared::frame::StatusFlags;
 
 use crate::contact_probe::ContactProbe;
@@ -15,7 +16,7 @@ pub struct FalseAlarms {
 
 impl FalseAlarms {
     /// Evaluates a completed tick: the contact that the controller reports against the true one.
-    pub fn tick(&mut self, trial: &Trial, contact: &ContactProbe) {
+    pub fn tick<P: Plant>(&mut self, trial: &Trial<P>, contact: &ContactProbe) {
         let says = trial.answer().flags.contains(StatusFlags::CONTACT);
         let slides = contact.captured_s.is_some() && contact.lift_offs == 0 && contact.touches();
         if slides && self.said_contact && !says && trial.fault().is_none() {

@@ -3,6 +3,7 @@
 use core::ops::Range;
 
 use painleve_firmware::refer::reference::Segment;
+use painleve_plant::Plant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::frame::StatusFlags;
@@ -39,18 +40,23 @@ pub enum LiftOffRule {
     Counted,
 }
 
-/// Runs a scenario with one reference to its end and judges it.
+/// Runs a scenario with one reference to its end, on a plant in its initial state, and judges it.
 ///
 /// # Errors
 /// [`StudyError`] if the scenario is invalid.
-pub fn run(scenario: &Scenario, index: usize, judged: LiftOffRule) -> Result<Row, StudyError> {
+pub fn run<P: Plant>(
+    plant: P,
+    scenario: &Scenario,
+    index: usize,
+    judged: LiftOffRule,
+) -> Result<Row, StudyError> {
     let end_s = scenario.run.duration_s;
     let arm = Arm::new(scenario.arm)?;
     let posture = Posture::of(&theta(&scenario.initial.state()));
     let v_belt_m_s = scenario.belt.profile.speed_m_s(0.0);
     let target_m = target_m(scenario);
     let enabled_s = scenario.run.enable_at_s;
-    let mut trial = Trial::new(scenario)?;
+    let mut trial = Trial::on(plant, scenario)?;
     let start_m = trial.tip_t_m();
     let mut contact = ContactProbe::new(enabled_s, CAPTURE_S);
     let mut alarms = FalseAlarms::default();

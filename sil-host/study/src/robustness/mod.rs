@@ -16,8 +16,12 @@ mod row;
 
 use std::collections::BTreeMap;
 
+use painleve_plant::Plant;
+use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
+use painleve_shared::range::OutOfRange;
 
+use super::loop_study::LoopStudy;
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
@@ -27,7 +31,7 @@ pub(crate) use draw::Journey;
 pub use draw::{admissible_m, scenario};
 pub use false_alarms::FalseAlarms;
 pub use judge::LiftOffRule;
-pub use options::Options;
+pub use options::{CampaignOptions, Options};
 pub use outcome::RobustnessOutcome;
 pub use part::Part;
 pub use row::{Ending, Row};
@@ -73,7 +77,18 @@ impl Study for Robustness {
     }
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {
-        run(index, &self.scenario(index)?)
+        self.row_on(index, &BuiltInPlant::new)
+    }
+}
+
+impl LoopStudy for Robustness {
+    fn row_on<P: Plant>(
+        &self,
+        index: usize,
+        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
+    ) -> Result<Row, StudyError> {
+        let scenario = self.scenario(index)?;
+        judge::run(plant(&scenario)?, &scenario, index, LiftOffRule::Fail)
     }
 }
 
@@ -82,7 +97,12 @@ impl Study for Robustness {
 /// # Errors
 /// [`StudyError`] if the scenario is invalid.
 pub fn run(index: usize, scenario: &Scenario) -> Result<Row, StudyError> {
-    judge::run(scenario, index, LiftOffRule::Fail)
+    judge::run(
+        BuiltInPlant::new(scenario)?,
+        scenario,
+        index,
+        LiftOffRule::Fail,
+    )
 }
 
 impl Tabular for Robustness {

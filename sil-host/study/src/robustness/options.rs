@@ -5,51 +5,60 @@ use clap::Args;
 use super::{Arms, Part, Robustness, RobustnessOutcome, Row};
 use crate::StudyError;
 use crate::catalogue::{StudyOptions, in_shards};
+use crate::register_study;
 use crate::tabular::Table;
 
-use crate::options::{self, Overrides};
+use crate::options::RandomRuns;
 
-/// A campaign of random arms, belts, converters and losses that the controller does not know.
+/// Options of studies that run the campaign.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct CampaignOptions {
     /// Arms: the paper's arm with errors, or any arm, known to the controller.
     #[arg(long, value_enum, default_value = "paper")]
     arms: Arms,
-    /// Seed of all runs.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    seed: u64,
-    /// Number of runs.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 10000,
-        value_parser = options::runs,
-        allow_negative_numbers = true
-    )]
-    runs: usize,
     /// Parts of the controller to switch off.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
-    without: Vec<Part>,
+    pub without: Vec<Part>,
     #[command(flatten)]
-    overrides: Overrides,
+    runs: RandomRuns,
 }
+
+impl CampaignOptions {
+    /// Returns the campaign with every part of the controller.
+    pub fn campaign(&self) -> Robustness {
+        Robustness {
+            arms: self.arms,
+            seed: self.runs.seed,
+            runs: self.runs.runs,
+            overrides: self.runs.overrides(),
+        }
+    }
+}
+
+/// A campaign of random arms, belts, converters and losses that the controller does not know.
+#[derive(Debug, Args)]
+#[command(mut_arg("runs", |runs| runs.default_value("10000")))]
+pub struct Options {
+    #[command(flatten)]
+    campaign: CampaignOptions,
+}
+
+register_study!(Options);
 
 impl StudyOptions for Options {
     const NAME: &'static str = "robustness";
+    const ORDER: u32 = 70;
     const HAS_SHARDS: bool = true;
     type Study = Robustness;
     type Outcome = RobustnessOutcome;
 
     fn study(&self) -> Result<Robustness, StudyError> {
-        let parts = self.without.iter().flat_map(|part| part.without());
+        let parts = self.campaign.without.iter();
+        let parts = parts.flat_map(|part| part.without());
         let mut overrides: Vec<String> = parts.map(ToString::to_string).collect();
-        overrides.extend(self.overrides.overrides.iter().cloned());
-        let study = Robustness {
-            arms: self.arms,
-            seed: self.seed,
-            runs: self.runs,
-            overrides,
-        };
+        let mut study = self.campaign.campaign();
+        overrides.append(&mut study.overrides);
+        study.overrides = overrides;
         study.check()?;
         Ok(study)
     }

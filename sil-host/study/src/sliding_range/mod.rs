@@ -14,14 +14,18 @@ mod page;
 
 use std::collections::BTreeMap;
 
+use painleve_plant::Plant;
+use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::statistics::Statistics;
+use painleve_shared::range::OutOfRange;
 use painleve_shared::{Arm, Posture, Slip};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::belt_line::{BeltLine, positive_stretches};
 use super::case::{self, ControllerChoice, ConverterChoice, Reference};
+use super::loop_study::LoopStudy;
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
@@ -186,7 +190,17 @@ impl Study for SlidingRange {
     }
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {
-        self.case(index)?.row()
+        self.row_on(index, &BuiltInPlant::new)
+    }
+}
+
+impl LoopStudy for SlidingRange {
+    fn row_on<P: Plant>(
+        &self,
+        index: usize,
+        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
+    ) -> Result<Row, StudyError> {
+        self.case(index)?.row(plant)
     }
 }
 
@@ -213,12 +227,17 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    fn row(&self) -> Result<Row, StudyError> {
-        let start_m = Trial::new(&self.scenario)?.tip_t_m();
+    fn row<P: Plant>(
+        &self,
+        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
+    ) -> Result<Row, StudyError> {
+        let start_m = Trial::on(plant(&self.scenario)?, &self.scenario)?.tip_t_m();
         let limit_m = self.limit_m(start_m)?;
         let targets = self.targets(start_m, limit_m);
-        let trials: Vec<Result<Trialled, StudyError>> =
-            targets.par_iter().map(|&target| self.run(target)).collect();
+        let trials: Vec<Result<Trialled, StudyError>> = targets
+            .par_iter()
+            .map(|&target| self.run(target, plant))
+            .collect();
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
 
         let mut reached = None;
@@ -236,7 +255,7 @@ impl Case<'_> {
             && far - near > self.criterion.resolution_m
         {
             let middle = 0.5 * (near + far);
-            match self.run(middle)? {
+            match self.run(middle, plant)? {
                 Trialled::Reached { tip_t_m } => reached = Some((middle, tip_t_m)),
                 Trialled::Failed(ending) => failed = Some((middle, ending)),
             }
@@ -284,7 +303,11 @@ impl Case<'_> {
         targets
     }
 
-    fn run(&self, target_m: f64) -> Result<Trialled, StudyError> {
+    fn run<P: Plant>(
+        &self,
+        target_m: f64,
+        plant: &impl Fn(&Scenario) -> Result<P, OutOfRange>,
+    ) -> Result<Trialled, StudyError> {
         let mut scenario = self.scenario.clone();
         scenario.controller.reference = self.reference.to(target_m);
         let row = || {
@@ -293,7 +316,7 @@ impl Case<'_> {
                 self.controller, self.posture, self.mu
             )
         };
-        let mut trial = Trial::new(&scenario)?;
+        let mut trial = Trial::on(plant(&scenario)?, &scenario)?;
         let mut statistics = Statistics::new(0.0);
         let criterion = &self.criterion;
         let end_s = scenario.run.enable_at_s + self.reference.duration_s();

@@ -3,35 +3,30 @@
 use clap::Args;
 
 use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
-use crate::case::{self, ControllerChoice, ConverterChoice, Reference};
+use crate::StudyError;
+use crate::case::Reference;
 use crate::catalogue::{PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
+use crate::register_study;
 use crate::tabular::Table;
-use crate::{Grid, StudyError};
 
-use crate::options::{Overrides, PostureOption, metres, seconds};
+use crate::options::{
+    ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, seconds,
+};
 
 /// How far each controller slides before its tip leaves the belt.
 #[derive(Debug, Args)]
+#[command(
+    mut_arg("controller", |controller| {
+        controller.default_value("pid,hybrid-paper,hybrid-paper-model,hybrid")
+    }),
+    mut_arg("converters", |converters| converters.default_value("ideal,hardware"))
+)]
 pub struct Options {
-    /// Controllers: pid, hybrid-paper (the paper's law and gains), hybrid-paper-model (the same
-    /// with known friction), hybrid (as built in), or any scenario or file.
-    #[arg(
-        long,
-        value_name = "NAMES",
-        value_delimiter = ',',
-        default_value = "pid,hybrid-paper,hybrid-paper-model,hybrid"
-    )]
-    controller: Vec<ControllerChoice>,
-    /// Converters: ideal (as in the paper), hardware, or the scenario's own.
-    #[arg(
-        long,
-        value_name = "SETS",
-        value_enum,
-        value_delimiter = ',',
-        default_value = "ideal,hardware"
-    )]
-    converters: Vec<ConverterChoice>,
+    #[command(flatten)]
+    controllers: ControllerOptions,
+    #[command(flatten)]
+    converters: ConverterOptions,
     /// Postures to start in.
     #[arg(
         long,
@@ -41,14 +36,8 @@ pub struct Options {
         default_value = "elbow-down,elbow-up"
     )]
     posture: Vec<PostureOption>,
-    /// Friction coefficients μ, FROM:TO:STEP or a list.
-    #[arg(
-        long,
-        value_name = "GRID",
-        default_value = "0.6",
-        allow_hyphen_values = true
-    )]
-    mu: Grid,
+    #[command(flatten)]
+    friction: FrictionGrid,
     /// References: minimum-jerk:SECONDS, ramp:SECONDS or step; separate several with commas.
     #[arg(
         long,
@@ -97,8 +86,11 @@ pub struct Options {
     overrides: Overrides,
 }
 
+register_study!(Options);
+
 impl StudyOptions for Options {
     const NAME: &'static str = "sliding-range";
+    const ORDER: u32 = 50;
     const HAS_SHARDS: bool = true;
     type Study = SlidingRange;
     type Outcome = SlidingRanges;
@@ -111,10 +103,10 @@ impl StudyOptions for Options {
             ("run.duration_s", "--patience-s"),
         ])?;
         let study = SlidingRange {
-            controllers: self.controller.clone(),
-            converters: self.converters.clone(),
+            controllers: self.controllers.controller.clone(),
+            converters: self.converters.converters.clone(),
             postures: self.posture.iter().map(|&posture| posture.into()).collect(),
-            mu: self.mu.values().to_vec(),
+            mu: self.friction.mu.values().to_vec(),
             references: self.reference.clone(),
             overrides: self.overrides.overrides.clone(),
             criterion: Criterion {
@@ -130,8 +122,7 @@ impl StudyOptions for Options {
     }
 
     fn scenarios(&self) -> Vec<String> {
-        let own = case::own_scenarios(&self.controller);
-        own.into_iter().map(str::to_owned).collect()
+        self.controllers.scenarios()
     }
 
     fn outcome(_: &SlidingRange, rows: Vec<Row>) -> SlidingRanges {

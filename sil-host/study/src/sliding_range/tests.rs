@@ -57,9 +57,12 @@ fn the_range_ends_where_the_next_target_fails() {
     assert_eq!(row.ends_by, RangeEnd::LiftOff);
     let case = study.case(0).unwrap();
     let end = row.z_sliding_m.unwrap();
-    assert!(matches!(case.run(end).unwrap(), Trialled::Reached { .. }));
+    assert!(matches!(
+        case.run(end, &BuiltInPlant::new).unwrap(),
+        Trialled::Reached { .. }
+    ));
     let beyond = end + study.criterion.resolution_m;
-    let failed = case.run(beyond).unwrap();
+    let failed = case.run(beyond, &BuiltInPlant::new).unwrap();
     assert!(matches!(failed, Trialled::Failed(RangeEnd::LiftOff)));
 }
 
