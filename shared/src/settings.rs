@@ -162,9 +162,30 @@ pub enum Shape {
         /// Largest number of values.
         maximum_length: usize,
     },
+    /// A kind that only the running program knows, such as that of the set of laws it was built with.
+    AtRunTime(ShapeSource),
+}
+
+/// Gives a [`Shape`] when the program runs.
+#[derive(Clone, Copy, Debug)]
+pub struct ShapeSource(pub fn() -> Shape);
+
+impl PartialEq for ShapeSource {
+    /// Compares the shapes: addresses of functions are not unique.
+    fn eq(&self, other: &Self) -> bool {
+        (self.0)() == (other.0)()
+    }
 }
 
 impl Shape {
+    /// Returns the kind itself in place of [`Shape::AtRunTime`].
+    pub fn resolved(self) -> Self {
+        match self {
+            Self::AtRunTime(ShapeSource(shape)) => shape(),
+            known => known,
+        }
+    }
+
     const fn needs_a_range(&self) -> bool {
         match self {
             Self::Number => true,

@@ -63,6 +63,30 @@ fn a_study_runs_with_the_law() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("hybrid-elbow-up"));
 }
 
+fn text(arguments: &[&str]) -> String {
+    let output = own_law(arguments);
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn schema_and_printed_scenarios_describe_the_laws_settings() {
+    let schema: Value = serde_json::from_str(&text(&["scenarios", "--schema"])).unwrap();
+    let laws = &schema["properties"]["controller"]["properties"]["law"]["oneOf"];
+    let impedance = laws.as_array().unwrap().iter();
+    let mut impedance = impedance.map(|law| &law["properties"]["impedance"]["properties"]);
+    let stiffness = impedance.find_map(|settings| settings.get("stiffness_n_m"));
+    assert_eq!(stiffness.unwrap()["maximum"], 1e5);
+    let printed = text(&["scenarios", "hybrid-elbow-down", "--set", LAW]);
+    for part in [
+        "[controller.law.impedance]",
+        "# Stiffness along the belt. (0 to 100000 N/m)\nstiffness_n_m = 1500",
+        "(off, pid, hybrid or impedance)",
+    ] {
+        assert!(printed.contains(part), "{part}\nis not in\n{printed}");
+    }
+}
+
 #[test]
 fn a_setting_out_of_range_is_refused_by_its_key() {
     let set = "controller.law={impedance={stiffness_n_m=-1}}";

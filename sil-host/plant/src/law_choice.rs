@@ -11,7 +11,7 @@ use std::sync::{Arc, OnceLock};
 
 use painleve_firmware::law::{Law, LawInput, LawOutput, LawSettings};
 use painleve_shared::OutOfRange;
-use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape};
+use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape, ShapeSource};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -21,6 +21,7 @@ static LAWS: OnceLock<LawSet> = OnceLock::new();
 /// Constructors of the laws in the program's set.
 #[derive(Clone, Copy)]
 struct LawSet {
+    shape: Shape,
     default: fn() -> LawChoice,
     read: fn(&mut dyn erased_serde::Deserializer<'_>) -> erased_serde::Result<LawChoice>,
 }
@@ -51,6 +52,7 @@ pub fn install<L: ScenarioLaws>() {
 impl LawSet {
     fn of<L: ScenarioLaws>() -> Self {
         Self {
+            shape: L::SHAPE,
             default: || LawChoice::new(L::default()),
             read: |source| erased_serde::deserialize::<L>(source).map(LawChoice::new),
         }
@@ -216,8 +218,7 @@ impl PartialEq for LawChoice {
 }
 
 impl SettingValue for LawChoice {
-    /// Shape of the built-in laws; other sets are known only at run time.
-    const SHAPE: Shape = LawSettings::SHAPE;
+    const SHAPE: Shape = Shape::AtRunTime(ShapeSource(|| LawSet::installed().shape));
 
     fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
         self.0.check(bounds, error)

@@ -28,7 +28,9 @@ fn right(shape: &Shape, range: Option<Range>) -> Value {
         Shape::Number => Value::Float(range.map_or(1.0, |range| range.minimum)),
         Shape::Optional(inner) => right(inner, range),
         Shape::Array { item, length } => Value::Array(vec![right(item, range); *length]),
-        Shape::Group(_) | Shape::List { .. } | Shape::Choice { .. } => unreachable!("{shape:?}"),
+        Shape::Group(_) | Shape::List { .. } | Shape::Choice { .. } | Shape::AtRunTime(_) => {
+            unreachable!("{shape:?}")
+        }
     }
 }
 
@@ -69,6 +71,7 @@ fn wrong(
             };
             values.into_iter().map(wrong).collect()
         }
+        Shape::AtRunTime(_) => wrong(key, &shape.resolved(), range, inside),
         Shape::Group(fields) => in_fields(key, fields, &[], inside),
         Shape::Optional(inner) => wrong(key, inner, range, inside),
         Shape::Array { item, length } => (0..*length)

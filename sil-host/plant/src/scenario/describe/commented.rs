@@ -3,7 +3,7 @@
 use painleve_shared::settings::{Field, Settings, Shape, Variant};
 use toml::{Table, Value};
 
-use super::{allowed, group, table};
+use super::{allowed, group, resolved, table};
 use crate::scenario::Scenario;
 
 /// Longest line of a comment, in characters.
@@ -20,6 +20,7 @@ impl Scenario {
 }
 
 fn write_group(text: &mut String, path: &str, values: &Table, fields: &[Field]) {
+    let fields: Vec<Field> = fields.iter().map(resolved).collect();
     // Keys of a table precede the tables inside it.
     let is_table = |field: &&Field| matches!(values.get(field.key), Some(Value::Table(_)));
     for field in fields.iter().filter(|field| !is_table(field)) {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use painleve_shared::settings::{Field, Settings, Shape};
 use toml::Value;
 
-use super::{allowed, default_at, group};
+use super::{allowed, default_at, group, resolved};
 use crate::scenario::Scenario;
 
 /// Returns a Markdown table of all settings in the groups `sections` of a scenario. Keys are full,
@@ -23,6 +23,7 @@ pub fn settings_table(sections: &[&str]) -> String {
 }
 
 fn rows(text: &mut String, path: &mut Vec<&'static str>, hidden: usize, field: &Field) {
+    let field = &resolved(field);
     if let Some(fields) = group(&field.shape) {
         if matches!(field.shape, Shape::Optional(_)) {
             row(text, &path[hidden..], "absent", "a group", field.meaning);

@@ -26,6 +26,14 @@ fn table<T: Serialize>(settings: &T) -> Table {
     text.parse().unwrap_or_default()
 }
 
+/// Returns a setting with the kind of value that this program knows for it.
+fn resolved(field: &Field) -> Field {
+    Field {
+        shape: field.shape.resolved(),
+        ..*field
+    }
+}
+
 /// Returns the allowed values of a setting in words; empty if its type says everything.
 fn allowed(field: &Field) -> String {
     let mut text = match (field.range, choice(&field.shape)) {

@@ -3,7 +3,7 @@
 use painleve_shared::settings::{Field, Range, Settings, Shape, Variant};
 use serde_json::{Map, Value, json};
 
-use super::{allowed, table};
+use super::{allowed, resolved, table};
 use crate::scenario::Scenario;
 
 /// Returns the JSON Schema (draft 2020-12) of a scenario file. Ranges that depend on other settings
@@ -31,6 +31,7 @@ fn object(fields: &[Field], defaults: &Value, required: &[&str]) -> Value {
 }
 
 fn property(field: &Field, default: &Value) -> Value {
+    let field = &resolved(field);
     let mut schema = value(&field.shape, field.range, default);
     let allowed = allowed(field);
     schema["description"] = if allowed.is_empty() {
@@ -60,6 +61,7 @@ fn value(shape: &Shape, range: Option<Range>, default: &Value) -> Value {
             }),
             None => json!({ "type": "number" }),
         },
+        Shape::AtRunTime(_) => value(&shape.resolved(), range, default),
         Shape::Group(fields) => object(fields, default, &[]),
         Shape::Optional(inner) => value(inner, range, default),
         Shape::Array { item, length } => json!({
