@@ -1,7 +1,8 @@
 //! The page of a run in headless Chromium, if the machine has Node and Chromium.
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use painleve_tests::Bench;
 
@@ -48,6 +49,23 @@ fn the_page_of_a_run_plays_zooms_and_has_no_error() {
         bench.report(&["run", scenario, "--json", "--no-record", "--html", &file]);
         run_script("page.mjs", &[path.to_str().unwrap()]);
     }
+}
+
+#[test]
+fn a_live_run_is_watched_paused_stepped_set_pushed_and_reset() {
+    let bench = Bench::new("live");
+    let mut command = bench.command(&["run", "--live", "0"]);
+    let mut run = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut line = String::new();
+    BufReader::new(run.stderr.take().unwrap())
+        .read_line(&mut line)
+        .unwrap();
+    let url = line
+        .split_whitespace()
+        .find(|word| word.starts_with("http"));
+    run_script("live.mjs", &[url.unwrap()]);
+    run.kill().unwrap();
+    run.wait().unwrap();
 }
 
 #[test]

@@ -7,6 +7,7 @@ mod drive;
 mod export;
 mod fail_on;
 mod figures;
+mod live;
 mod output;
 mod patience;
 mod plant;

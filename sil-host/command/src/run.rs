@@ -19,6 +19,7 @@ use painleve_system::terminal::warn;
 
 use super::bridge::{ImageArguments, SensorLineArguments};
 use super::fail_on::{self, FailOn};
+use super::live;
 use super::output::OutputArguments;
 use super::patience::PatienceArguments;
 use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
@@ -152,6 +153,11 @@ pub struct RunArguments {
     /// Exit with code 6 if one of these events happened; the report is still complete.
     #[arg(long, value_enum, value_name = "EVENTS", value_delimiter = ',')]
     fail_on: Vec<FailOn>,
+    /// Serve a page on this machine from which the run is watched and steered, in one process and
+    /// without files; until Ctrl-C.
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
+    #[arg(conflicts_with_all = ["bus", "port", "fail_on"])]
+    live: Option<u16>,
     /// Print one JSON object on stdout instead of the table.
     #[arg(long)]
     json: bool,
@@ -178,10 +184,23 @@ const CONTROLLER_END: Duration = Duration::from_millis(1700);
 /// Time for a bridge to end after the plant has reported it missing.
 const BRIDGE_END: Duration = Duration::from_millis(300);
 
+/// Runs a scenario that is watched and steered from a page.
+fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), CommandError> {
+    if arguments.host != Host::Native {
+        return Err(CommandError::Input(
+            "--live runs the controller in this process: leave out --host".into(),
+        ));
+    }
+    live::run(scenario, port, &Interrupt::catch()?)
+}
+
 /// Runs a scenario as two processes and reports.
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     // Validate before any process starts, so that an error is reported once.
-    arguments.scenario.load()?;
+    let scenario = arguments.scenario.load()?;
+    if let Some(port) = arguments.live {
+        return live(arguments, &scenario, port);
+    }
     if arguments.host == Host::Qemu {
         emulator::check(&arguments.image.path())?;
     }

@@ -217,6 +217,16 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
         }
     }
 
+    /// Returns the simulation, to change it while it runs.
+    pub fn simulation_mut(&mut self) -> &mut Simulation<P> {
+        &mut self.simulation
+    }
+
+    /// Returns the controller host, to change it while it runs.
+    pub fn host_mut(&mut self) -> &mut H {
+        &mut self.host
+    }
+
     /// Runs one control tick.
     ///
     /// # Errors

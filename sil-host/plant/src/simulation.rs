@@ -4,17 +4,20 @@
 //! after the tick), the encoders capture (a fraction of a tick before the next one), and the next
 //! tick begins.
 
-use painleve_shared::ActuatorFrame;
+use nalgebra::Vector2;
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
+use painleve_shared::kinematics::Pose;
 use painleve_shared::range::OutOfRange;
 use painleve_shared::settings::Settings;
 use painleve_shared::status::SupervisorState;
+use painleve_shared::{ActuatorFrame, Arm, GeneralisedTorque, JointTorque};
 
 use crate::converters::encoder::Encoders;
 use crate::converters::force_cell::ForceCell;
 use crate::converters::link_loss::{LossyLink, Lost};
 use crate::converters::torque_stage::TorqueStages;
 use crate::mechanics::BuiltInPlant;
+use crate::mechanics::belt::BeltSettings;
 use crate::plant::{Plant, PlantError, Probe};
 use crate::sample::Sample;
 use crate::scenario::Scenario;
@@ -32,6 +35,15 @@ pub struct Simulation<P = BuiltInPlant> {
     clock: TickClock,
     first_tick: u32,
     enable_at_s: f64,
+    arm: Arm<f64>,
+    push: Push,
+}
+
+/// A force on the tip for a number of ticks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Push {
+    force_n: Vector2<f64>,
+    ticks: u32,
 }
 
 impl Simulation {
@@ -42,6 +54,13 @@ impl Simulation {
     pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
         scenario.validate()?;
         Self::of(BuiltInPlant::new(scenario)?, scenario)
+    }
+}
+
+impl Simulation {
+    /// Gives the belt this friction and speed from now on.
+    pub fn set_belt(&mut self, belt: &BeltSettings) {
+        self.plant.set_belt(belt);
     }
 }
 
@@ -71,8 +90,27 @@ impl<P: Plant> Simulation<P> {
             clock: TickClock::new(tick_hz, scenario.run.tick_jitter, seed),
             first_tick: scenario.run.first_tick,
             enable_at_s: scenario.run.enable_at_s,
+            arm: Arm::new(scenario.arm)?,
+            push: Push::default(),
             plant,
         })
+    }
+
+    /// Pushes the tip with a force (f_t, f_n), N, for a number of ticks. It enters as the joint
+    /// torques that have the same effect, Jᵀ f, and is part of the torques that are recorded.
+    pub fn push(&mut self, force_n: [f64; 2], ticks: u32) {
+        self.push = Push {
+            force_n: force_n.into(),
+            ticks,
+        };
+    }
+
+    /// Returns the torques of the push at this tick, N·m, if there is one.
+    fn take_push_nm(&mut self) -> Option<JointTorque<f64>> {
+        self.push.ticks = self.push.ticks.checked_sub(1)?;
+        let pose = Pose::new(&self.plant.link_angles_rad());
+        let torque_nm = self.arm.jacobian(&pose).transpose() * self.push.force_n;
+        Some(GeneralisedTorque::from_vector(torque_nm).to_joints())
     }
 
     /// Returns the plant.
@@ -162,9 +200,12 @@ impl<P: Plant> Simulation<P> {
             self.plant.advance(change_s, probe)?;
         }
         let joints_rad = self.plant.link_angles_rad().to_joints();
-        let torque_nm = self
+        let mut torque_nm = self
             .torque_stages
             .target_nm(&joints_rad, self.plant.time_s());
+        if let Some(push_nm) = self.take_push_nm() {
+            torque_nm += push_nm;
+        }
         self.plant
             .command_torque(torque_nm, self.torque_stages.lag_s());
         if !captures_first {

@@ -114,7 +114,7 @@ class Page {
   play(playing) {
     if (playing && !this.live && this.time >= this.columns.end) this.time = this.columns.start;
     this.playing = playing;
-    $("play").textContent = playing ? "⏸" : "▶";
+    $("play").textContent = playing ? "❚❚" : "▶";
     $("play").setAttribute("aria-label", playing ? "Pause" : "Play");
     this.last = undefined;
     this.dirty = true;

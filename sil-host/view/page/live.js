@@ -1,9 +1,109 @@
 "use strict";
 // A run while it goes on: rows and events from the program, orders to it.
 
-/** Simulated time that stays on the page, s. */
-const KEPT_ROWS = 12000, SHOWN_S = 10;
+/** Rows and events that stay on the page, simulated time that the charts show, time between two drawings of them. */
+const KEPT_ROWS = 12000, KEPT_EVENTS = 500, SHOWN_S = 10, CHARTS_MS = 50;
 
 function connect(page) {
-  page.orders = () => {};
+  const socket = new WebSocket(`ws://${location.host}/live`);
+  socket.binaryType = "arraybuffer";
+  const rows = [];
+  let listed = 0, drawn = 0, fresh = false;
+  const send = (order, more = {}) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ order, ...more })); };
+
+  const status = document.createElement("p");
+  status.id = "status";
+  status.setAttribute("role", "status");
+  status.textContent = "connecting …";
+  $("hint").before(status);
+  $("reset").hidden = false;
+  $("verdict").textContent = "live";
+
+  socket.addEventListener("open", () => { status.textContent = "connected"; });
+  socket.addEventListener("close", () => { status.textContent = "the run has ended; what was seen stays here"; setPlaying(false); });
+  socket.addEventListener("message", ({ data }) => {
+    if (typeof data !== "string") { rows.push(data); return; }
+    const message = JSON.parse(data);
+    if (message.event) page.events.push(message.event);
+    if (message.reset) clear();
+    if (message.error || message.note) show(message.error ?? message.note, Boolean(message.error));
+    if (message.status) {
+      const { paused, factor, ticks_per_s, real_time_factor } = message.status;
+      setPlaying(!paused);
+      $("speed").value = String(factor);
+      status.textContent = paused ? "paused" : `${real_time_factor.toPrecision(3)}× real time, ${Math.round(ticks_per_s)} ticks/s`;
+    }
+  });
+
+  function clear() {
+    rows.length = 0;
+    page.columns.clear();
+    page.events = [];
+    listed = 0;
+    page.listEvents();
+    page.charts.range = null;
+    page.follow = fresh = true;
+  }
+
+  function setPlaying(playing) { if (page.playing !== playing) page.play(playing); }
+
+  page.toggle = () => send(page.playing ? "pause" : "resume");
+  page.speedChanged = (factor) => send("speed", { factor });
+  const stepBack = page.step.bind(page);
+  page.step = (ticks) => {
+    if (ticks < 0) { send("pause"); stepBack(ticks); return; }
+    page.follow = true;
+    send("step", { ticks });
+  };
+  $("reset").addEventListener("click", () => send("reset"));
+
+  /** Called before every picture. */
+  page.incoming = (now) => {
+    if (rows.length) {
+      for (const buffer of rows.splice(0)) page.columns.append(buffer, KEPT_ROWS);
+      if (page.follow) page.time = page.columns.end;
+      page.dirty = fresh = true;
+    }
+    if (!fresh || now - drawn < CHARTS_MS) return;
+    fresh = false;
+    drawn = now;
+    page.derive(0);
+    page.charts.update(SHOWN_S);
+    const { start, end } = page.columns, [from, to] = page.charts.range ?? [Math.max(end - SHOWN_S, start), end];
+    for (const ribbon of page.ribbons) ribbon.draw(from, to);
+    if (page.events.length > KEPT_EVENTS) { page.events.splice(0, page.events.length - KEPT_EVENTS / 2); listed = 0; }
+    if (page.events.length !== listed) { page.listEvents(listed); listed = page.events.length; page.verdict(); }
+  };
+
+  const form = $("parameters");
+  const errors = document.createElement("p");
+  errors.className = "error";
+  errors.setAttribute("role", "status");
+  const show = (text, wrong) => { errors.textContent = text; errors.style.color = wrong ? "" : "var(--faint)"; };
+  for (const { key, label, value, minimum, maximum, step, template } of page.run.parameters) {
+    const name = document.createElement("label"), input = document.createElement("input");
+    Object.assign(input, { type: "number", name: key, value, min: minimum, max: maximum, step });
+    input.addEventListener("change", () => {
+      if (input.value !== "") send("set", { key, value: (template ?? "%").replace("%", Number(input.value).toFixed(9)) });
+    });
+    name.append(label, input);
+    form.append(name);
+  }
+  const any = document.createElement("label"), line = document.createElement("input");
+  Object.assign(line, { type: "text", name: "any", placeholder: "controller.guard.enabled = false" });
+  line.addEventListener("change", () => {
+    const [key, ...value] = line.value.split("=");
+    if (value.length) send("set", { key: key.trim(), value: value.join("=").trim() });
+  });
+  any.append("any key = value", line);
+  form.append(any);
+  for (const [label, force_n] of [["push ←", [-5, 0]], ["push →", [5, 0]], ["push ↑", [0, 15]]]) {
+    const button = document.createElement("button");
+    Object.assign(button, { type: "button", textContent: label, title: `${Math.hypot(...force_n)} N on the tip for 50 ms` });
+    button.addEventListener("click", () => send("push", { force_n, duration_s: 0.05 }));
+    form.append(button);
+  }
+  form.append(errors);
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.hidden = false;
 }

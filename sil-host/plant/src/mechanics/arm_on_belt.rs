@@ -9,7 +9,7 @@ use painleve_shared::{Arm, JointTorque, LinkMotion, Slip};
 
 use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
 
-use super::belt::BeltProfile;
+use super::belt::{BeltProfile, BeltSettings};
 use super::cash_karp::ShortStep;
 use super::dop853::{Step, Tolerance};
 use super::impact::{self, ImpactLaw};
@@ -172,6 +172,15 @@ impl ArmOnBelt {
     /// Returns the contact force (f_t, f_n) on the tip now, N, without impulses.
     pub fn contact_force_n(&self) -> Vector2<f64> {
         self.evaluation().force_n
+    }
+
+    /// Gives the belt this friction and speed from now on.
+    pub fn set_belt(&mut self, belt: &BeltSettings) {
+        self.stick_start = (self.time_s, self.motion().tip_t_m(&self.state));
+        self.friction = belt.friction;
+        self.belt = belt.profile;
+        self.unsettled = true;
+        self.evaluation = None;
     }
 
     /// Commands joint torques `target_nm` from now on, through a first-order lag with time constant

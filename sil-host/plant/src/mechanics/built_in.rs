@@ -4,6 +4,7 @@ use nalgebra::Vector2;
 use painleve_shared::{JointTorque, LinkMotion, OutOfRange};
 
 use super::ArmOnBelt;
+use super::belt::BeltSettings;
 use super::compliant::{CompliantArmOnBelt, ContactKind};
 use crate::plant::{Plant, PlantError, Probe, Snapshot};
 use crate::scenario::Scenario;
@@ -39,6 +40,16 @@ impl BuiltInPlant {
                 start,
             )?),
         })
+    }
+}
+
+impl BuiltInPlant {
+    /// Gives the belt this friction and speed from now on.
+    pub fn set_belt(&mut self, belt: &BeltSettings) {
+        match self {
+            Self::Rigid(plant) => plant.set_belt(belt),
+            Self::Compliant(plant) => plant.set_belt(belt),
+        }
     }
 }
 

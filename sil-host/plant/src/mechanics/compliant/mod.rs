@@ -22,7 +22,7 @@ use equations::{CompliantMotion, FULL, PLAIN};
 use step::CompliantStep;
 
 use super::arm_on_belt::{CONTACT_AT_START_M, INSIDE_AT_START_M};
-use super::belt::BeltProfile;
+use super::belt::{BeltProfile, BeltSettings};
 use super::effects::Effects;
 use super::effects::gear::EncoderSide;
 use super::rosenbrock::Linearised;
@@ -56,6 +56,12 @@ pub struct CompliantArmOnBelt {
 }
 
 impl CompliantArmOnBelt {
+    /// Gives the belt this friction and speed from now on.
+    pub fn set_belt(&mut self, belt: &BeltSettings) {
+        self.friction = belt.friction;
+        self.belt = belt.profile;
+    }
+
     /// Creates a plant at time zero with zero torque. A tip at most 0.1 mm above the belt or 1 mm
     /// inside it is first moved onto the belt, without force.
     ///
