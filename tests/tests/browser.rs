@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use painleve_tests::Bench;
 
-/// Returns the name of the first program that starts; says what is skipped if there is none.
+/// Returns the name of the first program that starts; prints a notice if there is none.
 fn program(names: &[&'static str]) -> Option<&'static str> {
     let starts = |name: &&&str| {
         let version = Command::new(name).arg("--version").output();

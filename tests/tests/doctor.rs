@@ -1,4 +1,4 @@
-//! `painleve doctor` removes what is dead, and neither what is alive nor what it cannot judge.
+//! `painleve doctor` removes dead buses and segments, and keeps live and undecidable ones.
 
 #![allow(clippy::unwrap_used)]
 
@@ -13,7 +13,7 @@ use painleve_tests::{Bench, code, errors, is_running, program, unshared};
 
 const SOON: Duration = Duration::from_secs(20);
 
-/// Buses in a folder of their own.
+/// Buses in a separate folder.
 struct Ward {
     bench: Bench,
     runtime: PathBuf,
@@ -28,7 +28,7 @@ impl Ward {
         ward
     }
 
-    /// A plant that waits for its controller, once it is ready for one.
+    /// Starts a plant and waits until it is ready for a controller.
     fn plant(&self, bus: &str) -> Child {
         let mut command = self.bench.command(&["plant", "--bus", bus, "--no-record"]);
         command
@@ -44,7 +44,7 @@ impl Ward {
         child
     }
 
-    /// What the doctor says.
+    /// Returns the output of the doctor.
     fn doctor(&self, arguments: &[&str]) -> String {
         let mut command = self.bench.command(&[&["doctor"], arguments].concat());
         said(
@@ -128,14 +128,14 @@ fn segments_are_judged_by_their_own_lock_when_their_bus_is_out_of_sight() {
     assert!(segments(&run).is_empty());
 }
 
-/// In a PID namespace of its own the doctor sees none of the processes whose memory it sees.
+/// From another PID namespace the doctor cannot see the processes that use the memory.
 #[test]
 fn processes_of_another_pid_namespace_are_alive() {
     let ward = Ward::new("namespace");
     let plant = ward.plant("outside");
     let run = run_of(&ward.runtime.join("painleve/outside")).unwrap();
     let in_use = segments(&run).len();
-    // With another runtime folder, too: nothing but the memory is shared.
+    // With another runtime folder, too, only the memory is shared.
     for runtime in ["runtime", "inside"] {
         let runtime = ward.bench.path(runtime);
         if !runtime.exists() {

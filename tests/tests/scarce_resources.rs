@@ -10,7 +10,7 @@ use painleve_tests::{Bench, code, errors, program, unshared};
 const SHORT: &str = "--set run.duration_s=0.05 --no-plot --json";
 const SOON: Duration = Duration::from_secs(10);
 
-/// A shell line in which `$P` is the program, in a mount namespace of its own.
+/// Runs a shell command, in which `$P` is the program, in a separate mount namespace.
 fn with_own_mounts(bench: &Bench, line: &str) -> Option<Output> {
     let mut shell = Command::new("bash");
     shell
@@ -20,7 +20,7 @@ fn with_own_mounts(bench: &Bench, line: &str) -> Option<Output> {
     unshared(&["--mount"], &mut shell)
 }
 
-/// One line that begins as an error and contains `part`.
+/// Checks for a single error line that contains `part`.
 fn assert_told(output: &Output, exit: i32, part: &str) {
     let text = errors(output);
     assert_eq!(code(output.status), exit, "{output:?}");
@@ -50,7 +50,7 @@ fn a_small_shared_memory_is_enough_or_is_told() {
     assert!(enough > 0, "even 1 MiB is too little");
 }
 
-/// Somebody else fills the memory after the plant has looked at what is left.
+/// Another process fills the memory after the plant has checked the free space.
 #[test]
 fn a_shared_memory_that_fills_up_between_two_starts_ends_them() {
     let bench = Bench::new("filled-shm");
@@ -72,7 +72,7 @@ fn a_shared_memory_that_fills_up_between_two_starts_ends_them() {
         "{output:?}"
     );
     assert_told(&output, 0, "/dev/shm");
-    // It misses its controller, or needs memory for the connection to it.
+    // The plant misses its controller, or needs memory for the connection to it.
     let plant = std::fs::read_to_string(bench.path("plant")).unwrap();
     assert!(plant.starts_with("error: "), "{plant}");
     assert_eq!(plant.trim().lines().count(), 1, "{plant}");
@@ -97,7 +97,7 @@ fn read_only_folders_are_told() {
     }
 }
 
-/// The report of a run, by a shell line.
+/// Runs a shell command and returns the report of its run.
 #[allow(clippy::unwrap_used)]
 fn shell(bench: &Bench, line: &str) -> Output {
     let mut shell = Command::new("bash");
@@ -110,7 +110,7 @@ fn closed_streams_do_not_disturb_a_run() {
     let bench = Bench::new("closed");
     let output = shell(&bench, &format!("$P run {SHORT} <&- >&- 2>&-"));
     assert_eq!(code(output.status), 0, "{output:?}");
-    // Neither has anything that was meant for a stream got into a file.
+    // No output that was meant for a stream is in a file.
     let record = std::fs::read(bench.path("out/run.mcap")).unwrap();
     let summary = mcap::Summary::read(&record).unwrap().unwrap();
     assert!(summary.stats.unwrap().message_count > 0);

@@ -1,5 +1,5 @@
-//! Long runs with a disturbed link: one fault in every simulated minute, and at the end every
-//! counter of both sides must be exact. The frame counters wrap on the way.
+//! Long runs with a disturbed link: one fault in every simulated minute, after which every counter
+//! of both sides must be exact. The frame counters wrap during the run.
 //!
 //! `PAINLEVE_SOAK_MINUTES` and `PAINLEVE_SOAK_QEMU_MINUTES` set the simulated time;
 //! `cargo xtask soak` sets them to a day and an hour.
@@ -27,20 +27,20 @@ const TICKS_BEFORE_WRAP: u32 = 10_000;
 /// Bytes of garbage, with the zero that ends a message.
 const GARBAGE: [u8; 12] = [0x55, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0xaa, 0];
 
-/// What happens to a frame on its way.
+/// Fault of a frame in transit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
-    /// It does not arrive.
+    /// The frame does not arrive.
     Dropped,
-    /// It arrives twice.
+    /// The frame arrives twice.
     Repeated,
-    /// It arrives with a flipped bit.
+    /// The frame arrives with a flipped bit.
     Corrupted,
-    /// Garbage arrives before it.
+    /// Garbage arrives before the frame.
     Garbage,
-    /// Its answer does not arrive.
+    /// The answer does not arrive.
     Unanswered,
-    /// It holds an encoder reading that no encoder of this resolution gives.
+    /// The frame has an encoder reading outside its resolution.
     Impossible,
 }
 
@@ -54,12 +54,12 @@ impl Fault {
         Self::Impossible,
     ];
 
-    /// The frame is not read by the controller.
+    /// Returns whether the controller does not read the frame.
     fn loses_the_frame(self) -> bool {
         matches!(self, Self::Dropped | Self::Corrupted)
     }
 
-    /// The plant gets no answer.
+    /// Returns whether the plant gets no answer.
     fn loses_the_answer(self) -> bool {
         self.loses_the_frame() || self == Self::Unanswered
     }
@@ -68,9 +68,9 @@ impl Fault {
 /// The board's end of the link.
 trait Far {
     fn exchange(&mut self, frame: &SensorFrame) -> ActuatorFrame;
-    /// Delivers bytes that are no message.
+    /// Delivers bytes that are not a message.
     fn deliver(&mut self, bytes: &[u8]);
-    /// Ticks and lapses that the board has counted.
+    /// Returns the ticks and lapses counted by the board.
     fn counts(&mut self) -> (u32, LapseCounts);
 }
 
@@ -112,7 +112,7 @@ impl Native {
         Self { task, inbox }
     }
 
-    /// Takes bytes as the image's link does; the answer to a sensor frame among them.
+    /// Handles bytes as the image's link does; returns the answer to a sensor frame among them.
     fn take(&mut self, bytes: &[u8]) -> Option<ActuatorFrame> {
         let mut answer = None;
         for byte in bytes {
@@ -192,13 +192,14 @@ impl<B> Disturbed<B> {
         disturbed
     }
 
-    /// Draws the tick of the minute that begins; not its last ones, so that what a fault leaves is
-    /// counted in its minute, and not its first ones, so that the arm has been armed.
+    /// Draws the tick of the next minute's fault. It is not among the last ticks, so that its
+    /// effects are counted in the same minute, and not among the first, so that the arm has been
+    /// armed.
     fn draw(&mut self) {
         self.due = self.tick + self.random.random_range(1000..self.minute_ticks - 1000);
     }
 
-    /// The fault of this tick.
+    /// Returns the fault of this tick.
     fn fault(&mut self) -> Option<Fault> {
         let is_due = self.tick == self.due;
         self.tick += 1;
@@ -229,7 +230,7 @@ impl<B: Far> ControllerHost for Disturbed<B> {
                 let bytes = wire::encode(&Request::Sensor(*frame), &mut buffer).expect("it fits");
                 let mut bytes = bytes.to_vec();
                 let at = self.random.random_range(0..bytes.len() - 1);
-                // No zero, which would end the message.
+                // Avoids zero, which would end the message.
                 bytes[at] ^= if bytes[at] == 1 { 2 } else { 1 };
                 self.far.deliver(&bytes);
                 None
@@ -262,7 +263,7 @@ fn minutes(variable: &str, default: u32) -> u32 {
     set.and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Runs so many simulated minutes and compares every counter.
+/// Runs a number of simulated minutes and compares every counter.
 fn soak<B: Far>(minutes: u32, far: impl FnOnce(&Scenario) -> B) {
     let first_tick = format!("run.first_tick={}", u32::MAX - TICKS_BEFORE_WRAP);
     let scenario = Scenario::load("hybrid-elbow-down", &[first_tick]).expect("valid overrides");
@@ -272,7 +273,7 @@ fn soak<B: Far>(minutes: u32, far: impl FnOnce(&Scenario) -> B) {
     let mut closed_loop = ClosedLoop::new(simulation, link);
     let start = Instant::now();
     for _ in 0..ticks {
-        closed_loop.tick(&mut ()).expect("the run goes on");
+        closed_loop.tick(&mut ()).expect("the run continues");
     }
     let (result, mut link) = closed_loop.finish();
     let (board_ticks, lapses) = link.far.counts();
@@ -292,7 +293,7 @@ fn soak<B: Far>(minutes: u32, far: impl FnOnce(&Scenario) -> B) {
     let read = ticks - u64::from(link.count(Fault::loses_the_frame));
     let read = read + u64::from(only(Fault::Repeated));
     assert_eq!(u64::from(board_ticks), read);
-    // Every bit that is flipped breaks the checksum or the framing.
+    // Every flipped bit breaks the checksum or the framing.
     let broken = only(Fault::Corrupted) + only(Fault::Garbage);
     assert_eq!(lapses.failed_checksums + lapses.garbage, broken);
     assert!(lapses.garbage >= only(Fault::Garbage));

@@ -1,4 +1,4 @@
-//! `painleve doctor`: what earlier runs have left, and what the machine gives to runs.
+//! `painleve doctor`: leftovers of earlier runs, and the machine's capabilities.
 
 use clap::Args;
 use comfy_table::Table;
@@ -16,13 +16,12 @@ use super::{CommandError, say};
 /// Options of `painleve doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArguments {
-    /// Remove what killed processes have left. What is in use, and what cannot be proved dead,
-    /// stays.
+    /// Remove what killed processes left behind. Anything in use, or not provably dead, is kept.
     #[arg(long)]
     repair: bool,
 }
 
-/// Surveys the machine, repairs first if asked to, and prints a table.
+/// Repairs first if requested, then surveys the machine and prints a table.
 pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     if arguments.repair {
         Survey::repair()?;
@@ -80,7 +79,7 @@ fn state(state: SegmentState) -> &'static str {
         SegmentState::InUse => "in use",
         SegmentState::Dead => "dead: --repair removes it",
         SegmentState::Unknown => {
-            "has no lock file, so that nothing proves it dead: --repair leaves it; remove it \
+            "no lock file, so it is not provably dead: --repair keeps it; remove it \
              yourself when no run is going on"
         }
     }
@@ -105,7 +104,7 @@ fn image() -> String {
     }
 }
 
-/// Limits, and the least that is useful.
+/// Limits, and the smallest sufficient values.
 const LIMITS: [(&str, Resource, u64); 4] = [
     ("open files (ulimit -n)", Resource::RLIMIT_NOFILE, 64),
     (
@@ -124,7 +123,7 @@ const LIMITS: [(&str, Resource, u64); 4] = [
 fn limit(resource: Resource, least: u64) -> String {
     match getrlimit(resource) {
         Ok((u64::MAX, _)) => "unlimited".into(),
-        Ok((most, _)) if most < least => format!("{most}: less than the {least} that are useful"),
+        Ok((most, _)) if most < least => format!("{most}: less than the sufficient {least}"),
         Ok((most, _)) => most.to_string(),
         Err(error) => error.to_string(),
     }

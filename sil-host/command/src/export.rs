@@ -13,12 +13,12 @@ use super::CommandError;
 /// Options of `painleve export`.
 #[derive(Debug, Args)]
 pub struct ExportArguments {
-    /// Record of a run, as in out/run.mcap.
+    /// Record of a run, for example out/run.mcap.
     record: PathBuf,
     /// Write CSV, by default beside the record.
     #[arg(long, value_name = "PATH", num_args = 0..=1, required_unless_present = "parquet")]
     csv: Option<Option<PathBuf>>,
-    /// Write Parquet, by default beside the record; needs the cargo feature parquet.
+    /// Write Parquet, by default beside the record; requires the cargo feature parquet.
     #[arg(long, value_name = "PATH", num_args = 0..=1)]
     parquet: Option<Option<PathBuf>>,
 }

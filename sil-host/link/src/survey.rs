@@ -1,7 +1,7 @@
-//! What there is of this user's buses, alive or dead, and the removal of what is dead.
+//! A survey of this user's buses, and the removal of dead ones.
 //!
-//! Nothing is called dead because no process can be found that uses it: processes of other
-//! PID namespaces cannot be found. Dead is what has a lock file on which nobody holds a lock.
+//! The survey does not rely on finding processes, because those of other PID namespaces cannot be
+//! found. A bus or segment is dead if it has a lock file and no process holds a lock on it.
 
 use std::fs;
 use std::io;
@@ -23,27 +23,27 @@ pub struct BusState {
     pub has_controller: bool,
 }
 
-/// Who uses shared memory.
+/// Use of a run's shared memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SegmentState {
     /// A process holds its lock.
     InUse,
-    /// It has a lock file, and nobody holds a lock on it.
+    /// There is a lock file, but no process holds a lock on it.
     Dead,
-    /// It has no lock file: nothing can be said.
+    /// There is no lock file, so the state is unknown.
     Unknown,
 }
 
 /// The shared memory of one run.
 #[derive(Clone, Debug)]
 pub struct Segments {
-    /// What the names of its files in `/dev/shm` begin with.
+    /// Prefix of the names of its files in `/dev/shm`.
     pub prefix: String,
-    /// Who uses it.
+    /// Its use.
     pub state: SegmentState,
 }
 
-/// What there is of this user's buses.
+/// This user's buses and shared memory.
 #[derive(Clone, Debug)]
 pub struct Survey {
     /// The folder of all buses.
@@ -55,7 +55,7 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Looks at the buses. Only the folder of all buses is made if there is none.
+    /// Surveys the buses. Creates only the folder of all buses, if it does not exist.
     ///
     /// # Errors
     /// [`LinkError::Folder`] if the folder of the buses or shared memory cannot be read.
@@ -83,8 +83,7 @@ impl Survey {
         })
     }
 
-    /// Removes what is dead: buses on which nobody is, and shared memory whose lock nobody
-    /// holds. Everything else stays.
+    /// Removes dead buses and shared memory, and keeps everything else.
     ///
     /// # Errors
     /// As [`Survey::take`].
@@ -92,7 +91,7 @@ impl Survey {
         let place = Place::of_user()?;
         remove_dead(&place);
         for prefix in prefixes(&place).map_err(|cause| refuse(&place, &cause))? {
-            // What cannot be removed is there in the next survey.
+            // The next survey shows what could not be removed.
             let _ = remove_if_dead(&prefix);
         }
         Ok(())
@@ -117,7 +116,7 @@ fn remove_if_dead(prefix: &str) -> io::Result<()> {
     let Some(lock) = lock_of(prefix) else {
         return Ok(());
     };
-    // Held while the segments go, so that nobody can begin to use them.
+    // Held during the removal, so that no process can begin to use the segments.
     if lock.try_hold(Role::Plant)? && lock.try_hold(Role::Controller)? {
         remove_segments(prefix)?;
     }

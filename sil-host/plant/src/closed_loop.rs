@@ -29,8 +29,8 @@ pub enum LoopError {
     Host(#[from] HostError),
     /// The controller's answer has a state or fault number unknown to this version.
     #[error(
-        "the controller answers with state {state} and fault {fault}, of which this version knows \
-         at least one not: use the same build on both sides"
+        "the controller answers with state {state} and fault {fault}, at least one of which \
+         is unknown to this version: use the same build on both sides"
     )]
     NotUnderstood {
         /// Number of its supervisor's state.

@@ -1,4 +1,4 @@
-//! The instants of the control ticks, on time or late at random.
+//! The times of the control ticks, with optional random jitter.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 /// Random stream of the lateness, separate from those of the noise channels.
 const STREAM: u64 = 0x4a69_7474_6572_0001;
 
-/// Tick number and instant of each tick.
+/// Number and time of each tick.
 #[derive(Clone, Debug)]
 pub struct TickClock {
     tick_hz: f64,
@@ -40,17 +40,17 @@ impl TickClock {
         self.tick
     }
 
-    /// Returns the instant that is `ticks` tick periods after this tick, but not after the next tick, s.
+    /// Returns the time that is `ticks` tick periods after this tick, limited to the next tick, s.
     pub fn after_s(&self, ticks: f64) -> f64 {
         self.at_s((self.late + ticks).min(1.0 + self.next_late))
     }
 
-    /// Returns the instant that is `ticks` tick periods before the next tick, but not before this tick, s.
+    /// Returns the time that is `ticks` tick periods before the next tick, limited to this tick, s.
     pub fn before_next_s(&self, ticks: f64) -> f64 {
         self.at_s((1.0 + self.next_late - ticks).max(self.late))
     }
 
-    /// Goes on to the next tick.
+    /// Advances to the next tick.
     pub fn advance(&mut self) {
         self.tick += 1;
         self.late = self.next_late;

@@ -97,8 +97,8 @@ fn source(folder: &Path, text: &mut String) {
     }
 }
 
-/// A name is a word of at least three parts in backticks, as `lift_off_limit_s`; a table may shorten the
-/// name of a test with an ellipsis.
+/// A name is a word of at least three parts in backticks, such as `lift_off_limit_s`; a table may
+/// shorten the name of a test with an ellipsis.
 #[test]
 fn names_in_the_pages_occur_in_the_source() {
     let mut text = String::new();

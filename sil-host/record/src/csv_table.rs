@@ -1,7 +1,7 @@
 //! A run as a CSV file: one row per control tick, one column per quantity.
 //!
-//! The first column is `time_s`; the others are named as the topics and fields of the MCAP file,
-//! `plant.tip_t_m` for example. A cell is empty where its quantity is not finite or not known.
+//! The first column is `time_s`; the others are named by topic and field of the MCAP file, for
+//! example `plant.tip_t_m`. A cell is empty if its quantity is not finite or unknown.
 
 use std::path::PathBuf;
 
@@ -38,7 +38,7 @@ pub fn row(tick: &Tick<'_>) -> Vec<String> {
     row
 }
 
-/// Returns the shortest decimal that gives the same number; nothing if it is not finite.
+/// Returns the shortest decimal that gives the same number; an empty string if it is not finite.
 pub(crate) fn decimal(value: impl serde::Serialize) -> String {
     match serde_json::to_string(&value) {
         Ok(text) if text != "null" => text,

@@ -10,11 +10,11 @@ use painleve_shared::status::{Fault, SupervisorState};
 pub struct RunEvent {
     /// Simulated time, s.
     pub time_s: f64,
-    /// What happened.
+    /// Kind of event.
     pub kind: EventKind,
 }
 
-/// What happened.
+/// Kind of event, with its details.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
     /// The tip hit the belt.
@@ -60,8 +60,8 @@ pub enum EventKind {
         /// Whether it is in progress.
         active: bool,
     },
-    /// From here on the estimates are not known: the answers are not those of this build's
-    /// controller, or ticks were lost by the clock.
+    /// The estimates are unknown from here on: the answers are not those of this build's
+    /// controller, or ticks were lost in real time.
     EstimatesEnd,
 }
 
@@ -159,7 +159,7 @@ pub struct ControllerEvents {
 }
 
 impl ControllerEvents {
-    /// Returns what has changed since the last sample.
+    /// Returns the changes since the last sample.
     pub fn take_in(&mut self, sample: &Sample) -> [Option<EventKind>; 4] {
         let answer = &sample.actuator;
         let before = self.clone();

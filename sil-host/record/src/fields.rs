@@ -15,7 +15,7 @@ pub struct Topic {
     pub name: &'static str,
     /// Name of the schema.
     pub schema: &'static str,
-    /// What the topic holds.
+    /// Description of the topic.
     pub description: &'static str,
     /// Its quantities.
     pub fields: &'static [Field],
@@ -28,7 +28,7 @@ pub struct Topic {
 pub struct Field {
     /// The name, with its unit.
     pub name: &'static str,
-    /// What it is, with its unit.
+    /// Description, with the unit.
     pub description: &'static str,
     /// Reads it from a tick.
     pub read: Read,

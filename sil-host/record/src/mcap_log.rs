@@ -29,12 +29,12 @@ use crate::scene::Scene;
 const FRAME_TRANSFORMS: &str = include_str!("foxglove/FrameTransforms.json");
 const SCENE_UPDATE: &str = include_str!("foxglove/SceneUpdate.json");
 
-/// What was recorded.
+/// Source of the recorded run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A simulated arm.
     Simulation,
-    /// A real arm; what no sensor measures is left out.
+    /// A real arm; quantities without a sensor are left out.
     Arm,
 }
 
@@ -266,7 +266,7 @@ impl Serialize for Message<'_> {
     }
 }
 
-/// An event as a message; what an event does not have is left out.
+/// Returns an event as a message without the fields that do not apply.
 fn event_message(event: &RunEvent) -> Value {
     let kind = event.kind;
     let mut message = json!({
@@ -294,7 +294,7 @@ fn event_schema() -> Value {
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "painleve.Event",
-        "description": "Something that happened at an instant of the run.",
+        "description": "An event of the run.",
         "type": "object",
         "properties": {
             "time_s": property("number", "Simulated time, s; exact, while log_time has whole nanoseconds."),

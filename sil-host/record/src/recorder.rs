@@ -72,13 +72,13 @@ pub struct Tick<'a> {
 
 /// A file, or part of one, made from the ticks of a run.
 pub trait Sink: Send {
-    /// Takes in one control tick.
+    /// Receives one control tick.
     ///
     /// # Errors
     /// [`RecordError`] ends the recording.
     fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError>;
 
-    /// Takes in an event; events and ticks come in order of time.
+    /// Receives an event; events and ticks arrive in order of time.
     ///
     /// # Errors
     /// [`RecordError`] ends the recording.
@@ -234,7 +234,7 @@ impl Drop for Recorder {
 }
 
 fn new_buffer() -> Vec<Entry> {
-    // Some room for events, which are handed over with the next tick.
+    // Additional room for events, which are passed on with the next tick.
     Vec::with_capacity(ENTRIES_PER_BUFFER + ENTRIES_PER_BUFFER / 8)
 }
 

@@ -1,10 +1,10 @@
 //! The controller's estimates, recomputed from the recorded frames.
 //!
-//! The controller's answers carry torque counts, state and flags, but not its estimates. The controller
-//! is deterministic and gives the same bits on every host, so a second controller that receives the same
-//! frames has the same estimates, wherever the first one runs. Its answers are compared with the
-//! recorded ones at every tick: where they differ the other controller is not this build's, or has lost
-//! ticks by the clock, and its estimates are not known.
+//! The controller's answers carry torque counts, state and flags, but not its estimates. The
+//! controller is deterministic and gives the same bits on every host, so a second controller that
+//! receives the same frames has the same estimates, wherever the first one runs. Its answers are
+//! compared with the recorded ones at every tick. If they differ, the other controller is not of
+//! this build or has lost ticks in real time, and its estimates are unknown.
 
 use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::sample::Sample;
@@ -27,8 +27,8 @@ impl Replica {
         })
     }
 
-    /// Runs the tick of a sample. Returns whether the answer agrees with the recorded one, as far
-    /// as there is one.
+    /// Runs the tick of a sample. Returns whether the answer agrees with the recorded one, if there
+    /// is one.
     pub fn follow(&mut self, sample: &Sample) -> bool {
         if !sample.delivered {
             return true;
@@ -45,7 +45,7 @@ impl Replica {
     }
 }
 
-/// The part of an answer that tells one controller from another.
+/// Returns the part of an answer that distinguishes controllers.
 fn essence(answer: &ActuatorFrame) -> impl PartialEq {
     (answer.torques, answer.state, answer.fault, answer.flags)
 }

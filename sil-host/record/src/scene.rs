@@ -53,11 +53,11 @@ impl Scene {
         }
     }
 
-    /// Takes in a tick; returns a picture 60 times a second.
+    /// Receives a tick; returns a picture 60 times a second.
     pub fn tick(&mut self, tick: &Tick<'_>) -> Option<Picture> {
         let plant = &tick.sample.plant;
         let elapsed_s = plant.time_s - self.last_s.unwrap_or(plant.time_s);
-        // Not known on a real arm.
+        // Unknown on a real arm.
         if plant.belt_speed_m_s.is_finite() {
             self.travel_m += plant.belt_speed_m_s * elapsed_s;
         }
@@ -154,7 +154,7 @@ fn link(length_m: f64) -> Primitives {
 /// The belt's force on the tip, as an arrow that starts there.
 fn force(plant: &painleve_plant::Snapshot) -> Primitives {
     let force_n = plant.tangential_force_n.hypot(plant.normal_force_n);
-    // At an impact without collision the force has no bound; the arrow has.
+    // At an impact without collision the force is unbounded; the length of the arrow is limited.
     let length_m = (ARROW_M_PER_N * force_n).min(1.0);
     if !length_m.is_finite() || length_m <= 1e-6 {
         return Primitives::default();

@@ -1,11 +1,11 @@
-//! A run as a page in the browser: arm and belt that move, strip charts, states, events.
+//! A run as a browser page: moving arm and belt, strip charts, states, events.
 //!
-//! - [`row`]: what the page shows of a tick, as bytes
-//! - [`thinning`]: at most so many rows, with the extremes of the contact force kept
+//! - [`row`]: the data of one tick for the page, as bytes
+//! - [`thinning`]: limits the number of rows and keeps the extremes of the contact force
 //! - [`page`]: the page of a recorded run as one file that needs no network
 //! - [`server`]: the page of a run that goes on, served to this machine
 //!
-//! `page/` holds the page itself; its scripts are plain, so nothing has to be built.
+//! `page/` contains the page itself; its scripts need no build step.
 
 pub mod page;
 pub mod row;

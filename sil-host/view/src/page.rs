@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::row::{BYTE_COLUMNS, COLUMNS, ROW_BYTES, Row};
 use crate::thinning::Thinned;
 
-/// Events listed one by one; the others are counted.
+/// Number of events listed individually; further ones are counted.
 const LISTED_EVENTS: usize = 1000;
 
 const TEMPLATE: &str = include_str!("../page/index.html");
@@ -30,11 +30,12 @@ const SCRIPTS: [&str; 5] = [
     include_str!("../page/app.js"),
 ];
 
-/// Returns the page of a run; `run` is [`description`], with rows and events if the run is recorded.
+/// Returns the page of a run; `run` is [`description`], with rows and events if the run is
+/// recorded.
 pub fn html(run: &Value) -> String {
-    // In a script element only `</` and `<!--` have a meaning; JSON may write `<` as an escape.
+    // In a script element only `</` and `<!--` are special; JSON can escape `<`.
     let run = run.to_string().replace('<', "\\u003c");
-    // From the end to the start, so that no part that is put in is searched for the next place.
+    // From the end to the start, so that inserted parts are not searched for further placeholders.
     TEMPLATE
         .replacen("/*{{program}}*/", &SCRIPTS.join("\n"), 1)
         .replacen("/*{{uplot}}*/", UPLOT, 1)
@@ -42,7 +43,7 @@ pub fn html(run: &Value) -> String {
         .replacen("/*{{styles}}*/", &STYLES.join("\n"), 1)
 }
 
-/// Returns what the page shows of a scenario, and how its rows are laid out.
+/// Returns the description of a scenario for the page, including the layout of its rows.
 pub fn description(scenario: &Scenario) -> Value {
     json!({
         "name": scenario.name,
@@ -69,11 +70,11 @@ pub struct BeltTravel {
 }
 
 impl BeltTravel {
-    /// Moves on to a tick and returns the distance since the first one, m.
+    /// Advances to a tick and returns the distance since the first one, m.
     pub fn advance(&mut self, tick: &Tick<'_>) -> f64 {
         let plant = &tick.sample.plant;
         let elapsed_s = plant.time_s - self.last_s.unwrap_or(plant.time_s);
-        // Not known on a real arm.
+        // Unknown on a real arm.
         if plant.belt_speed_m_s.is_finite() {
             self.travel_m += plant.belt_speed_m_s * elapsed_s;
         }

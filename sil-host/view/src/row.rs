@@ -1,8 +1,8 @@
-//! One tick as the page shows it: a time, numbers and single bytes, little-endian.
+//! One tick for the page: a time, numbers and single bytes, little-endian.
 
 use painleve_record::Tick;
 
-/// Names of the numbers, in their order; 4 bytes each. A number that is not known is NaN.
+/// Names of the numbers, in order; 4 bytes each. Unknown numbers are NaN.
 pub const COLUMNS: [&str; 18] = [
     "theta1_rad",
     "theta2_rad",
@@ -30,7 +30,7 @@ pub const BYTE_COLUMNS: [&str; 4] = ["mode", "state", "fault", "flags"];
 /// Bytes of a row.
 pub const ROW_BYTES: usize = 8 + 4 * COLUMNS.len() + BYTE_COLUMNS.len();
 
-/// What the page shows of a tick.
+/// Data of one tick for the page.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     /// Simulated time, s.
@@ -79,7 +79,7 @@ impl Row {
                 plant.mode as u8,
                 answer.state,
                 answer.fault,
-                // The first eight flags; there are no others.
+                // The lower eight flags; there are no others.
                 answer.flags.0 as u8,
             ],
         }

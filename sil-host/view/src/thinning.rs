@@ -1,8 +1,8 @@
-//! A bounded number of rows that stands for a run of any length.
+//! Limits the number of rows of a run of any length.
 //!
-//! While a run is short every tick is a row. When there is no more room, blocks of rows are replaced by
-//! the two with the least and the greatest normal force: lift-offs and impacts stay visible, and every
-//! row is a state that the run was in.
+//! In a short run every tick is a row. When the limit is reached, blocks of rows are replaced by
+//! the two with the smallest and the largest normal force. Lift-offs and impacts stay visible, and
+//! every remaining row is an actual state of the run.
 
 use crate::row::Row;
 
@@ -19,7 +19,7 @@ pub struct Thinned {
     ends: Option<[Row; 2]>,
 }
 
-/// The extremes of some rows in a row.
+/// The extremes of consecutive rows.
 #[derive(Clone, Copy, Debug, Default)]
 struct Block {
     length: usize,

@@ -1,5 +1,5 @@
-//! `painleve drive` end to end: the program on one end of a pseudo-terminal, the image that is flashed on the
-//! other, with the simulated arm on its sensors and stages.
+//! `painleve drive` end to end: the program is at one end of a pseudo-terminal, the flashed image
+//! at the other, with the simulated arm on its sensors and stages.
 
 #![allow(clippy::unwrap_used)]
 
@@ -25,7 +25,7 @@ use painleve_tests::{errors, signal};
 const DEFAULT: &str = "hybrid-elbow-down";
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// What the rig's threads share.
+/// State shared by the rig's threads.
 #[derive(Default)]
 struct Observed {
     switch_closed: AtomicBool,
@@ -39,7 +39,7 @@ struct Observed {
     sent: AtomicUsize,
 }
 
-/// The emulated board with its arm, in a thread of its own, no faster than the clock.
+/// The emulated board with its arm in its own thread, no faster than real time.
 struct Rig {
     port: PathBuf,
     observed: Arc<Observed>,
@@ -49,7 +49,7 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        // Building it takes longer than the board starts.
+        // Building the program takes longer than the board's start.
         painleve_tests::program();
         let (near, far, port) = terminal();
         let observed = Arc::new(Observed::default());
@@ -77,7 +77,7 @@ impl Rig {
 
     /// Waits until the board is configured and has read its sensors for more than 100 ticks.
     fn wait_for_work(&self) {
-        self.wait_until("the board works", |rig| {
+        self.wait_until("the board runs", |rig| {
             rig.observed.sent.load(Ordering::SeqCst) > 6000
         });
     }
@@ -85,7 +85,7 @@ impl Rig {
     fn wait_until(&self, what: &str, is_met: impl Fn(&Self) -> bool) {
         let start = Instant::now();
         while !is_met(self) {
-            assert!(start.elapsed() < LIMIT, "waited in vain until {what}");
+            assert!(start.elapsed() < LIMIT, "timed out waiting until {what}");
             std::thread::sleep(Duration::from_millis(5));
         }
     }
@@ -135,7 +135,7 @@ fn is_readable(line: &File) -> bool {
     matches!(poll(&mut ends, PollTimeout::ZERO), Ok(1..))
 }
 
-/// `painleve drive` at work.
+/// A running `painleve drive`.
 struct Program {
     child: Child,
     folder: painleve_tests::Bench,
@@ -175,7 +175,7 @@ fn report(output: &Output) -> serde_json::Value {
 fn an_arm_is_driven_after_the_order_and_the_switch_and_recorded() {
     let rig = Rig::new();
     let mut program = Program::start(&rig.port, &["--record", "drive.mcap"]);
-    // The switch alone arms nothing.
+    // The switch alone does not arm the drive.
     rig.wait_for_work();
     rig.close_switch();
     let ticks = rig.ticks();
@@ -186,7 +186,9 @@ fn an_arm_is_driven_after_the_order_and_the_switch_and_recorded() {
     program.order("arm");
     rig.wait_until("the arm is driven", Rig::is_on);
     let ticks = rig.ticks();
-    rig.wait_until("it has been for a while", |rig| rig.ticks() > ticks + 300);
+    rig.wait_until("it has been driven for a while", |rig| {
+        rig.ticks() > ticks + 300
+    });
     assert!(rig.is_on());
     program.order("disarm");
     rig.wait_until("the torque is off", |rig| !rig.is_on());
@@ -244,7 +246,7 @@ fn ctrl_c_and_a_killed_program_take_the_torque_off() {
     }
 }
 
-/// A board of other sources answers; nothing is configured.
+/// A board of another build answers; nothing is configured.
 #[test]
 fn another_build_or_protocol_is_refused_and_both_are_named() {
     let build = painleve_firmware::BUILD;

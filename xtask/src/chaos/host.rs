@@ -27,7 +27,7 @@ const EMULATOR: &str = "qemu-system-arm";
 /// Kind of host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ChaosHost {
-    /// The controller in a process of its own.
+    /// The controller in its own process.
     Native,
     /// The image under QEMU.
     Qemu,
@@ -35,7 +35,7 @@ pub enum ChaosHost {
     Serial,
 }
 
-/// A host that commands can name.
+/// A running host with its command-line arguments.
 pub struct ControllerHost {
     kind: ChaosHost,
     /// Path of the image, or of the port.
@@ -44,10 +44,10 @@ pub struct ControllerHost {
 }
 
 impl ControllerHost {
-    /// Starts what the host needs.
+    /// Starts the processes of the host.
     ///
     /// # Errors
-    /// If there is no emulator.
+    /// If the emulator is not installed.
     pub fn start(kind: ChaosHost) -> io::Result<Self> {
         let (path, board) = match kind {
             ChaosHost::Native => (String::new(), None),
@@ -67,7 +67,7 @@ impl ControllerHost {
         })
     }
 
-    /// Arguments that start the controller's process.
+    /// Returns the arguments that start the controller's process.
     pub fn controller(&self) -> Vec<&str> {
         match self.kind {
             ChaosHost::Native => vec!["controller"],
@@ -76,7 +76,7 @@ impl ControllerHost {
         }
     }
 
-    /// Arguments that start a run.
+    /// Returns the arguments that start a run.
     pub fn run(&self) -> Vec<&str> {
         match self.kind {
             ChaosHost::Native => vec!["run"],
@@ -85,8 +85,9 @@ impl ControllerHost {
         }
     }
 
-    /// What must be the same in every undisturbed run: the hash of all frames. Over a serial line
-    /// a repeated request has a sequence number of its own, so there it is what the arm did.
+    /// Returns the part of a report that is the same in every undisturbed run: the hash of all
+    /// frames. Over a serial line a repeated request has a different sequence number; there it is
+    /// the motion of the arm.
     pub fn course(&self, report: &str) -> Option<String> {
         let report: Value = serde_json::from_str(report).ok()?;
         if self.kind != ChaosHost::Serial {
@@ -101,7 +102,7 @@ impl ControllerHost {
 struct SerialBoard {
     emulator: Child,
     port: String,
-    /// Kept open: with nobody at this end the emulator drops what the board sends.
+    /// Kept open, because the emulator drops the board's output while this end is closed.
     _end: File,
 }
 
@@ -128,7 +129,7 @@ impl SerialBoard {
             .find(|word| word.starts_with("/dev/"));
         let port = port.ok_or_else(|| io::Error::other(format!("{EMULATOR}: {line}")))?;
         let port = port.to_owned();
-        // What the image logs must not fill the pipe.
+        // The image's log must not fill the pipe.
         std::thread::spawn(move || io::copy(&mut output, &mut io::sink()));
         let end = open(Path::new(&port))?;
         Ok(Self {
@@ -159,7 +160,7 @@ fn open(port: &Path) -> io::Result<File> {
     Ok(end)
 }
 
-/// Disturbs the emulator of a run, `plan.call` milliseconds after it has come up.
+/// Disturbs the emulator of a run, `plan.call` milliseconds after its start.
 pub fn disturb_emulator(
     place: &ChaosFolder,
     bus: &str,
@@ -184,7 +185,7 @@ pub fn disturb_emulator(
         let (code, text) = run.outcome();
         judge("the run", code, &text, &mut findings);
     } else {
-        findings.push((Flaw::Hang, "the run goes on".into()));
+        findings.push((Flaw::Hang, "the run does not end".into()));
     }
     orphans(place, disturbed + expected.end, &mut findings);
     next_run(place, bus, expected, &mut findings)?;

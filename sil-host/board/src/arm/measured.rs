@@ -27,8 +27,8 @@ impl Measured {
         })
     }
 
-    /// Returns a tick as it is recorded. Angles, tip, gap, forces and torques are measured or commanded;
-    /// what no sensor measures is NaN.
+    /// Returns a tick as it is recorded. Angles, tip, gap, forces and torques are measured or
+    /// commanded; quantities without a sensor are NaN.
     pub fn sample(&self, sensor: &SensorFrame, answer: &ActuatorFrame) -> Sample {
         let reference_tip_t_m = match answer.supervisor_state() {
             Some(SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff) => {
@@ -95,10 +95,10 @@ mod tests {
     use painleve_plant::simulation::Simulation;
     use painleve_plant::statistics::Statistics;
 
-    /// The simulated arm's counts, scaled back, are the arm within a count.
+    /// The simulated arm's counts, scaled back, agree with the arm within a count.
     #[test]
     #[allow(clippy::unwrap_used)]
-    fn counts_become_the_arm_that_gave_them() {
+    fn scaled_counts_agree_with_the_arm() {
         let scenario = Scenario::default();
         let configuration = scenario.controller_configuration();
         let measured = Measured::new(&configuration).unwrap();

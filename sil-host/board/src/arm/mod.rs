@@ -1,7 +1,8 @@
-//! A board that drives a real arm by its own sensors: the host watches, permits arming and stops it.
+//! A board that drives a real arm with its own sensors: the host monitors it, permits arming and
+//! stops it.
 //!
-//! The controller runs on the board. The host sends a heartbeat; the board stops when it has heard nothing
-//! for 200 ms, and the host reports a board that has sent nothing for [`SILENCE_LIMIT`].
+//! The controller runs on the board. The host sends heartbeats; the board stops after 200 ms
+//! without one, and the host reports a board that has been silent for [`SILENCE_LIMIT`].
 
 mod measured;
 
@@ -19,15 +20,15 @@ use crate::{BoardError, ConnectedBoard, LineHealth, Serial};
 /// Time between two heartbeats: three may be lost before the board stops.
 const HEARTBEAT: Duration = Duration::from_millis(50);
 
-/// How long a board at work may send nothing.
+/// Longest silence of a running board.
 pub const SILENCE_LIMIT: Duration = Duration::from_millis(500);
 
-/// What a board at work sends.
+/// Messages from a running board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArmEvent {
     /// One control tick.
     Tick {
-        /// The board's readings; `None` if a fault has taken the torque off without any.
+        /// The board's readings; `None` if a fault has removed the torque without any.
         sensor: Option<SensorFrame>,
         /// The controller's answer.
         answer: ActuatorFrame,
@@ -41,9 +42,9 @@ pub enum ArmEvent {
 /// A board with an arm. Dropping it stops the drive, if the line still carries the request.
 pub struct Arm {
     serial: Serial,
-    /// When the last heartbeat was sent.
+    /// Time of the last heartbeat.
     heartbeat: Instant,
-    /// When the board last sent anything.
+    /// Time of the board's last message.
     heard: Instant,
 }
 
@@ -75,8 +76,8 @@ impl Arm {
         })
     }
 
-    /// Asks the board to permit or forbid arming; answered by [`ArmEvent::Permission`]. The drive arms when
-    /// its switch has been opened and closed as well.
+    /// Asks the board to permit or forbid arming; the answer is [`ArmEvent::Permission`]. The drive
+    /// arms only after its switch has also been opened and closed.
     ///
     /// # Errors
     /// [`BoardError::System`] if the port fails.
@@ -84,7 +85,7 @@ impl Arm {
         self.serial.send(&Request::PermitArming(permitted))
     }
 
-    /// Asks for the board's counters; answered by [`ArmEvent::Health`].
+    /// Requests the board's counters; the answer is [`ArmEvent::Health`].
     ///
     /// # Errors
     /// [`BoardError::System`] if the port fails.
@@ -92,10 +93,11 @@ impl Arm {
         self.serial.send(&Request::Health)
     }
 
-    /// Waits for what the board sends next, at most `limit`; sends heartbeats. `None` if nothing has come.
+    /// Waits for the board's next message for at most `limit`, and sends heartbeats meanwhile.
+    /// Returns `None` if no message arrives.
     ///
     /// # Errors
-    /// [`BoardError::Silent`] if the board has sent nothing for [`SILENCE_LIMIT`], and
+    /// [`BoardError::Silent`] if the board has been silent for [`SILENCE_LIMIT`], and
     /// [`BoardError::System`] if the port fails.
     pub fn next_event(&mut self, limit: Duration) -> Result<Option<ArmEvent>, BoardError> {
         let start = Instant::now();
@@ -136,7 +138,7 @@ impl Arm {
         self.serial.line().unwrap_or_default()
     }
 
-    /// Takes the torque off, and waits until the board has confirmed it.
+    /// Removes the torque, and waits until the board has confirmed it.
     ///
     /// # Errors
     /// [`BoardError::Silent`] if the board does not answer.

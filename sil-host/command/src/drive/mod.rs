@@ -1,4 +1,4 @@
-//! `painleve drive`: a real arm on a board's own sensors and torque stages.
+//! `painleve drive`: a real arm with a board's own sensors and torque stages.
 
 mod operator;
 mod view;
@@ -21,7 +21,7 @@ use self::operator::{Operator, Order};
 use self::view::View;
 use super::{CommandError, say};
 
-/// How long to wait for the board before looking at operator and signals again.
+/// Longest wait for the board before checking for operator commands and signals.
 const PATIENCE: Duration = Duration::from_millis(20);
 
 /// Time between two requests for the board's counters.
@@ -33,22 +33,23 @@ pub struct DriveArguments {
     /// Built-in scenario or TOML file with the arm's configuration.
     #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
     scenario: String,
-    /// Override one key, as in controller.torque_limit_nm=0.5; may be repeated.
+    /// Override one key, for example controller.torque_limit_nm=0.5; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Serial port of the board, as in /dev/ttyUSB0.
+    /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH")]
     port: PathBuf,
     /// Run the controller on the arm's sensors with the torque stages off.
     #[arg(long)]
     dry_run: bool,
-    /// Stop after this time on the board's clock; without it, on Ctrl-C or the order `stop`.
+    /// Stop after this time on the board's clock; by default, run until Ctrl-C or the command
+    /// `stop`.
     #[arg(long, value_name = "SECONDS", value_parser = super::seconds)]
     duration: Option<f64>,
     /// Record of every tick, for Foxglove and PlotJuggler.
     #[arg(long, value_name = "PATH", default_value = "out/drive.mcap")]
     record: PathBuf,
-    /// Write no record.
+    /// Do not write a record.
     #[arg(long, conflicts_with = "record")]
     no_record: bool,
     /// Print one JSON object on stdout at the end instead of the table.
@@ -73,14 +74,14 @@ struct DriveReport {
     fault: u8,
 }
 
-/// Connects to the board, configures it, and watches it until the operator stops it.
+/// Connects to the board, configures it, and monitors it until the operator stops it.
 pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     let scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let interrupt = Interrupt::catch()?;
     let mut recorder = recorder(arguments, &scenario)?;
     let mut drive = Drive::open(arguments, &scenario)?;
     let watched = drive.watch(arguments, &interrupt, &mut recorder);
-    // Whatever has ended the drive, the torque goes off; a board that is gone stops by itself.
+    // Whatever ended the drive, remove the torque; a board that cannot be reached stops by itself.
     let stopped = drive.arm.stop();
     drive.view.finish();
     if let Err(error) = watched.and(stopped.map_err(CommandError::from)) {
@@ -107,7 +108,7 @@ fn output(error: impl std::fmt::Display) -> CommandError {
     CommandError::Output(error.to_string())
 }
 
-/// Opens the record, so that a path that cannot be written is known before anything moves.
+/// Opens the record, so that an unwritable path is reported before anything moves.
 fn recorder(
     arguments: &DriveArguments,
     scenario: &Scenario,
@@ -130,11 +131,13 @@ fn keep_partial(recorder: Option<Recorder>, reason: &str) {
                 warn(format_args!("the partial record is in {}", path.display()));
             }
         }
-        Some(Err(error)) => warn(format_args!("no record is kept: {error}")),
+        Some(Err(error)) => warn(format_args!(
+            "the partial record could not be kept: {error}"
+        )),
     }
 }
 
-/// A board at work and what is known about it.
+/// A running board and its record.
 struct Drive {
     arm: Arm,
     measured: Measured,
@@ -176,7 +179,8 @@ impl Drive {
         })
     }
 
-    /// Passes orders to the board and records its ticks, until an order, a signal or the time ends it.
+    /// Passes commands to the board and records its ticks, until a command, a signal or the time
+    /// limit ends it.
     fn watch(
         &mut self,
         arguments: &DriveArguments,
@@ -228,7 +232,7 @@ impl Drive {
     ) -> Result<(), CommandError> {
         if !answer.is_understood() {
             return Err(CommandError::Process(format!(
-                "the board answers with state {} and fault {}, of which this version does not know at least one",
+                "the board answers with state {} and fault {}, at least one of which is unknown to this version",
                 answer.state, answer.fault
             )));
         }

@@ -32,10 +32,10 @@ impl Order {
 pub struct Operator(Receiver<Order>);
 
 impl Operator {
-    /// Reads standard input from now on. Its end is not an order: the drive goes on.
+    /// Starts reading standard input. Its end is not a command: the drive continues.
     ///
     /// # Errors
-    /// If the system refuses a thread.
+    /// If the thread cannot be started.
     pub fn listen() -> io::Result<Self> {
         let (sender, receiver) = channel();
         std::thread::Builder::new().spawn(move || {

@@ -1,5 +1,5 @@
-//! The live table of a drive: on a terminal it is redrawn in place; elsewhere each change of state, fault or
-//! permission is one line.
+//! The live table of a drive: a terminal shows it in place; elsewhere each change of state, fault
+//! or permission is one line.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ pub fn is_active(state: SupervisorState) -> bool {
 
 /// The table.
 pub struct View {
-    /// `None` where standard error is not a terminal.
+    /// `None` if standard error is not a terminal.
     table: Option<ProgressBar>,
     drawn: Option<Instant>,
     permitted: bool,
@@ -34,7 +34,7 @@ pub struct View {
 }
 
 impl View {
-    /// Makes an empty table.
+    /// Creates an empty table.
     pub fn new() -> Self {
         let table = std::io::stderr().is_terminal().then(|| {
             let table = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
@@ -83,7 +83,7 @@ impl View {
         );
     }
 
-    /// Shows an answer that came without readings.
+    /// Shows an answer without readings.
     pub fn show_answer(&mut self, answer: &ActuatorFrame) {
         let now = (answer.state, answer.fault);
         if self.reported.replace(now) != Some(now) {
@@ -106,7 +106,7 @@ impl View {
         }
     }
 
-    /// Leaves the last table on the terminal.
+    /// Keeps the last table on the terminal.
     pub fn finish(&mut self) {
         if let Some(table) = self.table.take() {
             table.abandon();
@@ -121,7 +121,7 @@ impl View {
     }
 }
 
-/// State and fault in words.
+/// Returns state and fault in words.
 fn status(answer: &ActuatorFrame) -> String {
     let state = answer
         .supervisor_state()

@@ -1,4 +1,4 @@
-//! Both ends of a bus against a model, under random sequences of what plants and controllers do.
+//! Both ends of a bus compared with a model, under random sequences of actions.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -9,7 +9,7 @@ use proptest_state_machine::{ReferenceStateMachine, StateMachineTest, prop_state
 
 use super::*;
 
-/// What the two ends may do.
+/// Actions of the two ends.
 #[derive(Clone, Copy, Debug)]
 enum Step {
     StartPlant,
@@ -17,13 +17,13 @@ enum Step {
     /// A controller starts while the plant waits for one.
     Join,
     StartSecondController,
-    /// The plant sends so many frames.
+    /// The plant sends this number of frames.
     Send(u32),
     /// The controller receives.
     Receive,
-    /// The controller sends so many answers.
+    /// The controller sends this number of answers.
     Answer(u32),
-    /// The plant takes an answer without waiting.
+    /// The plant polls for an answer.
     TakeAnswer,
     /// One lockstep tick.
     Exchange,
@@ -39,7 +39,7 @@ enum Left {
     WithoutEnd,
 }
 
-/// A controller, and what is under way to it.
+/// A controller, and the messages in transit to it.
 #[derive(Clone, Debug, Default)]
 struct Joined {
     frames: VecDeque<u32>,
@@ -50,15 +50,15 @@ struct Joined {
 struct BusModel {
     has_plant: bool,
     controller: Option<Joined>,
-    /// Under way to the plant.
+    /// Answers in transit to the plant.
     answers: VecDeque<u32>,
     /// Number of the next frame and of the next answer.
     next: u32,
-    /// What the last step must have given.
+    /// Expected outcome of the last step.
     expected: Outcome,
 }
 
-/// What a step has given.
+/// Outcome of a step.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 enum Outcome {
     #[default]
@@ -69,11 +69,12 @@ enum Outcome {
     PlantGone,
     Answer(u32),
     NoAnswer,
-    /// Nothing, or that the controller is gone: the plant looks only now and then.
+    /// Either no answer, or an error that the controller is gone: the plant checks only
+    /// occasionally.
     NoAnswerOrGone,
 }
 
-/// Adds to a queue of which the oldest is dropped when it is full.
+/// Appends to a queue that drops its oldest entry when it is full.
 fn push(queue: &mut VecDeque<u32>, tick: u32) {
     queue.push_back(tick);
     if queue.len() > FRAME_BUFFER {
@@ -93,7 +94,7 @@ impl BusModel {
             Step::EndPlant | Step::DropPlant => self.has_plant,
             Step::Join => self.has_plant && self.controller.is_none(),
             Step::StartSecondController => self.is_joined(),
-            // Otherwise it would wait.
+            // Otherwise it would block.
             Step::Receive => (self.controller.as_ref())
                 .is_some_and(|joined| !joined.frames.is_empty() || joined.plant_left.is_some()),
             Step::Answer(_) => self.is_joined(),
@@ -198,7 +199,7 @@ impl ReferenceStateMachine for BusReference {
             .collect();
         (prop::sample::select(allowed), 1..6_u32, 0..many)
             .prop_map(|(step, few, many)| {
-                // A burst now and then.
+                // An occasional burst.
                 let count = if few == 1 { many } else { few };
                 match step {
                     Step::Send(_) => Step::Send(count),
@@ -219,7 +220,7 @@ impl ReferenceStateMachine for BusReference {
     }
 }
 
-/// The controller's end stays in the thread that has made it.
+/// The controller's end stays in the thread that created it.
 struct ControllerThread {
     orders: Sender<Order>,
     outcomes: Receiver<Outcome>,
@@ -390,7 +391,7 @@ impl StateMachineTest for BusTest {
         ends
     }
 
-    /// Nothing stays, whoever leaves first.
+    /// Checks that nothing remains, whichever end leaves first.
     fn teardown(mut ends: Ends, model: BusModel) {
         if model.next.is_multiple_of(2) {
             drop(ends.plant.take());
@@ -403,7 +404,7 @@ impl StateMachineTest for BusTest {
     }
 }
 
-/// Some steps wait until a peer is found missing, so that a case takes a while.
+/// Some steps wait until a peer is found missing, so each case takes a while.
 const CASES: u32 = 24;
 
 fn config() -> ProptestConfig {
@@ -418,5 +419,5 @@ prop_state_machine! {
     #![proptest_config(config())]
 
     #[test]
-    fn both_ends_do_what_their_model_does(sequential 1..40 => BusTest);
+    fn both_ends_agree_with_their_model(sequential 1..40 => BusTest);
 }

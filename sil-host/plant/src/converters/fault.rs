@@ -1,7 +1,7 @@
 //! Timed faults of single channels, of the kinds that PX4 injects: off, stuck, wrong, slow, delayed and intermittent.
 //!
-//! A fault acts on the counts of its channel from one time to another. It never shows in the frame itself: the
-//! controller has to find out.
+//! A fault acts on the counts of its channel from one time to another. The frame does not reveal
+//! it; the controller has to detect it.
 
 use std::collections::VecDeque;
 
@@ -32,7 +32,8 @@ settings! {
             /// End.
             until_s: f64, 0.0..=1e7, "s";
         },
-        /// A constant is added; sums beyond the range saturate, those of an encoder go on around the turn.
+        /// A constant is added; sums beyond the range saturate, and those of an encoder wrap around
+        /// the turn.
         "wrong" => Wrong {
             /// Start.
             from_s: f64, 0.0..=1e7, "s";
@@ -50,7 +51,7 @@ settings! {
             /// Period.
             period_s: f64, 1e-6..=1e3, "s";
         },
-        /// The value is late by a constant time.
+        /// The value is delayed by a constant time.
         "delayed" => Delayed {
             /// Start.
             from_s: f64, 0.0..=1e7, "s";
@@ -59,15 +60,15 @@ settings! {
             /// The time, rounded to whole ticks.
             delay_s: f64, 0.0..=10.0, "s";
         },
-        /// The channel is off at random.
+        /// The channel is randomly off.
         "intermittent" => Intermittent {
             /// Start.
             from_s: f64, 0.0..=1e7, "s";
             /// End.
             until_s: f64, 0.0..=1e7, "s";
-            /// How long it stays on or off before that is drawn again.
+            /// Time for which the channel stays on or off before the next random draw.
             interval_s: f64, 1e-6..=1e3, "s";
-            /// Probability that it is off.
+            /// Probability that the channel is off.
             off_share: f64, 0.0..=1.0;
         },
     }
@@ -141,9 +142,9 @@ pub struct FaultyChannel {
     /// Counts of full scale.
     full_scale: i64,
     generator: Pcg64,
-    /// The value that a stuck or slow channel shows, or a channel before its fault.
+    /// Value of a stuck or slow channel, or of a channel before its fault.
     held: i64,
-    /// When a slow channel changes or an intermittent one is drawn next, s.
+    /// Time of the next change of a slow channel or of the next draw of an intermittent one, s.
     next_s: f64,
     is_off: bool,
     /// Past values of a delayed channel, the oldest first.
@@ -152,8 +153,8 @@ pub struct FaultyChannel {
 }
 
 impl FaultyChannel {
-    /// Creates a channel of `full_scale` counts that passes a value every `tick_s` seconds; `index` tells the
-    /// channels of equal seeds apart.
+    /// Creates a channel of `full_scale` counts that passes a value every `tick_s` seconds; `index`
+    /// distinguishes channels with equal seeds.
     pub fn new(fault: &ChannelFault, full_scale: i64, tick_s: f64, seed: u64, index: u64) -> Self {
         let delay_ticks = match *fault {
             ChannelFault::Delayed { delay_s, .. } => (delay_s / tick_s).round() as usize,
@@ -221,7 +222,8 @@ mod tests {
 
     const TICK_S: f64 = 0.001;
 
-    /// What a channel makes of the counts 100, 101, 102 … with a fault from 3 ms to 7 ms.
+    /// Returns the output of a channel for the counts 100, 101, 102 … with a fault from 3 ms to
+    /// 7 ms.
     fn passed(fault: ChannelFault) -> Vec<i64> {
         let mut channel = FaultyChannel::new(&fault, 1000, TICK_S, 1, 0);
         (0..10)
@@ -277,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn an_intermittent_channel_is_off_for_its_share_of_the_time_and_repeatably() {
+    fn an_intermittent_channel_is_off_with_its_probability_and_repeatable() {
         let fault = ChannelFault::Intermittent {
             from_s: 0.0,
             until_s: 1e6,
@@ -294,7 +296,7 @@ mod tests {
         assert!((28_000..32_000).contains(&off), "{off}");
         assert_eq!(first, values(1));
         assert_ne!(first, values(2));
-        // It stays on or off for ten ticks.
+        // The channel stays on or off for ten ticks.
         let changes = first.windows(2).filter(|pair| pair[0] != pair[1]).count();
         assert!(changes < 10_000 / 2, "{changes}");
     }

@@ -1,4 +1,4 @@
-//! Errors between the torque that is commanded and the torque at the joint.
+//! Errors between the commanded torque and the torque at the joint.
 //!
 //! τ = (1 + g) D(u) (1 + r sin nθ) + c sin nθ + τ_pulse, with the dead zone D, the joint angle θ and n periods in a turn.
 //! It is evaluated where the torque changes, once per tick, and held until the next change.
@@ -13,7 +13,8 @@ settings! {
     pub struct TorqueErrorSettings {
         /// Relative error g of the gain of each joint.
         gain: [f64; 2] = [0.0; 2], -1.0..=10.0;
-        /// Dead zone: a commanded torque is smaller by this amount, and none below it.
+        /// Dead zone: reduces the magnitude of a commanded torque by this amount, to zero for
+        /// smaller torques.
         dead_zone_nm: f64 = 0.0, 0.0..=1e6, "N·m";
         /// Amplitude r of the ripple relative to the torque.
         ripple: f64 = 0.0, 0.0..=1.0;

@@ -84,7 +84,7 @@ fn every_message_satisfies_its_schema_also_without_a_reference() {
                 ("jsonschema", "json")
             );
             let mut json: Value = serde_json::from_slice(&schema.data).unwrap();
-            // Nothing else than what the schema names.
+            // The message has no fields beyond the schema.
             if schema.name.starts_with("painleve") {
                 json["additionalProperties"] = json!(false);
             }

@@ -13,11 +13,12 @@ const MOST_ROWS: usize = 1_000_000;
 /// Largest change of friction.
 const LARGEST_CHANGE: f64 = 2.0;
 
-/// A CSV file with two columns, read when the scenario is read. In scenarios it is its path.
+/// A CSV file with two columns, loaded together with its scenario. Scenarios contain its path.
 ///
-/// The first line names the columns: `time_s,change` or `along_belt_m,change`. The first column rises. Between the rows
-/// the change of μ is interpolated linearly. Before the first time and after the last one it stays; along the belt the
-/// rows repeat, with the distance from the first place to the last one as the length of the belt.
+/// The first line names the columns: `time_s,change` or `along_belt_m,change`. The first column
+/// must increase. Between the rows the change of μ is interpolated linearly. Before the first time
+/// and after the last one it is constant; along the belt the rows repeat, with the distance from
+/// the first to the last position as the length of the belt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionFile {
     path: String,
@@ -27,7 +28,7 @@ pub struct FrictionFile {
 #[derive(Clone, Debug, PartialEq)]
 struct Rows {
     over: Over,
-    /// Time (s) or place (m), and change of μ.
+    /// Time (s) or position (m), and change of μ.
     points: Vec<(f64, f64)>,
 }
 
@@ -41,7 +42,7 @@ impl FrictionFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// One sentence with the path and the line that is wrong.
+    /// One sentence with the path and the invalid line.
     pub fn read(path: &str) -> Result<Self, String> {
         let text = input_file::read(Path::new(path))
             .map_err(|error| format!("cannot read {path}: {error}"))?;
@@ -52,7 +53,7 @@ impl FrictionFile {
         })
     }
 
-    /// Returns the change of μ at time `t_s` and at the place `along_belt_m` of the belt.
+    /// Returns the change of μ at time `t_s` and position `along_belt_m` on the belt.
     pub fn at(&self, t_s: f64, along_belt_m: f64) -> f64 {
         let points = &self.rows.points;
         let (Some(&(first, _)), Some(&(last, _))) = (points.first(), points.last()) else {
