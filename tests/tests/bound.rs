@@ -8,13 +8,9 @@ use painleve_tests::flash_image;
 fn the_control_interrupt_has_a_bound_within_the_budget() {
     let budget: serde_json::Value = serde_json::from_str(include_str!("../budget.json")).unwrap();
     let bound = Bound::of(flash_image()).unwrap_or_else(|error| panic!("{error}"));
-    let without_sensors = bound.cycles - bound.sensor_cycles;
     for (cycles, key) in [
         (bound.cycles, "bound_cycles_of_control_interrupt"),
-        (
-            without_sensors,
-            "bound_cycles_of_control_interrupt_without_sensors",
-        ),
+        (bound.sensor_cycles, "bound_cycles_of_sensor_interrupts"),
     ] {
         let most = budget[key].as_u64().unwrap();
         assert!(

@@ -3,11 +3,9 @@
 //! A frame has 16 bits; the answer to a command arrives with the next frame. Every word has even parity.
 //! Every answer has a flag that stays set after an error until the error register is read.
 
-use embedded_hal::delay::DelayNs;
-use embedded_hal::digital::OutputPin;
-use embedded_hal::spi::SpiBus;
 use painleve_shared::counts::EncoderCounts;
 
+use crate::exchange::{Dialogue, Exchange, SelectTiming};
 use crate::{ReadError, rescale};
 
 /// Resolution, bits.
@@ -55,35 +53,51 @@ impl Diagnostics {
     }
 }
 
-/// Two encoders.
-pub struct EncoderDriver<B, S, D> {
-    bus: B,
-    selects: [S; 2],
-    delay: D,
-    tick: u8,
-    diagnostics: [Option<Diagnostics>; 2],
+/// Position in the exchanges with one encoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// The first command is on its way; its answer belongs to an older one.
+    Ask,
+    First,
+    Second,
+    Diagnostics,
+    /// The error register is being read, which clears it.
+    Clear,
 }
 
-impl<B: SpiBus, S: OutputPin, D: DelayNs> EncoderDriver<B, S, D> {
-    /// Takes the encoders of θ1 and of the elbow. `selects` are active low and must already be high. The
-    /// bus is in mode 1 and no faster than [`FASTEST_HZ`].
-    pub fn new(bus: B, selects: [S; 2], delay: D) -> Self {
+/// Two encoders on one bus.
+#[derive(Clone, Debug)]
+pub struct EncoderDriver {
+    tick: u8,
+    diagnostics: [Option<Diagnostics>; 2],
+    readings: [Result<u16, ReadError>; 2],
+    /// The encoder in turn.
+    encoder: usize,
+    step: Step,
+    first: u16,
+    second: u16,
+    is_retry: bool,
+}
+
+impl EncoderDriver {
+    /// Makes the encoders of θ1 and of the elbow, with selects 0 and 1. The bus is in mode 1 and no faster
+    /// than [`FASTEST_HZ`].
+    pub const fn new() -> Self {
         Self {
-            bus,
-            selects,
-            delay,
             tick: 0,
             diagnostics: [None; 2],
+            readings: [Err(ReadError::Bus); 2],
+            encoder: 0,
+            step: Step::Ask,
+            first: 0,
+            second: 0,
+            is_retry: false,
         }
     }
 
-    /// Reads both angles as counts of `bits` bits. Takes 6 frames, 7 when it also checks a magnet, and 4
-    /// more for every encoder that was disturbed.
-    pub fn read(&mut self, bits: u8) -> [Result<EncoderCounts, ReadError>; 2] {
-        self.tick = (self.tick + 1) % DIAGNOSTICS_INTERVAL;
-        [0, 1].map(|encoder| {
-            let looks = usize::from(self.tick) == encoder;
-            let angle = self.angle(encoder, looks);
+    /// Returns both angles of the last set of readings as counts of `bits` bits.
+    pub fn readings(&self, bits: u8) -> [Result<EncoderCounts, ReadError>; 2] {
+        self.readings.map(|angle| {
             angle.map(|it| EncoderCounts(rescale(it.into(), BITS, bits).cast_unsigned()))
         })
     }
@@ -93,44 +107,99 @@ impl<B: SpiBus, S: OutputPin, D: DelayNs> EncoderDriver<B, S, D> {
         self.diagnostics
     }
 
-    fn angle(&mut self, encoder: usize, looks: bool) -> Result<u16, ReadError> {
-        self.read_twice(encoder, looks).or_else(|_| {
-            // The error register arrives with the next frame; reading it clears it.
-            self.frame(encoder, CLEAR_ERROR)?;
-            self.read_twice(encoder, false)
-        })
+    /// Returns whether this encoder's magnet is checked in this set of readings.
+    fn looks(&self) -> bool {
+        usize::from(self.tick) == self.encoder && !self.is_retry
     }
 
-    fn read_twice(&mut self, encoder: usize, looks: bool) -> Result<u16, ReadError> {
-        self.frame(encoder, READ_ANGLE)?;
-        let first = checked(self.frame(encoder, READ_ANGLE)?)?;
-        let next = if looks { READ_DIAGNOSTICS } else { READ_ANGLE };
-        let second = checked(self.frame(encoder, next)?)?;
-        if looks {
-            let diagnostics = checked(self.frame(encoder, READ_ANGLE)?)?;
-            self.diagnostics[encoder] = Some(Diagnostics(diagnostics));
+    fn send(&mut self, step: Step, command: u16) -> Exchange {
+        self.step = step;
+        Exchange {
+            select: self.encoder,
+            data: command.into(),
         }
-        let apart = second.wrapping_sub(first) & DATA;
+    }
+
+    /// Takes an answer; returns the next step, or the encoder's reading.
+    fn step(&mut self, answer: Option<u16>) -> Result<Option<Exchange>, ReadError> {
+        let answer = answer.ok_or(ReadError::Bus)?;
+        match self.step {
+            Step::Ask => return Ok(Some(self.send(Step::First, READ_ANGLE))),
+            Step::Clear => return Ok(Some(self.send(Step::Ask, READ_ANGLE))),
+            Step::First => {
+                self.first = checked(answer)?;
+                let command = if self.looks() {
+                    READ_DIAGNOSTICS
+                } else {
+                    READ_ANGLE
+                };
+                return Ok(Some(self.send(Step::Second, command)));
+            }
+            Step::Second => {
+                self.second = checked(answer)?;
+                if self.looks() {
+                    return Ok(Some(self.send(Step::Diagnostics, READ_ANGLE)));
+                }
+            }
+            Step::Diagnostics => {
+                self.diagnostics[self.encoder & 1] = Some(Diagnostics(checked(answer)?));
+            }
+        }
+        let apart = self.second.wrapping_sub(self.first) & DATA;
         if apart <= AGREEMENT || apart >= (DATA + 1) - AGREEMENT {
-            Ok(second)
+            Ok(None)
         } else {
             Err(ReadError::Disagreement)
         }
     }
 
-    /// Transfers one frame; the answer belongs to the previous command.
-    fn frame(&mut self, encoder: usize, command: u16) -> Result<u16, ReadError> {
-        let select = &mut self.selects[encoder];
-        let mut bytes = command.to_be_bytes();
-        select.set_low().map_err(|_| ReadError::Bus)?;
-        self.delay.delay_ns(SETTLING_NS);
-        let bus = &mut self.bus;
-        let done = bus.transfer_in_place(&mut bytes).and_then(|()| bus.flush());
-        self.delay.delay_ns(SETTLING_NS);
-        select.set_high().map_err(|_| ReadError::Bus)?;
-        self.delay.delay_ns(SETTLING_NS);
-        done.map_err(|_| ReadError::Bus)?;
-        Ok(u16::from_be_bytes(bytes))
+    /// Stores a reading and turns to the other encoder.
+    fn finish(&mut self, reading: Result<u16, ReadError>) -> Option<Exchange> {
+        // The mask spares a check of the index.
+        self.readings[self.encoder & 1] = reading;
+        self.is_retry = false;
+        if self.encoder == 1 {
+            return None;
+        }
+        self.encoder = 1;
+        Some(self.send(Step::Ask, READ_ANGLE))
+    }
+}
+
+impl Default for EncoderDriver {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Dialogue for EncoderDriver {
+    const BITS: u8 = 16;
+    const TIMING: SelectTiming = SelectTiming {
+        setup_ns: SETTLING_NS,
+        hold_ns: SETTLING_NS,
+        pause_ns: SETTLING_NS,
+    };
+    // Four with a magnet's check, or three; then four again after a disturbance.
+    const MOST_EXCHANGES: u32 = 4 + 3 + 2 * 4;
+
+    fn begin(&mut self) -> Exchange {
+        self.tick = (self.tick + 1) % DIAGNOSTICS_INTERVAL;
+        self.encoder = 0;
+        self.is_retry = false;
+        self.readings = [Err(ReadError::Bus); 2];
+        self.send(Step::Ask, READ_ANGLE)
+    }
+
+    fn proceed(&mut self, answer: Option<u32>) -> Option<Exchange> {
+        match self.step(answer.map(|it| it as u16)) {
+            Ok(Some(exchange)) => Some(exchange),
+            Ok(None) => self.finish(Ok(self.second)),
+            Err(disturbance) if self.is_retry => self.finish(Err(disturbance)),
+            Err(_) => {
+                self.is_retry = true;
+                Some(self.send(Step::Clear, CLEAR_ERROR))
+            }
+        }
     }
 }
 

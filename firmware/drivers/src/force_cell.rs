@@ -5,11 +5,9 @@
 //! sign are read; single-ended, the converter has no sign. The converter runs on 4.5 to 5.5 V: its inputs
 //! need a level shifter (74AHCT125), and its output needs a pin that tolerates 5 V.
 
-use embedded_hal::delay::DelayNs;
-use embedded_hal::digital::{self, OutputPin};
-use embedded_hal::spi::SpiDevice;
 use painleve_shared::counts::ForceCounts;
 
+use crate::exchange::{Dialogue, Exchange, SelectTiming};
 use crate::{ReadError, rescale};
 
 /// Resolution, bits.
@@ -28,100 +26,127 @@ const SETUP_NS: u32 = 100;
 const AGREEMENT: i32 = 2;
 
 /// Start bit, differential.
-const CONVERT: u8 = 0b0000_1000;
+const CONVERT: u32 = 0b0000_1000;
 
 /// The bit before the sign is always 0.
-const NULL_BIT: u8 = 0b0010_0000;
-
-/// The converter's select pin, with the pauses that the data sheet requires.
-pub struct PausedSelect<S, D> {
-    pin: S,
-    delay: D,
-}
-
-impl<S: OutputPin, D: DelayNs> PausedSelect<S, D> {
-    /// Takes a pin that is already high.
-    pub fn new(pin: S, delay: D) -> Self {
-        Self { pin, delay }
-    }
-}
-
-impl<S: OutputPin, D> digital::ErrorType for PausedSelect<S, D> {
-    type Error = S::Error;
-}
-
-impl<S: OutputPin, D: DelayNs> OutputPin for PausedSelect<S, D> {
-    fn set_low(&mut self) -> Result<(), S::Error> {
-        self.pin.set_low()?;
-        self.delay.delay_ns(SETUP_NS);
-        Ok(())
-    }
-
-    fn set_high(&mut self) -> Result<(), S::Error> {
-        self.pin.set_high()?;
-        self.delay.delay_ns(PAUSE_NS);
-        Ok(())
-    }
-}
+const NULL_BIT: u32 = 1 << 13;
 
 /// A force cell.
-pub struct ForceCellDriver<D> {
-    device: D,
+#[derive(Clone, Debug)]
+pub struct ForceCellDriver {
+    /// Normal and tangential force.
+    readings: [Result<i32, ReadError>; 2],
+    /// The pair of channels in turn.
+    pair: usize,
+    /// Conversions of this pair.
+    conversions: [Result<i32, ReadError>; 2],
+    count: usize,
 }
 
-impl<D: SpiDevice> ForceCellDriver<D> {
-    /// Makes a force cell on this device, in mode 0, no faster than [`FASTEST_HZ`], selected through
-    /// [`PausedSelect`].
-    pub fn new(device: D) -> Self {
-        Self { device }
+impl ForceCellDriver {
+    /// Makes a force cell, in mode 0, no faster than [`FASTEST_HZ`], with select 0: f_n on channels 0 (+)
+    /// and 1 (−), f_t on 2 (+) and 3 (−).
+    pub const fn new() -> Self {
+        Self {
+            readings: [Err(ReadError::Bus); 2],
+            pair: 0,
+            conversions: [Err(ReadError::Bus); 2],
+            count: 0,
+        }
     }
 
-    /// Reads (f_t, f_n) as counts of `bits` bits: f_n on channels 0 (+) and 1 (−), f_t on 2 (+) and 3 (−).
-    /// Each force takes two conversions, and a third if these two disagree.
-    pub fn read(
-        &mut self,
+    /// Returns (f_t, f_n) of the last set of readings as counts of `bits` bits. Each force takes two
+    /// conversions, and a third if these two disagree.
+    pub fn readings(
+        &self,
         bits: u8,
     ) -> (
         Result<ForceCounts, ReadError>,
         Result<ForceCounts, ReadError>,
     ) {
-        let [normal, tangential] = [0, 1].map(|pair| {
-            let counts = self.two_of_three(pair);
-            counts.map(|it| ForceCounts(rescale(it, BITS, bits)))
-        });
+        let [normal, tangential] = self
+            .readings
+            .map(|reading| reading.map(|it| ForceCounts(rescale(it, BITS, bits))));
         (tangential, normal)
     }
 
-    /// Returns two conversions that agree, or the median of three if two of these agree.
-    fn two_of_three(&mut self, pair: u8) -> Result<i32, ReadError> {
-        let first = self.convert(pair);
-        let second = self.convert(pair);
-        if first == second {
-            return first;
-        }
-        match (first, second, self.convert(pair)?) {
-            (Ok(one), Ok(two), three) => {
-                let [low, median, high] = sorted([one, two, three]);
-                let is_agreed = (median - low).min(high - median) <= AGREEMENT;
-                is_agreed.then_some(median).ok_or(ReadError::Disagreement)
-            }
-            (Ok(one), Err(_), two) | (Err(_), Ok(one), two) if one == two => Ok(two),
-            _ => Err(ReadError::Disagreement),
+    fn convert(&self) -> Exchange {
+        Exchange {
+            select: 0,
+            // The upper two channel bits follow the start bit; the third begins the second byte.
+            data: (CONVERT | self.pair as u32) << 16,
         }
     }
 
-    fn convert(&mut self, pair: u8) -> Result<i32, ReadError> {
-        // The upper two channel bits follow the start bit; the third begins the second byte.
-        let mut bytes = [CONVERT | pair, 0, 0];
-        let done = self.device.transfer_in_place(&mut bytes);
-        done.map_err(|_| ReadError::Bus)?;
-        let [_, high, low] = bytes;
-        if high & NULL_BIT != 0 {
-            return Err(ReadError::NotZero);
+    /// Returns the pair's reading once its conversions suffice.
+    fn reading(&mut self, conversion: Result<i32, ReadError>) -> Option<Result<i32, ReadError>> {
+        if let Some(place) = self.conversions.get_mut(self.count) {
+            *place = conversion;
+            self.count += 1;
+            let [first, second] = self.conversions;
+            return (self.count == 2 && first == second).then_some(first);
         }
-        let word = u16::from_be_bytes([high & 0x1f, low]);
-        // Extends the sign of 13 bits.
-        Ok(i32::from((word << 3).cast_signed() >> 3))
+        Some(median_of_agreeing(self.conversions, conversion))
+    }
+}
+
+/// Returns the median of three conversions if two of them agree.
+fn median_of_agreeing(
+    [first, second]: [Result<i32, ReadError>; 2],
+    third: Result<i32, ReadError>,
+) -> Result<i32, ReadError> {
+    match (first, second, third?) {
+        (Ok(one), Ok(two), three) => {
+            let [low, median, high] = sorted([one, two, three]);
+            let is_agreed = (median - low).min(high - median) <= AGREEMENT;
+            is_agreed.then_some(median).ok_or(ReadError::Disagreement)
+        }
+        (Ok(one), Err(_), two) | (Err(_), Ok(one), two) if one == two => Ok(two),
+        _ => Err(ReadError::Disagreement),
+    }
+}
+
+/// Returns the signed conversion in an answer.
+fn decoded(answer: Option<u32>) -> Result<i32, ReadError> {
+    let answer = answer.ok_or(ReadError::Bus)?;
+    if answer & NULL_BIT != 0 {
+        return Err(ReadError::NotZero);
+    }
+    // Extends the sign of 13 bits.
+    Ok((answer << 19).cast_signed() >> 19)
+}
+
+impl Default for ForceCellDriver {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Dialogue for ForceCellDriver {
+    const BITS: u8 = 24;
+    const TIMING: SelectTiming = SelectTiming {
+        setup_ns: SETUP_NS,
+        hold_ns: 0,
+        pause_ns: PAUSE_NS,
+    };
+    const MOST_EXCHANGES: u32 = 6;
+
+    fn begin(&mut self) -> Exchange {
+        *self = Self::new();
+        self.convert()
+    }
+
+    fn proceed(&mut self, answer: Option<u32>) -> Option<Exchange> {
+        if let Some(reading) = self.reading(decoded(answer)) {
+            // The mask spares a check of the index.
+            self.readings[self.pair & 1] = reading;
+            if self.pair == 1 {
+                return None;
+            }
+            self.pair = 1;
+            self.count = 0;
+        }
+        Some(self.convert())
     }
 }
 

@@ -1,8 +1,10 @@
 //! Drivers of the arm's sensors and switches over `embedded-hal`: the same code on the board and on a PC.
 //!
+//! - [`exchange`]: carries out a driver's exchanges on a SPI bus
 //! - [`encoders`]: two AS5048A magnetic encoders on one SPI bus
 //! - [`force_cell`]: an MCP3304 converter behind the force cell's bridge amplifiers
 //! - [`switches`]: ENABLE and RESET, debounced
+//! - [`front_end`]: sensor frames from readings and switches, and the permission to arm
 //! - [`plausibility`]: checks that readings can come from an arm before the drive is armed
 //!
 //! A reading that a single disturbed bit could have changed is not passed on: each value is read twice, and
@@ -12,7 +14,9 @@
 #![no_std]
 
 pub mod encoders;
+pub mod exchange;
 pub mod force_cell;
+pub mod front_end;
 pub mod plausibility;
 pub mod switches;
 

@@ -35,6 +35,13 @@ pub struct SensorReadings {
     pub magnets: [Option<bool>; 2],
 }
 
+impl SensorReadings {
+    /// Returns whether no reading of this tick is lost.
+    pub fn are_complete(&self) -> bool {
+        self.joints.iter().all(Option::is_some) && self.forces.iter().all(Option::is_some)
+    }
+}
+
 /// Checks readings at each tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Plausibility {
@@ -65,9 +72,7 @@ impl Plausibility {
                 0
             }
         };
-        let is_complete = readings.joints.iter().all(Option::is_some)
-            && readings.forces.iter().all(Option::is_some);
-        self.complete = count(self.complete, is_complete);
+        self.complete = count(self.complete, readings.are_complete());
         for (ticks, joint) in self.dead.iter_mut().zip(readings.joints) {
             *ticks = count(*ticks, joint.is_none_or(|it| it.0 == 0 || it.0 == ones));
         }

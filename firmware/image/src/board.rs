@@ -71,6 +71,11 @@ pub trait BoardDrive: Drive {
         false
     }
 
+    /// Serves the interrupt of one of the sensors' buses, by its number in [`tasks!`](crate::tasks!).
+    fn serve_sensor_bus(&mut self, bus: usize) {
+        let _ = bus;
+    }
+
     /// Returns the frequency of [`Drive::stopwatch`], Hz.
     fn stopwatch_hz(&self) -> u32;
 }

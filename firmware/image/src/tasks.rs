@@ -1,6 +1,7 @@
 //! The image's tasks, in order of priority, highest first:
 //!
-//! - `control`, the timer's interrupt at the control rate: sample → tick → actuate
+//! - `control`, the timer's interrupt at the control rate: sample → tick → actuate; and the sensors'
+//!   buses, whose interrupts read the sensors for the next tick. They do not interrupt each other.
 //! - `serial`, the serial port's interrupt: bytes from and to the host
 //! - `link`: requests from the host, responses to it
 //! - `idle`: the log
@@ -334,16 +335,17 @@ pub fn panicked<B: Board>(info: &PanicInfo<'_>) -> ! {
 
 /// Declares the tasks of an image for one board and one set of laws. Board crates invoke it with
 /// their chip's `device` and three interrupts: the `control` timer's, the `serial` port's, and one
-/// that no peripheral in use raises, which runs the `link`.
+/// that no peripheral in use raises, which runs the `link`; `sensors` adds those of the sensors' buses.
 #[macro_export]
 macro_rules! tasks {
     (
         board = $board:ty, laws = $laws:ty, device = $($device:ident)::+,
         control = $control:ident, serial = $serial:ident, link = $link:ident
+        $(, sensors = [$($task:ident($number:literal): $bus:ident),+])?
     ) => {
         #[::rtic::app(device = $($device)::+, peripherals = true)]
         mod tasks {
-            use $crate::board::{Board, Bytes, Parts, Port};
+            use $crate::board::{Board, BoardDrive, Bytes, Parts, Port};
             use $crate::heapless::spsc::{Consumer, Producer, Queue};
             use $crate::painleve_shared::message::Response;
             use $crate::tasks::{ANSWERS, Change, Control, EVENTS, Link};
@@ -407,6 +409,15 @@ macro_rules! tasks {
                     rtic::pend(LINK);
                 }
             }
+
+            $($(
+                #[task(binds = $bus, priority = 3, shared = [control])]
+                fn $task(mut cx: $task::Context) {
+                    cx.shared
+                        .control
+                        .lock(|control| control.task.drive_mut().serve_sensor_bus($number));
+                }
+            )+)?
 
             #[task(binds = $serial, priority = 2, local = [bytes])]
             fn serial(cx: serial::Context) {

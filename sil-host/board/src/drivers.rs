@@ -8,8 +8,8 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
 
-use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use painleve_drivers::encoders::{self, EncoderDriver};
+use painleve_drivers::exchange::PolledDriver;
 use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_firmware::supervise::lapses::Lapse;
 use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
@@ -33,19 +33,14 @@ const FORCE_BUS_HZ: u64 = 1_312_500;
 /// Output of a bridge amplifier at zero force, and its reference, counts.
 const BRIDGE_MIDDLE: i32 = 2048;
 
-type Force = ForceCellDriver<
-    ExclusiveDevice<
-        ModelledBus<Mcp3304>,
-        force_cell::PausedSelect<SelectPin<Mcp3304>, Clock>,
-        NoDelay,
-    >,
->;
+/// A driver over a modelled bus with `N` parts.
+type Modelled<D, P, const N: usize> = PolledDriver<D, ModelledBus<P>, SelectPin<P>, Clock, N>;
 
 /// The drivers, the chip models and the controller in this process.
 pub struct Drivers {
     controller: Controller,
-    encoders: EncoderDriver<ModelledBus<As5048a>, SelectPin<As5048a>, Clock>,
-    force_cell: Force,
+    encoders: Modelled<EncoderDriver, As5048a, 2>,
+    force_cell: Modelled<ForceCellDriver, Mcp3304, 1>,
     encoder_parts: [SharedPart<As5048a>; 2],
     force_part: SharedPart<Mcp3304>,
     encoder_bits: u8,
@@ -85,14 +80,11 @@ impl Drivers {
         let mut force_part = Mcp3304::default();
         force_part.bit_errors = BitErrors::new(bit_errors, 3);
         let force_part = Rc::new(RefCell::new(force_part));
-        let select = force_cell::PausedSelect::new(force_bus.attach(&force_part), clock.clone());
-        let device = ExclusiveDevice::new_no_delay(force_bus, select);
-        // The simulated pins cannot fail.
-        let Ok(device) = device;
+        let select = force_bus.attach(&force_part);
         Ok(Self {
             controller: Controller::new(configuration).map_err(|_| BoardError::Refused)?,
-            encoders: EncoderDriver::new(encoder_bus, selects, clock),
-            force_cell: ForceCellDriver::new(device),
+            encoders: PolledDriver::new(EncoderDriver::new(), encoder_bus, selects, clock.clone()),
+            force_cell: PolledDriver::new(ForceCellDriver::new(), force_bus, [select], clock),
             encoder_parts,
             force_part,
             encoder_bits: encoder.bits,
@@ -124,8 +116,8 @@ impl Drivers {
     /// Returns the frame as the drivers read it.
     fn read(&mut self, frame: &SensorFrame) -> SensorFrame {
         self.present(frame);
-        let joints = self.encoders.read(self.encoder_bits);
-        let (tangential, normal) = self.force_cell.read(self.force_bits);
+        let joints = self.encoders.read().readings(self.encoder_bits);
+        let (tangential, normal) = self.force_cell.read().readings(self.force_bits);
         SensorFrame {
             joints: joints.map(|it| it.unwrap_or(NO_ENCODER)),
             normal_force: normal.unwrap_or(NO_FORCE),

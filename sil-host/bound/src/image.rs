@@ -11,6 +11,8 @@ use crate::BoundError;
 pub struct Image {
     sections: Vec<(u32, Vec<u8>)>,
     functions: BTreeMap<u32, String>,
+    /// Addresses by name: the linker gives functions with equal code one address.
+    addresses: BTreeMap<String, u32>,
     /// Addresses at which code and data alternate: true for code.
     marks: BTreeMap<u32, bool>,
     /// `None` for code without an ELF file.
@@ -51,6 +53,7 @@ impl Image {
             sections.push((section.address() as u32, data.to_vec()));
         }
         let (mut functions, mut marks) = (BTreeMap::new(), BTreeMap::new());
+        let mut addresses = BTreeMap::new();
         for symbol in file.symbols() {
             let name = symbol.name().unwrap_or_default();
             let address = symbol.address() as u32;
@@ -59,6 +62,7 @@ impl Image {
                 Some("$d") => drop(marks.insert(address, false)),
                 _ if symbol.kind() == object::SymbolKind::Text => {
                     let name = format!("{:#}", rustc_demangle::demangle(name));
+                    addresses.insert(name.clone(), address & !1);
                     functions.insert(address & !1, name);
                 }
                 _ => {}
@@ -68,6 +72,7 @@ impl Image {
         Ok(Self {
             sections,
             functions,
+            addresses,
             marks,
             lines: Some(lines),
         })
@@ -78,6 +83,7 @@ impl Image {
         Self {
             sections: vec![(address, code.to_vec())],
             functions: BTreeMap::from([(address, function.to_owned())]),
+            addresses: BTreeMap::from([(function.to_owned(), address)]),
             marks: BTreeMap::new(),
             lines: None,
         }
@@ -103,8 +109,7 @@ impl Image {
 
     /// Returns the address of a function.
     pub fn function(&self, name: &str) -> Option<u32> {
-        let mut all = self.functions.iter();
-        all.find(|(_, found)| *found == name).map(|(at, _)| *at)
+        self.addresses.get(name).copied()
     }
 
     /// Returns the name of the function that contains an address.

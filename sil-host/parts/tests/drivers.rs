@@ -4,34 +4,36 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use embedded_hal_bus::spi::ExclusiveDevice;
 use painleve_drivers::ReadError;
 use painleve_drivers::encoders::{self, EncoderDriver};
+use painleve_drivers::exchange::PolledDriver;
 use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
 use painleve_parts::{As5048a, BitErrors, Mcp3304, SpiPart};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 
-type TestedEncoders = EncoderDriver<ModelledBus<As5048a>, SelectPin<As5048a>, Clock>;
+type Tested<D, P, const N: usize> = PolledDriver<D, ModelledBus<P>, SelectPin<P>, Clock, N>;
+type TestedEncoders = Tested<EncoderDriver, As5048a, 2>;
+type TestedForceCell = Tested<ForceCellDriver, Mcp3304, 1>;
 
 fn encoders() -> (TestedEncoders, [SharedPart<As5048a>; 2]) {
     let clock = Clock::default();
     let mut bus = ModelledBus::new(&clock, encoders::FASTEST_HZ.into(), true);
     let parts = [0, 1].map(|_| Rc::new(RefCell::new(As5048a::default())));
     let selects = parts.each_ref().map(|part| bus.attach(part));
-    (EncoderDriver::new(bus, selects, clock), parts)
+    let driver = PolledDriver::new(EncoderDriver::new(), bus, selects, clock);
+    (driver, parts)
 }
-
-type ForceSelect = force_cell::PausedSelect<SelectPin<Mcp3304>, Clock>;
-type TestedForceCell = ForceCellDriver<ExclusiveDevice<ModelledBus<Mcp3304>, ForceSelect, Clock>>;
 
 fn force_cell() -> (TestedForceCell, SharedPart<Mcp3304>) {
     let clock = Clock::default();
     let mut bus = ModelledBus::new(&clock, force_cell::FASTEST_HZ.into(), false);
     let part = Rc::new(RefCell::new(Mcp3304::default()));
-    let select = force_cell::PausedSelect::new(bus.attach(&part), clock.clone());
-    let device = ExclusiveDevice::new(bus, select, clock).unwrap();
-    (ForceCellDriver::new(device), part)
+    let select = bus.attach(&part);
+    (
+        PolledDriver::new(ForceCellDriver::new(), bus, [select], clock),
+        part,
+    )
 }
 
 #[test]
@@ -41,7 +43,7 @@ fn every_angle_is_read_within_the_encoders_limits() {
         parts[0].borrow_mut().angle = angle;
         parts[1].borrow_mut().angle = angle ^ 0x2a5a;
         let expected = [angle, angle ^ 0x2a5a].map(|it| Ok(EncoderCounts(it.into())));
-        assert_eq!(driver.read(encoders::BITS), expected);
+        assert_eq!(driver.read().readings(encoders::BITS), expected);
     }
     assert!(parts.iter().all(|it| it.borrow().violations().is_empty()));
 }
@@ -53,7 +55,7 @@ fn forces_of_either_sign_are_read() {
         part.borrow_mut().channels = [force, 0, 0, force + 1, 0, 0, 0, 0];
         let tangential = (-force - 1).clamp(-4096, 4095);
         let expected = (Ok(ForceCounts(tangential)), Ok(ForceCounts(force)));
-        assert_eq!(driver.read(force_cell::BITS), expected);
+        assert_eq!(driver.read().readings(force_cell::BITS), expected);
     }
     assert!(part.borrow().violations().is_empty());
 }
@@ -63,7 +65,10 @@ fn a_disturbed_encoder_is_read_again_in_the_same_tick() {
     let (mut driver, parts) = encoders();
     parts[1].borrow_mut().angle = 77;
     parts[1].borrow_mut().errors = 1;
-    assert_eq!(driver.read(encoders::BITS)[1], Ok(EncoderCounts(77)));
+    assert_eq!(
+        driver.read().readings(encoders::BITS)[1],
+        Ok(EncoderCounts(77))
+    );
     assert_eq!(parts[1].borrow().errors, 0, "the flag is cleared");
 }
 
@@ -73,31 +78,27 @@ fn dead_lines_give_no_reading_or_a_recognisably_dead_one() {
     parts[0].borrow_mut().dead = Some(true);
     parts[1].borrow_mut().dead = Some(false);
     assert_eq!(
-        driver.read(encoders::BITS),
+        driver.read().readings(encoders::BITS),
         [Err(ReadError::Flagged), Ok(EncoderCounts(0))]
     );
     let (mut driver, part) = force_cell();
     part.borrow_mut().dead = Some(true);
-    assert_eq!(driver.read(13).0, Err(ReadError::NotZero));
+    assert_eq!(driver.read().readings(13).0, Err(ReadError::NotZero));
 }
 
 #[test]
 fn a_missing_magnet_is_detected() {
     let (mut driver, parts) = encoders();
     for _ in 0..200 {
-        let _ = driver.read(encoders::BITS);
+        driver.read();
     }
-    assert!(
-        driver
-            .diagnostics()
-            .iter()
-            .all(|it| it.unwrap().is_healthy())
-    );
+    let diagnostics = driver.read().diagnostics();
+    assert!(diagnostics.iter().all(|it| it.unwrap().is_healthy()));
     parts[0].borrow_mut().diagnostics = 0x09ff;
     for _ in 0..200 {
-        let _ = driver.read(encoders::BITS);
+        driver.read();
     }
-    assert!(!driver.diagnostics()[0].unwrap().is_healthy());
+    assert!(!driver.read().diagnostics()[0].unwrap().is_healthy());
 }
 
 /// One bit in ten thousand is flipped, in both directions.
@@ -118,13 +119,18 @@ fn with_bit_errors_a_reading_is_correct_or_missing() {
         }
         let (normal, tangential) = ((tick * 11 % 8192) as i32 - 4096, (tick * 3 % 4096) as i32);
         force_part.borrow_mut().channels = [normal, 0, tangential, 0, 0, 0, 0, 0];
-        for (reading, angle) in driver.read(encoders::BITS).into_iter().zip(angles) {
+        for (reading, angle) in driver
+            .read()
+            .readings(encoders::BITS)
+            .into_iter()
+            .zip(angles)
+        {
             match reading {
                 Ok(counts) => assert_eq!(counts.0, angle, "tick {tick}"),
                 Err(_) => lost += 1,
             }
         }
-        let (t, n) = force_driver.read(force_cell::BITS);
+        let (t, n) = force_driver.read().readings(force_cell::BITS);
         for (reading, force) in [(t, tangential), (n, normal)] {
             match reading {
                 Ok(counts) => assert_eq!(counts.0, force, "tick {tick}"),

@@ -95,7 +95,10 @@ impl BoardBench {
     /// # Panics
     /// If the scenario is out of range.
     pub fn without_configuration(scenario: &Scenario, board: FlashedBoard) -> Self {
-        let simulation = Simulation::new(scenario).unwrap_or_else(|error| panic!("{error}"));
+        // The board itself takes one tick from the sample to the torque.
+        let mut simulated = scenario.clone();
+        simulated.converters.torque.delay_ticks = 0.0;
+        let simulation = Simulation::new(&simulated).unwrap_or_else(|error| panic!("{error}"));
         let mut bench = Self {
             board,
             simulation,

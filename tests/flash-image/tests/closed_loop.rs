@@ -29,10 +29,12 @@ fn the_board_with_its_own_sensors_gives_the_torques_of_a_pc() {
             answer(tick, false, bench.frame);
         }
         let mut driven = 0;
+        // The image reads its sensors one tick before it uses them.
+        let mut sampled = bench.frame;
         for tick in before + 1..=before + 1000 {
-            let (sampled, closed) = (bench.frame, bench.switch_is_closed());
+            let (read, closed) = (bench.frame, bench.switch_is_closed());
             bench.tick();
-            let answer = answer(tick, closed, sampled);
+            let answer = answer(tick, closed, std::mem::replace(&mut sampled, read));
             let drives = !matches!(
                 answer.supervisor_state(),
                 Some(SupervisorState::Idle | SupervisorState::Fault)

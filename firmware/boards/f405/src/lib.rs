@@ -14,6 +14,9 @@
 //! The control timer is TIM2, the stopwatch is the cycle counter. The control timer runs from the start,
 //! first at [`IDLE_HZ`], so that only finished control ticks feed the watchdogs.
 //!
+//! The sensors' buses are read by interrupts, for the next tick: readings are one tick old, which is the delay
+//! from sample to torque that scenarios simulate (`converters.torque.delay_ticks`).
+//!
 //! The torque stages are on only with the real plant: with frames from the host they stay off.
 
 #![no_std]
@@ -24,20 +27,18 @@ pub mod uart_dma;
 
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
-use embedded_hal::delay::DelayNs;
-use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use painleve_drivers::encoders::EncoderDriver;
-use painleve_drivers::force_cell::{self, ForceCellDriver};
-use painleve_drivers::plausibility::{Plausibility, SensorReadings};
-use painleve_drivers::switches::Switches;
+use painleve_drivers::force_cell::ForceCellDriver;
+use painleve_drivers::front_end::{FrontEnd, SwitchLevels};
 use painleve_firmware::Configuration;
 use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
 use painleve_image::board::{Board, BoardDrive, Parts, StartFault};
-use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
-use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
+use painleve_shared::counts::TorqueCounts;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::status::SupervisorState;
+use painleve_stm32f4::sensor_bus::{BusTiming, SensorBus};
 use painleve_stm32f4::timer;
 use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PinState};
 pub use stm32f4xx_hal::pac;
@@ -74,17 +75,14 @@ const DAC_BITS: u8 = 12;
 const ENCODER_BUS_HZ: u32 = 5_250_000;
 const FORCE_BUS_HZ: u32 = 1_312_500;
 
-/// Count of a sensor without a reading: out of every range, so that the controller counts it as a lapse.
-const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
-const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
-
 /// Declares the image for this board with these laws.
 #[macro_export]
 macro_rules! image {
     ($laws:ty) => {
         ::painleve_image::tasks! {
             board = $crate::F405, laws = $laws, device = $crate::pac,
-            control = TIM2, serial = USART1, link = SPI3
+            control = TIM2, serial = USART1, link = SPI3,
+            sensors = [encoders(0): SPI1, force_cell(1): SPI2]
         }
     };
 }
@@ -142,26 +140,32 @@ impl Board for F405 {
             Some(b.pb4.into_alternate::<5>()),
             Some(b.pb5.into_alternate::<5>()),
         );
-        let pause = Pause {
-            cycles_per_us: rcc.clocks.sysclk().to_MHz(),
+        let core_hz = rcc.clocks.sysclk().raw();
+        let spi = Spi::new(device.SPI1, pins, mode_1, ENCODER_BUS_HZ.Hz(), &mut rcc);
+        let (spi, _) = spi.frame_size_16bit().release();
+        let selects = [
+            b.pb6.into_push_pull_output_in_state(PinState::High).erase(),
+            b.pb7.into_push_pull_output_in_state(PinState::High).erase(),
+        ];
+        let timing = BusTiming {
+            core_hz,
+            bus_hz: ENCODER_BUS_HZ,
+            word_bits: 16,
         };
-        let encoders = EncoderDriver::new(
-            Spi::new(device.SPI1, pins, mode_1, ENCODER_BUS_HZ.Hz(), &mut rcc),
-            [
-                b.pb6.into_push_pull_output_in_state(PinState::High).erase(),
-                b.pb7.into_push_pull_output_in_state(PinState::High).erase(),
-            ],
-            pause,
-        );
+        let encoders = SensorBus::new(spi, selects, EncoderDriver::new(), timing);
         let pins = (Some(b.pb13), Some(b.pb14), Some(b.pb15));
-        let bus = Spi::new(device.SPI2, pins, mode_0, FORCE_BUS_HZ.Hz(), &mut rcc);
+        let spi = Spi::new(device.SPI2, pins, mode_0, FORCE_BUS_HZ.Hz(), &mut rcc);
+        let (spi, _) = spi.release();
         let select = b
             .pb12
             .into_push_pull_output_in_state(PinState::High)
             .erase();
-        let select = force_cell::PausedSelect::new(select, pause);
-        let force_cell =
-            ExclusiveDevice::new_no_delay(bus, select).map_err(|_| StartFault::Link)?;
+        let timing = BusTiming {
+            core_hz,
+            bus_hz: FORCE_BUS_HZ,
+            word_bits: 8,
+        };
+        let force_cell = SensorBus::new(spi, [select], ForceCellDriver::new(), timing);
 
         pac::TIM2::enable(&mut rcc);
         rcc.apb1enr().modify(|_, w| w.wwdgen().set_bit());
@@ -170,25 +174,19 @@ impl Board for F405 {
         let slow_bus_hz = rcc.clocks.pclk1().raw();
         let mut drive = F405Drive {
             timer_hz: rcc.clocks.timclk1().raw() as f32,
-            core_hz: rcc.clocks.sysclk().raw(),
+            core_hz,
             timer: device.TIM2,
             watchdogs: Watchdogs::new(device.IWDG, device.WWDG, slow_bus_hz),
             converter: device.DAC,
             enable,
             encoders,
-            force_cell: ForceCellDriver::new(force_cell),
+            force_cell,
             enable_switch: c.pc0.into_pull_down_input().erase(),
             reset_button: c.pc1.into_pull_down_input().erase(),
-            switches: Switches::default(),
-            plausibility: Plausibility::default(),
+            front_end: FrontEnd::default(),
             torque_bits: DAC_BITS,
-            encoder_bits: 14,
-            force_bits: 13,
             source: FrameSource::Lockstep,
             from_host: None,
-            sequence: 0,
-            may_arm: false,
-            is_active: false,
         };
         drive.start_timer(IDLE_HZ);
         Ok(Parts { drive, bytes, port })
@@ -239,21 +237,6 @@ fn put_out(converter: &pac::DAC, [code_1, code_2]: [u16; 2]) {
         .write(|w| w.dacc1dhr().set(code_1).dacc2dhr().set(code_2));
 }
 
-/// Pauses for at least a given number of nanoseconds.
-#[derive(Clone, Copy)]
-struct Pause {
-    cycles_per_us: u32,
-}
-
-impl DelayNs for Pause {
-    fn delay_ns(&mut self, nanoseconds: u32) {
-        cortex_m::asm::delay(nanoseconds * self.cycles_per_us / 1000 + 1);
-    }
-}
-
-type Force =
-    ExclusiveDevice<Spi<SPI2>, force_cell::PausedSelect<ErasedPin<Output>, Pause>, NoDelay>;
-
 /// The control task's part of the board.
 pub struct F405Drive {
     timer: pac::TIM2,
@@ -262,24 +245,16 @@ pub struct F405Drive {
     watchdogs: Watchdogs,
     converter: pac::DAC,
     enable: ErasedPin<Output>,
-    encoders: EncoderDriver<Spi<SPI1>, ErasedPin<Output>, Pause>,
-    force_cell: ForceCellDriver<Force>,
+    encoders: SensorBus<SPI1, ErasedPin<Output>, EncoderDriver, 2>,
+    force_cell: SensorBus<SPI2, ErasedPin<Output>, ForceCellDriver, 1>,
     enable_switch: ErasedPin<Input>,
     reset_button: ErasedPin<Input>,
-    switches: Switches,
-    plausibility: Plausibility,
-    /// Resolution of the counts that the controller gives and takes, bits.
+    front_end: FrontEnd,
+    /// Resolution of the controller's torques, bits.
     torque_bits: u8,
-    encoder_bits: u8,
-    force_bits: u8,
     source: FrameSource,
     /// Newest frame from the host, if the host is the source of frames.
     from_host: Option<SensorFrame>,
-    sequence: u32,
-    /// Whether the host permits the drive to arm.
-    may_arm: bool,
-    /// Whether the controller was armed at the last tick.
-    is_active: bool,
 }
 
 impl F405Drive {
@@ -289,37 +264,17 @@ impl F405Drive {
         self.watchdogs.set_period(1.0 / tick_hz);
     }
 
+    /// Returns the readings that were started at the last tick, and starts the next.
     fn read_sensors(&mut self) -> SensorFrame {
-        let joints = self.encoders.read(self.encoder_bits).map(Result::ok);
-        let (tangential, normal) = self.force_cell.read(self.force_bits);
-        let forces = [tangential.ok(), normal.ok()];
-        let readings = SensorReadings {
-            joints,
-            forces,
-            magnets: self
-                .encoders
-                .diagnostics()
-                .map(|it| it.map(|it| it.is_healthy())),
+        let levels = SwitchLevels {
+            enable: self.enable_switch.is_high(),
+            reset: self.reset_button.is_high(),
         };
-        let mut inputs = self
-            .switches
-            .tick(self.enable_switch.is_high(), self.reset_button.is_high());
-        let plausible = self
-            .plausibility
-            .tick(&readings, self.encoder_bits, self.force_bits);
-        if !self.may_arm || plausible.is_err() && !self.is_active {
-            // Do not arm without the host's permission or on implausible readings.
-            inputs.remove(DigitalInputs::ENABLE);
-        }
-        self.sequence = self.sequence.wrapping_add(1);
-        SensorFrame {
-            tick: self.sequence,
-            sequence: self.sequence,
-            joints: joints.map(|it| it.unwrap_or(NO_ENCODER)),
-            normal_force: forces[1].unwrap_or(NO_FORCE),
-            tangential_force: forces[0].unwrap_or(NO_FORCE),
-            inputs,
-        }
+        let (encoders, force_cell) = (self.encoders.complete(), self.force_cell.complete());
+        let frame = self.front_end.frame(encoders, force_cell, levels);
+        self.encoders.start();
+        self.force_cell.start();
+        frame
     }
 
     /// Returns the DAC's code for a torque: offset binary of 12 bits.
@@ -355,10 +310,8 @@ impl Drive for F405Drive {
         let is_active = answer
             .supervisor_state()
             .is_some_and(|state| !matches!(state, SupervisorState::Idle | SupervisorState::Fault));
-        // A drive that has stopped needs a new permission.
-        self.may_arm &= is_active || !self.is_active;
-        self.is_active = is_active;
-        if is_active && self.source == FrameSource::Sensors {
+        self.front_end.note_active(is_active);
+        if is_active && self.source == FrameSource::Sensors && self.front_end.has_readings() {
             let codes = answer.torques.map(|torque| self.code(torque));
             put_out(&self.converter, codes);
             self.enable.set_high();
@@ -375,16 +328,14 @@ impl Drive for F405Drive {
 
 impl BoardDrive for F405Drive {
     fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource) {
-        let [encoder, _] = &configuration.converters.encoders;
-        self.encoder_bits = encoder.bits;
-        self.force_bits = configuration.converters.force.bits;
-        self.torque_bits = configuration.converters.torque.bits;
+        let converters = &configuration.converters;
+        self.torque_bits = converters.torque.bits;
         self.source = source;
         self.from_host = None;
-        self.may_arm = false;
-        // Require that the switch is opened and closed again and that the sensors are checked anew.
-        self.switches = Switches::default();
-        self.plausibility = Plausibility::default();
+        // The switch has to be opened and closed again, and the sensors are checked anew.
+        self.front_end = FrontEnd::new(converters.encoders[0].bits, converters.force.bits);
+        self.encoders.restart();
+        self.force_cell.restart();
         self.start_timer(configuration.tick_hz);
     }
 
@@ -393,8 +344,17 @@ impl BoardDrive for F405Drive {
     }
 
     fn permit_arming(&mut self, permitted: bool) -> bool {
-        self.may_arm = permitted && self.source.is_on_board();
-        self.may_arm
+        let is_permitted = permitted && self.source.is_on_board();
+        self.front_end.permit_arming(is_permitted);
+        is_permitted
+    }
+
+    fn serve_sensor_bus(&mut self, bus: usize) {
+        if bus == 0 {
+            self.encoders.serve();
+        } else {
+            self.force_cell.serve();
+        }
     }
 
     fn stopwatch_hz(&self) -> u32 {

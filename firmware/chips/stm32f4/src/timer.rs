@@ -13,9 +13,11 @@ pub fn start(timer: &TIM2, counts: f32) {
     timer.cr1().write(|w| w.cen().set_bit());
 }
 
-/// Sets the count to zero. Do not call it under QEMU 7.2: its timer has no count of its own but
+/// Sets the count to zero and stops the interrupt until [`start`]. Do not call it under QEMU 7.2: its timer has no count of its own but
 /// reports the time since its start, and adds the amount set back to every period.
 pub fn set_back(timer: &TIM2) {
+    // Setting the count back raises the interrupt, too: the first tick would come at once.
+    timer.dier().write(|w| w.uie().clear_bit());
     timer.egr().write(|w| w.ug().set_bit());
 }
 

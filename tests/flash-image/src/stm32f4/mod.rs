@@ -26,6 +26,7 @@ use crate::unicorn::Processor;
 /// Interrupt numbers.
 const PVD: usize = 1;
 const TIM2: usize = 28;
+const SPIS: [usize; 2] = [35, 36];
 const USART1: usize = 37;
 const DMA1_STREAMS: [usize; 8] = [11, 12, 13, 14, 15, 16, 17, 47];
 const DMA2_STREAMS: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
@@ -421,6 +422,9 @@ impl<O: Outside> Chip for Stm32f4<O> {
             | u128::from(self.usart.interrupts()) << USART1
             | u128::from(self.external_interrupts[5] & self.external_interrupts[0] & 1 << 16 != 0)
                 << PVD;
+        for (spi, line) in self.spis.iter().zip(SPIS) {
+            lines |= u128::from(spi.interrupts()) << line;
+        }
         for stream in 0..8 {
             lines |= u128::from(self.dma[0].interrupts(stream)) << DMA1_STREAMS[stream];
             lines |= u128::from(self.dma[1].interrupts(stream)) << DMA2_STREAMS[stream];

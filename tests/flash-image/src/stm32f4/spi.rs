@@ -1,4 +1,4 @@
-//! An SPI master (RM0090, section 28), polled or with its interrupts off.
+//! An SPI master (RM0090, section 28): polled, or with an interrupt for every received word.
 
 use painleve_parts::Transfer;
 
@@ -80,6 +80,12 @@ impl Spi {
         let ends = now + SECOND * u64::from(bits) * divisor / clock_hz.max(1);
         self.shifting = Some((transfer, ends));
         self.flags |= EMPTY;
+    }
+
+    /// Returns whether the interrupt line is high.
+    pub fn interrupts(&self) -> bool {
+        const RECEIVED_ENABLED: u32 = 1 << 6;
+        self.flags & RECEIVED != 0 && self.control[1] & RECEIVED_ENABLED != 0
     }
 
     /// Returns the end of the present transfer.

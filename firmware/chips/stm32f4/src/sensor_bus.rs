@@ -1,0 +1,174 @@
+//! A SPI bus whose exchanges are carried by its interrupt: nothing waits for a byte.
+//!
+//! The interrupt comes with every received word. Between two exchanges it waits for the parts' set-up, hold
+//! and pause times, a microsecond together.
+
+use core::ops::Deref;
+
+use cortex_m::peripheral::DWT;
+use embedded_hal::digital::OutputPin;
+use painleve_drivers::exchange::{Dialogue, Exchange};
+use stm32f4xx_hal::pac::spi1::RegisterBlock;
+
+/// Words and waits of a bus.
+#[derive(Clone, Copy, Debug)]
+pub struct BusTiming {
+    /// The processor's clock, Hz.
+    pub core_hz: u32,
+    /// The bus' clock on the wire, Hz.
+    pub bus_hz: u32,
+    /// Bits of a word, 8 or 16, for which the SPI is configured.
+    pub word_bits: u8,
+}
+
+/// Processor cycles of the waits.
+#[derive(Clone, Copy, Debug)]
+struct Waits {
+    setup: u32,
+    hold: u32,
+    pause: u32,
+}
+
+/// A bus with its driver.
+pub struct SensorBus<I, S, D, const N: usize> {
+    spi: I,
+    selects: [S; N],
+    dialogue: D,
+    word_bits: u8,
+    /// Words of an exchange.
+    words: u8,
+    waits: Waits,
+    /// Bits still to send, and received so far.
+    sending: u32,
+    received: u32,
+    words_left: u8,
+    selected: usize,
+    has_failed: bool,
+    is_busy: bool,
+    is_complete: bool,
+}
+
+impl<I, S, D, const N: usize> SensorBus<I, S, D, N>
+where
+    I: Deref<Target = RegisterBlock>,
+    S: OutputPin,
+    D: Dialogue,
+{
+    /// Takes a SPI that is configured as a master, and select pins that are high.
+    pub fn new(spi: I, selects: [S; N], dialogue: D, timing: BusTiming) -> Self {
+        let cycles = |ns: u32| ns * (timing.core_hz / 1_000_000) / 1000 + 1;
+        // The last word is received at its last sampling edge, half a period before the clock rests.
+        let half_period_ns = 500_000_000 / timing.bus_hz.max(1) + 1;
+        let times = D::TIMING;
+        spi.cr2().modify(|_, w| w.rxneie().set_bit());
+        spi.cr1().modify(|_, w| w.spe().set_bit());
+        Self {
+            spi,
+            selects,
+            dialogue,
+            word_bits: timing.word_bits,
+            words: D::BITS / timing.word_bits.max(1),
+            waits: Waits {
+                setup: cycles(times.setup_ns),
+                hold: cycles(times.hold_ns + half_period_ns),
+                pause: cycles(times.pause_ns),
+            },
+            sending: 0,
+            received: 0,
+            words_left: 0,
+            selected: 0,
+            has_failed: false,
+            is_busy: false,
+            is_complete: false,
+        }
+    }
+
+    /// Returns the driver if its readings are complete.
+    pub fn complete(&self) -> Option<&D> {
+        self.is_complete.then_some(&self.dialogue)
+    }
+
+    /// Starts a new set of readings, unless the last one is still under way.
+    pub fn start(&mut self) {
+        if !self.is_busy {
+            self.is_busy = true;
+            self.is_complete = false;
+            let exchange = self.dialogue.begin();
+            self.open(exchange);
+        }
+    }
+
+    /// Gives up whatever is under way, and starts a new set of readings.
+    pub fn restart(&mut self) {
+        for select in &mut self.selects {
+            let _ = select.set_high();
+        }
+        let _ = self.spi.dr().read();
+        self.is_busy = false;
+        self.start();
+    }
+
+    /// Serves the interrupt: takes a received word, sends the next.
+    pub fn serve(&mut self) {
+        let flags = self.spi.sr().read();
+        if flags.rxne().bit_is_clear() {
+            return;
+        }
+        // Reading data, then flags, clears an overrun.
+        let word = self.spi.dr().read().bits();
+        self.has_failed |= flags.ovr().bit_is_set() && self.spi.sr().read().ovr().bit_is_set();
+        self.received = self.received << self.word_bits | u32::from(word as u16);
+        self.words_left = self.words_left.saturating_sub(1);
+        if self.words_left > 0 {
+            self.send();
+            return;
+        }
+        self.close();
+        let answer = (!self.has_failed).then_some(self.received);
+        match self.dialogue.proceed(answer) {
+            Some(exchange) => self.open(exchange),
+            None => {
+                self.is_busy = false;
+                self.is_complete = true;
+            }
+        }
+    }
+
+    fn open(&mut self, exchange: Exchange) {
+        self.selected = exchange.select;
+        self.sending = exchange.data << (32 - u32::from(D::BITS));
+        self.received = 0;
+        self.has_failed = false;
+        self.words_left = self.words;
+        if let Some(select) = self.selects.get_mut(self.selected) {
+            let _ = select.set_low();
+        }
+        wait(self.waits.setup);
+        self.send();
+    }
+
+    fn close(&mut self) {
+        wait(self.waits.hold);
+        if let Some(select) = self.selects.get_mut(self.selected) {
+            let _ = select.set_high();
+        }
+        wait(self.waits.pause);
+    }
+
+    fn send(&mut self) {
+        let word = self.sending >> (32 - u32::from(self.word_bits));
+        self.sending <<= self.word_bits;
+        self.spi.dr().write(|w| w.dr().set(word as u16));
+    }
+}
+
+/// Waits for at least this many processor cycles by the cycle counter, which must run.
+fn wait(cycles: u32) {
+    let start = DWT::cycle_count();
+    // Bounded even if the counter stands still.
+    for _ in 0..cycles {
+        if DWT::cycle_count().wrapping_sub(start) >= cycles {
+            return;
+        }
+    }
+}
