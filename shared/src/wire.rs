@@ -128,6 +128,7 @@ mod tests {
     use super::*;
     use crate::counts::{EncoderCounts, ForceCounts};
     use crate::frame::SensorFrame;
+    use crate::message::{Request, Response};
     use proptest::prelude::*;
     use std::vec::Vec;
 
@@ -141,6 +142,13 @@ mod tests {
                 ..Default::default()
             }
         }
+    }
+
+    fn requested(frame: &SensorFrame) -> Vec<u8> {
+        let mut buffer = [0; 64];
+        encode(&Request::Sensor(*frame), &mut buffer)
+            .unwrap()
+            .to_vec()
     }
 
     fn encoded(frame: &SensorFrame) -> Vec<u8> {
@@ -168,6 +176,46 @@ mod tests {
                 matches!(decoded, Err(WireError::Garbage | WireError::Checksum)),
                 "{:?}", decoded
             );
+        }
+    }
+
+    proptest! {
+        /// Random bytes, and messages with random bytes in them: the inbox finds the ends, the
+        /// decoder refuses or returns a message, and afterwards an intact message arrives.
+        #[test]
+        fn any_bytes_are_refused_or_decoded(
+            stream in prop::collection::vec(
+                prop_oneof![
+                    3 => prop::collection::vec(any::<u8>(), 0..40),
+                    1 => prop::collection::vec(any::<u8>(), 0..2 * MAXIMUM_LENGTH),
+                    3 => (sensor_frame(), any::<prop::sample::Index>(), any::<u8>()).prop_map(
+                        |(frame, at, byte)| {
+                            let mut bytes = requested(&frame);
+                            let at = at.index(bytes.len());
+                            bytes[at] = byte;
+                            bytes
+                        },
+                    ),
+                ],
+                0..12,
+            ),
+            frame in sensor_frame(),
+        ) {
+            let mut inbox = Inbox::new();
+            for byte in stream.concat() {
+                if let Some(message) = inbox.push(byte) {
+                    prop_assert!(message.len() <= MAXIMUM_LENGTH);
+                    let _ = decode::<Response>(&mut message.to_vec());
+                    let _ = decode::<Request>(message);
+                }
+            }
+            let mut last = None;
+            for byte in [std::vec![0], requested(&frame)].concat() {
+                if let Some(message) = inbox.push(byte) {
+                    last = Some(decode::<Request>(message) == Ok(Request::Sensor(frame)));
+                }
+            }
+            prop_assert_eq!(last, Some(true));
         }
     }
 

@@ -1,27 +1,62 @@
 //! Invalid scenarios, overrides, grids, campaigns, manifests and shards give an error message
-//! or a scenario that runs, without a panic and within bounded time.
+//! or a scenario that runs, without a panic and within bounded time and memory.
 //!
-//! `PROPTEST_CASES` sets the number of cases of each test.
+//! `PROPTEST_CASES` sets the number of cases of each test, `PAINLEVE_FUZZ_TICKS` the number of ticks
+//! for which valid scenarios run. Times are processor times of the test's thread, so that a busy
+//! machine fails no test.
 
 #![allow(clippy::unwrap_used)]
 
+use std::fmt::Debug;
 use std::fs;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use nix::time::{ClockId, clock_gettime};
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
-use painleve_plant::scenario::{Scenario, built_in};
+use painleve_plant::scenario::{Scenario, built_in, describe};
 use painleve_plant::simulation::Simulation;
 use painleve_study::Grid;
 use painleve_study::sweep::campaign::Campaign;
 use painleve_study::sweep::manifest::Manifest;
 use proptest::prelude::*;
 use proptest::sample::select;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+use serde_json::Value;
 
-/// Longer than any test takes, also on a busy machine.
-const LONG: Duration = Duration::from_secs(10);
+/// Longest time in which an input is read or refused.
+const READING: Duration = Duration::from_secs(1);
+/// Longest time in which a valid scenario gives a result or an error.
+const RUNNING: Duration = Duration::from_secs(10);
+/// Largest peak of the memory of all tests together, kB.
+const PEAK_KB: u64 = 500_000;
 /// Number of ticks for which a valid scenario is run.
 const TICKS: u64 = 50;
+
+/// Runs `work`; fails if it takes longer than `limit`, or the process has taken too much memory.
+#[track_caller]
+fn within<T>(limit: Duration, input: &impl Debug, work: impl FnOnce() -> T) -> T {
+    let now = || Duration::from(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).unwrap());
+    let start = now();
+    let result = work();
+    let took = now() - start;
+    assert!(took < limit, "took {took:?}: {input:?}");
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let peak = status.lines().find(|line| line.starts_with("VmHWM:"));
+    let peak = peak.unwrap().split_whitespace().nth(1).unwrap();
+    assert!(
+        peak.parse::<u64>().unwrap() < PEAK_KB,
+        "{peak} kB: {input:?}"
+    );
+    result
+}
+
+/// The number in an environment variable, or `default`.
+fn number(variable: &str, default: u64) -> u64 {
+    let set = std::env::var(variable).ok();
+    set.and_then(|text| text.parse().ok()).unwrap_or(default)
+}
 
 /// Plausible values, and values that no user would mean.
 fn value() -> impl Strategy<Value = String> {
@@ -87,22 +122,23 @@ fn key() -> impl Strategy<Value = String> {
     ]
 }
 
-/// Runs a scenario for a while if it is valid.
-fn try_out(scenario: &Scenario) {
-    let start = Instant::now();
-    if let (Ok(simulation), Ok(host)) = (
-        Simulation::new(scenario),
-        InProcess::new(&scenario.controller_configuration()),
-    ) {
-        let mut closed_loop = ClosedLoop::new(simulation, host);
-        for _ in 0..scenario.run.ticks().min(TICKS) {
-            // An arm that cannot continue is a valid result, too.
-            if closed_loop.tick(&mut ()).is_err() {
-                break;
+/// Runs a valid scenario for a while.
+fn try_out(scenario: &Scenario, input: &impl Debug) {
+    let ticks = number("PAINLEVE_FUZZ_TICKS", TICKS);
+    within(RUNNING, input, || {
+        if let (Ok(simulation), Ok(host)) = (
+            Simulation::new(scenario),
+            InProcess::new(&scenario.controller_configuration()),
+        ) {
+            let mut closed_loop = ClosedLoop::new(simulation, host);
+            for _ in 0..scenario.run.ticks().min(ticks) {
+                // An arm that cannot continue is a valid result, too.
+                if closed_loop.tick(&mut ()).is_err() {
+                    break;
+                }
             }
         }
-    }
-    assert!(start.elapsed() < LONG, "took {:?}", start.elapsed());
+    });
 }
 
 /// Returns a text with a few of its characters changed, removed, doubled or replaced.
@@ -147,20 +183,20 @@ proptest! {
     fn overrides_are_refused_or_run(overrides in prop::collection::vec((key(), value()), 1..4)) {
         let overrides: Vec<String> =
             overrides.iter().map(|(key, value)| format!("{key}={value}")).collect();
-        let start = Instant::now();
-        match Scenario::load(built_in::DEFAULT, &overrides) {
-            Ok(scenario) => try_out(&scenario),
+        let load = || Scenario::load(built_in::DEFAULT, &overrides);
+        match within(READING, &overrides, load) {
+            Ok(scenario) => try_out(&scenario, &overrides),
             Err(error) => prop_assert!(!error.to_string().trim().is_empty()),
         }
-        prop_assert!(start.elapsed() < LONG);
     }
 
     #[test]
     fn scenario_files_are_refused_or_run(text in scenario_text()) {
         let file = tempfile::NamedTempFile::new().unwrap();
         fs::write(file.path(), &text).unwrap();
-        if let Ok(scenario) = Scenario::load(file.path().to_str().unwrap(), &[]) {
-            try_out(&scenario);
+        let path = file.path().to_str().unwrap();
+        if let Ok(scenario) = within(READING, &text, || Scenario::load(path, &[])) {
+            try_out(&scenario, &text);
         }
     }
 
@@ -168,11 +204,10 @@ proptest! {
     fn grids_are_refused_or_finite(
         parts in prop::collection::vec(value(), 0..5), separator in select(vec![",", ":", " "]),
     ) {
-        let start = Instant::now();
-        if let Ok(grid) = parts.join(separator).parse::<Grid>() {
+        let text = parts.join(separator);
+        if let Ok(grid) = within(READING, &text, || text.parse::<Grid>()) {
             prop_assert!(grid.values().iter().all(|value| value.is_finite()));
         }
-        prop_assert!(start.elapsed() < LONG);
     }
 
     #[test]
@@ -180,8 +215,108 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("campaign.toml");
         fs::write(&path, &text).unwrap();
-        let _ = Campaign::load(&path);
         fs::write(Manifest::path(folder.path()), &text).unwrap();
-        prop_assert!(Manifest::load(folder.path()).is_err());
+        within(READING, &text, || {
+            let _ = Campaign::load(&path);
+            assert!(Manifest::load(folder.path()).is_err());
+        });
     }
+}
+
+/// A setting with a range.
+#[derive(Clone, Debug)]
+struct Ranged {
+    key: String,
+    minimum: f64,
+    maximum: f64,
+    is_integer: bool,
+    /// Elements of an array.
+    elements: Option<usize>,
+}
+
+/// Returns all settings with a range, from the schema for editors.
+fn ranged() -> Vec<Ranged> {
+    fn walk(prefix: &str, schema: &Value, found: &mut Vec<Ranged>) {
+        for (name, field) in schema["properties"].as_object().into_iter().flatten() {
+            let key = format!("{prefix}{name}");
+            walk(&format!("{key}."), field, found);
+            let elements = field["minItems"].as_u64().map(|count| count as usize);
+            let scalar = elements.map_or(field, |_| &field["items"]);
+            if let (Some(minimum), Some(maximum)) =
+                (scalar["minimum"].as_f64(), scalar["maximum"].as_f64())
+            {
+                let is_integer = scalar["type"] == "integer";
+                found.push(Ranged {
+                    key,
+                    minimum,
+                    maximum,
+                    is_integer,
+                    elements,
+                });
+            }
+        }
+    }
+    let mut found = Vec::new();
+    walk("", &describe::json_schema(), &mut found);
+    found
+}
+
+/// Sets some settings to the ends of their ranges, or close to them, or anywhere between.
+fn extremes() -> impl Strategy<Value = Vec<String>> {
+    let place = prop_oneof![
+        2 => Just(0.0),
+        2 => Just(1.0),
+        1 => 0.0..1e-6_f64,
+        1 => 1.0 - 1e-6..1.0_f64,
+        2 => (-12.0..0.0_f64).prop_map(|power| 10_f64.powf(power)),
+        2 => 0.0..1.0_f64,
+    ];
+    prop::collection::vec((select(ranged()), place), 1..5).prop_map(|settings| {
+        let overrides = settings.into_iter().map(|(setting, place)| {
+            let Ranged {
+                key,
+                minimum,
+                maximum,
+                is_integer,
+                elements,
+            } = setting;
+            let value = minimum + (maximum - minimum) * place;
+            let value = if is_integer {
+                format!("{value:.0}")
+            } else {
+                format!("{value:?}")
+            };
+            match elements {
+                Some(count) => format!("{key}=[{}]", vec![value; count].join(", ")),
+                None => format!("{key}={value}"),
+            }
+        });
+        overrides.collect()
+    })
+}
+
+/// Counts valid scenarios: most draws are refused, because settings must fit each other.
+#[test]
+fn extreme_scenarios_run_or_fail_in_time() {
+    let wanted = number("PROPTEST_CASES", 256);
+    let mut runner = TestRunner::deterministic();
+    let (strategy, mut drawn, mut valid) = (extremes(), 0_u64, 0);
+    while valid < wanted {
+        let overrides = strategy.new_tree(&mut runner).unwrap().current();
+        drawn += 1;
+        match within(READING, &overrides, || {
+            Scenario::load(built_in::DEFAULT, &overrides)
+        }) {
+            Ok(scenario) => {
+                valid += 1;
+                try_out(&scenario, &overrides);
+            }
+            Err(error) => assert!(!error.to_string().is_empty()),
+        }
+        assert!(
+            drawn < 100 * (wanted + 100),
+            "only {valid} of {drawn} are valid"
+        );
+    }
+    println!("{valid} valid scenarios of {drawn}");
 }

@@ -194,6 +194,8 @@ impl Manifest {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use proptest::prelude::*;
+    use proptest::sample::Index;
 
     /// Creates a manifest with this many rows and no content.
     pub fn manifest(rows: usize, shards: usize) -> Manifest {
@@ -209,6 +211,26 @@ pub(crate) mod tests {
                 study: "none".into(),
                 options: BTreeMap::from([("mu".into(), vec!["0.6".into()])]),
             },
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn damaged_manifests_are_refused_or_within_bounds(
+            edits in prop::collection::vec((any::<Index>(), 0..4_usize, "\\PC{0,12}"), 1..6),
+        ) {
+            let mut text: Vec<char> = manifest(10, 3).text().chars().collect();
+            for (at, removed, inserted) in edits {
+                let at = at.index(text.len().max(1));
+                let end = (at + removed).min(text.len());
+                text.splice(at.min(end)..end, inserted.chars());
+            }
+            match Manifest::parse(&text.into_iter().collect::<String>()) {
+                Ok(read) => prop_assert!(
+                    read.rows <= MOST_ROWS && (1..=MOST_SHARDS).contains(&read.shards)
+                ),
+                Err(message) => prop_assert!(!message.is_empty()),
+            }
         }
     }
 
