@@ -276,6 +276,13 @@ impl SplitMix {
     }
 }
 
+/// Returns the load of the machine over the last minute: limits of time mean little at a load far
+/// above the number of cores.
+fn load() -> String {
+    let loads = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    loads.split(' ').next().unwrap_or_default().to_owned()
+}
+
 /// Counts of trials and flaws.
 #[derive(Default)]
 struct TrialTable {
@@ -308,7 +315,7 @@ impl TrialTable {
         for (flaw, what) in outcome.findings {
             *row.flaws.entry(flaw).or_default() += 1;
             self.findings += 1;
-            eprintln!("{trial:?}: {flaw:?}: {what}");
+            eprintln!("{trial:?}: {flaw:?}: {what} (load {})", load());
         }
     }
 
@@ -330,8 +337,9 @@ impl TrialTable {
             sum += row.injections;
         }
         say(&format!(
-            "{sum} injections in {:.0} s, {} flaws, {} segments left{}",
+            "{sum} injections in {:.0} s at a load of {}, {} flaws, {} segments left{}",
             took.as_secs_f64(),
+            load(),
             self.findings,
             segments.len(),
             segments
