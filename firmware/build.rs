@@ -1,4 +1,4 @@
-//! Computes what tells one build of controller and messages from another: a hash of their sources.
+//! Computes the hash that identifies a build: that of the sources of controller and messages.
 //!
 //! A configuration is bytes without names. A board that was flashed from other sources might read a number
 //! as its neighbour; so both ends compare this hash before.

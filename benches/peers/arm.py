@@ -1,4 +1,4 @@
-"""The paper's arm on its belt, as the peers see it: parameters, start, and what to report."""
+"""The paper's arm on its belt, for the other simulators: parameters, start, and output."""
 
 import json
 import math
@@ -25,7 +25,7 @@ def start():
 
 
 class Report:
-    """Counts what a peer does and prints it as JSON, with the CPU time since its start."""
+    """Counts the events of a simulation and prints them as JSON, with the CPU time since its start."""
 
     def __init__(self):
         self.max_theta1_dot_rad_s = -math.inf
@@ -35,17 +35,17 @@ class Report:
         self.start_cpu_s = time.process_time()
 
     def see(self, theta1_dot_rad_s, gap_m):
-        """A state of the motion, the gap between tip and belt with it."""
+        """Records a state of the motion with the gap between tip and belt."""
         self.max_theta1_dot_rad_s = max(self.max_theta1_dot_rad_s, theta1_dot_rad_s)
         self.apex_m = max(self.apex_m, gap_m)
 
     def touch(self, time_s):
-        """The tip has come to the belt."""
+        """Counts an impact of the tip on the belt."""
         self.touches += 1
         self.last_touch_s = time_s
 
     def write(self, simulated_s, settings):
-        """Prints the outcome."""
+        """Prints the results."""
         print(
             json.dumps(
                 {

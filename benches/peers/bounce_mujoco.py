@@ -7,7 +7,7 @@ import mujoco
 import arm
 
 STEP_S = 1e-4
-# Of the sphere that is the tip: the contact lies so far beyond the rod's end.
+# Radius of the sphere at the tip: the contact is this far beyond the rod's end.
 RADIUS_M = 1e-4
 
 XML = f"""
@@ -46,14 +46,14 @@ def main(simulated_s):
     theta1, theta2 = arm.start()
     data.qpos[:] = [0, theta1, theta2 - theta1]
     data.qvel[0] = arm.V_BELT_M_S
-    # Steps between two looks at the arm, 0.5 ms.
+    # Steps between two samples of the arm, 0.5 ms.
     look = 5
     tip = model.geom("tip").id
     report = arm.Report()
     was_touching = True
     for _ in range(round(simulated_s / STEP_S / look)):
         mujoco.mj_step(model, data, look)
-        # The belt goes on for ever.
+        # The belt is endless.
         data.qpos[0] = 0
         data.qvel[0] = arm.V_BELT_M_S
         report.see(data.qvel[1], data.geom_xpos[tip][2] + arm.HEIGHT_M)

@@ -15,7 +15,7 @@ import arm
 M, L, G = arm.MASS_KG, arm.LENGTH_M, arm.GRAVITY_M_S2
 K, SIGMA, ALPHA0, MU = arm.STIFFNESS_NM_RAD, arm.DAMPING_NMS_RAD, arm.SPRING_REST_RAD, arm.FRICTION
 RTOL, ATOL = 1e-9, 1e-10
-# Bounces that get slower than this are over, m/s.
+# Bounces slower than this end, m/s.
 SLOWEST_M_S = 1e-6
 
 
@@ -88,7 +88,7 @@ def impact(x, without_collision):
         closing = -slip * rate[0]
         until_slip_dies = slip * velocity[0] / closing if slip != 0 and closing > 0 else np.inf
         if compressed is None:
-            # Where p <= 0 this phase cannot end compression.
+            # For p <= 0 this phase cannot end compression.
             until = max(-velocity[1] / rate[1], 0.0) if rate[1] > 0 else np.inf
         else:
             until = max((1 + arm.RESTITUTION) * compressed - impulse[1], 0.0)
@@ -111,7 +111,7 @@ def event(function, direction):
 
 
 def contact_mode(x):
-    """What follows at the belt with v_n = 0: "flight", "throw", or a slip direction."""
+    """The next mode of a tip on the belt with v_n = 0: "flight", "throw", or a slip direction."""
     _, _, _, q, free = parts(x)
     v_r = tip_velocity(x)[0]
     if abs(v_r) > 1e-9:
@@ -157,7 +157,7 @@ def main(simulated_s):
             break
         if slip is not None:
             if len(solution.t_events) == 3 and len(solution.t_events[2]):
-                # Slip has died: exactly zero, whatever the root's rounding.
+                # Slip has vanished: set it to exactly zero, despite the rounding of the root.
                 inverse, jacobian, _, q, _ = parts(x)
                 lost = np.linalg.solve(q, np.array([-tip_velocity(x)[0], 0.0]))
                 x = np.concatenate([x[:2], x[2:] + inverse @ jacobian.T @ lost])

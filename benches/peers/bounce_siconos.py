@@ -19,7 +19,7 @@ def main(simulated_s):
         source, plugin = os.path.join(here, "plugin.c"), os.path.join(folder, "plugin.so")
         flags = ["-O2", "-shared", "-fPIC", "-Wl,-soname,plugin.so"]
         subprocess.run(["cc", *flags, "-o", plugin, source, "-lm"], check=True)
-        # Siconos finds by its name what is loaded already.
+        # Siconos finds a loaded library by its name.
         ctypes.CDLL(plugin, mode=ctypes.RTLD_GLOBAL)
         theta1, theta2 = arm.start()
         system = kernel.LagrangianDS([theta1, theta2], [0.0, 0.0], "plugin:mass")

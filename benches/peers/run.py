@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""The open-loop bounce (x0,a, mu = 0.6, v_belt = -0.4 m/s) by painleve and by its peers, in one run.
+"""The open-loop bounce (x0,a, mu = 0.6, v_belt = -0.4 m/s) by painleve and by other simulators, in one run.
 
     cargo build --release && python3 benches/peers/run.py
 
 Prints a Markdown table of simulated seconds per CPU second. SciPy and MuJoCo go into a virtual
 environment of their own below target/; Siconos comes from Debian (apt-get install
-python3-siconos). A peer that cannot be installed or does not run is said to be missing.
+python3-siconos). A program that cannot be installed or does not run is reported as missing.
 """
 
 import json
@@ -26,14 +26,14 @@ PAINLEVE_S, SCIPY_S, MUJOCO_S, SICONOS_S = 20_000, 60, 100, 30
 
 PARADOX = {
     "painleve": "decided by the signs of p and b: impact without collision, Routh's process in closed form",
-    "SciPy": "the same rules, written again over `solve_ivp` and its events",
-    "MuJoCo": "not seen: contact is soft and convex, penetration throws the tip; what follows depends on softness and step",
-    "Siconos": "not seen: impulses per step under Newton's law of impact; the inconsistent state shows as an impulse",
+    "SciPy": "the same rules, reimplemented with `solve_ivp` and its events",
+    "MuJoCo": "not reproduced: contact is soft and convex, and penetration throws the tip off; the subsequent motion depends on softness and step",
+    "Siconos": "not reproduced: one impulse per step under Newton's impact law; the inconsistent state appears as an impulse",
 }
 
 
 def python_with(package, version_probe):
-    """The environment's Python with a package, or why there is none."""
+    """The environment's Python with a package, or the reason why it is missing."""
     python = ENVIRONMENT / "bin" / "python"
     if not python.exists():
         venv.create(ENVIRONMENT, with_pip=True)
@@ -97,7 +97,7 @@ def siconos():
 def main():
     if not PAINLEVE.exists():
         sys.exit(f"there is no {PAINLEVE}: run cargo build --release")
-    # One thread each, as painleve has.
+    # One thread each, like painleve.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
     print("| program | simulated s per CPU s | painleve is faster by | impacts per s | apex | largest θ̇₁ | the paradox |")

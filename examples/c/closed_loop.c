@@ -24,7 +24,7 @@ int main(void)
     PainlevePlant *plant = NULL;
     PainleveSnapshot end;
 
-    /* A mistake has a message. */
+    /* An invalid call has an error message. */
     if (painleve_plant_new("belt.friction = -1", &plant) == PAINLEVE_STATUS_OK) {
         fprintf(stderr, "negative friction has been accepted\n");
         return 1;

@@ -29,8 +29,8 @@ pub mod refer;
 pub mod supervise;
 pub mod telemetry;
 
-/// Tells a build of controller and messages from another: a hash of the sources of both. The host and the
-/// board compare it before a configuration is taken.
+/// Hash of the sources of controller and messages, which identifies a build. The host and the board
+/// compare it before the board accepts a configuration.
 pub const BUILD: u64 = match u64::from_str_radix(env!("PAINLEVE_BUILD"), 16) {
     Ok(build) => build,
     Err(_) => panic!("the build script writes sixteen hexadecimal digits"),

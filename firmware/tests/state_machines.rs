@@ -42,7 +42,7 @@ impl Limits {
     }
 }
 
-/// What the supervisor does, and since which tick.
+/// State of the supervisor, and the tick since which it has been in it.
 #[derive(Clone, Copy, Debug)]
 enum Doing {
     Nothing,

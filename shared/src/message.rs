@@ -84,7 +84,7 @@ pub enum Response {
         /// Identifies the board's build.
         build: u64,
     },
-    /// The torque is off, and there is no configuration any more.
+    /// The torque is off, and the configuration has been discarded.
     Stopped,
     /// The answer to a sensor frame.
     Actuator {

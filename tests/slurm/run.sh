@@ -3,13 +3,13 @@
 #
 # Sets up munge, slurmctld and two slurmd on this machine, each node under its own host name,
 # as two nodes of a cluster; submits a sweep; kills one node with everything that runs on it;
-# waits until Slurm has requeued its shard (it waits two minutes first); merges, and compares the bytes with those that one
-# process computes. Everything is taken down at the end.
+# waits until Slurm has requeued its shard (after two minutes); merges, and compares the bytes with those of a
+# single process. Everything is stopped at the end.
 #
 #   apt-get install -y --no-install-recommends slurmctld slurmd slurm-client munge
 #   cargo build --release && sudo tests/slurm/run.sh
 #
-# Ports, folders and names are its own: a Slurm that is already running is not touched.
+# It uses separate ports, folders and names, so a running Slurm is not affected.
 
 set -euo pipefail
 
@@ -21,7 +21,7 @@ pids=()
 
 fail() { echo "FAILED: $*" >&2; exit 1; }
 
-# What a process has started, youngest first, then itself.
+# Prints the descendants of a process, youngest first, then the process itself.
 tree() { local child; for child in $(pgrep -P "$1"); do tree "$child"; done; echo "$1"; }
 
 # Tasks do not belong to slurmd's tree: they run under a slurmstepd of the node.
@@ -87,7 +87,7 @@ TaskPlugin=task/none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core
 SchedulerParameters=batch_sched_delay=1,sched_interval=2
-# A node that does not answer for so long is down, and its tasks are requeued.
+# A node that does not answer for this long is down, and its tasks are requeued.
 SlurmdTimeout=10
 ReturnToService=1
 MpiDefault=none
@@ -103,7 +103,7 @@ export SLURM_CONF=$work/slurm.conf
 slurmctld -D -c > "$work/slurmctld.out.log" 2>&1 &
 pids+=($!)
 for node in "${nodes[@]}"; do
-    # A host name of its own, as on a machine of its own.
+    # A separate host name, as on a separate machine.
     unshare --uts sh -c "hostname $node && exec slurmd -D -N $node" > "$work/$node.out.log" 2>&1 &
     node_pids+=($!)
 done

@@ -70,7 +70,7 @@ pub struct TaskCounts {
 ///
 /// let mut task: ControlTask<Desk> = ControlTask::new(Desk::default());
 /// task.configure(&Configuration::default(), FrameSource::Sensors)?;
-/// let answered = task.tick().expect("a frame has come");
+/// let answered = task.tick().expect("a frame is available");
 /// assert_eq!(task.drive().answer, answered.frame);
 /// # Ok::<(), painleve_shared::range::OutOfRange>(())
 /// ```

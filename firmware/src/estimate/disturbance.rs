@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_slow_where_p_is_small() {
+    fn the_estimate_is_slow_where_p_is_small() {
         let truth = GeneralisedTorque::new(0.5, -0.3);
         let after = |p_ratio| {
             let (rest, unloaded) = (LinkMotion::zeros(), Vector2::zeros());
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_limited() {
+    fn the_estimate_is_limited() {
         let found = observed(
             GeneralisedTorque::new(1.9, -1.5),
             LinkMotion::zeros(),

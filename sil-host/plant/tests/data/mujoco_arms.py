@@ -74,7 +74,7 @@ def draw(random):
 
 
 def answer(arm):
-    """What MuJoCo says about the arm."""
+    """MuJoCo's values for the arm."""
     text = MODEL.format(down1=-arm["centre1"], down2=-arm["centre2"], **arm)
     text = text.replace('"0 0 --', '"0 0 ').replace(" --", " ")
     model = mujoco.MjModel.from_xml_string(text)
