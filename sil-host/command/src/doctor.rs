@@ -59,7 +59,7 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     row("scheduling", request_realtime().to_string());
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header(["what", "state"]);
+    table.set_header(["item", "state"]);
     table.add_rows(rows);
     say(table)?;
     survey.map(|_| ()).map_err(LinkError::into)

@@ -178,7 +178,7 @@ mod tests {
         assert!(settling.time_s() < 200.0);
     }
 
-    /// A motion that is no longer integrated would not have changed.
+    /// Integrating further would not have changed the motion.
     #[test]
     fn an_early_stop_does_not_change_the_result() {
         let early = Attractor::of(&mut plant(-11.4, -35.1), 250.0, 50.0).unwrap();

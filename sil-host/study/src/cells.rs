@@ -47,7 +47,7 @@ pub struct Cell {
     pub v_belt_m_s: f64,
     /// Initial condition.
     pub initial: Initial,
-    /// Initial state, before the tip is put onto the belt.
+    /// Initial state, before the tip is moved onto the belt.
     pub start: State,
 }
 

@@ -118,7 +118,7 @@ impl fmt::Display for Initial {
     }
 }
 
-/// Largest tip height of a random start over the belt, m.
+/// Largest tip height of a random start above the belt, m.
 const RANDOM_HEIGHT_M: f64 = 0.03;
 
 /// Largest rate of a joint in a random start, rad/s.
@@ -139,7 +139,7 @@ impl Initial {
     }
 
     /// Returns the initial state for an arm. A random one has its tip anywhere within reach, up to 3 cm
-    /// over the belt (less over a high belt), the elbow on either side and each joint rate at up to
+    /// above the belt (less above a high belt), the elbow on either side and each joint rate at up to
     /// 5 rad/s. It depends only on
     /// `seed`, `row` and the arm.
     pub fn state(self, arm: &Arm<f64>, seed: u64, row: u64) -> State {

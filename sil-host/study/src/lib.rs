@@ -12,7 +12,7 @@
 //! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
 //! - [`contact_probe`], [`distribution`], [`proportion`]: contact, distributions and success rates of many runs
 //! - [`case`], [`trial`]: closed loops to study, and their execution in this process;
-//!   [`loop_study`]: the same with a plant of one's own
+//!   [`loop_study`]: the same with a user-defined plant
 //! - [`bifurcation`]: Fig. 4, where over μ × v_belt the arm keeps bouncing
 //! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: the long-term motion of one
 //! - [`poincare`]: Fig. 5, periodic and chaotic bouncing

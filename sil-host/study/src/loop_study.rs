@@ -22,7 +22,7 @@ pub trait LoopStudy: Study {
     ) -> Result<Self::Row, StudyError>;
 }
 
-/// A closed-loop study with a plant of one's own.
+/// A closed-loop study with a user-defined plant.
 ///
 /// ```
 /// use painleve_plant::mechanics::BuiltInPlant;

@@ -1,4 +1,4 @@
-//! What a study came to, for programs, for spreadsheets and for people.
+//! The outcome of a study as JSON, CSV, table and figure.
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{ContentArrangement, Table};

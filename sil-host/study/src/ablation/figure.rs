@@ -35,7 +35,7 @@ impl Figure for Ablation {
             bar("95 % interval", BLACK_INK, 4, row.lower, row.upper);
         }
         Chart {
-            title: "What each part contributes".into(),
+            title: "Contribution of each part".into(),
             subtitle: format!("the same {runs} runs of the robustness campaign for every bar"),
             x_title: "Success (%)".into(),
             x: Some(0.0..101.0),

@@ -8,7 +8,7 @@ use crate::catalogue::StudyOptions;
 use crate::register_study;
 use crate::robustness::{CampaignOptions, Part, Row};
 
-/// What each part of the controller contributes to the robustness campaign.
+/// Contribution of each part of the controller to success in the robustness campaign.
 #[derive(Debug, Args)]
 #[command(
     mut_arg("runs", |runs| runs.default_value("500").help("Number of runs with each part switched off")),

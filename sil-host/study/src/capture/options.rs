@@ -10,7 +10,7 @@ use crate::tabular::Table;
 
 use crate::options::RandomRuns;
 
-/// How soon a bouncing arm is captured.
+/// Time until a bouncing arm is captured.
 #[derive(Debug, Args)]
 pub struct Options {
     #[command(flatten)]

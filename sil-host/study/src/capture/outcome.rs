@@ -50,7 +50,7 @@ impl Outcome for Captures {
     }
 
     fn table(&self) -> Table {
-        let mut table = outcome::table(["what", "median", "90 %", "99 %", "max"]);
+        let mut table = outcome::table(["quantity", "median", "90 %", "99 %", "max"]);
         table.add_row(["success (95 %)", &self.success.to_string(), "", "", ""]);
         if self.unsolved > 0 {
             table.add_row(["unsolved", &self.unsolved.to_string(), "", "", ""]);

@@ -1,4 +1,4 @@
-//! One effect of the study: what a level of it sets.
+//! One effect of the study, and the settings of its levels.
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ pub struct RigEffect {
     pub unit: &'static str,
     /// Levels from harmless to harmful, with the typical one among them.
     pub levels: &'static [f64],
-    /// Level of an ordinary rig.
+    /// Level of a typical rig.
     pub typical: f64,
     /// Whether only the compliant plant has the effect.
     pub compliant_only: bool,
@@ -23,7 +23,7 @@ pub struct RigEffect {
     /// The largest friction coefficient in a run, from the level and the belt's μ, of effects that
     /// change it. Their targets are where p is at least a fifth of Q22 at that friction.
     pub largest_friction: Option<fn(f64, f64) -> f64>,
-    /// The overrides of a level, from the level and what is drawn for the run.
+    /// The overrides of a level, from the level and the random values of the run.
     pub overrides: fn(f64, &Drawn) -> Vec<String>,
 }
 
@@ -34,13 +34,13 @@ pub struct Drawn {
     pub friction: f64,
     /// Speed of the belt, 0.1 … 1 m/s in either direction.
     pub speed_m_s: f64,
-    /// An instant while the tip moves, s.
+    /// A time while the tip moves, s.
     pub at_s: f64,
     /// A number from 0 to 1.
     pub share: f64,
     /// A phase, rad.
     pub phase_rad: f64,
-    /// Seed of what is random along the belt.
+    /// Seed of random properties along the belt.
     pub seed: u64,
 }
 

@@ -1,4 +1,4 @@
-//! The levels at which success falls below 99, 90 and 50 %, relative to those of an ordinary rig.
+//! The levels at which success falls below 99, 90 and 50 %, relative to those of a typical rig.
 
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREY, ORANGE, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel, PlotError};
@@ -27,12 +27,12 @@ impl Figure for EffectsOutcome {
             panels.push(panel(these, panels.is_empty()));
         }
         Chart {
-            title: "How much of each effect the closed loop takes".into(),
+            title: "Tolerance of the closed loop to each effect".into(),
             subtitle: format!(
                 "{} random closed loops at each level, seed {}; grey: the levels tried",
                 self.runs, self.seed
             ),
-            x_title: "Doublings of the level of an ordinary rig, which is given with each name"
+            x_title: "Doublings of the level of a typical rig, which is given with each name"
                 .into(),
             x: Some(NAMES - 0.2..MOST),
             panels,

@@ -1,7 +1,7 @@
-//! Success against the level of each effect that a rig has and the paper's arm has not.
+//! Success against the level of each effect of a real rig that the paper's arm lacks.
 //!
-//! Every cell (controller, contact, effect, level) runs the same random closed loops: the arm known
-//! exactly, friction 0.3 … 0.9, belt 0.1 … 1 m/s, either posture, 1 kHz, encoders of 14 bits, force and
+//! Every cell (controller, contact, effect, level) runs the same random closed loops: an exactly known
+//! arm, friction 0.3 … 0.9, belt 0.1 … 1 m/s, either posture, 1 kHz, encoders of 14 bits, force and
 //! torque of 12 bits, one sample of delay, half of the targets up to 20 mm beyond the edge. Each run is
 //! judged as in the [`robustness`](crate::robustness) campaign.
 

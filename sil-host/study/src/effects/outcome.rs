@@ -7,7 +7,7 @@ use super::{Contact, EFFECTS, EffectsStudy, RigEffect, Row, find};
 use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
 
-/// Success rates whose levels are sought.
+/// Success rates for which the study finds the levels.
 pub const RATES: [f64; 3] = [0.99, 0.9, 0.5];
 
 /// Success at one level of an effect.
@@ -32,7 +32,7 @@ pub struct Series {
     pub key: &'static str,
     /// Unit of a level.
     pub unit: &'static str,
-    /// Level of an ordinary rig.
+    /// Level of a typical rig.
     pub typical: f64,
     /// Success by level, from harmless to harmful.
     pub cells: Vec<LevelSuccess>,
@@ -44,7 +44,7 @@ pub struct Series {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fall {
-    /// It is below without the effect, or at the lowest level of an effect that has no smaller one.
+    /// Already below without the effect, or at the lowest level of an effect without a smaller one.
     Before,
     /// Between two levels, interpolated.
     At(f64),

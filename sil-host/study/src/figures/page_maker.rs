@@ -1,4 +1,4 @@
-//! What the sections of the page share: resolution, and computation with progress.
+//! Shared by the sections of the page: resolution, and computation with progress.
 
 use painleve_chart::PlotError;
 use painleve_plant::mechanics::PlantParameters;

@@ -29,7 +29,7 @@ impl Figure for LiftOffs {
             histogram(title, note, colour, FARTHEST_MS, limit_ms, &times)
         };
         Chart {
-            title: "How soon a lift-off is detected".into(),
+            title: "Delay in detecting a lift-off".into(),
             subtitle: "tips led over the edge p = 0 with the governor switched off".into(),
             x_title: "Time from lift-off to its detection (ms)".into(),
             x: Some(0.0..FARTHEST_MS),

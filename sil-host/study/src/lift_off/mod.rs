@@ -79,7 +79,7 @@ pub struct Row {
     pub flight_s: Option<f64>,
     /// Time from lift-off to its detection, s; null if it was not detected.
     pub noticed_s: Option<f64>,
-    /// Number of times that contact was taken for flight while the tip slid.
+    /// Number of times that contact was mistaken for flight while the tip slid.
     pub false_alarms: u32,
     /// Sliding time before the lift-off, s.
     pub slid_s: f64,

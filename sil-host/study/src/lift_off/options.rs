@@ -1,4 +1,4 @@
-//! Options of the study: how soon a lift-off is detected.
+//! Options of the study: delay in detecting a lift-off.
 
 use clap::Args;
 
@@ -10,7 +10,7 @@ use crate::tabular::Table;
 
 use crate::options::{self, RandomRuns};
 
-/// How soon a lift-off is detected, with the force cell and without.
+/// Delay in detecting a lift-off, with the force cell and without.
 #[derive(Debug, Args)]
 #[command(mut_arg("runs", |runs| runs.default_value("1200").help("Number of runs with each kind of evidence")))]
 pub struct Options {

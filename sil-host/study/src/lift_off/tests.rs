@@ -77,7 +77,7 @@ fn runs_that_cannot_be_solved_are_counted_and_all_others_are_kept() {
 
 /// Uses rows made by hand, so that a change of the controller does not change the snapshot.
 #[test]
-fn the_table_tells_early_late_short_and_missed_apart() {
+fn the_table_distinguishes_early_late_short_and_missed() {
     let row = |evidence, flight_s: f64, noticed_s: Option<f64>| Row {
         index: 0,
         evidence,

@@ -36,7 +36,7 @@ const SHORT_P_RATIO: f64 = 0.1;
 pub enum LiftOffRule {
     /// A single one fails the run.
     Fail,
-    /// They are counted only: what throws the tip is not the controller.
+    /// They are only counted, because the effect throws the tip off, not the controller.
     Counted,
 }
 

@@ -23,7 +23,7 @@ pub struct RobustnessOutcome {
     pub success: Proportion,
     /// Number of runs with each ending.
     pub endings: BTreeMap<Ending, usize>,
-    /// Number of times that contact was taken for flight, before any lift-off.
+    /// Number of times that contact was mistaken for flight, before any lift-off.
     pub false_alarms: u32,
     /// Simulated time after captures, h.
     pub slid_h: f64,
@@ -72,8 +72,14 @@ impl Outcome for RobustnessOutcome {
     }
 
     fn table(&self) -> Table {
-        let mut table =
-            outcome::table(["what", "runs", "μ", "belt (m/s)", "rate (Hz)", "error (mm)"]);
+        let mut table = outcome::table([
+            "result",
+            "runs",
+            "μ",
+            "belt (m/s)",
+            "rate (Hz)",
+            "error (mm)",
+        ]);
         table.add_row(["success (95 %)", &self.success.to_string(), "", "", "", ""]);
         for (ending, count) in &self.endings {
             table.add_row([&outcome::name(ending), &count.to_string(), "", "", "", ""]);

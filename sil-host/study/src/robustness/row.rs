@@ -55,7 +55,7 @@ pub struct Row {
     pub to_edge_m: f64,
     /// p at the tip as a fraction of Q22.
     pub p_ratio: f64,
-    /// Number of times that contact was taken for flight while the tip slid.
+    /// Number of times that contact was mistaken for flight while the tip slid.
     pub false_alarms: u32,
     /// Simulated time after the capture, s.
     pub slid_s: f64,

@@ -51,7 +51,7 @@ fn rows(endings: &[(Ending, f64)]) -> Vec<Row> {
 }
 
 #[test]
-fn every_ending_is_counted_and_the_gravest_come_first() {
+fn every_ending_is_counted_and_the_most_severe_come_first() {
     let found = RobustnessOutcome::new(
         Arms::Paper,
         7,

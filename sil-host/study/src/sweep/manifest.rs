@@ -148,7 +148,7 @@ impl Manifest {
         let table: Table = text.parse().map_err(|error| not_one(&error))?;
         // Checked first, because the other fields may differ between versions.
         let of = |key: &str| table.get(key).map(|value| value.to_string());
-        let told = |key: &str| of(key).unwrap_or_else(|| "nothing".into());
+        let value = |key: &str| of(key).unwrap_or_else(|| "nothing".into());
         for (key, ours) in [
             ("format", FORMAT.to_string()),
             ("version", format!("{VERSION:?}")),
@@ -158,7 +158,7 @@ impl Manifest {
                 return Err(format!(
                     "is of another version: {key} is {}, this program's is {ours}; \
                      use the program that planned the sweep, or plan it again elsewhere",
-                    told(key)
+                    value(key)
                 ));
             }
         }

@@ -1,4 +1,4 @@
-//! Joints, gears and masses of the arm, what pushes it, and what the controller does not know of it.
+//! Joints, gears and masses of the arm, pushes on it, and errors of its model.
 
 use super::{BOTH, COMPLIANT};
 use crate::effects::effect::{Drawn, RigEffect, set};
