@@ -7,6 +7,7 @@ mod ci;
 mod command;
 mod examples;
 mod flash;
+mod fuzz;
 mod setup;
 mod size;
 mod soak;
@@ -40,6 +41,8 @@ enum Chore {
     Examples,
     /// Disturb plant and controller at every system call and count the flaws.
     Chaos(chaos::ChaosArguments),
+    /// Send malformed and random input to parsers, controller and state machines.
+    Fuzz(fuzz::FuzzArguments),
     /// Simulate a day with a fault in every minute, after which every counter must be exact.
     Soak(soak::SoakArguments),
     /// Run the steps of continuous integration: formatting, clippy, every test.
@@ -54,6 +57,7 @@ fn main() -> ExitCode {
         Chore::Size => size::run(),
         Chore::Flash => flash::run(),
         Chore::Examples => examples::run(),
+        Chore::Fuzz(arguments) => fuzz::run(&arguments),
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),
         Chore::Ci => ci::run(),

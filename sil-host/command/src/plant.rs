@@ -20,7 +20,7 @@ use painleve_system::terminal::warn;
 use super::output::{Output, OutputArguments};
 use super::patience::PatienceArguments;
 use super::run::ScenarioArguments;
-use super::{CommandError, INTERRUPTED, or_interrupted};
+use super::{CommandError, INTERRUPTED, PEER_FAILED, or_interrupted, say};
 
 /// Options of `painleve plant`.
 #[derive(Debug, Args)]
@@ -46,7 +46,7 @@ pub struct PlantArguments {
     /// In real time, but paced by the board: wait for its answers.
     #[arg(long, hide = true)]
     board_keeps_time: bool,
-    /// Leave the message about an interruption to `painleve run`.
+    /// Leave the messages about an interruption and about the peer to `painleve run`.
     #[arg(long, hide = true)]
     started_by_run: bool,
 }
@@ -57,6 +57,14 @@ pub fn run(arguments: &PlantArguments) -> Result<(), CommandError> {
     match run_until(arguments, &interrupt) {
         Err(error) if arguments.started_by_run && error.exit_code() == INTERRUPTED => {
             Err(CommandError::Told { code: INTERRUPTED })
+        }
+        // The bridge of a board may know the cause: `run` prints one of the two messages.
+        Err(error) if arguments.started_by_run && error.exit_code() == PEER_FAILED => {
+            let message = error.to_string();
+            if !message.is_empty() {
+                say(message)?;
+            }
+            Err(CommandError::Told { code: PEER_FAILED })
         }
         other => other,
     }

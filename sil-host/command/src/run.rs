@@ -238,15 +238,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     )?;
     let deadlines_missed = status.code() == Some(i32::from(DEADLINES_MISSED));
     if !status.success() && !deadlines_missed {
-        // If the plant reports the controller as failed, the bridge's message gives the actual
-        // cause.
-        if status.code() == Some(i32::from(PEER_FAILED))
-            && arguments.host != Host::Native
-            && controller
-                .wait(BRIDGE_END)?
-                .is_some_and(|status| !status.success())
-        {
-            warn(format_args!("error{}", controller.complaint()));
+        if status.code() == Some(i32::from(PEER_FAILED)) {
+            return Err(peer_failure(
+                arguments.host,
+                &mut plant,
+                &mut controller,
+                status,
+            )?);
         }
         return Err(failure(status));
     }
@@ -277,6 +275,30 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         return Err(failure(status));
     }
     fail_on::check(&arguments.fail_on, &report)
+}
+
+/// Returns the failure of a plant whose peer has failed. The plant only knows that the controller has
+/// gone; the bridge of a board knows why.
+fn peer_failure(
+    host: Host,
+    plant: &mut RunProcess,
+    controller: &mut RunProcess,
+    status: ExitStatus,
+) -> Result<CommandError, CommandError> {
+    let told = plant.stdout.text();
+    if host != Host::Native
+        && (controller.wait(BRIDGE_END)?).is_some_and(|status| !status.success())
+    {
+        let complaint = controller.stderr.text();
+        let mut lines = complaint.lines();
+        if let Some(cause) = lines.find_map(|line| line.strip_prefix("error: ")) {
+            return Ok(CommandError::Process(cause.into()));
+        }
+    }
+    Ok(match told.trim() {
+        "" => failure(status),
+        told => CommandError::Process(told.into()),
+    })
 }
 
 /// Waits for the end of the plant, and stops it if necessary.

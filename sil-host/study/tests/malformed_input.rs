@@ -22,7 +22,7 @@ use painleve_study::sweep::manifest::Manifest;
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::ValueTree;
-use proptest::test_runner::TestRunner;
+use proptest::test_runner::{FileFailurePersistence, TestRunner};
 use serde_json::Value;
 
 /// Longest time in which an input is read or refused.
@@ -178,7 +178,17 @@ fn campaign_text() -> impl Strategy<Value = String> {
     damaged("study = \"bifurcation\"\nmu = \"0.1:1:0.1\"\nv-belt = [\"-0.4\", \"-0.5\"]\nset = \"belt.friction=0.4\"\n".into())
 }
 
+/// Cases that have failed are kept beside this file and tried again.
+fn config() -> ProptestConfig {
+    ProptestConfig {
+        failure_persistence: Some(Box::new(FileFailurePersistence::WithSource("regressions"))),
+        ..ProptestConfig::default()
+    }
+}
+
 proptest! {
+    #![proptest_config(config())]
+
     #[test]
     fn overrides_are_refused_or_run(overrides in prop::collection::vec((key(), value()), 1..4)) {
         let overrides: Vec<String> =

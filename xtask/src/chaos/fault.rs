@@ -98,5 +98,9 @@ pub fn run(
     let reached = fs::read_to_string(&log).is_ok_and(|log| log.contains("(INJECTED)"));
     orphans(place, deadline, &mut findings);
     next_run(place, bus, expected, &mut findings)?;
-    Ok(TrialOutcome { reached, findings })
+    Ok(TrialOutcome {
+        reached,
+        noticed: None,
+        findings,
+    })
 }

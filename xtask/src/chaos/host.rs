@@ -189,7 +189,11 @@ pub fn disturb_emulator(
     }
     orphans(place, disturbed + expected.end, &mut findings);
     next_run(place, bus, expected, &mut findings)?;
-    Ok(TrialOutcome { reached, findings })
+    Ok(TrialOutcome {
+        reached,
+        noticed: None,
+        findings,
+    })
 }
 
 fn is_emulator(id: i32) -> bool {

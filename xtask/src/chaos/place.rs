@@ -20,6 +20,8 @@ pub struct ChaosFolder {
     runtime: PathBuf,
     /// What runs the controller.
     pub host: ControllerHost,
+    /// Longest silence of a peer, and longest wait for one, s.
+    pub patience_s: [String; 2],
 }
 
 impl ChaosFolder {
@@ -29,6 +31,7 @@ impl ChaosFolder {
         mark: String,
         runtime: &Path,
         host: ControllerHost,
+        patience_s: [String; 2],
     ) -> std::io::Result<Self> {
         Ok(Self {
             program: program.to_path_buf(),
@@ -36,6 +39,7 @@ impl ChaosFolder {
             work: tempfile::tempdir()?,
             runtime: runtime.to_path_buf(),
             host,
+            patience_s,
         })
     }
 

@@ -8,16 +8,19 @@ use std::time::{Duration, Instant};
 
 use super::place::ChaosFolder;
 use super::tracer::{Traced, Victim};
+use clap::ValueEnum;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 /// Time for a traced process to reach its system call.
 const REACH: Duration = Duration::from_secs(30);
-/// Longest wait of a peer for the other, s; not longer than [`END`].
-const WAIT_S: &str = "2";
 /// Documented exit codes; 130 after SIGINT and SIGTERM.
 const DOCUMENTED: [i32; 6] = [0, 1, 2, 3, 4, 130];
 const QUICK: [&str; 4] = ["--set", "run.duration_s=0.05", "--no-plot", "--json"];
+
+/// Parts of the messages of a process whose peer has ended or says nothing. One whose peer never
+/// came waits for `--wait-s` instead.
+const NOTICES: [&str; 3] = ["is gone", "has not answered", "has sent nothing"];
 
 /// Beginnings of lines that are not errors.
 const REMARKS: [&str; 2] = ["the partial record is in ", "line: "];
@@ -34,7 +37,7 @@ pub enum ChaosRole {
 }
 
 /// Kind of disturbance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub enum Disturbance {
     Kill,
     Stop,
@@ -102,6 +105,8 @@ pub type Finding = (Flaw, String);
 pub struct TrialOutcome {
     /// Whether the victim reached the system call.
     pub reached: bool,
+    /// Time from the disturbance to the end of a peer that noticed it.
+    pub noticed: Option<Duration>,
     pub findings: Vec<Finding>,
 }
 
@@ -160,9 +165,13 @@ pub fn run(
         std::thread::sleep(Duration::from_millis(100));
         continue_process(&victim.child);
     }
+    let mut noticed = None;
     if let Some(peer) = &mut peer {
         if peer.wait(disturbed + end)? {
+            let took = disturbed.elapsed();
             let (code, text) = peer.outcome();
+            let is_notice = NOTICES.iter().any(|part| text.stderr.contains(part));
+            noticed = (reached && is_notice).then_some(took);
             judge("peer", code, &text, &mut findings);
         } else {
             findings.push((Flaw::Hang, "the peer does not end".into()));
@@ -195,7 +204,11 @@ pub fn run(
     }
     orphans(place, disturbed + end, &mut findings);
     next_run(place, bus, expected, &mut findings)?;
-    Ok(TrialOutcome { reached, findings })
+    Ok(TrialOutcome {
+        reached,
+        noticed,
+        findings,
+    })
 }
 
 /// Returns the peer of a role.
@@ -215,18 +228,20 @@ pub fn command(place: &ChaosFolder, role: ChaosRole, bus: &str, record: &str) ->
     } else {
         &recorded
     };
+    let [silence_s, wait_s] = &place.patience_s;
+    let wait = ["--wait-s", wait_s];
+    let patience = ["--bus", bus, "--silence-limit-s", silence_s];
     match role {
         ChaosRole::Plant => {
-            let wait = ["plant", "--bus", bus, "--wait-s", WAIT_S];
-            place.command(&[&wait, &QUICK[..], record].concat())
+            place.command(&[&["plant"], &patience[..], &wait, &QUICK[..], record].concat())
         }
         ChaosRole::Controller => {
-            let wait = ["--bus", bus, "--wait-s", WAIT_S];
-            place.command(&[&place.host.controller()[..], &wait].concat())
+            let controller = place.host.controller();
+            place.command(&[&controller[..], &patience[..], &wait].concat())
         }
         ChaosRole::Run | ChaosRole::Emulator => {
             let run = place.host.run();
-            place.command(&[&run[..], &["--bus", bus], &QUICK[..], record].concat())
+            place.command(&[&run[..], &patience[..], &QUICK[..], record].concat())
         }
     }
 }

@@ -1,0 +1,50 @@
+//! `cargo xtask fuzz`: malformed input for every parser, extreme scenarios, random frames for the
+//! controller and random events for the state machines. CI runs a short part of it with the tests.
+
+use clap::Args;
+
+use crate::command::{ChoreError, cargo, run_with};
+
+/// Options of the fuzzing.
+#[derive(Debug, Args)]
+pub struct FuzzArguments {
+    /// Number of cases of each test.
+    #[arg(long, default_value_t = 10_000)]
+    cases: u32,
+    /// Number of ticks for which each valid scenario runs.
+    #[arg(long, default_value_t = 200)]
+    scenario_ticks: u32,
+    /// Number of random sensor frames for each built-in scenario.
+    #[arg(long, default_value_t = 10_000_000)]
+    frames: u32,
+}
+
+/// Tests that are targets of their own, and tests within crates.
+const TARGETS: [&str; 2] = ["malformed_input", "state_machines"];
+const WITHIN: [&str; 3] = ["damaged_shards", "damaged_manifests", "any_bytes"];
+const FRAMES: &str = "random_frames";
+
+/// Runs all tests with random input for as many cases as asked for.
+///
+/// # Errors
+/// If a test fails; its input is printed.
+pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
+    let test = |selection: &[&str], variables: &[(&str, &str)]| {
+        run_with(
+            &cargo(),
+            &[&["test", "--workspace"], selection].concat(),
+            variables,
+        )
+    };
+    let cases = arguments.cases.to_string();
+    let ticks = arguments.scenario_ticks.to_string();
+    let variables = [
+        ("PROPTEST_CASES", cases.as_str()),
+        ("PAINLEVE_FUZZ_TICKS", ticks.as_str()),
+    ];
+    let targets = TARGETS.map(|target| ["--test", target]).concat();
+    test(&[&targets[..], &["--", "--nocapture"]].concat(), &variables)?;
+    test(&[&["--lib", "--"], &WITHIN[..]].concat(), &variables)?;
+    let frames = arguments.frames.to_string();
+    test(&["--test", FRAMES], &[("PAINLEVE_FUZZ_TICKS", &frames)])
+}
