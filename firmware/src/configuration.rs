@@ -4,6 +4,7 @@
 //! (serde) and compared, and from which the controller is built.
 
 use painleve_shared::counts::{EncoderScale, LinearScale};
+use painleve_shared::mounting::Mounting;
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::settings::Settings;
 use painleve_shared::{Arm, ArmParameters, Real, check_setting, settings};
@@ -33,6 +34,8 @@ settings! {
         force: LinearScale<f32> = LinearScale { bits: 12, range: 20.0 };
         /// Torque stages, N·m.
         torque: LinearScale<f32> = LinearScale { bits: 12, range: 5.0 };
+        /// Directions and zeros of the parts of a real arm.
+        mounting: Mounting = Mounting::default();
     }
 }
 

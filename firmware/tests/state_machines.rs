@@ -352,6 +352,9 @@ impl StateMachineTest for LapseTest {
             lost_frames: limit,
             encoder_out_of_range: limit,
             force_out_of_range: limit,
+            arming_refused: limit,
+            stage_not_ready: limit,
+            gap_against_force: limit,
             garbage: limit,
             failed_checksums: limit,
         })

@@ -30,6 +30,13 @@ bitflags! {
         const ENABLE = 1;
         /// A rising edge clears a latched fault.
         const RESET = 1 << 1;
+        /// The board refuses to arm: its switch is closed and arming permitted, but readings are implausible
+        /// or a torque stage is not ready.
+        const ARMING_REFUSED = 1 << 2;
+        /// A torque stage is not ready while the drive is armed.
+        const STAGE_NOT_READY = 1 << 3;
+        /// Encoders and force cell contradict each other while the drive is armed.
+        const GAP_AGAINST_FORCE = 1 << 4;
         /// Prolongs the tick until the next one is due, to test the lapse monitor. Only an emulated
         /// board and a real-time process have this input.
         const OVERLOAD = 1 << 31;

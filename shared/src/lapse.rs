@@ -117,6 +117,12 @@ lapses! {
         EncoderOutOfRange => encoder_out_of_range = 1, EncoderOutOfRange;
         /// Frames with a force reading that the resolution does not allow.
         ForceOutOfRange => force_out_of_range = 1, ForceOutOfRange;
+        /// Frames of a board that refuses to arm.
+        ArmingRefused => arming_refused = 1, ArmingRefused;
+        /// Frames with a torque stage that is not ready.
+        StageNotReady => stage_not_ready = 1, StageNotReady;
+        /// Frames whose encoders and force cell contradict each other.
+        GapAgainstForce => gap_against_force = 5, GapAgainstForce;
     }
     /// Lapses of the link that carries messages as bytes.
     OF_MESSAGES: {
@@ -151,6 +157,6 @@ mod tests {
             }
             assert_eq!(limits.of(*lapse), before + 1);
         }
-        assert_eq!((counts.overruns, counts.failed_checksums), (0, 7));
+        assert_eq!((counts.overruns, counts.failed_checksums), (0, 10));
     }
 }

@@ -36,6 +36,7 @@ pub mod frame;
 pub mod kinematics;
 pub mod lapse;
 pub mod message;
+pub mod mounting;
 pub mod range;
 pub mod real;
 pub mod settings;

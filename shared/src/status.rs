@@ -67,6 +67,12 @@ pub enum Fault {
     CorruptMessages = 11,
     /// tip left the belt again and again
     RecoveryFailed = 12,
+    /// arming refused: readings implausible or a torque stage not ready
+    ArmingRefused = 13,
+    /// torque stage not ready
+    StageNotReady = 14,
+    /// encoders and force cell contradict each other
+    GapAgainstForce = 15,
 }
 
 impl Fault {

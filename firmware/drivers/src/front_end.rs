@@ -1,59 +1,73 @@
 //! Sensor frames from readings and switches, and the permission to arm: the part of a board with an arm that
 //! depends on no chip.
 
-use painleve_shared::counts::{EncoderCounts, ForceCounts};
+use painleve_shared::Arm;
+use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
+use painleve_shared::mounting::Mounting;
 
-use crate::ReadError;
 use crate::encoders::{self, EncoderDriver};
 use crate::force_cell::{self, ForceCellDriver};
-use crate::plausibility::{Plausibility, SensorReadings};
+use crate::gap::GapCheck;
+use crate::plausibility::{Implausible, Plausibility, SensorReadings};
 use crate::switches::Switches;
 
 /// Count of a sensor without a reading: out of every range, so that the controller counts it as a lapse.
 const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
 const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
 
-/// Levels of the switches' pins.
+/// Levels of the input pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SwitchLevels {
+pub struct InputLevels {
     /// ENABLE.
     pub enable: bool,
     /// RESET.
     pub reset: bool,
+    /// Both torque stages are ready.
+    pub stages_ready: bool,
+}
+
+/// What a front end knows about its arm.
+#[derive(Clone, Debug)]
+pub struct FrontEndSettings {
+    /// Encoders of θ1 and of the elbow.
+    pub encoders: [EncoderScale; 2],
+    /// Force cell, N.
+    pub force: LinearScale<f32>,
+    /// Directions and zeros of the parts.
+    pub mounting: Mounting,
+    /// The arm on its belt.
+    pub arm: Arm<f32>,
 }
 
 /// Assembles the sensor frames of an arm.
 #[derive(Clone, Debug)]
 pub struct FrontEnd {
-    encoder_bits: u8,
-    force_bits: u8,
+    settings: Option<FrontEndSettings>,
+    gap: Option<GapCheck>,
     switches: Switches,
     plausibility: Plausibility,
     sequence: u32,
     may_arm: bool,
     is_active: bool,
-    has_readings: bool,
-}
-
-impl Default for FrontEnd {
-    fn default() -> Self {
-        Self::new(encoders::BITS, force_cell::BITS)
-    }
+    is_fit: bool,
 }
 
 impl FrontEnd {
-    /// Makes a front end that gives counts of these resolutions and does not permit arming.
-    pub fn new(encoder_bits: u8, force_bits: u8) -> Self {
+    /// Makes a front end that does not permit arming; without settings its frames have no readings.
+    pub fn new(settings: Option<FrontEndSettings>) -> Self {
+        let gap = settings
+            .as_ref()
+            .map(|it| GapCheck::new(it.arm, it.encoders, it.force));
         Self {
-            encoder_bits,
-            force_bits,
+            settings,
+            gap,
             switches: Switches::default(),
             plausibility: Plausibility::default(),
             sequence: 0,
             may_arm: false,
             is_active: false,
-            has_readings: false,
+            is_fit: false,
         }
     }
 
@@ -62,10 +76,11 @@ impl FrontEnd {
         self.may_arm = permitted;
     }
 
-    /// Returns whether every reading of the last frame has come. Without one the torque has to go off at once:
-    /// the controller tolerates a lost reading, which is one tick old already.
-    pub fn has_readings(&self) -> bool {
-        self.has_readings
+    /// Returns whether the drive may be on: every reading of the last frame has come, and the torque stages
+    /// are ready. Otherwise the torque has to go off at once: the controller tolerates a lapse, and readings
+    /// are one tick old already.
+    pub fn is_fit(&self) -> bool {
+        self.is_fit
     }
 
     /// Records whether the controller's last answer is in a state in which torque may be applied. A drive
@@ -76,33 +91,35 @@ impl FrontEnd {
     }
 
     /// Returns the frame of one tick. Sensors whose readings are not complete are `None`. ENABLE is high
-    /// only with the permission and, before the drive is armed, with plausible readings.
+    /// only with the permission and, before the drive is armed, with plausible readings and ready stages.
     pub fn frame(
         &mut self,
         encoders: Option<&EncoderDriver>,
         force_cell: Option<&ForceCellDriver>,
-        levels: SwitchLevels,
+        levels: InputLevels,
     ) -> SensorFrame {
-        let lost = (Err(ReadError::Bus), Err(ReadError::Bus));
-        let joints = encoders.map_or([Err(ReadError::Bus); 2], |it| {
-            it.readings(self.encoder_bits)
-        });
-        let (tangential, normal) = force_cell.map_or(lost, |it| it.readings(self.force_bits));
-        let magnets = encoders.map_or([None; 2], EncoderDriver::diagnostics);
-        let readings = SensorReadings {
-            joints: joints.map(Result::ok),
-            forces: [tangential.ok(), normal.ok()],
-            magnets: magnets.map(|it| it.map(|it| it.is_healthy())),
-        };
-        self.has_readings = readings.are_complete();
+        let readings = self.readings(encoders, force_cell);
         let mut inputs = self.switches.tick(levels.enable, levels.reset);
-        let plausible = self
-            .plausibility
-            .tick(&readings, self.encoder_bits, self.force_bits);
-        if !self.may_arm || plausible.is_err() && !self.is_active {
+        let contradiction = self.contradicts(&readings);
+        let plausible = self.plausibility.tick(&readings, self.bits());
+        self.is_fit = readings.are_complete() && levels.stages_ready;
+        if self.is_active {
+            inputs.set(DigitalInputs::STAGE_NOT_READY, !levels.stages_ready);
+            inputs.set(DigitalInputs::GAP_AGAINST_FORCE, contradiction);
+        } else {
+            let is_ready = plausible.is_ok() && levels.stages_ready && !contradiction;
+            // Readings that have not been checked for long enough are no refusal yet.
+            let is_refused = !is_ready && plausible != Err(Implausible::NotYet);
+            let is_wanted = self.may_arm && inputs.contains(DigitalInputs::ENABLE);
+            inputs.set(DigitalInputs::ARMING_REFUSED, is_wanted && is_refused);
+            inputs.set(DigitalInputs::ENABLE, is_wanted && is_ready);
+        }
+        if !self.may_arm {
             inputs.remove(DigitalInputs::ENABLE);
         }
         self.sequence = self.sequence.wrapping_add(1);
+        let SensorReadings { joints, forces, .. } = readings;
+        let [tangential, normal] = forces;
         SensorFrame {
             tick: self.sequence,
             sequence: self.sequence,
@@ -110,6 +127,70 @@ impl FrontEnd {
             normal_force: normal.unwrap_or(NO_FORCE),
             tangential_force: tangential.unwrap_or(NO_FORCE),
             inputs,
+        }
+    }
+
+    /// Returns the resolutions of encoders and force cell, bits.
+    fn bits(&self) -> (u8, u8) {
+        let settings = self.settings.as_ref();
+        settings.map_or((encoders::BITS, force_cell::BITS), |it| {
+            let [encoder, _] = it.encoders;
+            (encoder.bits, it.force.bits)
+        })
+    }
+
+    /// Returns the readings in the arm's directions, forces as (f_t, f_n).
+    fn readings(
+        &self,
+        encoders: Option<&EncoderDriver>,
+        force_cell: Option<&ForceCellDriver>,
+    ) -> SensorReadings {
+        let Some(settings) = &self.settings else {
+            return SensorReadings::default();
+        };
+        let (encoder_bits, force_bits) = self.bits();
+        let [encoder_1, encoder_2] = settings.mounting.encoder_reversed;
+        let [force_t, force_n] = settings.mounting.force_reversed;
+        let [tare_t, tare_n] = settings.mounting.force_tare;
+        let (joint_1, joint_2) = encoders.map_or((None, None), |it| {
+            let [joint_1, joint_2] = it.readings(encoder_bits);
+            (joint_1.ok(), joint_2.ok())
+        });
+        let (tangential, normal) = force_cell.map_or((None, None), |it| {
+            let (tangential, normal) = it.readings(force_bits);
+            (tangential.ok(), normal.ok())
+        });
+        let turned = |counts: EncoderCounts, reversed: bool| {
+            let mask = (1_u32 << (encoder_bits & 31)).wrapping_sub(1);
+            let backwards = EncoderCounts(counts.0.wrapping_neg() & mask);
+            if reversed { backwards } else { counts }
+        };
+        let most = settings.force.maximum_counts();
+        let balanced = |counts: ForceCounts, tare: ForceCounts, reversed: bool| {
+            let net = counts.0.wrapping_sub(tare.0);
+            ForceCounts(if reversed { net.wrapping_neg() } else { net }.clamp(-most - 1, most))
+        };
+        let magnets = encoders.map_or([None; 2], EncoderDriver::diagnostics);
+        SensorReadings {
+            joints: [
+                joint_1.map(|it| turned(it, encoder_1)),
+                joint_2.map(|it| turned(it, encoder_2)),
+            ],
+            forces: [
+                tangential.map(|it| balanced(it, tare_t, force_t)),
+                normal.map(|it| balanced(it, tare_n, force_n)),
+            ],
+            magnets: magnets.map(|it| it.map(|it| it.is_healthy())),
+        }
+    }
+
+    /// Returns whether complete readings contradict each other.
+    fn contradicts(&self, readings: &SensorReadings) -> bool {
+        match (&self.gap, readings.joints, readings.forces) {
+            (Some(gap), [Some(joint_1), Some(joint_2)], [_, Some(normal)]) => {
+                gap.contradicts([joint_1, joint_2], normal)
+            }
+            _ => false,
         }
     }
 }

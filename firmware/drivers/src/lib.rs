@@ -5,6 +5,7 @@
 //! - [`force_cell`]: an MCP3304 converter behind the force cell's bridge amplifiers
 //! - [`switches`]: ENABLE and RESET, debounced
 //! - [`front_end`]: sensor frames from readings and switches, and the permission to arm
+//! - [`gap`]: checks encoders and force cell against each other
 //! - [`plausibility`]: checks that readings can come from an arm before the drive is armed
 //!
 //! A reading that a single disturbed bit could have changed is not passed on: each value is read twice, and
@@ -17,6 +18,7 @@ pub mod encoders;
 pub mod exchange;
 pub mod force_cell;
 pub mod front_end;
+pub mod gap;
 pub mod plausibility;
 pub mod switches;
 

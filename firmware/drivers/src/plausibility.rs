@@ -25,7 +25,7 @@ pub enum Implausible {
 }
 
 /// Readings of one tick; `None` for a lost reading.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SensorReadings {
     /// Both encoders, counts of `encoder_bits`.
     pub joints: [Option<EncoderCounts>; 2],
@@ -61,8 +61,7 @@ impl Plausibility {
     pub fn tick(
         &mut self,
         readings: &SensorReadings,
-        encoder_bits: u8,
-        force_bits: u8,
+        (encoder_bits, force_bits): (u8, u8),
     ) -> Result<(), Implausible> {
         let ones = (1_u32 << (encoder_bits & 31)) - 1;
         let count = |ticks: u16, condition: bool| {
@@ -114,7 +113,7 @@ mod tests {
         let mut plausibility = Plausibility::default();
         let mut verdict = Err(Implausible::NotYet);
         for _ in 0..ticks {
-            verdict = plausibility.tick(&readings, 14, 13);
+            verdict = plausibility.tick(&readings, (14, 13));
         }
         verdict
     }

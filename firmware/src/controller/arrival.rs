@@ -1,6 +1,6 @@
 //! Classifies an arriving sensor frame and records its lapses.
 
-use painleve_shared::frame::SensorFrame;
+use painleve_shared::frame::{DigitalInputs, SensorFrame};
 
 use crate::configuration::Converters;
 use crate::drive::torque::LastCommand;
@@ -9,6 +9,11 @@ use crate::supervise::supervisor::Supervision;
 
 /// Largest count of ticks without readings: a fault is latched long before.
 const UNREAD_TICKS_LIMIT: u32 = 1 << 16;
+
+/// Faults that a board detects by itself.
+const BOARD_FAULTS: DigitalInputs = DigitalInputs::ARMING_REFUSED
+    .union(DigitalInputs::STAGE_NOT_READY)
+    .union(DigitalInputs::GAP_AGAINST_FORCE);
 
 /// Result of the checks of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,7 +84,9 @@ pub(super) fn arrive(
     let forces = forces
         .iter()
         .all(|force| converters.force.contains(force.0));
-    if ahead != 1 || !encoders || !forces {
+    let board_faults = frame.inputs.intersection(BOARD_FAULTS);
+    if ahead != 1 || !encoders || !forces || !board_faults.is_empty() {
+        note_board_faults(&mut lapses, board_faults);
         return irregular(state, lapses, frame.sequence, ahead, encoders, forces);
     }
     state.last_sequence = Some(frame.sequence);
@@ -87,6 +94,19 @@ pub(super) fn arrive(
         lapses.note(*lapse, 0);
     }
     Arrival::After(1 + core::mem::take(&mut state.unread_ticks))
+}
+
+/// Records the faults that the board has detected by itself.
+#[cold]
+#[inline(never)]
+fn note_board_faults(lapses: &mut Lapses<'_>, faults: DigitalInputs) {
+    for (bit, lapse) in [
+        (DigitalInputs::ARMING_REFUSED, Lapse::ArmingRefused),
+        (DigitalInputs::STAGE_NOT_READY, Lapse::StageNotReady),
+        (DigitalInputs::GAP_AGAINST_FORCE, Lapse::GapAgainstForce),
+    ] {
+        lapses.note(lapse, u32::from(faults.contains(bit)));
+    }
 }
 
 /// Handles a frame that is out of sequence or has readings (`encoders`, `forces`) out of range.

@@ -6,6 +6,7 @@ use painleve_plant::statistics::Statistics;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Request, Response};
+use painleve_shared::mounting::Mounting;
 
 use crate::board::{BoardSnapshot, FlashedBoard};
 use crate::stm32f4::Pin;
@@ -36,6 +37,12 @@ pub struct BoardBench {
     waits: u32,
     /// Whether [`Bench::tick`] closes the switch of the safety chain after a while.
     pub closes_switch: bool,
+    /// How the parts are mounted on the arm.
+    pub mounted: Mounting,
+    /// Turns of the encoders on their shafts, counts.
+    pub encoder_offset: [u16; 2],
+    /// Encoders that repeat their last angle.
+    pub is_frozen: [bool; 2],
     /// The arm is held until it is first driven.
     is_held: bool,
 }
@@ -109,23 +116,41 @@ impl BoardBench {
             host_is_there: false,
             waits: 0,
             closes_switch: true,
+            mounted: Mounting::default(),
+            encoder_offset: [0; 2],
+            is_frozen: [false; 2],
             is_held: true,
         };
         bench.present();
         bench
     }
 
-    fn present(&mut self) {
+    /// Gives the parts the state of the simulated arm, as they are mounted.
+    pub fn present(&mut self) {
         let frame = self.simulation.sample(&mut self.statistics);
         self.frame = frame.unwrap_or_else(|error| panic!("{error}"));
+        let mounted = self.mounted;
         let wiring = self.board.wiring();
-        for (encoder, counts) in wiring.encoders.iter_mut().zip(self.frame.joints) {
-            encoder.angle = counts.0 as u16;
+        for joint in 0..2 {
+            let counts = self.frame.joints[joint].0 as u16;
+            let turned = if mounted.encoder_reversed[joint] {
+                counts.wrapping_neg()
+            } else {
+                counts
+            };
+            if !self.is_frozen[joint] {
+                let angle = turned.wrapping_add(self.encoder_offset[joint]);
+                wiring.encoders[joint].angle = angle & 0x3fff;
+            }
         }
         let middle = 2048;
-        wiring.force.channels[0] = middle + self.frame.normal_force.0;
+        let signed = |counts: i32, axis: usize| {
+            let sign = if mounted.force_reversed[axis] { -1 } else { 1 };
+            middle + sign * counts + mounted.force_tare[axis].0
+        };
+        wiring.force.channels[0] = signed(self.frame.normal_force.0, 1);
         wiring.force.channels[1] = middle;
-        wiring.force.channels[2] = middle + self.frame.tangential_force.0;
+        wiring.force.channels[2] = signed(self.frame.tangential_force.0, 0);
         wiring.force.channels[3] = middle;
     }
 
@@ -143,7 +168,12 @@ impl BoardBench {
         }
         let torque = self.board.torque();
         let counts = if torque.enabled == Some(true) {
-            torque.counts
+            let [one, two] = torque.counts;
+            let [reversed_1, reversed_2] = self.mounted.stage_reversed;
+            [
+                if reversed_1 { -one } else { one },
+                if reversed_2 { -two } else { two },
+            ]
         } else {
             [0; 2]
         };

@@ -18,6 +18,8 @@ pub const STAGES: Pin = (1, 0);
 pub const ENABLE: Pin = (2, 0);
 /// The push button that resets a fault.
 pub const RESET: Pin = (2, 1);
+/// Both torque stages are ready.
+pub const STAGES_READY: Pin = (2, 2);
 const ENCODER_SELECTS: [Pin; 2] = [(1, 6), (1, 7)];
 const FORCE_SELECT: Pin = (1, 12);
 
@@ -164,6 +166,7 @@ impl FlashedBoard {
         let mut chip = Stm32f4::new(Wiring::default(), watchdog_hz);
         chip.drive_pin(ENABLE, Some(false));
         chip.drive_pin(RESET, Some(false));
+        chip.drive_pin(STAGES_READY, Some(true));
         Self {
             machine: Machine::new(&library(), &image(), chip),
             inbox: Inbox::new(),

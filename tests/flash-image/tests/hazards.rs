@@ -7,13 +7,17 @@ use std::collections::BTreeSet;
 
 use painleve_firmware::BUILD;
 use painleve_flash_image::bench::{BoardBench, encoded, scenario};
-use painleve_flash_image::board::FlashedBoard;
+use painleve_flash_image::board::{FlashedBoard, STAGES_READY};
 use painleve_flash_image::machine::Reset;
 use painleve_flash_image::{MICROSECOND, MILLISECOND};
+use painleve_plant::plant::Plant as _;
+use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
+use painleve_shared::counts::ForceCounts;
 use painleve_shared::message::{FrameSource, PROTOCOL, Request, Response};
-use painleve_shared::status::SupervisorState;
+use painleve_shared::mounting::Mounting;
+use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::wire;
 
 const DEFAULT: &str = "hybrid-elbow-down";
@@ -345,6 +349,103 @@ fn sensors_that_die_take_the_torque_off() {
     let mut bench = driven();
     bench.board.wiring().force.dead = Some(true);
     assert_off_in_time(bench);
+}
+
+/// The fault latched in the newest answer of the image.
+fn latched_fault(bench: &mut BoardBench) -> Option<Fault> {
+    bench.wait_for_tick();
+    bench.board.machine.run_for(MILLISECOND / 2);
+    let mut fault = None;
+    while let Some(response) = bench.board.response(0) {
+        if let Response::Tick { answer, .. } = response {
+            fault = answer.latched_fault();
+        }
+    }
+    fault
+}
+
+/// The tip moves on the belt; the encoder repeats a plausible angle.
+#[test]
+fn an_encoder_that_freezes_takes_the_torque_off() {
+    for encoder in 0..2 {
+        let mut bench = driven();
+        bench.is_frozen[encoder] = true;
+        let mut ticks = 0;
+        while !bench.board.torque().is_off() {
+            bench.tick();
+            ticks += 1;
+            assert!(ticks < 2000, "encoder {encoder}");
+        }
+        let fault = latched_fault(&mut bench);
+        println!("encoder {encoder}: {fault:?} after {ticks} ticks");
+        assert!(fault.is_some());
+        bench.assert_stays_off(100);
+    }
+}
+
+#[test]
+fn a_torque_stage_that_is_not_ready_takes_the_torque_off() {
+    let mut bench = driven();
+    bench.drive_pin(STAGES_READY, Some(false));
+    assert!(bench.time_until_off().is_some());
+    bench.assert_stays_off(10);
+    assert_eq!(latched_fault(&mut bench), Some(Fault::StageNotReady));
+    bench.drive_pin(STAGES_READY, Some(true));
+    bench.assert_stays_off(100);
+}
+
+/// An encoder that is zeroed 30° wrongly, a torque stage that is not ready.
+#[test]
+fn arming_on_implausible_readings_is_refused_with_a_fault() {
+    for (offsets, ready) in [([1365, 0], true), ([0, 1365], true), ([0, 0], false)] {
+        let mut bench =
+            BoardBench::without_configuration(&scenario(DEFAULT), FlashedBoard::booted());
+        bench.host_is_there = true;
+        bench.encoder_offset = offsets;
+        bench.present();
+        bench.drive_pin(STAGES_READY, Some(ready));
+        let configuration = encoded(&scenario(DEFAULT));
+        let response = bench.board.configure(FrameSource::Sensors, &configuration);
+        assert!(matches!(response, Some(Response::Ready { .. })));
+        assert!(bench.board.permit_arming());
+        for _ in 0..150 {
+            bench.tick();
+            assert!(bench.board.torque().is_off());
+        }
+        let fault = latched_fault(&mut bench);
+        assert_eq!(fault, Some(Fault::ArmingRefused), "{offsets:?} {ready}");
+    }
+}
+
+/// Every part mounted backwards and the force cell not at zero: the settings make it the same arm.
+#[test]
+fn parts_mounted_backwards_drive_the_same_arm() {
+    let mounted = Mounting {
+        encoder_reversed: [true; 2],
+        stage_reversed: [true; 2],
+        force_reversed: [true; 2],
+        force_tare: [ForceCounts(37), ForceCounts(-55)],
+    };
+    let mut scenario = scenario(DEFAULT);
+    let tip_m = |scenario: &Scenario, mounted| {
+        let mut bench = BoardBench::without_configuration(scenario, FlashedBoard::booted());
+        bench.host_is_there = true;
+        bench.mounted = mounted;
+        bench.present();
+        let response = bench
+            .board
+            .configure(FrameSource::Sensors, &encoded(scenario));
+        assert!(matches!(response, Some(Response::Ready { .. })));
+        assert!(bench.board.permit_arming());
+        bench.drive();
+        for _ in 0..300 {
+            bench.tick();
+        }
+        bench.simulation.plant().snapshot().tip_t_m
+    };
+    let straight = tip_m(&scenario, Mounting::default());
+    scenario.converters.mounting = mounted;
+    assert!((tip_m(&scenario, mounted) - straight).abs() < 1e-3);
 }
 
 #[test]

@@ -10,6 +10,7 @@
 //! | PB13, PB14, PB15 | SPI2 clock, in, out: force cell                    |
 //! | PB12       | select force cell (low)                                  |
 //! | PC0, PC1   | enable, reset (high; pulled down)                        |
+//! | PC2        | both torque stages are ready (high; pulled down)          |
 //!
 //! The control timer is TIM2, the stopwatch is the cycle counter. The control timer runs from the start,
 //! first at [`IDLE_HZ`], so that only finished control ticks feed the watchdogs.
@@ -29,11 +30,12 @@ use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use painleve_drivers::encoders::EncoderDriver;
 use painleve_drivers::force_cell::ForceCellDriver;
-use painleve_drivers::front_end::{FrontEnd, SwitchLevels};
+use painleve_drivers::front_end::{FrontEnd, FrontEndSettings, InputLevels};
 use painleve_firmware::Configuration;
 use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
 use painleve_image::board::{Board, BoardDrive, Parts, StartFault};
+use painleve_shared::Arm;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
@@ -183,8 +185,10 @@ impl Board for F405 {
             force_cell,
             enable_switch: c.pc0.into_pull_down_input().erase(),
             reset_button: c.pc1.into_pull_down_input().erase(),
-            front_end: FrontEnd::default(),
+            stages_ready: c.pc2.into_pull_down_input().erase(),
+            front_end: FrontEnd::new(None),
             torque_bits: DAC_BITS,
+            stage_reversed: [false; 2],
             source: FrameSource::Lockstep,
             from_host: None,
         };
@@ -249,9 +253,12 @@ pub struct F405Drive {
     force_cell: SensorBus<SPI2, ErasedPin<Output>, ForceCellDriver, 1>,
     enable_switch: ErasedPin<Input>,
     reset_button: ErasedPin<Input>,
+    stages_ready: ErasedPin<Input>,
     front_end: FrontEnd,
     /// Resolution of the controller's torques, bits.
     torque_bits: u8,
+    /// Whether the torque stages turn their joints backwards.
+    stage_reversed: [bool; 2],
     source: FrameSource,
     /// Newest frame from the host, if the host is the source of frames.
     from_host: Option<SensorFrame>,
@@ -266,9 +273,10 @@ impl F405Drive {
 
     /// Returns the readings that were started at the last tick, and starts the next.
     fn read_sensors(&mut self) -> SensorFrame {
-        let levels = SwitchLevels {
+        let levels = InputLevels {
             enable: self.enable_switch.is_high(),
             reset: self.reset_button.is_high(),
+            stages_ready: self.stages_ready.is_high(),
         };
         let (encoders, force_cell) = (self.encoders.complete(), self.force_cell.complete());
         let frame = self.front_end.frame(encoders, force_cell, levels);
@@ -278,12 +286,13 @@ impl F405Drive {
     }
 
     /// Returns the DAC's code for a torque: offset binary of 12 bits.
-    fn code(&self, torque: TorqueCounts) -> u16 {
+    fn code(&self, torque: TorqueCounts, reversed: bool) -> u16 {
         let counts = if self.torque_bits > DAC_BITS {
             torque.0 >> (self.torque_bits - DAC_BITS)
         } else {
             torque.0 << (DAC_BITS - self.torque_bits)
         };
+        let counts = if reversed { -counts } else { counts };
         (counts + i32::from(NO_TORQUE)).clamp(0, (1 << DAC_BITS) - 1) as u16
     }
 }
@@ -311,8 +320,13 @@ impl Drive for F405Drive {
             .supervisor_state()
             .is_some_and(|state| !matches!(state, SupervisorState::Idle | SupervisorState::Fault));
         self.front_end.note_active(is_active);
-        if is_active && self.source == FrameSource::Sensors && self.front_end.has_readings() {
-            let codes = answer.torques.map(|torque| self.code(torque));
+        if is_active && self.source == FrameSource::Sensors && self.front_end.is_fit() {
+            let [torque_1, torque_2] = answer.torques;
+            let [reversed_1, reversed_2] = self.stage_reversed;
+            let codes = [
+                self.code(torque_1, reversed_1),
+                self.code(torque_2, reversed_2),
+            ];
             put_out(&self.converter, codes);
             self.enable.set_high();
         } else {
@@ -330,10 +344,17 @@ impl BoardDrive for F405Drive {
     fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource) {
         let converters = &configuration.converters;
         self.torque_bits = converters.torque.bits;
+        self.stage_reversed = converters.mounting.stage_reversed;
         self.source = source;
         self.from_host = None;
         // The switch has to be opened and closed again, and the sensors are checked anew.
-        self.front_end = FrontEnd::new(converters.encoders[0].bits, converters.force.bits);
+        let arm = Arm::new(configuration.arm).ok();
+        self.front_end = FrontEnd::new(arm.map(|arm| FrontEndSettings {
+            encoders: converters.encoders,
+            force: converters.force,
+            mounting: converters.mounting,
+            arm,
+        }));
         self.encoders.restart();
         self.force_cell.restart();
         self.start_timer(configuration.tick_hz);

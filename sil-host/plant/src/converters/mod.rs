@@ -20,6 +20,7 @@ pub mod torque_stage;
 
 use painleve_firmware::configuration::Converters;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, LinearScale};
+use painleve_shared::mounting::Mounting;
 use painleve_shared::settings;
 
 use encoder::EncoderSettings;
@@ -42,6 +43,8 @@ settings! {
         link: LinkSettings = LinkSettings::default();
         /// Timed faults of single channels.
         faults: ChannelFaults = ChannelFaults::default();
+        /// Directions and zeros of the parts of a real arm; the simulated arm has none of them.
+        mounting: Mounting = Mounting::default();
     }
 }
 
@@ -58,6 +61,7 @@ impl ConverterSettings {
                 bits: self.torque.bits,
                 range: self.torque.range_nm as f32,
             },
+            mounting: self.mounting,
         }
     }
 }
