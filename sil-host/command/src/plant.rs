@@ -122,26 +122,34 @@ fn simulate(
     end.set_silence_limit(arguments.patience.peer());
     end.wait_for_controller(Duration::from_secs_f64(arguments.wait_s))?;
 
-    let name = &arguments.host_name;
-    match pacing {
+    let external = end.external_controller();
+    let name = match &external {
+        Some(_) => "external",
+        None => arguments.host_name.as_str(),
+    };
+    let mut report = match pacing {
         Pacing::Realtime if !arguments.board_keeps_time => {
             warn(format_args!("plant: {}", request_realtime()));
             let paced = Paced::start(end, scenario.run.tick_hz)?;
             let (result, host, wall) = drive(scenario, simulation, paced, output)?;
             let (lateness_ns, missed, end) = host.finish();
             end.end()?;
-            Ok(RunReport {
+            RunReport {
                 wake_up_us: Some(DurationPercentiles::of_ns(&lateness_ns)),
                 missed_deadlines: Some(missed),
                 ..RunReport::new(scenario, name, pacing.name(), &result, wall)
-            })
+            }
         }
         Pacing::Lockstep | Pacing::Realtime => {
             let (result, host, wall) = drive(scenario, simulation, Lockstep(end), output)?;
             host.0.end()?;
-            Ok(RunReport::new(scenario, name, pacing.name(), &result, wall))
+            RunReport::new(scenario, name, pacing.name(), &result, wall)
         }
+    };
+    if let Some(controller) = external {
+        report.controller = controller;
     }
+    Ok(report)
 }
 
 fn session(scenario: &Scenario, pacing: Pacing) -> Result<Session, CommandError> {

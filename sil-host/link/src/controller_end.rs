@@ -9,7 +9,7 @@ use super::claim::{Bus, Claim, LockFile, Role, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
 use super::place::Place;
-use super::run_files::RunFiles;
+use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{
     Presence, Receiver, Sender, Services, Unavailable, receiver, sender, transport,
 };
@@ -316,7 +316,8 @@ fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
         return Ok(Attempt::NotReady);
     };
     run.reserve().map_err(refuse("reserve its shared memory"))?;
-    run.set_answering().map_err(refuse("join its run"))?;
+    run.set_answering(OWN_CONTROLLER)
+        .map_err(refuse("join its run"))?;
     Ok(Attempt::Joined(Box::new(end), session))
 }
 

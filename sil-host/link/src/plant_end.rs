@@ -11,7 +11,7 @@ use super::claim::{Bus, Claim, LockFile, Role, Taken, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
 use super::place::{Place, SHARED_MEMORY};
-use super::run_files::RunFiles;
+use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{Presence, Receiver, Sender, Services, receiver, sender, transport};
 use super::session::{Session, SessionMessage};
 use super::{BusName, LinkError};
@@ -175,6 +175,15 @@ impl PlantEnd {
                 });
             }
             std::thread::sleep(CONTROLLER_POLL.min(timeout - waited));
+        }
+    }
+
+    /// Returns the name of a controller that is not this program's own, once one has joined:
+    /// `external` if it has not given any. `None` for this program's own.
+    pub fn external_controller(&self) -> Option<String> {
+        match self.run.controller_name() {
+            Some(name) if name == OWN_CONTROLLER => None,
+            name => Some(name.unwrap_or_else(|| "external".into())),
         }
     }
 

@@ -32,6 +32,9 @@ use super::LinkError;
 use super::claim::{Bus, LockFile, Role};
 use super::place::{Place, SHARED_MEMORY};
 
+/// Name of this program's own controllers.
+pub(super) const OWN_CONTROLLER: &str = "painleve";
+
 const READY: &str = "ready";
 const JOINED: &str = "joined";
 const ANSWERING: &str = "answering";
@@ -109,9 +112,26 @@ impl RunFiles {
         }
     }
 
-    /// Signals the plant that the controller is ready for frames.
-    pub(super) fn set_answering(&self) -> io::Result<()> {
-        fs::write(self.folder.join(ANSWERING), "")
+    /// Signals the plant that the controller is ready for frames, and which one it is.
+    pub(super) fn set_answering(&self, name: &str) -> io::Result<()> {
+        // The file appears with its contents.
+        let unnamed = self.folder.join("answering.new");
+        fs::write(&unnamed, name)?;
+        fs::rename(unnamed, self.folder.join(ANSWERING))
+    }
+
+    /// Returns the controller's name; `None` if it has not given any.
+    pub(super) fn controller_name(&self) -> Option<String> {
+        const LONGEST: usize = 64;
+        let text = fs::read_to_string(self.folder.join(ANSWERING)).ok()?;
+        let is_printable = |letter: &char| !letter.is_control();
+        let name: String = text
+            .trim()
+            .chars()
+            .filter(is_printable)
+            .take(LONGEST)
+            .collect();
+        Some(name).filter(|name| !name.is_empty())
     }
 
     /// Returns whether a controller has been ready for frames.

@@ -20,8 +20,10 @@ pub const FRAME_BUFFER: usize = 64;
 
 /// Messages buffered for the session: `Begin` and `End`.
 const SESSION_BUFFER: usize = 2;
-/// Largest number of nodes: plant and controller.
-const MAX_NODES: usize = 2;
+/// The other end, and up to three viewers.
+const MAX_SUBSCRIBERS: usize = 4;
+/// Plant, controller and viewers.
+const MAX_NODES: usize = 5;
 
 pub(super) type Service<T> = PortFactory<ipc::Service, T, ()>;
 pub(super) type Sender<T> = Publisher<ipc::Service, T, ()>;
@@ -77,7 +79,7 @@ impl Presence {
             .service_builder(&name)
             .publish_subscribe::<T>()
             .max_publishers(1)
-            .max_subscribers(1)
+            .max_subscribers(MAX_SUBSCRIBERS)
             .max_nodes(MAX_NODES)
             .enable_safe_overflow(true)
             .subscriber_max_borrowed_samples(1))

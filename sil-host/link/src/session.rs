@@ -137,6 +137,37 @@ mod tests {
         assert_eq!(SessionMessage::end().read(), Some(Announcement::End));
     }
 
+    /// Compares a table of offsets in docs/interface.md with a type of ours.
+    macro_rules! documented {
+        ($type:ident: $($field:ident),*) => {{
+            let name = stringify!($type);
+            let page = include_str!("../../../docs/interface.md");
+            let (_, section) = page.split_once(&format!("`{name}`, ")).unwrap();
+            let (head, rest) = section.split_once('\n').unwrap();
+            let bytes = (size_of::<$type>(), align_of::<$type>());
+            assert_eq!(head, format!("{} bytes, alignment {}:", bytes.0, bytes.1), "{name}");
+            let rows: Vec<(usize, &str)> = rest
+                .lines()
+                .skip(3)
+                .take_while(|line| line.starts_with('|'))
+                .map(|line| {
+                    let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+                    (cells[1].parse().unwrap(), cells[3])
+                })
+                .collect();
+            let fields = [$((std::mem::offset_of!($type, $field), stringify!($field))),*];
+            assert_eq!(rows, fields, "{name}");
+        }};
+    }
+
+    #[test]
+    fn the_documented_layouts_are_those_of_the_program() {
+        use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+        documented!(SensorFrame: tick, sequence, joints, normal_force, tangential_force, inputs);
+        documented!(ActuatorFrame: tick, sequence, torques, reference_tip, estimated_tip, state, fault, flags);
+        documented!(SessionMessage: kind, tick_hz, pacing, length, configuration);
+    }
+
     #[test]
     fn too_long_a_configuration_is_refused() {
         let length = CONFIGURATION_CAPACITY + 1;
