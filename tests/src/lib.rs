@@ -1,8 +1,10 @@
 //! Starts the `painleve` program in end-to-end tests and inspects what it leaves.
 //!
 //! - [`line`]: a serial line that can be disturbed, with the image at its end
+//! - [`printed`]: figures in the documentation against measured ones
 
 pub mod line;
+pub mod printed;
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

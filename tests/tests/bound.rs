@@ -1,8 +1,9 @@
 //! The cycle bound of the control interrupt, computed from the machine code of the flashed image,
-//! exists and is within the budget.
+//! exists, is within the budget, and is that of the documentation.
 
-use painleve_bound::report::Bound;
+use painleve_bound::report::{Bound, CORE_HZ};
 use painleve_tests::flash_image;
+use painleve_tests::printed::{self, LastFigure, thousands};
 
 #[test]
 fn the_control_interrupt_has_a_bound_within_the_budget() {
@@ -35,4 +36,20 @@ fn the_control_interrupt_has_a_bound_within_the_budget() {
             "{functions:?}"
         );
     }
+    let part = |cycles: u32| {
+        let microseconds = f64::from(cycles) / CORE_HZ * 1e6;
+        format!("{} | {microseconds:.0}", thousands(cycles.into()))
+    };
+    let expected = format!(
+        "| part | cycles | µs at 168 MHz |\n|---|---|---|\n\
+         | the control interrupt: the sensors' counts of the last tick, the controller, the stages | {} |\n\
+         | the interrupts that read the sensors for the next tick: every reading disturbed, each read \
+         again as often as its driver allows | {} |\n\
+         | both: proves up to {} Hz | {} |\n",
+        part(bound.cycles),
+        part(bound.sensor_cycles),
+        thousands(bound.proves_hz.into()),
+        part(bound.cycles + bound.sensor_cycles),
+    );
+    printed::check("benchmarks.md", "bound", &expected, LastFigure::Measured);
 }

@@ -19,6 +19,7 @@ use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::Health;
 use painleve_shared::status::{Fault, SupervisorState};
+use painleve_tests::printed::{self, LastFigure, thousands};
 use painleve_tests::{Bench, child_of, image, is_running, signal};
 
 /// Sends every frame to both controllers and compares their answers.
@@ -76,8 +77,9 @@ fn budget() -> serde_json::Value {
     serde_json::from_str(include_str!("../budget.json")).expect("valid JSON")
 }
 
-/// Runs a scenario on both and checks for equal counts within the budget for `key`.
-fn assert_equal_within_budget(name: &str, overrides: &[String], key: &str) {
+/// Runs a scenario on both and checks for equal counts within the budget for `key`. Returns the
+/// scenario's row of the documentation.
+fn equal_within_budget(name: &str, overrides: &[String], key: &str) -> String {
     let budget = budget();
     let scenario = Scenario::load(name, overrides).unwrap();
     let simulation = Simulation::new(&scenario).unwrap();
@@ -108,22 +110,37 @@ fn assert_equal_within_budget(name: &str, overrides: &[String], key: &str) {
         u64::from(stack_bytes) <= budget["stack_bytes"].as_u64().unwrap(),
         "{name}: {stack_bytes} bytes of stack are more than budget.json allows",
     );
+    let [median, max, most] = [report.median.into(), report.max.into(), most].map(thousands);
+    format!("| `{name}` | {median} | {max} | {most} |\n")
 }
+
+const HEADER: &str = "| scenario | median | worst tick | limit |\n|---|---|---|---|\n";
 
 #[test]
 fn the_image_answers_every_built_in_scenario_with_the_same_counts_within_budget() {
-    for name in built_in::names() {
-        assert_equal_within_budget(name, &[], "worst_tick_instructions");
-    }
+    let rows: String = built_in::names()
+        .map(|name| equal_within_budget(name, &[], "worst_tick_instructions"))
+        .collect();
+    printed::check(
+        "flashing.md",
+        "ticks",
+        &format!("{HEADER}{rows}"),
+        LastFigure::Limit,
+    );
 }
 
 #[test]
 fn the_image_detects_contact_from_the_encoders_with_the_same_counts_within_budget() {
     let encoders = ["controller.contact.evidence=encoders".to_string()];
-    for name in ["edge", "capture"] {
-        let key = "worst_tick_instructions_from_encoders";
-        assert_equal_within_budget(name, &encoders, key);
-    }
+    let key = "worst_tick_instructions_from_encoders";
+    let rows = ["edge", "capture"].map(|name| equal_within_budget(name, &encoders, key));
+    let expected = format!("{HEADER}{}", rows.concat());
+    printed::check(
+        "flashing.md",
+        "ticks from encoders",
+        &expected,
+        LastFigure::Limit,
+    );
 }
 
 /// Two consecutive overruns in the middle of a run.

@@ -13,6 +13,15 @@ use crate::command::{ChoreError, run_cargo, say, workspace};
 /// Further limits, which the end-to-end tests check as well.
 const BUDGET: &str = include_str!("../../tests/budget.json");
 
+/// The page that prints these figures.
+const PAGE: &str = include_str!("../../docs/flashing.md");
+
+/// The image whose flash and RAM it prints.
+const PRINTED_IMAGE: &str = "painleve-f405";
+
+/// Largest difference of a printed size from the measured one, relative to the measured one.
+const TOLERANCE: f64 = 0.03;
+
 /// Number of largest symbols to print.
 const LARGEST: usize = 12;
 
@@ -39,6 +48,9 @@ pub fn run() -> Result<(), ChoreError> {
             ("static RAM", ram_bytes(&image), board.ram_bytes),
         ] {
             over.extend(check(name, what, size, limit)?);
+            if name == PRINTED_IMAGE {
+                over.extend(misprinted(what, size, limit));
+            }
         }
         say("  largest symbols")?;
         let mut symbols: Vec<_> = image.symbols().collect();
@@ -54,12 +66,9 @@ pub fn run() -> Result<(), ChoreError> {
     let stack_limit = budget["stack_bytes"]
         .as_u64()
         .ok_or_else(|| ChoreError("tests/budget.json has no limit for the stack".into()))?;
-    over.extend(check(
-        "painleve-qemu",
-        "stack",
-        stack_bytes()?,
-        stack_limit,
-    )?);
+    let stack = stack_bytes()?;
+    over.extend(check("painleve-qemu", "stack", stack, stack_limit)?);
+    over.extend(misprinted("stack", stack, stack_limit));
     if over.is_empty() {
         Ok(())
     } else {
@@ -74,6 +83,30 @@ fn check(name: &str, what: &str, size: u64, limit: u64) -> Result<Option<String>
         "  {what:<10} {size:>7} of {limit:>6} bytes ({share:.0} %)"
     ))?;
     Ok((size > limit).then(|| format!("{name} takes {size} of {limit} bytes of {what}")))
+}
+
+/// Returns a message if the row of the documentation that begins with `what` prints another limit, or a
+/// size that differs by more than [`TOLERANCE`].
+fn misprinted(what: &str, size: u64, limit: u64) -> Option<String> {
+    let Some(row) = PAGE
+        .lines()
+        .find(|line| line.starts_with(&format!("| {what}")))
+    else {
+        return Some(format!("docs/flashing.md has no row for {what}"));
+    };
+    let figures: Vec<u64> = row
+        .split('|')
+        .skip(2)
+        .filter_map(|cell| {
+            let digits: String = cell.chars().filter(char::is_ascii_digit).collect();
+            digits.parse().ok()
+        })
+        .collect();
+    let agrees = matches!(figures[..], [printed, printed_limit]
+        if printed_limit == limit
+            && printed.abs_diff(size) as f64 <= TOLERANCE * size as f64);
+    (!agrees)
+        .then(|| format!("docs/flashing.md prints '{row}': {what} takes {size} of {limit} bytes"))
 }
 
 /// Returns the largest stack use of any scenario, measured on the emulated board. It occurs while
