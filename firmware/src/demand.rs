@@ -4,9 +4,9 @@
 use painleve_shared::{Arm, Posture};
 
 use crate::configuration::Configuration;
-use crate::drive::torque::LastCommand;
 use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
+use crate::last_command::LastCommand;
 use crate::law::{Law, LawInput, LawOutput};
 use crate::recover::{Recovery, RecoveryState};
 use crate::refer::Target;

@@ -23,6 +23,7 @@ pub mod demand;
 pub mod drive;
 pub mod estimate;
 pub mod guard;
+pub mod last_command;
 pub mod law;
 pub mod recover;
 pub mod refer;

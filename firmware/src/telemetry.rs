@@ -3,9 +3,9 @@
 use painleve_shared::Slip;
 use painleve_shared::status::{Fault, SupervisorState};
 
-use crate::drive::torque::LastCommand;
 use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
+use crate::last_command::LastCommand;
 use crate::refer::Target;
 use crate::supervise::supervisor::Supervision;
 

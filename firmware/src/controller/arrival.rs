@@ -3,7 +3,7 @@
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 
 use crate::configuration::Converters;
-use crate::drive::torque::LastCommand;
+use crate::last_command::LastCommand;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::Supervision;
 

@@ -23,9 +23,10 @@ use painleve_shared::status::Fault;
 use self::arrival::{Arrival, ArrivalState, Lapses, arrive};
 use crate::configuration::{Configuration, Converters};
 use crate::demand::{DemandInput, DemandState, TorqueDemand};
-use crate::drive::torque::{LastCommand, NotFinite, TorqueOutput};
+use crate::drive::torque::{NotFinite, TorqueOutput};
 use crate::estimate::joints::EncoderJump;
 use crate::estimate::{EstimatesState, Estimators, Readings};
+use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
 use crate::refer::{References, ReferencesState};
 use crate::supervise::lapses::{Lapse, LapseMonitor};
@@ -33,6 +34,42 @@ use crate::supervise::supervisor::{Supervision, Supervisor};
 use crate::telemetry::{Telemetry, TelemetrySink, Tick};
 
 /// The controller of one arm, with the laws `L`.
+///
+/// ```
+/// use painleve_firmware::{Configuration, Controller};
+/// use painleve_shared::counts::{EncoderCounts, ForceCounts};
+/// use painleve_shared::frame::{DigitalInputs, SensorFrame};
+/// use painleve_shared::status::SupervisorState;
+///
+/// // The paper's arm and hybrid law at 1 kHz.
+/// let configuration: Configuration = Configuration::default();
+/// let mut controller = Controller::new(&configuration)?;
+///
+/// // The arm rests on the belt, pressed on it with 10 N, and the enable switch is closed. The second
+/// // encoder measures the angle between the links.
+/// let encoder = configuration.converters.encoders[0];
+/// let [theta1, theta2] = [-11.4_f64, -35.1].map(f64::to_radians);
+/// let force = |newtons| ForceCounts(configuration.converters.force.counts(newtons).0);
+/// for tick in 0..100 {
+///     let answer = controller.tick(&SensorFrame {
+///         tick,
+///         sequence: tick,
+///         joints: [encoder.reading(theta1), encoder.reading(theta2 - theta1)],
+///         normal_force: force(10.0),
+///         tangential_force: force(-6.0),
+///         inputs: DigitalInputs::ENABLE,
+///     });
+///     assert_eq!(answer.latched_fault(), None);
+///     if tick > 20 {
+///         assert_eq!(answer.supervisor_state(), Some(SupervisorState::Tracking));
+///     }
+/// }
+///
+/// // A reading that no encoder can give takes the torque off.
+/// let impossible = SensorFrame { joints: [EncoderCounts(u32::MAX); 2], ..SensorFrame::default() };
+/// assert_eq!(controller.tick(&impossible).torques.map(|torque| torque.0), [0, 0]);
+/// # Ok::<(), painleve_shared::range::OutOfRange>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Controller<L: Law = LawSettings> {
     stages: Stages<L>,

@@ -28,7 +28,7 @@ use self::friction::{FrictionEstimate, FrictionEstimator, FrictionState};
 use self::joints::{EncoderJump, JointEstimator, JointState};
 use self::model::Model;
 use crate::configuration::Configuration;
-use crate::drive::torque::LastCommand;
+use crate::last_command::LastCommand;
 use crate::law::Law;
 
 /// Largest friction above the estimate that may explain a throw.

@@ -16,6 +16,7 @@ use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 
 use super::patience::PatienceArguments;
+use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve bridge`.
@@ -180,11 +181,11 @@ fn carry_until<B: ConnectedBoard>(
     let (mut end, session) = ControllerEnd::open(&bus.bus, wait, interrupt)?;
     end.set_silence_limit(bus.patience.peer());
     let configuration: Configuration =
-        postcard::from_bytes(&session.configuration).map_err(|error| {
-            CommandError::Process(format!(
-                "the plant on bus {} sent a configuration that cannot be read: {error}",
-                bus.bus
-            ))
+        postcard::from_bytes(&session.configuration).map_err(|source| {
+            ProcessError::Unreadable {
+                bus: bus.bus.clone(),
+                source,
+            }
         })?;
     let mut board = start(&configuration, session.pacing)?;
     let mut times = TickTimes::default();

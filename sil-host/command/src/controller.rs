@@ -12,6 +12,7 @@ use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
 
 use super::patience::PatienceArguments;
+use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve controller`.
@@ -40,14 +41,13 @@ fn answer_until(
     let wait = Duration::from_secs_f64(arguments.wait_s);
     let (mut end, session) = ControllerEnd::open(&arguments.bus, wait, interrupt)?;
     end.set_silence_limit(arguments.patience.peer());
-    let bad_session = |reason: String| {
-        CommandError::Process(format!(
-            "the plant on bus {} sent a configuration that this controller refuses: {reason}",
-            arguments.bus
-        ))
-    };
-    let configuration: Configuration = postcard::from_bytes(&session.configuration)
-        .map_err(|error| bad_session(error.to_string()))?;
+    let configuration: Configuration =
+        postcard::from_bytes(&session.configuration).map_err(|source| {
+            ProcessError::Unreadable {
+                bus: arguments.bus.clone(),
+                source,
+            }
+        })?;
     if session.pacing == Pacing::Realtime {
         warn(format_args!("controller: {}", request_realtime()));
     }
@@ -55,7 +55,10 @@ fn answer_until(
     let source = drive.source();
     let mut task: ControlTask<BusDrive, LawChoice> = ControlTask::new(drive);
     task.configure(&configuration, source)
-        .map_err(|error| bad_session(error.to_string()))?;
+        .map_err(|source| ProcessError::Refused {
+            bus: arguments.bus.clone(),
+            source,
+        })?;
     loop {
         task.tick();
         if let Some(outcome) = task.drive_mut().take_outcome() {

@@ -11,6 +11,7 @@ mod live;
 mod output;
 mod patience;
 mod plant;
+mod process_error;
 mod run;
 mod scenarios;
 mod study;
@@ -37,6 +38,8 @@ use painleve_study::sweep::SweepError;
 use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_size_limit};
 use painleve_system::memory_full::exit_when_shared_memory_is_full;
 use painleve_system::terminal::{self, warn};
+
+use process_error::ProcessError;
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
 ///
@@ -132,8 +135,8 @@ pub enum CommandError {
     #[error(transparent)]
     Sweep(#[from] SweepError),
     /// A process of the run could not be started or has died.
-    #[error("{0}")]
-    Process(String),
+    #[error(transparent)]
+    Process(#[from] ProcessError),
     /// A process of the run failed and has already printed its error.
     #[error("")]
     Told {
@@ -164,14 +167,18 @@ impl CommandError {
         match self {
             Self::Scenario(_) | Self::SameFile { .. } | Self::Input(_) | Self::Bound(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
+                StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
+                StudyError::Plot(_) | StudyError::Unwritable { .. } => 4,
                 StudyError::Scenario(_)
-                | StudyError::Option(_)
+                | StudyError::Grid(_)
+                | StudyError::Taken { .. }
+                | StudyError::OutOfReach { .. }
+                | StudyError::OffTheBelt { .. }
+                | StudyError::NothingAdmissible
                 | StudyError::Range(_)
                 | StudyError::TooManyRows(_) => 2,
-                StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
-                StudyError::Plot(_) => 4,
             },
-            Self::Sweep(SweepError::Incomplete(_)) => 1,
+            Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,
             Self::Sweep(SweepError::Output(_)) => 4,
             Self::Sweep(_) => 2,
             Self::Loop(LoopError::Plant(_)) | Self::Faulted(_) => 1,
@@ -193,7 +200,7 @@ impl CommandError {
 impl From<std::io::Error> for CommandError {
     /// Converts an error of the operating system outside files and links.
     fn from(error: std::io::Error) -> Self {
-        Self::Process(error.to_string())
+        Self::Process(error.into())
     }
 }
 

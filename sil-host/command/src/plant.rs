@@ -19,6 +19,7 @@ use painleve_system::terminal::warn;
 
 use super::output::{Output, OutputArguments};
 use super::patience::PatienceArguments;
+use super::process_error::ProcessError;
 use super::run::ScenarioArguments;
 use super::{CommandError, INTERRUPTED, PEER_FAILED, or_interrupted, say};
 
@@ -154,7 +155,7 @@ fn simulate(
 
 fn session(scenario: &Scenario, pacing: Pacing) -> Result<Session, CommandError> {
     let configuration = postcard::to_stdvec(&scenario.controller_configuration())
-        .map_err(|error| CommandError::Process(error.to_string()))?;
+        .map_err(ProcessError::Unsendable)?;
     Ok(Session {
         tick_hz: scenario.run.tick_hz,
         pacing,

@@ -22,6 +22,7 @@ use super::fail_on::{self, FailOn};
 use super::live;
 use super::output::OutputArguments;
 use super::patience::PatienceArguments;
+use super::process_error::ProcessError;
 use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
 
 /// A run of the robustness campaign.
@@ -251,15 +252,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     match controller.wait(CONTROLLER_END)? {
         Some(status) if status.success() => {}
         Some(status) => {
-            return Err(CommandError::Process(format!(
-                "the controller process failed ({status}){}",
-                controller.complaint()
-            )));
+            let complaint = controller.complaint();
+            return Err(ProcessError::Failed { status, complaint }.into());
         }
         None => {
-            return Err(CommandError::Process(
-                "the controller process did not end with its plant".into(),
-            ));
+            return Err(ProcessError::Outlived.into());
         }
     }
     let remarks = controller.stderr.text();
@@ -267,9 +264,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         warn(remarks.trim_end());
     }
     let text = plant.stdout.text();
-    let report: RunReport = serde_json::from_str(&text).map_err(|error| {
-        CommandError::Process(format!("the plant process gave no report: {error}"))
-    })?;
+    let report: RunReport = serde_json::from_str(&text).map_err(ProcessError::NoReport)?;
     print(&report, arguments.json)?;
     if deadlines_missed {
         return Err(failure(status));
@@ -308,11 +303,6 @@ fn watch(
     silence_limit: Duration,
     interrupt: &Interrupt,
 ) -> Result<ExitStatus, CommandError> {
-    let ended_early = |status, complaint: String| {
-        CommandError::Process(format!(
-            "the controller process ended early ({status}){complaint}"
-        ))
-    };
     loop {
         if let Some(status) = plant.child.ended()? {
             return Ok(status);
@@ -332,15 +322,21 @@ fn watch(
                 return Ok(plant_status);
             }
             if !plant.child.is_stopped() {
-                return Err(ended_early(status, controller.complaint()));
+                return Err(ProcessError::EndedEarly {
+                    process: "controller",
+                    status,
+                    complaint: controller.complaint(),
+                }
+                .into());
             }
         }
-        for (name, process) in [("plant", &mut *plant), ("controller", &mut *controller)] {
+        for (part, process) in [("plant", &mut *plant), ("controller", &mut *controller)] {
             if process.stopped_for(WATCH) >= silence_limit + STOPPED_MARGIN {
-                return Err(CommandError::Process(format!(
-                    "the {name} process ({}) was stopped and has been killed",
-                    process.child.id()
-                )));
+                return Err(ProcessError::Stopped {
+                    process: part,
+                    id: process.child.id(),
+                }
+                .into());
             }
         }
         std::thread::sleep(WATCH);
@@ -399,9 +395,7 @@ impl RunProcess {
             .stderr(stderr);
         let mut child = end_with_parent(&mut command, Signal::SIGTERM)
             .spawn()
-            .map_err(|error| {
-                CommandError::Process(format!("cannot start {}: {error}", program.display()))
-            })?;
+            .map_err(|source| ProcessError::Start { program, source })?;
         Ok(Self {
             stdout: Reader::start(child.stdout.take())?,
             stderr: Reader::start(child.stderr.take())?,
@@ -486,7 +480,11 @@ fn failure(status: ExitStatus) -> CommandError {
     match status.code().and_then(|code| u8::try_from(code).ok()) {
         Some(INTERRUPTED) => CommandError::Interrupted,
         Some(code) => CommandError::Told { code },
-        None => CommandError::Process(format!("the plant process ended early ({status})")),
+        None => CommandError::Process(ProcessError::EndedEarly {
+            process: "plant",
+            status,
+            complaint: String::new(),
+        }),
     }
 }
 

@@ -175,7 +175,7 @@ fn compute(arguments: &ShardArguments) -> Result<(), CommandError> {
         (0..manifest.shards).collect()
     } else {
         let variable = |name: &str| std::env::var(name).ok();
-        vec![share::shard(arguments.shard, manifest.shards, variable)?]
+        vec![share::shard(arguments.shard, manifest.shards, variable).map_err(SweepError::from)?]
     };
     for shard in shards {
         compute_shard(arguments, &manifest, &understood, shard)?;
@@ -288,7 +288,7 @@ fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
         cpus: arguments.cpus.get(),
         options: &arguments.options,
     };
-    let script = job.script().map_err(SweepError::Shard)?;
+    let script = job.script().map_err(SweepError::from)?;
     let default = folder.join("sweep.sbatch");
     let path = arguments.out.as_ref().unwrap_or(&default);
     atomic_file::write(path, script.as_bytes()).map_err(output)?;

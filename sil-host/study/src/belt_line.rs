@@ -4,8 +4,13 @@
 //! z_t = R sin τ, where R is the reach, they have none: the area of the triangle of both links is
 //! ¼ R cos τ √(d² − (l1 − l2)²), d = |z|, and p is an analytic function of τ from −π/2 to π/2.
 
+use core::ops::Range;
+
 use nalgebra::Matrix2;
 use painleve_shared::{Arm, LinkMotion, Pose, Posture, Slip};
+
+/// Usable fraction of the reach: at the full reach the arm is straight.
+const USED_REACH: f64 = 0.97;
 
 /// Number of points of the first search. A quantity has few extrema, so that each lies
 /// between its own points.
@@ -187,6 +192,27 @@ fn minimum(left: f64, right: f64, value: impl Fn(f64) -> f64) -> f64 {
         }
     }
     0.5 * (left + right)
+}
+
+/// Returns the intervals of z_t (m) in which p is at least a fraction of Q22 in a posture and slip,
+/// within the usable reach; the longest comes first.
+pub fn admissible_m(
+    arm: &Arm<f64>,
+    posture: Posture,
+    friction: f64,
+    slip: Slip,
+    least_p_ratio: f64,
+) -> Vec<Range<f64>> {
+    let line = BeltLine::new(arm, posture);
+    let reach_m = USED_REACH * arm.reach_on_belt_m();
+    let p = |tau| line.p(tau, friction, slip) - least_p_ratio * line.p(tau, 0.0, slip);
+    let mut stretches: Vec<_> = positive_stretches(p)
+        .into_iter()
+        .map(|(from, to)| line.tip_t_m(from).max(-reach_m)..line.tip_t_m(to).min(reach_m))
+        .filter(|stretch| stretch.start < stretch.end)
+        .collect();
+    stretches.sort_by(|one, other| (other.end - other.start).total_cmp(&(one.end - one.start)));
+    stretches
 }
 
 #[cfg(test)]

@@ -216,7 +216,7 @@ pub fn at_rest_on_belt(
 ) -> Result<InitialState, StudyError> {
     let theta = arm
         .link_angles_on_belt_rad(tip_t_m, posture)
-        .ok_or_else(|| StudyError::Option(format!("z_t = {tip_t_m} m is out of reach")))?;
+        .ok_or(StudyError::OutOfReach { tip_t_m })?;
     Ok(InitialState::at_rest(
         theta.first().to_degrees(),
         theta.second().to_degrees(),

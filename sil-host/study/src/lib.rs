@@ -78,9 +78,42 @@ pub enum StudyError {
     /// The scenario of the study is invalid.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// An option of the study is invalid.
-    #[error("{0}")]
-    Option(String),
+    /// The text of a grid is invalid.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// An override sets a key that an option of the study sets.
+    #[error("--set {key} has no effect here; use {option}")]
+    Taken {
+        /// The key.
+        key: String,
+        /// The option.
+        option: String,
+    },
+    /// A position is out of reach.
+    #[error("z_t = {tip_t_m} m is out of reach")]
+    OutOfReach {
+        /// Position along the belt, m.
+        tip_t_m: f64,
+    },
+    /// No θ1 of a grid puts the tip on the belt.
+    #[error(
+        "no θ1 of the grid puts the tip on the belt; |θ1| must be below {below_deg:.2} degrees"
+    )]
+    OffTheBelt {
+        /// Limit of |θ1|, degrees.
+        below_deg: f64,
+    },
+    /// p is not positive anywhere within reach.
+    #[error("the arm has no admissible tip position")]
+    NothingAdmissible,
+    /// A row cannot be written as a line of a table.
+    #[error("row {index} cannot be written: {source}")]
+    Unwritable {
+        /// Number of the row.
+        index: usize,
+        /// The reason.
+        source: csv::Error,
+    },
     /// The values of the options have more combinations than can be computed.
     #[error("{0} rows: at most {MOST_ROWS} can be computed; give coarser grids or fewer runs")]
     TooManyRows(usize),
@@ -106,12 +139,6 @@ pub enum StudyError {
     /// The figure cannot be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
-}
-
-impl From<GridError> for StudyError {
-    fn from(error: GridError) -> Self {
-        Self::Option(error.to_string())
-    }
 }
 
 /// A numbered list of rows, each of which depends only on its number.
@@ -182,7 +209,9 @@ mod tests {
 
         fn row(&self, index: usize) -> Result<usize, StudyError> {
             match index {
-                70 | 30 => Err(StudyError::Option(format!("row {index}"))),
+                70 | 30 => Err(StudyError::OutOfReach {
+                    tip_t_m: index as f64,
+                }),
                 _ => Ok(index * index),
             }
         }
@@ -217,7 +246,7 @@ mod tests {
             assert_eq!(pool.install(|| rows(&First(30), count)).unwrap(), expected);
             assert_eq!(done.into_inner(), 30);
             let error = pool.install(|| rows(&Squares, || ())).unwrap_err();
-            assert_eq!(error.to_string(), "row 30");
+            assert_eq!(error.to_string(), "z_t = 30 m is out of reach");
         }
     }
 }

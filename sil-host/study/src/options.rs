@@ -56,7 +56,7 @@ impl Overrides {
     /// Rejects overrides of keys that the study's own options set.
     ///
     /// # Errors
-    /// [`StudyError::Option`] naming the option to use instead.
+    /// [`StudyError::Taken`] naming the option to use instead.
     pub fn refuse(&self, taken: &[(&str, &str)]) -> Result<(), StudyError> {
         for text in &self.overrides {
             let key = text.split('=').next().unwrap_or_default().trim();
@@ -67,9 +67,10 @@ impl Overrides {
                         .is_some_and(|rest| rest.starts_with('.'))
             };
             if let Some((_, option)) = taken.iter().find(|(taken, _)| inside(taken)) {
-                return Err(StudyError::Option(format!(
-                    "--set {key} has no effect here; use {option}"
-                )));
+                return Err(StudyError::Taken {
+                    key: key.to_owned(),
+                    option: (*option).to_owned(),
+                });
             }
         }
         Ok(())

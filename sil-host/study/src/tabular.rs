@@ -62,7 +62,7 @@ impl<S: Tabular> Table for S {
 
     fn records(&self, index: usize) -> Result<Records, StudyError> {
         records(&S::lines(&self.row(index)?))
-            .map_err(|error| StudyError::Option(format!("row {index} cannot be written: {error}")))
+            .map_err(|source| StudyError::Unwritable { index, source })
     }
 
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {

@@ -19,6 +19,7 @@ use serde::Serialize;
 
 use self::operator::{Operator, Order};
 use self::view::View;
+use super::process_error::ProcessError;
 use super::{CommandError, say};
 
 /// Longest wait for the board before checking for operator commands and signals.
@@ -231,10 +232,11 @@ impl Drive {
         recorder: &mut Option<Recorder>,
     ) -> Result<(), CommandError> {
         if !answer.is_understood() {
-            return Err(CommandError::Process(format!(
-                "the board answers with state {} and fault {}, at least one of which is unknown to this version",
-                answer.state, answer.fault
-            )));
+            return Err(ProcessError::NotUnderstood {
+                state: answer.state,
+                fault: answer.fault,
+            }
+            .into());
         }
         let state = answer.supervisor_state().unwrap_or_default();
         self.report.state = state.name();

@@ -11,6 +11,7 @@ use painleve_study::Study;
 use painleve_study::catalogue::{AnyOutcome, AnyStudy};
 use painleve_system::atomic_file::{self, AtomicFile};
 
+use crate::process_error::ProcessError;
 use crate::{CommandError, say};
 
 /// Output files of a study, and the number of threads that compute it.
@@ -61,7 +62,7 @@ impl Threads {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .map_err(|error| CommandError::Process(format!("cannot start threads: {error}")))?;
+            .map_err(ProcessError::Threads)?;
         Ok(pool.install(work))
     }
 }

@@ -7,7 +7,7 @@ use painleve_shared::settings::Settings;
 use painleve_system::input_file;
 use toml::{Table, Value};
 
-use super::{Scenario, built_in};
+use super::{Scenario, built_in, describe};
 use crate::mechanics::BuiltInPlant;
 
 /// Upper limit of the levels of a key; no scenario key has as many.
@@ -214,15 +214,18 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
         message,
     };
     let mut root = Value::try_from(&scenario).map_err(|error| wrong_key(error.to_string()))?;
-    // Error message in case the missing key turns out not to be an optional one.
+    // Message on the first part of the key that is missing, unless an optional setting is absent.
     let mut missing = None;
+    let parts: Vec<&str> = key.split('.').collect();
     let mut place = &mut root;
-    for part in key.split('.') {
+    for (index, part) in parts.iter().copied().enumerate() {
         let next = match place {
             Value::Table(table) => {
                 if !table.contains_key(part) && missing.is_none() {
                     let known = table.keys().cloned().collect::<Vec<_>>().join(", ");
-                    missing = Some(format!("unknown key '{part}'; known: {known}"));
+                    let unknown = format!("unknown key '{part}'; known: {known}");
+                    let is_optional = describe::is_optional(&parts[..=index]);
+                    missing = Some((!is_optional).then_some(unknown));
                 }
                 let empty = || Value::Table(Table::new());
                 Ok(table.entry(part).or_insert_with(empty))
@@ -246,12 +249,7 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
     let Value::Table(table) = root else {
         return Err(wrong());
     };
-    from_table("--set", table).map_err(|error| match (missing, &error) {
-        // The key exists, but the value is invalid.
-        (_, ScenarioError::Key { message, .. }) if message.starts_with("invalid ") => error,
-        (Some(message), _) => wrong_key(message),
-        (None, _) => error,
-    })
+    from_table("--set", table).map_err(|error| missing.flatten().map_or(error, wrong_key))
 }
 
 #[cfg(test)]

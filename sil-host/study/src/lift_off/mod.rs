@@ -24,10 +24,11 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
+use super::belt_line::admissible_m;
 use super::case;
 use super::contact_probe::ContactProbe;
 use super::loop_study::LoopStudy;
-use super::robustness::{FalseAlarms, admissible_m};
+use super::robustness::FalseAlarms;
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};

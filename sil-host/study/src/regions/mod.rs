@@ -124,7 +124,7 @@ impl RegionsStudy {
     ///
     /// # Errors
     /// [`StudyError::Range`] if the arm or the friction coefficient is out of range,
-    /// [`StudyError::Option`] if no θ1 of the grid reaches the belt.
+    /// [`StudyError::OffTheBelt`] if no θ1 of the grid reaches the belt.
     pub fn check(&self) -> Result<(), StudyError> {
         range::check("--mu", self.mu, 0.0, 10.0)?;
         self.columns().map(|_| ())
@@ -144,10 +144,9 @@ impl RegionsStudy {
             .filter(|theta1| theta1.to_radians().abs() < reach_rad)
             .collect();
         if theta1_deg.is_empty() {
-            return Err(StudyError::Option(format!(
-                "no θ1 of the grid puts the tip on the belt; |θ1| must be below {:.2} degrees",
-                reach_rad.to_degrees()
-            )));
+            return Err(StudyError::OffTheBelt {
+                below_deg: reach_rad.to_degrees(),
+            });
         }
         Ok(Columns {
             arm: Arm::new(self.arm)?,

@@ -11,11 +11,9 @@ use rand::{RngExt, SeedableRng};
 use super::Arms;
 use super::judge::CAPTURE_LIMIT_S;
 use crate::StudyError;
-use crate::belt_line::{BeltLine, positive_stretches};
+use crate::belt_line::admissible_m;
 use crate::case::{self, Reference};
 
-/// Usable fraction of the reach: at the full reach the arm is straight.
-const USED_REACH: f64 = 0.97;
 /// Smallest p at the start, as a fraction of Q22. Nearer to the edge, an arm without torque
 /// presses on the belt with hundreds of newtons, and sticks to it before the first tick.
 const START_P_RATIO: f64 = 0.2;
@@ -23,27 +21,6 @@ const START_P_RATIO: f64 = 0.2;
 const BEYOND_M: f64 = 0.02;
 /// Settling time after the end of the reference, s.
 const REST_S: f64 = 2.0;
-
-/// Returns the intervals of z_t (m) in which p is at least a fraction of Q22 in a posture and slip,
-/// within the usable reach; the longest comes first.
-pub fn admissible_m(
-    arm: &Arm<f64>,
-    posture: Posture,
-    friction: f64,
-    slip: Slip,
-    least_p_ratio: f64,
-) -> Vec<Range<f64>> {
-    let line = BeltLine::new(arm, posture);
-    let reach_m = USED_REACH * arm.reach_on_belt_m();
-    let p = |tau| line.p(tau, friction, slip) - least_p_ratio * line.p(tau, 0.0, slip);
-    let mut stretches: Vec<_> = positive_stretches(p)
-        .into_iter()
-        .map(|(from, to)| line.tip_t_m(from).max(-reach_m)..line.tip_t_m(to).min(reach_m))
-        .filter(|stretch| stretch.start < stretch.end)
-        .collect();
-    stretches.sort_by(|one, other| (other.end - other.start).total_cmp(&(one.end - one.start)));
-    stretches
-}
 
 /// Returns the scenario of run `index` of the campaign with these arms and this seed.
 ///
@@ -123,8 +100,8 @@ impl Journey<'_> {
         let stretches =
             |ratio| admissible_m(self.arm, self.posture, self.friction, self.slip, ratio);
         let first = |stretches: Vec<Range<f64>>| {
-            let none = || StudyError::Option("the arm has no admissible tip position".into());
-            stretches.into_iter().next().ok_or_else(none)
+            let longest = stretches.into_iter().next();
+            longest.ok_or(StudyError::NothingAdmissible)
         };
         let start_m = draw(first(stretches(START_P_RATIO))?);
         let mut around = stretches(self.target_p_ratio);

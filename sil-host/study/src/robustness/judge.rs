@@ -9,10 +9,9 @@ use painleve_plant::scenario::Scenario;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
 
-use super::draw::admissible_m;
 use super::{Ending, FalseAlarms, Row};
 use crate::StudyError;
-use crate::belt_line::BeltLine;
+use crate::belt_line::{BeltLine, admissible_m};
 use crate::contact_probe::ContactProbe;
 use crate::trial::Trial;
 

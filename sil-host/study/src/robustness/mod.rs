@@ -28,7 +28,7 @@ use super::{Study, StudyError};
 
 pub use arms::Arms;
 pub(crate) use draw::Journey;
-pub use draw::{admissible_m, scenario};
+pub use draw::scenario;
 pub use false_alarms::FalseAlarms;
 pub use judge::LiftOffRule;
 pub use options::{CampaignOptions, Options};

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::manifest::Manifest;
 use super::shard_file::{self, Shard};
-use super::{SweepError, array};
+use super::{MismatchError, SweepError, array};
 
 /// State of the folder, shard by shard.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -139,7 +139,7 @@ pub fn merge(folder: &Path, manifest: &Manifest) -> Result<Vec<u8>, SweepError> 
     let contents = Contents::read(folder, manifest)?;
     refuse(&status_of(&contents, manifest), folder)?;
     let shards = contents.whole.into_iter().map(|(_, shard)| shard);
-    together(shards.collect(), manifest.rows)
+    Ok(together(shards.collect(), manifest.rows)?)
 }
 
 fn refuse(status: &SweepStatus, folder: &Path) -> Result<(), SweepError> {
@@ -166,33 +166,31 @@ fn refuse(status: &SweepStatus, folder: &Path) -> Result<(), SweepError> {
     if reasons.is_empty() {
         return Ok(());
     }
-    let folder = folder.display();
-    let reasons = reasons.join("; ");
-    Err(SweepError::Incomplete(format!(
-        "{folder} cannot be merged: {reasons}"
-    )))
+    Err(SweepError::Incomplete {
+        folder: folder.to_path_buf(),
+        reasons,
+    })
 }
 
-fn together(shards: Vec<Shard>, rows: usize) -> Result<Vec<u8>, SweepError> {
-    let incomplete = |message: &str| SweepError::Incomplete(message.to_owned());
+fn together(shards: Vec<Shard>, rows: usize) -> Result<Vec<u8>, MismatchError> {
     let header = shards.first().map(|shard| shard.header.clone());
-    let header = header.ok_or_else(|| incomplete("the folder holds no shards"))?;
+    let header = header.ok_or(MismatchError::None)?;
     if shards.iter().any(|shard| shard.header != header) {
-        return Err(incomplete("the headers of the shards differ"));
+        return Err(MismatchError::Headers);
     }
     let mut all: Vec<_> = shards.into_iter().flat_map(|shard| shard.rows).collect();
     all.sort_by_key(|(row, _)| *row);
     if all.iter().map(|(row, _)| *row).ne(0..rows) {
-        return Err(incomplete("the shards do not hold every row exactly once"));
+        return Err(MismatchError::Rows);
     }
     let mut writer = csv::Writer::from_writer(Vec::new());
     let written = writer.write_byte_record(&header).and_then(|()| {
         let mut lines = all.iter().flat_map(|(_, lines)| lines);
         lines.try_for_each(|line| writer.write_byte_record(line))
     });
-    written.map_err(|error| incomplete(&error.to_string()))?;
+    written?;
     let text = writer.into_inner();
-    text.map_err(|error| incomplete(&error.into_error().to_string()))
+    text.map_err(|error| csv::Error::from(error.into_error()).into())
 }
 
 /// Removes the temporary files of processes that were killed while writing a shard.

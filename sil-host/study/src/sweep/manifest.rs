@@ -12,9 +12,9 @@ use xxhash_rust::xxh3::xxh3_128;
 
 use crate::{MOST_ROWS, StudyError};
 
-use super::SweepError;
 use super::campaign::{Campaign, Understood};
 use super::share::MOST_SHARDS;
+use super::{ShardError, SweepError};
 
 /// Format version of the manifest file.
 const FORMAT: u32 = 1;
@@ -69,9 +69,7 @@ impl Manifest {
         }
         if !(1..=rows.min(MOST_SHARDS)).contains(&shards) {
             let most = rows.min(MOST_SHARDS);
-            return Err(SweepError::Shard(format!(
-                "--shards {shards}: give 1 to {most} for {rows} rows"
-            )));
+            return Err(ShardError::Count { shards, most, rows }.into());
         }
         Ok(Self {
             format: FORMAT,

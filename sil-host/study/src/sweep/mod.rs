@@ -59,17 +59,98 @@ pub enum SweepError {
         message: String,
     },
     /// No shard is given, or it does not exist.
-    #[error("{0}")]
-    Shard(String),
+    #[error(transparent)]
+    Shard(#[from] ShardError),
     /// A shard is missing, duplicated or broken.
-    #[error("{0}")]
-    Incomplete(String),
+    #[error("{} cannot be merged: {}", folder.display(), reasons.join("; "))]
+    Incomplete {
+        /// The folder of the sweep.
+        folder: PathBuf,
+        /// What is missing, duplicated or broken, file by file.
+        reasons: Vec<String>,
+    },
+    /// The script for a scheduler cannot be written.
+    #[error(transparent)]
+    Script(#[from] slurm::ScriptError),
+    /// The shards do not make one table.
+    #[error(transparent)]
+    Mismatch(#[from] MismatchError),
     /// The study is invalid or has no outcome.
     #[error(transparent)]
     Study(#[from] StudyError),
     /// A file cannot be written.
     #[error(transparent)]
     Output(#[from] AtomicFileError),
+}
+
+/// A shard or a number of shards that does not exist.
+#[derive(Debug, thiserror::Error)]
+pub enum ShardError {
+    /// A number of shards that the study cannot have.
+    #[error("--shards {shards}: give 1 to {most} for {rows} rows")]
+    Count {
+        /// The requested number.
+        shards: usize,
+        /// The largest number.
+        most: usize,
+        /// Rows of the study.
+        rows: usize,
+    },
+    /// Another number of shards than the sweep has.
+    #[error("--shard: this sweep has {shards} shards, not {given}; give K/{shards}")]
+    OtherCount {
+        /// Shards of the sweep.
+        shards: usize,
+        /// The given number.
+        given: usize,
+    },
+    /// A shard beyond the last.
+    #[error(
+        "{origin}: shard {shard} does not exist; the {shards} shards are numbered 0 to {}",
+        shards - 1
+    )]
+    Beyond {
+        /// The option or environment variable that gives the shard.
+        origin: String,
+        /// The shard.
+        shard: usize,
+        /// Shards of the sweep.
+        shards: usize,
+    },
+    /// Neither an option nor a scheduler gives a shard.
+    #[error(
+        "no shard is given; give --shard K/N or --all, or run under a scheduler that sets {}",
+        variables.join(", ")
+    )]
+    NotGiven {
+        /// Environment variables that schedulers set.
+        variables: &'static [&'static str],
+    },
+    /// A scheduler's variable that is not a number.
+    #[error("{name}={value} is not a shard number; give --shard K/N")]
+    NotANumber {
+        /// The variable.
+        name: &'static str,
+        /// Its value.
+        value: String,
+    },
+}
+
+/// Shards that do not make one table.
+#[derive(Debug, thiserror::Error)]
+pub enum MismatchError {
+    /// There are none.
+    #[error("the folder holds no shards")]
+    None,
+    /// Their headers differ.
+    #[error("the headers of the shards differ")]
+    Headers,
+    /// A row is missing or present twice.
+    #[error("the shards do not hold every row exactly once")]
+    Rows,
+    /// They cannot be written as one CSV file.
+    #[error(transparent)]
+    Csv(#[from] csv::Error),
 }
 
 impl SweepError {

@@ -7,7 +7,7 @@
 
 use std::str::FromStr;
 
-use super::SweepError;
+use super::ShardError;
 use crate::tabular::{Records, Table};
 use crate::{Study, StudyError};
 
@@ -62,48 +62,44 @@ impl FromStr for ShardOption {
 /// Returns the shard to compute out of `shards`: the requested one, or the scheduler's.
 ///
 /// # Errors
-/// [`SweepError::Shard`] if neither gives a shard, or if the shard does not exist.
+/// [`ShardError`] if neither gives a shard, or if the shard does not exist.
 pub fn shard(
     asked: Option<ShardOption>,
     shards: usize,
     variable: impl Fn(&str) -> Option<String>,
-) -> Result<usize, SweepError> {
+) -> Result<usize, ShardError> {
     let (shard, origin) = match asked {
         Some(ShardOption {
             shards: Some(given),
             ..
         }) if given != shards => {
-            return Err(SweepError::Shard(format!(
-                "--shard: this sweep has {shards} shards, not {given}; give K/{shards}"
-            )));
+            return Err(ShardError::OtherCount { shards, given });
         }
         Some(option) => (option.shard, "--shard".to_owned()),
         None => from_environment(variable)?,
     };
     if shard >= shards {
-        let last = shards - 1;
-        return Err(SweepError::Shard(format!(
-            "{origin}: shard {shard} does not exist; the {shards} shards are numbered 0 to {last}"
-        )));
+        return Err(ShardError::Beyond {
+            origin,
+            shard,
+            shards,
+        });
     }
     Ok(shard)
 }
 
 fn from_environment(
     variable: impl Fn(&str) -> Option<String>,
-) -> Result<(usize, String), SweepError> {
+) -> Result<(usize, String), ShardError> {
     let set = |name| variable(name).map(|value| (name, value));
     let Some((name, value)) = VARIABLES.into_iter().find_map(set) else {
-        return Err(SweepError::Shard(format!(
-            "no shard is given; give --shard K/N or --all, or run under a scheduler that sets {}",
-            VARIABLES.join(", ")
-        )));
+        return Err(ShardError::NotGiven {
+            variables: &VARIABLES,
+        });
     };
     match value.parse() {
         Ok(shard) => Ok((shard, format!("{name}={value}"))),
-        Err(_) => Err(SweepError::Shard(format!(
-            "{name}={value} is not a shard number; give --shard K/N"
-        ))),
+        Err(_) => Err(ShardError::NotANumber { name, value }),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The job script for Slurm, with one array task per shard.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Settings of the job script.
 #[derive(Clone, Debug)]
@@ -19,18 +19,29 @@ pub struct Job<'a> {
     pub options: &'a [String],
 }
 
+/// Text that does not fit into a line of the script.
+#[derive(Debug, thiserror::Error)]
+pub enum ScriptError {
+    /// A path.
+    #[error(
+        "{} cannot appear in a Slurm script; choose a path without quotes, backslashes, % and line ends",
+        .0.display()
+    )]
+    Path(PathBuf),
+    /// An option.
+    #[error("--option '{0}' is not an option of sbatch; give one, for example --option=--time=30")]
+    Option(String),
+}
+
 impl Job<'_> {
     /// Returns the script.
     ///
     /// # Errors
-    /// A message for the user if a path or an option does not fit into a line of the script.
-    pub fn script(&self) -> Result<String, String> {
+    /// [`ScriptError`] if a path or an option does not fit into a line of the script.
+    pub fn script(&self) -> Result<String, ScriptError> {
         let text = |path: &Path| match path.to_str() {
             Some(text) if !text.contains(['\n', '"', '\\', '%']) => Ok(text.to_owned()),
-            _ => Err(format!(
-                "{} cannot appear in a Slurm script; choose a path without quotes, backslashes, % and line ends",
-                path.display()
-            )),
+            _ => Err(ScriptError::Path(path.to_path_buf())),
         };
         let (program, directory) = (text(self.program)?, text(self.directory)?);
         let folder = text(self.folder)?;
@@ -47,9 +58,7 @@ impl Job<'_> {
         ];
         for option in self.options {
             if !option.starts_with('-') || option.contains('\n') {
-                return Err(format!(
-                    "--option '{option}' is not an option of sbatch; give one, for example --option=--time=30"
-                ));
+                return Err(ScriptError::Option(option.clone()));
             }
             options.push(option.clone());
         }

@@ -10,7 +10,7 @@ mod schema;
 
 use std::f64::consts::PI;
 
-use painleve_shared::settings::{Field, Range, Shape};
+use painleve_shared::settings::{Field, Range, Settings, Shape};
 use serde::Serialize;
 use toml::{Table, Value};
 
@@ -94,6 +94,51 @@ fn group(shape: &Shape) -> Option<&'static [Field]> {
         Shape::Group(fields) => Some(fields),
         Shape::Optional(inner) => group(inner),
         _ => None,
+    }
+}
+
+/// Whether the setting at `path` may be absent.
+pub(super) fn is_optional(path: &[&str]) -> bool {
+    let mut shapes = vec![Shape::Group(Scenario::FIELDS)];
+    for part in path {
+        shapes = shapes
+            .into_iter()
+            .flat_map(|shape| inside(shape, part))
+            .collect();
+    }
+    shapes
+        .iter()
+        .any(|shape| matches!(shape, Shape::Optional(_)))
+}
+
+/// Returns the kinds that a value's part may have: several if variants of a choice share its name.
+fn inside(shape: Shape, part: &str) -> Vec<Shape> {
+    match shape.resolved() {
+        Shape::Group(fields) => {
+            let named = fields.iter().filter(|field| field.key == part);
+            named.map(|field| field.shape).collect()
+        }
+        Shape::Optional(inner) => inside(*inner, part),
+        Shape::Array { item, .. } | Shape::List { item, .. } => {
+            let is_index = part.parse::<usize>().is_ok();
+            is_index.then_some(*item).into_iter().collect()
+        }
+        Shape::Choice {
+            tag: None,
+            variants,
+        } => {
+            let named = variants.iter().filter(|variant| variant.key == part);
+            named.filter_map(|variant| variant.content).collect()
+        }
+        // The settings of a tagged variant are beside its name.
+        Shape::Choice { tag: Some(tag), .. } if tag == part => vec![Shape::Text],
+        Shape::Choice { variants, .. } => {
+            let contents = variants.iter().filter_map(|variant| variant.content);
+            contents.flat_map(|content| inside(content, part)).collect()
+        }
+        Shape::Switch | Shape::Integer | Shape::Number | Shape::Text | Shape::AtRunTime(_) => {
+            Vec::new()
+        }
     }
 }
 
