@@ -220,7 +220,8 @@ pub fn link<D, L, P>(
                         })
                 }
                 Ok(Request::Health) => {
-                    let mut health = control.lock(|control| health(control));
+                    let mut health =
+                        control.lock(|control| health(&control.task, control.dropped_responses));
                     // Outside the lock: inspecting the stack takes too long to delay the control
                     // task.
                     health.stack_bytes = stack::high_water_bytes();

@@ -1,13 +1,11 @@
 //! Events and counters of the control task, for the log and the host.
 
-use painleve_firmware::drive::Drive;
+use painleve_firmware::drive::{ControlTask, Drive};
 use painleve_firmware::law::Law;
 use painleve_firmware::supervise::lapses::{LapseCounts, LapseMonitor};
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::message::Health;
 use painleve_shared::status::{Fault, SupervisorState};
-
-use crate::tasks::Control;
 
 /// State of the control task, as logged.
 #[derive(Clone, Copy, PartialEq)]
@@ -34,17 +32,13 @@ impl Change {
     }
 }
 
-/// Returns every counter except the stack.
-pub fn health<D: Drive, L: Law>(control: &Control<D, L>) -> Health {
-    let Control {
-        task,
-        dropped_responses,
-        ..
-    } = control;
+/// Returns every counter except the stack; `dropped_responses` is the number of answers discarded
+/// because the queue to the link was full.
+pub fn health<D: Drive, L: Law>(task: &ControlTask<D, L>, dropped_responses: u32) -> Health {
     Health {
         stack_bytes: 0,
         ticks: task.counts().ticks,
-        dropped_responses: *dropped_responses,
+        dropped_responses,
         lapses: task
             .lapse_counts()
             .map_or_else(LapseCounts::default, LapseMonitor::totals),
