@@ -52,6 +52,9 @@ pub enum ProcessError {
         /// Its process id.
         id: u32,
     },
+    /// A process failed and printed this.
+    #[error("{0}")]
+    Reported(String),
     /// The plant's output is not a report.
     #[error("the plant process gave no report: {0}")]
     NoReport(serde_json::Error),

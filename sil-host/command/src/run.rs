@@ -287,12 +287,12 @@ fn peer_failure(
         let complaint = controller.stderr.text();
         let mut lines = complaint.lines();
         if let Some(cause) = lines.find_map(|line| line.strip_prefix("error: ")) {
-            return Ok(CommandError::Process(cause.into()));
+            return Ok(ProcessError::Reported(cause.into()).into());
         }
     }
     Ok(match told.trim() {
         "" => failure(status),
-        told => CommandError::Process(told.into()),
+        told => ProcessError::Reported(told.into()).into(),
     })
 }
 
