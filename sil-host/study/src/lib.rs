@@ -9,6 +9,7 @@
 //! - [`closed_loop_bifurcation`]: Fig. 12, bifurcation over the belt speed with the controller in the loop
 //! - [`robustness`]: random arms, belts and converters; [`ablation`]: the contribution of each part of the controller
 //! - [`effects`]: success against the level of each effect of a real rig, on rigid and compliant contact
+//! - [`stiffness`]: the compliant contact as it gets stiffer, beside the rigid one
 //! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
 //! - [`contact_probe`], [`distribution`], [`proportion`]: contact, distributions and success rates of many runs
 //! - [`case`], [`trial`]: closed loops to study, and their execution in this process;
@@ -58,6 +59,7 @@ pub mod regions;
 pub mod robustness;
 pub mod settled;
 pub mod sliding_range;
+pub mod stiffness;
 pub mod sweep;
 pub mod tabular;
 pub mod trial;

@@ -1,0 +1,74 @@
+//! Options of the study of stiffness.
+
+use clap::Args;
+
+use super::{Row, Stiffness, StiffnessOutcome};
+use crate::catalogue::{StudyOptions, in_shards};
+use crate::options::{BaseOptions, seconds};
+use crate::register_study;
+use crate::tabular::Table;
+use crate::{Grid, StudyError};
+
+/// The compliant contact as it gets stiffer, beside the rigid one: the paradox resolved.
+#[derive(Debug, Args)]
+pub struct Options {
+    /// Stiffnesses of the contact, N/m.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "10000,100000,1000000,10000000"
+    )]
+    stiffness: Grid,
+    /// Belt speeds tried for bouncing, m/s.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "-0.65:-0.2:0.025",
+        allow_hyphen_values = true
+    )]
+    v_belt: Grid,
+    /// Time before bouncing is observed, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0, value_parser = seconds)]
+    transient_s: f64,
+    /// Time during which it is observed, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]
+    record_s: f64,
+    #[command(flatten)]
+    base: BaseOptions,
+}
+
+register_study!(Options);
+
+impl StudyOptions for Options {
+    const NAME: &'static str = "stiffness";
+    const ORDER: u32 = 95;
+    const HAS_SHARDS: bool = true;
+    type Study = Stiffness;
+    type Outcome = StiffnessOutcome;
+
+    fn study(&self) -> Result<Stiffness, StudyError> {
+        let scenario = self.base.load(&[("contact", "--stiffness")])?;
+        let study = Stiffness {
+            parameters: scenario.plant_parameters(),
+            stiffnesses_n_m: self.stiffness.values().to_vec(),
+            v_belt: self.v_belt.clone(),
+            times_s: (self.transient_s, self.record_s),
+        };
+        for &stiffness_n_m in self.stiffness.values() {
+            study.contact(stiffness_n_m, study.sticking_mass_kg()?)?;
+        }
+        Ok(study)
+    }
+
+    fn scenarios(&self) -> Vec<String> {
+        vec![self.base.name().to_owned()]
+    }
+
+    fn outcome(_: &Stiffness, rows: Vec<Row>) -> StiffnessOutcome {
+        StiffnessOutcome { rows }
+    }
+
+    fn table(study: Stiffness) -> Option<Box<dyn Table>> {
+        in_shards(study)
+    }
+}
