@@ -26,6 +26,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::{Config, FileName, Path as IceoryxPath, SemanticString};
+use nix::errno::Errno;
 use nix::fcntl::posix_fallocate;
 
 use super::LinkError;
@@ -172,7 +173,11 @@ impl RunFiles {
             let length = i64::try_from(metadata.len()).map_err(io::Error::other)?;
             if length > 0 {
                 let segment = OpenOptions::new().read(true).write(true).open(path)?;
-                posix_fallocate(&segment, 0, length)?;
+                while let Err(error) = posix_fallocate(&segment, 0, length) {
+                    if error != Errno::EINTR {
+                        return Err(error.into());
+                    }
+                }
             }
         }
         Ok(())

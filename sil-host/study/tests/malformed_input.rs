@@ -330,3 +330,21 @@ fn extreme_scenarios_run_or_fail_in_time() {
     }
     println!("{valid} valid scenarios of {drawn}");
 }
+
+/// Links of one gram with the strongest damping once took 60 ms of processor time for each tick.
+#[test]
+fn an_arm_that_is_too_stiff_ends_with_an_error() {
+    let overrides = [
+        "arm.link_mass_kg=[0.001, 0.001]",
+        "arm.damping_nms_rad=[1000.0, 1000.0]",
+    ];
+    let scenario = Scenario::load(built_in::DEFAULT, &overrides.map(String::from)).unwrap();
+    let simulation = Simulation::new(&scenario).unwrap();
+    let host = InProcess::new(&scenario.controller_configuration()).unwrap();
+    let mut closed_loop = ClosedLoop::new(simulation, host);
+    let error = within(RUNNING, &overrides, || {
+        (0..scenario.run.ticks()).find_map(|_| closed_loop.tick(&mut ()).err())
+    });
+    let error = error.unwrap().to_string();
+    assert!(error.contains("too stiff"), "{error}");
+}

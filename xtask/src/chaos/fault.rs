@@ -27,7 +27,7 @@ const fn fault(error: &'static str, call: &'static str) -> InjectedFault {
 }
 
 /// Errors that disks, memory and signals can cause in the system calls of plant and controller.
-pub const FAULTS: [InjectedFault; 22] = [
+pub const FAULTS: [InjectedFault; 25] = [
     fault("ENOSPC", "write"),
     fault("ENOSPC", "openat"),
     fault("ENOSPC", "mkdir"),
@@ -48,6 +48,9 @@ pub const FAULTS: [InjectedFault; 22] = [
     fault("EINTR", "read"),
     fault("EINTR", "openat"),
     fault("EINTR", "fcntl"),
+    fault("ENOSPC", "fallocate"),
+    fault("EINTR", "fallocate"),
+    fault("EINTR", "clock_nanosleep"),
     fault("EACCES", "openat"),
     fault("EACCES", "unlink"),
 ];

@@ -16,6 +16,7 @@ use super::impact::{self, ImpactLaw};
 use super::motion::{Evaluation, Motion, theta};
 use super::parameters::{InitialState, PlantParameters, SolverSettings};
 use super::probe::{ArmProbe, ArmStep};
+use super::step_budget::StepBudget;
 use super::torque::TorqueSegment;
 use super::transition;
 
@@ -29,6 +30,14 @@ pub enum MotionError {
         time_s: f64,
         /// Contact mode.
         mode: ContactMode,
+    },
+    /// The integrator needs so many steps that the run would take hours.
+    #[error(
+        "the plant is too stiff: far more than 500,000 integration steps a second by t = {time_s} s; give its arm less damping or stiffness for its masses"
+    )]
+    TooStiff {
+        /// Time, s.
+        time_s: f64,
     },
     /// Events follow one another without time passing.
     #[error("contact events without end at t = {time_s} s")]
@@ -74,6 +83,7 @@ pub struct ArmOnBelt {
     /// Whether torque or belt have changed since the mode was decided.
     unsettled: bool,
     step_size_s: f64,
+    budget: StepBudget,
     /// Steps up to this length are tried at order 5 first, s.
     short_size_s: f64,
     /// The equations evaluated at the present state, if known; cleared by any change of the state
@@ -108,6 +118,7 @@ impl ArmOnBelt {
             stick_start: (0.0, 0.0),
             unsettled: false,
             step_size_s: 1e-3,
+            budget: StepBudget::default(),
             short_size_s: LONGEST_SHORT_STEP_S,
             evaluation: None,
             step: Box::new(Step::empty()),
@@ -305,6 +316,7 @@ impl ArmOnBelt {
 
         let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
         loop {
+            self.budget.spend(start_s)?;
             let wanted = self.step_size_s.min(self.solver.maximum_step_s);
             let size = wanted.min(remaining);
             self.step

@@ -25,6 +25,7 @@ pub mod motion;
 mod parameters;
 mod probe;
 pub mod rosenbrock;
+mod step_budget;
 #[cfg(test)]
 mod tests;
 pub mod torque;

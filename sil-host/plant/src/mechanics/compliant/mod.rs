@@ -26,6 +26,7 @@ use super::belt::{BeltProfile, BeltSettings};
 use super::effects::Effects;
 use super::effects::gear::EncoderSide;
 use super::rosenbrock::Linearised;
+use super::step_budget::StepBudget;
 use super::torque::TorqueSegment;
 use super::{InitialState, MotionError, PlantParameters};
 use crate::plant::{ContactMode, Event, Plant, PlantError, Probe, Snapshot, State};
@@ -53,6 +54,7 @@ pub struct CompliantArmOnBelt {
     has_drives: bool,
     mode: ContactMode,
     step_size_s: f64,
+    budget: StepBudget,
 }
 
 impl CompliantArmOnBelt {
@@ -100,6 +102,7 @@ impl CompliantArmOnBelt {
             has_drives: effects.gear.elastic || effects.joints.is_on(),
             mode: ContactMode::Flight,
             step_size_s: 1e-4,
+            budget: StepBudget::default(),
         };
         let motion = plant.motion().rigid(0.0, 0.0);
         let gap_m = motion.gap_m(&initial);
@@ -183,6 +186,7 @@ impl CompliantArmOnBelt {
                 self.time_s = until_s;
                 break;
             }
+            self.budget.spend(self.time_s)?;
             let motion = self.motion();
             let (start_s, start) = (self.time_s, self.state);
             let mut x = SVector::<f64, N>::zeros();
