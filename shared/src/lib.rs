@@ -28,6 +28,7 @@ extern crate std;
 extern crate self as painleve_shared;
 
 pub mod arm;
+pub mod black_box;
 pub mod contact;
 pub mod coordinates;
 pub mod counts;

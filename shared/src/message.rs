@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::black_box::BlackBox;
 use crate::frame::{ActuatorFrame, SensorFrame};
 use crate::lapse::LapseCounts;
 
@@ -16,7 +17,7 @@ pub const PROTOCOL: u16 = 2;
 pub const MAXIMUM_LENGTH: usize = 768;
 
 /// Longest encoded response, in bytes.
-pub const MAXIMUM_RESPONSE_LENGTH: usize = 96;
+pub const MAXIMUM_RESPONSE_LENGTH: usize = 192;
 
 /// A request from the host to the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,6 +46,8 @@ pub enum Request<'a> {
     /// Permits or forbids the drive to arm; answered by [`Response::Permission`]. The board's own switch
     /// must close as well. Every configuration and every stop of the drive withdraws the permission.
     PermitArming(bool),
+    /// Asks for the record of the last reset, crash and fault; answered by [`Response::BlackBox`].
+    BlackBox,
 }
 
 /// Source of a controller's sensor frames.
@@ -114,6 +117,8 @@ pub enum Response {
         /// Duration of the tick in counts of the board's stopwatch.
         elapsed: u32,
     },
+    /// The record of the last reset, crash and fault.
+    BlackBox(BlackBox),
 }
 
 /// Counters of a board since its configuration. Counters wrap.
@@ -133,6 +138,7 @@ pub struct Health {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::black_box::{Crash, FILE_LENGTH, FaultRecord, ResetCause};
     use crate::counts::{Micrometres, TorqueCounts};
     use crate::frame::StatusFlags;
     use crate::wire;
@@ -157,7 +163,20 @@ mod tests {
             lapses: LapseCounts::from_fn(|_| u32::MAX),
         };
         let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
+        let black_box = BlackBox {
+            reset: ResetCause::Pin,
+            starts: u32::MAX,
+            crash: Some(Crash::Panic {
+                line: u32::MAX,
+                file: [u8::MAX; FILE_LENGTH],
+            }),
+            fault: Some(FaultRecord {
+                sensor: SensorFrame::LONGEST,
+                answer: frame,
+            }),
+        };
         for response in [
+            Response::BlackBox(black_box),
             Response::Tick {
                 sensor: SensorFrame::LONGEST,
                 answer: frame,

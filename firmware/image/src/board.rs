@@ -3,6 +3,7 @@
 use painleve_firmware::Configuration;
 use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
+use painleve_shared::black_box::ResetCause;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::FrameSource;
 
@@ -43,6 +44,11 @@ pub trait Board {
     fn start(device: Self::Device, core: cortex_m::Peripherals) -> Result<Parts<Self>, StartFault>
     where
         Self: Sized;
+
+    /// Returns the reason for the present start of the processor, and forgets it.
+    fn reset_cause() -> ResetCause {
+        ResetCause::Unknown
+    }
 
     /// Takes the torque off in any state of the program.
     fn take_torque_off();

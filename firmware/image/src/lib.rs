@@ -9,6 +9,7 @@
 #![no_std]
 #![cfg(target_os = "none")]
 
+pub mod black_box;
 pub mod board;
 pub mod stack;
 pub mod tasks;

@@ -16,13 +16,16 @@ use painleve_firmware::drive::{Answered, ControlTask, TaskCounts};
 use painleve_firmware::law::Law;
 use painleve_firmware::supervise::lapses::Lapse;
 use painleve_firmware::{BUILD, Configuration};
+use painleve_shared::black_box::{Crash, FaultRecord};
 use painleve_shared::message::{
     FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Request, Response,
 };
+use painleve_shared::status::Fault;
 use painleve_shared::wire::{self, Inbox, WireError};
 use rtic::Mutex;
 use serde::de::DeserializeOwned;
 
+use crate::black_box;
 use crate::board::{Board, BoardDrive, Parts, Port};
 use crate::stack;
 pub use crate::watch::Change;
@@ -50,6 +53,10 @@ pub struct Control<D, L: Law> {
     pub tick_hz: u32,
     /// Ticks since the host's last message.
     pub silent_ticks: u32,
+    /// The fault latched at the last tick.
+    fault: Option<Fault>,
+    /// A newly latched fault, for the black box.
+    fault_to_record: Option<FaultRecord>,
 }
 
 impl<D: BoardDrive, L: Law> Control<D, L> {
@@ -60,6 +67,8 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
             dropped_responses: 0,
             tick_hz: 0,
             silent_ticks: 0,
+            fault: None,
+            fault_to_record: None,
         }
     }
 
@@ -106,6 +115,7 @@ impl<L: Law> Default for Link<L> {
 /// Starts the board; if that fails, logs the fault and stops.
 pub fn start<B: Board>(device: B::Device, core: cortex_m::Peripherals) -> Parts<B> {
     stack::paint();
+    black_box::note_start(B::reset_cause());
     match B::start(device, core) {
         Ok(parts) => parts,
         Err(fault) => {
@@ -143,6 +153,13 @@ pub fn control<D: BoardDrive, L: Law>(
         control.dropped_responses = control.dropped_responses.wrapping_add(1);
     }
     let change = Change::of(&frame);
+    if let (Some(sensor), Some(_)) = (sensor, change.fault)
+        && change.fault != control.fault
+    {
+        let answer = frame;
+        control.fault_to_record = Some(FaultRecord { sensor, answer });
+    }
+    control.fault = change.fault;
     // An event for which the queue has no room is not logged.
     if change != *reported && events.enqueue(change).is_ok() {
         *reported = change;
@@ -166,6 +183,9 @@ pub fn link<D, L, P>(
         decoded,
         received,
     } = state;
+    if let Some(fault) = control.lock(|control| control.fault_to_record.take()) {
+        black_box::note_fault(fault);
+    }
     while let Some(answer) = answers.dequeue() {
         send(port, &answer);
     }
@@ -227,6 +247,7 @@ pub fn link<D, L, P>(
                     health.stack_bytes = stack::high_water_bytes();
                     Response::Health(health)
                 }
+                Ok(Request::BlackBox) => Response::BlackBox(black_box::read()),
                 Ok(Request::Alive) => continue,
                 Ok(Request::Identify) => Response::Identity {
                     protocol: PROTOCOL,
@@ -329,6 +350,10 @@ pub fn panicked<B: Board>(info: &PanicInfo<'_>) -> ! {
     B::take_torque_off();
     // Log the location only: formatting the message would link 20 KiB of text formatting.
     if let Some(place) = info.location() {
+        black_box::note_crash(Crash::Panic {
+            line: place.line(),
+            file: black_box::end_of(place.file()),
+        });
         defmt::error!("panic at {=str}:{=u32}", place.file(), place.line());
     }
     B::halt()

@@ -18,6 +18,7 @@ use nix::sys::termios::{
 };
 use painleve_firmware::BUILD;
 use painleve_plant::Configuration;
+use painleve_shared::black_box::BlackBox;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, PROTOCOL, Request, Response};
 use painleve_shared::wire::{self, Inbox, WireError};
@@ -117,6 +118,18 @@ impl Serial {
                 Err(BoardError::other_build(build))
             }
             _ => Ok(()),
+        }
+    }
+
+    /// Returns the board's record of its last reset, crash and fault.
+    ///
+    /// # Errors
+    /// [`BoardError::Silent`] if no board answers.
+    pub fn black_box(&mut self) -> Result<BlackBox, BoardError> {
+        let is_wanted = |response: &Response| matches!(response, Response::BlackBox(_));
+        match self.ask(&Request::BlackBox, PATIENCE, is_wanted)? {
+            Response::BlackBox(content) => Ok(content),
+            other => Err(BoardError::OutOfTurn(other)),
         }
     }
 

@@ -14,6 +14,7 @@ use painleve_plant::plant::Plant as _;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
+use painleve_shared::black_box::{BlackBox, Crash, ResetCause};
 use painleve_shared::counts::ForceCounts;
 use painleve_shared::message::{FrameSource, PROTOCOL, Request, Response};
 use painleve_shared::mounting::Mounting;
@@ -415,6 +416,39 @@ fn arming_on_implausible_readings_is_refused_with_a_fault() {
         let fault = latched_fault(&mut bench);
         assert_eq!(fault, Some(Fault::ArmingRefused), "{offsets:?} {ready}");
     }
+}
+
+/// What the image has recorded, asked for after its start.
+fn black_box(board: &mut FlashedBoard) -> BlackBox {
+    board.send(&Request::BlackBox);
+    match board.reply(20 * MILLISECOND) {
+        Some(Response::BlackBox(content)) => content,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_black_box_outlives_a_reset_and_names_its_reason() {
+    let mut bench = driven();
+    assert_eq!(black_box(&mut bench.board).reset, ResetCause::Power);
+    assert_eq!(black_box(&mut bench.board).starts, 1);
+    bench.board.wiring().force.dead = Some(true);
+    assert!(bench.time_until_off().is_some());
+    bench.assert_stays_off(5);
+    let before = bench.board.machine.program_counter();
+    bench.board.machine.hard_fault();
+    bench.run_ms(30);
+    let content = black_box(&mut bench.board);
+    assert_eq!(content.reset, ResetCause::Software);
+    assert_eq!(content.starts, 2);
+    let fault = content.fault.expect("the fault of the force cell");
+    assert_eq!(fault.answer.latched_fault(), Some(Fault::ForceOutOfRange));
+    assert!(fault.sensor.normal_force.0 > 1 << 20);
+    let is_there = |crash| matches!(crash, Some(Crash::HardFault { program_counter, .. }) if program_counter == before);
+    assert!(is_there(content.crash), "{content:?}, {before:#x}");
+    bench.board.machine.hang();
+    bench.run_ms(30);
+    assert_eq!(black_box(&mut bench.board).reset, ResetCause::Watchdog);
 }
 
 /// Every part mounted backwards and the force cell not at zero: the settings make it the same arm.

@@ -36,6 +36,7 @@ use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
 use painleve_image::board::{Board, BoardDrive, Parts, StartFault};
 use painleve_shared::Arm;
+use painleve_shared::black_box::ResetCause;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
@@ -194,6 +195,10 @@ impl Board for F405 {
         };
         drive.start_timer(IDLE_HZ);
         Ok(Parts { drive, bytes, port })
+    }
+
+    fn reset_cause() -> ResetCause {
+        safety::reset_cause()
     }
 
     fn take_torque_off() {

@@ -8,6 +8,8 @@
 
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
+use painleve_image::black_box;
+use painleve_shared::black_box::{Crash, ResetCause};
 use stm32f4xx_hal::pac;
 
 /// Keys that open the option bytes (RM0090, section 3.6.2).
@@ -67,28 +69,55 @@ pub fn take_torque_off() {
     }
 }
 
-/// Takes the torque off and resets the chip.
-pub fn reset() -> ! {
+/// Takes the torque off, records the crash and resets the chip.
+pub fn reset(crash: Crash) -> ! {
     take_torque_off();
+    black_box::note_crash(crash);
     SCB::sys_reset()
+}
+
+/// Returns the reason for the present start of the processor, and clears it for the next.
+pub fn reset_cause() -> ResetCause {
+    // SAFETY: flags that nothing else uses.
+    let status = unsafe { (*pac::RCC::ptr()).csr() };
+    let flags = status.read();
+    let cause = if flags.porrstf().bit_is_set() || flags.borrstf().bit_is_set() {
+        ResetCause::Power
+    } else if flags.wdgrstf().bit_is_set() || flags.wwdgrstf().bit_is_set() {
+        ResetCause::Watchdog
+    } else if flags.sftrstf().bit_is_set() {
+        ResetCause::Software
+    } else if flags.padrstf().bit_is_set() {
+        ResetCause::Pin
+    } else {
+        ResetCause::Unknown
+    };
+    status.modify(|_, w| w.rmvf().set_bit());
+    cause
 }
 
 /// Handles an instruction that cannot be executed, a bus that does not answer or a stack overflow.
 #[exception]
-unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-    reset()
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    // SAFETY: reads a register of the processor.
+    let status = unsafe { (*SCB::PTR).cfsr.read() };
+    reset(Crash::HardFault {
+        program_counter: frame.pc(),
+        link_register: frame.lr(),
+        status,
+    })
 }
 
 /// Handles a crystal failure; the chip continues on its internal oscillator.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
-    reset()
+    reset(Crash::Clock)
 }
 
 /// Handles low supply voltage, or an interrupt that no peripheral in use can have raised.
 #[exception]
-unsafe fn DefaultHandler(_: i16) -> ! {
-    reset()
+unsafe fn DefaultHandler(number: i16) -> ! {
+    reset(Crash::Interrupt { number })
 }
 
 /// Starts monitoring the crystal: if it stops, [`NonMaskableInt`] is raised at once.

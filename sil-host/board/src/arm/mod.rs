@@ -12,6 +12,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use painleve_plant::Configuration;
+use painleve_shared::black_box::BlackBox;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Health, Request, Response};
 
@@ -42,6 +43,8 @@ pub enum ArmEvent {
 /// A board with an arm. Dropping it stops the drive, if the line still carries the request.
 pub struct Arm {
     serial: Serial,
+    /// The board's record of its last reset, crash and fault, as read at the start.
+    pub black_box: BlackBox,
     /// Time of the last heartbeat.
     heartbeat: Instant,
     /// Time of the board's last message.
@@ -62,6 +65,7 @@ impl Arm {
     ) -> Result<Self, BoardError> {
         let mut serial = Serial::connect(path)?;
         serial.identify()?;
+        let black_box = serial.black_box()?;
         let source = if dry_run {
             FrameSource::DryRun
         } else {
@@ -71,6 +75,7 @@ impl Arm {
         let now = Instant::now();
         Ok(Self {
             serial,
+            black_box,
             heartbeat: now,
             heard: now,
         })

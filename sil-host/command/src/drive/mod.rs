@@ -1,5 +1,6 @@
 //! `painleve drive`: a real arm with a board's own sensors and torque stages.
 
+mod history;
 mod operator;
 mod view;
 
@@ -156,6 +157,9 @@ impl Drive {
             source,
         })?;
         let arm = Arm::open(&arguments.port, &configuration, arguments.dry_run)?;
+        for line in history::lines(&arm.black_box) {
+            warn(line);
+        }
         warn(format_args!(
             "connected: build {:016x}, scenario {}{}; orders: arm, disarm, stop",
             painleve_firmware::BUILD,
