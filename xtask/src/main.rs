@@ -8,6 +8,7 @@ mod command;
 mod examples;
 mod flash;
 mod fuzz;
+mod python;
 mod setup;
 mod size;
 mod soak;
@@ -39,6 +40,8 @@ enum Chore {
     Flash,
     /// Build and run every example.
     Examples,
+    /// Build the Python package, install its wheel in a virtual environment, and test it.
+    Python,
     /// Disturb plant and controller at every system call and count the flaws.
     Chaos(chaos::ChaosArguments),
     /// Send malformed and random input to parsers, controller and state machines.
@@ -57,6 +60,7 @@ fn main() -> ExitCode {
         Chore::Size => size::run(),
         Chore::Flash => flash::run(),
         Chore::Examples => examples::run(),
+        Chore::Python => python::run_chore(),
         Chore::Fuzz(arguments) => fuzz::run(&arguments),
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),

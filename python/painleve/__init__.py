@@ -1,0 +1,12 @@
+"""A robot arm that presses its tip on a moving belt: plant, real-time controller, runs.
+
+A scenario is the name of a built-in one (`painleve scenarios`) or a TOML text; `overrides` are keys with values in TOML::
+
+    import pandas, painleve
+    run = pandas.DataFrame(painleve.run("edge", {"belt.friction": 0.5})).set_index("time_s")
+    run[["plant.tip_t_m", "plant.reference_tip_t_m"]].plot()
+"""
+
+from ._painleve import Controller, Plant, Simulation, run
+
+__all__ = ["Controller", "Plant", "Simulation", "run"]

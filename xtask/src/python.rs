@@ -1,0 +1,40 @@
+//! `cargo xtask python`: builds the Python package, installs its wheel in a virtual environment, and tests it.
+
+use crate::command::{ChoreError, run};
+
+const FOLDER: &str = "target/python/package";
+const WHEELS: &str = "target/python/wheels";
+/// The test's own requirements.
+const TOOLS: [&str; 4] = ["maturin>=1.9,<2", "pytest", "gymnasium", "numpy"];
+
+/// Builds, installs and tests the package; needs Python 3.10 with `venv`, and the package index.
+///
+/// # Errors
+/// If a step fails.
+pub fn run_chore() -> Result<(), ChoreError> {
+    run("python3", &["-m", "venv", FOLDER])?;
+    let python = format!("{FOLDER}/bin/python");
+    let pip = ["-m", "pip", "install", "--quiet"];
+    run(&python, &[&pip[..], &TOOLS].concat())?;
+    run(
+        &format!("{FOLDER}/bin/maturin"),
+        &[
+            "build",
+            "--manifest-path",
+            "python/Cargo.toml",
+            "--target-dir",
+            "target",
+            "--out",
+            WHEELS,
+        ],
+    )?;
+    let install = [
+        "--force-reinstall",
+        "--no-index",
+        "--find-links",
+        WHEELS,
+        "painleve",
+    ];
+    run(&python, &[&pip[..], &install].concat())?;
+    run(&python, &["-m", "pytest", "-q", "python/tests"])
+}
