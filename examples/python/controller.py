@@ -1,4 +1,4 @@
-"""A controller of one's own in Python: holds both joints where they are found, pressed on the belt.
+"""A user-defined controller in Python: holds both joints at their initial angles and presses the tip on the belt.
 
     painleve plant --bus mine --wait-s 60 --json &      python controller.py mine
 """

@@ -3,7 +3,7 @@
     cargo build --release --package painleve-c-abi      pip install mujoco      python mujoco_plant.py
 
 The arm of the default scenario presses its tip on a moving belt and follows the reference. MuJoCo's contact is
-soft and convex: it does not reproduce the Painlevé paradox, so the reference stays where there is none.
+soft and convex: it does not reproduce the Painlevé paradox, so the reference stays in a region without it.
 """
 
 import ctypes

@@ -1,4 +1,4 @@
-"""Joins a painleve bus as its controller: docs/interface.md in code. Needs iceoryx2 0.9.x (PyPI)."""
+"""Joins a painleve bus as its controller, as described in docs/interface.md. Needs iceoryx2 0.9.x (PyPI)."""
 
 import fcntl
 import os
@@ -43,7 +43,7 @@ class SessionMessage(Structure):
 
 
 def place():
-    """The folder of this user's buses."""
+    """Returns the folder of this user's buses."""
     user = os.getuid()
     for folder in (os.environ.get("XDG_RUNTIME_DIR"), f"/run/user/{user}"):
         if folder and os.path.isabs(folder) and os.path.isdir(folder):
@@ -65,7 +65,7 @@ class Bus:
     CONTROLLER = 2
 
     def __init__(self, name, controller, wait_s=10.0):
-        """Joins the plant on bus `name`; `controller` is the name that its report shows."""
+        """Joins the plant on bus `name`; `controller` is its name in the plant's report."""
         folder, end = place() / name, time.monotonic() + wait_s
         while (run := self._ready_run(folder)) is None:
             if time.monotonic() > end:
@@ -109,7 +109,7 @@ class Bus:
         return next(waiting, None)
 
     def _wait(self, subscriber):
-        """The next message; spins, because the plant of a lockstep run waits for the answer."""
+        """Returns the next message; spins, because the plant of a lockstep run waits for the answer."""
         start = time.monotonic()
         while (sample := subscriber.receive()) is None:
             if subscriber is self._sensor and (message := self._session.receive()) is not None:

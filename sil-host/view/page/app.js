@@ -1,5 +1,5 @@
 "use strict";
-// The page of a run: reads the run from the page or from the program, plays it, reacts to its controls.
+// The page of a run: reads the run from the page or from the program, plays it and handles its controls.
 
 const $ = (id) => document.getElementById(id);
 

@@ -1,5 +1,5 @@
 "use strict";
-// The arm on its belt at one time, and the ribbons of modes and states.
+// The arm on its belt at one time, and the bands of modes and states.
 
 class ArmView {
   constructor(canvas, arm, columns) {
@@ -69,7 +69,7 @@ class ArmView {
     const first = ((x(0) + travel) % spacing + spacing) % spacing;
     for (let at = first - spacing; at < width; at += spacing) g.fillRect(at, beltY + 1, 3, 12);
     if (!c.length) return;
-    // Green where the controller admits sliding, red beyond its edges.
+    // Green where the controller allows sliding, red beyond the edges.
     const low = c.at("lower_edge_m", time), high = c.at("upper_edge_m", time);
     if (Number.isFinite(low) && Number.isFinite(high)) {
       const from = Math.max(x(low), 0), to = Math.min(x(high), width);
@@ -135,7 +135,7 @@ class Ribbon {
       const end = j < c.length ? c.t[j] : to;
       if (colours[kind]) {
         g.fillStyle = colours[kind];
-        // At least two pixels, so that the shortest flight is seen.
+        // At least two pixels, so that even the shortest flight is visible.
         g.fillRect(x(c.t[i]), 0, Math.max(x(end) - x(c.t[i]), 2 * ratio), canvas.height);
       }
       i = j;

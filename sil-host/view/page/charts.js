@@ -1,6 +1,6 @@
 "use strict";
-// Strip charts on one time axis, drawn by uPlot. The playhead is an element of its own, so that
-// playing does not draw the curves again.
+// Strip charts on one time axis, drawn by uPlot. The playhead is a separate element, so that
+// playing does not redraw the curves.
 
 const CHARTS = [
   { title: "Tip along the belt", unit: "mm", curves: [["reference_m", "reference", "--orange", 1e3, false, 5], ["tip_m", "tip", "--ink", 1e3], ["lower_edge_m", "edges", "--red", 1e3, true], ["upper_edge_m", "", "--red", 1e3, true]] },

@@ -1,5 +1,5 @@
 "use strict";
-// A run while it goes on: rows and events from the program, orders to it.
+// A live run: receives rows and events from the program, and sends commands to it.
 
 /** Rows and events that stay on the page, simulated time that the charts show, time between two drawings of them. */
 const KEPT_ROWS = 12000, KEPT_EVENTS = 500, SHOWN_S = 10, CHARTS_MS = 50;
@@ -20,7 +20,7 @@ function connect(page) {
   $("verdict").textContent = "live";
 
   socket.addEventListener("open", () => { status.textContent = "connected"; });
-  socket.addEventListener("close", () => { status.textContent = "the run has ended; what was seen stays here"; setPlaying(false); });
+  socket.addEventListener("close", () => { status.textContent = "the run has ended; the data received stay visible"; setPlaying(false); });
   socket.addEventListener("message", ({ data }) => {
     if (typeof data !== "string") { rows.push(data); return; }
     const message = JSON.parse(data);
