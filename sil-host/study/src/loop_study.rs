@@ -9,17 +9,37 @@ use painleve_shared::range::OutOfRange;
 use super::tabular::Tabular;
 use super::{Study, StudyError};
 
+/// Makes the plants of a study. A function from a scenario to a plant does.
+pub trait MakePlant: Sync {
+    /// The plant.
+    type Plant: Plant;
+
+    /// Returns the plant of a scenario in its initial state.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] naming the first key that is out of range.
+    fn make(&self, scenario: &Scenario) -> Result<Self::Plant, OutOfRange>;
+}
+
+impl<P, F> MakePlant for F
+where
+    P: Plant,
+    F: Fn(&Scenario) -> Result<P, OutOfRange> + Sync,
+{
+    type Plant = P;
+
+    fn make(&self, scenario: &Scenario) -> Result<P, OutOfRange> {
+        self(scenario)
+    }
+}
+
 /// A study whose rows are closed loops: the plant can be replaced.
 pub trait LoopStudy: Study {
-    /// Computes row `index` with the plants that `plant` makes, each in its scenario's initial state.
+    /// Computes row `index` with plants of `plants`.
     ///
     /// # Errors
     /// [`StudyError`] if the row cannot be computed.
-    fn row_on<P: Plant>(
-        &self,
-        index: usize,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Self::Row, StudyError>;
+    fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Self::Row, StudyError>;
 }
 
 /// A closed-loop study with a user-defined plant.
@@ -62,7 +82,7 @@ pub trait LoopStudy: Study {
 ///     runs: 2,
 ///     overrides: Vec::new(),
 /// };
-/// let study = OnPlant { study: campaign, plant: WeakMotors::new };
+/// let study = OnPlant { study: campaign, plants: WeakMotors::new };
 /// let rows = painleve_study::rows(&study, || ())?;
 /// assert!(rows.iter().all(|row| row.ending.is_success()));
 /// # Ok::<(), painleve_study::StudyError>(())
@@ -71,16 +91,11 @@ pub trait LoopStudy: Study {
 pub struct OnPlant<S, M> {
     /// The study.
     pub study: S,
-    /// Makes the plant of a scenario in its initial state.
-    pub plant: M,
+    /// Makes its plants.
+    pub plants: M,
 }
 
-impl<S, P, M> Study for OnPlant<S, M>
-where
-    S: LoopStudy,
-    P: Plant,
-    M: Fn(&Scenario) -> Result<P, OutOfRange> + Sync,
-{
+impl<S: LoopStudy, M: MakePlant> Study for OnPlant<S, M> {
     type Row = S::Row;
 
     fn len(&self) -> usize {
@@ -88,16 +103,11 @@ where
     }
 
     fn row(&self, index: usize) -> Result<S::Row, StudyError> {
-        self.study.row_on(index, &self.plant)
+        self.study.row_on(index, &self.plants)
     }
 }
 
-impl<S, P, M> Tabular for OnPlant<S, M>
-where
-    S: LoopStudy + Tabular,
-    P: Plant,
-    M: Fn(&Scenario) -> Result<P, OutOfRange> + Sync,
-{
+impl<S: LoopStudy + Tabular, M: MakePlant> Tabular for OnPlant<S, M> {
     type Line = S::Line;
 
     fn lines(row: &S::Row) -> Vec<S::Line> {

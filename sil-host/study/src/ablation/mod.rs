@@ -4,12 +4,9 @@ mod figure;
 mod options;
 mod outcome;
 
-use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
-use painleve_plant::scenario::Scenario;
-use painleve_shared::range::OutOfRange;
 
-use crate::loop_study::LoopStudy;
+use crate::loop_study::{LoopStudy, MakePlant};
 use crate::robustness::{Part, Robustness, Row};
 use crate::{Study, StudyError};
 
@@ -38,17 +35,13 @@ impl Study for AblationStudy {
 }
 
 impl LoopStudy for AblationStudy {
-    fn row_on<P: Plant>(
-        &self,
-        index: usize,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Row, StudyError> {
+    fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Row, StudyError> {
         let mut campaign = self.campaign.clone();
         let part = index / campaign.runs;
         if let Some(part) = part.checked_sub(1).and_then(|part| self.parts.get(part)) {
             let keys = part.without().iter().map(ToString::to_string);
             campaign.overrides.extend(keys);
         }
-        campaign.row_on(index % campaign.runs, plant)
+        campaign.row_on(index % campaign.runs, plants)
     }
 }

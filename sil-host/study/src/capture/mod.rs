@@ -6,16 +6,14 @@ mod outcome;
 
 use std::collections::BTreeMap;
 
-use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::range::OutOfRange;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
 use super::contact_probe::ContactProbe;
-use super::loop_study::LoopStudy;
+use super::loop_study::{LoopStudy, MakePlant};
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
@@ -114,15 +112,11 @@ impl Study for Capture {
 }
 
 impl LoopStudy for Capture {
-    fn row_on<P: Plant>(
-        &self,
-        index: usize,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Row, StudyError> {
+    fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Row, StudyError> {
         let scenario = self.scenario(index)?;
         let enabled_s = scenario.run.enable_at_s;
         let end_s = scenario.run.duration_s;
-        let mut trial = Trial::on(plant(&scenario)?, &scenario)?;
+        let mut trial = Trial::on(plants.make(&scenario)?, &scenario)?;
         let mut contact = ContactProbe::new(enabled_s, 0.0);
         let mut error_m = 0.0_f64;
         let mut solved = true;

@@ -12,19 +12,18 @@ mod page;
 
 use std::collections::BTreeMap;
 
+use painleve_plant::State;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_plant::statistics::Statistics;
-use painleve_plant::{Plant, State};
-use painleve_shared::range::OutOfRange;
 use painleve_shared::{Arm, Posture};
 use serde::Serialize;
 
 use super::attractor::Attractor;
 use super::case::{self, ControllerChoice, ConverterChoice, Reference};
 use super::initial::Initial;
-use super::loop_study::LoopStudy;
+use super::loop_study::{LoopStudy, MakePlant};
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
@@ -188,11 +187,7 @@ impl Study for ClosedLoopBifurcation {
 }
 
 impl LoopStudy for ClosedLoopBifurcation {
-    fn row_on<P: Plant>(
-        &self,
-        index: usize,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Row, StudyError> {
+    fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Row, StudyError> {
         let (cell, scenario) = self.scenario(index)?;
         let failed = |source| StudyError::Plant {
             row: format!(
@@ -201,7 +196,7 @@ impl LoopStudy for ClosedLoopBifurcation {
             ),
             source,
         };
-        let mut trial = Trial::on(plant(&scenario)?, &scenario)?;
+        let mut trial = Trial::on(plants.make(&scenario)?, &scenario)?;
         let ticks = |seconds: f64| (seconds * f64::from(scenario.run.tick_hz)).round() as u64;
         let (mut statistics, mut attractor) = (Statistics::new(0.0), Attractor::default());
         for _ in 0..ticks(self.transient_s) {

@@ -16,15 +16,12 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
-use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
-use painleve_shared::range::OutOfRange;
 use serde::Serialize;
 
 use super::case::ControllerChoice;
-use super::loop_study::LoopStudy;
+use super::loop_study::{LoopStudy, MakePlant};
 use super::robustness::{Ending, judge};
 use super::tabular::Tabular;
 use super::{Study, StudyError};
@@ -144,16 +141,17 @@ impl Study for EffectsStudy {
 }
 
 impl LoopStudy for EffectsStudy {
-    fn row_on<P: Plant>(
-        &self,
-        index: usize,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Row, StudyError> {
+    fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Row, StudyError> {
         let cells = self.cells();
         let (cell, run) = (index / self.runs, index % self.runs);
         let place = cells[cell];
         let scenario = self.scenario(place, run)?;
-        let judged = judge::run(plant(&scenario)?, &scenario, run, place.effect.lift_offs)?;
+        let judged = judge::run(
+            plants.make(&scenario)?,
+            &scenario,
+            run,
+            place.effect.lift_offs,
+        )?;
         Ok(Row {
             controller: place.controller.to_string(),
             contact: place.contact,

@@ -13,12 +13,10 @@ use std::collections::BTreeMap;
 
 use painleve_firmware::estimate::contact::Evidence;
 use painleve_firmware::refer::reference::Segment;
-use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::frame::StatusFlags;
-use painleve_shared::range::OutOfRange;
 use painleve_shared::{Arm, Posture, Slip};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -27,7 +25,7 @@ use serde::Serialize;
 use super::belt_line::admissible_m;
 use super::case;
 use super::contact_probe::ContactProbe;
-use super::loop_study::LoopStudy;
+use super::loop_study::{LoopStudy, MakePlant};
 use super::robustness::FalseAlarms;
 use super::tabular::Tabular;
 use super::trial::Trial;
@@ -178,13 +176,9 @@ impl Study for LiftOff {
 }
 
 impl LoopStudy for LiftOff {
-    fn row_on<P: Plant>(
-        &self,
-        index: usize,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Row, StudyError> {
+    fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Row, StudyError> {
         let scenario = self.scenario(index)?;
-        let mut trial = Trial::on(plant(&scenario)?, &scenario)?;
+        let mut trial = Trial::on(plants.make(&scenario)?, &scenario)?;
         let bar_s = bar_s(scenario.controller.contact.evidence);
         let mut flight = FirstFlight::new(SETTLING_S, bar_s);
         let mut contact = ContactProbe::new(SETTLING_S, 0.0);

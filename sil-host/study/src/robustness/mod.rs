@@ -16,12 +16,10 @@ mod row;
 
 use std::collections::BTreeMap;
 
-use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::range::OutOfRange;
 
-use super::loop_study::LoopStudy;
+use super::loop_study::{LoopStudy, MakePlant};
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError};
@@ -82,13 +80,9 @@ impl Study for Robustness {
 }
 
 impl LoopStudy for Robustness {
-    fn row_on<P: Plant>(
-        &self,
-        index: usize,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Row, StudyError> {
+    fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Row, StudyError> {
         let scenario = self.scenario(index)?;
-        judge::run(plant(&scenario)?, &scenario, index, LiftOffRule::Fail)
+        judge::run(plants.make(&scenario)?, &scenario, index, LiftOffRule::Fail)
     }
 }
 

@@ -14,18 +14,16 @@ mod page;
 
 use std::collections::BTreeMap;
 
-use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::statistics::Statistics;
-use painleve_shared::range::OutOfRange;
 use painleve_shared::{Arm, Posture, Slip};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::belt_line::{BeltLine, positive_stretches};
 use super::case::{self, ControllerChoice, ConverterChoice, Reference};
-use super::loop_study::LoopStudy;
+use super::loop_study::{LoopStudy, MakePlant};
 use super::tabular::Tabular;
 use super::trial::Trial;
 use super::{Study, StudyError, paper};
@@ -195,12 +193,8 @@ impl Study for SlidingRange {
 }
 
 impl LoopStudy for SlidingRange {
-    fn row_on<P: Plant>(
-        &self,
-        index: usize,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Row, StudyError> {
-        self.case(index)?.row(plant)
+    fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Row, StudyError> {
+        self.case(index)?.row(plants)
     }
 }
 
@@ -227,16 +221,13 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    fn row<P: Plant>(
-        &self,
-        plant: &(impl Fn(&Scenario) -> Result<P, OutOfRange> + Sync),
-    ) -> Result<Row, StudyError> {
-        let start_m = Trial::on(plant(&self.scenario)?, &self.scenario)?.tip_t_m();
+    fn row(&self, plants: &impl MakePlant) -> Result<Row, StudyError> {
+        let start_m = Trial::on(plants.make(&self.scenario)?, &self.scenario)?.tip_t_m();
         let limit_m = self.limit_m(start_m)?;
         let targets = self.targets(start_m, limit_m);
         let trials: Vec<Result<Trialled, StudyError>> = targets
             .par_iter()
-            .map(|&target| self.run(target, plant))
+            .map(|&target| self.run(target, plants))
             .collect();
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
 
@@ -255,7 +246,7 @@ impl Case<'_> {
             && far - near > self.criterion.resolution_m
         {
             let middle = 0.5 * (near + far);
-            match self.run(middle, plant)? {
+            match self.run(middle, plants)? {
                 Trialled::Reached { tip_t_m } => reached = Some((middle, tip_t_m)),
                 Trialled::Failed(ending) => failed = Some((middle, ending)),
             }
@@ -303,11 +294,7 @@ impl Case<'_> {
         targets
     }
 
-    fn run<P: Plant>(
-        &self,
-        target_m: f64,
-        plant: &impl Fn(&Scenario) -> Result<P, OutOfRange>,
-    ) -> Result<Trialled, StudyError> {
+    fn run(&self, target_m: f64, plants: &impl MakePlant) -> Result<Trialled, StudyError> {
         let mut scenario = self.scenario.clone();
         scenario.controller.reference = self.reference.to(target_m);
         let row = || {
@@ -316,7 +303,7 @@ impl Case<'_> {
                 self.controller, self.posture, self.mu
             )
         };
-        let mut trial = Trial::on(plant(&scenario)?, &scenario)?;
+        let mut trial = Trial::on(plants.make(&scenario)?, &scenario)?;
         let mut statistics = Statistics::new(0.0);
         let criterion = &self.criterion;
         let end_s = scenario.run.enable_at_s + self.reference.duration_s();
