@@ -43,6 +43,9 @@ pub struct ChaosArguments {
     /// Number of trials, drawn from all with --seed.
     #[arg(long)]
     trials: Option<usize>,
+    /// Begin no trial after so many seconds.
+    #[arg(long, value_name = "SECONDS")]
+    stop_after_s: Option<u64>,
     /// Seed of the draw.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -89,6 +92,7 @@ pub fn short() -> Result<(), ChoreError> {
         jobs: 4,
         crowd: 0,
         faults: 0,
+        stop_after_s: None,
         host: ChaosHost::Native,
         load: 0,
         // Tests share their machine with other work.
@@ -133,6 +137,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                 let (plans, next, table) = (&plans, &next, &table);
                 let (program, runtime) = (&program, runtime.path());
                 let host = arguments.host;
+                let stop_after_s = arguments.stop_after_s;
                 let patience_s = PATIENCE.map(|part| (part * arguments.end_s as f64).to_string());
                 scope.spawn(move || {
                     let mark = format!("{}-{worker}", std::process::id());
@@ -148,7 +153,11 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                         course: undisturbed(&place, &bus)?,
                         end: Duration::from_secs(arguments.end_s),
                     };
-                    while let Some(&plan) = plans.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let is_time_left =
+                        || stop_after_s.is_none_or(|limit| start.elapsed().as_secs() < limit);
+                    while is_time_left()
+                        && let Some(&plan) = plans.get(next.fetch_add(1, Ordering::Relaxed))
+                    {
                         let outcome = match plan {
                             ChaosTrial::Signal(plan) if plan.victim == ChaosRole::Emulator => {
                                 host::disturb_emulator(&place, &bus, plan, &expected)?
