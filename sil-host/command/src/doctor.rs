@@ -10,7 +10,6 @@ use painleve_board::emulator;
 use painleve_firmware::BUILD;
 use painleve_link::{BusState, LinkError, SegmentState, Survey};
 use painleve_system::realtime::request_realtime;
-use painleve_system::terminal;
 
 use super::{CommandError, say};
 
@@ -62,7 +61,7 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     table.load_style(UTF8_FULL_CONDENSED);
     table.set_header(["item", "state"]);
     table.add_rows(rows);
-    say(terminal::readable(table))?;
+    say(table)?;
     survey.map(|_| ()).map_err(LinkError::into)
 }
 

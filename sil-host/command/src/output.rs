@@ -129,8 +129,6 @@ const PROGRESS_TICKS: u64 = 256;
 
 /// The files of a run and its progress bar.
 pub struct Output {
-    /// The files' paths, as they were given.
-    paths: Vec<PathBuf>,
     /// `None` if the run writes no file.
     recorder: Option<Recorder>,
     progress: ProgressBar,
@@ -155,9 +153,7 @@ impl Output {
             let configuration = scenario.controller_configuration();
             Some(Recorder::start(&configuration, sinks).map_err(output_error)?)
         };
-        let paths = arguments.files().into_iter().map(|(_, path)| path.into());
         Ok(Self {
-            paths: paths.collect(),
             recorder,
             progress: progress_bar(scenario.run.ticks()),
             interrupt,
@@ -187,13 +183,11 @@ impl Output {
         }
     }
 
-    /// Completes the files and returns their paths; without this nothing appears under their names.
-    pub fn finish(self) -> Result<Vec<PathBuf>, CommandError> {
+    /// Completes the files; they have no final name before that.
+    pub fn finish(self) -> Result<(), CommandError> {
         self.progress.finish_and_clear();
-        if let Some(recorder) = self.recorder {
-            recorder.finish().map_err(output_error)?;
-        }
-        Ok(self.paths)
+        self.recorder
+            .map_or(Ok(()), |recorder| recorder.finish().map_err(output_error))
     }
 }
 

@@ -1,6 +1,5 @@
 //! Output files of a study, and the number of threads that compute it.
 
-use painleve_system::terminal;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -104,9 +103,9 @@ impl OutcomeOptions {
             table
                 .load_style(ASCII_MARKDOWN)
                 .set_content_arrangement(ContentArrangement::Disabled);
-            say(terminal::readable(table))
+            say(table)
         } else {
-            say(terminal::readable(outcome.table()))
+            say(outcome.table())
         }
     }
 }
