@@ -5,8 +5,9 @@ use std::time::{Duration, Instant};
 
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
-use super::claim::{Bus, Claim, LockFile, Role, remove_dead};
+use super::claim::{Bus, Claim, remove_dead};
 use super::guardian::{CallMark, Guardian};
+use super::lock_file::{LockFile, Role};
 use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
 use super::place::Place;
 use super::run_files::{OWN_CONTROLLER, RunFiles};
@@ -286,7 +287,7 @@ fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
     let in_use = || LinkError::ControllerInUse {
         bus: bus.name.clone(),
     };
-    let Some(run) = RunFiles::ready(bus) else {
+    let Some(run) = RunFiles::ready(&bus.folder(), &bus.place) else {
         // Another controller has joined, or the plant is not ready yet.
         return if lock.is_held(Role::Controller) {
             Err(in_use())

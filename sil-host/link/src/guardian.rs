@@ -13,7 +13,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::LinkError;
-use super::claim::{Bus, Claim, LockFile, Role};
+use super::claim::{Bus, Claim};
+use super::lock_file::{LockFile, Role};
 use super::run_files::RunFiles;
 
 /// Exit code of a process whose call is blocked; the same as for any failed peer.
@@ -115,7 +116,7 @@ impl PeerWatch {
             looks = if same { looks + 1 } else { 0 };
             last = call;
             if looks >= LOOKS_UNTIL_REMOVAL && !self.lock.is_held(self.peer) {
-                RunFiles::remove_half_made(&self.bus);
+                RunFiles::remove_half_made(&self.bus.folder(), &self.bus.place);
             }
             if looks >= LOOKS_UNTIL_END {
                 self.give_up();

@@ -33,6 +33,7 @@ mod claim;
 mod controller_end;
 mod error;
 mod guardian;
+mod lock_file;
 pub mod lockstep;
 pub mod paced;
 mod patience;

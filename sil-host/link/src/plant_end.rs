@@ -7,8 +7,9 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use nix::sys::statvfs::statvfs;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
-use super::claim::{Bus, Claim, LockFile, Role, Taken, remove_dead};
+use super::claim::{Bus, Claim, Taken, remove_dead};
 use super::guardian::{CallMark, Guardian};
+use super::lock_file::{LockFile, Role};
 use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
 use super::place::{Place, SHARED_MEMORY};
 use super::run_files::{OWN_CONTROLLER, RunFiles};
@@ -190,7 +191,7 @@ impl PlantEnd {
     /// Creates a new run for the next controller, because the last one died while it joined.
     fn restart(&mut self) -> Result<(), LinkError> {
         let bus = self.claim.bus();
-        RunFiles::remove_half_made(bus);
+        RunFiles::remove_half_made(&bus.folder(), &bus.place);
         let (run, ports) = start_run(bus, &self.guardian, &self.begin)?;
         self.ports = ports;
         std::mem::replace(&mut self.run, run)
@@ -336,7 +337,7 @@ fn start_run(
     begin: &SessionMessage,
 ) -> Result<(RunFiles, Ports), LinkError> {
     let refuse = |cause: io::Error| transport(&bus.name, "make the files of its run", cause);
-    let run = RunFiles::create(bus).map_err(refuse)?;
+    let run = RunFiles::create(&bus.folder(), &bus.place).map_err(refuse)?;
     let ports = guardian.during(|| {
         let ports = Ports::create(bus, &run, guardian)?;
         announce(&ports, *begin).map(|()| ports)

@@ -30,7 +30,7 @@ use nix::errno::Errno;
 use nix::fcntl::posix_fallocate;
 
 use super::LinkError;
-use super::claim::{Bus, LockFile, Role};
+use super::lock_file::{LockFile, Role};
 use super::place::{Place, SHARED_MEMORY};
 
 /// Name of this program's own controllers.
@@ -55,18 +55,18 @@ pub(super) struct RunFiles {
 
 impl RunFiles {
     /// Creates the folder of a new run. Only the plant calls it.
-    pub(super) fn create(bus: &Bus) -> io::Result<Self> {
+    pub(super) fn create(bus_folder: &Path, place: &Place) -> io::Result<Self> {
         let folder = tempfile::Builder::new()
             .prefix("")
             .rand_bytes(NAME_LENGTH)
-            .tempdir_in(bus.folder())?
+            .tempdir_in(bus_folder)?
             .keep();
-        Ok(Self::at(folder, &bus.place))
+        Ok(Self::at(folder, place))
     }
 
     /// Returns the run that waits for a controller on the bus, if there is one.
-    pub(super) fn ready(bus: &Bus) -> Option<Self> {
-        let runs = all(&bus.folder(), &bus.place).unwrap_or_default();
+    pub(super) fn ready(bus_folder: &Path, place: &Place) -> Option<Self> {
+        let runs = all(bus_folder, place).unwrap_or_default();
         runs.into_iter()
             .find(|run| run.has(READY) && !run.has(JOINED))
     }
@@ -206,8 +206,8 @@ impl RunFiles {
     /// checking its timeout: `dynamic_storage/posix_shared_memory.rs`, `open_impl`, match arm
     /// `MappingSizeIsZero`. A process that dies between `shm_open` and `ftruncate` leaves such a
     /// segment. Each attempt opens the segment by name, so removing the name ends the call.
-    pub(super) fn remove_half_made(bus: &Bus) {
-        for run in all(&bus.folder(), &bus.place).unwrap_or_default() {
+    pub(super) fn remove_half_made(bus_folder: &Path, place: &Place) {
+        for run in all(bus_folder, place).unwrap_or_default() {
             for (path, metadata) in segments(&run.prefix).unwrap_or_default() {
                 let write_only = metadata.permissions().mode() & 0o777 == 0o200;
                 if (metadata.len() == 0 || write_only) && path != run.lock_path() {

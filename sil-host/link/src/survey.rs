@@ -7,7 +7,8 @@ use std::fs;
 use std::io;
 use std::path::PathBuf;
 
-use super::claim::{Bus, Role, remove_dead};
+use super::claim::{Bus, remove_dead};
+use super::lock_file::Role;
 use super::place::Place;
 use super::run_files::{lock_of, prefixes, remove_segments};
 use super::{BusName, LinkError};

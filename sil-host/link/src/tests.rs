@@ -591,7 +591,7 @@ fn dead_controller(bus: &TestBus) -> PathBuf {
         name: bus.name.clone(),
         place: bus.place.clone(),
     };
-    let run = run_files::RunFiles::ready(&bus).unwrap();
+    let run = run_files::RunFiles::ready(&bus.folder(), &bus.place).unwrap();
     assert!(run.join().unwrap());
     let prefix = run.config().unwrap().global.prefix.to_string();
     let segment = Path::new(SHARED_MEMORY).join(format!("{prefix}half-made"));
@@ -620,13 +620,13 @@ fn a_dead_peers_half_made_segment_is_removed_and_a_live_peers_is_kept() {
         name: test.name.clone(),
         place: test.place.clone(),
     };
-    let claim = bus.claim(claim::Role::Plant).unwrap().unwrap();
-    let run = run_files::RunFiles::create(&bus).unwrap();
+    let claim = bus.claim(lock_file::Role::Plant).unwrap().unwrap();
+    let run = run_files::RunFiles::create(&bus.folder(), &bus.place).unwrap();
     run.set_ready().unwrap();
     let guardian = guardian::Guardian::start(&claim).unwrap();
     let segment = dead_controller(&test);
     // A live controller's segment stays, because the controller may still be creating it.
-    let peer = bus.claim(claim::Role::Controller).unwrap().unwrap();
+    let peer = bus.claim(lock_file::Role::Controller).unwrap().unwrap();
     guardian.during(|| thread::sleep(Duration::from_millis(1200)));
     assert!(segment.exists());
     drop(peer);

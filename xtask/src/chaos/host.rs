@@ -1,28 +1,20 @@
 //! The host of the controller during chaos: a native process, the image under QEMU, or the image
 //! behind a serial line.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader};
 use std::os::fd::AsFd;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use nix::fcntl::OFlag;
-use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
-use nix::unistd::Pid;
 use serde_json::Value;
 
-use super::place::ChaosFolder;
-use super::trial::{
-    ChaosRole, Disturbance, Expected, Flaw, Plan, TrialOutcome, TrialProcess, command, judge,
-    next_run, orphans,
-};
 use crate::build_fw;
 
-const EMULATOR: &str = "qemu-system-arm";
+pub const EMULATOR: &str = "qemu-system-arm";
 
 /// Kind of host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -158,44 +150,4 @@ fn open(port: &Path) -> io::Result<File> {
     cfmakeraw(&mut settings);
     tcsetattr(end.as_fd(), SetArg::TCSANOW, &settings)?;
     Ok(end)
-}
-
-/// Disturbs the emulator of a run, `plan.call` milliseconds after its start.
-pub fn disturb_emulator(
-    place: &ChaosFolder,
-    bus: &str,
-    plan: Plan,
-    expected: &Expected,
-) -> io::Result<TrialOutcome> {
-    let mut findings = Vec::new();
-    let mut run = TrialProcess::start(&mut command(place, ChaosRole::Run, bus, "out/run.mcap"))?;
-    let start = Instant::now();
-    let mut emulator = None;
-    while emulator.is_none() && start.elapsed() < expected.end {
-        emulator = place.processes().into_iter().find(|id| is_emulator(*id));
-    }
-    std::thread::sleep(Duration::from_millis(u64::from(plan.call)));
-    let signal = match plan.disturbance {
-        Disturbance::Kill => Signal::SIGKILL,
-        _ => Signal::SIGSTOP,
-    };
-    let reached = emulator.is_some_and(|id| kill(Pid::from_raw(id), signal).is_ok());
-    let disturbed = Instant::now();
-    if run.wait(disturbed + expected.end)? {
-        let (code, text) = run.outcome();
-        judge("the run", code, &text, &mut findings);
-    } else {
-        findings.push((Flaw::Hang, "the run does not end".into()));
-    }
-    orphans(place, disturbed + expected.end, &mut findings);
-    next_run(place, bus, expected, &mut findings)?;
-    Ok(TrialOutcome {
-        reached,
-        noticed: None,
-        findings,
-    })
-}
-
-fn is_emulator(id: i32) -> bool {
-    fs::read_link(format!("/proc/{id}/exe")).is_ok_and(|program| program.ends_with(EMULATOR))
 }

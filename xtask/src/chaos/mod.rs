@@ -6,6 +6,7 @@
 //! run on the same bus gives the correct log hash. The controller is a native process, or the image
 //! under QEMU, directly or behind a serial line.
 
+mod emulator;
 mod fault;
 mod host;
 mod place;
@@ -160,7 +161,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                     {
                         let outcome = match plan {
                             ChaosTrial::Signal(plan) if plan.victim == ChaosRole::Emulator => {
-                                host::disturb_emulator(&place, &bus, plan, &expected)?
+                                emulator::disturb_emulator(&place, &bus, plan, &expected)?
                             }
                             ChaosTrial::Signal(plan) => trial::run(&place, &bus, plan, &expected)?,
                             ChaosTrial::Fault(victim, fault, number) => {

@@ -12,48 +12,14 @@ use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
 use super::belt::{BeltProfile, BeltSettings};
 use super::cash_karp::ShortStep;
 use super::dop853::{Step, Tolerance};
-use super::impact::{self, ImpactLaw};
+use super::impact::ImpactLaw;
 use super::motion::{Evaluation, Motion, theta};
+use super::motion_error::MotionError;
 use super::parameters::{InitialState, PlantParameters, SolverSettings};
 use super::probe::{ArmProbe, ArmStep};
 use super::step_budget::StepBudget;
 use super::torque::TorqueSegment;
 use super::transition;
-
-/// Why the plant cannot continue.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum MotionError {
-    /// The integrator would need steps below the rounding error of the time.
-    #[error("the plant's step size vanished at t = {time_s} s in mode {mode:?}")]
-    StepVanished {
-        /// Time, s.
-        time_s: f64,
-        /// Contact mode.
-        mode: ContactMode,
-    },
-    /// The integrator needs so many steps that the run would take hours.
-    #[error(
-        "the plant is too stiff: far more than 500,000 integration steps a second by t = {time_s} s; give its arm less damping or stiffness for its masses"
-    )]
-    TooStiff {
-        /// Time, s.
-        time_s: f64,
-    },
-    /// Events follow one another without time passing.
-    #[error("contact events without end at t = {time_s} s")]
-    EventsWithoutEnd {
-        /// Time, s.
-        time_s: f64,
-    },
-    /// A collision has no solution.
-    #[error("at t = {time_s} s: {source}")]
-    EndlessImpact {
-        /// Time, s.
-        time_s: f64,
-        /// The unsolvable collision.
-        source: impact::EndlessImpact,
-    },
-}
 
 /// Longest step to try at order 5, s: at the default tolerance, the error estimate of a sliding arm
 /// reaches 1 at 2 ms.

@@ -1,13 +1,12 @@
 //! The built-in plants as one type: the arm on a rigid or on a compliant contact.
 
 use nalgebra::Vector2;
-use painleve_shared::{JointTorque, LinkMotion, OutOfRange};
+use painleve_shared::{JointTorque, LinkMotion};
 
 use super::ArmOnBelt;
 use super::belt::BeltSettings;
-use super::compliant::{CompliantArmOnBelt, ContactKind};
+use super::compliant::CompliantArmOnBelt;
 use crate::plant::{Plant, PlantError, Probe, Snapshot};
-use crate::scenario::Scenario;
 
 /// The plant of a scenario, selected by its `contact.kind`.
 #[derive(Clone, Debug)]
@@ -16,31 +15,6 @@ pub enum BuiltInPlant {
     Rigid(ArmOnBelt),
     /// Compliant contact.
     Compliant(CompliantArmOnBelt),
-}
-
-impl BuiltInPlant {
-    /// Creates the scenario's plant at its start.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] naming the first key that is out of range, or an effect that requires a
-    /// compliant contact.
-    pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
-        let parameters = scenario.plant_parameters();
-        let start = scenario.initial.state();
-        let (contact, effects) = (&scenario.contact, &scenario.effects);
-        Ok(match contact.kind {
-            ContactKind::Rigid => {
-                effects.none()?;
-                Self::Rigid(ArmOnBelt::new(&parameters, start)?)
-            }
-            ContactKind::Compliant => Self::Compliant(CompliantArmOnBelt::new(
-                &parameters,
-                contact,
-                effects,
-                start,
-            )?),
-        })
-    }
 }
 
 impl BuiltInPlant {

@@ -22,6 +22,7 @@ pub mod effects;
 pub mod event;
 pub mod impact;
 pub mod motion;
+mod motion_error;
 mod parameters;
 mod probe;
 pub mod rosenbrock;
@@ -31,7 +32,8 @@ mod tests;
 pub mod torque;
 pub mod transition;
 
-pub use arm_on_belt::{ArmOnBelt, MotionError};
+pub use arm_on_belt::ArmOnBelt;
 pub use built_in::BuiltInPlant;
+pub use motion_error::MotionError;
 pub use parameters::{InitialState, PlantParameters, SolverSettings};
 pub use probe::{ArmProbe, ArmStep};

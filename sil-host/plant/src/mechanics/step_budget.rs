@@ -1,7 +1,7 @@
 //! A bound on the number of integration steps: a plant that is too stiff ends with an error instead of
 //! a run that takes hours.
 
-use super::arm_on_belt::MotionError;
+use super::motion_error::MotionError;
 
 /// Steps for each second of simulated time. Ordinary arms take a few thousand.
 const STEPS_PER_S: f64 = 5e5;

@@ -6,6 +6,7 @@
 pub mod built_in;
 pub mod describe;
 mod load;
+mod plant;
 
 use painleve_firmware::configuration::ControllerSettings;
 use painleve_shared::{ArmParameters, OutOfRange, settings};
