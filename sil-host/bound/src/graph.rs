@@ -99,22 +99,17 @@ fn table(image: &Image, branch: &Instruction) -> Result<Vec<u32>, BoundError> {
     let bytes = image.bytes(start).ok_or_else(unknown)?;
     let bytes = bytes.get(..(end - start) as usize).ok_or_else(unknown)?;
     let mut targets = Vec::new();
-    let mut first = u32::MAX;
-    for (place, entry) in bytes.chunks_exact(width).enumerate() {
-        // A table may be padded; its targets do not lie within it.
-        if start + (place * width) as u32 >= first {
-            break;
-        }
+    for entry in bytes.chunks_exact(width) {
         let half_words = entry
             .iter()
             .rev()
             .fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
-        let padding = half_words == 0 && place + 1 == bytes.len() / width;
-        if !padding {
-            let target = start + 2 * half_words;
-            first = first.min(target);
-            targets.push(target);
+        let target = start + 2 * half_words;
+        // Padding and literals may follow the table. No entry leads into them.
+        if target < end {
+            break;
         }
+        targets.push(target);
     }
     targets.sort_unstable();
     targets.dedup();
@@ -176,4 +171,27 @@ fn blocks(
         }
     }
     blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::instruction::Decoder;
+
+    /// A table of four targets, its padding and a literal, as the compiler lays them out.
+    #[test]
+    fn a_table_ends_where_padding_and_literals_begin() {
+        let mut code = vec![0xdf, 0xe8, 0x05, 0xf0]; // tbb [pc, r5]
+        code.extend([6, 7, 8, 9]);
+        code.extend([0x00, 0xbf]); // nop
+        code.extend([0x52, 0xb8, 0x7e, 0x3f, 0x03, 0x00]);
+        code.extend([0x70, 0x47].repeat(8)); // bx lr
+        let mut image = Image::of_code(0x100, &code, "switch");
+        image.mark(0x100, true);
+        image.mark(0x104, false);
+        image.mark(0x110, true);
+        let branch = Decoder::new().unwrap().at(&image, 0x100, false).unwrap();
+        let targets = table(&image, &branch).unwrap();
+        assert_eq!(targets, [0x110, 0x112, 0x114, 0x116]);
+    }
 }

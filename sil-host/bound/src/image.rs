@@ -89,6 +89,12 @@ impl Image {
         }
     }
 
+    /// Marks the start of code or of data at an address.
+    #[cfg(test)]
+    pub(crate) fn mark(&mut self, address: u32, is_code: bool) {
+        self.marks.insert(address, is_code);
+    }
+
     /// Returns the bytes from an address on, if it is code or constant data.
     pub fn bytes(&self, address: u32) -> Option<&[u8]> {
         self.sections.iter().find_map(|(start, bytes)| {
