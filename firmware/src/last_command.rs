@@ -19,8 +19,6 @@ pub struct LastCommand {
     pub expected_acceleration_rad_s2: JointMotion<f32>,
     /// Part of that acceleration due to the contact force, rad/s².
     pub contact_acceleration_rad_s2: JointMotion<f32>,
-    /// Velocity of the reference that the command follows, m/s.
-    pub reference_velocity_m_s: f32,
     /// Torque withheld by rounding to counts, to be added at the next tick, N·m.
     pub(crate) rounding_nm: JointTorque<f32>,
 }

@@ -37,9 +37,6 @@ pub struct Telemetry {
     pub contact: bool,
     /// Certainty of the contact decision, 0 … 1.
     pub contact_confidence: f32,
-    /// Fraction of the largest gain that the contact allows to loops through its force: 1 if it is
-    /// rigid.
-    pub observer_share: f32,
     /// Estimated friction coefficient.
     pub friction: f32,
     /// Standard deviation of the friction coefficient.
@@ -115,7 +112,6 @@ impl<'a> TelemetrySink<'a> {
             torque_nm: command.torque_nm.into(),
             contact: contact.touches,
             contact_confidence: contact.confidence,
-            observer_share: contact.response.observer_share,
             friction: contact.friction.coefficient,
             friction_deviation: contact.friction.deviation,
             slip: contact.friction.slip,

@@ -293,7 +293,6 @@ impl<L: Law> Stages<L> {
                 state.supervision.latch(Fault::NotFinite);
             }
         }
-        state.command.reference_velocity_m_s = target.reference.velocity_m_s;
         if !state.supervision.drives() {
             state.release();
         }

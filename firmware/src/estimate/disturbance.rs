@@ -16,8 +16,6 @@ use crate::estimate::model::Model;
 
 /// Largest fraction of the residual adopted in one tick, per unit of p/Q22.
 const SHARE: f32 = 0.05;
-/// The same where the contact gives, per unit of the share that it allows.
-const CONTACT_SHARE: f32 = 0.167;
 
 settings! {
     /// Settings of the disturbance observer.
@@ -41,8 +39,6 @@ pub struct Balance {
     pub force_n: Vector2<f32>,
     /// p of a tip in contact, 1/kg.
     pub p_per_kg: Option<f32>,
-    /// Fraction of the largest gain that the contact allows, 0 … 1.
-    pub share: f32,
     /// Time since the previous tick, s.
     pub elapsed_s: f32,
 }
@@ -86,9 +82,9 @@ impl DisturbanceEstimator {
         if residual_nm.amax() > 2.0 * limit {
             return;
         }
-        let share = balance.p_per_kg.map_or(1.0, |p| {
-            SHARE.at_most(CONTACT_SHARE * balance.share) * (p / model.q22_per_kg).at_least(0.0)
-        });
+        let share = balance
+            .p_per_kg
+            .map_or(1.0, |p| SHARE * (p / model.q22_per_kg).at_least(0.0));
         let weight = (self.settings.bandwidth_rad_s * self.tick_s).at_most(share);
         state.torque_nm =
             (state.torque_nm + residual_nm * weight).map(|torque| torque.within(limit));
@@ -134,7 +130,6 @@ mod tests {
                     torque_nm: truth.inverse_dynamics_nm(&acceleration, &force_n),
                     force_n,
                     p_per_kg: p_ratio.map(|ratio| ratio * model.q22_per_kg),
-                    share: 1.0,
                     elapsed_s: TICK_S,
                 },
             );
@@ -196,7 +191,6 @@ mod tests {
                 torque_nm: model.inverse_dynamics_nm(&LinkMotion::zeros(), &Vector2::zeros()),
                 force_n: Vector2::zeros(),
                 p_per_kg: None,
-                share: 1.0,
                 elapsed_s: TICK_S,
             };
             estimator.update(&mut state, &model, &balance);

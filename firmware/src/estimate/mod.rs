@@ -5,7 +5,6 @@
 //! - [`contact`]: contact decision
 //! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
 //! - [`calibration`]: length of the links
-//! - [`response`]: how much the contact gives
 //! - [`disturbance`]: torques that the model does not explain
 
 pub mod belt;
@@ -15,7 +14,6 @@ pub mod disturbance;
 pub mod friction;
 pub mod joints;
 pub mod model;
-pub mod response;
 
 use nalgebra::Vector2;
 use painleve_shared::Arm;
@@ -29,16 +27,12 @@ use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceState};
 use self::friction::{FrictionEstimate, FrictionEstimator, FrictionState};
 use self::joints::{EncoderJump, JointEstimator, JointState};
 use self::model::Model;
-use self::response::{ContactResponse, ForceReading, ResponseEstimator, ResponseState};
 use crate::configuration::Configuration;
 use crate::last_command::LastCommand;
 use crate::law::Law;
 
 /// Largest friction above the estimate that may explain a throw.
 const THROWN_BY_FRICTION: f32 = 0.4;
-
-/// Least velocity by which a sticking tip falls behind its reference, m/s.
-const DRAGGED_M_S: f32 = 0.02;
 
 /// The contact estimate after a tick's readings.
 #[derive(Clone, Copy, Debug)]
@@ -57,8 +51,6 @@ pub struct ContactEstimate {
     pub friction: FrictionEstimate,
     /// p with that friction, 1/kg.
     pub p_per_kg: f32,
-    /// What the contact's response to torque allows.
-    pub response: ContactResponse,
 }
 
 /// One frame's readings.
@@ -79,7 +71,6 @@ pub struct Estimators {
     contact: ContactDetector,
     friction: FrictionEstimator,
     belt: BeltEstimator,
-    response: ResponseEstimator,
     disturbance: DisturbanceEstimator,
     calibrator: LengthCalibrator,
 }
@@ -93,7 +84,6 @@ pub struct EstimatesState {
     contact: ContactState,
     friction: FrictionState,
     belt: BeltState,
-    response: ResponseState,
     disturbance: DisturbanceState,
     calibration: CalibrationState,
 }
@@ -130,7 +120,6 @@ impl Estimators {
                 tick_s,
             ),
             belt: BeltEstimator::new(&configuration.settings.belt, tick_s),
-            response: ResponseEstimator::new(&configuration.settings.response, tick_s),
             disturbance: DisturbanceEstimator::new(&configuration.settings.disturbance, tick_s),
             calibrator: LengthCalibrator::new(
                 &configuration.settings.calibration,
@@ -148,7 +137,6 @@ impl Estimators {
             contact: ContactState::default(),
             friction: self.friction.start(),
             belt: BeltState::default(),
-            response: ResponseState::default(),
             disturbance: DisturbanceState::default(),
             calibration: CalibrationState::default(),
         }
@@ -221,10 +209,7 @@ impl Estimators {
                 state.friction.expect_slip(slip);
             }
             if force_in_range {
-                let slip = state.friction.slip().sign::<f32>();
-                let lag_m_s = last.reference_velocity_m_s - tip_velocity_m_s;
-                let dragged = slip * lag_m_s > DRAGGED_M_S;
-                self.friction.update(&mut state.friction, &force_n, dragged);
+                self.friction.update(&mut state.friction, &force_n);
             }
             // An unchanged reading would gain weight merely with time.
             if certain && state.joints.has_moved() {
@@ -239,23 +224,7 @@ impl Estimators {
         let sliding = contact.then_some(&friction);
         self.belt.update(&mut state.belt, tip_velocity_m_s, sliding);
         let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
-        let informative = certain && force_in_range && drives;
-        let slides = contact && p_per_kg > 0.0 && !friction.sticks;
-        if !self.response.is_enabled() {
-            // Nothing to do: a rigid contact is assumed.
-        } else if informative && slides && !last.is_constrained() {
-            let (_, slope) = model.free_normal_acceleration();
-            let reading = ForceReading {
-                normal_force_n: force_n.y,
-                withheld_n: last.rounding_nm.vector().dot(&slope) / p_per_kg,
-                p_ratio: p_per_kg / model.q22_per_kg,
-            };
-            self.response.update(&mut state.response, &reading);
-        } else {
-            state.response.pause();
-        }
-        let response = self.response.response(&state.response, p_per_kg);
-        if informative {
+        if certain && force_in_range && drives {
             self.disturbance.update(
                 &mut state.disturbance,
                 model,
@@ -263,7 +232,6 @@ impl Estimators {
                     torque_nm: last.torque_nm,
                     force_n,
                     p_per_kg: contact.then_some(p_per_kg),
-                    share: response.observer_share,
                     elapsed_s: elapsed_ticks as f32 * self.tick_s,
                 },
             );
@@ -278,7 +246,6 @@ impl Estimators {
             force_n,
             friction,
             p_per_kg,
-            response,
         }
     }
 

@@ -9,7 +9,7 @@ pub mod reference;
 use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, Posture};
 
-use self::governor::{EdgeGovernor, GovernorState, LeastPRatio};
+use self::governor::{EdgeGovernor, GovernorState};
 use self::reference::{ReferenceGenerator, ReferenceState, TipReference};
 use crate::configuration::Configuration;
 use crate::estimate::ContactEstimate;
@@ -114,7 +114,7 @@ impl References {
             // position has changed with the links' length.
             state.generator.start_from(tip_t_m);
         }
-        let landing_p_ratio = if recovering || landing.is_some() {
+        let minimum_p_ratio = if recovering || landing.is_some() {
             self.landing_p_ratio
         } else {
             0.0
@@ -125,10 +125,7 @@ impl References {
             state.posture,
             tip_t_m,
             &contact.friction,
-            LeastPRatio {
-                landing: landing_p_ratio,
-                contact: contact.response.least_p_ratio,
-            },
+            minimum_p_ratio,
         );
         let wanted = match phase.state {
             SupervisorState::Armed => state.generator.start(),

@@ -10,6 +10,7 @@ use painleve_board::emulator;
 use painleve_firmware::BUILD;
 use painleve_link::{BusState, LinkError, SegmentState, Survey};
 use painleve_system::realtime::request_realtime;
+use painleve_system::terminal;
 
 use super::{CommandError, say};
 
@@ -61,7 +62,7 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     table.load_style(UTF8_FULL_CONDENSED);
     table.set_header(["item", "state"]);
     table.add_rows(rows);
-    say(table)?;
+    say(terminal::readable(table))?;
     survey.map(|_| ()).map_err(LinkError::into)
 }
 

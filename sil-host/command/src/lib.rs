@@ -1,6 +1,7 @@
 //! The `painleve` command: subcommands, options and errors.
 
 mod bridge;
+mod completions;
 mod controller;
 mod doctor;
 mod drive;
@@ -72,6 +73,10 @@ enum Command {
     Doctor(doctor::DoctorArguments),
     /// Write the ticks of a record as a table.
     Export(export::ExportArguments),
+    /// Print a completion script for a shell.
+    Completions(completions::CompletionsArguments),
+    /// Write a manual page for every command.
+    Man(completions::ManArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
     /// Compute one of the paper's studies as numbers, data files and figures.
@@ -307,7 +312,9 @@ fn execute(command: Command) -> Result<(), CommandError> {
             exit_when_shared_memory_is_full(PEER_FAILED)?;
         }
         Command::Run(_) | Command::Drive(_) | Command::Timing(_) | Command::Doctor(_) => {}
-        Command::Export(_)
+        Command::Completions(_)
+        | Command::Man(_)
+        | Command::Export(_)
         | Command::Scenarios(_)
         | Command::Study(_)
         | Command::Sweep(_)
@@ -324,6 +331,8 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        Command::Completions(arguments) => completions::print(&arguments),
+        Command::Man(arguments) => completions::write_manual(&arguments),
         Command::Scenarios(arguments) => scenarios::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),

@@ -129,6 +129,8 @@ const PROGRESS_TICKS: u64 = 256;
 
 /// The files of a run and its progress bar.
 pub struct Output {
+    /// The files' paths, as they were given.
+    paths: Vec<PathBuf>,
     /// `None` if the run writes no file.
     recorder: Option<Recorder>,
     progress: ProgressBar,
@@ -153,7 +155,9 @@ impl Output {
             let configuration = scenario.controller_configuration();
             Some(Recorder::start(&configuration, sinks).map_err(output_error)?)
         };
+        let paths = arguments.files().into_iter().map(|(_, path)| path.into());
         Ok(Self {
+            paths: paths.collect(),
             recorder,
             progress: progress_bar(scenario.run.ticks()),
             interrupt,
@@ -183,11 +187,13 @@ impl Output {
         }
     }
 
-    /// Completes the files; they have no final name before that.
-    pub fn finish(self) -> Result<(), CommandError> {
+    /// Completes the files and returns their paths; without this nothing appears under their names.
+    pub fn finish(self) -> Result<Vec<PathBuf>, CommandError> {
         self.progress.finish_and_clear();
-        self.recorder
-            .map_or(Ok(()), |recorder| recorder.finish().map_err(output_error))
+        if let Some(recorder) = self.recorder {
+            recorder.finish().map_err(output_error)?;
+        }
+        Ok(self.paths)
     }
 }
 

@@ -75,8 +75,8 @@ fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), Co
     let scenario = arguments.scenario.load()?;
     let mut output = Output::open(&arguments.output, &scenario, interrupt.clone())?;
     match simulate(arguments, &scenario, interrupt, &mut output) {
-        Ok(report) => {
-            output.finish()?;
+        Ok(mut report) => {
+            report.files = output.finish()?;
             super::run::print(&report, arguments.json)?;
             match report.fault.and_then(Fault::from_code) {
                 Some(fault)

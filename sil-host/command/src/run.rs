@@ -15,7 +15,7 @@ use painleve_record::report::RunReport;
 use painleve_study::robustness::{self, Arms};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
-use painleve_system::terminal::warn;
+use painleve_system::terminal::{self, warn};
 
 use super::bridge::{ImageArguments, SensorLineArguments};
 use super::fail_on::{self, FailOn};
@@ -159,6 +159,9 @@ pub struct RunArguments {
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     #[arg(conflicts_with_all = ["bus", "port", "fail_on"])]
     live: Option<u16>,
+    /// Print errors and warnings only.
+    #[arg(short, long, conflicts_with = "json")]
+    quiet: bool,
     /// Print one JSON object on stdout instead of the table.
     #[arg(long)]
     json: bool,
@@ -265,7 +268,16 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     }
     let text = plant.stdout.text();
     let report: RunReport = serde_json::from_str(&text).map_err(ProcessError::NoReport)?;
-    print(&report, arguments.json)?;
+    if !arguments.quiet {
+        print(&report, arguments.json)?;
+    }
+    if let Some(missed) = report.missed_deadlines.filter(|missed| *missed > 0) {
+        warn(format_args!(
+            "real time was missed: {missed} of {} ticks came a whole tick or more late; end other programs or \
+             permit SCHED_FIFO",
+            report.ticks
+        ));
+    }
     if deadlines_missed {
         return Err(failure(status));
     }
@@ -493,7 +505,7 @@ pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
     let text = if json {
         serde_json::to_string(report).map_err(|error| CommandError::Output(error.to_string()))?
     } else {
-        report.table()
+        terminal::readable(report.table())
     };
     say(text)
 }

@@ -5,6 +5,8 @@ use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{ContentArrangement, Table};
 use painleve_plant::scenario::{Scenario, built_in, describe};
 
+use painleve_system::terminal;
+
 use super::{CommandError, say};
 
 /// Options of `painleve scenarios`.
@@ -37,5 +39,5 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     for name in built_in::names() {
         table.add_row([name, &Scenario::load(name, &[])?.description]);
     }
-    say(table)
+    say(terminal::readable(table))
 }

@@ -17,7 +17,7 @@ use painleve_shared::message::FrameSource;
 use painleve_system::atomic_file::{self, AtomicFile};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
-use painleve_system::terminal::warn;
+use painleve_system::terminal::{self, warn};
 
 use super::run::Host;
 use super::{CommandError, say};
@@ -63,7 +63,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         return if arguments.json {
             say(serde_json::to_string(&bound).map_err(|error| output(&error))?)
         } else {
-            say(bound.text())
+            say(terminal::readable(bound.text()))
         };
     }
     let names: Vec<&str> = match arguments.names.as_slice() {
@@ -94,7 +94,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         let text = serde_json::to_string(&reports).map_err(|error| output(&error))?;
         say(text)
     } else {
-        say(report::table(&reports))
+        say(terminal::readable(report::table(&reports)))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The report of a run: one JSON object for programs, one table for readers.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
@@ -89,6 +90,9 @@ pub struct RunReport {
     /// Time at which the torque stages removed the torque for lack of commands, s; null if never.
     #[serde(default)]
     pub drive_watchdog_s: Option<f64>,
+    /// Files that the run wrote.
+    #[serde(default)]
+    pub files: Vec<PathBuf>,
     /// Number of the fault latched at the end; null for none.
     pub fault: Option<u8>,
     /// Meaning of that fault.
@@ -137,6 +141,7 @@ impl RunReport {
             log_hash: result.log_hash.clone(),
             seed: scenario.run.seed,
             pacing: pacing.into(),
+            files: Vec::new(),
             drive_watchdog_s: result
                 .drive_watchdog_tick
                 .map(|tick| tick as f64 / f64::from(scenario.run.tick_hz)),
@@ -213,6 +218,10 @@ impl RunReport {
                 self.sim_s, self.wall_s, self.realtime_factor
             ),
         );
+        for (index, file) in self.files.iter().enumerate() {
+            let name = if index == 0 { "wrote" } else { "" };
+            row(name, file.display().to_string());
+        }
         if let Some(tripped_s) = self.drive_watchdog_s {
             row(
                 "drive watchdog",

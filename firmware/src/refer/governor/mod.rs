@@ -34,15 +34,6 @@ const CAUGHT_M: f32 = 2e-5;
 /// Rate at which the remaining distance to a target decays, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
 
-/// Least p/Q22 required in addition to the setting.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LeastPRatio {
-    /// Where a thrown tip may land. A change of it makes the edges unknown.
-    pub landing: f32,
-    /// What the contact's response asks for. The edges follow it.
-    pub contact: f32,
-}
-
 /// The governor's settings for one arm and rate.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeGovernor {
@@ -134,10 +125,10 @@ impl EdgeGovernor {
         posture: Posture,
         tip_t_m: f32,
         friction: &FrictionEstimate,
-        least: LeastPRatio,
+        minimum_p_ratio: f32,
     ) {
-        if least.landing != state.asked_p_ratio {
-            state.asked_p_ratio = least.landing;
+        if minimum_p_ratio != state.asked_p_ratio {
+            state.asked_p_ratio = minimum_p_ratio;
             state.search = None;
             state.is_fresh = false;
         }
@@ -147,10 +138,7 @@ impl EdgeGovernor {
             posture,
             friction: friction.coefficient + margin,
             slip: friction.slip_seen.then_some(friction.slip),
-            minimum_p_ratio: self
-                .least_p_ratio
-                .at_least(least.landing)
-                .at_least(least.contact),
+            minimum_p_ratio: self.least_p_ratio.at_least(minimum_p_ratio),
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
@@ -264,14 +252,7 @@ mod tests {
     fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> GovernorState {
         let mut state = GovernorState::new(arm().reach_on_belt_m());
         for _ in 0..300 {
-            governor().search(
-                &mut state,
-                &arm(),
-                posture,
-                tip_t_m,
-                friction,
-                LeastPRatio::default(),
-            );
+            governor().search(&mut state, &arm(), posture, tip_t_m, friction, 0.0);
         }
         state
     }

@@ -1,5 +1,6 @@
 //! Output files of a study, and the number of threads that compute it.
 
+use painleve_system::terminal;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -103,9 +104,9 @@ impl OutcomeOptions {
             table
                 .load_style(ASCII_MARKDOWN)
                 .set_content_arrangement(ContentArrangement::Disabled);
-            say(table)
+            say(terminal::readable(table))
         } else {
-            say(outcome.table())
+            say(terminal::readable(outcome.table()))
         }
     }
 }

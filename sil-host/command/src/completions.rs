@@ -1,0 +1,44 @@
+//! `painleve completions` and `painleve man`: what shells and `man` know about the command.
+
+use std::path::PathBuf;
+
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+use super::{Cli, CommandError};
+
+/// Options of `painleve completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArguments {
+    /// The shell.
+    shell: Shell,
+}
+
+/// Options of `painleve man`.
+#[derive(Debug, Args)]
+pub struct ManArguments {
+    /// Folder for the pages, as in ~/.local/share/man/man1.
+    folder: PathBuf,
+}
+
+/// Prints a completion script.
+pub fn print(arguments: &CompletionsArguments) -> Result<(), CommandError> {
+    let mut script = Vec::new();
+    clap_complete::generate(
+        arguments.shell,
+        &mut Cli::command(),
+        "painleve",
+        &mut script,
+    );
+    super::say(String::from_utf8_lossy(&script).trim_end())
+}
+
+/// Writes `painleve.1` and one page for each subcommand.
+pub fn write_manual(arguments: &ManArguments) -> Result<(), CommandError> {
+    let folder = &arguments.folder;
+    let refuse = |error: std::io::Error| {
+        CommandError::Output(format!("cannot write to {}: {error}", folder.display()))
+    };
+    std::fs::create_dir_all(folder).map_err(refuse)?;
+    clap_mangen::generate_to(Cli::command(), folder).map_err(refuse)
+}
