@@ -67,6 +67,11 @@ pub trait BoardDrive: Drive {
     /// Discards a frame offered before.
     fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource);
 
+    /// Returns to the control rate of a board without a configuration. The torque is off. Building the
+    /// next controller may take longer than a tick of the last one, and must not look like a program
+    /// that hangs.
+    fn idle(&mut self) {}
+
     /// Takes the newest frame from the link, for a plant that the host simulates.
     fn offer(&mut self, frame: SensorFrame);
 

@@ -221,7 +221,10 @@ pub fn link<D, L, P>(
                     configuration,
                     ..
                 }) => {
-                    control.lock(|control| control.task.stop());
+                    control.lock(|control| {
+                        control.task.stop();
+                        control.task.drive_mut().idle();
+                    });
                     decode(decoded, configuration);
                     decoded
                         .as_ref()

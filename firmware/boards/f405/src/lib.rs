@@ -365,6 +365,10 @@ impl BoardDrive for F405Drive {
         self.start_timer(configuration.tick_hz);
     }
 
+    fn idle(&mut self) {
+        self.start_timer(IDLE_HZ);
+    }
+
     fn offer(&mut self, frame: SensorFrame) {
         self.from_host = Some(frame);
     }
