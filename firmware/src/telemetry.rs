@@ -63,7 +63,7 @@ pub struct Telemetry {
 
 /// Results of the stages of one tick.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tick<'a> {
+pub(crate) struct TelemetryTick<'a> {
     pub(crate) model: &'a Model,
     pub(crate) contact: &'a ContactEstimate,
     pub(crate) target: &'a Target,
@@ -87,11 +87,11 @@ impl<'a> TelemetrySink<'a> {
 
     /// Writes the results of a tick.
     #[inline]
-    pub(crate) fn record(self, of: &Tick<'_>, tick: u32, supervision: &Supervision) {
+    pub(crate) fn record(self, of: &TelemetryTick<'_>, tick: u32, supervision: &Supervision) {
         let Some(telemetry) = self.0 else {
             return;
         };
-        let Tick {
+        let TelemetryTick {
             model,
             contact,
             target,

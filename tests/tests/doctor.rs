@@ -6,6 +6,7 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use nix::unistd::getuid;
@@ -92,8 +93,15 @@ fn end(mut child: Child) {
     child.wait().unwrap();
 }
 
+/// Shared memory is one for all tests: a repair of one test would remove what another left on purpose.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 #[test]
 fn what_is_dead_is_removed_and_what_is_alive_stays() {
+    let _alone = alone();
     let ward = Ward::new("doctor");
     let (dead, alive) = (ward.plant("dies"), ward.plant("lives"));
     end(dead);
@@ -116,6 +124,7 @@ fn what_is_dead_is_removed_and_what_is_alive_stays() {
 /// The bus of a run may be out of sight, in another runtime folder or another container.
 #[test]
 fn segments_are_judged_by_their_own_lock_when_their_bus_is_out_of_sight() {
+    let _alone = alone();
     let (ward, other) = (Ward::new("seen"), Ward::new("unseen"));
     let plant = other.plant("elsewhere");
     let run = run_of(&other.runtime.join("painleve/elsewhere")).unwrap();
@@ -131,6 +140,7 @@ fn segments_are_judged_by_their_own_lock_when_their_bus_is_out_of_sight() {
 /// From another PID namespace the doctor cannot see the processes that use the memory.
 #[test]
 fn processes_of_another_pid_namespace_are_alive() {
+    let _alone = alone();
     let ward = Ward::new("namespace");
     let plant = ward.plant("outside");
     let run = run_of(&ward.runtime.join("painleve/outside")).unwrap();
@@ -160,6 +170,7 @@ fn processes_of_another_pid_namespace_are_alive() {
 
 #[test]
 fn what_cannot_be_proved_dead_is_named_and_left() {
+    let _alone = alone();
     let ward = Ward::new("unknown");
     let run = "Zz0Zz0Zz0Zz0";
     let orphan = format!("/dev/shm/painleve_{}_{run}_x.data", getuid());
@@ -176,6 +187,7 @@ fn what_cannot_be_proved_dead_is_named_and_left() {
 
 #[test]
 fn a_folder_that_cannot_be_used_is_named_with_what_to_do() {
+    let _alone = alone();
     let bench = Bench::new("no-folder");
     let blocked = bench.path("blocked");
     private_folder(&blocked);

@@ -31,7 +31,7 @@ use crate::law::{Law, LawSettings};
 use crate::refer::{References, ReferencesState};
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::{Supervision, Supervisor};
-use crate::telemetry::{Telemetry, TelemetrySink, Tick};
+use crate::telemetry::{Telemetry, TelemetrySink, TelemetryTick};
 
 /// The controller of one arm, with the laws `L`.
 ///
@@ -296,7 +296,7 @@ impl<L: Law> Stages<L> {
         if !state.supervision.drives() {
             state.release();
         }
-        let tick = Tick {
+        let tick = TelemetryTick {
             model: &model,
             contact: &contact,
             target: &target,
@@ -327,8 +327,8 @@ fn report(answer: &mut ActuatorFrame, supervision: &Supervision) {
 }
 
 /// Returns the answer's flags for one tick.
-fn flags(tick: &Tick<'_>, reference_done: bool) -> StatusFlags {
-    let Tick {
+fn flags(tick: &TelemetryTick<'_>, reference_done: bool) -> StatusFlags {
+    let TelemetryTick {
         contact,
         target,
         command,

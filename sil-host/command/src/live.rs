@@ -11,14 +11,14 @@ use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Controller, Event};
-use painleve_record::Tick;
+use painleve_record::RecordedTick;
 use painleve_record::events::{ControllerEvents, RunEvent};
 use painleve_shared::frame::SensorFrame;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 use painleve_view::page::{BeltTravel, description, event_entry, html};
 use painleve_view::row::Row;
-use painleve_view::server::{Hub, Order, Server};
+use painleve_view::server::{Hub, Server, ViewerRequest};
 use serde_json::{Value, json};
 
 use super::CommandError;
@@ -133,7 +133,7 @@ impl Monitor for Viewers {
 
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
         let telemetry = self.telemetry.get();
-        let tick = Tick {
+        let tick = RecordedTick {
             sample,
             estimates: Some(&telemetry),
         };
@@ -230,25 +230,25 @@ impl Live {
     }
 
     /// Obeys an order; what cannot be done is said to the viewers.
-    fn obey(&mut self, order: Order) -> Result<(), CommandError> {
+    fn obey(&mut self, order: ViewerRequest) -> Result<(), CommandError> {
         match order {
-            Order::Pause => self.paused = true,
-            Order::Resume => {
+            ViewerRequest::Pause => self.paused = true,
+            ViewerRequest::Resume => {
                 self.paused = false;
                 self.restart_clock();
             }
-            Order::Step { ticks } => {
+            ViewerRequest::Step { ticks } => {
                 self.paused = true;
                 self.steps = ticks.min(100_000);
             }
-            Order::Speed { factor } if (0.0..=1000.0).contains(&factor) => {
+            ViewerRequest::Speed { factor } if (0.0..=1000.0).contains(&factor) => {
                 self.factor = factor;
                 self.restart_clock();
             }
-            Order::Speed { .. } => self.say("the speed is 0 to 1000"),
-            Order::Reset => self.reset()?,
-            Order::Set { key, value } => self.set(&key, &value)?,
-            Order::Push {
+            ViewerRequest::Speed { .. } => self.say("the speed is 0 to 1000"),
+            ViewerRequest::Reset => self.reset()?,
+            ViewerRequest::Set { key, value } => self.set(&key, &value)?,
+            ViewerRequest::Push {
                 force_n,
                 duration_s,
             } => {

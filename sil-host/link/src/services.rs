@@ -30,8 +30,8 @@ pub(super) type Sender<T> = Publisher<ipc::Service, T, ()>;
 pub(super) type Receiver<T> = Subscriber<ipc::Service, T, ()>;
 
 /// Data that may cross the link.
-pub(super) trait Payload: ZeroCopySend + std::fmt::Debug + Copy + 'static {}
-impl<T: ZeroCopySend + std::fmt::Debug + Copy + 'static> Payload for T {}
+pub(super) trait BusPayload: ZeroCopySend + std::fmt::Debug + Copy + 'static {}
+impl<T: ZeroCopySend + std::fmt::Debug + Copy + 'static> BusPayload for T {}
 
 /// Why services are not available now.
 pub(super) enum Unavailable {
@@ -71,7 +71,10 @@ impl Presence {
         transport(&self.bus, action, cause)
     }
 
-    fn builder<T: Payload>(&self, kind: &str) -> Result<Builder<T, (), ipc::Service>, LinkError> {
+    fn builder<T: BusPayload>(
+        &self,
+        kind: &str,
+    ) -> Result<Builder<T, (), ipc::Service>, LinkError> {
         let name = ServiceName::new(&format!("painleve/{}/{kind}", self.bus))
             .map_err(|cause| self.transport("name its services", cause))?;
         Ok(self
@@ -140,7 +143,7 @@ impl Services {
 }
 
 /// Creates the publishing port of a service.
-pub(super) fn sender<T: Payload>(
+pub(super) fn sender<T: BusPayload>(
     presence: &Presence,
     service: &Service<T>,
 ) -> Result<Sender<T>, LinkError> {
@@ -151,7 +154,7 @@ pub(super) fn sender<T: Payload>(
 }
 
 /// Creates the receiving port of a service.
-pub(super) fn receiver<T: Payload>(
+pub(super) fn receiver<T: BusPayload>(
     presence: &Presence,
     service: &Service<T>,
 ) -> Result<Receiver<T>, LinkError> {
@@ -161,7 +164,7 @@ pub(super) fn receiver<T: Payload>(
         .map_err(|cause| presence.transport("create a subscriber", cause))
 }
 
-fn create<T: Payload>(
+fn create<T: BusPayload>(
     presence: &Presence,
     kind: &str,
     buffer: usize,
@@ -175,7 +178,7 @@ fn create<T: Payload>(
         .map_err(|cause| presence.transport("create its services", cause))
 }
 
-fn open<T: Payload>(presence: &Presence, kind: &str) -> Result<Service<T>, Unavailable> {
+fn open<T: BusPayload>(presence: &Presence, kind: &str) -> Result<Service<T>, Unavailable> {
     presence
         .builder::<T>(kind)
         .map_err(Unavailable::Never)?

@@ -8,12 +8,12 @@ use std::path::PathBuf;
 use painleve_system::atomic_file::AtomicFile;
 
 use crate::fields::{Read, TOPICS};
-use crate::recorder::{RecordError, Sink, Tick};
+use crate::recorder::{RecordError, RecordedTick, Sink};
 
 /// Returns the header of the table.
 pub fn header() -> Vec<String> {
     let columns = TOPICS.iter().flat_map(|topic| {
-        let name = |field: &crate::fields::Field| format!("{}.{}", topic.name, field.name);
+        let name = |field: &crate::fields::RecordField| format!("{}.{}", topic.name, field.name);
         topic.fields.iter().map(name)
     });
     std::iter::once("time_s".to_owned())
@@ -22,7 +22,7 @@ pub fn header() -> Vec<String> {
 }
 
 /// Returns the row of a tick.
-pub fn row(tick: &Tick<'_>) -> Vec<String> {
+pub fn row(tick: &RecordedTick<'_>) -> Vec<String> {
     let mut row = vec![decimal(tick.sample.plant.time_s)];
     for topic in TOPICS {
         let known = tick.estimates.is_some() || !topic.needs_estimates;
@@ -80,7 +80,7 @@ impl CsvTable {
 }
 
 impl Sink for CsvTable {
-    fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError> {
+    fn tick(&mut self, tick: &RecordedTick<'_>) -> Result<(), RecordError> {
         self.write(row(tick))
     }
 

@@ -6,7 +6,7 @@ use painleve_plant::sample::Sample;
 use painleve_shared::Slip;
 use serde_json::{Value, json};
 
-use crate::recorder::Tick;
+use crate::recorder::RecordedTick;
 
 /// A group of quantities: one topic of the MCAP file.
 #[derive(Debug)]
@@ -18,14 +18,14 @@ pub struct Topic {
     /// Description of the topic.
     pub description: &'static str,
     /// Its quantities.
-    pub fields: &'static [Field],
-    /// Whether the topic needs [`Tick::estimates`].
+    pub fields: &'static [RecordField],
+    /// Whether the topic needs [`RecordedTick::estimates`].
     pub needs_estimates: bool,
 }
 
 /// One quantity.
 #[derive(Debug)]
-pub struct Field {
+pub struct RecordField {
     /// The name, with its unit.
     pub name: &'static str,
     /// Description, with the unit.
@@ -38,33 +38,37 @@ pub struct Field {
 #[derive(Clone, Copy, Debug)]
 pub enum Read {
     /// A number; left out where it is not finite.
-    Number(fn(&Tick<'_>) -> f64),
+    Number(fn(&RecordedTick<'_>) -> f64),
     /// A number of the controller; left out where it is not finite.
-    Single(fn(&Tick<'_>) -> f32),
+    Single(fn(&RecordedTick<'_>) -> f32),
     /// A whole number.
-    Whole(fn(&Tick<'_>) -> i64),
+    Whole(fn(&RecordedTick<'_>) -> i64),
     /// A name.
-    Text(fn(&Tick<'_>) -> &'static str),
+    Text(fn(&RecordedTick<'_>) -> &'static str),
     /// True or false.
-    Truth(fn(&Tick<'_>) -> bool),
+    Truth(fn(&RecordedTick<'_>) -> bool),
 }
 
 const fn number(
     name: &'static str,
     description: &'static str,
-    read: fn(&Tick<'_>) -> f64,
-) -> Field {
+    read: fn(&RecordedTick<'_>) -> f64,
+) -> RecordField {
     let read = Read::Number(read);
-    Field {
+    RecordField {
         name,
         description,
         read,
     }
 }
 
-const fn whole(name: &'static str, description: &'static str, read: fn(&Tick<'_>) -> i64) -> Field {
+const fn whole(
+    name: &'static str,
+    description: &'static str,
+    read: fn(&RecordedTick<'_>) -> i64,
+) -> RecordField {
     let read = Read::Whole(read);
-    Field {
+    RecordField {
         name,
         description,
         read,
@@ -74,10 +78,10 @@ const fn whole(name: &'static str, description: &'static str, read: fn(&Tick<'_>
 const fn text(
     name: &'static str,
     description: &'static str,
-    read: fn(&Tick<'_>) -> &'static str,
-) -> Field {
+    read: fn(&RecordedTick<'_>) -> &'static str,
+) -> RecordField {
     let read = Read::Text(read);
-    Field {
+    RecordField {
         name,
         description,
         read,
@@ -87,14 +91,14 @@ const fn text(
 /// A field of the controller's telemetry; not finite without telemetry.
 macro_rules! estimate {
     ($name:literal, $description:literal, Single, $read:expr) => {
-        Field {
+        RecordField {
             name: $name,
             description: $description,
             read: Read::Single(|tick| tick.estimates.map_or(f32::NAN, $read)),
         }
     };
     ($name:literal, $description:literal, $kind:ident, $read:expr) => {
-        Field {
+        RecordField {
             name: $name,
             description: $description,
             read: Read::$kind(|tick| tick.estimates.map_or_else(Default::default, $read)),
@@ -222,7 +226,7 @@ pub const SENSOR: Topic = Topic {
             "Digital inputs, one bit each: 1 enable, 2 reset.",
             |tick| tick.sample.sensor.inputs.0.into(),
         ),
-        Field {
+        RecordField {
             name: "delivered",
             description: "Whether the controller received the frame.",
             read: Read::Truth(|tick| tick.sample.delivered),
@@ -283,7 +287,7 @@ pub const ACTUATOR: Topic = Topic {
              16 at edge, 32 recovering, 64 slip negative, 128 sticks.",
             |tick| tick.sample.actuator.flags.0.into(),
         ),
-        Field {
+        RecordField {
             name: "answered",
             description: "Whether this frame answers this tick; otherwise it is the last answer.",
             read: Read::Truth(|tick| tick.sample.answered),

@@ -20,4 +20,4 @@ pub mod scene;
 
 pub use mcap_log::McapLog;
 pub use plot::RunPlot;
-pub use recorder::{RecordError, Recorder, Sink, Tick};
+pub use recorder::{RecordError, RecordedTick, Recorder, Sink};

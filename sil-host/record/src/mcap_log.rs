@@ -22,7 +22,7 @@ use serde_json::{Value, json};
 
 use crate::events::RunEvent;
 use crate::fields::{Read, TOPICS, Topic};
-use crate::recorder::{RecordError, Sink, Tick};
+use crate::recorder::{RecordError, RecordedTick, Sink};
 use crate::scene::Scene;
 
 /// Foxglove's published schemas; see `foxglove/README.md`.
@@ -134,7 +134,7 @@ impl McapLog {
         })
     }
 
-    fn write_tick(&mut self, tick: &Tick<'_>) -> Result<(), McapError> {
+    fn write_tick(&mut self, tick: &RecordedTick<'_>) -> Result<(), McapError> {
         let time_ns = nanoseconds(tick.sample.plant.time_s);
         let sequence = self.sequence;
         for (channel, topic) in self.topics.into_iter().zip(TOPICS) {
@@ -178,7 +178,7 @@ impl McapLog {
 }
 
 impl Sink for McapLog {
-    fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError> {
+    fn tick(&mut self, tick: &RecordedTick<'_>) -> Result<(), RecordError> {
         self.write_tick(tick)
             .map_err(|error| RecordError::write(&self.path, reason(error)))
     }
@@ -236,7 +236,7 @@ fn add_channel(
 /// The quantities of one topic at one tick.
 struct Message<'a> {
     topic: &'a Topic,
-    tick: &'a Tick<'a>,
+    tick: &'a RecordedTick<'a>,
 }
 
 impl Serialize for Message<'_> {

@@ -22,7 +22,7 @@ use painleve_system::atomic_file::{self, AtomicFile};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use crate::recorder::{RecordError, Sink, Tick};
+use crate::recorder::{RecordError, RecordedTick, Sink};
 
 use self::panels::{
     B_PANEL, Curve, FORCE_PANEL, P_PANEL, SignalPanel, TIP_PANEL, TORQUE_PANEL, signal,
@@ -137,7 +137,7 @@ pub struct PlotFile {
 }
 
 impl Sink for PlotFile {
-    fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError> {
+    fn tick(&mut self, tick: &RecordedTick<'_>) -> Result<(), RecordError> {
         self.plot.push(tick.sample);
         Ok(())
     }

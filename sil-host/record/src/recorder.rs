@@ -63,7 +63,7 @@ impl RecordError {
 
 /// Everything about one control tick.
 #[derive(Clone, Copy, Debug)]
-pub struct Tick<'a> {
+pub struct RecordedTick<'a> {
     /// Both frames and the plant's state.
     pub sample: &'a Sample,
     /// The controller's internal state after the tick; `None` if it is not known.
@@ -76,7 +76,7 @@ pub trait Sink: Send {
     ///
     /// # Errors
     /// [`RecordError`] ends the recording.
-    fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError>;
+    fn tick(&mut self, tick: &RecordedTick<'_>) -> Result<(), RecordError>;
 
     /// Receives an event; events and ticks arrive in order of time.
     ///
@@ -284,7 +284,7 @@ impl Recording {
                 kind,
             })?;
         }
-        let tick = Tick {
+        let tick = RecordedTick {
             sample,
             estimates: self.replica.as_ref().map(Replica::telemetry),
         };

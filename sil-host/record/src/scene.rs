@@ -9,7 +9,7 @@ use painleve_plant::scenario::Scenario;
 use painleve_shared::ArmParameters;
 use serde_json::{Value, json};
 
-use crate::recorder::Tick;
+use crate::recorder::RecordedTick;
 
 /// Rate of the scene, Hz.
 const RATE_HZ: u32 = 60;
@@ -54,7 +54,7 @@ impl Scene {
     }
 
     /// Receives a tick; returns a picture 60 times a second.
-    pub fn tick(&mut self, tick: &Tick<'_>) -> Option<Picture> {
+    pub fn tick(&mut self, tick: &RecordedTick<'_>) -> Option<Picture> {
         let plant = &tick.sample.plant;
         let elapsed_s = plant.time_s - self.last_s.unwrap_or(plant.time_s);
         // Unknown on a real arm.
@@ -67,7 +67,7 @@ impl Scene {
         is_due.then(|| self.picture(tick))
     }
 
-    fn picture(&self, tick: &Tick<'_>) -> Picture {
+    fn picture(&self, tick: &RecordedTick<'_>) -> Picture {
         let plant = &tick.sample.plant;
         let time = timestamp(plant.time_s);
         let [length_1, length_2] = self.arm.link_length_m;
@@ -175,7 +175,7 @@ fn force(plant: &painleve_plant::Snapshot) -> Primitives {
 }
 
 /// Lines across the belt: the edges of the admissible stretch, and the reference.
-fn edges(tick: &Tick<'_>) -> Primitives {
+fn edges(tick: &RecordedTick<'_>) -> Primitives {
     let edges_m = tick.estimates.map_or([f32::NAN; 2], |now| now.edges_m);
     let red = colour([0.80, 0.10, 0.10], 1.0);
     let orange = colour([0.90, 0.62, 0.0], 1.0);

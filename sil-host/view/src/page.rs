@@ -6,7 +6,7 @@ use std::io::Write;
 use data_encoding::BASE64;
 use painleve_plant::scenario::Scenario;
 use painleve_record::events::RunEvent;
-use painleve_record::{RecordError, Sink, Tick};
+use painleve_record::{RecordError, RecordedTick, Sink};
 use painleve_system::atomic_file::AtomicFile;
 use serde_json::{Value, json};
 
@@ -71,7 +71,7 @@ pub struct BeltTravel {
 
 impl BeltTravel {
     /// Advances to a tick and returns the distance since the first one, m.
-    pub fn advance(&mut self, tick: &Tick<'_>) -> f64 {
+    pub fn advance(&mut self, tick: &RecordedTick<'_>) -> f64 {
         let plant = &tick.sample.plant;
         let elapsed_s = plant.time_s - self.last_s.unwrap_or(plant.time_s);
         // Unknown on a real arm.
@@ -109,7 +109,7 @@ impl PageFile {
 }
 
 impl Sink for PageFile {
-    fn tick(&mut self, tick: &Tick<'_>) -> Result<(), RecordError> {
+    fn tick(&mut self, tick: &RecordedTick<'_>) -> Result<(), RecordError> {
         let travel_m = self.travel.advance(tick);
         self.rows.push(&Row::new(tick, travel_m));
         Ok(())

@@ -1,6 +1,6 @@
 //! One tick for the page: a time, numbers and single bytes, little-endian.
 
-use painleve_record::Tick;
+use painleve_record::RecordedTick;
 
 /// Names of the numbers, in order; 4 bytes each. Unknown numbers are NaN.
 pub const COLUMNS: [&str; 18] = [
@@ -46,7 +46,7 @@ impl Row {
     pub(crate) const NORMAL_FORCE: usize = 7;
 
     /// Creates the row of a tick; the belt has moved by `travel_m` since the start.
-    pub fn new(tick: &Tick<'_>, travel_m: f64) -> Self {
+    pub fn new(tick: &RecordedTick<'_>, travel_m: f64) -> Self {
         let (plant, answer) = (&tick.sample.plant, &tick.sample.actuator);
         let estimates = |read: fn(&painleve_firmware::telemetry::Telemetry) -> f32| {
             tick.estimates.map_or(f32::NAN, read)

@@ -33,7 +33,7 @@ const MOST_WAITING: usize = 4 << 20;
 /// What a viewer orders.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "order", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Order {
+pub enum ViewerRequest {
     /// Stops simulated time.
     Pause,
     /// Lets simulated time go on.
@@ -129,7 +129,7 @@ pub struct Server {
     /// The viewers.
     pub hub: Arc<Hub>,
     /// What they order.
-    pub orders: Receiver<Order>,
+    pub orders: Receiver<ViewerRequest>,
     /// Where the page is.
     pub address: SocketAddr,
 }
@@ -176,7 +176,7 @@ struct Service {
     page: Arc<str>,
     port: u16,
     hub: Arc<Hub>,
-    orders: Sender<Order>,
+    orders: Sender<ViewerRequest>,
 }
 
 impl Service {
@@ -379,7 +379,7 @@ mod tests {
             .send(Message::text("{\"order\":\"step\",\"ticks\":3}"))
             .unwrap();
         let order = server.orders.recv_timeout(PATIENCE).unwrap();
-        assert_eq!(order, Order::Step { ticks: 3 });
+        assert_eq!(order, ViewerRequest::Step { ticks: 3 });
         socket
             .send(Message::text("{\"order\":\"explode\"}"))
             .unwrap();

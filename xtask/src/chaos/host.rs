@@ -28,14 +28,14 @@ pub enum ChaosHost {
 }
 
 /// A running host with its command-line arguments.
-pub struct ControllerHost {
+pub struct ChaosController {
     kind: ChaosHost,
     /// Path of the image, or of the port.
     path: String,
     _board: Option<SerialBoard>,
 }
 
-impl ControllerHost {
+impl ChaosController {
     /// Starts the processes of the host.
     ///
     /// # Errors

@@ -24,7 +24,7 @@ use nix::sys::prctl::set_child_subreaper;
 use crate::build_fw;
 use crate::command::{ChoreError, run_cargo, workspace};
 use fault::{FAULTS, InjectedFault};
-use host::{ChaosHost, ControllerHost};
+use host::{ChaosController, ChaosHost};
 use place::{ChaosFolder, unused_segments};
 use table::TrialTable;
 use trial::{ChaosRole, Disturbance, Expected, Plan, TrialProcess};
@@ -147,7 +147,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                         program,
                         mark,
                         runtime,
-                        ControllerHost::start(host)?,
+                        ChaosController::start(host)?,
                         patience_s.clone(),
                     )?;
                     let expected = Expected {

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::host::ControllerHost;
+use super::host::ChaosController;
 use crate::command::ChoreError;
 
 /// Environment variable that marks every process of a chaos run with the name of its place.
@@ -19,7 +19,7 @@ pub struct ChaosFolder {
     work: tempfile::TempDir,
     runtime: PathBuf,
     /// What runs the controller.
-    pub host: ControllerHost,
+    pub host: ChaosController,
     /// Longest silence of a peer, and longest wait for one, s.
     pub patience_s: [String; 2],
 }
@@ -30,7 +30,7 @@ impl ChaosFolder {
         program: &Path,
         mark: String,
         runtime: &Path,
-        host: ControllerHost,
+        host: ChaosController,
         patience_s: [String; 2],
     ) -> std::io::Result<Self> {
         Ok(Self {

@@ -80,7 +80,7 @@ pub struct Plan {
 
 /// Expected consequences.
 pub struct Expected {
-    /// [Course](super::host::ControllerHost::course) of an undisturbed run.
+    /// [Course](super::host::ChaosController::course) of an undisturbed run.
     pub course: String,
     /// Time within which everything must have ended after a disturbance.
     pub end: Duration,

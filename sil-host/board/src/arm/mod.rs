@@ -41,7 +41,7 @@ pub enum ArmEvent {
 }
 
 /// A board with an arm. Dropping it stops the drive, if the line still carries the request.
-pub struct Arm {
+pub struct ConnectedArm {
     serial: Serial,
     /// The board's record of its last reset, crash and fault, as read at the start.
     pub black_box: BlackBox,
@@ -51,7 +51,7 @@ pub struct Arm {
     heard: Instant,
 }
 
-impl Arm {
+impl ConnectedArm {
     /// Connects, compares protocol and build, and configures the board. With `dry_run` the torque stages
     /// stay off.
     ///

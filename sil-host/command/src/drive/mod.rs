@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use painleve_board::BoardError;
-use painleve_board::arm::{Arm, ArmEvent, Measured};
+use painleve_board::arm::{ArmEvent, ConnectedArm, Measured};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_record::mcap_log::Source;
 use painleve_record::{McapLog, Recorder};
@@ -18,7 +18,7 @@ use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 use serde::Serialize;
 
-use self::operator::{Operator, Order};
+use self::operator::{Operator, OperatorCommand};
 use self::view::View;
 use super::process_error::ProcessError;
 use super::{CommandError, say};
@@ -141,7 +141,7 @@ fn keep_partial(recorder: Option<Recorder>, reason: &str) {
 
 /// A running board and its record.
 struct Drive {
-    arm: Arm,
+    arm: ConnectedArm,
     measured: Measured,
     view: View,
     report: DriveReport,
@@ -156,7 +156,7 @@ impl Drive {
             origin: scenario.name.clone(),
             source,
         })?;
-        let arm = Arm::open(&arguments.port, &configuration, arguments.dry_run)?;
+        let arm = ConnectedArm::open(&arguments.port, &configuration, arguments.dry_run)?;
         for line in history::lines(&arm.black_box) {
             warn(line);
         }
@@ -198,10 +198,10 @@ impl Drive {
         while !interrupt.is_requested() {
             match operator.order() {
                 None => {}
-                Some(Order::Arm) => self.arm.permit_arming(true)?,
-                Some(Order::Disarm) => self.arm.permit_arming(false)?,
-                Some(Order::Stop) => return Ok(()),
-                Some(Order::Unknown(text)) => {
+                Some(OperatorCommand::Arm) => self.arm.permit_arming(true)?,
+                Some(OperatorCommand::Disarm) => self.arm.permit_arming(false)?,
+                Some(OperatorCommand::Stop) => return Ok(()),
+                Some(OperatorCommand::Unknown(text)) => {
                     warn(format_args!("unknown order {text:?}: arm, disarm or stop"));
                 }
             }

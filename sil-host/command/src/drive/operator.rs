@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, channel};
 
 /// An order to the drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Order {
+pub enum OperatorCommand {
     /// Permit the drive to arm.
     Arm,
     /// Withdraw the permission; the torque goes off.
@@ -16,7 +16,7 @@ pub enum Order {
     Unknown(String),
 }
 
-impl Order {
+impl OperatorCommand {
     fn of(line: &str) -> Option<Self> {
         match line.trim() {
             "" => None,
@@ -29,7 +29,7 @@ impl Order {
 }
 
 /// Reads orders without holding up the drive.
-pub struct Operator(Receiver<Order>);
+pub struct Operator(Receiver<OperatorCommand>);
 
 impl Operator {
     /// Starts reading standard input. Its end is not a command: the drive continues.
@@ -41,7 +41,7 @@ impl Operator {
         std::thread::Builder::new().spawn(move || {
             for line in io::stdin().lock().lines() {
                 let Ok(line) = line else { return };
-                if let Some(order) = Order::of(&line)
+                if let Some(order) = OperatorCommand::of(&line)
                     && sender.send(order).is_err()
                 {
                     return;
@@ -52,7 +52,7 @@ impl Operator {
     }
 
     /// Returns the next order, if one has been given.
-    pub fn order(&self) -> Option<Order> {
+    pub fn order(&self) -> Option<OperatorCommand> {
         self.0.try_recv().ok()
     }
 }
@@ -63,10 +63,16 @@ mod tests {
 
     #[test]
     fn only_the_whole_word_is_an_order() {
-        assert_eq!(Order::of("arm\n"), Some(Order::Arm));
-        assert_eq!(Order::of(" stop "), Some(Order::Stop));
-        assert_eq!(Order::of("\n"), None);
-        assert_eq!(Order::of("armed"), Some(Order::Unknown("armed".into())));
-        assert_eq!(Order::of("ARM"), Some(Order::Unknown("ARM".into())));
+        assert_eq!(OperatorCommand::of("arm\n"), Some(OperatorCommand::Arm));
+        assert_eq!(OperatorCommand::of(" stop "), Some(OperatorCommand::Stop));
+        assert_eq!(OperatorCommand::of("\n"), None);
+        assert_eq!(
+            OperatorCommand::of("armed"),
+            Some(OperatorCommand::Unknown("armed".into()))
+        );
+        assert_eq!(
+            OperatorCommand::of("ARM"),
+            Some(OperatorCommand::Unknown("ARM".into()))
+        );
     }
 }
