@@ -65,9 +65,18 @@ use crate::telemetry::{Telemetry, TelemetrySink, TelemetryTick};
 ///     }
 /// }
 ///
-/// // A reading that no encoder can give takes the torque off.
-/// let impossible = SensorFrame { joints: [EncoderCounts(u32::MAX); 2], ..SensorFrame::default() };
-/// assert_eq!(controller.tick(&impossible).torques.map(|torque| torque.0), [0, 0]);
+/// // Readings that no encoder can give latch a fault, which takes the torque off.
+/// for tick in 100..200 {
+///     controller.tick(&SensorFrame {
+///         tick,
+///         sequence: tick,
+///         joints: [EncoderCounts(u32::MAX); 2],
+///         ..SensorFrame::default()
+///     });
+/// }
+/// let answer = controller.tick(&SensorFrame::default());
+/// assert!(answer.latched_fault().is_some());
+/// assert_eq!(answer.torques.map(|torque| torque.0), [0, 0]);
 /// # Ok::<(), painleve_shared::range::OutOfRange>(())
 /// ```
 #[derive(Clone, Debug)]
