@@ -8,8 +8,8 @@ use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Plant, Snapshot};
-use painleve_record::Tick;
-use painleve_record::fields::{ESTIMATES, Field, PLANT, Read, TOPICS};
+use painleve_record::RecordedTick;
+use painleve_record::fields::{ESTIMATES, PLANT, Read, RecordField, TOPICS};
 use painleve_record::replica::Replica;
 use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
@@ -72,7 +72,7 @@ impl Column {
         }
     }
 
-    fn push(&mut self, read: Read, tick: &Tick<'_>) {
+    fn push(&mut self, read: Read, tick: &RecordedTick<'_>) {
         match (self, read) {
             (Self::Numbers(values), Read::Number(read)) => values.push(read(tick)),
             (Self::Numbers(values), Read::Single(read)) => values.push(read(tick).into()),
@@ -105,7 +105,7 @@ impl Monitor for Columns {
         if let Some(replica) = &mut self.replica {
             replica.follow(sample);
         }
-        let tick = Tick {
+        let tick = RecordedTick {
             sample,
             estimates: self.replica.as_ref().map(Replica::telemetry),
         };
@@ -140,7 +140,7 @@ fn collect(scenario: &Scenario) -> PyResult<Columns> {
     let configuration = scenario.controller_configuration();
     let simulation = Simulation::new(scenario).map_err(failed)?;
     let host = InProcess::new(&configuration).map_err(failed)?;
-    let column = |topic: &str, field: &Field| {
+    let column = |topic: &str, field: &RecordField| {
         let name = format!("{topic}.{}", field.name);
         (name, field.read, Column::new(field.read))
     };
@@ -169,11 +169,11 @@ fn put_finite(values: &Bound<'_, PyDict>, name: &str, value: f64) -> PyResult<()
 /// Returns quantities at one tick; a number that is not finite is left out.
 fn quantities<'py>(
     py: Python<'py>,
-    fields: &[Field],
-    tick: &Tick<'_>,
+    fields: &[RecordField],
+    tick: &RecordedTick<'_>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let values = PyDict::new(py);
-    for Field { name, read, .. } in fields {
+    for RecordField { name, read, .. } in fields {
         match read {
             Read::Number(read) => put_finite(&values, name, read(tick))?,
             Read::Single(read) => put_finite(&values, name, read(tick).into())?,
@@ -192,7 +192,7 @@ fn state<'py>(py: Python<'py>, plant: Snapshot) -> PyResult<Bound<'py, PyDict>> 
         reference_tip_t_m: f64::NAN,
         ..Sample::default()
     };
-    let tick = Tick {
+    let tick = RecordedTick {
         sample: &sample,
         estimates: None,
     };
@@ -355,7 +355,7 @@ impl PyController {
 
     /// The controller's estimates: the fields of the topic `estimates`.
     fn telemetry<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let tick = Tick {
+        let tick = RecordedTick {
             sample: &Sample::default(),
             estimates: Some(&self.telemetry),
         };

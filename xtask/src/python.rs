@@ -1,7 +1,8 @@
 //! `cargo xtask python`: builds the Python package, installs its wheel in a virtual environment, and tests it.
 
-use crate::command::{ChoreError, run};
+use crate::command::{ChoreError, run, run_cargo};
 
+const MANIFEST: &str = "python/Cargo.toml";
 const FOLDER: &str = "target/python/package";
 const WHEELS: &str = "target/python/wheels";
 /// The test's own requirements.
@@ -21,7 +22,7 @@ pub fn run_chore() -> Result<(), ChoreError> {
         &[
             "build",
             "--manifest-path",
-            "python/Cargo.toml",
+            MANIFEST,
             "--target-dir",
             "target",
             "--out",
@@ -37,4 +38,19 @@ pub fn run_chore() -> Result<(), ChoreError> {
     ];
     run(&python, &[&pip[..], &install].concat())?;
     run(&python, &["-m", "pytest", "-q", "python/tests"])
+}
+
+/// Compiles the package, which is a workspace of its own, against the present crates; needs no
+/// Python.
+///
+/// # Errors
+/// If it does not compile.
+pub fn check() -> Result<(), ChoreError> {
+    run_cargo(&[
+        "check",
+        "--manifest-path",
+        MANIFEST,
+        "--target-dir",
+        "target",
+    ])
 }
