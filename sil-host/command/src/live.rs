@@ -12,7 +12,7 @@ use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Controller, Event};
 use painleve_record::RecordedTick;
-use painleve_record::events::{ControllerEvents, RunEvent};
+use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
 use painleve_shared::frame::SensorFrame;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
@@ -147,7 +147,8 @@ impl Monitor for Viewers {
     }
 
     fn event(&mut self, time_s: f64, event: Event) {
-        self.tell(&RunEvent::of_plant(time_s, event));
+        let kind = EventKind::Plant(event);
+        self.tell(&RunEvent { time_s, kind });
     }
 }
 

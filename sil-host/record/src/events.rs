@@ -17,30 +17,8 @@ pub struct RunEvent {
 /// Kind of event, with its details.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
-    /// The tip hit the belt.
-    Impact {
-        /// Normal velocity before, m/s, negative.
-        approach_m_s: f64,
-        /// Impulse of the belt on the tip, (P_t, P_n), N·s.
-        impulse_ns: [f64; 2],
-    },
-    /// The tip was thrown off the belt without a collision.
-    ImpactWithoutCollision {
-        /// Impulse of the belt on the tip, (P_t, P_n), N·s.
-        impulse_ns: [f64; 2],
-    },
-    /// Contact ended in flight.
-    LiftOff {
-        /// The contact mode before.
-        from: ContactMode,
-    },
-    /// The contact mode changed to a mode of contact.
-    Mode {
-        /// The mode before.
-        from: ContactMode,
-        /// The mode after.
-        to: ContactMode,
-    },
+    /// A discontinuity of the plant's motion.
+    Plant(Event),
     /// The controller's supervisor changed its state.
     State {
         /// The state before.
@@ -65,38 +43,17 @@ pub enum EventKind {
     EstimatesEnd,
 }
 
-impl RunEvent {
-    /// Returns a discontinuity of the plant's motion as an event of the run.
-    pub fn of_plant(time_s: f64, event: Event) -> Self {
-        let kind = match event {
-            Event::Impact {
-                approach_m_s,
-                impulse_ns,
-            } => EventKind::Impact {
-                approach_m_s,
-                impulse_ns,
-            },
-            Event::ImpactWithoutCollision { impulse_ns } => {
-                EventKind::ImpactWithoutCollision { impulse_ns }
-            }
-            Event::ModeChange {
-                from,
-                to: ContactMode::Flight,
-            } => EventKind::LiftOff { from },
-            Event::ModeChange { from, to } => EventKind::Mode { from, to },
-        };
-        Self { time_s, kind }
-    }
-}
-
 impl EventKind {
     /// Returns the kind's name, as in files.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Impact { .. } => "impact",
-            Self::ImpactWithoutCollision { .. } => "impact-without-collision",
-            Self::LiftOff { .. } => "lift-off",
-            Self::Mode { .. } => "mode",
+            Self::Plant(Event::Impact { .. }) => "impact",
+            Self::Plant(Event::ImpactWithoutCollision { .. }) => "impact-without-collision",
+            Self::Plant(Event::ModeChange {
+                to: ContactMode::Flight,
+                ..
+            }) => "lift-off",
+            Self::Plant(Event::ModeChange { .. }) => "mode",
             Self::State { .. } => "state",
             Self::Fault(_) => "fault",
             Self::Edge { .. } => "edge",
@@ -108,15 +65,20 @@ impl EventKind {
     /// Returns the event in words.
     pub fn describe(&self) -> String {
         match self {
-            Self::Impact {
+            Self::Plant(Event::Impact {
                 approach_m_s,
                 impulse_ns: [_, normal],
-            } => format!("impact at {approach_m_s:.4} m/s, normal impulse {normal:.4} N·s"),
-            Self::ImpactWithoutCollision {
+            }) => format!("impact at {approach_m_s:.4} m/s, normal impulse {normal:.4} N·s"),
+            Self::Plant(Event::ImpactWithoutCollision {
                 impulse_ns: [_, normal],
-            } => format!("impact without collision, normal impulse {normal:.4} N·s"),
-            Self::LiftOff { from } => format!("lift-off from {}", from.name()),
-            Self::Mode { from, to } => format!("{} to {}", from.name(), to.name()),
+            }) => format!("impact without collision, normal impulse {normal:.4} N·s"),
+            Self::Plant(Event::ModeChange {
+                from,
+                to: ContactMode::Flight,
+            }) => format!("lift-off from {}", from.name()),
+            Self::Plant(Event::ModeChange { from, to }) => {
+                format!("{} to {}", from.name(), to.name())
+            }
             Self::State { from, to } => format!("controller: {} to {}", from.name(), to.name()),
             Self::Fault(fault) => format!("fault {}: {}", *fault as u8, fault.description()),
             Self::Edge { held: true } => "reference held at the edge".into(),
@@ -132,9 +94,9 @@ impl EventKind {
     /// Returns the impulse of the belt on the tip, (P_t, P_n), N·s, if there was one.
     pub fn impulse_ns(&self) -> Option<[f64; 2]> {
         match self {
-            Self::Impact { impulse_ns, .. } | Self::ImpactWithoutCollision { impulse_ns } => {
-                Some(*impulse_ns)
-            }
+            Self::Plant(
+                Event::Impact { impulse_ns, .. } | Event::ImpactWithoutCollision { impulse_ns },
+            ) => Some(*impulse_ns),
             _ => None,
         }
     }
@@ -142,8 +104,7 @@ impl EventKind {
     /// Returns the names of mode or state before and after, where the event changes one.
     pub fn change(&self) -> Option<(&'static str, &'static str)> {
         match self {
-            Self::LiftOff { from } => Some((from.name(), ContactMode::Flight.name())),
-            Self::Mode { from, to } => Some((from.name(), to.name())),
+            Self::Plant(Event::ModeChange { from, to }) => Some((from.name(), to.name())),
             Self::State { from, to } => Some((from.name(), to.name())),
             _ => None,
         }

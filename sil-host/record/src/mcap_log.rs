@@ -14,13 +14,14 @@ use std::path::PathBuf;
 
 use mcap::McapError;
 use mcap::records::{MessageHeader, Metadata};
+use painleve_plant::Event;
 use painleve_plant::scenario::Scenario;
 use painleve_system::atomic_file::AtomicFile;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
-use crate::events::RunEvent;
+use crate::events::{EventKind, RunEvent};
 use crate::fields::{Read, TOPICS, Topic};
 use crate::recorder::{RecordError, RecordedTick, Sink};
 use crate::scene::Scene;
@@ -278,7 +279,7 @@ fn event_message(event: &RunEvent) -> Value {
         message["impulse_t_ns"] = json!(tangential);
         message["impulse_n_ns"] = json!(normal);
     }
-    if let crate::events::EventKind::Impact { approach_m_s, .. } = kind {
+    if let EventKind::Plant(Event::Impact { approach_m_s, .. }) = kind {
         message["approach_m_s"] = json!(approach_m_s);
     }
     if let Some((from, to)) = kind.change() {

@@ -109,7 +109,7 @@ pub type Sinks = Vec<Box<dyn Sink>>;
 #[derive(Clone, Copy, Debug)]
 enum Entry {
     Tick(Sample),
-    Plant { time_s: f64, event: Event },
+    Event(RunEvent),
 }
 
 /// Passes the ticks of a run to a thread that records them.
@@ -175,7 +175,8 @@ impl Recorder {
 
     /// Adds a discontinuity of the plant's motion.
     pub fn push_event(&mut self, time_s: f64, event: Event) {
-        self.buffer.push(Entry::Plant { time_s, event });
+        let kind = EventKind::Plant(event);
+        self.buffer.push(Entry::Event(RunEvent { time_s, kind }));
     }
 
     /// Records the remaining samples and completes every file.
@@ -256,9 +257,7 @@ impl Recording {
             for entry in &buffer {
                 match entry {
                     Entry::Tick(sample) => self.tick(sample)?,
-                    Entry::Plant { time_s, event } => {
-                        self.event(&RunEvent::of_plant(*time_s, *event))?;
-                    }
+                    Entry::Event(event) => self.event(event)?,
                 }
             }
             buffer.clear();
