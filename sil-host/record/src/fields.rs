@@ -49,60 +49,32 @@ pub enum Read {
     Truth(fn(&RecordedTick<'_>) -> bool),
 }
 
-const fn number(
-    name: &'static str,
-    description: &'static str,
-    read: fn(&RecordedTick<'_>) -> f64,
-) -> RecordField {
-    let read = Read::Number(read);
-    RecordField {
-        name,
-        description,
-        read,
-    }
-}
-
-const fn whole(
-    name: &'static str,
-    description: &'static str,
-    read: fn(&RecordedTick<'_>) -> i64,
-) -> RecordField {
-    let read = Read::Whole(read);
-    RecordField {
-        name,
-        description,
-        read,
-    }
-}
-
-const fn text(
-    name: &'static str,
-    description: &'static str,
-    read: fn(&RecordedTick<'_>) -> &'static str,
-) -> RecordField {
-    let read = Read::Text(read);
-    RecordField {
-        name,
-        description,
-        read,
-    }
-}
-
-/// A field of the controller's telemetry; not finite without telemetry.
-macro_rules! estimate {
-    ($name:literal, $description:literal, Single, $read:expr) => {
-        RecordField {
-            name: $name,
-            description: $description,
-            read: Read::Single(|tick| tick.estimates.map_or(f32::NAN, $read)),
-        }
+/// Lists the quantities of a topic as `name: kind = value;`, each under its description. The values
+/// are read from the tick's sample or from its estimates; without estimates a number is NaN.
+macro_rules! fields {
+    (@unknown Single) => { f32::NAN };
+    (@unknown $kind:ident) => { Default::default() };
+    (@list $($name:ident [$($description:literal)+] $read:expr)*) => {
+        &[$(RecordField {
+            name: stringify!($name),
+            description: concat!($($description),+).trim_ascii(),
+            read: $read,
+        }),*]
     };
-    ($name:literal, $description:literal, $kind:ident, $read:expr) => {
-        RecordField {
-            name: $name,
-            description: $description,
-            read: Read::$kind(|tick| tick.estimates.map_or_else(Default::default, $read)),
-        }
+    (|$sample:ident|
+        $($(#[doc = $description:literal])+ $name:ident: $kind:ident = $value:expr;)*
+    ) => {
+        fields!(@list $($name [$($description)+] Read::$kind(|tick| {
+            let $sample = tick.sample;
+            $value
+        }))*)
+    };
+    (estimates |$now:ident|
+        $($(#[doc = $description:literal])+ $name:ident: $kind:ident = $value:expr;)*
+    ) => {
+        fields!(@list $($name [$($description)+] Read::$kind(|tick| {
+            tick.estimates.map_or(fields!(@unknown $kind), |$now| $value)
+        }))*)
     };
 }
 
@@ -115,79 +87,42 @@ pub const PLANT: Topic = Topic {
     schema: "painleve.Plant",
     description: "State, contact and torques of the simulated arm.",
     needs_estimates: false,
-    fields: &[
-        number(
-            "theta1_rad",
-            "Angle of the first link from the belt's inward normal, rad.",
-            |tick| tick.sample.plant.theta_rad[0],
-        ),
-        number(
-            "theta2_rad",
-            "Angle of the second link from the belt's inward normal, rad.",
-            |tick| tick.sample.plant.theta_rad[1],
-        ),
-        number(
-            "theta1_dot_rad_s",
-            "Rate of the first angle, rad/s.",
-            |tick| tick.sample.plant.theta_dot_rad_s[0],
-        ),
-        number(
-            "theta2_dot_rad_s",
-            "Rate of the second angle, rad/s.",
-            |tick| tick.sample.plant.theta_dot_rad_s[1],
-        ),
-        number(
-            "tip_t_m",
-            "Position of the tip along the belt z_t, m.",
-            |tick| tick.sample.plant.tip_t_m,
-        ),
-        number(
-            "reference_tip_t_m",
-            "Reference z_t* that the controller follows, m; absent while it follows none.",
-            |tick| tick.sample.reference_tip_t_m,
-        ),
-        number("gap_m", "Height of the tip over the belt, m.", |tick| {
-            tick.sample.plant.gap_m
-        }),
-        number(
-            "slip_velocity_m_s",
-            "Velocity of the tip relative to the belt, m/s.",
-            |tick| tick.sample.plant.slip_velocity_m_s,
-        ),
-        number("belt_speed_m_s", "Velocity of the belt, m/s.", |tick| {
-            tick.sample.plant.belt_speed_m_s
-        }),
-        number("normal_force_n", "Normal force f_n, N.", |tick| {
-            tick.sample.plant.normal_force_n
-        }),
-        number("tangential_force_n", "Tangential force f_t, N.", |tick| {
-            tick.sample.plant.tangential_force_n
-        }),
-        number("b_m_s2", "Free normal acceleration b, m/s².", |tick| {
-            tick.sample.plant.b_m_s2
-        }),
-        number(
-            "p_per_kg",
-            "Contact coefficient p for the present direction of slip, 1/kg.",
-            |tick| tick.sample.plant.p_per_kg,
-        ),
-        number("u1_nm", "Torque on the first joint, N·m.", |tick| {
-            tick.sample.plant.torque_nm[0]
-        }),
-        number("u2_nm", "Torque on the second joint, N·m.", |tick| {
-            tick.sample.plant.torque_nm[1]
-        }),
-        text(
-            "mode",
-            "Contact mode of the tip: flight, slide-positive, slide-negative or stick.",
-            |tick| tick.sample.plant.mode.name(),
-        ),
-        whole(
-            "mode_number",
-            "Contact mode as a number: 0 flight, 1 slide-positive, 2 slide-negative, 3 stick.",
-            |tick| tick.sample.plant.mode as i64,
-        ),
-    ],
+    fields: fields! { |sample|
+        /// Angle of the first link from the belt's inward normal, rad.
+        theta1_rad: Number = sample.plant.theta_rad[0];
+        /// Angle of the second link from the belt's inward normal, rad.
+        theta2_rad: Number = sample.plant.theta_rad[1];
+        /// Rate of the first angle, rad/s.
+        theta1_dot_rad_s: Number = sample.plant.theta_dot_rad_s[0];
+        /// Rate of the second angle, rad/s.
+        theta2_dot_rad_s: Number = sample.plant.theta_dot_rad_s[1];
+        /// Position of the tip along the belt z_t, m.
+        tip_t_m: Number = sample.plant.tip_t_m;
+        /// Reference z_t* that the controller follows, m; absent while it follows none.
+        reference_tip_t_m: Number = sample.reference_tip_t_m;
+        /// Height of the tip over the belt, m.
+        gap_m: Number = sample.plant.gap_m;
+        /// Velocity of the tip relative to the belt, m/s.
+        slip_velocity_m_s: Number = sample.plant.slip_velocity_m_s;
+        /// Velocity of the belt, m/s.
+        belt_speed_m_s: Number = sample.plant.belt_speed_m_s;
+        /// Normal force f_n, N.
+        normal_force_n: Number = sample.plant.normal_force_n;
+        /// Tangential force f_t, N.
+        tangential_force_n: Number = sample.plant.tangential_force_n;
+        /// Free normal acceleration b, m/s².
+        b_m_s2: Number = sample.plant.b_m_s2;
+        /// Contact coefficient p for the present direction of slip, 1/kg.
+        p_per_kg: Number = sample.plant.p_per_kg;
+        /// Torque on the first joint, N·m.
+        u1_nm: Number = sample.plant.torque_nm[0];
+        /// Torque on the second joint, N·m.
+        u2_nm: Number = sample.plant.torque_nm[1];
+        /// Contact mode of the tip: flight, slide-positive, slide-negative or stick.
+        mode: Text = sample.plant.mode.name();
+        /// Contact mode as a number: 0 flight, 1 slide-positive, 2 slide-negative, 3 stick.
+        mode_number: Whole = sample.plant.mode as i64;
+    },
 };
 
 /// The frame that the controller received.
@@ -196,42 +131,24 @@ pub const SENSOR: Topic = Topic {
     schema: "painleve.Sensor",
     description: "The sensor frame, raw counts.",
     needs_estimates: false,
-    fields: &[
-        whole("tick", "Control tick of the sample; wraps.", |tick| {
-            tick.sample.sensor.tick.into()
-        }),
-        whole("sequence", "Sequence number of the frame; wraps.", |tick| {
-            tick.sample.sensor.sequence.into()
-        }),
-        whole(
-            "joint1_counts",
-            "Encoder of the first joint, θ1, counts.",
-            |tick| tick.sample.sensor.joints[0].0.into(),
-        ),
-        whole(
-            "joint2_counts",
-            "Encoder in the elbow, θ2 − θ1, counts.",
-            |tick| tick.sample.sensor.joints[1].0.into(),
-        ),
-        whole("normal_force_counts", "Normal force, counts.", |tick| {
-            tick.sample.sensor.normal_force.0.into()
-        }),
-        whole(
-            "tangential_force_counts",
-            "Tangential force, counts.",
-            |tick| tick.sample.sensor.tangential_force.0.into(),
-        ),
-        whole(
-            "inputs",
-            "Digital inputs, one bit each: 1 enable, 2 reset.",
-            |tick| tick.sample.sensor.inputs.0.into(),
-        ),
-        RecordField {
-            name: "delivered",
-            description: "Whether the controller received the frame.",
-            read: Read::Truth(|tick| tick.sample.delivered),
-        },
-    ],
+    fields: fields! { |sample|
+        /// Control tick of the sample; wraps.
+        tick: Whole = sample.sensor.tick.into();
+        /// Sequence number of the frame; wraps.
+        sequence: Whole = sample.sensor.sequence.into();
+        /// Encoder of the first joint, θ1, counts.
+        joint1_counts: Whole = sample.sensor.joints[0].0.into();
+        /// Encoder in the elbow, θ2 − θ1, counts.
+        joint2_counts: Whole = sample.sensor.joints[1].0.into();
+        /// Normal force, counts.
+        normal_force_counts: Whole = sample.sensor.normal_force.0.into();
+        /// Tangential force, counts.
+        tangential_force_counts: Whole = sample.sensor.tangential_force.0.into();
+        /// Digital inputs, one bit each: 1 enable, 2 reset.
+        inputs: Whole = sample.sensor.inputs.0.into();
+        /// Whether the controller received the frame.
+        delivered: Truth = sample.delivered;
+    },
 };
 
 /// The controller's answer.
@@ -240,59 +157,33 @@ pub const ACTUATOR: Topic = Topic {
     schema: "painleve.Actuator",
     description: "The actuator frame, raw counts, with state and fault by name.",
     needs_estimates: false,
-    fields: &[
-        whole(
-            "tick",
-            "Tick of the sensor frame that this frame answers.",
-            |tick| tick.sample.actuator.tick.into(),
-        ),
-        whole("sequence", "Sequence number of the frame; wraps.", |tick| {
-            tick.sample.actuator.sequence.into()
-        }),
-        whole("u1_counts", "Torque on the first joint, counts.", |tick| {
-            tick.sample.actuator.torques[0].0.into()
-        }),
-        whole("u2_counts", "Torque on the second joint, counts.", |tick| {
-            tick.sample.actuator.torques[1].0.into()
-        }),
-        whole(
-            "reference_tip_um",
-            "Reference z_t* of this tick, µm.",
-            |tick| tick.sample.actuator.reference_tip.0.into(),
-        ),
-        whole(
-            "estimated_tip_um",
-            "Tip position as the controller estimates it, µm.",
-            |tick| tick.sample.actuator.estimated_tip.0.into(),
-        ),
-        text("state", "The supervisor's state.", |tick| {
-            state_name(tick.sample)
-        }),
-        whole(
-            "state_number",
-            "Number of the supervisor's state.",
-            |tick| tick.sample.actuator.state.into(),
-        ),
-        text("fault", "The latched fault, or \"none\".", |tick| {
-            fault_name(tick.sample)
-        }),
-        whole(
-            "fault_number",
-            "Number of the latched fault, 0 for none.",
-            |tick| tick.sample.actuator.fault.into(),
-        ),
-        whole(
-            "flags",
-            "Flags, one bit each: 1 contact, 2 torque saturated, 4 reference done, 8 guarded, \
-             16 at edge, 32 recovering, 64 slip negative, 128 sticks.",
-            |tick| tick.sample.actuator.flags.0.into(),
-        ),
-        RecordField {
-            name: "answered",
-            description: "Whether this frame answers this tick; otherwise it is the last answer.",
-            read: Read::Truth(|tick| tick.sample.answered),
-        },
-    ],
+    fields: fields! { |sample|
+        /// Tick of the sensor frame that this frame answers.
+        tick: Whole = sample.actuator.tick.into();
+        /// Sequence number of the frame; wraps.
+        sequence: Whole = sample.actuator.sequence.into();
+        /// Torque on the first joint, counts.
+        u1_counts: Whole = sample.actuator.torques[0].0.into();
+        /// Torque on the second joint, counts.
+        u2_counts: Whole = sample.actuator.torques[1].0.into();
+        /// Reference z_t* of this tick, µm.
+        reference_tip_um: Whole = sample.actuator.reference_tip.0.into();
+        /// Tip position as the controller estimates it, µm.
+        estimated_tip_um: Whole = sample.actuator.estimated_tip.0.into();
+        /// The supervisor's state.
+        state: Text = state_name(sample);
+        /// Number of the supervisor's state.
+        state_number: Whole = sample.actuator.state.into();
+        /// The latched fault, or "none".
+        fault: Text = fault_name(sample);
+        /// Number of the latched fault, 0 for none.
+        fault_number: Whole = sample.actuator.fault.into();
+        /// Flags, one bit each: 1 contact, 2 torque saturated, 4 reference done, 8 guarded,
+        /// 16 at edge, 32 recovering, 64 slip negative, 128 sticks.
+        flags: Whole = sample.actuator.flags.0.into();
+        /// Whether this frame answers this tick; otherwise it is the last answer.
+        answered: Truth = sample.answered;
+    },
 };
 
 /// The controller's internal state.
@@ -301,147 +192,59 @@ pub const ESTIMATES: Topic = Topic {
     schema: "painleve.Estimates",
     description: "The controller's estimates and decisions, recomputed from the frames.",
     needs_estimates: true,
-    fields: &[
-        estimate!("theta1_rad", "Estimated angle θ1, rad.", Single, |now| now
-            .theta_rad[0]),
-        estimate!("theta2_rad", "Estimated angle θ2, rad.", Single, |now| now
-            .theta_rad[1]),
-        estimate!(
-            "theta1_dot_rad_s",
-            "Estimated rate of θ1, rad/s.",
-            Single,
-            |now| now.theta_dot_rad_s[0]
-        ),
-        estimate!(
-            "theta2_dot_rad_s",
-            "Estimated rate of θ2, rad/s.",
-            Single,
-            |now| now.theta_dot_rad_s[1]
-        ),
-        estimate!(
-            "tip_t_m",
-            "Estimated position of the tip along the belt, m.",
-            Single,
-            |now| now.tip_t_m
-        ),
-        estimate!(
-            "reference_m",
-            "Reference after the edge governor, m.",
-            Single,
-            |now| now.reference_m
-        ),
-        estimate!(
-            "normal_force_n",
-            "Measured normal force, N.",
-            Single,
-            |now| now.normal_force_n
-        ),
-        estimate!(
-            "tangential_force_n",
-            "Measured tangential force, N.",
-            Single,
-            |now| now.tangential_force_n
-        ),
-        estimate!(
-            "u1_nm",
-            "Torque on the first joint as output, N·m.",
-            Single,
-            |now| now.torque_nm[0]
-        ),
-        estimate!(
-            "u2_nm",
-            "Torque on the second joint as output, N·m.",
-            Single,
-            |now| now.torque_nm[1]
-        ),
-        estimate!(
-            "contact",
-            "The contact decision: the tip touches the belt.",
-            Truth,
-            |now| now.contact
-        ),
-        estimate!(
-            "contact_confidence",
-            "Certainty of the contact decision, 0 to 1.",
-            Single,
-            |now| now.contact_confidence
-        ),
-        estimate!(
-            "friction",
-            "Estimated friction coefficient μ.",
-            Single,
-            |now| now.friction
-        ),
-        estimate!(
-            "friction_deviation",
-            "Standard deviation of the estimate of μ.",
-            Single,
-            |now| now.friction_deviation
-        ),
-        estimate!(
-            "slip_sign",
-            "Estimated direction of slip: 1 positive, -1 negative.",
-            Whole,
-            |now| match now.slip {
-                Slip::Positive => 1,
-                Slip::Negative => -1,
-            }
-        ),
-        estimate!(
-            "sticks",
-            "Whether the tip is estimated to stick to the belt.",
-            Truth,
-            |now| now.sticks
-        ),
-        estimate!(
-            "lower_edge_m",
-            "Lower edge of the admissible stretch of the belt, m; absent if there is none.",
-            Single,
-            |now| now.edges_m[0]
-        ),
-        estimate!(
-            "upper_edge_m",
-            "Upper edge of the admissible stretch of the belt, m; absent if there is none.",
-            Single,
-            |now| now.edges_m[1]
-        ),
-        estimate!(
-            "at_edge",
-            "Whether an edge holds the reference back.",
-            Truth,
-            |now| now.at_edge
-        ),
-        estimate!(
-            "recovering",
-            "Whether the tip is being returned to the belt.",
-            Truth,
-            |now| now.recovering
-        ),
-        estimate!(
-            "guarded",
-            "Whether the contact guard changed the torque.",
-            Truth,
-            |now| now.guarded
-        ),
-        estimate!(
-            "saturated",
-            "Whether the torque was limited.",
-            Truth,
-            |now| now.saturated
-        ),
-        estimate!(
-            "guarded_ticks",
-            "Number of ticks since the start in which the contact guard acted; wraps.",
-            Whole,
-            |now| now.guarded_ticks.into()
-        ),
-        estimate!(
-            "saturated_ticks",
-            "Number of ticks since the start with limited torque; wraps.",
-            Whole,
-            |now| now.saturated_ticks.into()
-        ),
-    ],
+    fields: fields! { estimates |now|
+        /// Estimated angle θ1, rad.
+        theta1_rad: Single = now.theta_rad[0];
+        /// Estimated angle θ2, rad.
+        theta2_rad: Single = now.theta_rad[1];
+        /// Estimated rate of θ1, rad/s.
+        theta1_dot_rad_s: Single = now.theta_dot_rad_s[0];
+        /// Estimated rate of θ2, rad/s.
+        theta2_dot_rad_s: Single = now.theta_dot_rad_s[1];
+        /// Estimated position of the tip along the belt, m.
+        tip_t_m: Single = now.tip_t_m;
+        /// Reference after the edge governor, m.
+        reference_m: Single = now.reference_m;
+        /// Measured normal force, N.
+        normal_force_n: Single = now.normal_force_n;
+        /// Measured tangential force, N.
+        tangential_force_n: Single = now.tangential_force_n;
+        /// Torque on the first joint as output, N·m.
+        u1_nm: Single = now.torque_nm[0];
+        /// Torque on the second joint as output, N·m.
+        u2_nm: Single = now.torque_nm[1];
+        /// The contact decision: the tip touches the belt.
+        contact: Truth = now.contact;
+        /// Certainty of the contact decision, 0 to 1.
+        contact_confidence: Single = now.contact_confidence;
+        /// Estimated friction coefficient μ.
+        friction: Single = now.friction;
+        /// Standard deviation of the estimate of μ.
+        friction_deviation: Single = now.friction_deviation;
+        /// Estimated direction of slip: 1 positive, -1 negative.
+        slip_sign: Whole = match now.slip {
+            Slip::Positive => 1,
+            Slip::Negative => -1,
+        };
+        /// Whether the tip is estimated to stick to the belt.
+        sticks: Truth = now.sticks;
+        /// Lower edge of the admissible stretch of the belt, m; absent if there is none.
+        lower_edge_m: Single = now.edges_m[0];
+        /// Upper edge of the admissible stretch of the belt, m; absent if there is none.
+        upper_edge_m: Single = now.edges_m[1];
+        /// Whether an edge holds the reference back.
+        at_edge: Truth = now.at_edge;
+        /// Whether the tip is being returned to the belt.
+        recovering: Truth = now.recovering;
+        /// Whether the contact guard changed the torque.
+        guarded: Truth = now.guarded;
+        /// Whether the torque was limited.
+        saturated: Truth = now.saturated;
+        /// Number of ticks since the start in which the contact guard acted; wraps.
+        guarded_ticks: Whole = now.guarded_ticks.into();
+        /// Number of ticks since the start with limited torque; wraps.
+        saturated_ticks: Whole = now.saturated_ticks.into();
+    },
 };
 
 const UNKNOWN: &str = "unknown";
