@@ -15,7 +15,7 @@ use crate::estimate::calibration::CalibrationSettings;
 use crate::estimate::contact::ContactSettings;
 use crate::estimate::disturbance::DisturbanceSettings;
 use crate::estimate::friction::FrictionSettings;
-use crate::estimate::joints::EstimatorSettings;
+use crate::estimate::joints::JointEstimatorSettings;
 use crate::guard::GuardSettings;
 use crate::law::{Law, LawSettings};
 use crate::recover::RecoverySettings;
@@ -45,7 +45,7 @@ settings! {
         /// Largest torque on either joint; at most the torque stages' range.
         torque_limit_nm: f32 = 5.0, 0.0..=1e6, "N·m";
         /// Estimation of joint angles and rates from encoder counts.
-        estimator: EstimatorSettings = EstimatorSettings::default();
+        estimator: JointEstimatorSettings = JointEstimatorSettings::default();
         /// Detection of contact between tip and belt.
         contact: ContactSettings = ContactSettings::default();
         /// Estimation of friction.

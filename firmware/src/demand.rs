@@ -3,12 +3,11 @@
 
 use painleve_shared::{Arm, Posture};
 
-use crate::configuration::Configuration;
 use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
 use crate::last_command::LastCommand;
 use crate::law::{Law, LawInput, LawOutput};
-use crate::recover::{Recovery, RecoveryState};
+use crate::recover::{Recovery, RecoverySettings, RecoveryState};
 use crate::refer::Target;
 use crate::supervise::supervisor::Phase;
 
@@ -58,14 +57,14 @@ pub struct DemandInput<'a> {
 }
 
 impl<L: Law> TorqueDemand<L> {
-    /// Makes the law and the recovery of a controller with this configuration.
-    pub fn new(configuration: &Configuration<L>) -> Self {
-        let settings = &configuration.settings;
+    /// Makes the demand of this law and this recovery, with a control period of `tick_s` (s) and torques
+    /// up to `torque_limit_nm` (N·m).
+    pub fn new(law: L, recovery: &RecoverySettings, tick_s: f32, torque_limit_nm: f32) -> Self {
         Self {
-            law: settings.law.clone(),
-            recovery: Recovery::new(&settings.recovery, configuration.tick_s()),
-            tick_s: configuration.tick_s(),
-            torque_limit_nm: settings.torque_limit_nm,
+            law,
+            recovery: Recovery::new(recovery, tick_s),
+            tick_s,
+            torque_limit_nm,
         }
     }
 

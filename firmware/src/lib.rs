@@ -9,8 +9,9 @@
 //! The modules follow the order of one tick: [`controller`] checks the frame; [`estimate`] converts
 //! counts to angles, rates, contact and friction; [`supervise`] decides which actions are allowed;
 //! [`refer`] gives the target position of the tip; [`demand`] computes torques, with the [`law`] or,
-//! to return a thrown tip to the belt, with [`recover`]; [`drive`] outputs them, limited and, by
-//! [`guard`], such that the tip stays pressed. [`telemetry`] exposes the internal state.
+//! to return a thrown tip to the belt, with [`recover`]; [`torque_output`] limits them and, by
+//! [`guard`], keeps the tip pressed. [`telemetry`] exposes the internal state. [`drive`] runs the
+//! ticks on the hardware.
 
 #![no_std]
 
@@ -29,6 +30,7 @@ pub mod recover;
 pub mod refer;
 pub mod supervise;
 pub mod telemetry;
+pub mod torque_output;
 
 /// Hash of the sources of controller and messages, which identifies a build. The host and the board
 /// compare it before the board accepts a configuration.

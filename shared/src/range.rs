@@ -2,7 +2,7 @@
 
 use core::fmt::{self, Write};
 
-use crate::Real;
+use nalgebra::{RealField, convert, try_convert};
 
 /// A number outside its allowed range; NaN and infinities are always outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -138,7 +138,7 @@ impl fmt::Display for Shortest {
 /// # Errors
 /// [`OutOfRange`] naming `key` otherwise.
 #[inline]
-pub fn check<T: Real>(
+pub fn check<T: RealField + Copy>(
     key: &'static str,
     value: T,
     minimum: f64,
@@ -147,16 +147,16 @@ pub fn check<T: Real>(
     if is_within(value, minimum, maximum) {
         Ok(())
     } else {
-        Err(refused(value.to_f64(), minimum, maximum).inside(key))
+        Err(refused(try_convert(value).unwrap_or(f64::NAN), minimum, maximum).inside(key))
     }
 }
 
 /// Returns whether `value` is finite and within `minimum ..= maximum`.
 #[inline]
-pub(crate) fn is_within<T: Real>(value: T, minimum: f64, maximum: f64) -> bool {
+pub(crate) fn is_within<T: RealField + Copy>(value: T, minimum: f64, maximum: f64) -> bool {
     // Compare in the value's own precision: the bound 0.1 then allows the single-precision 0.1, and
     // a microcontroller without double precision compares single-precision numbers.
-    value >= T::literal(minimum) && value <= T::literal(maximum) && value.is_finite()
+    value >= convert(minimum) && value <= convert(maximum) && value.is_finite()
 }
 
 #[cold]

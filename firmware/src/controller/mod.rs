@@ -23,15 +23,15 @@ use painleve_shared::status::Fault;
 use self::arrival::{Arrival, ArrivalState, Lapses, arrive};
 use crate::configuration::{Configuration, Converters};
 use crate::demand::{DemandInput, DemandState, TorqueDemand};
-use crate::drive::torque::{NotFinite, TorqueOutput};
 use crate::estimate::joints::EncoderJump;
-use crate::estimate::{EstimatesState, Estimators, Readings};
+use crate::estimate::{EstimateSettings, EstimatesState, Estimators, Readings};
 use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
 use crate::refer::{References, ReferencesState};
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::{Supervision, Supervisor};
 use crate::telemetry::{Telemetry, TelemetrySink, TelemetryTick};
+use crate::torque_output::{NotFinite, TorqueOutput};
 
 /// The controller of one arm, with the laws `L`.
 ///
@@ -117,18 +117,7 @@ impl<L: Law> Controller<L> {
     pub fn new(configuration: &Configuration<L>) -> Result<Self, OutOfRange> {
         let arm = configuration.validate()?;
         let settings = &configuration.settings;
-        let stages = Stages {
-            converters: configuration.converters,
-            estimators: Estimators::new(configuration),
-            supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
-            references: References::new(configuration),
-            demand: TorqueDemand::new(configuration),
-            torques: TorqueOutput::new(
-                &settings.guard,
-                configuration.converters.torque,
-                settings.torque_limit_nm,
-            ),
-        };
+        let stages = Stages::new(configuration);
         let state = State {
             arrivals: ArrivalState::default(),
             monitor: LapseMonitor::new(settings.lapses),
@@ -247,6 +236,50 @@ impl<L: Law> Controller<L> {
 }
 
 impl<L: Law> Stages<L> {
+    /// Makes the stages, each with its own settings.
+    fn new(configuration: &Configuration<L>) -> Self {
+        let Configuration {
+            tick_hz,
+            arm,
+            converters,
+            settings,
+        } = configuration;
+        Self {
+            converters: *converters,
+            estimators: Estimators::new(&EstimateSettings {
+                tick_hz: *tick_hz,
+                encoders: converters.encoders,
+                force: converters.force,
+                link_length_m: arm.link_length_m[0],
+                joints: &settings.estimator,
+                contact: &settings.contact,
+                friction: &settings.friction,
+                belt: &settings.belt,
+                disturbance: &settings.disturbance,
+                calibration: &settings.calibration,
+            }),
+            supervisor: Supervisor::new(settings.supervisor, *tick_hz),
+            references: References::new(
+                &settings.reference,
+                &settings.governor,
+                *tick_hz,
+                configuration.tip_count_m(),
+                settings.recovery.minimum_p_ratio,
+            ),
+            demand: TorqueDemand::new(
+                settings.law.clone(),
+                &settings.recovery,
+                configuration.tick_s(),
+                settings.torque_limit_nm,
+            ),
+            torques: TorqueOutput::new(
+                &settings.guard,
+                converters.torque,
+                settings.torque_limit_nm,
+            ),
+        }
+    }
+
     /// Runs one tick, from readings to the answer.
     #[inline]
     fn tick(

@@ -1,11 +1,9 @@
 //! The hardware interface of a tick, and the task that runs ticks on it.
 //!
-//! - [`torque`]: converts wanted torques to counts: guarded against lift-off, limited and rounded
 //! - [`Drive`]: the hardware interface of the control task
 //! - [`ControlTask`]: one control tick with sampling, actuation and monitoring, on every host
 
 mod task;
-pub mod torque;
 
 pub use self::task::{Answered, ControlTask, TaskCounts};
 

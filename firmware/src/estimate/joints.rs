@@ -15,7 +15,7 @@ use painleve_shared::{Real, settings};
 settings! {
     /// Settings of the tracking loops.
     #[derive(Copy)]
-    pub struct EstimatorSettings {
+    pub struct JointEstimatorSettings {
         /// Bandwidth ω of both tracking loops; at most three times the control rate.
         bandwidth_rad_s: f32 = 400.0, 1.0..=3e5, "rad/s";
         /// Largest joint rate; a faster reading latches the fault `EncoderJump`.
@@ -64,7 +64,7 @@ pub struct JointState {
 
 impl JointEstimator {
     /// Makes an estimator for encoders with these scalings, read `tick_hz` times a second.
-    pub fn new(settings: &EstimatorSettings, scales: [EncoderScale; 2], tick_hz: f32) -> Self {
+    pub fn new(settings: &JointEstimatorSettings, scales: [EncoderScale; 2], tick_hz: f32) -> Self {
         let tick_s = 1.0 / tick_hz;
         let pole = libm::expf(-settings.bandwidth_rad_s * tick_s);
         let rad_per_count = scales.map(|scale| scale.rad_per_count::<f32>());
@@ -228,7 +228,7 @@ mod tests {
     };
 
     fn estimator() -> JointEstimator {
-        JointEstimator::new(&EstimatorSettings::default(), [SCALE; 2], 1000.0)
+        JointEstimator::new(&JointEstimatorSettings::default(), [SCALE; 2], 1000.0)
     }
 
     fn track(motion: impl Fn(f64) -> (f64, f64), acceleration: f32, ticks: u32) -> JointState {

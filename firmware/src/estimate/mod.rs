@@ -17,19 +17,17 @@ pub mod model;
 
 use nalgebra::Vector2;
 use painleve_shared::Arm;
-use painleve_shared::counts::LinearScale;
+use painleve_shared::counts::{EncoderScale, LinearScale};
 use painleve_shared::frame::SensorFrame;
 
-use self::belt::{BeltEstimator, BeltState};
-use self::calibration::{CalibrationState, LengthCalibrator};
-use self::contact::{ContactDetector, ContactState, EncoderReading, Evidence};
-use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceState};
-use self::friction::{FrictionEstimate, FrictionEstimator, FrictionState};
-use self::joints::{EncoderJump, JointEstimator, JointState};
+use self::belt::{BeltEstimator, BeltSpeedSettings, BeltState};
+use self::calibration::{CalibrationSettings, CalibrationState, LengthCalibrator};
+use self::contact::{ContactDetector, ContactSettings, ContactState, EncoderReading, Evidence};
+use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceSettings, DisturbanceState};
+use self::friction::{FrictionEstimate, FrictionEstimator, FrictionSettings, FrictionState};
+use self::joints::{EncoderJump, JointEstimator, JointEstimatorSettings, JointState};
 use self::model::Model;
-use crate::configuration::Configuration;
 use crate::last_command::LastCommand;
-use crate::law::Law;
 
 /// Largest friction above the estimate that may explain a throw.
 const THROWN_BY_FRICTION: f32 = 0.4;
@@ -60,6 +58,31 @@ pub struct Readings<'a> {
     pub frame: &'a SensorFrame,
     /// Ticks since the previous readings: 1 unless frames were lost.
     pub elapsed_ticks: u32,
+}
+
+/// Settings of all estimators, and the scalings of their readings.
+#[derive(Clone, Copy, Debug)]
+pub struct EstimateSettings<'a> {
+    /// Control rate, Hz.
+    pub tick_hz: f32,
+    /// Scalings of the encoders of θ1 and of θ2 − θ1.
+    pub encoders: [EncoderScale; 2],
+    /// Scaling of the force cell.
+    pub force: LinearScale<f32>,
+    /// Length of the first link before calibration, m.
+    pub link_length_m: f32,
+    /// Tracking loops of the joints.
+    pub joints: &'a JointEstimatorSettings,
+    /// Contact decision.
+    pub contact: &'a ContactSettings,
+    /// Friction.
+    pub friction: &'a FrictionSettings,
+    /// Bounds of the belt's speed.
+    pub belt: &'a BeltSpeedSettings,
+    /// Unknown torques.
+    pub disturbance: &'a DisturbanceSettings,
+    /// Calibration of the links' length.
+    pub calibration: &'a CalibrationSettings,
 }
 
 /// All estimators of one arm.
@@ -102,30 +125,22 @@ impl EstimatesState {
 }
 
 impl Estimators {
-    /// Makes the estimators of a controller with this configuration.
-    pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
-        let tick_s = configuration.tick_s();
+    /// Makes the estimators with these settings.
+    pub fn new(settings: &EstimateSettings<'_>) -> Self {
+        let tick_s = 1.0 / settings.tick_hz;
         Self {
-            force_scale: configuration.converters.force,
+            force_scale: settings.force,
             tick_s,
-            joints: JointEstimator::new(
-                &configuration.settings.estimator,
-                configuration.converters.encoders,
-                configuration.tick_hz,
-            ),
-            contact: ContactDetector::new(&configuration.settings.contact),
+            joints: JointEstimator::new(settings.joints, settings.encoders, settings.tick_hz),
+            contact: ContactDetector::new(settings.contact),
             friction: FrictionEstimator::new(
-                &configuration.settings.friction,
-                configuration.settings.contact.force_noise_n,
+                settings.friction,
+                settings.contact.force_noise_n,
                 tick_s,
             ),
-            belt: BeltEstimator::new(&configuration.settings.belt, tick_s),
-            disturbance: DisturbanceEstimator::new(&configuration.settings.disturbance, tick_s),
-            calibrator: LengthCalibrator::new(
-                &configuration.settings.calibration,
-                configuration.arm.link_length_m[0],
-                tick_s,
-            ),
+            belt: BeltEstimator::new(settings.belt, tick_s),
+            disturbance: DisturbanceEstimator::new(settings.disturbance, tick_s),
+            calibrator: LengthCalibrator::new(settings.calibration, settings.link_length_m, tick_s),
         }
     }
 

@@ -9,12 +9,10 @@ pub mod reference;
 use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, Posture};
 
-use self::governor::{EdgeGovernor, GovernorState};
-use self::reference::{ReferenceGenerator, ReferenceState, TipReference};
-use crate::configuration::Configuration;
+use self::governor::{EdgeGovernor, GovernorSettings, GovernorState};
+use self::reference::{Program, ReferenceGenerator, ReferenceState, TipReference};
 use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
-use crate::law::Law;
 use crate::supervise::supervisor::Phase;
 
 /// The target of the tip at one tick, and its limits.
@@ -53,19 +51,20 @@ pub struct ReferencesState {
 }
 
 impl References {
-    /// Makes the references of a controller with this configuration.
-    pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
+    /// Makes the references with these settings at this control rate. `tip_count_m` is the distance by
+    /// which one encoder count moves the tip; `landing_p_ratio` is the least p, as a fraction of Q22, at
+    /// which a recovered tip may land.
+    pub fn new(
+        program: &Program,
+        governor: &GovernorSettings,
+        tick_hz: f32,
+        tip_count_m: f32,
+        landing_p_ratio: f32,
+    ) -> Self {
         Self {
-            generator: ReferenceGenerator::new(
-                &configuration.settings.reference,
-                configuration.tick_hz,
-            ),
-            governor: EdgeGovernor::new(
-                &configuration.settings.governor,
-                configuration.tick_s(),
-                configuration.tip_count_m(),
-            ),
-            landing_p_ratio: configuration.settings.recovery.minimum_p_ratio,
+            generator: ReferenceGenerator::new(program, tick_hz),
+            governor: EdgeGovernor::new(governor, 1.0 / tick_hz, tip_count_m),
+            landing_p_ratio,
         }
     }
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::str::FromStr;
 
-use super::LinkError;
+use thiserror::Error;
 
 /// Name of a bus: 1 to 64 characters of `A-Z a-z 0-9 _ -`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -28,15 +28,23 @@ impl BusName {
     }
 }
 
-impl FromStr for BusName {
-    type Err = LinkError;
+/// A string is not a valid bus name.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("bus name {name:?} is not allowed: use 1 to 64 characters of A-Z, a-z, 0-9, '_' and '-'")]
+pub struct InvalidBusName {
+    /// The rejected name.
+    pub name: String,
+}
 
-    fn from_str(name: &str) -> Result<Self, LinkError> {
+impl FromStr for BusName {
+    type Err = InvalidBusName;
+
+    fn from_str(name: &str) -> Result<Self, InvalidBusName> {
         let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if (1..=Self::MAX_LENGTH).contains(&name.len()) && name.chars().all(allowed) {
             Ok(Self(name.to_owned()))
         } else {
-            Err(LinkError::InvalidBusName {
+            Err(InvalidBusName {
                 name: name.to_owned(),
             })
         }

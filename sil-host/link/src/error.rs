@@ -5,21 +5,13 @@ use std::time::Duration;
 
 use thiserror::Error;
 
-use super::{BusName, CONFIGURATION_CAPACITY};
+use super::bus::BusName;
+use super::session::ConfigurationTooLong;
 
 /// A failure of the link. The message names the bus and the remedy.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// The name is not a valid bus name.
-    #[error(
-        "bus name {name:?} is not allowed: use 1 to 64 characters of A-Z, a-z, 0-9, '_' and '-'"
-    )]
-    InvalidBusName {
-        /// The rejected name.
-        name: String,
-    },
-
     /// Another plant is alive on the bus.
     #[error("bus `{bus}` already has a plant: choose another name with --bus, or end that plant")]
     BusInUse {
@@ -116,13 +108,8 @@ pub enum LinkError {
     },
 
     /// The configuration does not fit the session message.
-    #[error(
-        "the configuration takes {length} bytes; at most {CONFIGURATION_CAPACITY} fit the link"
-    )]
-    ConfigurationTooLong {
-        /// Its length in bytes.
-        length: usize,
-    },
+    #[error(transparent)]
+    ConfigurationTooLong(#[from] ConfigurationTooLong),
 
     /// The peer uses another version of the frames or of the session message.
     #[error("bus `{bus}` is used by another version of painleve: use the same build for both ends")]

@@ -4,10 +4,18 @@
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
-use super::LinkError;
+use thiserror::Error;
 
 /// Largest size of a session's configuration in bytes.
 pub const CONFIGURATION_CAPACITY: usize = 2048;
+
+/// The configuration does not fit the session message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("the configuration takes {length} bytes; at most {CONFIGURATION_CAPACITY} fit the link")]
+pub struct ConfigurationTooLong {
+    /// Its length in bytes.
+    pub length: usize,
+}
 
 /// How the plant paces its ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -69,12 +77,12 @@ impl SessionMessage {
     const LOCKSTEP: u32 = 1;
     const REALTIME: u32 = 2;
 
-    pub(super) fn begin(session: &Session) -> Result<Self, LinkError> {
+    pub(super) fn begin(session: &Session) -> Result<Self, ConfigurationTooLong> {
         let length = session.configuration.len();
         let mut configuration = [0; CONFIGURATION_CAPACITY];
         configuration
             .get_mut(..length)
-            .ok_or(LinkError::ConfigurationTooLong { length })?
+            .ok_or(ConfigurationTooLong { length })?
             .copy_from_slice(&session.configuration);
         Ok(Self {
             kind: Self::BEGIN,
@@ -173,7 +181,7 @@ mod tests {
         let length = CONFIGURATION_CAPACITY + 1;
         assert!(matches!(
             SessionMessage::begin(&session(length)),
-            Err(LinkError::ConfigurationTooLong { length: l }) if l == length
+            Err(ConfigurationTooLong { length: l }) if l == length
         ));
     }
 

@@ -3,6 +3,8 @@
 mod figure;
 mod options;
 mod outcome;
+#[cfg(test)]
+mod tables;
 
 use painleve_plant::mechanics::BuiltInPlant;
 

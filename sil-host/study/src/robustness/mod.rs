@@ -112,6 +112,6 @@ impl Tabular for Robustness {
 }
 
 #[cfg(test)]
-mod tables;
+pub(crate) mod tables;
 #[cfg(test)]
 mod tests;

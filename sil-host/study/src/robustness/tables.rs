@@ -3,7 +3,6 @@
 use painleve_shared::Posture;
 
 use super::*;
-use crate::ablation::{Ablation, AblationStudy};
 use crate::outcome::plain;
 
 fn row(index: usize, ending: Ending, error_m: f64) -> Row {
@@ -44,7 +43,7 @@ fn row(index: usize, ending: Ending, error_m: f64) -> Row {
     }
 }
 
-fn rows(endings: &[(Ending, f64)]) -> Vec<Row> {
+pub(crate) fn rows(endings: &[(Ending, f64)]) -> Vec<Row> {
     let rows = endings.iter().enumerate();
     rows.map(|(index, &(ending, error_m))| row(index, ending, error_m))
         .collect()
@@ -69,28 +68,4 @@ fn every_ending_is_counted_and_the_most_severe_come_first() {
         ]),
     );
     insta::assert_snapshot!(plain(&found));
-}
-
-#[test]
-fn each_part_has_a_line() {
-    let study = AblationStudy {
-        campaign: Robustness {
-            arms: Arms::Paper,
-            seed: 7,
-            runs: 4,
-            overrides: Vec::new(),
-        },
-        parts: vec![Part::Governor, Part::FrictionEstimate],
-    };
-    let (reached, fell) = ((Ending::Reached, 1e-4), (Ending::LiftOff, 0.08));
-    let whole = [reached, reached, (Ending::AtEdge, 2e-4), reached];
-    let without_governor = [reached, fell, (Ending::Fault, 0.04), fell];
-    let without_estimate = [
-        reached,
-        (Ending::StoppedEarly, 5e-4),
-        (Ending::NotCaptured, 0.01),
-        (Ending::Unsolved, 0.0),
-    ];
-    let all = [whole, without_governor, without_estimate].concat();
-    insta::assert_snapshot!(plain(&Ablation::new(&study, rows(&all))));
 }
