@@ -1,6 +1,7 @@
 //! The `painleve` command: subcommands, options and errors.
 
 mod bridge;
+mod commission;
 mod completions;
 mod controller;
 mod doctor;
@@ -30,6 +31,7 @@ use painleve_shared::status::Fault;
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
 use painleve_bound::BoundError;
+use painleve_commission::Mistake;
 use painleve_link::LinkError;
 use painleve_plant::closed_loop::LoopError;
 use painleve_plant::law_choice::{self, ScenarioLaws};
@@ -64,6 +66,8 @@ enum Command {
     Controller(controller::ControllerArguments),
     /// Connect the controller's image on a board to the plant's bus.
     Bridge(bridge::BridgeArguments),
+    /// Measure how the sensors and torque stages of an arm are mounted, and correct its scenario.
+    Commission(commission::CommissionArguments),
     /// Drive a real arm through its board: watch, permit arming, record, stop.
     Drive(drive::DriveArguments),
     /// Report the cost of control ticks: instructions, cycles or wake-up latency, and the worst
@@ -119,6 +123,9 @@ pub enum CommandError {
     /// The cycles of an image cannot be bounded.
     #[error(transparent)]
     Bound(#[from] BoundError),
+    /// The arm has a mistake that no setting can describe.
+    #[error("{0}")]
+    Mounting(Mistake),
     /// A file cannot be written.
     #[error("{0}")]
     Output(String),
@@ -186,7 +193,7 @@ impl CommandError {
             Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,
             Self::Sweep(SweepError::Output(_)) => 4,
             Self::Sweep(_) => 2,
-            Self::Loop(LoopError::Plant(_)) | Self::Faulted(_) => 1,
+            Self::Loop(LoopError::Plant(_)) | Self::Faulted(_) | Self::Mounting(_) => 1,
             Self::Link(LinkError::Interrupted) => INTERRUPTED,
             Self::Loop(LoopError::Host(_) | LoopError::NotUnderstood { .. })
             | Self::Link(_)
@@ -311,7 +318,11 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Plant(_) | Command::Controller(_) | Command::Bridge(_) => {
             exit_when_shared_memory_is_full(PEER_FAILED)?;
         }
-        Command::Run(_) | Command::Drive(_) | Command::Timing(_) | Command::Doctor(_) => {}
+        Command::Run(_)
+        | Command::Commission(_)
+        | Command::Drive(_)
+        | Command::Timing(_)
+        | Command::Doctor(_) => {}
         Command::Completions(_)
         | Command::Man(_)
         | Command::Export(_)
@@ -327,6 +338,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Plant(arguments) => plant::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
         Command::Bridge(arguments) => bridge::run(&arguments),
+        Command::Commission(arguments) => commission::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),

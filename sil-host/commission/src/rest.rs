@@ -1,0 +1,134 @@
+//! Step 2: the tip rests on the belt, stages off. Its height gives the belt's; the weight of the arm, by the
+//! model, gives the force that the cell should read.
+//!
+//! At rest, 0 = −w + Jᵀ f + u (paper, eq. 1 without motion), whether the tip sticks or is about to slide.
+
+use nalgebra::Vector2;
+use painleve_shared::counts::ForceCounts;
+use painleve_shared::kinematics::Pose;
+use painleve_shared::{Arm, JointTorque, LinkMotion};
+
+use crate::readings::Session;
+use crate::{CommissionError, Deviation, Instruction, Mistake, Rig};
+
+/// Largest error of the belt's height that counts as the scenario's own, m: 0.5° of each encoder's zero.
+const HEIGHT_TOLERANCE_M: f64 = 0.005;
+
+/// Farthest tip from the point below joint 1, as a part of the arm's height.
+const FARTHEST: f64 = 0.25;
+
+/// Largest error of the belt's height, as a part of the height.
+const LARGEST_HEIGHT_ERROR: f64 = 0.15;
+
+/// Smallest measurable weight, N and as a part of the force cell's range.
+const LEAST_N: f64 = 0.2;
+const LEAST_SHARE: f64 = 0.01;
+
+/// Allowed ratio of the reading to the expected force: the model's masses and springs are inexact.
+const RATIO: core::ops::Range<f64> = 0.5..2.0;
+
+/// Reading below which the cell has not noticed the weight, as a part of the expected force.
+const DEAD: f64 = 0.2;
+
+/// Reading that counts as the force cell's limit, as a part of its range.
+const LIMIT: f64 = 0.99;
+
+/// The arm at rest.
+#[derive(Clone, Debug)]
+pub struct RestFound {
+    /// Link angles, rad.
+    pub theta_rad: LinkMotion<f64>,
+    /// Distance of the first joint from the belt, m.
+    pub height_m: f64,
+    /// Normal force by the force cell, N; positive.
+    pub normal_force_n: f64,
+    /// Whether the cell reads f_n with the opposite sign.
+    pub normal_reversed: bool,
+    /// Readings without a load.
+    pub tare: [ForceCounts; 2],
+    /// Deviations from the scenario.
+    pub deviations: Vec<Deviation>,
+}
+
+/// Returns the force on the tip (f_t, f_n), N, at rest under joint torques; `None` for a straight arm.
+pub(crate) fn force_at_rest_n(
+    arm: &Arm<f64>,
+    theta: &LinkMotion<f64>,
+    torque_nm: [f64; 2],
+) -> Option<Vector2<f64>> {
+    let pose = Pose::new(theta);
+    let load_nm = arm.passive_torque_nm(theta, &LinkMotion::zeros(), &pose);
+    let torque_nm = JointTorque::new(torque_nm[0], torque_nm[1]).to_links();
+    let inverse = arm.jacobian(&pose).transpose().try_inverse()?;
+    Some(inverse * (load_nm.vector() - torque_nm.vector()))
+}
+
+/// Measures height and weight.
+pub(crate) fn measure<R: Rig>(
+    session: &mut Session<'_, R>,
+    tare: &[ForceCounts; 2],
+) -> Result<RestFound, CommissionError<R::Error>> {
+    let posture = session.expected.posture;
+    session.instruct(Instruction::SetDown { posture })?;
+    let readings = session.mean([0.0; 2])?;
+    let expected = session.expected;
+    let theta_rad = session
+        .theta_rad(readings.joints)
+        .ok_or(Mistake::EncoderSilent { joint: 0 })?;
+    let tip_m = expected.arm.tip_m(&Pose::new(&theta_rad));
+    let height_m = -tip_m.y;
+    let error_m = height_m - expected.arm.height_m();
+    if tip_m.x.abs() > FARTHEST * height_m
+        || error_m.abs() > LARGEST_HEIGHT_ERROR * expected.arm.height_m()
+    {
+        return Err(Mistake::NotSetDown {
+            tip_mm: 1e3 * tip_m.x,
+            gap_mm: -1e3 * error_m,
+        }
+        .into());
+    }
+    let mut deviations = Vec::new();
+    let is_other_height = error_m.abs() > HEIGHT_TOLERANCE_M;
+    if is_other_height {
+        deviations.push(Deviation::BeltHeight { error_m });
+    }
+    let net_n = session.net_force_n(readings.forces, *tare);
+    let expected_n = force_at_rest_n(&expected.arm, &theta_rad, [0.0; 2]).map_or(0.0, |it| it.y);
+    let range_n = f64::from(expected.converters.force.range);
+    if expected_n < LEAST_N.max(LEAST_SHARE * range_n) {
+        return Err(Mistake::TooLight { expected_n }.into());
+    }
+    let most = f64::from(expected.converters.force.maximum_counts());
+    if readings.forces.iter().any(|it| it.abs() > LIMIT * most) {
+        return Err(Mistake::ForceLimit { expected_n }.into());
+    }
+    let ratio = net_n.y.abs() / expected_n;
+    if ratio < DEAD {
+        let is_on_other_axis = RATIO.contains(&(net_n.x.abs() / expected_n));
+        return Err(if is_on_other_axis {
+            Mistake::ForceAxesSwapped
+        } else {
+            Mistake::ForceDead { expected_n }
+        }
+        .into());
+    }
+    if !RATIO.contains(&ratio) {
+        return Err(Mistake::ForceScale { ratio }.into());
+    }
+    let normal_reversed = net_n.y < 0.0;
+    if normal_reversed != expected.converters.mounting.force_reversed[1] {
+        deviations.push(Deviation::ForceDirection { axis: 1 });
+    }
+    Ok(RestFound {
+        theta_rad,
+        height_m: if is_other_height {
+            height_m
+        } else {
+            expected.arm.height_m()
+        },
+        normal_force_n: net_n.y.abs(),
+        normal_reversed,
+        tare: *tare,
+        deviations,
+    })
+}

@@ -1,0 +1,170 @@
+//! Every built-in mistake is found and named, and nothing is found in healthy arms.
+
+#![allow(clippy::unwrap_used)]
+
+use painleve_commission::simulated::{BuiltInMistake, SimulatedRig, random_arm};
+use painleve_commission::{CommissionError, Commissioned, Expected, commission};
+use painleve_plant::scenario::Scenario;
+
+const TORQUE_LIMIT_NM: f64 = 1.0;
+
+/// First seed of the random arms.
+const FIRST_SEED: u64 = 20_000;
+
+/// Commissions a simulated arm; a refusal is its message.
+fn commissioned(
+    scenario: &Scenario,
+    mistake: Option<BuiltInMistake>,
+    seed: u64,
+) -> Result<Commissioned, String> {
+    let expected = Expected::new(scenario, TORQUE_LIMIT_NM).unwrap();
+    let mut rig = SimulatedRig::new(scenario, mistake, seed);
+    commission(&mut rig, &expected).map_err(|error| match error {
+        CommissionError::Refused(mistake) => mistake.to_string(),
+        other => panic!("{other}"),
+    })
+}
+
+/// Returns the findings as messages, and whether the arm was refused.
+fn found(scenario: &Scenario, mistake: BuiltInMistake, seed: u64) -> (bool, Vec<String>) {
+    match commissioned(scenario, Some(mistake), seed) {
+        Ok(commissioned) => {
+            let deviations = commissioned.deviations.iter();
+            (false, deviations.map(ToString::to_string).collect())
+        }
+        Err(message) => (true, vec![message]),
+    }
+}
+
+/// Returns the beginning of every message that names the mistake, and whether the arm is refused.
+fn named(mistake: BuiltInMistake) -> (bool, &'static [&'static str]) {
+    use BuiltInMistake::*;
+    match mistake {
+        FirstEncoderMirrored => (
+            false,
+            &["encoder of joint 1: counts in the other direction"],
+        ),
+        ElbowEncoderMirrored => (
+            false,
+            &["encoder of the elbow: counts in the other direction"],
+        ),
+        EncodersSwapped => (true, &["encoders: exchanged"]),
+        FirstEncoderTurned => (false, &["encoder of joint 1: its zero is"]),
+        ElbowEncoderTurned => (false, &["encoder of the elbow: its zero is"]),
+        ElbowEncoderDead => (true, &["encoder of the elbow: its reading did not change"]),
+        FirstEncoderSilent => (true, &["encoder of joint 1: no readings"]),
+        ElbowEncoderGeared => (true, &["encoder of the elbow: turned by"]),
+        FirstStageMirrored => (
+            false,
+            &["torque stage of joint 1: turns its joint in the other"],
+        ),
+        ElbowStageMirrored => (
+            false,
+            &["torque stage of the elbow: turns its joint in the other"],
+        ),
+        StagesSwapped => (true, &["torque stages: exchanged"]),
+        FirstStageHalved => (true, &["torque stage of joint 1: gives 0."]),
+        ElbowStageDoubled => (true, &["torque stage of the elbow: gives "]),
+        ElbowStageDead => (true, &["torque stage of the elbow: no effect"]),
+        ForceCellUpsideDown => (
+            false,
+            &[
+                "force cell: f_n has the other sign",
+                "force cell: f_t has the other sign",
+            ],
+        ),
+        TangentialForceMirrored => (false, &["force cell: f_t has the other sign"]),
+        ForceAxesSwapped => (true, &["force cell: f_t and f_n are exchanged"]),
+        ForceCellOutOfBalance => (true, &["force cell: f_n reads"]),
+        ForceLineDead => (true, &["force cell: f_n did not change"]),
+        ForceCellOfAnotherRange => (true, &["force cell: reads 0.3"]),
+        BeltTooHigh => (false, &["belt: it is"]),
+    }
+}
+
+/// Checks that exactly the messages of the mistake are found.
+fn is_named(scenario: &Scenario, mistake: BuiltInMistake, seed: u64) -> Result<(), String> {
+    let (is_refused, beginnings) = named(mistake);
+    let (refused, messages) = found(scenario, mistake, seed);
+    let matches = refused == is_refused
+        && messages.len() == beginnings.len()
+        && messages
+            .iter()
+            .zip(beginnings)
+            .all(|(message, beginning)| message.starts_with(beginning));
+    matches
+        .then_some(())
+        .ok_or(format!("seed {seed}, {}: {messages:?}", mistake.name()))
+}
+
+#[test]
+fn every_built_in_mistake_is_found_and_named() {
+    for mistake in BuiltInMistake::ALL {
+        assert_eq!(is_named(&Scenario::default(), *mistake, 1), Ok(()));
+    }
+}
+
+#[test]
+fn every_mistake_is_found_in_random_arms() {
+    let failures: Vec<String> = (FIRST_SEED..FIRST_SEED + 25)
+        .flat_map(|seed| {
+            let scenario = random_arm(seed).unwrap();
+            let failures = BuiltInMistake::ALL.iter();
+            failures
+                .filter_map(|mistake| is_named(&scenario, *mistake, seed).err())
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    assert!(
+        failures.is_empty(),
+        "{} failures: {failures:#?}",
+        failures.len()
+    );
+}
+
+#[test]
+fn nothing_is_found_in_a_hundred_healthy_random_arms() {
+    for seed in FIRST_SEED..FIRST_SEED + 100 {
+        let commissioned = commissioned(&random_arm(seed).unwrap(), None, seed);
+        let deviations = commissioned.map(|it| it.deviations);
+        assert_eq!(deviations, Ok(Vec::new()), "seed {seed}");
+    }
+}
+
+/// A corrected scenario describes the arm: commissioned again, nothing is found.
+#[test]
+fn a_corrected_scenario_describes_the_arm() {
+    let scenario = Scenario::default();
+    for mistake in BuiltInMistake::ALL.iter().filter(|it| !named(**it).0) {
+        let corrected = commissioned(&scenario, Some(*mistake), 1).unwrap();
+        let corrected = corrected.applied_to(&scenario).unwrap();
+        if *mistake != BuiltInMistake::BeltTooHigh {
+            // The arm keeps its mistake: what is described now is built into the arm that was described.
+            let mut mistaken = SimulatedRig::new(&scenario, Some(*mistake), 2);
+            let expected = Expected::new(&corrected, TORQUE_LIMIT_NM).unwrap();
+            let again = commission(&mut mistaken, &expected).unwrap();
+            assert_eq!(again.deviations, [], "{}", mistake.name());
+        }
+        assert_eq!(
+            Scenario::from_toml(&corrected.to_commented_toml()).unwrap(),
+            corrected
+        );
+    }
+}
+
+#[test]
+fn friction_is_measured_to_a_tenth() {
+    let mut measured = 0;
+    for seed in FIRST_SEED..FIRST_SEED + 40 {
+        let scenario = random_arm(seed).unwrap();
+        if let Some(friction) = commissioned(&scenario, None, seed).unwrap().friction {
+            let actual = scenario.belt.friction;
+            assert!(
+                (friction / actual - 1.0).abs() < 0.15,
+                "seed {seed}: {friction}, {actual}"
+            );
+            measured += 1;
+        }
+    }
+    assert!(measured > 10, "{measured}");
+}
