@@ -57,7 +57,7 @@ impl EffectsStudy {
             Contact::Rigid => Vec::new(),
             Contact::Compliant => vec!["contact.kind=compliant".to_owned()],
         };
-        overrides.extend((effect.overrides)(level, &drawn));
+        overrides.extend(effect.overrides(level, &drawn));
         overrides.extend(self.overrides.iter().cloned());
         let origin = format!("effect {} at level {level}", effect.name);
         let mut scenario = scenario.with_overrides(&origin, &overrides)?;

@@ -8,7 +8,7 @@ use crate::robustness::LiftOffRule;
 pub struct RigEffect {
     /// Name on the command line and in rows.
     pub name: &'static str,
-    /// The key that a level sets; further keys may go with it.
+    /// The key that a level sets; [`Overrides::Computed`] may set further keys with it.
     pub key: &'static str,
     /// Unit of a level; empty for a ratio.
     pub unit: &'static str,
@@ -23,8 +23,20 @@ pub struct RigEffect {
     /// The largest friction coefficient in a run, from the level and the belt's μ, of effects that
     /// change it. Their targets are where p is at least a fifth of Q22 at that friction.
     pub largest_friction: Option<fn(f64, f64) -> f64>,
-    /// The overrides of a level, from the level and the random values of the run.
-    pub overrides: fn(f64, &Drawn) -> Vec<String>,
+    /// How a level is set.
+    pub overrides: Overrides,
+}
+
+/// The overrides of a level.
+pub enum Overrides {
+    /// None.
+    None,
+    /// The key is the level.
+    Level,
+    /// The key is two values, each the level with a random sign.
+    RandomSigns,
+    /// Computed from the level and the random values of the run.
+    Computed(fn(f64, &Drawn) -> Vec<String>),
 }
 
 /// Random values of a run that effects use.
@@ -69,6 +81,20 @@ pub enum Contact {
 }
 
 impl RigEffect {
+    /// Returns the overrides of a level in a run with these random values.
+    pub fn overrides(&self, level: f64, drawn: &Drawn) -> Vec<String> {
+        let key = self.key;
+        match self.overrides {
+            Overrides::None => Vec::new(),
+            Overrides::Level => vec![format!("{key}={level}")],
+            Overrides::RandomSigns => {
+                let [one, two] = drawn.signs(level);
+                vec![format!("{key}=[{one}, {two}]")]
+            }
+            Overrides::Computed(computed) => computed(level, drawn),
+        }
+    }
+
     /// Whether the plant with this contact has the effect.
     pub fn acts_on(&self, contact: Contact) -> bool {
         contact == Contact::Compliant || !self.compliant_only
@@ -90,4 +116,23 @@ impl RigEffect {
 macro_rules! set {
     ($($text:literal),+ $(,)?) => { vec![$(format!($text)),+] };
 }
-pub(super) use set;
+
+/// Returns a table of effects from lines of `name: key, unit, levels, typical level`, followed by the
+/// fields that differ from those of the given effect.
+macro_rules! effects {
+    (..$other:ident; $(
+        $name:literal: $key:literal, $unit:literal, $levels:expr, typical $typical:literal
+        $(, $field:ident: $value:expr)*;
+    )*) => {
+        &[$(RigEffect {
+            name: $name,
+            key: $key,
+            unit: $unit,
+            levels: &$levels,
+            typical: $typical,
+            $($field: $value,)*
+            ..$other
+        }),*]
+    };
+}
+pub(super) use {effects, set};

@@ -1,92 +1,49 @@
 //! Faults of single channels, and many effects together.
 
-use super::{BOTH, COMPLIANT, find};
-use crate::effects::effect::{Drawn, RigEffect, set};
+use super::{BOTH, find};
+use crate::effects::effect::Overrides::Computed;
+use crate::effects::effect::{Drawn, RigEffect, effects, set};
 use crate::robustness::LiftOffRule;
 
+/// An effect whose lift-offs are counted.
+const COUNTED: RigEffect = RigEffect {
+    lift_offs: LiftOffRule::Counted,
+    ..BOTH
+};
+
 /// The effects.
-pub(super) const EFFECTS: &[RigEffect] = &[
-    RigEffect {
-        name: "force-cell-off",
-        key: "converters.faults.normal_force",
-        unit: "s, at a random time",
-        levels: &[0.002, 0.005, 0.01, 0.02, 0.05],
-        typical: 0.005,
-        lift_offs: LiftOffRule::Counted,
-        overrides: |level, drawn| {
-            let mut both = fault("normal_force", "off", level, drawn);
-            both.extend(fault("tangential_force", "off", level, drawn));
-            both
-        },
-        ..BOTH
-    },
-    RigEffect {
-        name: "force-cell-stuck",
-        key: "converters.faults.normal_force",
-        unit: "s, at a random time",
-        levels: &[0.005, 0.02, 0.05, 0.2],
-        typical: 0.02,
-        lift_offs: LiftOffRule::Counted,
-        overrides: |level, drawn| {
-            let mut both = fault("normal_force", "stuck", level, drawn);
-            both.extend(fault("tangential_force", "stuck", level, drawn));
-            both
-        },
-        ..BOTH
-    },
-    RigEffect {
-        name: "encoder-off",
-        key: "converters.faults.encoder_1",
-        unit: "s, at a random time",
-        levels: &[0.002, 0.005, 0.01, 0.02],
-        typical: 0.005,
-        lift_offs: LiftOffRule::Counted,
-        overrides: |level, drawn| fault(drawn.joint("encoder_1", "encoder_2"), "off", level, drawn),
-        ..BOTH
-    },
-    RigEffect {
-        name: "encoder-stuck",
-        key: "converters.faults.encoder_1",
-        unit: "s, at a random time",
-        levels: &[0.002, 0.005, 0.01, 0.02, 0.05],
-        typical: 0.005,
-        lift_offs: LiftOffRule::Counted,
-        overrides: |level, drawn| {
-            fault(drawn.joint("encoder_1", "encoder_2"), "stuck", level, drawn)
-        },
-        ..BOTH
-    },
-    RigEffect {
-        name: "torque-off",
-        key: "converters.faults.torque_1",
-        unit: "s, at a random time",
-        levels: &[0.002, 0.005, 0.01, 0.02, 0.05],
-        typical: 0.005,
-        lift_offs: LiftOffRule::Counted,
-        overrides: |level, drawn| fault(drawn.joint("torque_1", "torque_2"), "off", level, drawn),
-        ..BOTH
-    },
-    RigEffect {
-        name: "torque-stuck",
-        key: "converters.faults.torque_1",
-        unit: "s, at a random time",
-        levels: &[0.005, 0.01, 0.02, 0.05, 0.1],
-        typical: 0.01,
-        lift_offs: LiftOffRule::Counted,
-        overrides: |level, drawn| fault(drawn.joint("torque_1", "torque_2"), "stuck", level, drawn),
-        ..BOTH
-    },
-    RigEffect {
-        name: "everything",
-        key: "all of the keys above but contact, model and faults",
-        unit: "of the typical levels",
-        levels: &[0.25, 0.5, 1.0, 2.0],
-        typical: 1.0,
-        lift_offs: LiftOffRule::Counted,
-        overrides: everything,
-        ..COMPLIANT
-    },
-];
+pub(super) const EFFECTS: &[RigEffect] = effects! {
+    ..COUNTED;
+
+    "force-cell-off": "converters.faults.normal_force", "s, at a random time",
+        [0.002, 0.005, 0.01, 0.02, 0.05], typical 0.005,
+        overrides: Computed(|level, drawn| force_cell_fault("off", level, drawn));
+
+    "force-cell-stuck": "converters.faults.normal_force", "s, at a random time",
+        [0.005, 0.02, 0.05, 0.2], typical 0.02,
+        overrides: Computed(|level, drawn| force_cell_fault("stuck", level, drawn));
+
+    "encoder-off": "converters.faults.encoder_1", "s, at a random time",
+        [0.002, 0.005, 0.01, 0.02], typical 0.005,
+        overrides: Computed(|level, drawn| encoder_fault("off", level, drawn));
+
+    "encoder-stuck": "converters.faults.encoder_1", "s, at a random time",
+        [0.002, 0.005, 0.01, 0.02, 0.05], typical 0.005,
+        overrides: Computed(|level, drawn| encoder_fault("stuck", level, drawn));
+
+    "torque-off": "converters.faults.torque_1", "s, at a random time",
+        [0.002, 0.005, 0.01, 0.02, 0.05], typical 0.005,
+        overrides: Computed(|level, drawn| torque_fault("off", level, drawn));
+
+    "torque-stuck": "converters.faults.torque_1", "s, at a random time",
+        [0.005, 0.01, 0.02, 0.05, 0.1], typical 0.01,
+        overrides: Computed(|level, drawn| torque_fault("stuck", level, drawn));
+
+    "everything": "all of the keys above but contact, model and faults", "of the typical levels",
+        [0.25, 0.5, 1.0, 2.0], typical 1.0,
+        compliant_only: true,
+        overrides: Computed(everything);
+};
 
 /// A fault of a channel that begins at a random time and lasts for `duration_s`.
 fn fault(channel: &str, kind: &str, duration_s: f64, drawn: &Drawn) -> Vec<String> {
@@ -94,6 +51,29 @@ fn fault(channel: &str, kind: &str, duration_s: f64, drawn: &Drawn) -> Vec<Strin
     set![
         "converters.faults.{channel}={{ kind = '{kind}', from_s = {from_s:?}, until_s = {until_s:?} }}"
     ]
+}
+
+/// A fault of both axes of the force cell; see [`fault`].
+fn force_cell_fault(kind: &str, duration_s: f64, drawn: &Drawn) -> Vec<String> {
+    ["normal_force", "tangential_force"]
+        .iter()
+        .flat_map(|channel| fault(channel, kind, duration_s, drawn))
+        .collect()
+}
+
+/// A fault of the encoder of either joint; see [`fault`].
+fn encoder_fault(kind: &str, duration_s: f64, drawn: &Drawn) -> Vec<String> {
+    fault(
+        drawn.joint("encoder_1", "encoder_2"),
+        kind,
+        duration_s,
+        drawn,
+    )
+}
+
+/// A fault of the torque of either joint; see [`fault`].
+fn torque_fault(kind: &str, duration_s: f64, drawn: &Drawn) -> Vec<String> {
+    fault(drawn.joint("torque_1", "torque_2"), kind, duration_s, drawn)
 }
 
 /// Effects of a rig together, each at this share of its typical level.
@@ -125,6 +105,6 @@ fn everything(share: f64, drawn: &Drawn) -> Vec<String> {
     ];
     let effects = TOGETHER.iter().filter_map(|name| find(name));
     effects
-        .flat_map(|effect| (effect.overrides)(share * effect.typical, drawn))
+        .flat_map(|effect| effect.overrides(share * effect.typical, drawn))
         .collect()
 }

@@ -7,13 +7,13 @@ mod converters;
 
 use std::sync::LazyLock;
 
-use super::effect::RigEffect;
+use super::effect::{Overrides, RigEffect};
 use crate::robustness::LiftOffRule;
 
 /// Every effect; the first changes nothing.
 pub static EFFECTS: LazyLock<Vec<&'static RigEffect>> = LazyLock::new(|| {
     let groups = [
-        &[BOTH],
+        &[NONE],
         belt::EFFECTS,
         arm::EFFECTS,
         converters::EFFECTS,
@@ -22,8 +22,8 @@ pub static EFFECTS: LazyLock<Vec<&'static RigEffect>> = LazyLock::new(|| {
     groups.into_iter().flatten().collect()
 });
 
-/// An effect that both plants have, with lift-offs as failures.
-const BOTH: RigEffect = RigEffect {
+/// No effect.
+const NONE: RigEffect = RigEffect {
     name: "none",
     key: "–",
     unit: "",
@@ -32,7 +32,13 @@ const BOTH: RigEffect = RigEffect {
     compliant_only: false,
     lift_offs: LiftOffRule::Fail,
     largest_friction: None,
-    overrides: |_, _| Vec::new(),
+    overrides: Overrides::None,
+};
+
+/// An effect that both plants have, with lift-offs as failures.
+const BOTH: RigEffect = RigEffect {
+    overrides: Overrides::Level,
+    ..NONE
 };
 
 /// An effect of the compliant plant alone.
