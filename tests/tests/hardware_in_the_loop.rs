@@ -263,6 +263,24 @@ fn a_board_that_is_gone_ends_the_run_with_a_message() {
     assert!(text.contains("has not answered for"), "{text}");
 }
 
+/// QEMU's timers count nanoseconds in 32 bits, which last 4.3 s.
+#[test]
+fn a_board_idle_for_longer_than_its_timer_counts_is_configured_again() {
+    let line = SerialLine::new(LineNoise::None);
+    let _board = line.start_board();
+    std::thread::sleep(Duration::from_secs(5));
+    let configuration = Scenario::default().controller_configuration();
+    let serial = Serial::open(
+        &line.host_port,
+        &configuration,
+        FrameSource::Lockstep,
+        Duration::from_secs(4),
+    );
+    let board = serial.expect("it answers");
+    let (result, _) = first_ticks(OnBoard::new(board));
+    assert_eq!((result.ticks, result.fault), (400, None));
+}
+
 #[test]
 fn a_port_that_cannot_be_used_is_named() {
     let bench = Bench::new("no-port");

@@ -23,6 +23,9 @@ pub struct FuzzArguments {
 const TARGETS: [&str; 2] = ["malformed_input", "state_machines"];
 const WITHIN: [&str; 3] = ["damaged_shards", "damaged_manifests", "any_bytes"];
 const FRAMES: &str = "random_frames";
+/// Compares both ends of a bus with a model. Its cases wait for each other, so there are fewer.
+const BUS: [&str; 4] = ["--package", "painleve-link", "--lib", "both_ends"];
+const BUS_SHARE: u32 = 20;
 
 /// Runs all tests with random input for as many cases as asked for.
 ///
@@ -45,6 +48,12 @@ pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
     let targets = TARGETS.map(|target| ["--test", target]).concat();
     test(&[&targets[..], &["--", "--nocapture"]].concat(), &variables)?;
     test(&[&["--lib", "--"], &WITHIN[..]].concat(), &variables)?;
+    let bus_cases = (arguments.cases / BUS_SHARE).max(1).to_string();
+    run_with(
+        &cargo(),
+        &[&["test"], &BUS[..]].concat(),
+        &[("PROPTEST_CASES", &bus_cases)],
+    )?;
     let frames = arguments.frames.to_string();
     test(&["--test", FRAMES], &[("PAINLEVE_FUZZ_TICKS", &frames)])
 }

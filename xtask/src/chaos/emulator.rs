@@ -10,8 +10,8 @@ use nix::unistd::Pid;
 use super::host::EMULATOR;
 use super::place::ChaosFolder;
 use super::trial::{
-    ChaosRole, Disturbance, Expected, Flaw, Plan, TrialOutcome, TrialProcess, command, judge,
-    next_run, orphans,
+    ChaosRole, Disturbance, Expected, Flaw, NOTICED, Plan, TrialOutcome, TrialProcess, command,
+    judge, next_run, orphans,
 };
 
 /// Disturbs the emulator of a run, `plan.call` milliseconds after its start.
@@ -35,8 +35,11 @@ pub fn disturb_emulator(
     };
     let reached = emulator.is_some_and(|id| kill(Pid::from_raw(id), signal).is_ok());
     let disturbed = Instant::now();
+    let mut noticed = None;
     if run.wait(disturbed + expected.end)? {
+        let took = disturbed.elapsed();
         let (code, text) = run.outcome();
+        noticed = (reached && code == Some(NOTICED)).then_some(took);
         judge("the run", code, &text, &mut findings);
     } else {
         findings.push((Flaw::Hang, "the run does not end".into()));
@@ -45,7 +48,7 @@ pub fn disturb_emulator(
     next_run(place, bus, expected, &mut findings)?;
     Ok(TrialOutcome {
         reached,
-        noticed: None,
+        noticed,
         findings,
     })
 }

@@ -11,6 +11,7 @@ use crate::command::{ChoreError, say};
 #[derive(Default)]
 pub struct TrialTable {
     rows: BTreeMap<String, Row>,
+    trials: usize,
     /// Number of flaws.
     pub findings: usize,
 }
@@ -34,6 +35,9 @@ const FLAWS: [(Flaw, &str); 7] = [
     (Flaw::Message, "messages"),
 ];
 
+/// Number of trials after which the progress is printed.
+const REPORTED: usize = 100;
+
 const PERCENTILES: [usize; 4] = [50, 90, 99, 100];
 
 impl TrialTable {
@@ -48,13 +52,23 @@ impl TrialTable {
             self.findings += 1;
             eprintln!("{trial:?}: {flaw:?}: {what} (load {})", load());
         }
+        self.trials += 1;
+        if self.trials.is_multiple_of(REPORTED) {
+            eprintln!("{} trials, {} flaws", self.trials, self.findings);
+        }
     }
 
-    /// Prints the counts, and the percentiles of the times in which peers ended.
+    /// Prints the counts, and the percentiles of the times in which peers ended, beside their limits
+    /// of silence and of waiting.
     ///
     /// # Errors
     /// If standard output is closed.
-    pub fn print(&mut self, took: Duration, segments: &[String]) -> Result<(), ChoreError> {
+    pub fn print(
+        &mut self,
+        took: Duration,
+        segments: &[String],
+        patience_s: &[String; 2],
+    ) -> Result<(), ChoreError> {
         let titles: String = FLAWS.map(|(_, title)| format!("{title:>10}")).concat();
         say(&format!(
             "{:24}{:>8}{:>12}{titles}",
@@ -71,7 +85,7 @@ impl TrialTable {
             ))?;
             sum += row.injections;
         }
-        self.print_noticed()?;
+        self.print_noticed(patience_s)?;
         say(&format!(
             "{sum} injections in {:.0} s at a load of {}, {} flaws, {} segments left{}",
             took.as_secs_f64(),
@@ -85,12 +99,15 @@ impl TrialTable {
         ))
     }
 
-    fn print_noticed(&mut self) -> Result<(), ChoreError> {
+    fn print_noticed(&mut self, [silence_s, wait_s]: &[String; 2]) -> Result<(), ChoreError> {
         let titles = PERCENTILES.map(|percent| match percent {
             100 => format!("{:>10}", "max ms"),
             percent => format!("{:>10}", format!("p{percent} ms")),
         });
         let titles = titles.concat();
+        say(&format!(
+            "peers were to notice a silence of {silence_s} s, and to wait {wait_s} s for a peer"
+        ))?;
         say(&format!("{:24}{:>8}{titles}", "peer ended after", "times"))?;
         for (name, row) in &mut self.rows {
             row.noticed.sort_unstable();

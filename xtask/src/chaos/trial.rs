@@ -18,9 +18,8 @@ const REACH: Duration = Duration::from_secs(30);
 const DOCUMENTED: [i32; 6] = [0, 1, 2, 3, 4, 130];
 const QUICK: [&str; 4] = ["--set", "run.duration_s=0.05", "--no-plot", "--json"];
 
-/// Parts of the messages of a process whose peer has ended or says nothing. One whose peer never
-/// came waits for `--wait-s` instead.
-const NOTICES: [&str; 3] = ["is gone", "has not answered", "has sent nothing"];
+/// Exit code of a process whose peer is gone, silent or never came.
+pub const NOTICED: i32 = 3;
 
 /// Beginnings of lines that are not errors.
 const REMARKS: [&str; 2] = ["the partial record is in ", "line: "];
@@ -170,8 +169,7 @@ pub fn run(
         if peer.wait(disturbed + end)? {
             let took = disturbed.elapsed();
             let (code, text) = peer.outcome();
-            let is_notice = NOTICES.iter().any(|part| text.stderr.contains(part));
-            noticed = (reached && is_notice).then_some(took);
+            noticed = (reached && code == Some(NOTICED)).then_some(took);
             judge("peer", code, &text, &mut findings);
         } else {
             findings.push((Flaw::Hang, "the peer does not end".into()));
