@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::cycles::{
-    FLASH_DATA_WAIT, FLASH_LINE_BYTES, FLASH_READ, FLASH_WAIT_STATES, InstructionKind,
-    PERIPHERAL_WAIT, PIPELINE_REFILL,
+    FLASH_DATA_WAIT, FLASH_LINE_BYTES, FLASH_READ, InstructionKind, PIPELINE_REFILL, data_wait,
+    fetch_wait, is_in_flash,
 };
 use crate::graph::{Block, Graph};
 use crate::instruction::{Effect, Instruction, PROGRAM_COUNTER};
@@ -93,7 +93,7 @@ pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
 
 /// The cost of consecutive instructions.
 ///
-/// While a line is executed, the accelerator reads the next one (RM0090, section 3.5.2, prefetch).
+/// A program in RAM waits for no line. In flash, while a line is executed, the accelerator reads the next one (RM0090, section 3.5.2, prefetch).
 /// A line therefore takes as long as its instructions or as the read, whichever is longer. Both
 /// grow with the cost of the instructions, so upper bounds of these give an upper bound.
 #[derive(Clone, Debug, Default)]
@@ -120,6 +120,7 @@ impl Walk {
         let last_byte = instruction.address + instruction.size - 1;
         for touched in [instruction.address, last_byte].map(|at| at / FLASH_LINE_BYTES) {
             match self.line {
+                _ if !is_in_flash(instruction.address) => {}
                 Some(line) if line >= touched => {}
                 Some(_) => {
                     self.cycles += FLASH_READ.saturating_sub(self.reading);
@@ -154,9 +155,9 @@ impl Walk {
         follow(&mut self.constants, instruction);
     }
 
-    /// Takes a branch: the pipeline is refilled from a line that has to be read.
-    pub fn branch(&mut self) {
-        self.cycles += PIPELINE_REFILL + FLASH_WAIT_STATES;
+    /// Takes a branch: the pipeline is refilled, in flash from a line that has to be read.
+    pub fn branch(&mut self, target: u32) {
+        self.cycles += branch(target);
         self.line = None;
         self.reading = 0;
     }
@@ -165,26 +166,27 @@ impl Walk {
 /// Returns the additional wait of a load or store for its memory.
 fn wait(instruction: &Instruction, now: &Constants) -> Option<u32> {
     if instruction.kind == InstructionKind::TableBranch {
-        return Some(FLASH_DATA_WAIT);
+        return Some(data_wait(instruction.address));
     }
     let (base, offset) = instruction.memory?;
     if base == PROGRAM_COUNTER {
-        return Some(FLASH_DATA_WAIT);
+        return Some(data_wait(instruction.address));
     }
-    match now.get(&base)?.wrapping_add_signed(offset) {
-        0x0800_0000..0x1000_0000 => Some(FLASH_DATA_WAIT),
-        0x4000_0000..0xa000_0000 => Some(PERIPHERAL_WAIT),
-        _ => None,
-    }
+    Some(data_wait(now.get(&base)?.wrapping_add_signed(offset)))
 }
 
-/// Returns the cost of entering a block. A taken branch refills the pipeline from a line that has
-/// to be read. Without a branch, a line may end at the block's start; the next one is then being
-/// read already.
+/// Returns the cost of a taken branch beyond its own cycle.
+pub fn branch(target: u32) -> u32 {
+    PIPELINE_REFILL + fetch_wait(target)
+}
+
+/// Returns the cost of entering a block. A taken branch refills the pipeline. Without a branch, a line
+/// of the flash may end at the block's start; the next one is then being read already.
 pub fn of_edge(from: &BlockCost, to: &Block, taken: bool) -> u32 {
+    let address = to.instructions[0].address;
     if taken {
-        return PIPELINE_REFILL + FLASH_WAIT_STATES;
+        return branch(address);
     }
-    let starts_line = to.instructions[0].address.is_multiple_of(FLASH_LINE_BYTES);
+    let starts_line = is_in_flash(address) && address.is_multiple_of(FLASH_LINE_BYTES);
     u32::from(starts_line) * FLASH_READ.saturating_sub(from.reading)
 }

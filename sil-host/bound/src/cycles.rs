@@ -1,17 +1,17 @@
-//! The cycle model: the cost of an instruction on a Cortex-M4F that runs from the flash of an
-//! STM32F405.
+//! The cycle model: the cost of an instruction on the Cortex-M4F of an STM32F405, which runs from flash
+//! or from RAM.
 //!
 //! Silicon has not been measured. Every number has its source:
 //!
 //! - TRM: ARM, *Cortex-M4 Technical Reference Manual* r0p1 (DDI 0439D), table 3-1 (instructions),
 //!   section 3.9 (exceptions) and table 7-1 (floating point);
-//! - RM0090: ST, *STM32F405/415 … reference manual*, section 3.5 (flash accelerator) and
-//!   section 2 (buses).
+//! - RM0090: ST, *STM32F405/415 … reference manual*, section 3.5 (flash accelerator), section 2
+//!   (buses) and section 9.2.1 (memory mapped to address 0).
 //!
 //! Where a table gives a range, the model takes its upper end. It never assumes pipelined loads or
-//! stores, predicted branches or folded instructions. It does assume that data lies in SRAM, which
-//! no other bus master uses at the same time, unless the address is a constant in flash or in a
-//! peripheral.
+//! stores, predicted branches or folded instructions. It does assume that data lies in RAM other than
+//! the program's, which no other bus master uses at the same time, unless the address is a constant
+//! in flash, in the program or in a peripheral.
 
 /// Wait states of the flash: RM0090, table 10, 168 MHz at 2.7 … 3.6 V.
 pub const FLASH_WAIT_STATES: u32 = 5;
@@ -32,22 +32,62 @@ pub const PIPELINE_REFILL: u32 = 3;
 /// own.
 pub const FLASH_DATA_WAIT: u32 = 2 * FLASH_READ;
 
+/// Longest wait of a load of a constant from the program in RAM: its bus and that of the instructions
+/// take turns (RM0090, section 2.1.8), which delays the load and the next instruction by a cycle each.
+pub const PROGRAM_DATA_WAIT: u32 = 2;
+
 /// Longest wait of an access to a peripheral. The slower bus, APB1, runs at a quarter of the core's
 /// clock; a transfer takes two of its cycles, after up to one for synchronisation (AMBA APB
 /// protocol, IHI 0024, section 3.1).
 pub const PERIPHERAL_WAIT: u32 = 12;
 
-/// Cycles from the interrupt's request to its first instruction, TRM section 3.9.1: 12 without wait
-/// states, plus the reads of the vector and of the first line from flash.
-pub const EXCEPTION_ENTRY: u32 = 12 + 2 * FLASH_READ;
+/// Addresses of the program in RAM: SRAM1, mapped to 0.
+const PROGRAM_IN_RAM: core::ops::Range<u32> = 0..0x0001_c000;
 
-/// Cycles to save s0 … s15 and FPSCR when the handler first uses the floating-point unit: 17 stores
-/// and one cycle to begin (TRM, section 7.2.2 and table 7-1, VSTM).
-pub const LAZY_FLOAT_STACKING: u32 = 18;
+/// Addresses of the flash.
+const FLASH: core::ops::Range<u32> = 0x0800_0000..0x1000_0000;
 
-/// Cycles to return to the interrupted program, TRM section 3.9.1: 12, plus 17 for the
-/// floating-point state, plus the read of the next line.
-pub const EXCEPTION_EXIT: u32 = 12 + 17 + FLASH_READ;
+/// Addresses of peripherals.
+const PERIPHERALS: core::ops::Range<u32> = 0x4000_0000..0xa000_0000;
+
+/// Returns whether instructions at this address are read from flash.
+pub fn is_in_flash(address: u32) -> bool {
+    !PROGRAM_IN_RAM.contains(&address)
+}
+
+/// Returns the longest wait for an instruction that does not follow the last one.
+pub fn fetch_wait(address: u32) -> u32 {
+    if is_in_flash(address) {
+        FLASH_WAIT_STATES
+    } else {
+        0
+    }
+}
+
+/// Returns the longest wait of a load or store at a known address.
+pub fn data_wait(address: u32) -> u32 {
+    if FLASH.contains(&address) {
+        FLASH_DATA_WAIT
+    } else if PROGRAM_IN_RAM.contains(&address) {
+        PROGRAM_DATA_WAIT
+    } else if PERIPHERALS.contains(&address) {
+        PERIPHERAL_WAIT
+    } else {
+        0
+    }
+}
+
+/// Returns the cycles around an interrupt's handler. From the request to the first instruction, TRM
+/// section 3.9.1: 12, plus the read of the vector from flash and the wait for the first instruction. To
+/// return: 12, plus the wait for an instruction from flash. A handler that uses the floating-point unit
+/// saves s0 … s15 and FPSCR, 17 stores and one cycle to begin (TRM, section 7.2.2 and table 7-1, VSTM),
+/// and loads them again, 17.
+pub fn around(handler: u32, uses_float: bool) -> u32 {
+    let entry = 12 + FLASH_READ + fetch_wait(handler);
+    let exit = 12 + FLASH_READ;
+    let float = if uses_float { 18 + 17 } else { 0 };
+    entry + exit + float
+}
 
 /// Kinds of instruction with different costs, with the number of registers where it matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -86,6 +86,12 @@ impl Graph {
             blocks: blocks(&instructions, &leaders, &tables),
         })
     }
+
+    /// Returns whether an instruction uses the floating-point unit.
+    pub fn uses_float(&self) -> bool {
+        let mut instructions = self.blocks.values().flat_map(|block| &block.instructions);
+        instructions.any(|instruction| instruction.text.starts_with('v'))
+    }
 }
 
 fn table(image: &Image, branch: &Instruction) -> Result<Vec<u32>, BoundError> {

@@ -10,10 +10,10 @@ use painleve_drivers::force_cell::ForceCellDriver;
 use serde::Serialize;
 
 use crate::BoundError;
-use crate::cycles::{EXCEPTION_ENTRY, EXCEPTION_EXIT, LAZY_FLOAT_STACKING};
+use crate::cycles::around;
 use crate::image::Image;
 use crate::loops::Limits;
-use crate::worst::{Analysis, Loop, Visit};
+use crate::worst::{Analysis, Loop, Visit, Worst};
 
 /// Handler of the control timer.
 pub const CONTROL_INTERRUPT: &str = "TIM2";
@@ -41,6 +41,8 @@ pub struct Bound {
     pub microseconds: f64,
     /// Highest control rate at which the interrupt ends before the next one, Hz.
     pub proves_hz: u32,
+    /// Cycles of the entry to the control interrupt and of the exit from it.
+    pub around_cycles: u32,
     /// Instructions on the worst path.
     pub instructions: u32,
     /// The path, in order of execution.
@@ -81,15 +83,15 @@ impl Bound {
             let worst = analysis.of(entry)?;
             worst.ok_or(BoundError::NeverReturns { address: entry })
         };
-        let around = EXCEPTION_ENTRY + LAZY_FLOAT_STACKING + EXCEPTION_EXIT;
+        let with_entry = |worst: &Worst| worst.cycles + around(worst.entry, worst.uses_float);
         let worst = of_handler(CONTROL_INTERRUPT)?;
         let (mut sensor_cycles, mut longest_sensor_cycles) = (0, 0);
         for (handler, times) in SENSOR_INTERRUPTS {
-            let once = of_handler(handler)?.cycles + around;
+            let once = with_entry(&of_handler(handler)?);
             sensor_cycles += times * once;
             longest_sensor_cycles = once.max(longest_sensor_cycles);
         }
-        let cycles = worst.cycles + around;
+        let cycles = with_entry(&worst);
         let path = stretches(&image, &worst.path);
         Ok(Self {
             cycles,
@@ -97,6 +99,7 @@ impl Bound {
             longest_sensor_cycles,
             microseconds: f64::from(cycles) / CORE_HZ * 1e6,
             proves_hz: (CORE_HZ / f64::from(cycles + sensor_cycles)) as u32,
+            around_cycles: cycles - worst.cycles,
             instructions: worst.instructions,
             path,
             loops: analysis
@@ -120,14 +123,14 @@ impl Bound {
                 (None, _) => writeln!(text),
             };
         }
-        let around = EXCEPTION_ENTRY + LAZY_FLOAT_STACKING + EXCEPTION_EXIT;
+        let around = self.around_cycles;
         let _ = writeln!(text, "{around:>7}  entry to and exit from the interrupt");
         let _ = write!(
             text,
             "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz.\n\
              Interrupts that read the sensors for the next tick: {} cycles, {:.1} µs in a tick, {:.1} µs each at most.\n\
              Together they prove control rates up to {} Hz.\n\
-             Not a measurement: cycles by the documents of ARM and ST, every flash line a miss. Tasks of lower \
+             Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss. Tasks of lower \
              priority that mask the interrupts come on top.",
             self.cycles,
             self.microseconds,

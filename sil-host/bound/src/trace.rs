@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::BoundError;
 use crate::cost::Walk;
-use crate::cycles::{EXCEPTION_ENTRY, EXCEPTION_EXIT, LAZY_FLOAT_STACKING};
+use crate::cycles::around;
 use crate::image::Image;
 use crate::instruction::{Decoder, Instruction};
 use crate::worst::Loop;
@@ -55,12 +55,15 @@ impl<'a> Tracer<'a> {
             let instruction = &self.decoded[address];
             let next = addresses.get(place + 1).map(|next| &self.decoded[next]);
             walk.step(instruction, next);
-            if next.is_some_and(|next| next.address != address + instruction.size) {
-                walk.branch();
+            if let Some(next) = next
+                && next.address != address + instruction.size
+            {
+                walk.branch(next.address);
             }
         }
+        let handler = addresses.first().copied().unwrap_or_default();
         Ok(Executed {
-            cycles: EXCEPTION_ENTRY + LAZY_FLOAT_STACKING + walk.cycles + EXCEPTION_EXIT,
+            cycles: walk.cycles + around(handler, true),
             instructions: addresses.len() as u32,
         })
     }

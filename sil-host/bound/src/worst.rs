@@ -14,7 +14,6 @@ use microlp::{
 
 use crate::BoundError;
 use crate::cost;
-use crate::cycles::{FLASH_WAIT_STATES, PIPELINE_REFILL};
 use crate::graph::Graph;
 use crate::image::{Frame, Image};
 use crate::instruction::Decoder;
@@ -34,6 +33,8 @@ pub struct Worst {
     pub path: Vec<Visit>,
     /// Instructions on that path, including calls.
     pub instructions: u32,
+    /// Whether it or a function that it calls uses the floating-point unit.
+    pub uses_float: bool,
     /// Loops of the function.
     pub loops: Vec<Loop>,
 }
@@ -111,19 +112,24 @@ impl<'a> Analysis<'a> {
         };
         let graph = Graph::of(self.image, &self.decoder, entry)?;
         let mut calls = BTreeMap::new();
+        let mut uses_float = graph.uses_float();
         for block in graph.blocks.values() {
             if let Some(callee) = block.call {
                 if callee == entry {
                     return Err(BoundError::Recursion { address: callee });
                 }
                 let worst = self.of(callee)?;
+                uses_float |= worst.as_ref().is_some_and(|worst| worst.uses_float);
                 calls.insert(
                     callee,
                     worst.map(|worst| (worst.cycles, worst.instructions)),
                 );
             }
         }
-        let worst = self.solve(&graph, &calls)?;
+        let worst = self.solve(&graph, &calls)?.map(|worst| Worst {
+            uses_float,
+            ..worst
+        });
         self.known.insert(entry, worst.clone());
         Ok(worst)
     }
@@ -141,8 +147,9 @@ impl<'a> Analysis<'a> {
             let known = constants.get(address).cloned().unwrap_or_default();
             let call = block.call.and_then(|callee| calls[&callee]);
             let call = call.map_or(0, |(cycles, _)| {
-                // Call and return, each to a line that has to be read.
-                cycles + 2 * (PIPELINE_REFILL + FLASH_WAIT_STATES)
+                // Call and return.
+                let callee = block.call.unwrap_or(*address);
+                cycles + cost::branch(callee) + cost::branch(*address)
             });
             let own = cost::of_block(block, &known);
             costs.insert(*address, own.cycles + call);
@@ -153,7 +160,7 @@ impl<'a> Analysis<'a> {
         for one in &loops {
             if let Limit::Cycles(cycles) = one.limit {
                 let round: u32 = one.blocks.iter().map(|block| costs[block]).sum();
-                let edges = one.blocks.len() as u32 * (PIPELINE_REFILL + FLASH_WAIT_STATES);
+                let edges = one.blocks.len() as u32 * cost::branch(one.header);
                 entered.insert(one.header, cycles + 2 * (round + edges));
                 for block in &one.blocks {
                     costs.insert(*block, 0);
@@ -261,6 +268,7 @@ impl<'a> Analysis<'a> {
             cycles: solution.objective().ceil() as u32,
             path: Vec::new(),
             instructions: 0,
+            uses_float: false,
             loops,
         };
         let mut visits: BTreeMap<u32, Visit> = BTreeMap::new();

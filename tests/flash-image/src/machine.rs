@@ -30,6 +30,8 @@ pub trait Chip: Clone {
     const FLASH: (u32, usize);
     /// Start and length of its RAM.
     const RAM: (u32, usize);
+    /// Bytes of the RAM that can be mapped to address 0.
+    const ALIASED_RAM: usize;
 
     /// Resets the peripherals for the given cause.
     fn reset(&mut self, reset: Reset, now: Picoseconds);
@@ -60,6 +62,9 @@ pub trait Chip: Clone {
 
     /// Returns the processor's clock, Hz; 0 if it has stopped.
     fn core_hz(&self) -> u64;
+
+    /// Returns whether the RAM, rather than the flash, is mapped to address 0.
+    fn ram_is_at_zero(&self) -> bool;
 }
 
 /// Cause of a reset.
@@ -92,6 +97,8 @@ struct Core<C> {
     chip: C,
     system: SystemControl,
     flash: Arc<[u8]>,
+    /// The program that the image copies to the RAM at address 0.
+    program: Arc<[u8]>,
     now: Picoseconds,
     cycles: u64,
     instructions: u64,
@@ -163,8 +170,13 @@ impl<C: Chip> Core<C> {
     }
 
     fn opcode(&self, address: u32) -> u16 {
-        let at = address.wrapping_sub(C::FLASH.0) as usize;
-        let bytes = self.flash.get(at..at + 2);
+        let at = address as usize;
+        let bytes = if at < C::ALIASED_RAM {
+            self.program.get(at..at + 2)
+        } else {
+            let at = address.wrapping_sub(C::FLASH.0) as usize;
+            self.flash.get(at..at + 2)
+        };
         bytes.map_or(0, |it| u16::from_le_bytes([it[0], it[1]]))
     }
 }
@@ -174,6 +186,10 @@ impl<C: Chip> Surroundings for Core<C> {
         if self.is_dirty {
             self.refresh();
         }
+        assert!(
+            address as usize >= C::ALIASED_RAM || self.chip.ram_is_at_zero(),
+            "{address:#010x} is executed before the RAM is mapped to it"
+        );
         let mut stop = None;
         if self.conditional == 0 {
             if self.candidate {
@@ -288,8 +304,13 @@ impl<C: Chip> Machine<C> {
             .unwrap_or_else(|error| panic!("no image at {}: {error}", image.display()));
         let elf = object::File::parse(&*file).unwrap_or_else(|error| panic!("{error}"));
         let mut flash = vec![0xff; C::FLASH.1];
+        let mut program = vec![0; C::ALIASED_RAM];
         for segment in elf.segments() {
             let bytes = segment.data().unwrap_or_default();
+            let at = segment.address() as usize;
+            if let Some(place) = program.get_mut(at..at + bytes.len()) {
+                place.copy_from_slice(bytes);
+            }
             // Initial values are in flash, after the code; the image copies them.
             let at = physical_address(&elf, &segment).wrapping_sub(u64::from(C::FLASH.0)) as usize;
             if let Some(place) = flash.get_mut(at..at + bytes.len()) {
@@ -302,8 +323,9 @@ impl<C: Chip> Machine<C> {
             .collect();
         let core = Core {
             chip,
-            system: SystemControl::new(C::FLASH.0),
+            system: SystemControl::new(),
             flash: flash.as_slice().into(),
+            program: program.into(),
             now: 0,
             cycles: 0,
             instructions: 0,
@@ -320,7 +342,7 @@ impl<C: Chip> Machine<C> {
         let mut unicorn = Unicorn::new(library, core)
             .unwrap_or_else(|error| panic!("{}: {error}", library.display()));
         unicorn.map(C::FLASH.0, C::FLASH.1);
-        unicorn.map(C::RAM.0, C::RAM.1);
+        unicorn.map_with_alias(C::RAM.0, C::RAM.1, 0, C::ALIASED_RAM);
         unicorn.map_peripherals(&[
             (0x4000_0000, 0x0010_0000),
             (0x4200_0000, 0x0200_0000),
@@ -394,7 +416,7 @@ impl<C: Chip> Machine<C> {
     pub fn reset(&mut self, reset: Reset) {
         let core = self.unicorn.surroundings_mut();
         core.chip.reset(reset, core.now);
-        core.system = SystemControl::new(C::FLASH.0);
+        core.system = SystemControl::new();
         core.conditional = 0;
         core.refresh();
         let now = core.now;
@@ -482,8 +504,8 @@ impl<C: Chip> Machine<C> {
 
     /// Puts the program into an endless loop without interrupts.
     pub fn hang(&mut self) {
-        // A branch to itself, in unused memory.
-        let place = C::RAM.0 + C::RAM.1 as u32 / 2;
+        // A branch to itself, in memory that the image leaves unused.
+        let place = C::RAM.0;
         self.unicorn.processor().write_memory(place, &[0xfe, 0xe7]);
         self.unicorn.surroundings_mut().conditional = 0;
         self.unicorn.set(Register::PRIMASK, 1);
@@ -608,7 +630,10 @@ impl<C: Chip> Machine<C> {
         core.system.enter(exception);
         core.is_dirty = true;
         core.conditional = 0;
-        let vector = core.system.vector_table + 4 * exception as u32;
+        let mut vector = core.system.vector_table + 4 * exception as u32;
+        if (vector as usize) < C::ALIASED_RAM && !core.chip.ram_is_at_zero() {
+            vector += C::FLASH.0;
+        }
         let mut handler = [0; 4];
         unicorn.processor().read_memory(vector, &mut handler);
         unicorn.set(Register::SP, frame_at);

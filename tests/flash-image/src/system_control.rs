@@ -26,7 +26,7 @@ pub struct SystemControl {
     pub active: Vec<Exception>,
     /// Whether a non-maskable interrupt is pending.
     pub nmi_pending: bool,
-    /// Address of the vector table.
+    /// Address of the vector table; 0 after a reset.
     pub vector_table: u32,
     /// Whether a reset has been requested.
     pub reset_requested: bool,
@@ -39,9 +39,15 @@ pub struct SystemControl {
     system_control: u32,
 }
 
+impl Default for SystemControl {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl SystemControl {
     /// Creates the registers in their reset state.
-    pub fn new(vector_table: u32) -> Self {
+    pub fn new() -> Self {
         Self {
             enabled: 0,
             latched: 0,
@@ -50,7 +56,7 @@ impl SystemControl {
             system_priorities: [0; 16],
             active: Vec::new(),
             nmi_pending: false,
-            vector_table,
+            vector_table: 0,
             reset_requested: false,
             cycle_counter_enabled: false,
             cycle_counter_zero: 0,

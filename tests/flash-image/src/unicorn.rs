@@ -105,6 +105,7 @@ struct Functions {
     close: unsafe extern "C" fn(Handle) -> Status,
     control: unsafe extern "C" fn(Handle, u32, ...) -> Status,
     memory_map: unsafe extern "C" fn(Handle, u64, u64, u32) -> Status,
+    memory_map_at: unsafe extern "C" fn(Handle, u64, u64, u32, *mut c_void) -> Status,
     memory_read: unsafe extern "C" fn(Handle, u64, *mut c_void, u64) -> Status,
     memory_write: unsafe extern "C" fn(Handle, u64, *const c_void, u64) -> Status,
     mmio_map: MmioMap,
@@ -128,6 +129,7 @@ impl Functions {
                 close: *library.get(b"uc_close\0")?,
                 control: *library.get(b"uc_ctl\0")?,
                 memory_map: *library.get(b"uc_mem_map\0")?,
+                memory_map_at: *library.get(b"uc_mem_map_ptr\0")?,
                 memory_read: *library.get(b"uc_mem_read\0")?,
                 memory_write: *library.get(b"uc_mem_write\0")?,
                 mmio_map: *library.get(b"uc_mmio_map\0")?,
@@ -183,6 +185,8 @@ struct CallbackContext<S> {
     processor: Processor,
     surroundings: S,
     regions: Vec<Region>,
+    /// Memory with an alias, which Unicorn uses.
+    shared_memory: Vec<Vec<Page>>,
     /// Payload of a panic in a callback; no panic may unwind through Unicorn.
     panic: Option<Box<dyn Any + Send>>,
 }
@@ -192,6 +196,11 @@ struct Region {
     base: u32,
     shared: *mut c_void,
 }
+
+/// A page of memory, aligned as Unicorn requires.
+#[derive(Clone)]
+#[repr(align(4096))]
+struct Page(#[allow(dead_code)] [u8; 4096]); // Unicorn reads and writes it
 
 /// A Cortex-M4F with memory and [`Surroundings`].
 pub struct Unicorn<S> {
@@ -229,6 +238,7 @@ impl<S: Surroundings> Unicorn<S> {
             processor: Processor { functions, handle },
             surroundings,
             regions: Vec::new(),
+            shared_memory: Vec::new(),
             panic: None,
         }));
         let mut hook = 0;
@@ -273,6 +283,29 @@ impl<S: Surroundings> Unicorn<S> {
                 7,
             )
         });
+    }
+
+    /// Maps executable memory whose first `alias_length` bytes are also found at address `alias`.
+    pub fn map_with_alias(&mut self, address: u32, length: usize, alias: u32, alias_length: usize) {
+        let shared = self.shared;
+        // SAFETY: see `parts`.
+        let parts = unsafe { &mut *shared };
+        let mut pages = vec![Page([0; 4096]); length.div_ceil(4096)];
+        let place: *mut c_void = pages.as_mut_ptr().cast();
+        parts.shared_memory.push(pages);
+        let processor = &parts.processor;
+        for (address, length) in [(address, length), (alias, alias_length.min(length))] {
+            // SAFETY: the pages are at least as long, never move, and are freed after the engine.
+            check(unsafe {
+                (processor.functions.memory_map_at)(
+                    processor.handle,
+                    address.into(),
+                    length as u64,
+                    7,
+                    place,
+                )
+            });
+        }
     }
 
     /// Directs loads and stores of address ranges to the [`Surroundings`].

@@ -23,6 +23,7 @@
 #![no_std]
 #![cfg(target_os = "none")]
 
+pub mod program_memory;
 pub mod safety;
 pub mod uart_dma;
 

@@ -25,9 +25,9 @@ const FASTEST_OSCILLATOR_HZ: f32 = 47_000.0;
 const WINDOW_CYCLES: f32 = 4096.0;
 
 // The first instructions after a reset, in assembly because memory is not initialised yet: enable the clock
-// of port B, set PB0 low, then make it an output.
+// of port B, set PB0 low, then make it an output. Then `program_memory` copies the program.
 core::arch::global_asm!(
-    ".section .text.__pre_init, \"ax\", %progbits",
+    ".section .Reset, \"ax\", %progbits",
     ".global __pre_init",
     ".type __pre_init, %function",
     ".thumb_func",
@@ -44,7 +44,7 @@ core::arch::global_asm!(
     "bic r1, r1, #3",
     "orr r1, r1, #1",
     "str r1, [r0]",
-    "bx lr",
+    "b __copy_program",
     ".ltorg",
     ".size __pre_init, . - __pre_init",
     rcc_ahb1enr = const 0x4002_3830_u32,

@@ -1,20 +1,30 @@
 //! Worst cases of code short enough to count by hand.
 
 use super::*;
+use crate::cycles::{FLASH_WAIT_STATES, PIPELINE_REFILL};
 use crate::loops::Declared;
 
 const AT: u32 = 0x0800_1000;
+const AT_IN_RAM: u32 = 0x0000_1000;
 
 fn worst(code: &[u16], limits: &[(&'static str, Limit)]) -> Result<Option<Worst>, BoundError> {
+    worst_at(AT, code, limits)
+}
+
+fn worst_at(
+    at: u32,
+    code: &[u16],
+    limits: &[(&'static str, Limit)],
+) -> Result<Option<Worst>, BoundError> {
     let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
-    let image = Image::of_code(AT, &bytes, "kernel");
+    let image = Image::of_code(at, &bytes, "kernel");
     let declared = limits.iter().map(|(function, limit)| Declared {
         function,
         limit: *limit,
         because: "",
     });
     let limits = Limits(declared.collect());
-    Analysis::new(&image, &limits)?.of(AT)
+    Analysis::new(&image, &limits)?.of(at)
 }
 
 /// movs r0, #3; again: subs r0, #1; bne again; bx lr
@@ -34,6 +44,21 @@ fn a_loop_costs_its_iterations() {
         1 + 1 + PIPELINE_REFILL + FLASH_WAIT_STATES
     );
     assert_eq!(cycles(1), 4);
+}
+
+#[test]
+fn code_in_ram_waits_for_no_line() {
+    // Sixteen instructions of a cycle each, over two lines, then the return.
+    let code = [0x2003; 16].into_iter().chain([0x4770]).collect::<Vec<_>>();
+    let cycles = |at| worst_at(at, &code, &[]).unwrap().unwrap().cycles;
+    assert_eq!(cycles(AT_IN_RAM), 17);
+    assert!(cycles(AT) >= cycles(AT_IN_RAM));
+    let limits = [("kernel", Limit::Times(3))];
+    let count_down = |at| worst_at(at, &COUNT_DOWN, &limits).unwrap().unwrap().cycles;
+    assert_eq!(
+        count_down(AT) - count_down(AT_IN_RAM),
+        2 * FLASH_WAIT_STATES
+    );
 }
 
 #[test]

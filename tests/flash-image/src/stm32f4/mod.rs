@@ -257,7 +257,9 @@ impl<O: Outside> Stm32f4<O> {
             0x4001_3000 if self.rcc.is_on(0x44, 12) => {
                 self.spis[0].write(offset, value, fast, now);
             }
-            0x4001_3800 => self.syscfg[((offset / 4) & 15) as usize] = value,
+            0x4001_3800 if self.rcc.is_on(0x44, 14) => {
+                self.syscfg[((offset / 4) & 15) as usize] = value;
+            }
             0x4001_3c00 if offset == 0x14 => self.external_interrupts[5] &= !value,
             0x4001_3c00 => self.external_interrupts[((offset / 4) & 7) as usize] = value,
             0x4002_0000..0x4002_2000 => {
@@ -323,6 +325,7 @@ impl<O: Outside> Stm32f4<O> {
 impl<O: Outside> Chip for Stm32f4<O> {
     const FLASH: (u32, usize) = (0x0800_0000, 1 << 20);
     const RAM: (u32, usize) = (0x2000_0000, 128 << 10);
+    const ALIASED_RAM: usize = 112 << 10;
 
     fn reset(&mut self, reset: Reset, now: Picoseconds) {
         let external = self.ports.each_ref().map(|it| it.external);
@@ -347,6 +350,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.power = [0x4000, 0];
         self.flash_control[2] = 0;
         self.flash_control[5] |= 1;
+        self.syscfg = [0; 16];
         self.external_interrupts = [0; 8];
         self.reset = None;
     }
@@ -415,6 +419,11 @@ impl<O: Outside> Chip for Stm32f4<O> {
             .min(self.watchdog.expires())
             .min(self.window_watchdog.expires())
             .min(if dma { 0 } else { Picoseconds::MAX })
+    }
+
+    /// Returns whether SYSCFG_MEMRMP maps SRAM1 to address 0 (RM0090, section 9.2.1).
+    fn ram_is_at_zero(&self) -> bool {
+        self.syscfg[0] & 3 == 3
     }
 
     fn interrupt_lines(&self) -> u128 {
