@@ -368,7 +368,7 @@ impl StateMachineTest for LapseTest {
         if times == 0 {
             monitor.note_good(lapse);
         } else {
-            assert_eq!(monitor.note_bad(lapse, times), model.is_too_much(lapse));
+            assert_eq!(monitor.note(lapse, times), model.is_too_much(lapse));
         }
         monitor
     }

@@ -19,6 +19,8 @@ const FORCE_TOLERANCE: f32 = 0.05;
 pub struct GapCheck {
     arm: Arm<f32>,
     encoders: [EncoderScale; 2],
+    /// One count of each encoder, rad.
+    rad_per_count: [f32; 2],
     force: LinearScale<f32>,
 }
 
@@ -28,6 +30,7 @@ impl GapCheck {
         Self {
             arm,
             encoders,
+            rad_per_count: encoders.map(|scale| scale.rad_per_count()),
             force,
         }
     }
@@ -35,11 +38,12 @@ impl GapCheck {
     /// Returns whether these readings contradict each other.
     pub fn contradicts(&self, joints: [EncoderCounts; 2], normal_force: ForceCounts) -> bool {
         let [scale_1, scale_2] = &self.encoders;
+        let [rad_1, rad_2] = self.rad_per_count;
         let [joint_1, joint_2] = joints;
-        let angle_rad = |scale: &EncoderScale, reading| {
-            scale.counts_from_zero(reading) as f32 * scale.rad_per_count::<f32>()
-        };
-        let joints = JointMotion::new(angle_rad(scale_1, joint_1), angle_rad(scale_2, joint_2));
+        let joints = JointMotion::new(
+            scale_1.counts_from_zero(joint_1) as f32 * rad_1,
+            scale_2.counts_from_zero(joint_2) as f32 * rad_2,
+        );
         let gap_m = self.arm.gap_m(&Pose::new(&joints.to_links()));
         let tolerance_m = HEIGHT_TOLERANCE * self.arm.height_m();
         let touches = self.force.value(normal_force.0) > FORCE_TOLERANCE * self.force.range;

@@ -58,12 +58,32 @@ impl Lapses<'_> {
     #[cold]
     #[inline(never)]
     fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
-        let latches = self.monitor.note_bad(lapse, times) && self.supervision.fault().is_none();
+        self.monitor.note(lapse, times) && self.latch(lapse)
+    }
+
+    /// Latches the fault of a lapse that has occurred too often, unless there is a fault already.
+    /// Returns whether it has.
+    fn latch(&mut self, lapse: Lapse) -> bool {
+        let latches = self.supervision.fault().is_none();
         if latches {
             self.supervision.latch(lapse.fault());
             *self.command = LastCommand::default();
         }
         latches
+    }
+
+    /// Records several lapses; only the first that has occurred too often may latch its fault.
+    #[inline]
+    fn note_all<const N: usize>(&mut self, lapses: [(Lapse, u32); N]) {
+        let mut first = None;
+        for (lapse, times) in lapses {
+            if self.monitor.note(lapse, times) && first.is_none() {
+                first = Some(lapse);
+            }
+        }
+        if let Some(lapse) = first {
+            self.latch(lapse);
+        }
     }
 }
 
@@ -86,8 +106,8 @@ pub(super) fn arrive(
         .all(|force| converters.force.contains(force.0));
     let board_faults = frame.inputs.intersection(BOARD_FAULTS);
     if ahead != 1 || !encoders || !forces || !board_faults.is_empty() {
-        note_board_faults(&mut lapses, board_faults);
-        return irregular(state, lapses, frame.sequence, ahead, encoders, forces);
+        let reading = Readability { encoders, forces };
+        return irregular(state, lapses, frame.sequence, ahead, reading, board_faults);
     }
     state.last_sequence = Some(frame.sequence);
     for lapse in Lapse::OF_FRAMES {
@@ -96,20 +116,13 @@ pub(super) fn arrive(
     Arrival::After(1 + core::mem::take(&mut state.unread_ticks))
 }
 
-/// Records the faults that the board has detected by itself.
-#[cold]
-#[inline(never)]
-fn note_board_faults(lapses: &mut Lapses<'_>, faults: DigitalInputs) {
-    for (bit, lapse) in [
-        (DigitalInputs::ARMING_REFUSED, Lapse::ArmingRefused),
-        (DigitalInputs::STAGE_NOT_READY, Lapse::StageNotReady),
-        (DigitalInputs::GAP_AGAINST_FORCE, Lapse::GapAgainstForce),
-    ] {
-        lapses.note(lapse, u32::from(faults.contains(bit)));
-    }
+/// Whether the readings of a frame are within their converters' ranges.
+struct Readability {
+    encoders: bool,
+    forces: bool,
 }
 
-/// Handles a frame that is out of sequence or has readings (`encoders`, `forces`) out of range.
+/// Handles a frame that is out of sequence, has readings out of range, or reports faults of the board.
 #[cold]
 #[inline(never)]
 fn irregular(
@@ -117,19 +130,31 @@ fn irregular(
     mut lapses: Lapses<'_>,
     sequence: u32,
     ahead: u32,
-    encoders: bool,
-    forces: bool,
+    Readability { encoders, forces }: Readability,
+    board_faults: DigitalInputs,
 ) -> Arrival {
     // More than half the counter's range ahead means behind.
     let stale = ahead == 0 || ahead > u32::MAX / 2;
-    lapses.note(Lapse::StaleFrame, u32::from(stale));
+    let [refused, not_ready, against_force] = [
+        (DigitalInputs::ARMING_REFUSED, Lapse::ArmingRefused),
+        (DigitalInputs::STAGE_NOT_READY, Lapse::StageNotReady),
+        (DigitalInputs::GAP_AGAINST_FORCE, Lapse::GapAgainstForce),
+    ]
+    .map(|(bit, lapse)| (lapse, u32::from(board_faults.contains(bit))));
     if stale {
+        lapses.note_all([refused, not_ready, against_force, (Lapse::StaleFrame, 1)]);
         return Arrival::Stale;
     }
     state.last_sequence = Some(sequence);
-    lapses.note(Lapse::LostFrame, ahead - 1);
-    lapses.note(Lapse::EncoderOutOfRange, u32::from(!encoders));
-    lapses.note(Lapse::ForceOutOfRange, u32::from(!forces));
+    lapses.note_all([
+        refused,
+        not_ready,
+        against_force,
+        (Lapse::StaleFrame, 0),
+        (Lapse::LostFrame, ahead - 1),
+        (Lapse::EncoderOutOfRange, u32::from(!encoders)),
+        (Lapse::ForceOutOfRange, u32::from(!forces)),
+    ]);
     let ticks = ahead.saturating_add(state.unread_ticks);
     if encoders && forces {
         state.unread_ticks = 0;

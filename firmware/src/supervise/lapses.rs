@@ -34,13 +34,15 @@ impl LapseMonitor {
         self.counts[lapse as usize].in_a_row = 0;
     }
 
-    /// Records how many times `lapse` occurred; returns whether it has now occurred too often in a
-    /// row.
+    /// Records how many times `lapse` occurred, 0 for none; returns whether it has now occurred too
+    /// often in a row.
+    #[inline]
     #[must_use]
-    pub fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
+    pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
         let count = &mut self.counts[lapse as usize];
         count.total = count.total.wrapping_add(times);
-        count.in_a_row = count.in_a_row.saturating_add(times);
+        let in_a_row = count.in_a_row.saturating_add(times);
+        count.in_a_row = if times == 0 { 0 } else { in_a_row };
         count.in_a_row > self.limits.of(lapse)
     }
 
@@ -66,15 +68,15 @@ mod tests {
             let limit = limits.of(lapse);
             let mut monitor = LapseMonitor::new(limits);
             for _ in 0..limit {
-                assert!(!monitor.note_bad(lapse, 1), "{lapse:?}");
+                assert!(!monitor.note(lapse, 1), "{lapse:?}");
             }
             monitor.note_good(lapse);
-            assert!(!monitor.note_bad(lapse, limit));
+            assert!(!monitor.note(lapse, limit));
             for other in Lapse::ALL.iter().copied().filter(|other| *other != lapse) {
-                assert!(!monitor.note_bad(other, 1));
+                assert!(!monitor.note(other, 1));
                 assert_eq!(monitor.total(other), 1);
             }
-            assert!(monitor.note_bad(lapse, 1), "{lapse:?}");
+            assert!(monitor.note(lapse, 1), "{lapse:?}");
             assert_eq!(monitor.total(lapse), 2 * limit + 1);
         }
     }
@@ -83,7 +85,7 @@ mod tests {
     fn totals_wrap_without_a_fault() {
         let mut monitor = LapseMonitor::default();
         monitor.counts[Lapse::MissingFrame as usize].total = u32::MAX;
-        assert!(!monitor.note_bad(Lapse::MissingFrame, 1));
+        assert!(!monitor.note(Lapse::MissingFrame, 1));
         assert_eq!(monitor.total(Lapse::MissingFrame), 0);
     }
 }
