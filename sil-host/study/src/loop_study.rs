@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use painleve_plant::Plant;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::range::OutOfRange;
+use serde::Serialize;
 
 use super::tabular::Tabular;
 use super::{Study, StudyError};
@@ -108,9 +109,7 @@ impl<S: LoopStudy, M: MakePlant> Study for OnPlant<S, M> {
 }
 
 impl<S: LoopStudy + Tabular, M: MakePlant> Tabular for OnPlant<S, M> {
-    type Line = S::Line;
-
-    fn lines(row: &S::Row) -> Vec<S::Line> {
+    fn lines(row: &S::Row) -> impl IntoIterator<Item: Serialize> {
         S::lines(row)
     }
 

@@ -9,12 +9,12 @@ use super::{Study, StudyError};
 
 /// A study whose rows each make lines of its CSV file, so that the file can
 /// be assembled from rows computed separately.
-pub trait Tabular: Study {
-    /// One line: a flat struct, whose field names are the header.
-    type Line: Serialize;
-
-    /// Returns the lines of a row, at least one.
-    fn lines(row: &Self::Row) -> Vec<Self::Line>;
+pub trait Tabular: Study<Row: Serialize> {
+    /// Returns the lines of a row, at least one: flat structs, whose field names are the header. By
+    /// default the row itself is its only line.
+    fn lines(row: &Self::Row) -> impl IntoIterator<Item: Serialize> {
+        [row]
+    }
 
     /// Returns every seed that the rows depend on, by its purpose.
     ///
@@ -61,7 +61,7 @@ impl<S: Tabular> Table for S {
     }
 
     fn records(&self, index: usize) -> Result<Records, StudyError> {
-        records(&S::lines(&self.row(index)?))
+        records(S::lines(&self.row(index)?))
             .map_err(|source| StudyError::Unwritable { index, source })
     }
 
@@ -70,7 +70,7 @@ impl<S: Tabular> Table for S {
     }
 }
 
-fn records(lines: &[impl Serialize]) -> Result<Records, csv::Error> {
+fn records(lines: impl IntoIterator<Item: Serialize>) -> Result<Records, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for line in lines {
         writer.serialize(line)?;

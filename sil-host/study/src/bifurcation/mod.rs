@@ -97,12 +97,6 @@ impl Study for Bifurcation {
 }
 
 impl Tabular for Bifurcation {
-    type Line = Row;
-
-    fn lines(row: &Row) -> Vec<Row> {
-        vec![row.clone()]
-    }
-
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         Ok(self.cells.seeds())
     }

@@ -147,12 +147,6 @@ impl LoopStudy for Capture {
 }
 
 impl Tabular for Capture {
-    type Line = Row;
-
-    fn lines(row: &Row) -> Vec<Row> {
-        vec![row.clone()]
-    }
-
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         Ok(BTreeMap::from([("runs".into(), self.seed)]))
     }

@@ -225,12 +225,6 @@ impl LoopStudy for ClosedLoopBifurcation {
 }
 
 impl Tabular for ClosedLoopBifurcation {
-    type Line = Row;
-
-    fn lines(row: &Row) -> Vec<Row> {
-        vec![row.clone()]
-    }
-
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         let mut seeds = case::noise_seeds(&self.controllers, &self.overrides)?;
         seeds.insert("initial".into(), self.seed);

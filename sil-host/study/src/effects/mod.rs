@@ -173,12 +173,6 @@ impl LoopStudy for EffectsStudy {
 }
 
 impl Tabular for EffectsStudy {
-    type Line = Row;
-
-    fn lines(row: &Row) -> Vec<Row> {
-        vec![row.clone()]
-    }
-
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         Ok(BTreeMap::from([("runs".into(), self.seed)]))
     }

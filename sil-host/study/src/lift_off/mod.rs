@@ -231,12 +231,6 @@ impl LoopStudy for LiftOff {
 }
 
 impl Tabular for LiftOff {
-    type Line = Row;
-
-    fn lines(row: &Row) -> Vec<Row> {
-        vec![row.clone()]
-    }
-
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         Ok(BTreeMap::from([("runs".into(), self.seed)]))
     }

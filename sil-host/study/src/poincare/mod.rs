@@ -97,24 +97,34 @@ impl Study for Poincare {
     }
 }
 
-impl Tabular for Poincare {
-    type Line = ReturnLine;
-
-    fn lines(row: &Row) -> Vec<ReturnLine> {
+impl Row {
+    /// Returns one line for each return, or one without θ1.
+    fn lines(&self) -> Vec<ReturnLine> {
         let line = |theta1_rad| ReturnLine {
-            mu: row.mu,
-            v_belt_m_s: row.v_belt_m_s,
-            initial: row.initial.clone(),
-            regime: row.regime,
-            period: row.period,
-            exponent_per_s: row.exponent_per_s,
-            standard_error_per_s: row.standard_error_per_s,
+            mu: self.mu,
+            v_belt_m_s: self.v_belt_m_s,
+            initial: self.initial.clone(),
+            regime: self.regime,
+            period: self.period,
+            exponent_per_s: self.exponent_per_s,
+            standard_error_per_s: self.standard_error_per_s,
             theta1_rad,
         };
-        if row.theta1_rad.is_empty() {
+        if self.theta1_rad.is_empty() {
             return vec![line(None)];
         }
-        row.theta1_rad.iter().copied().map(Some).map(line).collect()
+        self.theta1_rad
+            .iter()
+            .copied()
+            .map(Some)
+            .map(line)
+            .collect()
+    }
+}
+
+impl Tabular for Poincare {
+    fn lines(row: &Row) -> impl IntoIterator<Item: Serialize> {
+        row.lines()
     }
 
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {

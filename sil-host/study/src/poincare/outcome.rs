@@ -7,7 +7,6 @@ use super::{Poincare, ReturnLine, Row};
 use crate::cells::Cells;
 use crate::chaos::Regime;
 use crate::outcome::{self, Outcome};
-use crate::tabular::Tabular;
 
 /// The whole diagram.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -95,7 +94,7 @@ impl Outcome for PoincareDiagram {
     type Line = ReturnLine;
 
     fn lines(&self) -> Vec<ReturnLine> {
-        self.rows.iter().flat_map(Poincare::lines).collect()
+        self.rows.iter().flat_map(Row::lines).collect()
     }
 
     fn table(&self) -> Table {

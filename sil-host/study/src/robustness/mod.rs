@@ -100,12 +100,6 @@ pub fn run(index: usize, scenario: &Scenario) -> Result<Row, StudyError> {
 }
 
 impl Tabular for Robustness {
-    type Line = Row;
-
-    fn lines(row: &Row) -> Vec<Row> {
-        vec![row.clone()]
-    }
-
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         Ok(BTreeMap::from([("runs".into(), self.seed)]))
     }

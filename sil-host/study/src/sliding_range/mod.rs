@@ -199,12 +199,6 @@ impl LoopStudy for SlidingRange {
 }
 
 impl Tabular for SlidingRange {
-    type Line = Row;
-
-    fn lines(row: &Row) -> Vec<Row> {
-        vec![row.clone()]
-    }
-
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         case::noise_seeds(&self.controllers, &self.overrides)
     }

@@ -262,12 +262,6 @@ impl Study for Stiffness {
 }
 
 impl Tabular for Stiffness {
-    type Line = Row;
-
-    fn lines(row: &Row) -> Vec<Row> {
-        vec![row.clone()]
-    }
-
     fn seeds(&self) -> Result<BTreeMap<String, u64>, StudyError> {
         Ok(BTreeMap::new())
     }
