@@ -41,6 +41,8 @@ pub trait StudyOptions: Args + Sync + 'static {
     const NAME: &'static str;
     /// Place in the command's help and on the page of figures: the lower, the earlier.
     const ORDER: u32;
+    /// [`in_shards`] if a sweep can compute the study in shards.
+    const IN_SHARDS: Option<InShards<Self::Study>> = None;
     /// The study.
     type Study: Study + 'static;
     /// The outcome of its rows.
@@ -54,14 +56,6 @@ pub trait StudyOptions: Args + Sync + 'static {
 
     /// Collects all rows of a study into its outcome.
     fn outcome(study: &Self::Study, rows: Vec<<Self::Study as Study>::Row>) -> Self::Outcome;
-
-    /// Whether a sweep can compute the study in shards; [`table`](Self::table) then returns one.
-    const HAS_SHARDS: bool = false;
-
-    /// Returns the study as a table that a sweep computes in shards; `None` by default.
-    fn table(_study: Self::Study) -> Option<Box<dyn tabular::Table>> {
-        None
-    }
 
     /// Returns the names of the scenarios that the study starts from.
     fn scenarios(&self) -> Vec<String> {
@@ -80,9 +74,12 @@ pub trait StudyOptions: Args + Sync + 'static {
 /// A section of the page of figures, and the outcome that it shows.
 pub type PageSection = (Section, Box<dyn AnyOutcome>);
 
-/// Implements [`StudyOptions::table`] for a study whose rows are lines of a table.
-pub fn in_shards<S: Tabular + 'static>(study: S) -> Option<Box<dyn tabular::Table>> {
-    Some(Box::new(study))
+/// Turns a study into a table that a sweep computes in shards.
+pub type InShards<S> = fn(S) -> Box<dyn tabular::Table>;
+
+/// The [`InShards`] of a study whose rows are lines of a table.
+pub fn in_shards<S: Tabular + 'static>(study: S) -> Box<dyn tabular::Table> {
+    Box::new(study)
 }
 
 /// An entry of the list of studies.
@@ -114,7 +111,7 @@ impl CatalogueEntry {
             name: O::NAME,
             order: O::ORDER,
             augment: O::augment_args,
-            has_shards: O::HAS_SHARDS,
+            has_shards: O::IN_SHARDS.is_some(),
             read: |matches| Ok(Box::new(O::from_arg_matches(matches)?)),
             sections: O::sections,
         }
@@ -164,7 +161,8 @@ impl<O: StudyOptions> AnyOptions for O {
     }
 
     fn table(&self) -> Result<Option<Box<dyn tabular::Table>>, StudyError> {
-        StudyOptions::study(self).map(O::table)
+        let study = StudyOptions::study(self)?;
+        Ok(O::IN_SHARDS.map(|in_shards| in_shards(study)))
     }
 
     fn scenarios(&self) -> Vec<String> {

@@ -4,10 +4,9 @@ use clap::Args;
 
 use super::{Bifurcation, BifurcationDiagram, Row, page};
 use crate::StudyError;
-use crate::catalogue::{PageSection, StudyOptions, in_shards};
+use crate::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
 use crate::register_study;
-use crate::tabular::Table;
 
 use crate::cell_options::CellOptions;
 
@@ -27,7 +26,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "bifurcation";
     const ORDER: u32 = 30;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Bifurcation;
     type Outcome = BifurcationDiagram;
 
@@ -42,10 +41,6 @@ impl StudyOptions for Options {
 
     fn outcome(study: &Bifurcation, rows: Vec<Row>) -> BifurcationDiagram {
         BifurcationDiagram::new(study, rows)
-    }
-
-    fn table(study: Bifurcation) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 
     fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {

@@ -4,9 +4,8 @@ use clap::Args;
 
 use super::{Capture, Captures, Row};
 use crate::StudyError;
-use crate::catalogue::{StudyOptions, in_shards};
+use crate::catalogue::{InShards, StudyOptions, in_shards};
 use crate::register_study;
-use crate::tabular::Table;
 
 use crate::options::RandomRuns;
 
@@ -22,7 +21,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "capture";
     const ORDER: u32 = 100;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Capture;
     type Outcome = Captures;
 
@@ -38,9 +37,5 @@ impl StudyOptions for Options {
 
     fn outcome(_: &Capture, rows: Vec<Row>) -> Captures {
         Captures::new(rows)
-    }
-
-    fn table(study: Capture) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 }

@@ -5,10 +5,9 @@ use clap::Args;
 use super::{ClosedLoopBifurcation, ClosedLoopDiagram, Row, page};
 use crate::StudyError;
 use crate::case::Reference;
-use crate::catalogue::{PageSection, StudyOptions, in_shards};
+use crate::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
 use crate::register_study;
-use crate::tabular::Table;
 
 use crate::options::{
     BeltSpeedGrid, ControllerOptions, ConverterOptions, FrictionGrid, InitialOptions, Overrides,
@@ -53,7 +52,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "closed-loop-bifurcation";
     const ORDER: u32 = 60;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = ClosedLoopBifurcation;
     type Outcome = ClosedLoopDiagram;
 
@@ -88,10 +87,6 @@ impl StudyOptions for Options {
 
     fn outcome(_: &ClosedLoopBifurcation, rows: Vec<Row>) -> ClosedLoopDiagram {
         ClosedLoopDiagram::new(rows)
-    }
-
-    fn table(study: ClosedLoopBifurcation) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 
     fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {

@@ -5,10 +5,9 @@ use clap::builder::PossibleValuesParser;
 
 use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
 use crate::StudyError;
-use crate::catalogue::{StudyOptions, in_shards};
+use crate::catalogue::{InShards, StudyOptions, in_shards};
 use crate::options::{ControllerOptions, RandomRuns};
 use crate::register_study;
-use crate::tabular::Table;
 
 /// Success against the level of each effect of a real rig, on rigid and on compliant contact.
 #[derive(Debug, Args)]
@@ -42,7 +41,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "effects";
     const ORDER: u32 = 90;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = EffectsStudy;
     type Outcome = EffectsOutcome;
 
@@ -73,10 +72,6 @@ impl StudyOptions for Options {
 
     fn outcome(study: &EffectsStudy, rows: Vec<Row>) -> EffectsOutcome {
         EffectsOutcome::new(study, rows)
-    }
-
-    fn table(study: EffectsStudy) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 
     fn scenarios(&self) -> Vec<String> {

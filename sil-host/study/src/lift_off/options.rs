@@ -4,9 +4,8 @@ use clap::Args;
 
 use super::{LiftOff, LiftOffs, Row};
 use crate::StudyError;
-use crate::catalogue::{StudyOptions, in_shards};
+use crate::catalogue::{InShards, StudyOptions, in_shards};
 use crate::register_study;
-use crate::tabular::Table;
 
 use crate::options::{self, RandomRuns};
 
@@ -32,7 +31,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "lift-off";
     const ORDER: u32 = 110;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = LiftOff;
     type Outcome = LiftOffs;
 
@@ -49,9 +48,5 @@ impl StudyOptions for Options {
 
     fn outcome(_: &LiftOff, rows: Vec<Row>) -> LiftOffs {
         LiftOffs::new(rows)
-    }
-
-    fn table(study: LiftOff) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 }

@@ -4,10 +4,9 @@ use clap::Args;
 
 use super::{Poincare, PoincareDiagram, Row, page};
 use crate::StudyError;
-use crate::catalogue::{PageSection, StudyOptions, in_shards};
+use crate::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
 use crate::register_study;
-use crate::tabular::Table;
 
 use crate::cell_options::CellOptions;
 
@@ -29,7 +28,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "poincare";
     const ORDER: u32 = 40;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Poincare;
     type Outcome = PoincareDiagram;
 
@@ -44,10 +43,6 @@ impl StudyOptions for Options {
 
     fn outcome(study: &Poincare, rows: Vec<Row>) -> PoincareDiagram {
         PoincareDiagram::new(study, rows)
-    }
-
-    fn table(study: Poincare) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 
     fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {

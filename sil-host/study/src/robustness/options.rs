@@ -4,9 +4,8 @@ use clap::Args;
 
 use super::{Arms, Part, Robustness, RobustnessOutcome, Row};
 use crate::StudyError;
-use crate::catalogue::{StudyOptions, in_shards};
+use crate::catalogue::{InShards, StudyOptions, in_shards};
 use crate::register_study;
-use crate::tabular::Table;
 
 use crate::options::RandomRuns;
 
@@ -48,7 +47,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "robustness";
     const ORDER: u32 = 70;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Robustness;
     type Outcome = RobustnessOutcome;
 
@@ -65,9 +64,5 @@ impl StudyOptions for Options {
 
     fn outcome(study: &Robustness, rows: Vec<Row>) -> RobustnessOutcome {
         RobustnessOutcome::new(study.arms, study.seed, rows)
-    }
-
-    fn table(study: Robustness) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 }

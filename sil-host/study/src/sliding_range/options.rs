@@ -5,10 +5,9 @@ use clap::Args;
 use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
 use crate::StudyError;
 use crate::case::Reference;
-use crate::catalogue::{PageSection, StudyOptions, in_shards};
+use crate::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
 use crate::register_study;
-use crate::tabular::Table;
 
 use crate::options::{
     ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, seconds,
@@ -91,7 +90,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "sliding-range";
     const ORDER: u32 = 50;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = SlidingRange;
     type Outcome = SlidingRanges;
 
@@ -127,10 +126,6 @@ impl StudyOptions for Options {
 
     fn outcome(_: &SlidingRange, rows: Vec<Row>) -> SlidingRanges {
         SlidingRanges { rows }
-    }
-
-    fn table(study: SlidingRange) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 
     fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {

@@ -3,10 +3,9 @@
 use clap::Args;
 
 use super::{Row, Stiffness, StiffnessOutcome};
-use crate::catalogue::{StudyOptions, in_shards};
+use crate::catalogue::{InShards, StudyOptions, in_shards};
 use crate::options::{BaseOptions, seconds};
 use crate::register_study;
-use crate::tabular::Table;
 use crate::{Grid, StudyError};
 
 /// The compliant contact as it gets stiffer, beside the rigid one: the paradox resolved.
@@ -42,7 +41,7 @@ register_study!(Options);
 impl StudyOptions for Options {
     const NAME: &'static str = "stiffness";
     const ORDER: u32 = 95;
-    const HAS_SHARDS: bool = true;
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Stiffness;
     type Outcome = StiffnessOutcome;
 
@@ -66,9 +65,5 @@ impl StudyOptions for Options {
 
     fn outcome(_: &Stiffness, rows: Vec<Row>) -> StiffnessOutcome {
         StiffnessOutcome { rows }
-    }
-
-    fn table(study: Stiffness) -> Option<Box<dyn Table>> {
-        in_shards(study)
     }
 }
