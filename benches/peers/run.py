@@ -9,16 +9,16 @@ python3-siconos). A program that cannot be installed or does not run is reported
 """
 
 import json
-import os
 import resource
 import subprocess
 import sys
-import venv
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-TARGET = HERE.parent.parent / "target"
-ENVIRONMENT = TARGET / "peers"
+sys.path.insert(0, str(HERE.parent))
+
+from programs import TARGET, one_thread_each, python_with, result_of
+
 PAINLEVE = TARGET / "release" / "painleve"
 
 # Simulated seconds: a few CPU seconds each.
@@ -32,28 +32,8 @@ PARADOX = {
 }
 
 
-def python_with(package, version_probe):
-    """The environment's Python with a package, or the reason why it is missing."""
-    python = ENVIRONMENT / "bin" / "python"
-    if not python.exists():
-        venv.create(ENVIRONMENT, with_pip=True)
-    if subprocess.run([python, "-c", version_probe], capture_output=True).returncode:
-        install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *package]
-        done = subprocess.run(install, capture_output=True, text=True)
-        if done.returncode:
-            raise RuntimeError(f"pip cannot install {' '.join(package)}: {last_line(done.stderr)}")
-    return python
-
-
-def last_line(text):
-    return (text.strip().splitlines() or ["no reason given"])[-1]
-
-
 def peer(python, script, simulated_s):
-    done = subprocess.run([python, HERE / script, str(simulated_s)], capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"{script} fails: {last_line(done.stderr)}")
-    return json.loads(done.stdout.strip().splitlines()[-1])
+    return result_of(script, [python, HERE / script, str(simulated_s)])
 
 
 def painleve():
@@ -80,11 +60,11 @@ def painleve():
 
 
 def scipy():
-    return peer(python_with(["numpy", "scipy"], "import scipy"), "bounce_scipy.py", SCIPY_S)
+    return peer(python_with("peers", {"numpy": "numpy", "scipy": "scipy"}), "bounce_scipy.py", SCIPY_S)
 
 
 def mujoco():
-    return peer(python_with(["mujoco"], "import mujoco"), "bounce_mujoco.py", MUJOCO_S)
+    return peer(python_with("peers", {"mujoco": "mujoco"}), "bounce_mujoco.py", MUJOCO_S)
 
 
 def siconos():
@@ -97,9 +77,7 @@ def siconos():
 def main():
     if not PAINLEVE.exists():
         sys.exit(f"there is no {PAINLEVE}: run cargo build --release")
-    # One thread each, like painleve.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
+    one_thread_each()
     print("| program | simulated s per CPU s | painleve is faster by | impacts per s | apex | largest θ̇₁ | the paradox |")
     print("|---|---|---|---|---|---|---|")
     ours, notes = None, []
