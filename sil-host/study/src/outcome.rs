@@ -8,11 +8,8 @@ use serde::Serialize;
 /// The outcome of a study. Serialised it is the JSON object of `--json`, whose names are
 /// a contract: add to them, never rename.
 pub trait Outcome: Serialize {
-    /// One line of the CSV file: a flat struct, whose field names are the header.
-    type Line: Serialize;
-
-    /// The lines of the CSV file.
-    fn lines(&self) -> Vec<Self::Line>;
+    /// The lines of the CSV file: flat structs, whose field names are the header.
+    fn lines(&self) -> impl IntoIterator<Item: Serialize>;
 
     /// The outcome as a table, with the paper's values beside.
     fn table(&self) -> Table;

@@ -84,10 +84,8 @@ impl Ablated {
 }
 
 impl Outcome for Ablation {
-    type Line = Ablated;
-
-    fn lines(&self) -> Vec<Ablated> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {

@@ -31,9 +31,7 @@ impl Admissible {
 }
 
 impl Outcome for Admissible {
-    type Line = IntervalLine;
-
-    fn lines(&self) -> Vec<IntervalLine> {
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
         let mut lines = Vec::new();
         for (posture, _, intervals) in self.postures() {
             for &[from_m, to_m] in &intervals.intervals_m {

@@ -132,10 +132,8 @@ impl BifurcationDiagram {
 }
 
 impl Outcome for BifurcationDiagram {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {

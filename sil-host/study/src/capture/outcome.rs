@@ -43,10 +43,8 @@ impl Captures {
 }
 
 impl Outcome for Captures {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {

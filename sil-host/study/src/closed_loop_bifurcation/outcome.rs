@@ -88,10 +88,8 @@ impl ClosedLoopDiagram {
 }
 
 impl Outcome for ClosedLoopDiagram {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {

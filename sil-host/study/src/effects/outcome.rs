@@ -169,10 +169,8 @@ pub(super) fn number(level: f64) -> String {
 }
 
 impl Outcome for EffectsOutcome {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {

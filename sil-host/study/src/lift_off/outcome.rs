@@ -83,10 +83,8 @@ impl LiftOffs {
 }
 
 impl Outcome for LiftOffs {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {

@@ -53,7 +53,7 @@ pub struct Row {
 
 /// One return in the CSV file; a cell without returns has one line without θ1.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ReturnLine {
+struct ReturnLine {
     mu: f64,
     v_belt_m_s: f64,
     initial: String,

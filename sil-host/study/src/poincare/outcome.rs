@@ -3,7 +3,7 @@
 use comfy_table::Table;
 use serde::Serialize;
 
-use super::{Poincare, ReturnLine, Row};
+use super::{Poincare, Row};
 use crate::cells::Cells;
 use crate::chaos::Regime;
 use crate::outcome::{self, Outcome};
@@ -91,10 +91,8 @@ impl RegimeInterval {
 }
 
 impl Outcome for PoincareDiagram {
-    type Line = ReturnLine;
-
-    fn lines(&self) -> Vec<ReturnLine> {
-        self.rows.iter().flat_map(Row::lines).collect()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        self.rows.iter().flat_map(Row::lines)
     }
 
     fn table(&self) -> Table {

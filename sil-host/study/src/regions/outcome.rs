@@ -1,16 +1,14 @@
 //! Table of the maps.
 
 use comfy_table::Table;
+use serde::Serialize;
 
-use super::{RegionCell, Regions, Theta2};
+use super::{Regions, Theta2};
 use crate::outcome::{self, Outcome};
 
 impl Outcome for Regions {
-    type Line = RegionCell;
-
-    fn lines(&self) -> Vec<RegionCell> {
-        let cells = self.maps.iter().flat_map(|map| &map.cells);
-        cells.copied().collect()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        self.maps.iter().flat_map(|map| &map.cells)
     }
 
     fn table(&self) -> Table {

@@ -65,10 +65,8 @@ impl RobustnessOutcome {
 }
 
 impl Outcome for RobustnessOutcome {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {

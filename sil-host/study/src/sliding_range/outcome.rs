@@ -1,15 +1,14 @@
 //! Sliding ranges as a table and as bars, with the paper's values and the limit.
 
 use comfy_table::Table;
+use serde::Serialize;
 
 use super::{Row, SlidingRanges};
 use crate::outcome::{self, Outcome};
 
 impl Outcome for SlidingRanges {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {

@@ -14,10 +14,8 @@ pub struct StiffnessOutcome {
 }
 
 impl Outcome for StiffnessOutcome {
-    type Line = Row;
-
-    fn lines(&self) -> Vec<Row> {
-        self.rows.clone()
+    fn lines(&self) -> impl IntoIterator<Item: Serialize> {
+        &self.rows
     }
 
     fn table(&self) -> Table {
