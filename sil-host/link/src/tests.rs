@@ -5,16 +5,18 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use nix::sys::signal::Signal;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_system::interrupt::Interrupt;
 
 use super::place::{Place, SHARED_MEMORY};
 use super::*;
 
+mod exchange;
+mod files;
+mod peers;
 mod session_model;
 
 /// Longer than any pause of a busy test machine.
@@ -94,10 +96,46 @@ impl TestBus {
         Ok((controller, session))
     }
 
-    /// Starts a controller in a thread; it answers every frame and returns their number.
-    fn echo(&self) -> thread::JoinHandle<Result<u32, LinkError>> {
+    /// Starts a controller in a thread that does this with its end and the session.
+    fn spawn<T: Send + 'static>(
+        &self,
+        act: impl FnOnce(ControllerEnd, Session) -> T + Send + 'static,
+    ) -> JoinHandle<T> {
         let bus = self.clone();
-        thread::spawn(move || answer_all(bus.controller(PATIENT)?.0))
+        thread::spawn(move || {
+            let (controller, session) = bus.controller(PATIENT).unwrap();
+            act(controller, session)
+        })
+    }
+
+    /// Starts a controller in a thread; it answers every frame and returns their number.
+    fn echo(&self) -> JoinHandle<Result<u32, LinkError>> {
+        self.spawn(|controller, _| answer_all(controller))
+    }
+
+    /// A plant, and the [`echo`](Self::echo) that it has waited for.
+    fn plant_and_echo(&self) -> (PlantEnd, JoinHandle<Result<u32, LinkError>>) {
+        let mut plant = self.plant().unwrap();
+        let controller = self.echo();
+        plant.wait_for_controller(PATIENT).unwrap();
+        (plant, controller)
+    }
+
+    /// Lets a controller join a plant, and expects their session to leave nothing behind.
+    #[track_caller]
+    fn assert_works(&self, mut plant: PlantEnd) {
+        let controller = self.echo();
+        plant.wait_for_controller(PATIENT).unwrap();
+        finish(plant, controller);
+        self.assert_nothing_left();
+    }
+
+    /// The bus as its ends use it.
+    fn bus(&self) -> claim::Bus {
+        claim::Bus {
+            name: self.name.clone(),
+            place: self.place.clone(),
+        }
     }
 
     /// Starts this test binary again as one end in its own process.
@@ -120,6 +158,14 @@ impl TestBus {
         let left = self.files.as_ref().unwrap().left();
         assert!(left.is_empty(), "left behind: {left:?}");
     }
+}
+
+/// Exchanges one frame, ends the session, and expects the controller to end with it.
+#[track_caller]
+fn finish(mut plant: PlantEnd, controller: JoinHandle<Result<u32, LinkError>>) {
+    plant.exchange(&sensor(1)).unwrap();
+    plant.end().unwrap();
+    controller.join().unwrap().unwrap();
 }
 
 fn find(folder: &Path, prefix: &str, found: &mut Vec<PathBuf>) {
@@ -230,427 +276,4 @@ fn answer_all(mut controller: ControllerEnd) -> Result<u32, LinkError> {
         count += 1;
     }
     Ok(count)
-}
-
-#[test]
-fn every_frame_is_answered() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    let first = u32::MAX - 500;
-    for n in 0..1000 {
-        let frame = sensor(first.wrapping_add(n));
-        assert_eq!(plant.exchange(&frame).unwrap(), answer(&frame));
-    }
-    plant.end().unwrap();
-    assert_eq!(controller.join().unwrap().unwrap(), 1000);
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn a_late_controller_receives_the_session_and_all_further_frames() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    for tick in 0..10 {
-        plant.send(&sensor(tick)).unwrap();
-    }
-    let controller = {
-        let bus = bus.clone();
-        thread::spawn(move || {
-            let (mut controller, session) = bus.controller(PATIENT).unwrap();
-            (session, controller.receive().unwrap())
-        })
-    };
-    plant.wait_for_controller(PATIENT).unwrap();
-    plant.send(&sensor(10)).unwrap();
-    let (learned, received) = controller.join().unwrap();
-    assert_eq!(learned, session());
-    assert_eq!(received, Received::Frame(sensor(10)));
-    drop(plant);
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn frames_sent_in_a_burst_arrive_in_order_and_before_the_end() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let (sent, all_sent) = std::sync::mpsc::channel();
-    let controller = {
-        let bus = bus.clone();
-        thread::spawn(move || {
-            let (mut controller, _) = bus.controller(PATIENT).unwrap();
-            all_sent.recv().unwrap();
-            let mut ticks = Vec::new();
-            while let Received::Frame(frame) = controller.receive().unwrap() {
-                ticks.push(frame.tick);
-            }
-            ticks
-        })
-    };
-    plant.wait_for_controller(PATIENT).unwrap();
-    let burst = FRAME_BUFFER as u32 + 6;
-    for tick in 0..burst {
-        plant.send(&sensor(tick)).unwrap();
-    }
-    plant.end().unwrap();
-    sent.send(()).unwrap();
-    // More than the buffer holds: the oldest six are dropped.
-    assert_eq!(controller.join().unwrap(), (6..burst).collect::<Vec<_>>());
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn answers_are_received_without_waiting() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    assert!(plant.try_receive().unwrap().is_none());
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    for tick in 0..3 {
-        plant.send(&sensor(tick)).unwrap();
-    }
-    let mut answered = Vec::new();
-    while answered.len() < 3 {
-        match plant.try_receive().unwrap() {
-            Some(frame) => answered.push(frame.tick),
-            None => thread::yield_now(),
-        }
-    }
-    assert_eq!(answered, [0, 1, 2]);
-    plant.end().unwrap();
-    controller.join().unwrap().unwrap();
-}
-
-#[test]
-fn a_second_plant_is_refused_and_the_first_continues() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let error = bus.plant().err().unwrap();
-    assert!(matches!(&error, LinkError::BusInUse { bus: named } if *named == bus.name));
-    assert!(error.to_string().contains(bus.name.as_str()));
-
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    plant.exchange(&sensor(1)).unwrap();
-    plant.end().unwrap();
-    controller.join().unwrap().unwrap();
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn a_second_controller_is_refused_and_the_first_continues() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    let error = bus.controller(PATIENT).err().unwrap();
-    assert!(matches!(&error, LinkError::ControllerInUse { bus: named } if *named == bus.name));
-
-    plant.exchange(&sensor(1)).unwrap();
-    plant.end().unwrap();
-    controller.join().unwrap().unwrap();
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn simultaneous_buses_do_not_interfere() {
-    let a = TestBus::new();
-    let b = TestBus {
-        name: BusName::unique(),
-        ..a.clone()
-    };
-    let mut plants = [a.plant().unwrap(), b.plant().unwrap()];
-    let controllers = [a.echo(), b.echo()];
-    for (index, plant) in plants.iter_mut().enumerate() {
-        plant.wait_for_controller(PATIENT).unwrap();
-        for tick in 0..=index as u32 {
-            plant.exchange(&sensor(tick)).unwrap();
-        }
-    }
-    for plant in plants {
-        plant.end().unwrap();
-    }
-    assert_eq!(controllers.map(|c| c.join().unwrap().unwrap()), [1, 2]);
-    a.assert_nothing_left();
-}
-
-#[test]
-fn the_error_about_a_missing_plant_names_the_command_to_start() {
-    let bus = TestBus::new();
-    let error = bus.controller(SHORT).err().unwrap();
-    assert!(matches!(error, LinkError::PlantMissing { .. }));
-    let advice = format!("painleve plant --bus {}", bus.name);
-    assert!(error.to_string().contains(&advice), "{error}");
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn the_error_about_a_missing_controller_names_the_command_to_start() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let error = plant.wait_for_controller(SHORT).unwrap_err();
-    assert!(matches!(error, LinkError::ControllerMissing { .. }));
-    let advice = format!("painleve controller --bus {}", bus.name);
-    assert!(error.to_string().contains(&advice), "{error}");
-    assert!(matches!(
-        plant.exchange(&sensor(0)),
-        Err(LinkError::ControllerGone { .. })
-    ));
-}
-
-#[test]
-fn a_plant_that_leaves_without_ending_the_session_is_detected() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    plant.exchange(&sensor(0)).unwrap();
-    drop(plant);
-    assert!(matches!(
-        controller.join().unwrap(),
-        Err(LinkError::PlantGone { .. })
-    ));
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn an_answer_to_a_wrong_tick_is_an_error() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let controller = {
-        let bus = bus.clone();
-        thread::spawn(move || {
-            let (mut controller, _) = bus.controller(PATIENT).unwrap();
-            controller.receive().unwrap();
-            controller.send(&answer(&sensor(6))).unwrap();
-            controller.receive().unwrap()
-        })
-    };
-    plant.wait_for_controller(PATIENT).unwrap();
-    assert!(matches!(
-        plant.exchange(&sensor(7)),
-        Err(LinkError::WrongTick {
-            asked: 7,
-            answered: 6,
-            ..
-        })
-    ));
-    plant.end().unwrap();
-    assert_eq!(controller.join().unwrap(), Received::End);
-}
-
-#[test]
-fn a_silent_live_controller_is_detected() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let _mute = bus.process("mute");
-    plant.wait_for_controller(PATIENT).unwrap();
-    plant.set_silence_limit(SHORT);
-    assert!(matches!(
-        plant.exchange(&sensor(0)),
-        Err(LinkError::ControllerSilent { .. })
-    ));
-    plant.send(&sensor(1)).unwrap();
-    let error = loop {
-        match plant.try_receive() {
-            Ok(_) => thread::sleep(Duration::from_millis(1)),
-            Err(error) => break error,
-        }
-    };
-    assert!(matches!(error, LinkError::ControllerSilent { .. }));
-}
-
-#[test]
-fn a_silent_live_plant_is_detected() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let controller = {
-        let bus = bus.clone();
-        thread::spawn(move || {
-            let (mut controller, _) = bus.controller(PATIENT).unwrap();
-            controller.set_silence_limit(SHORT);
-            controller.receive()
-        })
-    };
-    plant.wait_for_controller(PATIENT).unwrap();
-    assert!(matches!(
-        controller.join().unwrap(),
-        Err(LinkError::PlantSilent { .. })
-    ));
-}
-
-#[test]
-fn a_killed_controller_is_detected_and_the_bus_can_be_used_again() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let mut killed = bus.process("controller");
-    plant.wait_for_controller(PATIENT).unwrap();
-    plant.exchange(&sensor(0)).unwrap();
-    killed.kill();
-    // Well before the silence limit, which would give another error.
-    assert!(matches!(
-        plant.exchange(&sensor(1)),
-        Err(LinkError::ControllerGone { .. })
-    ));
-    plant.send(&sensor(2)).unwrap();
-    let error = loop {
-        match plant.try_receive() {
-            Ok(_) => thread::sleep(Duration::from_millis(1)),
-            Err(error) => break error,
-        }
-    };
-    assert!(matches!(error, LinkError::ControllerGone { .. }));
-
-    // The surviving plant can continue with another controller...
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    plant.exchange(&sensor(3)).unwrap();
-    plant.end().unwrap();
-    controller.join().unwrap().unwrap();
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn a_killed_plant_is_detected_and_the_bus_can_be_used_again() {
-    let bus = TestBus::new();
-    let mut killed = bus.process("plant");
-    let (mut survivor, _) = bus.controller(PATIENT).unwrap();
-    for _ in 0..100 {
-        let Received::Frame(frame) = survivor.receive().unwrap() else {
-            panic!("the plant has not ended the session");
-        };
-        survivor.send(&answer(&frame)).unwrap();
-    }
-    killed.kill();
-    // A new plant starts while the surviving controller is still there.
-    let restarted = {
-        let bus = bus.clone();
-        thread::spawn(move || {
-            let mut plant = bus.plant().unwrap();
-            plant.wait_for_controller(PATIENT).unwrap();
-            plant.exchange(&sensor(0)).unwrap();
-            plant.end().unwrap();
-        })
-    };
-    let error = loop {
-        match survivor.receive() {
-            Ok(Received::Frame(frame)) => survivor.send(&answer(&frame)).unwrap(),
-            Ok(Received::End) => panic!("the plant was killed before any end"),
-            Err(error) => break error,
-        }
-    };
-    assert!(matches!(error, LinkError::PlantGone { .. }), "{error}");
-    drop(survivor);
-
-    assert_eq!(bus.echo().join().unwrap().unwrap(), 1);
-    restarted.join().unwrap();
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn the_next_run_removes_the_files_of_two_killed_processes() {
-    let bus = TestBus::new();
-    let mut plant = bus.process("plant");
-    let mut mute = bus.process("mute");
-    mute.wait_until_open();
-    plant.kill();
-    mute.kill();
-
-    let mut plant = bus.plant().unwrap();
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    plant.exchange(&sensor(0)).unwrap();
-    plant.end().unwrap();
-    controller.join().unwrap().unwrap();
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn the_link_installs_no_signal_handlers() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    plant.exchange(&sensor(0)).unwrap();
-
-    let status = std::fs::read_to_string("/proc/self/status").unwrap();
-    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
-    let caught = u64::from_str_radix(caught.unwrap().trim(), 16).unwrap();
-    for signal in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP] {
-        assert_eq!(caught >> (signal as u32 - 1) & 1, 0, "{signal} is caught");
-    }
-    plant.end().unwrap();
-    controller.join().unwrap().unwrap();
-}
-
-/// The place of a bus on which a controller died after it had joined and created a segment of size
-/// zero.
-fn dead_controller(bus: &TestBus) -> PathBuf {
-    let bus = claim::Bus {
-        name: bus.name.clone(),
-        place: bus.place.clone(),
-    };
-    let run = run_files::RunFiles::ready(&bus.folder(), &bus.place).unwrap();
-    assert!(run.join().unwrap());
-    let prefix = run.config().unwrap().global.prefix.to_string();
-    let segment = Path::new(SHARED_MEMORY).join(format!("{prefix}half-made"));
-    std::fs::write(&segment, "").unwrap();
-    segment
-}
-
-#[test]
-fn files_of_a_controller_that_died_while_joining_do_not_block_the_next() {
-    let bus = TestBus::new();
-    let mut plant = bus.plant().unwrap();
-    let segment = dead_controller(&bus);
-    let controller = bus.echo();
-    plant.wait_for_controller(PATIENT).unwrap();
-    assert!(!segment.exists());
-    plant.exchange(&sensor(0)).unwrap();
-    plant.end().unwrap();
-    controller.join().unwrap().unwrap();
-    bus.assert_nothing_left();
-}
-
-#[test]
-fn a_dead_peers_half_made_segment_is_removed_and_a_live_peers_is_kept() {
-    let test = TestBus::new();
-    let bus = claim::Bus {
-        name: test.name.clone(),
-        place: test.place.clone(),
-    };
-    let claim = bus.claim(lock_file::Role::Plant).unwrap().unwrap();
-    let run = run_files::RunFiles::create(&bus.folder(), &bus.place).unwrap();
-    run.set_ready().unwrap();
-    let guardian = guardian::Guardian::start(&claim).unwrap();
-    let segment = dead_controller(&test);
-    // A live controller's segment stays, because the controller may still be creating it.
-    let peer = bus.claim(lock_file::Role::Controller).unwrap().unwrap();
-    guardian.during(|| thread::sleep(Duration::from_millis(1200)));
-    assert!(segment.exists());
-    drop(peer);
-    // Waits as iceoryx2 does: until the name disappears.
-    guardian.during(|| {
-        while segment.exists() {
-            thread::sleep(Duration::from_millis(1));
-        }
-    });
-}
-
-#[test]
-fn an_interrupt_ends_a_wait() {
-    let bus = TestBus::new();
-    let interrupt = Interrupt::default();
-    let mut plant =
-        PlantEnd::create_in(bus.place.clone(), &bus.name, &session(), &interrupt).unwrap();
-    interrupt.request();
-    assert!(matches!(
-        plant.wait_for_controller(PATIENT),
-        Err(LinkError::Interrupted)
-    ));
-    drop(plant);
-    let opened = ControllerEnd::open_in(bus.place.clone(), &bus.name, PATIENT, &interrupt);
-    assert!(matches!(opened, Err(LinkError::Interrupted)));
-    bus.assert_nothing_left();
 }
