@@ -97,6 +97,61 @@ fn read_only_folders_are_told() {
     }
 }
 
+/// A power failure loses neither a reported file nor the new folders that lead to it.
+#[test]
+fn data_and_names_are_on_the_disk_before_a_file_is_reported() {
+    let bench = Bench::new("power");
+    let mut traced = Command::new("strace");
+    traced
+        .args(["-f", "-y", "-o", "trace"])
+        .args(["-e", "trace=write,fsync,rename,renameat,renameat2"])
+        .arg(program())
+        .args(["run", "--record", "new/deeper/run.mcap"])
+        .args(SHORT.split(' '))
+        .current_dir(bench.path(""));
+    let Ok(output) = traced.output() else {
+        eprintln!("strace is not installed: not tested");
+        return;
+    };
+    assert_eq!(code(output.status), 0, "{output:?}");
+    let trace = std::fs::read_to_string(bench.path("trace")).unwrap();
+    let calls: Vec<_> = trace.lines().collect();
+    let folder = bench.path("").canonicalize().unwrap();
+    let at = |call: &str, path: &str| {
+        let path = format!("{}{path}", folder.display());
+        calls
+            .iter()
+            .rposition(|line| line.contains(call) && line.contains(&path))
+            .unwrap_or_else(|| panic!("no {call} of {path} in {trace}"))
+    };
+    let data = at("fsync(", "/new/deeper/.run.mcap.");
+    let named = at("rename", "/new/deeper/run.mcap\"");
+    let name = at("fsync(", "/new/deeper>");
+    let folders = [at("fsync(", "/new>"), at("fsync(", ">")];
+    let reported = calls.iter().rposition(|line| line.contains("write(1<"));
+    let reported = reported.expect("the report");
+    assert!(data < named && named < name && name < reported, "{trace}");
+    assert!(folders.iter().all(|folder| *folder < reported), "{trace}");
+}
+
+/// The second memory that a thread asks for is its stack for signals.
+#[test]
+fn memory_refused_to_a_new_thread_ends_a_run_with_one_message() {
+    let bench = Bench::new("thread");
+    let mut starved = Command::new("strace");
+    starved
+        .args(["-f", "-qq", "-o", "trace", "-e", "trace=mmap"])
+        .args(["-e", "inject=mmap:error=ENOMEM:when=2"])
+        .arg(program())
+        .args(["run", "--no-record"])
+        .args(SHORT.split(' '))
+        .current_dir(bench.path(""));
+    match starved.output() {
+        Ok(output) => assert_told(&output, 3, "refuses"),
+        Err(_) => eprintln!("strace is not installed: not tested"),
+    }
+}
+
 /// Runs a shell command and returns the report of its run.
 #[allow(clippy::unwrap_used)]
 fn shell(bench: &Bench, line: &str) -> Output {

@@ -291,6 +291,10 @@ pub fn main() -> ExitCode {
 /// resource, for example a file descriptor.
 static PANIC_IN_ICEORYX2: AtomicBool = AtomicBool::new(false);
 
+/// Where the standard library panics if the system refuses memory to a thread that has just started.
+/// Nothing can catch this panic.
+const THREAD_START: &str = "library/std/src/sys/pal/unix/";
+
 /// Reports a panic in one line instead of a backtrace.
 fn tell_panic(panic: &PanicHookInfo) {
     let place = panic.location().map_or("", |location| location.file());
@@ -304,6 +308,11 @@ fn tell_panic(panic: &PanicHookInfo) {
     if place.contains("iceoryx2") {
         PANIC_IN_ICEORYX2.store(true, Ordering::Relaxed);
         warn(format_args!("error: iceoryx2 has failed: {message}"));
+    } else if place.contains(THREAD_START) {
+        warn(format_args!(
+            "error: the system refuses a thread: {message}"
+        ));
+        std::process::exit(i32::from(PEER_FAILED));
     } else {
         let line = panic.location().map_or(0, |location| location.line());
         warn(format_args!(

@@ -79,7 +79,7 @@ impl AtomicFile {
         let Some((folder, name)) = place(&path) else {
             return Err(AtomicFileError::NotAFile { path });
         };
-        if let Err(source) = fs::create_dir_all(&folder) {
+        if let Err(source) = create_folders(&folder) {
             return Err(AtomicFileError::Folder {
                 path,
                 folder,
@@ -244,6 +244,20 @@ fn remove_abandoned(folder: &Path, prefix: &str) {
             let _ = fs::remove_file(entry.path());
         }
     }
+}
+
+/// Creates a folder and the missing ones above it, and writes their names to the disk.
+fn create_folders(folder: &Path) -> io::Result<()> {
+    let missing: Vec<_> = folder.ancestors().take_while(|it| !it.exists()).collect();
+    fs::create_dir_all(folder)?;
+    for created in missing {
+        match created.parent() {
+            Some(above) if above.as_os_str().is_empty() => sync_folder(Path::new("."))?,
+            Some(above) => sync_folder(above)?,
+            None => {}
+        }
+    }
+    Ok(())
 }
 
 /// Writes the new directory entry to the disk.

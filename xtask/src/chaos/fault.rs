@@ -15,6 +15,12 @@ const START: Duration = Duration::from_secs(5);
 /// Exit code of a program that the dynamic loader cannot load.
 const NOT_LOADED: i32 = 127;
 
+/// Returns whether the dynamic loader failed, before the program's first instruction. It crashes if
+/// the system refuses its first memory.
+fn is_loaders_failure(fault: InjectedFault, number: u32, code: Option<i32>) -> bool {
+    code == Some(NOT_LOADED) || (code.is_none() && fault.call == "mmap" && number == 1)
+}
+
 /// A system call and the error with which it fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InjectedFault {
@@ -94,7 +100,7 @@ pub fn run(
             continue;
         }
         let (code, text) = process.outcome();
-        if code != Some(NOT_LOADED) {
+        if !is_loaders_failure(fault, number, code) {
             judge(name, code, &text, &mut findings);
         }
     }
