@@ -27,6 +27,8 @@ pub struct Telemetry {
     pub tip_t_m: f32,
     /// Reference z_t*, m.
     pub reference_m: f32,
+    /// Reference that the program requests, before an edge holds it back, m.
+    pub requested_m: f32,
     /// Measured normal force, N.
     pub normal_force_n: f32,
     /// Measured tangential force, N.
@@ -107,6 +109,7 @@ impl<'a> TelemetrySink<'a> {
             theta_dot_rad_s: model.theta_dot_rad_s.into(),
             tip_t_m: model.tip_m.x,
             reference_m: target.reference.position_m,
+            requested_m: target.requested_m,
             normal_force_n: contact.force_n.y,
             tangential_force_n: contact.force_n.x,
             torque_nm: command.torque_nm.into(),

@@ -135,6 +135,7 @@ fn the_report_keeps_its_contract() {
         "max_tip_t_m",
         "final_tip_t_m",
         "final_reference_m",
+        "requested_target_m",
         "min_normal_force_n",
         "peak_torque_nm",
         "contact_fraction",

@@ -20,6 +20,8 @@ use crate::supervise::supervisor::Phase;
 pub struct Target {
     /// Reference of the tip.
     pub reference: TipReference,
+    /// Position that the program requests, before an edge holds it back, m.
+    pub requested_m: f32,
     /// Posture in which the tip should be there.
     pub posture: Posture,
     /// Edges of the admissible stretch of the belt, m.
@@ -145,6 +147,7 @@ impl References {
             } else {
                 wanted
             },
+            requested_m: wanted.position_m,
             posture: state.posture,
             edges_m: state.governor.edges_m(),
             fresh_edges_m: state.governor.fresh_edges_m(),

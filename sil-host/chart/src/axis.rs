@@ -123,7 +123,9 @@ impl ValueAxis {
 /// Formats a label with enough decimals to distinguish values `step` apart.
 pub fn label(value: f64, step: f64) -> String {
     if !(1e-6..1e7).contains(&step) {
-        return format!("{value:.1e}").replace('-', "−");
+        // One digit more than separates the value from its neighbours.
+        let digits = (value.abs() / step).log10().ceil().clamp(1.0, 15.0) as usize;
+        return format!("{value:.digits$e}").replace('-', "−");
     }
     // Ticks are at 1, 2 or 5 times a power of ten below the step.
     let decimals = (-step.log10().floor()).max(0.0) as usize;

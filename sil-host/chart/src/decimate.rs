@@ -73,7 +73,7 @@ pub struct Bin<const SIGNALS: usize> {
     /// Extent of each signal.
     pub extents: [Extent; SIGNALS],
     /// Union of the flags of all samples.
-    pub flags: u8,
+    pub flags: u16,
     samples: u64,
 }
 
@@ -112,7 +112,7 @@ impl<const SIGNALS: usize> Default for Decimator<SIGNALS> {
 impl<const SIGNALS: usize> Decimator<SIGNALS> {
     /// Adds a sample without allocating. Discards a sample whose time is not finite,
     /// because it has no position in a figure.
-    pub fn push(&mut self, time_s: f64, values: [f64; SIGNALS], flags: u8) {
+    pub fn push(&mut self, time_s: f64, values: [f64; SIGNALS], flags: u16) {
         if !time_s.is_finite() {
             return;
         }

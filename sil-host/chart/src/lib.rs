@@ -1,24 +1,16 @@
 //! Charts as SVG, laid out as in the paper.
 //!
-//! - [`chart`]: stacked panels of curves, points and regions over one shared axis
+//! - [`chart`]: panels of curves, points and regions, stacked over one shared axis or side by side
+//! - [`canvas`]: shapes and text as an SVG file, for light and dark screens
 //! - [`style`]: colours, fonts and ticks common to all figures
 //! - [`decimate`]: runs of any length in bounded memory, with their extremes
 //! - [`axis`]: ranges that are robust to outliers, and their labels
 
 pub mod axis;
+pub mod canvas;
 pub mod chart;
+mod dark;
 pub mod decimate;
 pub mod style;
 
 pub use chart::{Chart, Mark, Panel};
-
-/// Why a figure could not be drawn or written.
-#[derive(Debug, thiserror::Error)]
-pub enum PlotError {
-    /// The drawing library failed.
-    #[error("cannot draw the figure: {0}; please report this")]
-    Draw(String),
-    /// The figure's file cannot be written.
-    #[error(transparent)]
-    File(#[from] painleve_system::atomic_file::AtomicFileError),
-}

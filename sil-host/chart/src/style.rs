@@ -1,115 +1,105 @@
-//! Colours, fonts and ticks common to all figures, in SVG at twice the displayed size.
+//! Colours, fonts, widths of text and ticks common to all figures.
+//!
+//! A figure is [`WIDTH`] units wide and shown at half that. Labels are [`SMALL`] high, so that they
+//! are 9 px high when a narrow screen shows the figure 400 px wide.
 
-use std::io;
 use std::ops::Range;
 
-use plotters::coord::Shift;
-use plotters::coord::ranged1d::Ranged;
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-
-use super::PlotError;
+/// A colour: red, green and blue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Colour(pub u8, pub u8, pub u8);
 
 // The palette of Okabe and Ito, distinguishable by colour-blind readers and in grey.
 
 /// Near black, for text and for the reference of a comparison.
-pub const BLACK_INK: RGBColor = RGBColor(0x1A, 0x1A, 0x1A);
+pub const BLACK_INK: Colour = Colour(0x1A, 0x1A, 0x1A);
 /// Blue, for the first curve.
-pub const BLUE_INK: RGBColor = RGBColor(0x00, 0x72, 0xB2);
+pub const BLUE_INK: Colour = Colour(0x00, 0x72, 0xB2);
 /// Light blue.
-pub const SKY: RGBColor = RGBColor(0x56, 0xB4, 0xE9);
+pub const SKY: Colour = Colour(0x56, 0xB4, 0xE9);
 /// Green.
-pub const GREEN: RGBColor = RGBColor(0x00, 0x9E, 0x73);
+pub const GREEN: Colour = Colour(0x00, 0x9E, 0x73);
 /// Orange.
-pub const ORANGE: RGBColor = RGBColor(0xE6, 0x9F, 0x00);
+pub const ORANGE: Colour = Colour(0xE6, 0x9F, 0x00);
+/// Purple.
+pub const PURPLE: Colour = Colour(0xCC, 0x79, 0xA7);
 /// Red, for failures.
-pub const VERMILLION: RGBColor = RGBColor(0xD5, 0x5E, 0x00);
+pub const VERMILLION: Colour = Colour(0xD5, 0x5E, 0x00);
 /// Grey, for notes and for the background.
-pub const GREY: RGBColor = RGBColor(0x70, 0x70, 0x70);
+pub const GREY: Colour = Colour(0x66, 0x66, 0x66);
 /// Light grey, for grids.
-pub const GRID: RGBColor = RGBColor(0xE4, 0xE4, 0xE4);
+pub const GRID: Colour = Colour(0xE4, 0xE4, 0xE4);
+/// Lightest grey, for cells in which nothing happens.
+pub const QUIET: Colour = Colour(0xF2, 0xF2, 0xF2);
+/// The paper.
+pub const WHITE: Colour = Colour(0xFF, 0xFF, 0xFF);
 
-/// Figures are drawn at twice the displayed size, because coordinates are whole pixels.
+/// Width of a figure, drawn units.
+pub const WIDTH: i32 = 1400;
+/// Figures are drawn at twice the displayed size, because coordinates are whole units.
 pub const DRAWN_PER_SHOWN: i32 = 2;
+/// Height of the smallest labels, drawn units.
+pub const SMALL: i32 = 32;
 /// Font family, with fallbacks.
 pub const FONT: &str = "Helvetica, Arial, Liberation Sans, DejaVu Sans, sans-serif";
+
 /// Size, weight and colour of a text.
+#[derive(Clone, Copy, Debug)]
 pub struct Look {
     /// Height, drawn units.
     pub size: i32,
-    weight: FontStyle,
-    colour: RGBColor,
+    /// Whether the text is bold.
+    pub bold: bool,
+    /// Colour.
+    pub colour: Colour,
 }
 
-impl Look {
-    const fn new(size: i32, weight: FontStyle, colour: RGBColor) -> Self {
-        Self {
-            size,
-            weight,
-            colour,
-        }
-    }
+const fn look(size: i32, bold: bool, colour: Colour) -> Look {
+    Look { size, bold, colour }
 }
 
 /// Title of a figure.
-pub const TITLE: Look = Look::new(46, FontStyle::Bold, BLACK_INK);
-/// Line below the title.
-pub const SUBTITLE: Look = Look::new(31, FontStyle::Normal, GREY);
+pub const TITLE: Look = look(40, true, BLACK_INK);
+/// Lines below the title.
+pub const SUBTITLE: Look = look(SMALL, false, GREY);
 /// Title of a panel.
-pub const HEADING: Look = Look::new(33, FontStyle::Bold, BLACK_INK);
-/// Names of curves.
-pub const LEGEND: Look = Look::new(31, FontStyle::Normal, BLACK_INK);
+pub const HEADING: Look = look(SMALL, true, BLACK_INK);
+/// Names of curves, and numbers at the axes.
+pub const LABEL: Look = look(SMALL, false, BLACK_INK);
 /// Notes.
-pub const NOTE: Look = Look::new(29, FontStyle::Normal, GREY);
-/// Numbers at the axes.
-pub const TICK: Look = Look::new(29, FontStyle::Normal, BLACK_INK);
-
-/// A region of a figure being drawn.
-pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// Result of a call to the drawing library.
-pub type Drawn = Result<(), DrawingAreaErrorKind<io::Error>>;
-
-/// Draws a figure of `size` (width, height) in drawn units.
-///
-/// # Errors
-/// [`PlotError::Draw`] if the drawing library fails.
-pub fn svg(size: (i32, i32), draw: impl FnOnce(&Area<'_>) -> Drawn) -> Result<String, PlotError> {
-    let (width, height) = size;
-    let mut svg = String::new();
-    {
-        let backend = SVGBackend::with_string(&mut svg, (width as u32, height as u32));
-        let root = backend.into_drawing_area();
-        root.fill(&WHITE)
-            .and_then(|()| draw(&root))
-            .and_then(|()| root.present())
-            .map_err(|error| PlotError::Draw(error.to_string()))?;
-    }
-    let drawn = format!(r#"width="{width}" height="{height}""#);
-    let shown = format!(
-        r#"width="{}" height="{}" stroke-linejoin="round""#,
-        width / DRAWN_PER_SHOWN,
-        height / DRAWN_PER_SHOWN
-    );
-    Ok(svg.replacen(&drawn, &shown, 1))
-}
+pub const NOTE: Look = look(SMALL, false, GREY);
 
 /// Returns the opaque colour that looks like a translucent one on white.
-pub fn over_white(colour: RGBColor, opacity: f64) -> RGBColor {
+pub fn over_white(colour: Colour, opacity: f64) -> Colour {
     let mix = |part: u8| (255.0 + (f64::from(part) - 255.0) * opacity.clamp(0.0, 1.0)) as u8;
-    RGBColor(mix(colour.0), mix(colour.1), mix(colour.2))
+    Colour(mix(colour.0), mix(colour.1), mix(colour.2))
 }
 
-/// Returns about `count` round values within a range, and their spacing.
+/// Returns about `count` round values within a range, and their spacing: 1, 2 or 5 times a power of
+/// ten.
 pub fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
-    // Rounding must not drop a tick at the very end.
-    let slack = 1e-6 * (range.end - range.start);
-    let ticks = RangedCoordf64::from(range.start - slack..range.end + slack).key_points(count);
-    let step = match ticks.as_slice() {
-        [first, second, ..] => second - first,
-        _ => range.end - range.start,
+    let span = range.end - range.start;
+    let coarsest = span / count.max(1) as f64;
+    let power = 10_f64.powf(coarsest.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|factor| factor * power)
+        .find(|step| *step >= coarsest * (1.0 - 1e-9));
+    let Some(step) = step.filter(|step| step.is_normal()) else {
+        return (Vec::new(), span);
     };
-    (ticks, step)
+    // Rounding must not drop a tick at the very end.
+    let slack = 1e-6 * span;
+    let (first, last) = (
+        ((range.start - slack) / step).ceil(),
+        ((range.end + slack) / step).floor(),
+    );
+    // At such a distance from zero, adjacent ticks are the same number.
+    if last.abs().max(first.abs()) > 1e15 {
+        return (Vec::new(), step);
+    }
+    let ticks = (first as i64..=last as i64).map(|tick| tick as f64 * step);
+    (ticks.collect(), step)
 }
 
 /// Removes points on a straight vertical or horizontal run to the next point.
@@ -134,23 +124,42 @@ pub fn without_straight_ons(points: impl Iterator<Item = (i32, i32)>) -> Vec<(i3
     kept
 }
 
-/// Estimates the width of a text in a common font; only the viewer knows the true width.
+/// Estimates the width of a text; only the viewer knows the true width. The widths are those of
+/// DejaVu Sans, the widest of the fonts.
 pub fn text_width(text: &str, look: &Look) -> i32 {
-    text.chars().count() as i32 * look.size * 45 / 100
+    let thousandths: i32 = text.chars().map(character_width).sum();
+    let bold = if look.bold { 110 } else { 100 };
+    thousandths * look.size / 1000 * bold / 100
 }
 
-/// Draws a text at a point, aligned left, right or centred.
-///
-/// # Errors
-/// The error of the drawing library.
-pub fn text(root: &Area<'_>, text: &str, look: &Look, at: (i32, i32), side: HPos) -> Drawn {
-    if text.is_empty() {
-        return Ok(());
+/// Returns the width of a character, thousandths of the font's height.
+fn character_width(character: char) -> i32 {
+    match character {
+        // Placed over the letter before it.
+        '\u{307}' => 0,
+        'i' | 'j' | 'l' | '\'' | ' ' | ',' | '.' | ':' | ';' | '|' | '·' => 320,
+        'f' | 'r' | 't' | 'I' | '(' | ')' | '[' | ']' | '!' | '/' | '-' => 400,
+        '₁' | '₂' | 'ₜ' | 'ₙ' | 'ᵣ' | '₀' | '²' | '³' => 420,
+        'm' | 'w' | 'M' | 'W' | '%' | '…' | '@' | '→' => 980,
+        '<' | '>' | '=' | '+' | '−' | '≤' | '≥' | '≈' | '±' | '∞' => 838,
+        'A'..='Z' => 720,
+        _ => 630,
     }
-    let style = TextStyle::from((FONT, look.size, look.weight))
-        .color(&look.colour)
-        .pos(Pos::new(side, VPos::Center));
-    root.draw_text(text, &style, at)
+}
+
+/// Breaks a text at spaces into lines no wider than `width`; a longer word gets a line of its own.
+pub fn wrapped(text: &str, look: &Look, width: i32) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ').filter(|word| !word.is_empty()) {
+        match lines.last_mut() {
+            Some(line) if text_width(&format!("{line} {word}"), look) <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 #[cfg(test)]
@@ -173,5 +182,23 @@ mod tests {
             without_straight_ons(points.into_iter()),
             [(0, 0), (0, 9), (0, 2), (8, 2), (9, 3)]
         );
+    }
+
+    #[test]
+    fn ticks_are_round_and_within_the_range() {
+        assert_eq!(
+            ticks(&(0.0..6.0), 6),
+            (vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 1.0)
+        );
+        assert_eq!(ticks(&(-0.31..0.25), 4), (vec![-0.2, 0.0, 0.2], 0.2));
+        assert_eq!(ticks(&(1e20..1e20 + 1e5), 4).0, []);
+        assert_eq!(ticks(&(5.0..5.0), 4).0, []);
+    }
+
+    #[test]
+    fn long_texts_are_broken_at_spaces() {
+        let lines = wrapped("one two  three", &LABEL, text_width("one two", &LABEL));
+        assert_eq!(lines, ["one two", "three"]);
+        assert_eq!(wrapped("", &LABEL, 100), Vec::<String>::new());
     }
 }

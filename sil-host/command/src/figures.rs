@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use painleve_plant::Event;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult, Monitor};
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
-use painleve_record::RunPlot;
-use painleve_study::StudyError;
+use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
+use painleve_record::replica::Replica;
+use painleve_record::{RecordedTick, RunPlot};
 use painleve_study::catalogue::{AnyOutcome, STUDIES};
 use painleve_study::figures::page_maker::{Fineness, PageMaker};
 use painleve_study::figures::{self, Page, Section};
@@ -111,25 +113,45 @@ fn data(
 /// Runs a scenario and draws it.
 fn simulated(name: &str) -> Result<Section, CommandError> {
     let scenario = Scenario::load(name, &[])?;
-    let subtitle = format!(
-        "law: {} · {} Hz · μ = {}",
-        scenario.controller.law.name(),
-        scenario.run.tick_hz,
-        scenario.belt.friction
-    );
-    let mut drawing = Drawing(RunPlot::new(name, subtitle));
+    let mut drawing = Drawing {
+        plot: RunPlot::new(&scenario),
+        replica: Replica::new(&scenario.controller_configuration()),
+        events: ControllerEvents::default(),
+    };
     let result = simulate(&scenario, &mut drawing)?;
-    let svg = drawing.0.svg().map_err(StudyError::from)?;
-    Ok(figures::run::section(&scenario, &result, svg))
+    Ok(figures::run::section(
+        &scenario,
+        &result,
+        drawing.plot.svg(),
+    ))
 }
 
 /// Draws a run while it is simulated.
-struct Drawing(RunPlot);
+struct Drawing {
+    plot: RunPlot,
+    replica: Option<Replica>,
+    events: ControllerEvents,
+}
 
 impl Monitor for Drawing {
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
-        self.0.push(sample);
+        if let Some(replica) = &mut self.replica {
+            replica.follow(sample);
+        }
+        for kind in self.events.take_in(sample).into_iter().flatten() {
+            let time_s = sample.plant.time_s;
+            self.plot.event(&RunEvent { time_s, kind });
+        }
+        self.plot.tick(&RecordedTick {
+            sample,
+            estimates: self.replica.as_ref().map(Replica::telemetry),
+        });
         Ok(())
+    }
+
+    fn event(&mut self, time_s: f64, event: Event) {
+        let kind = EventKind::Plant(event);
+        self.plot.event(&RunEvent { time_s, kind });
     }
 }
 

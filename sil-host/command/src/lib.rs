@@ -180,7 +180,7 @@ impl CommandError {
             Self::Scenario(_) | Self::SameFile { .. } | Self::Input(_) | Self::Bound(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
-                StudyError::Plot(_) | StudyError::Unwritable { .. } => 4,
+                StudyError::Unwritable { .. } => 4,
                 StudyError::Scenario(_)
                 | StudyError::Grid(_)
                 | StudyError::Taken { .. }

@@ -103,25 +103,13 @@ impl OutputArguments {
                 "csv" => Box::new(CsvTable::to(file).map_err(output_error)?),
                 "html" => Box::new(PageFile::new(file, scenario)),
                 _ => Box::new(PlotFile {
-                    plot: figure(scenario),
+                    plot: RunPlot::new(scenario),
                     file,
                 }),
             });
         }
         Ok(sinks)
     }
-}
-
-/// Returns the empty figure of a run of this scenario.
-fn figure(scenario: &Scenario) -> RunPlot {
-    let subtitle = format!(
-        "law: {} · {} Hz · μ = {} · seed {}",
-        scenario.controller.law.name(),
-        scenario.run.tick_hz,
-        scenario.belt.friction,
-        scenario.run.seed,
-    );
-    RunPlot::new(&scenario.name, subtitle)
 }
 
 /// Ticks between two updates of the progress bar.

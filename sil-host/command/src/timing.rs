@@ -87,8 +87,8 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         .map(|scenario| measure(arguments, scenario, &interrupt))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(path) = &arguments.svg {
-        let figure = figure::svg(&reports).map_err(|error| output(&error))?;
-        atomic_file::write(path, figure.as_bytes()).map_err(|error| output(&error))?;
+        atomic_file::write(path, figure::svg(&reports).as_bytes())
+            .map_err(|error| output(&error))?;
     }
     if arguments.json {
         let text = serde_json::to_string(&reports).map_err(|error| output(&error))?;

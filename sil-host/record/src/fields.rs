@@ -205,6 +205,8 @@ pub const ESTIMATES: Topic = Topic {
         tip_t_m: Single = now.tip_t_m;
         /// Reference after the edge governor, m.
         reference_m: Single = now.reference_m;
+        /// Reference that the program requests, before the edge governor, m.
+        requested_m: Single = now.requested_m;
         /// Measured normal force, N.
         normal_force_n: Single = now.normal_force_n;
         /// Measured tangential force, N.

@@ -69,6 +69,10 @@ pub struct RunReport {
     pub final_tip_t_m: f64,
     /// Reference at the end, m.
     pub final_reference_m: f64,
+    /// End of the reference that the scenario requests, before any edge holds it back, m; null if it
+    /// requests none.
+    #[serde(default)]
+    pub requested_target_m: Option<f64>,
     /// Smallest normal force after the first 50 ms, N; null for shorter runs.
     pub min_normal_force_n: Option<f64>,
     /// Largest joint torque, N·m.
@@ -132,6 +136,7 @@ impl RunReport {
             max_tip_t_m: statistics.max_tip_t_m,
             final_tip_t_m: result.final_tip_t_m,
             final_reference_m: result.final_reference_m,
+            requested_target_m: requested_target_m(scenario),
             min_normal_force_n: force.is_finite().then_some(force),
             peak_torque_nm: statistics.peak_torque_nm,
             contact_fraction: statistics.contact_fraction(),
@@ -237,6 +242,16 @@ impl RunReport {
         }
         table.to_string()
     }
+}
+
+/// Returns the end of the scenario's reference, m; `None` without a law or a target.
+fn requested_target_m(scenario: &Scenario) -> Option<f64> {
+    let controller = &scenario.controller;
+    let segments = controller.reference.segments.iter();
+    let target = segments.rev().find_map(|segment| segment.target_m());
+    target
+        .map(f64::from)
+        .filter(|_| controller.law.name() != "off")
 }
 
 fn microseconds(percentiles: &DurationPercentiles) -> String {

@@ -1,8 +1,7 @@
 //! Distribution of a value over many runs: percentiles and a histogram.
 
-use painleve_chart::style::VERMILLION;
+use painleve_chart::style::{Colour, VERMILLION};
 use painleve_chart::{Mark, Panel};
-use plotters::style::RGBColor;
 use serde::Serialize;
 
 /// Number of bars of a histogram.
@@ -52,7 +51,7 @@ impl Percentiles {
 pub fn histogram(
     title: &str,
     note: String,
-    colour: RGBColor,
+    colour: Colour,
     end: f64,
     limit: f64,
     values: &[f64],
@@ -108,7 +107,7 @@ mod tests {
         let panel = histogram(
             "n",
             String::new(),
-            RGBColor(0, 0, 0),
+            Colour(0, 0, 0),
             6.0,
             5.0,
             &[0.0, 0.05, 9.0],

@@ -11,7 +11,7 @@
 //! - [`effects`]: success against the level of each effect of a real rig, on rigid and compliant contact
 //! - [`stiffness`]: the compliant contact as it gets stiffer, beside the rigid one
 //! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
-//! - [`contact_probe`], [`distribution`], [`proportion`]: contact, distributions and success rates of many runs
+//! - [`contact_probe`], [`distribution`], [`proportion`], [`paired_difference`]: contact, distributions and success rates
 //! - [`case`], [`trial`]: closed loops to study, and their execution in this process;
 //!   [`loop_study`]: the same with a user-defined plant
 //! - [`bifurcation`]: Fig. 4, where over μ × v_belt the arm keeps bouncing
@@ -51,6 +51,7 @@ pub mod lift_off;
 pub mod loop_study;
 pub mod options;
 pub mod outcome;
+pub mod paired_difference;
 pub mod paper;
 mod places;
 pub mod poincare;
@@ -64,7 +65,6 @@ pub mod sweep;
 pub mod tabular;
 pub mod trial;
 
-use painleve_chart::PlotError;
 use painleve_plant::PlantError;
 use painleve_plant::closed_loop::LoopError;
 use painleve_plant::scenario::ScenarioError;
@@ -138,9 +138,6 @@ pub enum StudyError {
         /// The reason.
         source: LoopError,
     },
-    /// The figure cannot be drawn.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
 }
 
 /// A numbered list of rows, each of which depends only on its number.

@@ -2,7 +2,6 @@
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{ContentArrangement, Table};
-use painleve_chart::PlotError;
 use serde::Serialize;
 
 /// The outcome of a study. Serialised it is the JSON object of `--json`, whose names are
@@ -18,10 +17,7 @@ pub trait Outcome: Serialize {
 /// An outcome that can be drawn.
 pub trait Figure {
     /// The figure as SVG text.
-    ///
-    /// # Errors
-    /// [`PlotError`] if it cannot be drawn.
-    fn svg(&self) -> Result<String, PlotError>;
+    fn svg(&self) -> String;
 }
 
 /// The CSV file of an outcome, header included.

@@ -1,39 +1,60 @@
-//! Figures of studies: stacked panels of curves, points and regions over one shared axis.
+//! Figures: panels of curves, points and regions, stacked over one shared axis or side by side.
 
+mod heading;
+mod mark;
 mod placed;
 
 use std::ops::Range;
 
-use plotters::style::RGBColor;
-use plotters::style::text_anchor::HPos;
-
-use super::PlotError;
-use super::axis::label;
-use super::style::{self, HEADING, SUBTITLE, TICK, TITLE, over_white, text, ticks};
+use crate::axis::label;
+use crate::canvas::{Anchor, Canvas};
+use crate::style::{HEADING, LABEL, SUBTITLE, TITLE, WIDTH, text_width, ticks, wrapped};
+use heading::{Heading, ROW};
+pub use mark::Mark;
 use placed::{Placed, x_pixel};
 
-const WIDTH: i32 = 2000;
-const LEFT: i32 = 170;
-const RIGHT: i32 = 50;
-const TITLE_HEIGHT: i32 = 124;
-const ROW: i32 = 50;
-const GAP: i32 = 24;
-const AXIS_HEIGHT: i32 = 110;
-const X_TICKS: usize = 12;
+/// Left end of the panels, drawn units; the labels of the value axis are to the left.
+pub const LEFT: i32 = 170;
+/// Distance of the panels from the right end of the figure, drawn units.
+pub const RIGHT: i32 = 50;
+const TITLE_ROW: i32 = 54;
+const TOP: i32 = 16;
+const GAP: i32 = 28;
 
 /// A figure.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Chart {
     /// Title of the figure.
     pub title: String,
-    /// Parameters common to all panels; about 110 characters.
+    /// Lines below the title: a verdict, parameters common to all panels.
     pub subtitle: String,
     /// Name and unit of the axis that all panels share.
     pub x_title: String,
     /// Ends of the shared axis; by default those of all points.
     pub x: Option<Range<f64>>,
-    /// Panels from top to bottom.
+    /// Labels of the shared axis and their positions; round numbers by default.
+    pub x_labels: Option<Vec<(f64, String)>>,
+    /// Panels from left to right, then from top to bottom.
     pub panels: Vec<Panel>,
+    /// Number of panels side by side.
+    pub columns: usize,
+    /// Whether one legend above the panels serves all of them.
+    pub one_legend: bool,
+}
+
+impl Default for Chart {
+    fn default() -> Self {
+        Self {
+            title: String::new(),
+            subtitle: String::new(),
+            x_title: String::new(),
+            x: None,
+            x_labels: None,
+            panels: Vec::new(),
+            columns: 1,
+            one_legend: false,
+        }
+    }
 }
 
 /// A panel of a figure.
@@ -43,11 +64,19 @@ pub struct Panel {
     pub title: String,
     /// Note on how to read the panel.
     pub note: String,
+    /// Unit of the value axis, for the note on values off the scale.
+    pub unit: String,
+    /// Title and ends of an axis of its own instead of the shared one.
+    pub x: Option<(String, Range<f64>)>,
     /// Ends of the value axis; by default those of all points.
     pub y: Option<Range<f64>>,
+    /// Smallest span of an axis chosen from the points, so that noise on a constant stays small.
+    pub minimum_span: f64,
     /// Approximate number of value labels; zero for a strip without values.
     pub y_ticks: usize,
-    /// Height in drawn units; a whole figure is 2000 wide.
+    /// Labels of the value axis and their positions; round numbers by default.
+    pub y_labels: Option<Vec<(f64, String)>>,
+    /// Height in drawn units; a whole figure is [`WIDTH`] wide.
     pub height: i32,
     /// Contents, from bottom to top.
     pub marks: Vec<Mark>,
@@ -58,204 +87,150 @@ impl Default for Panel {
         Self {
             title: String::new(),
             note: String::new(),
+            unit: String::new(),
+            x: None,
             y: None,
+            minimum_span: 0.0,
             y_ticks: 6,
-            height: 600,
+            y_labels: None,
+            height: 420,
             marks: Vec::new(),
         }
     }
 }
 
-/// An element of a panel; a named element appears in the legend.
-#[derive(Clone, Debug)]
-pub enum Mark {
-    /// Points joined by straight lines; a NaN interrupts the line.
-    Line {
-        /// Name in the legend.
-        name: String,
-        /// Colour.
-        colour: RGBColor,
-        /// Width in drawn units.
-        width: u32,
-        /// Dashed instead of solid.
-        dashed: bool,
-        /// Points from first to last.
-        points: Vec<(f64, f64)>,
-    },
-    /// Separate points.
-    Dots {
-        /// Name in the legend.
-        name: String,
-        /// Colour.
-        colour: RGBColor,
-        /// Side of the square in drawn units.
-        size: i32,
-        /// Points in any order.
-        points: Vec<(f64, f64)>,
-    },
-    /// An interval of the axis, shaded over the panel's height.
-    Span {
-        /// Name in the legend.
-        name: String,
-        /// Colour.
-        colour: RGBColor,
-        /// Opacity, from 0 (clear) to 1 (solid).
-        opacity: f64,
-        /// Ends of the interval.
-        x: Range<f64>,
-    },
-    /// A map of equal cells.
-    Cells {
-        /// Ends of the map along the shared axis.
-        x: Range<f64>,
-        /// Ends of the map along the value axis.
-        y: Range<f64>,
-        /// Number of cells from left to right.
-        columns: usize,
-        /// Names and colours of the palette.
-        palette: Vec<(String, RGBColor)>,
-        /// Palette index of each cell, row by row from the bottom, left to right;
-        /// an index outside the palette leaves the cell clear.
-        cells: Vec<u8>,
-    },
-    /// A text in the panel.
-    Label {
-        /// Position of its middle, or of its left end.
-        at: (f64, f64),
-        /// Whether `at` is the middle.
-        centred: bool,
-        /// The text.
-        text: String,
-    },
-}
-
-impl Mark {
-    /// Creates a solid line.
-    pub fn line(name: &str, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
-        Self::Line {
-            name: name.into(),
-            colour,
-            width: 3,
-            dashed: false,
-            points,
-        }
-    }
-
-    /// Creates a dashed line.
-    pub fn dashed(name: &str, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
-        Self::Line {
-            name: name.into(),
-            colour,
-            width: 3,
-            dashed: true,
-            points,
-        }
-    }
-
-    fn points(&self) -> &[(f64, f64)] {
-        match self {
-            Self::Line { points, .. } | Self::Dots { points, .. } => points,
-            _ => &[],
-        }
-    }
-
-    /// Returns the entries for the legend.
-    fn legend(&self) -> Vec<Entry<'_>> {
-        let entry = |name, colour, symbol| Entry {
-            name,
-            colour,
-            symbol,
-        };
-        match self {
-            Self::Line {
-                name,
-                colour,
-                dashed,
-                ..
-            } => {
-                let symbol = if *dashed {
-                    Symbol::Dashes
-                } else {
-                    Symbol::Line
-                };
-                vec![entry(name, *colour, symbol)]
-            }
-            Self::Dots { name, colour, .. } => vec![entry(name, *colour, Symbol::Area)],
-            Self::Span {
-                name,
-                colour,
-                opacity,
-                ..
-            } => vec![entry(name, over_white(*colour, *opacity), Symbol::Area)],
-            Self::Cells { palette, .. } => palette
-                .iter()
-                .map(|(name, colour)| entry(name, *colour, Symbol::Area))
-                .collect(),
-            Self::Label { .. } => Vec::new(),
-        }
-    }
-}
-
-/// An entry of a legend.
-struct Entry<'a> {
-    name: &'a str,
-    colour: RGBColor,
-    symbol: Symbol,
-}
-
-/// The symbol of a legend entry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Symbol {
-    Line,
-    Dashes,
-    Area,
-}
-
 impl Chart {
     /// Returns the figure as SVG text.
-    ///
-    /// # Errors
-    /// [`PlotError::Draw`] if the drawing library fails, which is not expected.
-    pub fn svg(&self) -> Result<String, PlotError> {
+    pub fn svg(&self) -> String {
+        let mut canvas = Canvas::default();
+        let mut top = TOP;
+        for (text, look, row) in [
+            (&self.title, &TITLE, TITLE_ROW),
+            (&self.subtitle, &SUBTITLE, ROW),
+        ] {
+            for line in text
+                .lines()
+                .flat_map(|line| wrapped(line, look, WIDTH - 2 * RIGHT))
+            {
+                canvas.text(&line, look, (RIGHT, top + row / 2), Anchor::Left);
+                top += row;
+            }
+        }
+        if self.one_legend {
+            let panels = self.panels.iter();
+            let mut entries: Vec<_> = panels.flat_map(Panel::legend).collect();
+            let mut seen = std::collections::BTreeSet::new();
+            entries.retain(|entry| seen.insert(entry.name));
+            let legend = Heading::new("", "", entries, RIGHT..WIDTH - RIGHT);
+            legend.draw(&mut canvas, top);
+            top += legend.height();
+        }
+        top += GAP / 2;
+
         let x = self.x_range();
-        let laid_out: Vec<Placed<'_>> = self
-            .panels
-            .iter()
-            .scan(TITLE_HEIGHT, |top, panel| {
-                let placed = Placed::new(panel, *top, x.clone());
-                *top = placed.bottom + GAP;
-                Some(placed)
-            })
-            .collect();
-        let bottom = laid_out.last().map_or(TITLE_HEIGHT, |placed| placed.bottom);
-        style::svg((WIDTH, bottom + AXIS_HEIGHT), |root| {
-            text(root, &self.title, &TITLE, (LEFT, 44), HPos::Left)?;
-            text(root, &self.subtitle, &SUBTITLE, (LEFT, 90), HPos::Left)?;
-            for placed in &laid_out {
-                placed.draw(root)?;
+        let columns = self.columns.max(1);
+        let mut bottoms = vec![top; columns];
+        for row in self.panels.chunks(columns) {
+            let placed: Vec<_> = row
+                .iter()
+                .zip(column_sides(columns))
+                .map(|(panel, sides)| Placed::new(panel, sides, &x, self))
+                .collect();
+            let heading = placed.iter().map(Placed::heading_height).max().unwrap_or(0);
+            let mut bottom = top;
+            for (panel, column) in placed.iter().zip(&mut bottoms) {
+                *column = panel.draw(&mut canvas, top + heading);
+                bottom = bottom.max(*column);
             }
-            let (values, step) = ticks(&x, X_TICKS);
-            for value in values {
-                let at = (x_pixel(&x, value), bottom + 26);
-                text(root, &label(value, step), &TICK, at, HPos::Center)?;
+            top = bottom + GAP;
+        }
+        let is_shared = self.panels.iter().any(|panel| panel.x.is_none());
+        let mut end = bottoms.iter().copied().max().unwrap_or(top);
+        for (sides, bottom) in column_sides(columns).into_iter().zip(&bottoms) {
+            if is_shared {
+                let labels = x_labels(self, &x, &sides);
+                let below = draw_x_axis(&mut canvas, &labels, &self.x_title, &x, &sides, *bottom);
+                end = end.max(below);
             }
-            let middle = ((LEFT + WIDTH - RIGHT) / 2, bottom + 68);
-            text(root, &self.x_title, &HEADING, middle, HPos::Center)
-        })
+        }
+        canvas.finish((WIDTH, end + TOP), &self.title, &self.subtitle)
     }
 
     fn x_range(&self) -> Range<f64> {
         self.x.clone().unwrap_or_else(|| {
             let points = self.panels.iter().flat_map(|panel| &panel.marks);
-            let values = points.flat_map(|mark| mark.points().iter().map(|point| point.0));
+            let values = points.flat_map(|mark| mark.points().into_iter().map(|point| point.0));
             let (low, high) = values
                 .filter(|value| value.is_finite())
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
                     (low.min(value), high.max(value))
                 });
-            if low < high { low..high } else { 0.0..1.0 }
+            if low < high {
+                low..high
+            } else if low == high {
+                // A single point is in the middle.
+                let half = 0.1 * low.abs().max(1e-3);
+                low - half..low + half
+            } else {
+                0.0..1.0
+            }
         })
     }
+}
+
+/// Draws labels and title below a panel; returns the lower end.
+fn draw_x_axis(
+    canvas: &mut Canvas,
+    labels: &[(f64, String)],
+    title: &str,
+    x: &Range<f64>,
+    sides: &Range<i32>,
+    bottom: i32,
+) -> i32 {
+    for (value, name) in labels {
+        let at = (x_pixel(x, sides, *value), bottom + 26);
+        canvas.text(name, &LABEL, at, Anchor::Middle);
+    }
+    let mut row = bottom + 50;
+    for line in wrapped(title, &HEADING, sides.end - sides.start + RIGHT) {
+        let middle = ((sides.start + sides.end) / 2, row + ROW / 2);
+        canvas.text(&line, &HEADING, middle, Anchor::Middle);
+        row += ROW;
+    }
+    row
+}
+
+/// Returns the left and right ends of the panels of each column.
+fn column_sides(columns: usize) -> Vec<Range<i32>> {
+    let pitch = WIDTH / columns as i32;
+    (0..columns as i32)
+        .map(|column| column * pitch + LEFT..(column + 1) * pitch - RIGHT)
+        .collect()
+}
+
+/// Returns the labels of the shared axis.
+fn x_labels(chart: &Chart, x: &Range<f64>, sides: &Range<i32>) -> Vec<(f64, String)> {
+    if let Some(labels) = &chart.x_labels {
+        return labels.clone();
+    }
+    round_labels(x, sides)
+}
+
+/// Returns as many round numbers as have room along an axis.
+fn round_labels(x: &Range<f64>, sides: &Range<i32>) -> Vec<(f64, String)> {
+    for count in (1..=10).rev() {
+        let (values, step) = ticks(x, count);
+        let labels: Vec<_> = values
+            .into_iter()
+            .map(|value| (value, label(value, step)))
+            .collect();
+        let widths = labels.iter().map(|(_, name)| text_width(name, &LABEL));
+        let widest = widths.max().unwrap_or(0) + 40;
+        if widest * labels.len() as i32 <= sides.end - sides.start + widest {
+            return labels;
+        }
+    }
+    Vec::new()
 }
 
 #[cfg(test)]

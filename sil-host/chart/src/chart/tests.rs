@@ -26,11 +26,11 @@ fn named_elements_are_in_the_legend_and_titles_are_escaped() {
     let svg = chart(vec![
         Mark::line("solid", BLUE_INK, vec![(0.0, 1.0), (1.0, 2.0)]),
         Mark::dashed("", GREEN, vec![(0.0, 2.0), (1.0, 1.0)]),
-        Mark::Span {
+        Mark::Spans {
             name: "span".into(),
             colour: ORANGE,
             opacity: 0.5,
-            x: 0.2..0.4,
+            x: vec![0.2..0.4],
         },
         Mark::Cells {
             x: 0.0..1.0,
@@ -45,18 +45,19 @@ fn named_elements_are_in_the_legend_and_titles_are_escaped() {
             text: "word".into(),
         },
     ])
-    .svg()
-    .unwrap();
+    .svg();
     for text in [
         "solid", "span", "cell", "word", "a &lt; b", "x (m)", "y (N)",
     ] {
         assert!(
-            svg.contains(&format!("\n{text}\n")),
+            svg.contains(&format!(">{text}</text>")),
             "{text} is not in {svg}"
         );
     }
-    // The lower row is one rectangle, the upper row has a clear cell, and one is in the legend.
-    assert_eq!(count(&svg, "fill=\"#D55E00\""), 3);
+    // One rectangle in the legend; in the map one for the lower row, and one beside the clear cell.
+    let shapes = svg.split("<path fill=\"#D55E00\"").skip(1);
+    let rectangles = shapes.map(|shape| count(shape.split_once("/>").unwrap().0, "M"));
+    assert_eq!(rectangles.collect::<Vec<_>>(), [1, 2]);
 }
 
 #[test]
@@ -68,26 +69,71 @@ fn nan_interrupts_lines_and_coincident_dots_are_merged() {
         (3.0, 1.0),
         (4.0, 0.0),
     ];
-    let svg = chart(vec![Mark::line("", BLUE_INK, points)]).svg().unwrap();
-    assert_eq!(count(&svg, "stroke=\"#0072B2\""), 2);
+    let svg = chart(vec![Mark::line("", BLUE_INK, points)]).svg();
+    assert_eq!(count(&svg, "stroke=\"#0072B2\" "), 2);
     let dots = Mark::Dots {
         name: String::new(),
         colour: GREEN,
         size: 4,
         points: vec![(0.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.5, f64::NAN)],
     };
-    assert_eq!(count(&chart(vec![dots]).svg().unwrap(), "#009E73"), 2);
+    let svg = chart(vec![dots]).svg();
+    let (_, dots) = svg.split_once("<path fill=\"#009E73\"").unwrap();
+    assert_eq!(count(dots.split_once("/>").unwrap().0, "M"), 2);
 }
 
 #[test]
 fn long_legends_get_a_row_of_their_own() {
     let height = |name: &str| {
         let marks = (0..3).map(|_| Mark::line(name, BLUE_INK, vec![(0.0, 0.0), (1.0, 1.0)]));
-        let svg = chart(marks.collect()).svg().unwrap();
+        let svg = chart(marks.collect()).svg();
         let (_, rest) = svg.split_once("height=\"").unwrap();
         rest.split_once('"').unwrap().0.parse::<i32>().unwrap()
     };
-    assert_eq!(height(&"long name ".repeat(5)), height("short") + ROW / 2);
+    // Shown at half the drawn size.
+    assert_eq!(
+        height(&"long name ".repeat(3)),
+        height("short") + 3 * ROW / 2
+    );
+}
+
+#[test]
+fn a_single_point_is_a_dot_in_the_middle_with_labels_that_differ() {
+    let svg = chart(vec![Mark::line("", BLUE_INK, vec![(-0.4, 6.0)])]).svg();
+    assert_eq!(count(&svg, "<circle"), 1);
+    assert!(
+        svg.contains(">−0.40</text>") && svg.contains(">6.0</text>"),
+        "{svg}"
+    );
+    let labels: Vec<&str> = svg
+        .split("text-anchor=\"end\"")
+        .skip(1)
+        .filter_map(|rest| rest.split_once('>')?.1.split_once('<'))
+        .map(|(label, _)| label)
+        .collect();
+    let mut distinct = labels.clone();
+    distinct.dedup();
+    assert_eq!(labels, distinct);
+}
+
+#[test]
+fn panels_side_by_side_share_one_legend() {
+    let panel = || Panel {
+        title: "y".into(),
+        marks: vec![Mark::line(
+            "only once",
+            BLUE_INK,
+            vec![(0.0, 1.0), (1.0, 2.0)],
+        )],
+        ..Panel::default()
+    };
+    let chart = Chart {
+        columns: 2,
+        one_legend: true,
+        panels: (0..4).map(|_| panel()).collect(),
+        ..Chart::default()
+    };
+    assert_eq!(count(&chart.svg(), ">only once</text>"), 1);
 }
 
 proptest! {
@@ -106,7 +152,7 @@ proptest! {
             size: 2,
             points: points.clone(),
         };
-        let svg = chart(vec![mark("l", BLUE_INK, points), dots]).svg().unwrap();
+        let svg = chart(vec![mark("l", BLUE_INK, points), dots]).svg();
         prop_assert!(!svg.contains("NaN") && !svg.contains("inf"));
         for line in svg.lines().filter_map(|line| line.split_once("points=\"")) {
             let (points, _) = line.1.split_once('"').unwrap();

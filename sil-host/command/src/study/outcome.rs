@@ -95,7 +95,7 @@ impl OutcomeOptions {
             atomic_file::write(path, &outcome.csv().map_err(output)?).map_err(output)?;
         }
         if let Some(path) = &self.svg {
-            atomic_file::write(path, outcome.svg()?.as_bytes()).map_err(output)?;
+            atomic_file::write(path, outcome.svg().as_bytes()).map_err(output)?;
         }
         if self.json {
             say(outcome.json().map_err(output)?)

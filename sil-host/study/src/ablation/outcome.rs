@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::AblationStudy;
 use crate::outcome::{self, Outcome};
+use crate::paired_difference::PairedDifference;
 use crate::proportion::Proportion;
 use crate::robustness::{Ending, Part, RobustnessOutcome, Row};
 
@@ -25,6 +26,10 @@ pub struct Ablated {
     pub lower: f64,
     /// Upper bound of its 95 % confidence interval.
     pub upper: f64,
+    /// Runs that succeed with the part and fail without it.
+    pub lost: usize,
+    /// Runs that fail with the part and succeed without it.
+    pub gained: usize,
     /// Runs with a lift-off after capture.
     pub lift_offs: usize,
     /// Runs that ended elsewhere, or at a wrongly estimated edge.
@@ -49,11 +54,19 @@ impl Ablation {
     pub fn new(study: &AblationStudy, rows: Vec<Row>) -> Self {
         let runs = study.campaign.runs.max(1);
         let without = std::iter::once(None).chain(study.parts.iter().copied().map(Some));
+        let whole = &rows[..runs.min(rows.len())];
         let rows = without
             .zip(rows.chunks(runs))
             .map(|(without, rows)| {
                 let campaign =
                     RobustnessOutcome::new(study.campaign.arms, study.campaign.seed, rows.to_vec());
+                let differing = |with: bool| {
+                    let pairs = whole.iter().zip(rows);
+                    let succeed = |(one, other): &(&Row, &Row)| {
+                        (one.ending.is_success(), other.ending.is_success()) == (with, !with)
+                    };
+                    pairs.filter(succeed).count()
+                };
                 let errors: f64 = rows.iter().map(|row| row.error_m).sum();
                 Ablated {
                     without,
@@ -63,6 +76,8 @@ impl Ablation {
                     rate: campaign.success.rate,
                     lower: campaign.success.lower,
                     upper: campaign.success.upper,
+                    lost: differing(true),
+                    gained: differing(false),
                     lift_offs: campaign.count(Ending::LiftOff),
                     not_reached: campaign.count(Ending::NotReached)
                         + campaign.count(Ending::StoppedEarly),
@@ -77,6 +92,11 @@ impl Ablation {
 }
 
 impl Ablated {
+    /// Returns the change of the success rate when the part is switched off, in the same runs.
+    pub(super) fn difference(&self) -> PairedDifference {
+        PairedDifference::new(self.gained, self.lost, self.runs)
+    }
+
     pub(super) fn name(&self) -> String {
         let part = |part: &Part| format!("without {}", outcome::name(part));
         self.without.as_ref().map_or("everything".into(), part)
@@ -92,6 +112,7 @@ impl Outcome for Ablation {
         let mut table = outcome::table([
             "controller",
             "success (95 %)",
+            "paired difference (95 %)",
             "lift-off",
             "not reached",
             "not captured",
@@ -102,6 +123,8 @@ impl Outcome for Ablation {
             table.add_row([
                 row.name(),
                 Proportion::new(row.successes, row.runs).to_string(),
+                row.without
+                    .map_or("–".into(), |_| row.difference().to_string()),
                 row.lift_offs.to_string(),
                 row.not_reached.to_string(),
                 row.not_captured.to_string(),

@@ -1,7 +1,7 @@
 //! p along the belt, in both postures.
 
 use painleve_chart::style::{BLUE_INK, GREY, VERMILLION};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
+use painleve_chart::{Chart, Mark, Panel};
 use painleve_shared::{Arm, Slip};
 
 use super::Admissible;
@@ -12,7 +12,7 @@ use crate::outcome::Figure;
 const CURVE_POINTS: usize = 400;
 
 impl Figure for Admissible {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         let mut marks = Vec::new();
         // The arm was checked before.
         if let Ok(arm) = Arm::new(self.arm) {
@@ -43,6 +43,7 @@ impl Figure for Admissible {
                 marks,
                 ..Panel::default()
             }],
+            ..Chart::default()
         }
         .svg()
     }

@@ -1,6 +1,5 @@
 //! Table II on the page of figures.
 
-use painleve_chart::PlotError;
 use painleve_plant::mechanics::PlantParameters;
 
 use super::{Admissible, AdmissibleStudy, Intervals};
@@ -19,21 +18,18 @@ pub fn sections(_: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
         mu: paper::FRICTION,
     };
     let outcome = study.row(0)?;
-    Ok(vec![(table_2(&outcome)?, Box::new(outcome))])
+    Ok(vec![(table_2(&outcome), Box::new(outcome))])
 }
 
 /// Table II.
-///
-/// # Errors
-/// [`PlotError`] if the figure cannot be drawn.
-fn table_2(outcome: &Admissible) -> Result<Section, PlotError> {
+fn table_2(outcome: &Admissible) -> Section {
     let command = format!("painleve study admissible --mu {}", outcome.mu);
     let mut section = section(
         "admissible",
         "Table II: admissible configurations",
         command,
         outcome,
-    )?;
+    );
     for (name, intervals) in [
         ("elbow up", &outcome.elbow_up),
         ("elbow down", &outcome.elbow_down),
@@ -73,7 +69,7 @@ fn table_2(outcome: &Admissible) -> Result<Section, PlotError> {
          it is analytic."
             .into(),
     );
-    Ok(section)
+    section
 }
 
 fn slip_of_the_pen(name: &str, mu: f64, intervals: &Intervals) -> Option<String> {

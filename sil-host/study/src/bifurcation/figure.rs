@@ -1,31 +1,26 @@
-//! Fig. 4: a section at one friction coefficient as curves, a whole diagram as maps.
+//! Fig. 4: a section at one friction coefficient as points, a whole diagram as maps.
 
-use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, GREY, SKY, VERMILLION};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
-use plotters::style::RGBColor;
+use painleve_chart::style::{BLACK_INK, BLUE_INK, Colour, GREEN, GREY, QUIET, SKY, VERMILLION};
+use painleve_chart::{Chart, Mark, Panel};
 
 use super::Row;
 use super::outcome::BifurcationDiagram;
 use crate::cells::Cells;
-use crate::initial::Initial;
 use crate::outcome::Figure;
 use crate::places::Places;
 
 /// Colours of a map in ascending order after the quiet colour; distinguishable in grey.
-const RISING: [RGBColor; 6] = [
-    RGBColor(0xFD, 0xE7, 0x25),
-    RGBColor(0x90, 0xD7, 0x43),
-    RGBColor(0x35, 0xB7, 0x79),
-    RGBColor(0x21, 0x90, 0x8C),
-    RGBColor(0x3B, 0x52, 0x8B),
-    RGBColor(0x44, 0x01, 0x54),
+const RISING: [Colour; 6] = [
+    Colour(0xFD, 0xE7, 0x25),
+    Colour(0x90, 0xD7, 0x43),
+    Colour(0x35, 0xB7, 0x79),
+    Colour(0x21, 0x90, 0x8C),
+    Colour(0x3B, 0x52, 0x8B),
+    Colour(0x44, 0x01, 0x54),
 ];
 
-/// Colour of cells where the arm is quiet.
-const QUIET: RGBColor = RGBColor(0xF2, 0xF2, 0xF2);
-
 impl Figure for BifurcationDiagram {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         chart(self).svg()
     }
 }
@@ -39,81 +34,80 @@ fn chart(diagram: &BifurcationDiagram) -> Chart {
         ..
     } = diagram.settings();
     let groups = diagram.groups();
-    let watched = format!("largest θ̇1 within {record_s} s after {transient_s} s of transient");
+    let watched = format!("largest θ̇₁ within {record_s} s after {transient_s} s of transient");
     match mu.as_slice() {
         [mu] => Chart {
             title: format!("Bifurcation diagram at μ = {mu}"),
             subtitle: format!("no control, {watched} (paper: Fig. 4)"),
-            x_title: "belt speed v_belt in m/s".into(),
-            x: None,
+            x_title: "Belt speed v_belt (m/s)".into(),
             panels: vec![section(diagram, &groups), apexes(diagram, &groups)],
+            ..Chart::default()
         },
         _ => Chart {
             title: "Bifurcation diagram over belt speed and friction".into(),
             subtitle: format!("no control, {watched}; dashed: bouncing in the paper"),
-            x_title: "belt speed v_belt in m/s".into(),
+            x_title: "Belt speed v_belt (m/s)".into(),
             x: Some(Places::of(&diagram.settings().v_belt_m_s).ends()),
             panels: groups.iter().map(|group| map(diagram, group)).collect(),
+            ..Chart::default()
         },
     }
 }
 
-/// Returns the name of a group of initial conditions, its colour, and whether its line is dashed.
-fn look(group: &str) -> (String, RGBColor, bool) {
+/// Returns the name of a group of initial conditions and its colour.
+fn look(group: &str) -> (String, Colour) {
     match group {
-        "a" => ("from x0,a".into(), BLACK_INK, false),
-        "d" => ("from x0,d".into(), VERMILLION, true),
-        "u" => ("from x0,u".into(), BLUE_INK, true),
-        _ => ("from random states".into(), GREEN, false),
+        "a" => ("from x0,a".into(), BLACK_INK),
+        "d" => ("from x0,d".into(), VERMILLION),
+        "u" => ("from x0,u".into(), BLUE_INK),
+        _ => ("from random states".into(), GREEN),
     }
 }
 
-/// Draws a value of each cell of a section against belt speed; several random states at
-/// the same speed are drawn as dots.
-fn curve(diagram: &BifurcationDiagram, group: &str, value: impl Fn(&Row) -> f64) -> Mark {
-    let (name, colour, dashed) = look(group);
+/// Draws a value of each cell of a section against belt speed. Adjacent cells are not joined: their
+/// motions need not be related. A dot is larger than those drawn over it, so that both are seen.
+fn points(
+    diagram: &BifurcationDiagram,
+    group: &str,
+    size: i32,
+    value: impl Fn(&Row) -> f64,
+) -> Mark {
+    let (name, colour) = look(group);
     let points = diagram
         .rising_speeds()
         .into_iter()
         .flat_map(|place| diagram.at(0, place, group))
         .map(|row| (row.v_belt_m_s, value(row)))
         .collect();
-    if group == Initial::Random(1).group() {
-        return Mark::Dots {
-            name,
-            colour,
-            size: 8,
-            points,
-        };
-    }
-    Mark::Line {
+    Mark::Dots {
         name,
         colour,
-        width: 4,
-        dashed,
+        size,
         points,
     }
 }
 
 fn curves(diagram: &BifurcationDiagram, groups: &[&str], value: impl Fn(&Row) -> f64) -> Vec<Mark> {
     // The first series is drawn last, on top.
-    let lines = groups.iter().rev();
-    lines.map(|group| curve(diagram, group, &value)).collect()
+    let places = groups.iter().enumerate().rev();
+    places
+        .map(|(place, group)| points(diagram, group, 8 + 5 * place as i32, &value))
+        .collect()
 }
 
 fn section(diagram: &BifurcationDiagram, groups: &[&str]) -> Panel {
     let mut marks = Vec::new();
     if let Some([from, to]) = diagram.windows.iter().find_map(|window| window.paper_m_s) {
-        marks.push(Mark::Span {
+        marks.push(Mark::Spans {
             name: format!("bouncing in the paper, {from} … {to} m/s").replace('-', "−"),
             colour: SKY,
             opacity: 0.25,
-            x: from..to,
+            x: vec![from..to],
         });
     }
     marks.extend(curves(diagram, groups, |row| row.max_theta1_dot_rad_s));
     Panel {
-        title: "largest θ̇1 in rad/s".into(),
+        title: "Largest θ̇₁ (rad/s)".into(),
         marks,
         ..Panel::default()
     }
@@ -121,7 +115,7 @@ fn section(diagram: &BifurcationDiagram, groups: &[&str]) -> Panel {
 
 fn apexes(diagram: &BifurcationDiagram, groups: &[&str]) -> Panel {
     Panel {
-        title: "apex of the tip in mm".into(),
+        title: "Apex of the tip (mm)".into(),
         height: 300,
         y_ticks: 4,
         marks: curves(diagram, groups, |row| 1e3 * row.apex_m)
@@ -134,7 +128,7 @@ fn apexes(diagram: &BifurcationDiagram, groups: &[&str]) -> Panel {
 
 /// Removes the legend entries that the panel above shows already.
 fn without_name(mut mark: Mark) -> Mark {
-    if let Mark::Line { name, .. } | Mark::Dots { name, .. } = &mut mark {
+    if let Mark::Dots { name, .. } = &mut mark {
         name.clear();
     }
     mark
@@ -178,16 +172,17 @@ fn map(diagram: &BifurcationDiagram, group: &str) -> Panel {
     }
     Panel {
         title: format!("μ, {}", look(group).0),
-        note: "largest θ̇1 in rad/s:".into(),
+        note: "largest θ̇₁ in rad/s:".into(),
         y: Some(lines.ends()),
         y_ticks: 10,
         height: 560,
         marks,
+        ..Panel::default()
     }
 }
 
 /// Returns a palette for values, and the index of each value in it; minus infinity is quiet.
-fn shades(values: &[f64]) -> (Vec<(String, RGBColor)>, Vec<u8>) {
+fn shades(values: &[f64]) -> (Vec<(String, Colour)>, Vec<u8>) {
     let finite = || values.iter().copied().filter(|value| value.is_finite());
     let low = finite().fold(f64::INFINITY, f64::min).floor();
     let high = finite().fold(f64::NEG_INFINITY, f64::max).ceil();

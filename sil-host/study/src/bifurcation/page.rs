@@ -1,7 +1,5 @@
 //! Fig. 4 and the map over friction on the page of figures.
 
-use painleve_chart::PlotError;
-
 use super::{Bifurcation, BifurcationDiagram, Window};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
@@ -22,16 +20,13 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let study = Bifurcation { cells };
     let map = BifurcationDiagram::new(&study, page.rows("Friction and belt speed", &study)?);
     Ok(vec![
-        (bifurcation_section(&section)?, Box::new(section)),
-        (bifurcation_map(&map)?, Box::new(map)),
+        (bifurcation_section(&section), Box::new(section)),
+        (bifurcation_map(&map), Box::new(map)),
     ])
 }
 
 /// Fig. 4.
-///
-/// # Errors
-/// [`PlotError`] if the figure cannot be drawn.
-fn bifurcation_section(outcome: &BifurcationDiagram) -> Result<Section, PlotError> {
+fn bifurcation_section(outcome: &BifurcationDiagram) -> Section {
     let settings = outcome.settings();
     let command = format!(
         "painleve study bifurcation --mu {} --initial a,d --transient-s {} --record-s {}",
@@ -44,7 +39,7 @@ fn bifurcation_section(outcome: &BifurcationDiagram) -> Result<Section, PlotErro
         "Fig. 4: bouncing over belt speed",
         command,
         outcome,
-    )?;
+    );
     for window in &outcome.windows {
         let speeds = stretches(&window.v_belt_m_s);
         match (window.initial.as_str(), window.paper_m_s) {
@@ -71,14 +66,11 @@ fn bifurcation_section(outcome: &BifurcationDiagram) -> Result<Section, PlotErro
          process with Poisson restitution 0.10 reproduces the paper's window to within a step or two of 0.005 m/s."
             .into(),
     );
-    Ok(section)
+    section
 }
 
 /// The paper's two-dimensional diagram.
-///
-/// # Errors
-/// [`PlotError`] if the figure cannot be drawn.
-fn bifurcation_map(outcome: &BifurcationDiagram) -> Result<Section, PlotError> {
+fn bifurcation_map(outcome: &BifurcationDiagram) -> Section {
     let settings = outcome.settings();
     let command = format!(
         "painleve study bifurcation --mu {} --initial a",
@@ -89,7 +81,7 @@ fn bifurcation_map(outcome: &BifurcationDiagram) -> Result<Section, PlotError> {
         "Bouncing over friction and belt speed",
         command,
         outcome,
-    )?;
+    );
     let (bouncing, quiet): (Vec<&Window>, Vec<&Window>) = outcome
         .windows
         .iter()
@@ -139,7 +131,7 @@ fn bifurcation_map(outcome: &BifurcationDiagram) -> Result<Section, PlotError> {
             ));
         }
     }
-    Ok(section)
+    section
 }
 
 fn stretches(speeds: &[[f64; 2]]) -> String {

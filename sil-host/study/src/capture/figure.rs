@@ -1,7 +1,7 @@
 //! Histogram of the capture time, with its limit.
 
+use painleve_chart::Chart;
 use painleve_chart::style::BLUE_INK;
-use painleve_chart::{Chart, PlotError};
 
 use super::LIMIT_S;
 use super::outcome::Captures;
@@ -9,7 +9,7 @@ use crate::distribution::histogram;
 use crate::outcome::Figure;
 
 impl Figure for Captures {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         let solved = self.rows.iter().filter(|row| row.solved);
         let times: Vec<f64> = solved.map(|row| row.capture_s).collect();
         let note = "last bar: that long or longer".to_string();
@@ -19,6 +19,7 @@ impl Figure for Captures {
             x_title: "Time from enabling to the last landing (s)".into(),
             x: Some(0.0..0.6),
             panels: vec![histogram("Runs", note, BLUE_INK, 0.6, LIMIT_S, &times)],
+            ..Chart::default()
         }
         .svg()
     }

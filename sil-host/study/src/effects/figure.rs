@@ -1,7 +1,7 @@
 //! The levels at which success falls below 99, 90 and 50 %, relative to those of a typical rig.
 
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREY, ORANGE, VERMILLION};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
+use painleve_chart::{Chart, Mark, Panel};
 
 use super::outcome::{EffectsOutcome, Fall, RATES, Series, number};
 use crate::outcome::{self, Figure};
@@ -14,7 +14,7 @@ const NAMES: f64 = -13.0;
 const LINE: i32 = 52;
 
 impl Figure for EffectsOutcome {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         let mut panels: Vec<Panel> = Vec::new();
         let mut rest = self.effects.as_slice();
         while let Some(first) = rest.first() {
@@ -36,6 +36,7 @@ impl Figure for EffectsOutcome {
                 .into(),
             x: Some(NAMES - 0.2..MOST),
             panels,
+            ..Chart::default()
         }
         .svg()
     }
@@ -116,5 +117,6 @@ fn panel(all: &[Series], is_first: bool) -> Panel {
         y_ticks: 0,
         height: LINE * count as i32,
         marks,
+        ..Panel::default()
     }
 }

@@ -1,6 +1,5 @@
 //! Shared by the sections of the page: resolution, and computation with progress.
 
-use painleve_chart::PlotError;
 use painleve_plant::mechanics::PlantParameters;
 
 use super::page::Section;
@@ -108,26 +107,23 @@ impl PageMaker<'_> {
 }
 
 /// Creates the common part of a section.
-///
-/// # Errors
-/// [`PlotError`] if the figure cannot be drawn.
 pub fn section<O: Outcome + Figure>(
     name: &str,
     title: &str,
     command: String,
     outcome: &O,
-) -> Result<Section, PlotError> {
-    Ok(Section {
+) -> Section {
+    Section {
         name: name.into(),
         title: title.into(),
         command,
-        svg: outcome.svg()?,
+        svg: outcome.svg(),
         table: Some(outcome.table()),
         files: ["svg", "csv", "json"]
             .map(|ending| format!("{name}.{ending}"))
             .to_vec(),
         ..Section::default()
-    })
+    }
 }
 
 /// Formats values as a list on the command line.

@@ -1,7 +1,7 @@
 //! Histograms of the detection time of a lift-off, with its limit.
 
+use painleve_chart::Chart;
 use painleve_chart::style::{BLUE_INK, ORANGE};
-use painleve_chart::{Chart, PlotError};
 use painleve_firmware::estimate::contact::Evidence;
 
 use super::outcome::LiftOffs;
@@ -13,7 +13,7 @@ use crate::outcome::Figure;
 const FARTHEST_MS: f64 = 20.0;
 
 impl Figure for LiftOffs {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         let panel = |title: &str, evidence, colour| {
             let bar_s = bar_s(evidence);
             let is_long = |row: &&Row| row.evidence == evidence && row.is_long(bar_s);
@@ -21,10 +21,13 @@ impl Figure for LiftOffs {
             let times = long.clone().filter_map(|row| Some(1e3 * row.noticed_s?));
             let times: Vec<f64> = times.collect();
             let limit_ms = 1e3 * bar_s;
+            let within = times.iter().filter(|time_ms| **time_ms <= limit_ms).count();
+            let flights = long.count();
             let note = format!(
-                "{} of {} flights of more than {limit_ms} ms detected; last bar: that long or longer",
-                times.len(),
-                long.count(),
+                "{within} of {flights} flights longer than {limit_ms} ms detected within that limit, \
+                 {} later, {} not; last bar: that long or longer",
+                times.len() - within,
+                flights - times.len(),
             );
             histogram(title, note, colour, FARTHEST_MS, limit_ms, &times)
         };
@@ -37,6 +40,7 @@ impl Figure for LiftOffs {
                 panel("With the force cell (runs)", Evidence::ForceCell, BLUE_INK),
                 panel("From the encoders (runs)", Evidence::Encoders, ORANGE),
             ],
+            ..Chart::default()
         }
         .svg()
     }

@@ -1,10 +1,9 @@
-//! Fig. 5: θ1 at the returns, a strip of periodic and chaotic motion, and the exponent.
+//! Fig. 5: θ1 at the returns, coloured by period, a strip of the motion, and the exponent.
 
 use core::ops::Range;
 
-use painleve_chart::style::{BLACK_INK, BLUE_INK, GREY, ORANGE};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
-use plotters::style::RGBColor;
+use painleve_chart::style::{BLACK_INK, BLUE_INK, Colour, GREEN, GREY, ORANGE, PURPLE, QUIET, SKY};
+use painleve_chart::{Chart, Mark, Panel};
 
 use super::Row;
 use super::outcome::PoincareDiagram;
@@ -14,18 +13,33 @@ use crate::outcome::Figure;
 use crate::places::Places;
 
 /// Red for chaotic motion, as in the paper.
-const RED: RGBColor = RGBColor(0xC6, 0x1A, 0x1A);
+const RED: Colour = Colour(0xC6, 0x1A, 0x1A);
 
-/// The regimes of the strip, in the paper's colours.
-const STRIP: [(Regime, RGBColor); 4] = [
-    (Regime::Periodic, BLACK_INK),
-    (Regime::Chaotic, RED),
-    (Regime::Undecided, ORANGE),
-    (Regime::Quiet, RGBColor(0xF2, 0xF2, 0xF2)),
+/// The kinds of motion in the order of the legend.
+const MOTIONS: [(&str, Colour); 8] = [
+    ("period 1", BLACK_INK),
+    ("2", BLUE_INK),
+    ("3", GREEN),
+    ("4", PURPLE),
+    ("longer", SKY),
+    ("chaotic", RED),
+    ("undecided", ORANGE),
+    ("quiet", QUIET),
 ];
 
+/// Returns the place of a row's motion in [`MOTIONS`].
+fn motion(row: &Row) -> usize {
+    match (row.regime, row.period) {
+        (Regime::Periodic, Some(period @ 1..=4)) => period - 1,
+        (Regime::Periodic, _) => 4,
+        (Regime::Chaotic, _) => 5,
+        (Regime::Undecided, _) => 6,
+        (Regime::Quiet, _) => 7,
+    }
+}
+
 impl Figure for PoincareDiagram {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         chart(self).svg()
     }
 }
@@ -45,53 +59,63 @@ fn chart(diagram: &PoincareDiagram) -> Chart {
         .collect();
     let places = Places::of(v_belt_m_s);
     Chart {
-        title: format!("θ1 where θ̇1 turns positive, at μ = {}", mu[0]),
+        title: format!("θ₁ where θ̇₁ turns positive, at μ = {}", mu[0]),
         subtitle: format!(
             "no control, from x0,{}, {record_s} s after {transient_s} s of transient (paper: Fig. 5)",
             initial[0]
         ),
-        x_title: "belt speed v_belt in m/s".into(),
+        x_title: "Belt speed v_belt (m/s)".into(),
         x: Some(places.ends()),
         panels: vec![
             returns(&rows),
             strip(&rows, &places),
             exponents(&rows, places.ends()),
         ],
+        ..Chart::default()
     }
 }
 
 fn returns(rows: &[&Row]) -> Panel {
-    let points = rows.iter().flat_map(|row| {
-        let theta1 = row.theta1_rad.iter();
-        theta1.map(|theta1| (row.v_belt_m_s, theta1.to_degrees()))
-    });
+    // The dots of a few belt speeds would hardly be seen in the size of a whole diagram.
+    let size = if rows.len() < 40 { 10 } else { 4 };
+    let marks = MOTIONS
+        .iter()
+        .enumerate()
+        .filter_map(|(place, (name, colour))| {
+            let rows = rows.iter().filter(|row| motion(row) == place);
+            let points: Vec<(f64, f64)> = rows
+                .flat_map(|row| {
+                    let theta1 = row.theta1_rad.iter();
+                    theta1.map(|theta1| (row.v_belt_m_s, theta1.to_degrees()))
+                })
+                .collect();
+            (!points.is_empty()).then(|| Mark::Dots {
+                name: (*name).into(),
+                colour: *colour,
+                size,
+                points,
+            })
+        });
     Panel {
-        title: "θ1 in degrees".into(),
-        height: 760,
-        marks: vec![Mark::Dots {
-            name: String::new(),
-            colour: BLUE_INK,
-            size: 2,
-            points: points.collect(),
-        }],
+        title: "θ₁ (°)".into(),
+        height: 700,
+        marks: marks.collect(),
         ..Panel::default()
     }
 }
 
 fn strip(rows: &[&Row], places: &Places) -> Panel {
-    let kind = |place: &usize| {
-        let regime = rows[*place].regime;
-        STRIP.iter().position(|(kind, _)| *kind == regime)
-    };
     let cells = places
         .nearest
         .iter()
-        .map(|place| kind(place).unwrap_or(0) as u8);
-    let palette = STRIP
-        .iter()
-        .map(|(kind, colour)| (kind.name().to_owned(), *colour));
+        .map(|place| motion(rows[*place]) as u8);
+    // The other names are in the legend of the returns.
+    let palette = MOTIONS.iter().map(|(name, colour)| match *name {
+        "quiet" => ((*name).to_owned(), *colour),
+        _ => (String::new(), *colour),
+    });
     Panel {
-        title: "motion".into(),
+        title: "Motion".into(),
         y: Some(0.0..1.0),
         y_ticks: 0,
         height: 70,
@@ -113,9 +137,9 @@ fn exponents(rows: &[&Row], x: Range<f64>) -> Panel {
         .collect();
     points.sort_by(|one, other| one.0.total_cmp(&other.0));
     Panel {
-        title: "largest Lyapunov exponent in 1/s".into(),
+        title: "Largest Lyapunov exponent (1/s)".into(),
         note: "across the flow".into(),
-        height: 360,
+        height: 330,
         marks: vec![
             Mark::line("", GREY, vec![(x.start, 0.0), (x.end, 0.0)]),
             Mark::line("", BLUE_INK, points),

@@ -1,7 +1,5 @@
 //! Fig. 5 on the page of figures.
 
-use painleve_chart::PlotError;
-
 use super::{Poincare, PoincareDiagram};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
@@ -17,14 +15,11 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let cells = page.cells("0.6", page.fineness.poincare_v_belt, &[Initial::A])?;
     let study = Poincare { cells };
     let outcome = PoincareDiagram::new(&study, page.rows("Fig. 5: Poincaré", &study)?);
-    Ok(vec![(figure_5(&outcome)?, Box::new(outcome))])
+    Ok(vec![(figure_5(&outcome), Box::new(outcome))])
 }
 
 /// Fig. 5.
-///
-/// # Errors
-/// [`PlotError`] if the figure cannot be drawn.
-fn figure_5(outcome: &PoincareDiagram) -> Result<Section, PlotError> {
+fn figure_5(outcome: &PoincareDiagram) -> Section {
     let settings = outcome.settings();
     let command = format!("painleve study poincare --mu {}", list(&settings.mu));
     let mut section = section(
@@ -32,7 +27,7 @@ fn figure_5(outcome: &PoincareDiagram) -> Result<Section, PlotError> {
         "Fig. 5: periodic and chaotic bouncing",
         command,
         outcome,
-    )?;
+    );
     let mut counts: Vec<(String, usize)> = Vec::new();
     for stretch in &outcome.stretches {
         let name = outcome::name(&stretch.regime);
@@ -61,5 +56,5 @@ fn figure_5(outcome: &PoincareDiagram) -> Result<Section, PlotError> {
          across the flow, through the saltation matrices of the impacts."
             .into(),
     );
-    Ok(section)
+    section
 }

@@ -2,25 +2,26 @@
 
 use std::ops::Range;
 
-use painleve_chart::style::{BLACK_INK, BLUE_INK, GREY, ORANGE, SKY, VERMILLION, over_white};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
+use painleve_chart::style::{
+    BLACK_INK, BLUE_INK, Colour, GREY, ORANGE, SKY, VERMILLION, over_white,
+};
+use painleve_chart::{Chart, Mark, Panel};
 use painleve_plant::scenario::InitialState;
 use painleve_shared::{Arm, Slip, SolutionMode};
-use plotters::style::RGBColor;
 
 use super::lines::RegionColumn;
 use super::{Map, Regions, Theta2};
 use crate::outcome::Figure;
 
 /// The paper's colour of the line p = 0.
-const RED: RGBColor = RGBColor(0xB0, 0x00, 0x20);
+const RED: Colour = Colour(0xB0, 0x00, 0x20);
 
 /// Number of cells of a map in the figure.
 const FINE_COLUMNS: usize = 445;
 const FINE_ROWS: usize = 260;
 
 impl Figure for Regions {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         let columns = self.maps.first().map_or(&[][..], |map| &map.grid.0);
         // The arm was checked before.
         let arm = Arm::new(self.arm).ok();
@@ -28,7 +29,8 @@ impl Figure for Regions {
         Chart {
             title: "Solution modes with the tip on the belt (Fig. 3)".into(),
             subtitle: format!(
-                "μ = {} · u = 0 · θ₂ and its rate keep the tip on the belt",
+                "θ̇₁ (rad/s) over θ₁ (°) at μ = {} and u = 0; θ₂ and its rate keep the tip on the \
+                 belt; x0 as on a belt of negative speed",
                 self.mu
             ),
             x_title: "θ₁ (°)".into(),
@@ -36,6 +38,9 @@ impl Figure for Regions {
             panels: arm.map_or_else(Vec::new, |arm| {
                 maps.map(|map| map.panel(&arm, self.mu)).collect()
             }),
+            columns: self.maps.len().min(2),
+            one_legend: true,
+            ..Chart::default()
         }
         .svg()
     }
@@ -51,11 +56,15 @@ impl Map {
             Slip::Positive => "slip żᵣ > 0",
             Slip::Negative => "slip żᵣ < 0",
         };
-        format!("θ̇₁ (rad/s): {side}, {slip}")
+        format!("{side}, {slip}")
     }
 
-    /// Returns the paper's initial conditions on this side of the vertical.
+    /// Returns the paper's initial conditions on this side of the vertical; at rest on a belt of
+    /// negative speed, they slip in the positive direction.
     fn initial_conditions(&self) -> Vec<(&'static str, f64)> {
+        if self.slip == Slip::Negative {
+            return Vec::new();
+        }
         let down = InitialState::default();
         [
             ("x₀,a", 32.0, 18.27),
@@ -134,7 +143,8 @@ impl Map {
                 points: vec![(theta1, 0.0)],
             });
             marks.push(Mark::Label {
-                at: (theta1 + 0.5, 0.0),
+                // Towards the middle of the map.
+                at: (theta1 + if theta1 > 0.0 { -13.0 } else { 1.5 }, 0.0),
                 centred: false,
                 text: name.into(),
             });
@@ -142,7 +152,7 @@ impl Map {
         Panel {
             title: self.title(),
             y: Some(rate_range),
-            height: 520,
+            height: 420,
             marks,
             ..Panel::default()
         }

@@ -1,6 +1,5 @@
 //! Fig. 3 on the page of figures.
 
-use painleve_chart::PlotError;
 use painleve_plant::mechanics::PlantParameters;
 use painleve_shared::Slip;
 
@@ -25,16 +24,13 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     };
     let maps = page.rows("Fig. 3: regions", &settings)?;
     let outcome = Regions::new(&settings, maps);
-    Ok(vec![(figure_3(&outcome)?, Box::new(outcome))])
+    Ok(vec![(figure_3(&outcome), Box::new(outcome))])
 }
 
 /// Fig. 3.
-///
-/// # Errors
-/// [`PlotError`] if the figure cannot be drawn.
-fn figure_3(outcome: &Regions) -> Result<Section, PlotError> {
+fn figure_3(outcome: &Regions) -> Section {
     let command = format!("painleve study regions --mu {}", outcome.mu);
-    let mut section = section("regions", "Fig. 3: solution modes", command, outcome)?;
+    let mut section = section("regions", "Fig. 3: solution modes", command, outcome);
     let has_all = |map: &&Map| {
         let parts = [map.sliding, map.flight, map.indeterminate, map.inconsistent];
         parts.iter().all(|part| *part > 0.0)
@@ -86,5 +82,5 @@ fn figure_3(outcome: &Regions) -> Result<Section, PlotError> {
             percent(other.inconsistent),
         ));
     }
-    Ok(section)
+    section
 }

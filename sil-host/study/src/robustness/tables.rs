@@ -5,7 +5,7 @@ use painleve_shared::Posture;
 use super::*;
 use crate::outcome::plain;
 
-fn row(index: usize, ending: Ending, error_m: f64) -> Row {
+pub(super) fn row(index: usize, ending: Ending, error_m: f64) -> Row {
     let number = index as f64;
     let is_captured = ending != Ending::NotCaptured;
     Row {

@@ -1,75 +1,109 @@
-//! Bar chart of the sliding ranges, with the paper's values and the limit.
+//! Bar chart of the sliding ranges in groups, with the paper's values and the limit.
 
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, ORANGE, VERMILLION};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
+use painleve_chart::{Chart, Mark, Panel};
 
-use super::SlidingRanges;
+use super::{Row, SlidingRanges};
 use crate::case::ControllerChoice;
-use crate::outcome::Figure;
+use crate::outcome::{self, Figure};
+
+/// Height of a row, drawn units: a label and its bar.
+const ROW: i32 = 84;
 
 impl Figure for SlidingRanges {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         let far = self
             .rows
             .iter()
             .fold(0.19, |far: f64, row| far.max(row.limit_m + 0.005));
-        let mut marks = Vec::new();
-        let mut named = Vec::new();
-        for (index, row) in self.rows.iter().enumerate() {
-            let top = (self.rows.len() - index) as f64;
-            marks.push(Mark::Label {
-                at: (-0.98 * far, top - 0.3),
-                centred: false,
-                text: row.title(),
-            });
-            let colour = match row.controller {
-                ControllerChoice::Pid => ORANGE,
-                ControllerChoice::HybridPaper | ControllerChoice::HybridPaperModel => BLUE_INK,
-                ControllerChoice::Hybrid | ControllerChoice::Scenario(_) => GREEN,
-            };
-            let name = match row.controller {
-                ControllerChoice::Pid => "PID",
-                ControllerChoice::HybridPaper | ControllerChoice::HybridPaperModel => {
-                    "paper's hybrid law"
-                }
-                ControllerChoice::Hybrid | ControllerChoice::Scenario(_) => "hybrid law here",
-            };
-            let mut line = |name: &'static str, colour, width, points| {
-                let name = if named.contains(&name) { "" } else { name };
-                named.push(name);
-                marks.push(Mark::Line {
-                    name: name.into(),
-                    colour,
-                    width,
-                    dashed: false,
-                    points,
-                });
-            };
-            let at = top - 0.75;
-            if let Some(reached) = row.z_sliding_m {
-                line(name, colour, 18, vec![(row.start_m, at), (reached, at)]);
+        let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
+        for row in &self.rows {
+            let group = row.group();
+            match groups.iter_mut().find(|(name, _)| *name == group) {
+                Some((_, rows)) => rows.push(row),
+                None => groups.push((group, vec![row])),
             }
-            let tick = |x: f64| vec![(x, at - 0.2), (x, at + 0.2)];
-            if let Some(paper) = row.paper_m {
-                line("the paper", VERMILLION, 8, tick(paper));
-            }
-            line("p = 0", BLACK_INK, 4, tick(row.limit_m));
         }
-        let rows = self.rows.len();
+        let panels = groups.iter().map(|(name, rows)| panel(name, rows, far));
         Chart {
             title: "Sliding range".into(),
-            subtitle: "farthest reference reached without lift-off".into(),
+            subtitle: "from the start to the farthest reference reached without lift-off".into(),
             x_title: "Tip position zₜ (m)".into(),
             x: Some(-far..far),
-            panels: vec![Panel {
-                title: "From the start to Zₜ,sliding".into(),
-                y: Some(0.0..rows.max(1) as f64),
-                y_ticks: 0,
-                height: 76 * rows.max(1) as i32,
-                marks,
-                ..Panel::default()
-            }],
+            panels: panels.collect(),
+            one_legend: true,
+            ..Chart::default()
         }
         .svg()
+    }
+}
+
+impl Row {
+    /// Returns what the rows of a panel have in common.
+    fn group(&self) -> String {
+        format!(
+            "{}, μ = {}, {}",
+            outcome::name(&self.posture),
+            self.mu,
+            self.reference
+        )
+    }
+
+    /// Returns what distinguishes the row from others of its group, and the result.
+    fn label(&self) -> String {
+        let row = format!("{}, {}", self.controller, outcome::name(&self.converters));
+        match self.z_sliding_m {
+            Some(reached) => format!("{row}: {reached:.4} m").replace(": -", ": −"),
+            None => format!("{row}: none"),
+        }
+    }
+}
+
+fn panel(name: &str, rows: &[&Row], far: f64) -> Panel {
+    let mut marks = Vec::new();
+    for (index, row) in rows.iter().enumerate() {
+        let top = (rows.len() - index) as f64;
+        marks.push(Mark::Label {
+            at: (-0.98 * far, top - 0.32),
+            centred: false,
+            text: row.label(),
+        });
+        let (name, colour) = match row.controller {
+            ControllerChoice::Pid => ("PID", ORANGE),
+            ControllerChoice::HybridPaper | ControllerChoice::HybridPaperModel => {
+                ("paper's hybrid law", BLUE_INK)
+            }
+            ControllerChoice::Hybrid | ControllerChoice::Scenario(_) => ("hybrid law here", GREEN),
+        };
+        let at = top - 0.76;
+        let line = |name: &str, colour, width, points| Mark::Line {
+            name: name.into(),
+            colour,
+            width,
+            dashed: false,
+            points,
+        };
+        if let Some(reached) = row.z_sliding_m {
+            marks.push(line(
+                name,
+                colour,
+                20,
+                vec![(row.start_m, at), (reached, at)],
+            ));
+        }
+        let tick = |x: f64| vec![(x, at - 0.19), (x, at + 0.19)];
+        if let Some(paper) = row.paper_m {
+            marks.push(line("the paper", VERMILLION, 8, tick(paper)));
+        }
+        marks.push(line("p = 0", BLACK_INK, 4, tick(row.limit_m)));
+    }
+    let count = rows.len().max(1);
+    Panel {
+        title: name.into(),
+        y: Some(0.0..count as f64),
+        y_ticks: 0,
+        height: ROW * count as i32,
+        marks,
+        ..Panel::default()
     }
 }

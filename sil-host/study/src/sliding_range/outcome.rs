@@ -45,20 +45,3 @@ impl Outcome for SlidingRanges {
         table
     }
 }
-
-impl Row {
-    pub(super) fn title(&self) -> String {
-        let row = format!(
-            "{}, {}, {}, μ = {}, {}",
-            self.controller,
-            outcome::name(&self.converters),
-            outcome::name(&self.posture),
-            self.mu,
-            self.reference,
-        );
-        match self.z_sliding_m {
-            Some(reached) => format!("{row}: {reached:.4} m"),
-            None => format!("{row}: none"),
-        }
-    }
-}

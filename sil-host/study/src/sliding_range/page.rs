@@ -1,6 +1,5 @@
 //! How far each controller slides, on the page of figures.
 
-use painleve_chart::PlotError;
 use painleve_shared::Posture;
 
 use super::{Criterion, Row, SlidingRange, SlidingRanges};
@@ -37,20 +36,17 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let mut rows = page.rows("Sliding range", &study)?;
     rows.extend(page.rows("Sliding range, ramps", &ramps)?);
     let outcome = SlidingRanges { rows };
-    Ok(vec![(ranges(&outcome)?, Box::new(outcome))])
+    Ok(vec![(ranges(&outcome), Box::new(outcome))])
 }
 
 /// Z_t,sliding.
-///
-/// # Errors
-/// [`PlotError`] if the figure cannot be drawn.
-fn ranges(outcome: &SlidingRanges) -> Result<Section, PlotError> {
+fn ranges(outcome: &SlidingRanges) -> Section {
     let mut section = section(
         "sliding-range",
         "Section III: how far each controller slides",
         "painleve study sliding-range".into(),
         outcome,
-    )?;
+    );
     for row in &outcome.rows {
         section.comparisons.push(compared(row));
     }
@@ -62,7 +58,7 @@ fn ranges(outcome: &SlidingRanges) -> Result<Section, PlotError> {
             .into(),
     );
     section.reasons.push(SAMPLED_FRICTION.into());
-    Ok(section)
+    section
 }
 
 fn compared(row: &Row) -> Comparison {

@@ -1,7 +1,7 @@
 //! The inconsistent start over time: normal force, slip and height of the tip.
 
 use painleve_chart::style::{BLACK_INK, BLUE_INK, GREEN, ORANGE, SKY, VERMILLION};
-use painleve_chart::{Chart, Mark, Panel, PlotError};
+use painleve_chart::{Chart, Mark, Panel};
 
 use super::{Row, StiffnessOutcome, Trace};
 use crate::outcome::Figure;
@@ -10,7 +10,7 @@ use crate::outcome::Figure;
 const END_MS: f64 = 8.0;
 
 impl Figure for StiffnessOutcome {
-    fn svg(&self) -> Result<String, PlotError> {
+    fn svg(&self) -> String {
         let colours = [SKY, BLUE_INK, GREEN, ORANGE, VERMILLION];
         let panel = |title: &str, note: &str, named: bool, value: fn(&Trace, usize) -> f64| {
             let curves = self.rows.iter().enumerate().map(|(index, row)| {
@@ -55,6 +55,7 @@ impl Figure for StiffnessOutcome {
             x_title: "Time (ms)".into(),
             x: Some(0.0..END_MS),
             panels: vec![force_n, slip_m_s, gap_mm],
+            ..Chart::default()
         }
         .svg()
     }
