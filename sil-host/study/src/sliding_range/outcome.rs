@@ -3,7 +3,7 @@
 use comfy_table::Table;
 use serde::Serialize;
 
-use super::{Row, SlidingRanges};
+use super::SlidingRanges;
 use crate::outcome::{self, Outcome};
 
 impl Outcome for SlidingRanges {
