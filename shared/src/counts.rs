@@ -153,7 +153,8 @@ impl<T: Real> LinearScale<T> {
     /// One count in the quantity's unit.
     #[inline]
     pub fn per_count(&self) -> T {
-        self.range / T::from_integer(1 << ((self.bits & 31).wrapping_sub(1) & 31))
+        // Exactly range / 2^(bits − 1), without a division.
+        self.range * T::negative_power_of_two((self.bits & 31).wrapping_sub(1))
     }
 
     /// Returns the largest reading, 2^(bits−1) − 1; the smallest is −2^(bits−1).

@@ -25,6 +25,8 @@ pub trait Real: RealField + Copy + SettingValue {
     /// Returns the number nearest to an integer; exact in `f32` up to 24 bits. The conversion
     /// avoids `f64`, which a Cortex-M4F computes in software.
     fn from_integer(value: i32) -> Self;
+    /// Returns 2^−`exponent`, exactly; `exponent` is at most 126.
+    fn negative_power_of_two(exponent: u8) -> Self;
 
     /// Returns the integer part; saturates, and NaN gives 0.
     fn truncate_to_i32(self) -> i32;
@@ -104,6 +106,11 @@ impl Real for f64 {
     }
 
     #[inline]
+    fn negative_power_of_two(exponent: u8) -> Self {
+        Self::from_bits((1023 - u64::from(exponent & 127)) << 52)
+    }
+
+    #[inline]
     fn truncate_to_i32(self) -> i32 {
         self as i32
     }
@@ -143,6 +150,11 @@ impl Real for f32 {
     #[inline]
     fn from_integer(value: i32) -> Self {
         value as f32
+    }
+
+    #[inline]
+    fn negative_power_of_two(exponent: u8) -> Self {
+        Self::from_bits((127 - u32::from(exponent & 127)) << 23)
     }
 
     #[inline]
@@ -232,6 +244,17 @@ mod tests {
                 .max((f64::from(cosine) - libm::cos(exact)).abs());
         }
         assert!(worst < 1.2e-7, "{}", format!("worst error {worst:e}"));
+    }
+
+    #[test]
+    fn negative_powers_of_two_are_exact() {
+        let (mut single, mut double) = (1.0_f32, 1.0_f64);
+        for exponent in 0..=126 {
+            assert_eq!(f32::negative_power_of_two(exponent), single);
+            assert_eq!(f64::negative_power_of_two(exponent), double);
+            single *= 0.5;
+            double *= 0.5;
+        }
     }
 
     #[test]

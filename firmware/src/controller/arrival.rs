@@ -43,7 +43,7 @@ pub(super) struct Lapses<'a> {
 
 impl Lapses<'_> {
     /// Records how many times a lapse occurred, 0 for none. Returns whether this has just latched a
-    /// fault.
+    /// fault; the caller then takes the torque off.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
         // Nearly all calls record no lapse: return early.
@@ -58,16 +58,9 @@ impl Lapses<'_> {
     #[cold]
     #[inline(never)]
     fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
-        self.monitor.note(lapse, times) && self.latch(lapse)
-    }
-
-    /// Latches the fault of a lapse that has occurred too often, unless there is a fault already.
-    /// Returns whether it has.
-    fn latch(&mut self, lapse: Lapse) -> bool {
-        let latches = self.supervision.fault().is_none();
+        let latches = self.monitor.note(lapse, times) && self.supervision.fault().is_none();
         if latches {
             self.supervision.latch(lapse.fault());
-            *self.command = LastCommand::default();
         }
         latches
     }
@@ -81,8 +74,11 @@ impl Lapses<'_> {
                 first = Some(lapse);
             }
         }
-        if let Some(lapse) = first {
-            self.latch(lapse);
+        if let Some(lapse) = first
+            && self.supervision.fault().is_none()
+        {
+            self.supervision.latch(lapse.fault());
+            *self.command = LastCommand::default();
         }
     }
 }

@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize};
 /// Largest number of segments in a program.
 pub const MAXIMUM_SEGMENTS: usize = 16;
 
+/// Largest number of segments that end in one tick: one that has lasted, and two without duration.
+const MOST_ENDS: usize = 3;
+
 settings! {
     /// One piece of the reference z_t*(t).
     #[derive(Copy)]
@@ -193,10 +196,13 @@ impl ReferenceGenerator {
         state.segment >= self.program.segments.len()
     }
 
-    /// Returns the reference of this tick, then advances time by one tick.
+    /// Returns the reference of this tick, then advances time by one tick. A segment without duration
+    /// ends at once; of several in a row, [`MOST_ENDS`] end per tick.
     pub fn next_tick(&self, state: &mut ReferenceState) -> TipReference {
-        // A segment without duration ends at once, so several segments may end in one tick.
-        while let Some(segment) = self.program.segments.get(state.segment) {
+        for _ in 0..MOST_ENDS {
+            let Some(segment) = self.program.segments.get(state.segment) else {
+                break;
+            };
             let duration_ticks = segment.duration_s() * self.tick_hz;
             if (state.elapsed_ticks as f32) < duration_ticks - 0.5 {
                 let reference = at(segment, state.start_m, state.elapsed_ticks, self.tick_hz);
@@ -279,6 +285,21 @@ mod tests {
         for (ours, theirs) in positions.iter().zip(expected) {
             assert!((ours - theirs).abs() < 1e-7, "{positions:?}");
         }
+        assert!(generator.is_done(&state));
+    }
+
+    #[test]
+    fn a_series_of_segments_without_duration_ends_three_at_a_tick() {
+        let step = |target_m| Segment::Step {
+            target_m,
+            duration_s: 0.0,
+        };
+        let steps = [0.01, 0.02, 0.03, 0.04, 0.05].map(step);
+        let generator = ReferenceGenerator::new(&program(&steps), 1000.0);
+        let mut state = ReferenceState::default();
+        let positions: [f32; 4] =
+            core::array::from_fn(|_| generator.next_tick(&mut state).position_m);
+        assert_eq!(positions, [0.03, 0.05, 0.05, 0.05]);
         assert!(generator.is_done(&state));
     }
 

@@ -49,6 +49,15 @@ pub fn constants(graph: &Graph) -> BTreeMap<u32, Constants> {
     at
 }
 
+/// Returns the value of a register after a block's last instruction, if it is a known constant.
+pub fn constant_after(block: &Block, before: &Constants, register: u16) -> Option<u32> {
+    let mut now = before.clone();
+    for instruction in &block.instructions {
+        follow(&mut now, instruction);
+    }
+    now.get(&register).copied()
+}
+
 fn follow(now: &mut Constants, instruction: &Instruction) {
     let old = |register: &u16| now.get(register).copied();
     let value = match &instruction.effect {

@@ -74,6 +74,9 @@ pub struct Instruction {
 /// Decodes the instructions of an image.
 pub struct Decoder(Capstone);
 
+/// Number of the register that holds a function's second argument.
+pub const SECOND_ARGUMENT: u16 = ArmReg::ARM_REG_R1 as u16;
+
 /// Number of the program counter.
 pub const PROGRAM_COUNTER: u16 = ArmReg::ARM_REG_PC as u16;
 

@@ -61,6 +61,12 @@ pub enum BoundError {
         /// Source functions of the loop.
         place: String,
     },
+    /// A call clears more memory than declared, or an unknown amount.
+    #[error("the call in the block at 0x{address:08x} may clear more than the declared bytes")]
+    ClearsTooMuch {
+        /// Address.
+        address: u32,
+    },
     /// The interrupt never returns.
     #[error("the function at 0x{address:08x} never returns")]
     NeverReturns {

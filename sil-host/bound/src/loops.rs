@@ -2,19 +2,32 @@
 
 use std::collections::BTreeSet;
 
+use painleve_drivers::encoders::EncoderDriver;
+use painleve_drivers::exchange::{Dialogue, SelectTiming};
+use painleve_drivers::force_cell::ForceCellDriver;
+
 use crate::graph::Graph;
 use crate::image::Image;
 
 /// Points of the belt that the governor checks per tick (`firmware/src/refer/governor`).
 const POINTS_IN_A_HURRY: u32 = 2;
 
-/// Segments of a reference (`firmware/src/refer/reference.rs`).
-const MAXIMUM_SEGMENTS: u32 = 16;
+/// Segments of a reference that end in one tick (`firmware/src/refer/reference.rs`).
+const MOST_ENDS: u32 = 3;
+
+/// Bytes that the interrupts clear at once, at most; every call is checked.
+pub const CLEARED_BYTES: u32 = 48;
+
+/// Function that clears memory: its second argument is the number of bytes.
+pub const CLEARS: &str = "__aeabi_memclr";
+
+/// Cycles of a nanosecond, at 168 MHz.
+const CYCLES_PER_NS: f64 = 0.168;
 
 /// Limit of a loop, counted from its entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// A number of iterations.
+    /// A number of executions of its first block: the iterations, plus one if the loop ends there.
     Times(u32),
     /// A number of cycles, for a loop that waits for hardware.
     Cycles(u32),
@@ -25,7 +38,7 @@ pub enum Limit {
 pub struct Declared {
     /// Part of the name of the function whose source holds the loop.
     pub function: &'static str,
-    /// Its limit.
+    /// Its limit; for iterations without the check that ends the loop.
     pub limit: Limit,
     /// Reason for the limit.
     pub because: &'static str,
@@ -43,40 +56,73 @@ impl Limits {
             limit,
             because,
         };
+        let longest_setup_ns = EncoderDriver::TIMING
+            .setup_ns
+            .max(ForceCellDriver::TIMING.setup_ns);
         Self(vec![
             declare(
                 "EdgeGovernor::search",
-                Limit::Times(POINTS_IN_A_HURRY + 1),
-                "two points of the belt per tick, and the check that ends the loop",
+                Limit::Times(POINTS_IN_A_HURRY),
+                "two points of the belt per tick",
             ),
             declare(
                 "ReferenceGenerator::next_tick",
-                Limit::Times(MAXIMUM_SEGMENTS + 1),
-                "sixteen segments without duration, and the check that ends the loop",
+                Limit::Times(MOST_ENDS),
+                "three segments end per tick",
             ),
             declare(
-                "sensor_bus::wait",
-                Limit::Cycles(475 * 168 / 1000 + 30),
-                "475 ns, the longest pause of the sensors' drivers, and one more look at the cycle counter",
+                "::set_up",
+                wait(longest_setup_ns, 0.0),
+                "the longer set-up time of the two buses, which are started one after the other",
             ),
-            declare("plausibility::", Limit::Times(3), "two joints, and the end"),
+            declare("plausibility::", Limit::Times(2), "two joints"),
             declare(
                 "div_rem",
                 Limit::Times(64),
                 "a division of 64 bits: at least one bit of the quotient per iteration",
             ),
-            declare("set_bytes", Limit::Times(4), "a word's bytes at either end"),
+            declare("set_bytes", Limit::Times(3), "a word's bytes at either end"),
+            declare(
+                CLEARS,
+                Limit::Times(CLEARED_BYTES / 16),
+                "sixteen bytes per iteration, then three words and three bytes",
+            ),
             declare(
                 "__aeabi_mem",
                 Limit::Times(8),
-                "sixteen bytes per iteration: at most 128 are cleared or moved per tick",
+                "sixteen bytes per iteration: at most 128 are moved per tick",
             ),
         ])
     }
 
+    /// Returns the declarations for the interrupt of a sensor's bus: the times around an exchange, and half
+    /// a period of the bus' clock, by which the last word comes early.
+    pub fn of_sensor_bus(timing: SelectTiming, bus_hz: f64) -> Self {
+        let declare = |function, limit| Declared {
+            function,
+            limit,
+            because: "a time of the part's data sheet",
+        };
+        let half_period_ns = 0.5e9 / bus_hz;
+        let mut all = vec![
+            declare("::set_up", wait(timing.setup_ns, 0.0)),
+            declare("::hold", wait(timing.hold_ns, half_period_ns)),
+            declare("::pause", wait(timing.pause_ns, 0.0)),
+        ];
+        all.extend(Self::of_control().0);
+        Self(all)
+    }
+
     /// Returns the limit of a loop that consists of these blocks: that of the first declaration
-    /// whose function is a source function, inlined or not, of the loop's instructions.
-    pub fn of(&self, image: &Image, graph: &Graph, blocks: &BTreeSet<u32>) -> Option<Limit> {
+    /// whose function is a source function, inlined or not, of the loop's instructions. The first block
+    /// is executed once more than the loop iterates, unless the loop ends only where it begins anew.
+    pub fn of(
+        &self,
+        image: &Image,
+        graph: &Graph,
+        header: u32,
+        blocks: &BTreeSet<u32>,
+    ) -> Option<Limit> {
         let mut all = Vec::new();
         for address in blocks {
             for instruction in &graph.blocks[address].instructions {
@@ -87,6 +133,29 @@ impl Limits {
             all.iter()
                 .any(|frame| frame.function.contains(declared.function))
         };
-        self.0.iter().find(holds).map(|declared| declared.limit)
+        let declared = self.0.iter().find(holds)?;
+        match declared.limit {
+            Limit::Times(times) if !ends_where_it_repeats(graph, header, blocks) => {
+                Some(Limit::Times(times + 1))
+            }
+            limit => Some(limit),
+        }
     }
+}
+
+/// Returns whether a loop is left only from blocks that may also begin it anew. Each execution of its first
+/// block then belongs to one complete iteration.
+fn ends_where_it_repeats(graph: &Graph, header: u32, blocks: &BTreeSet<u32>) -> bool {
+    blocks.iter().all(|address| {
+        let block = &graph.blocks[address];
+        let successors = || block.successors.iter().map(|(to, _)| to);
+        let leaves = block.returns || successors().any(|to| !blocks.contains(to));
+        !leaves || successors().any(|to| *to == header)
+    })
+}
+
+/// Returns the limit of a wait: the time, rounded up by the driver to whole cycles, and one more.
+fn wait(time_ns: u32, early_ns: f64) -> Limit {
+    let cycles = (f64::from(time_ns) + early_ns) * CYCLES_PER_NS;
+    Limit::Cycles(cycles.ceil() as u32 + 2)
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use painleve_drivers::encoders::EncoderDriver;
-use painleve_drivers::exchange::Dialogue;
+use painleve_drivers::exchange::{Dialogue, SelectTiming};
 use painleve_drivers::force_cell::ForceCellDriver;
 use serde::Serialize;
 
@@ -18,11 +18,39 @@ use crate::worst::{Analysis, Loop, Visit, Worst};
 /// Handler of the control timer.
 pub const CONTROL_INTERRUPT: &str = "TIM2";
 
-/// The interrupts of the sensors' buses, and how often each comes in a tick at most: one word per interrupt,
-/// every reading disturbed and repeated as often as its driver allows.
-pub const SENSOR_INTERRUPTS: [(&str, u32); 2] = [
-    ("SPI1", EncoderDriver::MOST_EXCHANGES),
-    ("SPI2", 3 * ForceCellDriver::MOST_EXCHANGES),
+/// Modules of the default law and of the other one: of these, a configuration chooses one.
+const LAWS: [&str; 2] = ["law::hybrid::", "law::pid::"];
+
+/// Ends an exchange on a sensor's bus, and begins the next.
+const END_OF_EXCHANGE: &str = "SensorBus<I,S,D,_>::close";
+
+/// A sensor's bus.
+struct SensorBus {
+    handler: &'static str,
+    timing: SelectTiming,
+    /// Its clock (`firmware/boards/f405/src/lib.rs`), Hz.
+    clock_hz: f64,
+    /// Exchanges in a tick, with every reading disturbed and repeated as often as its driver allows.
+    exchanges: u32,
+    /// Interrupts of an exchange, one for each word.
+    words: u32,
+}
+
+const SENSOR_BUSES: [SensorBus; 2] = [
+    SensorBus {
+        handler: "SPI1",
+        timing: EncoderDriver::TIMING,
+        clock_hz: 5_250_000.0,
+        exchanges: EncoderDriver::MOST_EXCHANGES,
+        words: 1,
+    },
+    SensorBus {
+        handler: "SPI2",
+        timing: ForceCellDriver::TIMING,
+        clock_hz: 1_312_500.0,
+        exchanges: ForceCellDriver::MOST_EXCHANGES,
+        words: 3,
+    },
 ];
 
 /// The core's clock, Hz.
@@ -31,8 +59,10 @@ pub const CORE_HZ: f64 = 168e6;
 /// A bound on the control interrupt.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bound {
-    /// Cycles from the request of the interrupt to the return from it.
+    /// Cycles from the request of the interrupt to the return from it, with any law.
     pub cycles: u32,
+    /// The same with the default law.
+    pub default_law_cycles: u32,
     /// Cycles per tick of the interrupts that read the sensors for the next tick.
     pub sensor_cycles: u32,
     /// Cycles of the longest of these interrupts, which may delay the control interrupt.
@@ -45,7 +75,7 @@ pub struct Bound {
     pub around_cycles: u32,
     /// Instructions on the worst path.
     pub instructions: u32,
-    /// The path, in order of execution.
+    /// The path with the default law, in order of execution.
     pub path: Vec<PathStretch>,
     /// Loops of the interrupt and of the functions that it calls.
     #[serde(skip)]
@@ -72,9 +102,8 @@ impl Bound {
     /// [`BoundError`] naming the file or the code that cannot be bounded.
     pub fn of(path: &Path) -> Result<Self, BoundError> {
         let image = Image::read(path)?;
-        let limits = Limits::of_control();
-        let mut analysis = Analysis::new(&image, &limits)?;
-        let mut of_handler = |handler: &str| {
+        let with_entry = |worst: &Worst| worst.cycles + around(worst.entry, worst.uses_float);
+        let worst_of = |handler: &str, analysis: &mut Analysis<'_>| {
             let entry = image.function(handler);
             let entry = entry.ok_or_else(|| BoundError::Image {
                 path: path.to_owned(),
@@ -83,27 +112,39 @@ impl Bound {
             let worst = analysis.of(entry)?;
             worst.ok_or(BoundError::NeverReturns { address: entry })
         };
-        let with_entry = |worst: &Worst| worst.cycles + around(worst.entry, worst.uses_float);
-        let worst = of_handler(CONTROL_INTERRUPT)?;
+        let limits = Limits::of_control();
+        let [default_law, other_law] = LAWS;
+        let (without_other, without_default) = ([other_law], [default_law]);
+        let mut with_default = Analysis::new(&image, &limits)?.without(&without_other);
+        let mut with_other = Analysis::new(&image, &limits)?.without(&without_default);
+        let worst = worst_of(CONTROL_INTERRUPT, &mut with_default)?;
+        let default_law_cycles = with_entry(&worst);
+        let other = worst_of(CONTROL_INTERRUPT, &mut with_other)?;
         let (mut sensor_cycles, mut longest_sensor_cycles) = (0, 0);
-        for (handler, times) in SENSOR_INTERRUPTS {
-            let once = with_entry(&of_handler(handler)?);
-            sensor_cycles += times * once;
-            longest_sensor_cycles = once.max(longest_sensor_cycles);
+        for bus in SENSOR_BUSES {
+            let limits = Limits::of_sensor_bus(bus.timing, bus.clock_hz);
+            let mut analysis = Analysis::new(&image, &limits)?;
+            let last = with_entry(&worst_of(bus.handler, &mut analysis)?);
+            let mut analysis = Analysis::new(&image, &limits)?.without(&[END_OF_EXCHANGE]);
+            let other = with_entry(&worst_of(bus.handler, &mut analysis)?);
+            sensor_cycles += bus.exchanges * (last + (bus.words - 1) * other);
+            longest_sensor_cycles = longest_sensor_cycles.max(last);
         }
-        let cycles = with_entry(&worst);
+        let cycles = default_law_cycles.max(with_entry(&other));
         let path = stretches(&image, &worst.path);
         Ok(Self {
             cycles,
+            default_law_cycles,
             sensor_cycles,
             longest_sensor_cycles,
             microseconds: f64::from(cycles) / CORE_HZ * 1e6,
             proves_hz: (CORE_HZ / f64::from(cycles + sensor_cycles)) as u32,
-            around_cycles: cycles - worst.cycles,
+            around_cycles: default_law_cycles - worst.cycles,
             instructions: worst.instructions,
             path,
-            loops: analysis
+            loops: with_default
                 .functions()
+                .chain(with_other.functions())
                 .flat_map(|function| function.loops.iter().cloned())
                 .collect(),
         })
@@ -127,14 +168,15 @@ impl Bound {
         let _ = writeln!(text, "{around:>7}  entry to and exit from the interrupt");
         let _ = write!(
             text,
-            "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz.\n\
+            "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz; with any law, {} cycles.\n\
              Interrupts that read the sensors for the next tick: {} cycles, {:.1} µs in a tick, {:.1} µs each at most.\n\
              Together they prove control rates up to {} Hz.\n\
              Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss. Tasks of lower \
              priority that mask the interrupts come on top.",
-            self.cycles,
-            self.microseconds,
+            self.default_law_cycles,
+            f64::from(self.default_law_cycles) / CORE_HZ * 1e6,
             CORE_HZ / 1e6,
+            self.cycles,
             self.sensor_cycles,
             f64::from(self.sensor_cycles) / CORE_HZ * 1e6,
             f64::from(self.longest_sensor_cycles) / CORE_HZ * 1e6,

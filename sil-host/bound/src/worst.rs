@@ -14,10 +14,10 @@ use microlp::{
 
 use crate::BoundError;
 use crate::cost;
-use crate::graph::Graph;
+use crate::graph::{Block, Graph};
 use crate::image::{Frame, Image};
-use crate::instruction::Decoder;
-use crate::loops::{Limit, Limits};
+use crate::instruction::{Decoder, SECOND_ARGUMENT};
+use crate::loops::{CLEARED_BYTES, CLEARS, Limit, Limits};
 
 /// Smaller counts are rounding errors of the linear programme.
 const LEAST_FLOW: f64 = 1e-6;
@@ -77,8 +77,8 @@ pub struct Analysis<'a> {
     decoder: Decoder,
     limits: &'a Limits,
     known: BTreeMap<u32, Option<Worst>>,
-    /// Pairs of blocks that are never executed together.
-    excluded: Vec<(u32, u32)>,
+    /// Parts of the names of functions that are not executed.
+    excluded: &'a [&'static str],
 }
 
 impl<'a> Analysis<'a> {
@@ -92,8 +92,21 @@ impl<'a> Analysis<'a> {
             decoder: Decoder::new()?,
             limits,
             known: BTreeMap::new(),
-            excluded: Vec::new(),
+            excluded: &[],
         })
+    }
+
+    /// Excludes paths through functions, inlined or not, whose names contain one of these texts.
+    pub fn without(self, excluded: &'a [&'static str]) -> Self {
+        Self { excluded, ..self }
+    }
+
+    /// Returns whether the source of an instruction is in an excluded function.
+    fn is_excluded(&self, block: &Block) -> bool {
+        let is_in = |frame: &Frame| self.excluded.iter().any(|it| frame.function.contains(it));
+        let mut instructions = block.instructions.iter();
+        !self.excluded.is_empty()
+            && instructions.any(|it| self.image.frames(it.address).iter().any(is_in))
     }
 
     /// Returns the analysed functions.
@@ -145,6 +158,14 @@ impl<'a> Analysis<'a> {
         let mut ends_at = BTreeMap::new();
         for (address, block) in &graph.blocks {
             let known = constants.get(address).cloned().unwrap_or_default();
+            if let Some(callee) = block.call
+                && self.image.name(callee).contains(CLEARS)
+            {
+                let bytes = cost::constant_after(block, &known, SECOND_ARGUMENT);
+                if bytes.is_none_or(|bytes| bytes > CLEARED_BYTES) {
+                    return Err(BoundError::ClearsTooMuch { address: *address });
+                }
+            }
             let call = block.call.and_then(|callee| calls[&callee]);
             let call = call.map_or(0, |(cycles, _)| {
                 // Call and return.
@@ -243,19 +264,22 @@ impl<'a> Analysis<'a> {
             }
             problem.add_constraint(rounds, ComparisonOp::Le, 0.0);
         }
-        for (one, other) in &self.excluded {
-            let (Some(one), Some(other)) = (incoming.get(one), incoming.get(other)) else {
-                continue;
-            };
-            let mut both = LinearExpr::empty();
-            for edge in one.iter().chain(other) {
-                both.add(*edge, 1.0);
+        for (address, block) in &graph.blocks {
+            if self.is_excluded(block) {
+                for edge in incoming.get(address).into_iter().flatten() {
+                    problem.add_constraint(
+                        LinearExpr::from_iter([(*edge, 1.0)]),
+                        ComparisonOp::Le,
+                        0.0,
+                    );
+                }
             }
-            problem.add_constraint(both, ComparisonOp::Le, 1.0);
         }
-        let outcome = problem
-            .solve()
-            .map_err(|error| BoundError::Programme(error.to_string()))?;
+        let outcome = match problem.solve() {
+            // Every path leads through an excluded function.
+            Err(microlp::Error::Infeasible) if !self.excluded.is_empty() => return Ok(None),
+            outcome => outcome.map_err(|error| BoundError::Programme(error.to_string()))?,
+        };
         let SolveOutcome::Solution(solution) = outcome else {
             return Err(BoundError::Programme("no optimum".to_owned()));
         };
@@ -334,7 +358,7 @@ impl<'a> Analysis<'a> {
                 };
                 let limit = self
                     .limits
-                    .of(self.image, graph, &connected)
+                    .of(self.image, graph, header, &connected)
                     .ok_or_else(|| {
                         let frames = self.image.frames(header);
                         let ours = |frame: &&Frame| frame.function.contains("painleve");

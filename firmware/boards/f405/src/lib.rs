@@ -380,6 +380,8 @@ impl BoardDrive for F405Drive {
         is_permitted
     }
 
+    // In line: each interrupt contains its own bus only.
+    #[inline(always)]
     fn serve_sensor_bus(&mut self, bus: usize) {
         if bus == 0 {
             self.encoders.serve();

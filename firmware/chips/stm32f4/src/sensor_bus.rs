@@ -134,6 +134,7 @@ where
         }
     }
 
+    #[inline]
     fn open(&mut self, exchange: Exchange) {
         self.selected = exchange.select;
         self.sending = exchange.data << (32 - u32::from(D::BITS));
@@ -143,15 +144,33 @@ where
         if let Some(select) = self.selects.get_mut(self.selected) {
             let _ = select.set_low();
         }
-        wait(self.waits.setup);
+        self.set_up();
         self.send();
     }
 
+    #[inline]
     fn close(&mut self) {
-        wait(self.waits.hold);
+        self.hold();
         if let Some(select) = self.selects.get_mut(self.selected) {
             let _ = select.set_high();
         }
+        self.pause();
+    }
+
+    // One function for each wait, so that the bound of the interrupt finds them by their names.
+
+    #[inline]
+    fn set_up(&self) {
+        wait(self.waits.setup);
+    }
+
+    #[inline]
+    fn hold(&self) {
+        wait(self.waits.hold);
+    }
+
+    #[inline]
+    fn pause(&self) {
         wait(self.waits.pause);
     }
 
@@ -163,6 +182,7 @@ where
 }
 
 /// Waits for at least this many processor cycles by the cycle counter, which must run.
+#[inline]
 fn wait(cycles: u32) {
     let start = DWT::cycle_count();
     // Bounded even if the counter stands still.
@@ -170,5 +190,7 @@ fn wait(cycles: u32) {
         if DWT::cycle_count().wrapping_sub(start) >= cycles {
             return;
         }
+        // Keeps the compiler from unrolling the loop, which would make the last look later.
+        cortex_m::asm::nop();
     }
 }

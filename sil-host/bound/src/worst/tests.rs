@@ -46,6 +46,30 @@ fn a_loop_costs_its_iterations() {
     assert_eq!(cycles(1), 4);
 }
 
+/// again: cmp r0, #0; beq end; subs r0, #1; b again; end: bx lr
+const CHECK_FIRST: [u16; 5] = [0x2800, 0xd001, 0x3801, 0xe7fb, 0x4770];
+
+#[test]
+fn a_loop_that_ends_at_its_first_block_executes_it_once_more() {
+    let limits = [("kernel", Limit::Times(3))];
+    let worst = worst(&CHECK_FIRST, &limits).unwrap().unwrap();
+    assert_eq!(worst.loops[0].limit, Limit::Times(4));
+    assert_eq!(worst.instructions, 4 * 2 + 3 * 2 + 1);
+}
+
+#[test]
+fn an_excluded_function_has_no_path() {
+    // bx lr
+    let image = Image::of_code(AT, &[0x70, 0x47], "kernel");
+    let limits = Limits(Vec::new());
+    let of = |excluded: &[&'static str]| {
+        let analysis = Analysis::new(&image, &limits).unwrap();
+        analysis.without(excluded).of(AT).unwrap().is_some()
+    };
+    assert!(of(&["other"]));
+    assert!(!of(&["kernel"]));
+}
+
 #[test]
 fn code_in_ram_waits_for_no_line() {
     // Sixteen instructions of a cycle each, over two lines, then the return.
