@@ -324,7 +324,7 @@ impl Drive for F405Drive {
     fn actuate(&mut self, answer: &ActuatorFrame) {
         let is_active = answer
             .supervisor_state()
-            .is_some_and(|state| !matches!(state, SupervisorState::Idle | SupervisorState::Fault));
+            .is_some_and(SupervisorState::drives);
         self.front_end.note_active(is_active);
         if is_active && self.source == FrameSource::Sensors && self.front_end.is_fit() {
             let [torque_1, torque_2] = answer.torques;

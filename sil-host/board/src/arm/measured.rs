@@ -1,11 +1,10 @@
 //! A tick of a real arm in SI units: converter counts through the controller's own scalings and arm model.
 
-use painleve_plant::sample::Sample;
+use painleve_plant::sample::{Sample, reference_tip_t_m};
 use painleve_plant::{Configuration, ContactMode, Snapshot};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::kinematics::Pose;
 use painleve_shared::range::OutOfRange;
-use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, JointMotion};
 
 /// Scalings of a configured arm.
@@ -30,17 +29,11 @@ impl Measured {
     /// Returns a tick as it is recorded. Angles, tip, gap, forces and torques are measured or
     /// commanded; quantities without a sensor are NaN.
     pub fn sample(&self, sensor: &SensorFrame, answer: &ActuatorFrame) -> Sample {
-        let reference_tip_t_m = match answer.supervisor_state() {
-            Some(SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff) => {
-                answer.reference_tip.to_metres()
-            }
-            _ => f64::NAN,
-        };
         Sample {
             plant: self.snapshot(sensor, answer),
             sensor: *sensor,
             actuator: *answer,
-            reference_tip_t_m,
+            reference_tip_t_m: reference_tip_t_m(answer),
             delivered: true,
             answered: answer.tick == sensor.tick,
         }

@@ -253,7 +253,7 @@ impl Drive {
         let step = before.map_or(1, |before| sensor.sequence.wrapping_sub(before));
         self.report.ticks += 1;
         self.report.lost_ticks += u64::from(step.saturating_sub(1));
-        self.report.active_ticks += u64::from(view::is_active(state));
+        self.report.active_ticks += u64::from(state.drives());
         let sample = self.measured.sample(&sensor, answer);
         if let Some(recorder) = recorder {
             recorder.push(&sample).map_err(output)?;

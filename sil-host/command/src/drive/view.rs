@@ -16,11 +16,6 @@ use painleve_system::terminal::warn;
 /// Time between two redraws.
 const REDRAW: Duration = Duration::from_millis(100);
 
-/// Returns whether torque may be applied in this state.
-pub fn is_active(state: SupervisorState) -> bool {
-    !matches!(state, SupervisorState::Idle | SupervisorState::Fault)
-}
-
 /// The table.
 pub struct View {
     /// `None` if standard error is not a terminal.
@@ -90,7 +85,7 @@ impl View {
             self.log(&status(answer));
         }
         // The board withdraws the permission when the drive stops.
-        let is_active = is_active(answer.supervisor_state().unwrap_or_default());
+        let is_active = answer.supervisor_state().unwrap_or_default().drives();
         self.permitted &= is_active || !self.was_active;
         self.was_active = is_active;
     }
