@@ -278,13 +278,13 @@ impl<'a> Analysis<'a> {
         let outcome = match problem.solve() {
             // Every path leads through an excluded function.
             Err(microlp::Error::Infeasible) if !self.excluded.is_empty() => return Ok(None),
-            outcome => outcome.map_err(|error| BoundError::Programme(error.to_string()))?,
+            outcome => outcome?,
         };
         let SolveOutcome::Solution(solution) = outcome else {
-            return Err(BoundError::Programme("no optimum".to_owned()));
+            return Err(BoundError::NoOptimum);
         };
         if solution.status() != SolutionStatus::Optimal {
-            return Err(BoundError::Programme("no optimum".to_owned()));
+            return Err(BoundError::NoOptimum);
         }
 
         let mut worst = Worst {

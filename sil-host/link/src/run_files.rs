@@ -29,9 +29,9 @@ use iceoryx2::prelude::{Config, FileName, Path as IceoryxPath, SemanticString};
 use nix::errno::Errno;
 use nix::fcntl::posix_fallocate;
 
-use super::LinkError;
 use super::lock_file::{LockFile, Role};
 use super::place::{Place, SHARED_MEMORY};
+use super::{FolderError, LinkError};
 
 /// Name of this program's own controllers.
 pub(super) const OWN_CONTROLLER: &str = "painleve";
@@ -82,7 +82,7 @@ impl RunFiles {
     pub(super) fn config(&self) -> Result<Config, LinkError> {
         let refuse = || LinkError::Folder {
             folder: self.folder.clone(),
-            reason: "its name is too long for shared memory".into(),
+            source: FolderError::NameTooLong,
         };
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|_| refuse())?;

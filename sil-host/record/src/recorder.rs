@@ -40,9 +40,6 @@ pub enum RecordError {
         /// The reason.
         source: io::Error,
     },
-    /// A figure or page cannot be drawn, which is not expected.
-    #[error("cannot draw the run: {0}")]
-    Draw(String),
     /// The recording thread cannot be started.
     #[error("cannot start the recording thread: {0}; end other processes or run without recording")]
     Thread(io::Error),
