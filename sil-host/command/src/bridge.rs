@@ -15,6 +15,7 @@ use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 
+use super::output_error::output;
 use super::patience::{PatienceArguments, WAIT_S};
 use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
@@ -217,9 +218,8 @@ fn carry_until<B: ConnectedBoard>(
 }
 
 fn write(path: &Path, report: &TimingReport) -> Result<(), CommandError> {
-    let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
-    let text = serde_json::to_string_pretty(report).map_err(|error| output(&error))?;
-    let mut file = AtomicFile::create(path).map_err(|error| output(&error))?;
-    writeln!(file, "{text}").map_err(|error| output(&error))?;
-    file.commit().map_err(|error| output(&error))
+    let text = serde_json::to_string_pretty(report).map_err(output)?;
+    let mut file = AtomicFile::create(path).map_err(output)?;
+    writeln!(file, "{text}").map_err(output)?;
+    file.commit().map_err(output)
 }

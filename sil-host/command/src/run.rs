@@ -21,6 +21,7 @@ use super::bridge::{ImageArguments, SensorLineArguments};
 use super::fail_on::{self, FailOn};
 use super::live;
 use super::output::OutputArguments;
+use super::output_error::{InputError, output};
 use super::patience::PatienceArguments;
 use super::process_error::ProcessError;
 use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
@@ -191,9 +192,7 @@ const BRIDGE_END: Duration = Duration::from_millis(300);
 /// Runs a scenario that is watched and steered from a page.
 fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), CommandError> {
     if arguments.host != Host::Native {
-        return Err(CommandError::Input(
-            "--live runs the controller in this process: leave out --host".into(),
-        ));
+        return Err(InputError::LiveHost.into());
     }
     live::run(scenario, port, &Interrupt::catch()?)
 }
@@ -503,7 +502,7 @@ fn failure(status: ExitStatus) -> CommandError {
 /// Prints a report as JSON or as a table.
 pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
     let text = if json {
-        serde_json::to_string(report).map_err(|error| CommandError::Output(error.to_string()))?
+        serde_json::to_string(report).map_err(output)?
     } else {
         terminal::readable(report.table())
     };

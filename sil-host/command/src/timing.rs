@@ -19,6 +19,7 @@ use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::{self, warn};
 
+use super::output_error::output;
 use super::run::Host;
 use super::{CommandError, say};
 
@@ -55,13 +56,12 @@ pub struct TimingArguments {
 
 /// Runs every scenario and reports the cost of its ticks.
 pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
-    let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
     if arguments.bound {
         let image = arguments.elf.clone();
         let image = image.unwrap_or_else(|| emulator::built_image("painleve-f405"));
         let bound = Bound::of(&image)?;
         return if arguments.json {
-            say(serde_json::to_string(&bound).map_err(|error| output(&error))?)
+            say(serde_json::to_string(&bound).map_err(output)?)
         } else {
             say(terminal::readable(bound.text()))
         };
@@ -76,7 +76,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         .map(|name| Scenario::load(name, &arguments.overrides))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(path) = &arguments.svg {
-        AtomicFile::create(path).map_err(|error| output(&error))?;
+        AtomicFile::create(path).map_err(output)?;
     }
     let interrupt = Interrupt::catch()?;
     if arguments.host == Host::Native {
@@ -87,11 +87,10 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         .map(|scenario| measure(arguments, scenario, &interrupt))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(path) = &arguments.svg {
-        atomic_file::write(path, figure::svg(&reports).as_bytes())
-            .map_err(|error| output(&error))?;
+        atomic_file::write(path, figure::svg(&reports).as_bytes()).map_err(output)?;
     }
     if arguments.json {
-        let text = serde_json::to_string(&reports).map_err(|error| output(&error))?;
+        let text = serde_json::to_string(&reports).map_err(output)?;
         say(text)
     } else {
         say(terminal::readable(report::table(&reports)))

@@ -20,6 +20,7 @@ use serde::Serialize;
 
 use self::operator::{Operator, OperatorCommand};
 use self::view::View;
+use super::output_error::output;
 use super::process_error::ProcessError;
 use super::{CommandError, say};
 
@@ -104,10 +105,6 @@ pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     })?;
     painleve_shared::status::Fault::from_code(report.fault)
         .map_or(Ok(()), |fault| Err(CommandError::Faulted(fault)))
-}
-
-fn output(error: impl std::fmt::Display) -> CommandError {
-    CommandError::Output(error.to_string())
 }
 
 /// Opens the record, so that an unwritable path is reported before anything moves.
