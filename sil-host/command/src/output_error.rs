@@ -3,7 +3,6 @@
 use std::io;
 use std::path::PathBuf;
 
-use painleve_chart::PlotError;
 use painleve_commission::simulated::SimulatedError;
 use painleve_record::export::ExportError;
 use painleve_record::recorder::RecordError;
@@ -20,9 +19,6 @@ pub enum OutputError {
     /// The record of a run.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A figure.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
     /// JSON.
     #[error(transparent)]
     Json(#[from] serde_json::Error),

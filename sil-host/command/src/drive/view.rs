@@ -133,8 +133,8 @@ fn status(answer: &ActuatorFrame) -> String {
 
 fn text(sample: &Sample, permitted: bool, counters: &str) -> String {
     let plant = &sample.plant;
-    let [theta_1, theta_2] = plant.theta_rad.map(f64::to_degrees);
-    let [torque_1, torque_2] = plant.torque_nm;
+    let [theta_1, theta_2] = plant.theta_rad.to_array().map(f64::to_degrees);
+    let [torque_1, torque_2] = plant.torque_nm.to_array();
     let switch = sample.sensor.inputs.contains(DigitalInputs::ENABLE);
     let flags: Vec<String> = sample
         .actuator

@@ -161,7 +161,7 @@ impl Stiffness {
         quiet.advance(QUIET_S, &mut ()).map_err(failed)?;
         let now = quiet.snapshot();
         let [theta, rates] = [now.theta_rad, now.theta_dot_rad_s];
-        let start = State::new(theta[0], theta[1], rates[0], rates[1]);
+        let start = State::new(theta.first(), theta.second(), rates.first(), rates.second());
         let mut rigid = self.plant(None, speed_m_s, start, mass_kg)?;
         let mut soft = self.plant(stiffness_n_m, speed_m_s, start, mass_kg)?;
         let mut largest = 0.0_f64;
