@@ -16,6 +16,7 @@ mod patience;
 mod plant;
 mod process_error;
 mod run;
+mod run_process;
 mod scenarios;
 mod study;
 mod sweep;
@@ -132,7 +133,7 @@ pub enum CommandError {
     /// A file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// A file or option given is of no use.
+    /// A file or option cannot be used.
     #[error(transparent)]
     Input(#[from] InputError),
     /// Two files would replace each other.

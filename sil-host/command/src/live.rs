@@ -228,7 +228,7 @@ impl Live {
         };
     }
 
-    /// Obeys an order; what cannot be done is said to the viewers.
+    /// Executes a viewer's request; reports to the viewers if it is impossible.
     fn obey(&mut self, order: ViewerRequest) -> Result<(), CommandError> {
         match order {
             ViewerRequest::Pause => self.paused = true,

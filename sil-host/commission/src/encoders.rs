@@ -2,7 +2,7 @@
 //! operator holds the arm clear of the belt, with plumb line and spirit level.
 //!
 //! From the first pose to the second, joint 1 turns by +90° and the elbow by −90°; from the second to the
-//! third, only the elbow, by −90°. That tells the encoders and their directions apart.
+//! third, only the elbow, by −90°. This identifies the encoders and their directions.
 
 use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts};

@@ -21,7 +21,7 @@ pub(crate) struct MeanReadings {
     pub forces: [f64; 2],
 }
 
-/// A rig with what is known about it.
+/// A rig and its properties measured until now.
 pub(crate) struct Session<'a, R> {
     rig: &'a mut R,
     pub expected: &'a Expected,

@@ -16,7 +16,7 @@
 //! The first of the run's files in shared memory is `<prefix>lock`. Plant and controller hold
 //! a lock on it for as long as they use the run. Locks are visible to every process that sees
 //! the file, whatever PID namespace, container or runtime folder it has, so that segments
-//! whose folder is out of sight can still be told dead from alive (`survey`).
+//! whose folder is out of sight can still be identified as dead or alive (`survey`).
 
 use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};

@@ -90,7 +90,7 @@ pub trait Sink: Send {
     fn finish(self: Box<Self>) -> Result<(), RecordError>;
 
     /// Keeps the file of a run that ended early under a name that marks it as partial, which is
-    /// returned; `None` if such a file is of no use.
+    /// returned; `None` if a partial file has no use.
     ///
     /// # Errors
     /// [`RecordError`] if the file cannot be written.

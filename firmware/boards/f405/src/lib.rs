@@ -138,7 +138,7 @@ impl Board for F405 {
             polarity: Polarity::IdleLow,
             phase: Phase::CaptureOnSecondTransition,
         };
-        // Two of these pins belong to the debugger at reset; it needs them for JTAG only.
+        // At reset, two of these pins belong to the debugger, which uses them only for JTAG.
         let pins = (
             Some(b.pb3.into_alternate::<5>()),
             Some(b.pb4.into_alternate::<5>()),

@@ -288,7 +288,7 @@ impl ArmOnBelt {
             self.step
                 .take(&derivative, start_s, &start, &here.slope, size, &tolerance);
             if self.step.error <= 1.0 {
-                // A truncated step is no reason against a longer one.
+                // A truncated step does not limit the next one.
                 let proposed = self.step.proposed_size();
                 self.step_size_s = if size < wanted {
                     wanted.max(proposed)
