@@ -1,4 +1,4 @@
-//! `painleve completions` and `painleve man`: what shells and `man` know about the command.
+//! `painleve completions` and `painleve man`: shell completions and manual pages.
 
 use std::path::PathBuf;
 

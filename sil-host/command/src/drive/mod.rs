@@ -84,7 +84,7 @@ pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     let mut recorder = recorder(arguments, &scenario)?;
     let mut drive = Drive::open(arguments, &scenario)?;
     let watched = drive.watch(arguments, &interrupt, &mut recorder);
-    // Whatever ended the drive, remove the torque; a board that cannot be reached stops by itself.
+    // Remove the torque in every case; a board that cannot be reached stops by itself.
     let stopped = drive.arm.stop();
     drive.view.finish();
     if let Err(error) = watched.and(stopped.map_err(CommandError::from)) {
@@ -199,7 +199,9 @@ impl Drive {
                 Some(OperatorCommand::Disarm) => self.arm.permit_arming(false)?,
                 Some(OperatorCommand::Stop) => return Ok(()),
                 Some(OperatorCommand::Unknown(text)) => {
-                    warn(format_args!("unknown order {text:?}: arm, disarm or stop"));
+                    warn(format_args!(
+                        "unknown command {text:?}: arm, disarm or stop"
+                    ));
                 }
             }
             if health.elapsed() >= HEALTH_INTERVAL {

@@ -58,7 +58,7 @@ impl View {
         });
     }
 
-    /// Shows the board's counters, and the line's at this end.
+    /// Shows the counters of the board, and of this end of the line.
     pub fn show_health(&mut self, health: &Health, line: LineHealth) {
         let lapses: Vec<String> = Lapse::ALL
             .iter()
