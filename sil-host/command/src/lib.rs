@@ -11,12 +11,10 @@ mod fail_on;
 mod figures;
 mod live;
 mod output;
-mod output_error;
 mod patience;
 mod plant;
 mod process_error;
 mod run;
-mod run_process;
 mod scenarios;
 mod study;
 mod sweep;
@@ -32,6 +30,7 @@ use painleve_shared::status::Fault;
 
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
+use painleve_board::timing::CyclictestError;
 use painleve_bound::BoundError;
 use painleve_commission::Mistake;
 use painleve_link::LinkError;
@@ -44,8 +43,6 @@ use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_siz
 use painleve_system::memory_full::exit_when_shared_memory_is_full;
 use painleve_system::terminal::{self, warn};
 
-use fail_on::FailedCondition;
-use output_error::{InputError, OutputError, output};
 use process_error::ProcessError;
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
@@ -124,6 +121,9 @@ pub enum CommandError {
     /// The board that runs the controller is missing, gone or incompatible.
     #[error(transparent)]
     Board(#[from] BoardError),
+    /// There is no comparison with another program's wake-ups.
+    #[error(transparent)]
+    Cyclictest(#[from] CyclictestError),
     /// The cycles of an image cannot be bounded.
     #[error(transparent)]
     Bound(#[from] BoundError),
@@ -131,11 +131,11 @@ pub enum CommandError {
     #[error("{0}")]
     Mounting(Mistake),
     /// A file cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    /// A file or option cannot be used.
-    #[error(transparent)]
-    Input(#[from] InputError),
+    #[error("{0}")]
+    Output(String),
+    /// A file or option given is of no use.
+    #[error("{0}")]
+    Input(String),
     /// Two files would replace each other.
     #[error("--{} and --{} both name `{}`: choose different files", options[0], options[1], path.display())]
     SameFile {
@@ -163,8 +163,8 @@ pub enum CommandError {
     #[error("the drive has latched fault {}: {}", *.0 as u8, .0.description())]
     Faulted(Fault),
     /// The run met a condition of --fail-on.
-    #[error("--fail-on: {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
-    FailedOn(Vec<FailedCondition>),
+    #[error("--fail-on: {0}")]
+    FailedOn(String),
     /// In real time, too many consecutive ticks were late or lost.
     #[error("the controller missed its deadlines and removed the torque: {}", .0.description())]
     DeadlinesMissed(Fault),
@@ -202,6 +202,7 @@ impl CommandError {
             Self::Loop(LoopError::Host(_) | LoopError::NotUnderstood { .. })
             | Self::Link(_)
             | Self::Board(_)
+            | Self::Cyclictest(_)
             | Self::Process(_) => PEER_FAILED,
             Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => 4,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => INTERRUPTED,
@@ -224,7 +225,7 @@ impl From<std::io::Error> for CommandError {
 fn say(line: impl std::fmt::Display) -> Result<(), CommandError> {
     terminal::say(line).map_err(|error| match error.kind() {
         std::io::ErrorKind::BrokenPipe => CommandError::Unread,
-        _ => output(OutputError::StandardOutput(error)),
+        _ => CommandError::Output(format!("cannot write to stdout: {error}")),
     })
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
-use painleve_board::timing::{Metronome, TimingReport, Unit, report};
+use painleve_board::timing::{Cyclictest, Metronome, TimingReport, Unit, report};
 use painleve_board::{ConnectedBoard, Drivers, OnBoard, SILENCE_LIMIT, Serial};
 use painleve_bound::report::Bound;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
@@ -16,10 +16,9 @@ use painleve_plant::simulation::Simulation;
 use painleve_shared::message::FrameSource;
 use painleve_system::atomic_file::{self, AtomicFile};
 use painleve_system::interrupt::Interrupt;
-use painleve_system::realtime::request_realtime;
+use painleve_system::realtime::{FIFO_PRIORITY, request_realtime};
 use painleve_system::terminal::{self, warn};
 
-use super::output_error::output;
 use super::run::Host;
 use super::{CommandError, say};
 
@@ -44,8 +43,12 @@ pub struct TimingArguments {
     elf: Option<PathBuf>,
     /// Bound the cycles of the flash image's control interrupt from its machine code and show the
     /// path that attains the bound, instead of running a scenario; --elf selects another image.
-    #[arg(long, conflicts_with_all = ["names", "overrides", "host", "port", "svg"])]
+    #[arg(long, conflicts_with_all = ["names", "overrides", "host", "port", "svg", "cyclictest"])]
     bound: bool,
+    /// With --host native: run cyclictest (Debian's package rt-tests) beside each scenario, at the same rate
+    /// and priority. Its row shows what the machine itself grants.
+    #[arg(long)]
+    cyclictest: bool,
     /// Print JSON on stdout instead of the table.
     #[arg(long)]
     json: bool,
@@ -56,12 +59,13 @@ pub struct TimingArguments {
 
 /// Runs every scenario and reports the cost of its ticks.
 pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
+    let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
     if arguments.bound {
         let image = arguments.elf.clone();
         let image = image.unwrap_or_else(|| emulator::built_image("painleve-f405"));
         let bound = Bound::of(&image)?;
         return if arguments.json {
-            say(serde_json::to_string(&bound).map_err(output)?)
+            say(serde_json::to_string(&bound).map_err(|error| output(&error))?)
         } else {
             say(terminal::readable(bound.text()))
         };
@@ -76,21 +80,37 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         .map(|name| Scenario::load(name, &arguments.overrides))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(path) = &arguments.svg {
-        AtomicFile::create(path).map_err(output)?;
+        AtomicFile::create(path).map_err(|error| output(&error))?;
     }
     let interrupt = Interrupt::catch()?;
-    if arguments.host == Host::Native {
-        warn(format_args!("controller: {}", request_realtime()));
+    if arguments.cyclictest && arguments.host != Host::Native {
+        let reason =
+            "--cyclictest needs --host native: other hosts do not wait for this machine's clock";
+        return Err(output(&reason));
     }
-    let reports = scenarios
-        .iter()
-        .map(|scenario| measure(arguments, scenario, &interrupt))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut priority = None;
+    if arguments.host == Host::Native {
+        let status = request_realtime();
+        warn(format_args!("controller: {status}"));
+        priority = status.scheduling.is_ok().then_some(FIFO_PRIORITY);
+    }
+    let mut reports = Vec::new();
+    for scenario in &scenarios {
+        let beside = arguments
+            .cyclictest
+            .then(|| Cyclictest::start(scenario.run.tick_hz, scenario.run.ticks(), priority))
+            .transpose()?;
+        reports.push(measure(arguments, scenario, &interrupt)?);
+        if let Some(beside) = beside {
+            reports.push(beside.finish()?);
+        }
+    }
     if let Some(path) = &arguments.svg {
-        atomic_file::write(path, figure::svg(&reports).as_bytes()).map_err(output)?;
+        atomic_file::write(path, figure::svg(&reports).as_bytes())
+            .map_err(|error| output(&error))?;
     }
     if arguments.json {
-        let text = serde_json::to_string(&reports).map_err(output)?;
+        let text = serde_json::to_string(&reports).map_err(|error| output(&error))?;
         say(text)
     } else {
         say(terminal::readable(report::table(&reports)))

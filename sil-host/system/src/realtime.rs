@@ -18,7 +18,7 @@ use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
 /// Priority under `SCHED_FIFO`: above all ordinary threads, just below the interrupt threads (50)
 /// of a real-time kernel, on which the wake-ups depend.
-const FIFO_PRIORITY: u8 = 49;
+pub const FIFO_PRIORITY: u8 = 49;
 
 /// Waiting on the monotonic clock failed.
 #[derive(Debug, thiserror::Error)]

@@ -2,8 +2,9 @@
 //!
 //! - [`tick_times`]: exact percentiles, and the worst tick
 //! - [`report`]: the report, as JSON and as a table; [`figure`]: its figure
-//! - [`metronome`]: wake-ups at absolute deadlines on a PC
+//! - [`metronome`]: wake-ups at absolute deadlines on a PC; [`cyclictest`]: those of another program
 
+pub mod cyclictest;
 pub mod figure;
 pub mod metronome;
 pub mod report;
@@ -13,6 +14,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+pub use cyclictest::{Cyclictest, CyclictestError};
 pub use metronome::Metronome;
 pub use report::TimingReport;
 pub use tick_times::TickTimes;

@@ -27,7 +27,7 @@ pub struct TickTimes {
 impl TickTimes {
     /// Adds one tick, which gave `answer`.
     pub fn push(&mut self, answer: &ActuatorFrame, cost: u32) {
-        *self.ticks_by_cost.entry(cost).or_default() += 1;
+        self.push_cost(cost);
         if self.worst.as_ref().is_none_or(|worst| cost > worst.cost) {
             self.worst = Some(WorstTick {
                 tick: answer.tick,
@@ -38,6 +38,11 @@ impl TickTimes {
                 cost,
             });
         }
+    }
+
+    /// Adds one tick of unknown circumstances.
+    pub fn push_cost(&mut self, cost: u32) {
+        *self.ticks_by_cost.entry(cost).or_default() += 1;
     }
 
     /// Returns the number of ticks.

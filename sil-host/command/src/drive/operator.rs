@@ -1,9 +1,9 @@
-//! The operator's commands: lines on standard input.
+//! The operator's orders: lines on standard input.
 
 use std::io::{self, BufRead};
 use std::sync::mpsc::{Receiver, channel};
 
-/// A command to the drive.
+/// An order to the drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum OperatorCommand {
     /// Permit the drive to arm.
@@ -28,7 +28,7 @@ impl OperatorCommand {
     }
 }
 
-/// Reads commands without blocking the drive.
+/// Reads orders without holding up the drive.
 pub struct Operator(Receiver<OperatorCommand>);
 
 impl Operator {
@@ -51,7 +51,7 @@ impl Operator {
         Ok(Self(receiver))
     }
 
-    /// Returns the next command, if there is one.
+    /// Returns the next order, if one has been given.
     pub fn order(&self) -> Option<OperatorCommand> {
         self.0.try_recv().ok()
     }

@@ -12,7 +12,6 @@ use painleve_study::Study;
 use painleve_study::catalogue::{AnyOutcome, AnyStudy};
 use painleve_system::atomic_file::{self, AtomicFile};
 
-use crate::output_error::output;
 use crate::process_error::ProcessError;
 use crate::{CommandError, say};
 
@@ -110,6 +109,11 @@ impl OutcomeOptions {
             say(terminal::readable(outcome.table()))
         }
     }
+}
+
+/// Converts an error of an output file.
+pub fn output(error: impl std::fmt::Display) -> CommandError {
+    CommandError::Output(error.to_string())
 }
 
 /// Returns a progress bar on stderr if it is a terminal, otherwise a hidden one.
