@@ -10,11 +10,7 @@ fn the_control_interrupt_has_a_bound_within_the_budget() {
     let budget: serde_json::Value = serde_json::from_str(include_str!("../budget.json")).unwrap();
     let bound = Bound::of(flash_image()).unwrap_or_else(|error| panic!("{error}"));
     for (cycles, key) in [
-        (
-            bound.default_law_cycles,
-            "bound_cycles_of_control_interrupt",
-        ),
-        (bound.cycles, "bound_cycles_with_any_law"),
+        (bound.cycles, "bound_cycles_of_control_interrupt"),
         (bound.sensor_cycles, "bound_cycles_of_sensor_interrupts"),
     ] {
         let most = budget[key].as_u64().unwrap();
@@ -26,7 +22,7 @@ fn the_control_interrupt_has_a_bound_within_the_budget() {
     }
     let sum: u32 = bound.path.iter().map(|stretch| stretch.cycles).sum();
     assert!(
-        bound.default_law_cycles.abs_diff(sum) < 200,
+        bound.cycles.abs_diff(sum) < 200,
         "the path explains {sum} cycles"
     );
     let functions: Vec<&str> = bound
@@ -34,7 +30,8 @@ fn the_control_interrupt_has_a_bound_within_the_budget() {
         .iter()
         .map(|stretch| &*stretch.function)
         .collect();
-    for part in ["estimate::", "refer::", "law::", "drive::"] {
+    // The worst tick returns the tip to the belt or follows a law.
+    for part in ["estimate::", "refer::", "drive::"] {
         assert!(
             functions.iter().any(|name| name.contains(part)),
             "{functions:?}"
@@ -46,12 +43,10 @@ fn the_control_interrupt_has_a_bound_within_the_budget() {
     };
     let expected = format!(
         "| part | cycles | µs at 168 MHz |\n|---|---|---|\n\
-         | the control interrupt: the sensors' counts of the last tick, the default law's controller, the stages | {} |\n\
-         | the same with the PID law | {} |\n\
+         | the control interrupt: the sensors' counts of the last tick, the controller, the stages | {} |\n\
          | the interrupts that read the sensors for the next tick: every reading disturbed, each read \
          again as often as its driver allows | {} |\n\
-         | both, with any law: proves up to {} Hz | {} |\n",
-        part(bound.default_law_cycles),
+         | both: proves up to {} Hz | {} |\n",
         part(bound.cycles),
         part(bound.sensor_cycles),
         thousands(bound.proves_hz.into()),

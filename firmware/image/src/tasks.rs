@@ -72,8 +72,8 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
         }
     }
 
-    /// Stops when the host has been silent for too long, whatever the frames' source.
-    fn note_silence(&mut self) {
+    /// Returns whether the host has been silent for too long, whatever the frames' source.
+    fn note_silence(&mut self) -> bool {
         self.silent_ticks = self.silent_ticks.saturating_add(1);
         let limit_ms = match self.task.source() {
             FrameSource::Sensors | FrameSource::DryRun => SENSORS_SILENCE_MS,
@@ -81,10 +81,7 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
         };
         // 32 bits hold 5 s at 100 kHz; dividing 64 would be a loop without a declared limit.
         let limit = limit_ms.saturating_mul(self.tick_hz) / 1000;
-        if self.tick_hz > 0 && self.silent_ticks > limit {
-            self.task.stop();
-            self.tick_hz = 0;
-        }
+        self.tick_hz > 0 && self.silent_ticks > limit
     }
 }
 
@@ -132,7 +129,11 @@ pub fn control<D: BoardDrive, L: Law>(
     events: &mut Producer<'static, Change>,
     reported: &mut Change,
 ) -> bool {
-    control.note_silence();
+    if control.note_silence() {
+        control.task.stop_instead_of_tick();
+        control.tick_hz = 0;
+        return false;
+    }
     let Some(Answered {
         sensor,
         frame,

@@ -78,7 +78,7 @@ impl Lapses<'_> {
             && self.supervision.fault().is_none()
         {
             self.supervision.latch(lapse.fault());
-            *self.command = LastCommand::default();
+            self.command.clear();
         }
     }
 }

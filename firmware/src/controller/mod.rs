@@ -357,7 +357,7 @@ impl<L: Law> Stages<L> {
 impl<L: Law> State<L> {
     /// Takes the torque off and cancels a recovery in progress.
     fn release(&mut self) {
-        self.command = LastCommand::default();
+        self.command.clear();
         self.demand.cancel_recovery();
     }
 }

@@ -122,6 +122,12 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         self.controller = None;
     }
 
+    /// Stops as [`stop`](Self::stop) does, when a tick is due.
+    pub fn stop_instead_of_tick(&mut self) {
+        self.drive.begin_tick();
+        self.stop();
+    }
+
     /// Runs one tick; returns `None` if there is no answer to send.
     pub fn tick(&mut self) -> Option<Answered> {
         self.drive.begin_tick();
@@ -299,6 +305,15 @@ mod tests {
             [Call::BeginTick, Call::Sample, actuated]
         );
         assert_eq!((task.counts().ticks, task.counts().worst_elapsed), (21, 7));
+    }
+
+    #[test]
+    fn a_stop_instead_of_a_tick_takes_the_torque_off_and_samples_nothing() {
+        let mut task = tracking(FrameSource::Realtime);
+        task.stop_instead_of_tick();
+        let off = Call::Actuate(ActuatorFrame::default());
+        assert_eq!(task.drive.calls(), [Call::BeginTick, off]);
+        assert_eq!(task.lapse_counts().map(|_| ()), None);
     }
 
     #[test]

@@ -83,8 +83,16 @@ pub struct Phase {
 impl Phase {
     /// Returns whether torque may be applied.
     pub fn drives(&self) -> bool {
-        self.state.drives()
+        drives(self.state)
     }
+}
+
+/// Returns whether torque may be applied in this state.
+fn drives(state: SupervisorState) -> bool {
+    matches!(
+        state,
+        SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff
+    )
 }
 
 impl Supervisor {
@@ -198,7 +206,7 @@ impl Supervision {
 
     /// Returns whether torque may be applied.
     pub fn drives(&self) -> bool {
-        self.state.drives()
+        drives(self.state)
     }
 
     /// Latches a fault unless one is latched already.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
-use crate::{BoundError, ImageError};
+use crate::BoundError;
 
 /// The code of an ELF file.
 pub struct Image {
@@ -36,15 +36,12 @@ impl Image {
     /// # Errors
     /// [`BoundError::Image`] naming the file.
     pub fn read(path: &Path) -> Result<Self, BoundError> {
-        Self::read_elf(path).map_err(|source| BoundError::Image {
+        let refused = |error: &dyn std::fmt::Display| BoundError::Image {
             path: path.to_owned(),
-            source,
-        })
-    }
-
-    fn read_elf(path: &Path) -> Result<Self, ImageError> {
-        let bytes = std::fs::read(path)?;
-        let file = object::File::parse(&*bytes)?;
+            reason: error.to_string(),
+        };
+        let bytes = std::fs::read(path).map_err(|error| refused(&error))?;
+        let file = object::File::parse(&*bytes).map_err(|error| refused(&error))?;
         let mut sections = Vec::new();
         for section in file.sections().filter(|section| {
             matches!(
@@ -52,7 +49,7 @@ impl Image {
                 SectionKind::Text | SectionKind::ReadOnlyData
             ) && section.address() != 0
         }) {
-            let data = section.data()?;
+            let data = section.data().map_err(|error| refused(&error))?;
             sections.push((section.address() as u32, data.to_vec()));
         }
         let (mut functions, mut marks) = (BTreeMap::new(), BTreeMap::new());
@@ -71,7 +68,7 @@ impl Image {
                 _ => {}
             }
         }
-        let lines = addr2line::Loader::new(path).map_err(ImageError::Lines)?;
+        let lines = addr2line::Loader::new(path).map_err(|error| refused(&error))?;
         Ok(Self {
             sections,
             functions,

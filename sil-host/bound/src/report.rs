@@ -9,20 +9,14 @@ use painleve_drivers::exchange::{Dialogue, SelectTiming};
 use painleve_drivers::force_cell::ForceCellDriver;
 use serde::Serialize;
 
+use crate::BoundError;
 use crate::cycles::around;
 use crate::image::Image;
 use crate::loops::Limits;
 use crate::worst::{Analysis, Loop, Visit, Worst};
-use crate::{BoundError, ImageError};
 
 /// Handler of the control timer.
 pub const CONTROL_INTERRUPT: &str = "TIM2";
-
-/// Modules of the default law and of the other one: of these, a configuration chooses one.
-const LAWS: [&str; 2] = ["law::hybrid::", "law::pid::"];
-
-/// Ends an exchange on a sensor's bus, and begins the next.
-const END_OF_EXCHANGE: &str = "SensorBus<I,S,D,_>::close";
 
 /// A sensor's bus.
 struct SensorBus {
@@ -59,10 +53,8 @@ pub const CORE_HZ: f64 = 168e6;
 /// A bound on the control interrupt.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bound {
-    /// Cycles from the request of the interrupt to the return from it, with any law.
+    /// Cycles from the request of the interrupt to the return from it.
     pub cycles: u32,
-    /// The same with the default law.
-    pub default_law_cycles: u32,
     /// Cycles per tick of the interrupts that read the sensors for the next tick.
     pub sensor_cycles: u32,
     /// Cycles of the longest of these interrupts, which may delay the control interrupt.
@@ -75,7 +67,7 @@ pub struct Bound {
     pub around_cycles: u32,
     /// Instructions on the worst path.
     pub instructions: u32,
-    /// The path with the default law, in order of execution.
+    /// The path, in order of execution.
     pub path: Vec<PathStretch>,
     /// Loops of the interrupt and of the functions that it calls.
     #[serde(skip)]
@@ -107,44 +99,37 @@ impl Bound {
             let entry = image.function(handler);
             let entry = entry.ok_or_else(|| BoundError::Image {
                 path: path.to_owned(),
-                source: ImageError::NoFunction(handler.to_owned()),
+                reason: format!("there is no function {handler}"),
             })?;
             let worst = analysis.of(entry)?;
             worst.ok_or(BoundError::NeverReturns { address: entry })
         };
         let limits = Limits::of_control();
-        let [default_law, other_law] = LAWS;
-        let (without_other, without_default) = ([other_law], [default_law]);
-        let mut with_default = Analysis::new(&image, &limits)?.without(&without_other);
-        let mut with_other = Analysis::new(&image, &limits)?.without(&without_default);
-        let worst = worst_of(CONTROL_INTERRUPT, &mut with_default)?;
-        let default_law_cycles = with_entry(&worst);
-        let other = worst_of(CONTROL_INTERRUPT, &mut with_other)?;
+        let mut analysis = Analysis::new(&image, &limits)?;
+        let worst = worst_of(CONTROL_INTERRUPT, &mut analysis)?;
+        let cycles = with_entry(&worst);
         let (mut sensor_cycles, mut longest_sensor_cycles) = (0, 0);
         for bus in SENSOR_BUSES {
             let limits = Limits::of_sensor_bus(bus.timing, bus.clock_hz);
-            let mut analysis = Analysis::new(&image, &limits)?;
-            let last = with_entry(&worst_of(bus.handler, &mut analysis)?);
-            let mut analysis = Analysis::new(&image, &limits)?.without(&[END_OF_EXCHANGE]);
-            let other = with_entry(&worst_of(bus.handler, &mut analysis)?);
-            sensor_cycles += bus.exchanges * (last + (bus.words - 1) * other);
-            longest_sensor_cycles = longest_sensor_cycles.max(last);
+            let once = with_entry(&worst_of(
+                bus.handler,
+                &mut Analysis::new(&image, &limits)?,
+            )?);
+            sensor_cycles += bus.exchanges * bus.words * once;
+            longest_sensor_cycles = longest_sensor_cycles.max(once);
         }
-        let cycles = default_law_cycles.max(with_entry(&other));
         let path = stretches(&image, &worst.path);
         Ok(Self {
             cycles,
-            default_law_cycles,
             sensor_cycles,
             longest_sensor_cycles,
             microseconds: f64::from(cycles) / CORE_HZ * 1e6,
             proves_hz: (CORE_HZ / f64::from(cycles + sensor_cycles)) as u32,
-            around_cycles: default_law_cycles - worst.cycles,
+            around_cycles: cycles - worst.cycles,
             instructions: worst.instructions,
             path,
-            loops: with_default
+            loops: analysis
                 .functions()
-                .chain(with_other.functions())
                 .flat_map(|function| function.loops.iter().cloned())
                 .collect(),
         })
@@ -168,15 +153,14 @@ impl Bound {
         let _ = writeln!(text, "{around:>7}  entry to and exit from the interrupt");
         let _ = write!(
             text,
-            "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz; with any law, {} cycles.\n\
+            "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz.\n\
              Interrupts that read the sensors for the next tick: {} cycles, {:.1} µs in a tick, {:.1} µs each at most.\n\
              Together they prove control rates up to {} Hz.\n\
              Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss. Tasks of lower \
              priority that mask the interrupts come on top.",
-            self.default_law_cycles,
-            f64::from(self.default_law_cycles) / CORE_HZ * 1e6,
-            CORE_HZ / 1e6,
             self.cycles,
+            self.microseconds,
+            CORE_HZ / 1e6,
             self.sensor_cycles,
             f64::from(self.sensor_cycles) / CORE_HZ * 1e6,
             f64::from(self.longest_sensor_cycles) / CORE_HZ * 1e6,

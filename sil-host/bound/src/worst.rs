@@ -14,7 +14,7 @@ use microlp::{
 
 use crate::BoundError;
 use crate::cost;
-use crate::graph::{Block, Graph};
+use crate::graph::Graph;
 use crate::image::{Frame, Image};
 use crate::instruction::{Decoder, SECOND_ARGUMENT};
 use crate::loops::{CLEARED_BYTES, CLEARS, Limit, Limits};
@@ -77,8 +77,6 @@ pub struct Analysis<'a> {
     decoder: Decoder,
     limits: &'a Limits,
     known: BTreeMap<u32, Option<Worst>>,
-    /// Parts of the names of functions that are not executed.
-    excluded: &'a [&'static str],
 }
 
 impl<'a> Analysis<'a> {
@@ -92,21 +90,7 @@ impl<'a> Analysis<'a> {
             decoder: Decoder::new()?,
             limits,
             known: BTreeMap::new(),
-            excluded: &[],
         })
-    }
-
-    /// Excludes paths through functions, inlined or not, whose names contain one of these texts.
-    pub fn without(self, excluded: &'a [&'static str]) -> Self {
-        Self { excluded, ..self }
-    }
-
-    /// Returns whether the source of an instruction is in an excluded function.
-    fn is_excluded(&self, block: &Block) -> bool {
-        let is_in = |frame: &Frame| self.excluded.iter().any(|it| frame.function.contains(it));
-        let mut instructions = block.instructions.iter();
-        !self.excluded.is_empty()
-            && instructions.any(|it| self.image.frames(it.address).iter().any(is_in))
     }
 
     /// Returns the analysed functions.
@@ -264,27 +248,14 @@ impl<'a> Analysis<'a> {
             }
             problem.add_constraint(rounds, ComparisonOp::Le, 0.0);
         }
-        for (address, block) in &graph.blocks {
-            if self.is_excluded(block) {
-                for edge in incoming.get(address).into_iter().flatten() {
-                    problem.add_constraint(
-                        LinearExpr::from_iter([(*edge, 1.0)]),
-                        ComparisonOp::Le,
-                        0.0,
-                    );
-                }
-            }
-        }
-        let outcome = match problem.solve() {
-            // Every path leads through an excluded function.
-            Err(microlp::Error::Infeasible) if !self.excluded.is_empty() => return Ok(None),
-            outcome => outcome?,
-        };
+        let outcome = problem
+            .solve()
+            .map_err(|error| BoundError::Programme(error.to_string()))?;
         let SolveOutcome::Solution(solution) = outcome else {
-            return Err(BoundError::NoOptimum);
+            return Err(BoundError::Programme("no optimum".to_owned()));
         };
         if solution.status() != SolutionStatus::Optimal {
-            return Err(BoundError::NoOptimum);
+            return Err(BoundError::Programme("no optimum".to_owned()));
         }
 
         let mut worst = Worst {

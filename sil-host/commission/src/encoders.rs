@@ -2,9 +2,8 @@
 //! operator holds the arm clear of the belt, with plumb line and spirit level.
 //!
 //! From the first pose to the second, joint 1 turns by +90° and the elbow by −90°; from the second to the
-//! third, only the elbow, by −90°. This identifies the encoders and their directions.
+//! third, only the elbow, by −90°. That tells the encoders and their directions apart.
 
-use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts};
 
 use crate::readings::{MeanReadings, Session, forward};
@@ -48,7 +47,7 @@ pub(crate) fn measure<R: Rig>(
     let mut held = Vec::new();
     for plumb_deg in POSES_DEG {
         session.instruct(Instruction::Hold { plumb_deg })?;
-        held.push(session.mean(JointTorque::zeros())?);
+        held.push(session.mean([0.0; 2])?);
     }
     let scales = session.expected.converters.encoders;
     let reversed = directions(&scales, &held)?;

@@ -1,6 +1,5 @@
 //! The plant's end of the link.
 
-use std::error::Error;
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -311,11 +310,7 @@ impl PlantEnd {
     }
 
     #[cold]
-    fn transport(
-        &self,
-        action: &'static str,
-        cause: impl Into<Box<dyn Error + Send + Sync>>,
-    ) -> LinkError {
+    fn transport(&self, action: &'static str, cause: impl ToString) -> LinkError {
         self.ports.presence.transport(action, cause)
     }
 

@@ -1,7 +1,5 @@
 //! The iceoryx2 side of a run: a node, its three services, and their ports.
 
-use std::error::Error;
-
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
@@ -69,11 +67,7 @@ impl Presence {
     }
 
     /// Returns a [`LinkError::Transport`] on this bus.
-    pub(super) fn transport(
-        &self,
-        action: &'static str,
-        cause: impl Into<Box<dyn Error + Send + Sync>>,
-    ) -> LinkError {
+    pub(super) fn transport(&self, action: &'static str, cause: impl ToString) -> LinkError {
         transport(&self.bus, action, cause)
     }
 
@@ -113,15 +107,11 @@ fn quieten() {
     }
 }
 
-pub(super) fn transport(
-    bus: &BusName,
-    action: &'static str,
-    cause: impl Into<Box<dyn Error + Send + Sync>>,
-) -> LinkError {
+pub(super) fn transport(bus: &BusName, action: &'static str, cause: impl ToString) -> LinkError {
     LinkError::Transport {
         bus: bus.clone(),
         action,
-        source: cause.into(),
+        cause: cause.to_string(),
     }
 }
 

@@ -40,6 +40,9 @@ pub enum RecordError {
         /// The reason.
         source: io::Error,
     },
+    /// A figure or page cannot be drawn, which is not expected.
+    #[error("cannot draw the run: {0}")]
+    Draw(String),
     /// The recording thread cannot be started.
     #[error("cannot start the recording thread: {0}; end other processes or run without recording")]
     Thread(io::Error),
@@ -90,7 +93,7 @@ pub trait Sink: Send {
     fn finish(self: Box<Self>) -> Result<(), RecordError>;
 
     /// Keeps the file of a run that ended early under a name that marks it as partial, which is
-    /// returned; `None` if a partial file has no use.
+    /// returned; `None` if such a file is of no use.
     ///
     /// # Errors
     /// [`RecordError`] if the file cannot be written.

@@ -58,19 +58,6 @@ fn a_loop_that_ends_at_its_first_block_executes_it_once_more() {
 }
 
 #[test]
-fn an_excluded_function_has_no_path() {
-    // bx lr
-    let image = Image::of_code(AT, &[0x70, 0x47], "kernel");
-    let limits = Limits(Vec::new());
-    let of = |excluded: &[&'static str]| {
-        let analysis = Analysis::new(&image, &limits).unwrap();
-        analysis.without(excluded).of(AT).unwrap().is_some()
-    };
-    assert!(of(&["other"]));
-    assert!(!of(&["kernel"]));
-}
-
-#[test]
 fn code_in_ram_waits_for_no_line() {
     // Sixteen instructions of a cycle each, over two lines, then the return.
     let code = [0x2003; 16].into_iter().chain([0x4770]).collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! Mounting and wiring of a simulated arm's parts, and their effect on its readings and torques.
+//! How the parts of a simulated arm are mounted and wired: what it reads and does instead of the perfect arm.
 
 use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::{
@@ -54,7 +54,7 @@ impl Wiring {
         }
     }
 
-    /// Returns the encoders' readings for the readings of a perfectly mounted arm.
+    /// Returns what the encoders read for perfect readings.
     pub fn encoders(
         &self,
         scales: &[EncoderScale; 2],
@@ -86,7 +86,7 @@ impl Wiring {
         raw
     }
 
-    /// Returns the force cell's readings for those of a perfectly mounted one, f_t and f_n.
+    /// Returns what the force cell reads for perfect readings of f_t and f_n.
     pub fn forces(
         &self,
         scale: &LinearScale<f32>,

@@ -39,7 +39,7 @@ impl Figure for SlidingRanges {
 }
 
 impl Row {
-    /// Returns the parameters that the rows of a panel share.
+    /// Returns what the rows of a panel have in common.
     fn group(&self) -> String {
         format!(
             "{}, μ = {}, {}",

@@ -43,31 +43,31 @@ pub enum SweepError {
         source: std::io::Error,
     },
     /// The campaign file is invalid.
-    #[error("campaign file {}: {source}", path.display())]
+    #[error("campaign file {}: {message}", path.display())]
     Campaign {
         /// The file.
         path: PathBuf,
         /// The error and the allowed values.
-        source: campaign::CampaignError,
+        message: String,
     },
     /// The manifest is invalid, or belongs to another program.
-    #[error("manifest {}: {source}", path.display())]
+    #[error("manifest {}: {message}", path.display())]
     Manifest {
         /// The file.
         path: PathBuf,
         /// The error and how to correct it.
-        source: manifest::ManifestError,
+        message: String,
     },
     /// No shard is given, or it does not exist.
     #[error(transparent)]
     Shard(#[from] ShardError),
     /// A shard is missing, duplicated or broken.
-    #[error("{} cannot be merged: {}", folder.display(), status.defects().join("; "))]
+    #[error("{} cannot be merged: {}", folder.display(), reasons.join("; "))]
     Incomplete {
         /// The folder of the sweep.
         folder: PathBuf,
-        /// What is missing, duplicated or broken.
-        status: Box<folder::SweepStatus>,
+        /// What is missing, duplicated or broken, file by file.
+        reasons: Vec<String>,
     },
     /// The script for a scheduler cannot be written.
     #[error(transparent)]
