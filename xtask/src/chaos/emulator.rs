@@ -10,8 +10,8 @@ use nix::unistd::Pid;
 use super::host::EMULATOR;
 use super::place::ChaosFolder;
 use super::trial::{
-    ChaosRole, Disturbance, Expected, Flaw, NOTICED, Plan, TrialOutcome, TrialProcess, command,
-    judge, next_run, orphans,
+    ChaosRole, Disturbance, ExpectedOutcome, Flaw, NOTICED, Plan, TrialOutcome, TrialProcess,
+    command, judge, next_run, orphans,
 };
 
 /// Disturbs the emulator of a run, `plan.call` milliseconds after its start.
@@ -19,7 +19,7 @@ pub fn disturb_emulator(
     place: &ChaosFolder,
     bus: &str,
     plan: Plan,
-    expected: &Expected,
+    expected: &ExpectedOutcome,
 ) -> io::Result<TrialOutcome> {
     let mut findings = Vec::new();
     let mut run = TrialProcess::start(&mut command(place, ChaosRole::Run, bus, "out/run.mcap"))?;

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use super::place::ChaosFolder;
 use super::trial::{
-    ChaosRole, Expected, Flaw, TrialOutcome, TrialProcess, command, judge, next_run, orphans, other,
+    ChaosRole, ExpectedOutcome, Flaw, TrialOutcome, TrialProcess, command, judge, next_run,
+    orphans, other,
 };
 
 /// Time for a traced start, plus two seconds of waiting for a peer that may have failed.
@@ -66,7 +67,7 @@ pub fn run(
     place: &ChaosFolder,
     bus: &str,
     (victim, fault, number): (ChaosRole, InjectedFault, u32),
-    expected: &Expected,
+    expected: &ExpectedOutcome,
 ) -> std::io::Result<TrialOutcome> {
     let mut findings = Vec::new();
     let log = place.path("strace.log");

@@ -27,7 +27,7 @@ use fault::{FAULTS, InjectedFault};
 use host::{ChaosController, ChaosHost};
 use place::{ChaosFolder, unused_segments};
 use table::TrialTable;
-use trial::{ChaosRole, Disturbance, Expected, Plan, TrialProcess};
+use trial::{ChaosRole, Disturbance, ExpectedOutcome, Plan, TrialProcess};
 
 /// Options of `cargo xtask chaos`.
 #[derive(Debug, Args)]
@@ -151,7 +151,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                         ChaosController::start(host)?,
                         patience_s,
                     )?;
-                    let expected = Expected {
+                    let expected = ExpectedOutcome {
                         course: undisturbed(&place, &bus)?,
                         end: Duration::from_secs(arguments.end_s),
                     };

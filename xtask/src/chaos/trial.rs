@@ -78,7 +78,7 @@ pub struct Plan {
 }
 
 /// Expected consequences.
-pub struct Expected {
+pub struct ExpectedOutcome {
     /// [Course](super::host::ChaosController::course) of an undisturbed run.
     pub course: String,
     /// Time within which everything must have ended after a disturbance.
@@ -114,7 +114,7 @@ pub fn run(
     place: &ChaosFolder,
     bus: &str,
     plan: Plan,
-    expected: &Expected,
+    expected: &ExpectedOutcome,
 ) -> std::io::Result<TrialOutcome> {
     let end = expected.end;
     let mut findings = Vec::new();
@@ -266,7 +266,7 @@ pub fn orphans(place: &ChaosFolder, deadline: Instant, findings: &mut Vec<Findin
 pub fn next_run(
     place: &ChaosFolder,
     bus: &str,
-    expected: &Expected,
+    expected: &ExpectedOutcome,
     findings: &mut Vec<Finding>,
 ) -> std::io::Result<()> {
     let mut next = TrialProcess::start(&mut command(place, ChaosRole::Run, bus, "out/run.mcap"))?;

@@ -8,7 +8,7 @@ use crate::robustness::LiftOffRule;
 pub struct RigEffect {
     /// Name on the command line and in rows.
     pub name: &'static str,
-    /// The key that a level sets; [`Overrides::Computed`] may set further keys with it.
+    /// The key that a level sets; [`LevelOverrides::Computed`] may set further keys with it.
     pub key: &'static str,
     /// Unit of a level; empty for a ratio.
     pub unit: &'static str,
@@ -24,11 +24,11 @@ pub struct RigEffect {
     /// change it. Their targets are where p is at least a fifth of Q22 at that friction.
     pub largest_friction: Option<fn(f64, f64) -> f64>,
     /// How a level is set.
-    pub overrides: Overrides,
+    pub overrides: LevelOverrides,
 }
 
 /// The overrides of a level.
-pub enum Overrides {
+pub enum LevelOverrides {
     /// None.
     None,
     /// The key is the level.
@@ -85,13 +85,13 @@ impl RigEffect {
     pub fn overrides(&self, level: f64, drawn: &Drawn) -> Vec<String> {
         let key = self.key;
         match self.overrides {
-            Overrides::None => Vec::new(),
-            Overrides::Level => vec![format!("{key}={level}")],
-            Overrides::RandomSigns => {
+            LevelOverrides::None => Vec::new(),
+            LevelOverrides::Level => vec![format!("{key}={level}")],
+            LevelOverrides::RandomSigns => {
                 let [one, two] = drawn.signs(level);
                 vec![format!("{key}=[{one}, {two}]")]
             }
-            Overrides::Computed(computed) => computed(level, drawn),
+            LevelOverrides::Computed(computed) => computed(level, drawn),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Joints, gears and masses of the arm, pushes on it, and errors of its model.
 
 use super::COMPLIANT;
-use crate::effects::effect::Overrides::Computed;
+use crate::effects::effect::LevelOverrides::Computed;
 use crate::effects::effect::{Drawn, RigEffect, effects, set};
 use crate::robustness::LiftOffRule::Counted;
 

@@ -1,7 +1,7 @@
 //! Contact, friction and surface of the belt.
 
 use super::COMPLIANT;
-use crate::effects::effect::Overrides::Computed;
+use crate::effects::effect::LevelOverrides::Computed;
 use crate::effects::effect::{RigEffect, effects, set};
 use crate::robustness::LiftOffRule::Counted;
 

@@ -1,7 +1,7 @@
 //! Faults of single channels, and many effects together.
 
 use super::{BOTH, find};
-use crate::effects::effect::Overrides::Computed;
+use crate::effects::effect::LevelOverrides::Computed;
 use crate::effects::effect::{Drawn, RigEffect, effects, set};
 use crate::robustness::LiftOffRule;
 

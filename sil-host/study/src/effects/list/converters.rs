@@ -3,7 +3,7 @@
 use core::f64::consts::PI;
 
 use super::BOTH;
-use crate::effects::effect::Overrides::{Computed, RandomSigns};
+use crate::effects::effect::LevelOverrides::{Computed, RandomSigns};
 use crate::effects::effect::{RigEffect, effects, set};
 use crate::robustness::LiftOffRule::Counted;
 

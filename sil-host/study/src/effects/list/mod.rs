@@ -7,7 +7,7 @@ mod converters;
 
 use std::sync::LazyLock;
 
-use super::effect::{Overrides, RigEffect};
+use super::effect::{LevelOverrides, RigEffect};
 use crate::robustness::LiftOffRule;
 
 /// Every effect; the first changes nothing.
@@ -32,12 +32,12 @@ const NONE: RigEffect = RigEffect {
     compliant_only: false,
     lift_offs: LiftOffRule::Fail,
     largest_friction: None,
-    overrides: Overrides::None,
+    overrides: LevelOverrides::None,
 };
 
 /// An effect that both plants have, with lift-offs as failures.
 const BOTH: RigEffect = RigEffect {
-    overrides: Overrides::Level,
+    overrides: LevelOverrides::Level,
     ..NONE
 };
 
