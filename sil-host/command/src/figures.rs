@@ -75,18 +75,14 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
         ));
         sections.push(section);
     }
-    let draft = if arguments.draft {
-        " This is a draft, on coarse grids and from short runs."
-    } else {
-        ""
-    };
     let page = Page {
         title: "The paper's studies, computed again".into(),
         introduction: format!(
             "Every figure and number of Marchese, Coraggio, Hogan and di Bernardo, Control of Painlevé \
-             Paradox in a Robotic System (arXiv:1907.04070), beside what painleve {} finds.{draft}",
+             Paradox in a Robotic System (arXiv:1907.04070), beside what painleve {} finds.",
             env!("CARGO_PKG_VERSION")
         ),
+        is_draft: arguments.draft,
         sections,
     };
     for (path, contents) in files {

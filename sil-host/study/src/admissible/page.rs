@@ -27,7 +27,7 @@ fn table_2(outcome: &Admissible) -> Section {
     let mut section = section(
         "admissible",
         "Table II: admissible configurations",
-        command,
+        vec![command],
         outcome,
     );
     for (name, intervals) in [

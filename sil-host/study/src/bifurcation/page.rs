@@ -3,7 +3,7 @@
 use super::{Bifurcation, BifurcationDiagram, Window};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
-use crate::figures::page_maker::{PageMaker, list, section};
+use crate::figures::page_maker::{PageMaker, cell_options, section};
 use crate::initial::Initial;
 use crate::{StudyError, paper};
 
@@ -19,25 +19,27 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let cells = page.cells(fineness.map_mu, fineness.map_v_belt, &[Initial::A])?;
     let study = Bifurcation { cells };
     let map = BifurcationDiagram::new(&study, page.rows("Friction and belt speed", &study)?);
+    let command = |mu, v_belt, initial| {
+        let options = cell_options(mu, v_belt, initial, fineness.open_loop_s);
+        format!("painleve study bifurcation {options}")
+    };
+    let section_command = command("0.6", fineness.section_v_belt, "a,d");
+    let map_command = command(fineness.map_mu, fineness.map_v_belt, "a");
     Ok(vec![
-        (bifurcation_section(&section), Box::new(section)),
-        (bifurcation_map(&map), Box::new(map)),
+        (
+            bifurcation_section(&section, section_command),
+            Box::new(section),
+        ),
+        (bifurcation_map(&map, map_command), Box::new(map)),
     ])
 }
 
 /// Fig. 4.
-fn bifurcation_section(outcome: &BifurcationDiagram) -> Section {
-    let settings = outcome.settings();
-    let command = format!(
-        "painleve study bifurcation --mu {} --initial a,d --transient-s {} --record-s {}",
-        list(&settings.mu),
-        settings.transient_s,
-        settings.record_s
-    );
+fn bifurcation_section(outcome: &BifurcationDiagram, command: String) -> Section {
     let mut section = section(
         "bifurcation-section",
         "Fig. 4: bouncing over belt speed",
-        command,
+        vec![command],
         outcome,
     );
     for window in &outcome.windows {
@@ -70,16 +72,11 @@ fn bifurcation_section(outcome: &BifurcationDiagram) -> Section {
 }
 
 /// The paper's two-dimensional diagram.
-fn bifurcation_map(outcome: &BifurcationDiagram) -> Section {
-    let settings = outcome.settings();
-    let command = format!(
-        "painleve study bifurcation --mu {} --initial a",
-        list(&settings.mu)
-    );
+fn bifurcation_map(outcome: &BifurcationDiagram, command: String) -> Section {
     let mut section = section(
         "bifurcation",
         "Bouncing over friction and belt speed",
-        command,
+        vec![command],
         outcome,
     );
     let (bouncing, quiet): (Vec<&Window>, Vec<&Window>) = outcome

@@ -4,7 +4,7 @@ use super::{ClosedLoopBifurcation, ClosedLoopDiagram};
 use crate::case::{ControllerChoice, ConverterChoice, Reference};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
-use crate::figures::page_maker::{PageMaker, SAMPLED_FRICTION, section};
+use crate::figures::page_maker::{PageMaker, SAMPLED_FRICTION, cell_options, section};
 use crate::initial::Initial;
 use crate::{StudyError, outcome, paper};
 
@@ -43,18 +43,31 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let mut rows = page.rows("Fig. 12: ideal", &ideal)?;
     rows.extend(page.rows("Fig. 12: hardware", &hardware)?);
     let outcome = ClosedLoopDiagram::new(rows);
-    Ok(vec![(figure_12(&outcome), Box::new(outcome))])
+    let command = |controllers, converters, v_belt, initial| {
+        let options = cell_options("0.6", v_belt, initial, fineness.closed_loop_s);
+        format!(
+            "painleve study closed-loop-bifurcation --controller {controllers} \
+             --converters {converters} {options}"
+        )
+    };
+    let commands = vec![
+        command("hybrid-paper", "ideal", fineness.ideal_v_belt, "d"),
+        command(
+            "hybrid-paper,hybrid-paper-model,hybrid",
+            "hardware",
+            fineness.closed_loop_v_belt,
+            "d,u",
+        ),
+    ];
+    Ok(vec![(figure_12(&outcome, commands), Box::new(outcome))])
 }
 
 /// Fig. 12.
-fn figure_12(outcome: &ClosedLoopDiagram) -> Section {
-    let command = "painleve study closed-loop-bifurcation \
-                   --controller hybrid-paper,hybrid-paper-model,hybrid --initial d,u"
-        .to_owned();
+fn figure_12(outcome: &ClosedLoopDiagram, commands: Vec<String>) -> Section {
     let mut section = section(
         "closed-loop-bifurcation",
         "Fig. 12: belt speed with the controller in the loop",
-        command,
+        commands,
         outcome,
     );
     for cells in &outcome.sections {

@@ -10,6 +10,8 @@ pub struct Page {
     pub title: String,
     /// Introduction, one paragraph.
     pub introduction: String,
+    /// Whether the numbers are those of coarse grids and short runs, which the page then says.
+    pub is_draft: bool,
     /// Sections from top to bottom.
     pub sections: Vec<Section>,
 }
@@ -21,8 +23,8 @@ pub struct Section {
     pub name: String,
     /// Heading, with the paper's number of the figure or table.
     pub title: String,
-    /// Command that reproduces it.
-    pub command: String,
+    /// Commands that reproduce its rows, in order.
+    pub commands: Vec<String>,
     /// Statements of the paper with the computed results.
     pub comparisons: Vec<Comparison>,
     /// Reasons for the differences, one paragraph each.
@@ -115,8 +117,12 @@ border-top:1px solid #ddd}p{max-width:820px}code{background:#f3f3f3;padding:1px 
 font-size:90%}table{border-collapse:collapse;margin:12px 0;font-size:14px}th,td{text-align:left;\
 vertical-align:top;padding:5px 12px 5px 0;border-bottom:1px solid #e4e4e4}th{border-bottom:2px solid #707070}\
 .scroll{overflow-x:auto}.yes{color:#00674c;font-weight:bold}.no{color:#b04a00;font-weight:bold}\
-.none{color:#707070}svg{max-width:100%;height:auto}nav a{margin-right:14px}\
-.files{color:#707070;font-size:14px}a{color:#0072b2}";
+.none{color:#707070}svg{max-width:100%;height:auto}nav h2{border:0;margin:16px 0 0;padding:0}\
+.draft{border:2px solid #b04a00;padding:8px 12px;font-weight:bold}\
+.files{color:#707070;font-size:14px}a{color:#0072b2}\
+@media(prefers-color-scheme:dark){body{color:#e8e8e8;background:#161616}code{background:#2a2a2a}\
+th,td{border-color:#444}h2{border-color:#444}.yes{color:#3fc39a}.no{color:#ff9b5e}a{color:#62b5f0}\
+.none,.files{color:#a0a0a0}}";
 
 impl Page {
     /// Returns the page as HTML text.
@@ -136,12 +142,21 @@ impl Page {
              <title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>",
             escaped(&self.introduction)
         )?;
-        writeln!(html, "<nav>")?;
+        if self.is_draft {
+            writeln!(
+                html,
+                "<p class=\"draft\">Draft: coarse grids and short runs. Its numbers are not results.</p>"
+            )?;
+        }
+        writeln!(
+            html,
+            "<nav aria-label=\"Contents\">\n<h2>Contents</h2>\n<ol>"
+        )?;
         for section in &self.sections {
             let (name, title) = (escaped(&section.name), escaped(&section.title));
-            writeln!(html, "<a href=\"#{name}\">{title}</a>")?;
+            writeln!(html, "<li><a href=\"#{name}\">{title}</a></li>")?;
         }
-        writeln!(html, "</nav>")?;
+        writeln!(html, "</ol>\n</nav>")?;
         for section in &self.sections {
             section.write(html)?;
         }
@@ -153,11 +168,13 @@ impl Section {
     fn write(&self, html: &mut String) -> core::fmt::Result {
         writeln!(
             html,
-            "<section>\n<h2 id=\"{}\">{}</h2>\n<p><code>{}</code></p>",
+            "<section>\n<h2 id=\"{}\">{}</h2>",
             escaped(&self.name),
-            escaped(&self.title),
-            escaped(&self.command)
+            escaped(&self.title)
         )?;
+        for command in &self.commands {
+            writeln!(html, "<p><code>{}</code></p>", escaped(command))?;
+        }
         if !self.comparisons.is_empty() {
             writeln!(
                 html,
@@ -243,10 +260,11 @@ mod tests {
         let page = Page {
             title: "Figures & <tables>".into(),
             introduction: "all \u{7}of them".into(),
+            is_draft: true,
             sections: vec![Section {
                 name: "one".into(),
                 title: "One".into(),
-                command: "painleve study one --set a=\"b\"".into(),
+                commands: vec!["painleve study one --set a=\"b\"".into()],
                 comparisons: vec![
                     Comparison::new("edge", "0.183", "0.1827", true),
                     Comparison::new("other", "p > 0", "p < 0", false),
@@ -262,7 +280,8 @@ mod tests {
         for part in [
             "<h1>Figures &amp; &lt;tables&gt;</h1>",
             "<p>all of them</p>",
-            "<a href=\"#one\">One</a>",
+            "<li><a href=\"#one\">One</a></li>",
+            "Draft: coarse grids",
             "--set a=&quot;b&quot;",
             "<td>p &gt; 0</td><td>p &lt; 0</td><td class=\"no\">differs</td>",
             "<td class=\"yes\">agrees</td>",

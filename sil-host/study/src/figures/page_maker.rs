@@ -110,13 +110,13 @@ impl PageMaker<'_> {
 pub fn section<O: Outcome + Figure>(
     name: &str,
     title: &str,
-    command: String,
+    commands: Vec<String>,
     outcome: &O,
 ) -> Section {
     Section {
         name: name.into(),
         title: title.into(),
-        command,
+        commands,
         svg: outcome.svg(),
         table: Some(outcome.table()),
         files: ["svg", "csv", "json"]
@@ -126,10 +126,16 @@ pub fn section<O: Outcome + Figure>(
     }
 }
 
-/// Formats values as a list on the command line.
-pub fn list(values: &[f64]) -> String {
-    let words: Vec<String> = values.iter().map(ToString::to_string).collect();
-    words.join(",")
+/// Formats the options of the cells of a study: the grids as they were written, and the durations.
+pub fn cell_options(
+    mu: &str,
+    v_belt: &str,
+    initial: &str,
+    [transient_s, record_s]: [f64; 2],
+) -> String {
+    format!(
+        "--mu {mu} --v-belt={v_belt} --initial {initial} --transient-s {transient_s} --record-s {record_s}"
+    )
 }
 
 /// Why the sampled law of the paper differs from the continuous one.

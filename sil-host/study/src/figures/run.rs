@@ -34,7 +34,7 @@ pub fn section(scenario: &Scenario, result: &LoopResult, svg: String) -> Section
     );
     Section {
         title: format!("Simulation: {}", scenario.name),
-        command: format!("painleve run {}", scenario.name),
+        commands: vec![format!("painleve run {}", scenario.name)],
         comparisons: contact.into_iter().chain([end]).collect(),
         reasons: vec![scenario.description.clone()],
         svg,

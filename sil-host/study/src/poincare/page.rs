@@ -3,7 +3,7 @@
 use super::{Poincare, PoincareDiagram};
 use crate::catalogue::PageSection;
 use crate::figures::page::{Comparison, Section};
-use crate::figures::page_maker::{PageMaker, list, section};
+use crate::figures::page_maker::{PageMaker, cell_options, section};
 use crate::initial::Initial;
 use crate::{StudyError, outcome};
 
@@ -15,17 +15,22 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let cells = page.cells("0.6", page.fineness.poincare_v_belt, &[Initial::A])?;
     let study = Poincare { cells };
     let outcome = PoincareDiagram::new(&study, page.rows("Fig. 5: Poincaré", &study)?);
-    Ok(vec![(figure_5(&outcome), Box::new(outcome))])
+    let options = cell_options(
+        "0.6",
+        page.fineness.poincare_v_belt,
+        "a",
+        page.fineness.open_loop_s,
+    );
+    let command = format!("painleve study poincare {options}");
+    Ok(vec![(figure_5(&outcome, command), Box::new(outcome))])
 }
 
 /// Fig. 5.
-fn figure_5(outcome: &PoincareDiagram) -> Section {
-    let settings = outcome.settings();
-    let command = format!("painleve study poincare --mu {}", list(&settings.mu));
+fn figure_5(outcome: &PoincareDiagram, command: String) -> Section {
     let mut section = section(
         "poincare",
         "Fig. 5: periodic and chaotic bouncing",
-        command,
+        vec![command],
         outcome,
     );
     let mut counts: Vec<(String, usize)> = Vec::new();

@@ -30,7 +30,7 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
 /// Fig. 3.
 fn figure_3(outcome: &Regions) -> Section {
     let command = format!("painleve study regions --mu {}", outcome.mu);
-    let mut section = section("regions", "Fig. 3: solution modes", command, outcome);
+    let mut section = section("regions", "Fig. 3: solution modes", vec![command], outcome);
     let has_all = |map: &&Map| {
         let parts = [map.sliding, map.flight, map.indeterminate, map.inconsistent];
         parts.iter().all(|part| *part > 0.0)

@@ -36,15 +36,23 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let mut rows = page.rows("Sliding range", &study)?;
     rows.extend(page.rows("Sliding range, ramps", &ramps)?);
     let outcome = SlidingRanges { rows };
-    Ok(vec![(ranges(&outcome), Box::new(outcome))])
+    let step = page.fineness.scan_step_m;
+    let commands = vec![
+        format!("painleve study sliding-range --scan-step-m {step}"),
+        format!(
+            "painleve study sliding-range --controller pid,hybrid --converters ideal \
+             --posture elbow-down --reference ramp:2,ramp:3 --scan-step-m {step}"
+        ),
+    ];
+    Ok(vec![(ranges(&outcome, commands), Box::new(outcome))])
 }
 
 /// Z_t,sliding.
-fn ranges(outcome: &SlidingRanges) -> Section {
+fn ranges(outcome: &SlidingRanges, commands: Vec<String>) -> Section {
     let mut section = section(
         "sliding-range",
         "Section III: how far each controller slides",
-        "painleve study sliding-range".into(),
+        commands,
         outcome,
     );
     for row in &outcome.rows {

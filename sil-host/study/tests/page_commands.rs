@@ -1,0 +1,46 @@
+//! The commands that the page of figures prints reproduce the rows of its sections.
+
+#![allow(clippy::unwrap_used)]
+
+use painleve_study::catalogue::{CatalogueEntry, STUDIES};
+use painleve_study::figures::page_maker::{Fineness, PageMaker};
+
+/// Returns the CSV rows that a printed command computes, header first.
+fn rows(command: &str) -> Vec<String> {
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let ["painleve", "study", name, options @ ..] = words.as_slice() else {
+        panic!("{command} is not a study");
+    };
+    let entry = CatalogueEntry::find(name).unwrap();
+    let parser = entry.command().no_binary_name(true);
+    let matches = parser.try_get_matches_from(options).unwrap();
+    let study = (entry.read)(&matches).unwrap().study().unwrap();
+    lines(&study.compute(&|| ()).unwrap().csv().unwrap())
+}
+
+fn lines(csv: &[u8]) -> Vec<String> {
+    let text = std::str::from_utf8(csv).unwrap();
+    text.lines().map(ToOwned::to_owned).collect()
+}
+
+#[test]
+fn every_printed_command_reproduces_the_rows_of_its_section() {
+    let page = PageMaker {
+        fineness: &Fineness::DRAFT,
+        progress: &|_, _| Box::new(|| ()),
+    };
+    let mut sections = 0;
+    for study in STUDIES.iter() {
+        for (section, outcome) in (study.sections)(&page).unwrap() {
+            let mut found: Vec<String> = Vec::new();
+            for command in &section.commands {
+                let rows = rows(command);
+                let header = usize::from(!found.is_empty());
+                found.extend(rows.into_iter().skip(header));
+            }
+            assert_eq!(found, lines(&outcome.csv().unwrap()), "{}", section.name);
+            sections += 1;
+        }
+    }
+    assert!(sections > 5);
+}
