@@ -1,10 +1,13 @@
 //! The main use case, end to end: two processes over shared memory, and their output files.
 
+use std::io::Write;
+use std::process::Stdio;
+
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
-use painleve_tests::Bench;
+use painleve_tests::{Bench, code, errors};
 use serde_json::Value;
 
 const QUIET: [&str; 2] = ["--no-record", "--no-plot"];
@@ -313,4 +316,30 @@ fn the_record_holds_every_tick_with_its_schema() {
             .values()
             .all(|channel| channel.schema.is_some())
     );
+}
+
+#[test]
+fn a_scenario_from_standard_input_runs_like_the_built_in_one() {
+    let bench = Bench::new("standard-input");
+    let shortened = ["--set", "run.duration_s=0.2", "--no-plot", "--json"];
+    let text = bench.run(&["scenarios", "edge"]).stdout;
+    let mut command = bench.command(&[&["run", "-"], &shortened[..]].concat());
+    let mut child = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(&text).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let piped: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let named = bench.report(&[&["run", "edge"], &shortened[..]].concat());
+    assert_eq!(piped["log_hash"], named["log_hash"]);
+    assert_eq!(piped["requested_target_m"], named["requested_target_m"]);
+}
+
+#[test]
+fn a_figure_that_is_not_svg_is_refused_with_the_way_to_convert_it() {
+    let output = Bench::new("png").run(&["run", "--plot", "run.png"]);
+    assert_eq!(code(output.status), 2);
+    assert!(errors(&output).contains("rsvg-convert"), "{output:?}");
 }

@@ -33,7 +33,7 @@ pub struct OutputArguments {
     #[arg(long, conflicts_with = "record")]
     no_record: bool,
     /// Figure of the run.
-    #[arg(long, value_name = "PATH", default_value = "out/run.svg")]
+    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = figure_path)]
     plot: PathBuf,
     /// Page of the run for the browser: it moves, and needs no network.
     #[arg(long, value_name = "PATH", default_value = "out/run.html")]
@@ -109,6 +109,22 @@ impl OutputArguments {
             });
         }
         Ok(sinks)
+    }
+}
+
+/// Reads the path of a figure, which is an SVG file.
+///
+/// # Errors
+/// One sentence if the path ends like another kind of picture.
+pub fn figure_path(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension() {
+        Some(extension) if !extension.eq_ignore_ascii_case("svg") => Err(format!(
+            "figures are SVG files, not .{}: let the name end with .svg, and convert the file with \
+             `rsvg-convert -o FILE.png FILE.svg` (or `-f pdf`)",
+            extension.display()
+        )),
+        _ => Ok(path),
     }
 }
 

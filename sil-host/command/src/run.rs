@@ -16,6 +16,7 @@ use painleve_study::robustness::{self, Arms};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
 use painleve_system::terminal::{self, warn};
+use tempfile::NamedTempFile;
 
 use super::bridge::{ImageArguments, SensorLineArguments};
 use super::fail_on::{self, FailOn};
@@ -52,7 +53,7 @@ impl std::str::FromStr for Replay {
 /// The scenario and its pacing.
 #[derive(Clone, Debug, Args)]
 pub struct ScenarioArguments {
-    /// Built-in scenario or TOML file.
+    /// Built-in scenario or TOML file; `run -` reads standard input.
     #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
     name: String,
     /// The same, as an option.
@@ -94,6 +95,21 @@ impl ScenarioArguments {
             }
             None => Ok(Scenario::load(self.name(), &self.overrides)?),
         }
+    }
+
+    /// Copies a scenario from standard input, if it is requested as `-`, to a file that every process
+    /// of the run can read, and which lasts as long as the returned handle.
+    fn copy_standard_input(&mut self) -> Result<Option<NamedTempFile>, CommandError> {
+        if self.replay.is_some() || self.name() != "-" {
+            return Ok(None);
+        }
+        let mut file = tempfile::Builder::new()
+            .prefix("painleve-standard-input-")
+            .suffix(".toml")
+            .tempfile()?;
+        std::io::copy(&mut std::io::stdin().lock(), &mut file)?;
+        self.option = Some(file.path().display().to_string());
+        Ok(Some(file))
     }
 
     fn to_arguments(&self) -> Vec<OsString> {
@@ -200,6 +216,9 @@ fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), 
 
 /// Runs a scenario as two processes and reports.
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
+    let mut arguments = arguments.clone();
+    let _standard_input = arguments.scenario.copy_standard_input()?;
+    let arguments = &arguments;
     // Validate before any process starts, so that an error is reported once.
     let scenario = arguments.scenario.load()?;
     if let Some(port) = arguments.live {

@@ -52,8 +52,8 @@ pub struct TimingArguments {
     /// Print JSON on stdout instead of the table.
     #[arg(long)]
     json: bool,
-    /// Write histograms as a figure.
-    #[arg(long, value_name = "PATH")]
+    /// Write histograms as a figure, an SVG file.
+    #[arg(long, value_name = "PATH", value_parser = super::output::figure_path)]
     svg: Option<PathBuf>,
 }
 

@@ -12,6 +12,7 @@ use painleve_study::Study;
 use painleve_study::catalogue::{AnyOutcome, AnyStudy};
 use painleve_system::atomic_file::{self, AtomicFile};
 
+use crate::output::figure_path;
 use crate::process_error::ProcessError;
 use crate::{CommandError, say};
 
@@ -27,8 +28,8 @@ pub struct OutcomeOptions {
     /// Write the rows as a CSV file.
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
-    /// Write the figure.
-    #[arg(long, value_name = "PATH")]
+    /// Write the figure, an SVG file.
+    #[arg(long, value_name = "PATH", value_parser = figure_path)]
     svg: Option<PathBuf>,
     #[command(flatten)]
     threads: Threads,

@@ -16,15 +16,24 @@ impl Figure for SlidingRanges {
             .rows
             .iter()
             .fold(0.19, |far: f64, row| far.max(row.limit_m + 0.005));
+        let varies: Vec<bool> = (0..Row::PARTS)
+            .map(|part| {
+                let pairs = self.rows.windows(2);
+                let mut differ = pairs.map(|two| two[0].parts()[part] != two[1].parts()[part]);
+                differ.any(|differs| differs)
+            })
+            .collect();
         let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
         for row in &self.rows {
-            let group = row.group();
+            let group = row.group(&varies);
             match groups.iter_mut().find(|(name, _)| *name == group) {
                 Some((_, rows)) => rows.push(row),
                 None => groups.push((group, vec![row])),
             }
         }
-        let panels = groups.iter().map(|(name, rows)| panel(name, rows, far));
+        let panels = groups
+            .iter()
+            .map(|(name, rows)| panel(name, rows, &varies, far));
         Chart {
             title: "Sliding range".into(),
             subtitle: "from the start to the farthest reference reached without lift-off".into(),
@@ -39,34 +48,54 @@ impl Figure for SlidingRanges {
 }
 
 impl Row {
-    /// Returns what the rows of a panel have in common.
-    fn group(&self) -> String {
-        format!(
-            "{}, μ = {}, {}",
-            outcome::name(&self.posture),
-            self.mu,
-            self.reference
-        )
+    /// Number of [`parts`](Self::parts).
+    const PARTS: usize = 4;
+
+    /// Returns what a row is about besides its posture.
+    fn parts(&self) -> [String; Self::PARTS] {
+        [
+            self.controller.to_string(),
+            outcome::name(&self.converters),
+            format!("μ = {}", self.mu),
+            self.reference.to_string(),
+        ]
     }
 
-    /// Returns what distinguishes the row from others of its group, and the result.
-    fn label(&self) -> String {
-        let row = format!("{}, {}", self.controller, outcome::name(&self.converters));
-        match self.z_sliding_m {
-            Some(reached) => format!("{row}: {reached:.4} m").replace(": -", ": −"),
-            None => format!("{row}: none"),
-        }
+    /// Returns the parts that vary, or those that do not.
+    fn parts_that(&self, vary: bool, varies: &[bool]) -> Vec<String> {
+        let parts = self.parts().into_iter().zip(varies);
+        parts
+            .filter(|(_, varies)| **varies == vary)
+            .map(|(part, _)| part)
+            .collect()
+    }
+
+    /// Returns what the rows of a panel have in common: their posture, and what never varies.
+    fn group(&self, varies: &[bool]) -> String {
+        let mut words = vec![outcome::name(&self.posture)];
+        words.extend(self.parts_that(false, varies));
+        words.join(", ")
+    }
+
+    /// Returns what distinguishes the row from others of its panel, and the result.
+    fn label(&self, varies: &[bool]) -> String {
+        let mut words = self.parts_that(true, varies);
+        words.push(match self.z_sliding_m {
+            Some(reached) => format!("{reached:.4} m").replace('-', "−"),
+            None => "none".into(),
+        });
+        words.join(", ")
     }
 }
 
-fn panel(name: &str, rows: &[&Row], far: f64) -> Panel {
+fn panel(name: &str, rows: &[&Row], varies: &[bool], far: f64) -> Panel {
     let mut marks = Vec::new();
     for (index, row) in rows.iter().enumerate() {
         let top = (rows.len() - index) as f64;
         marks.push(Mark::Label {
             at: (-0.98 * far, top - 0.32),
             centred: false,
-            text: row.label(),
+            text: row.label(varies),
         });
         let (name, colour) = match row.controller {
             ControllerChoice::Pid => ("PID", ORANGE),
