@@ -1,7 +1,7 @@
 //! Internal state of the controller at its last tick, in SI units.
 
-use painleve_shared::Slip;
 use painleve_shared::status::{Fault, SupervisorState};
+use painleve_shared::{JointTorque, LinkMotion, Slip};
 
 use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
@@ -19,10 +19,10 @@ pub struct Telemetry {
     pub state: SupervisorState,
     /// Latched fault.
     pub fault: Option<Fault>,
-    /// Estimated joint angles θ1, θ2, rad.
-    pub theta_rad: [f32; 2],
-    /// Estimated joint rates, rad/s.
-    pub theta_dot_rad_s: [f32; 2],
+    /// Estimated link angles θ1, θ2, rad.
+    pub theta_rad: LinkMotion<f32>,
+    /// Estimated rates of the link angles, rad/s.
+    pub theta_dot_rad_s: LinkMotion<f32>,
     /// Estimated tip position z_t, m.
     pub tip_t_m: f32,
     /// Reference z_t*, m.
@@ -34,7 +34,7 @@ pub struct Telemetry {
     /// Measured tangential force, N.
     pub tangential_force_n: f32,
     /// Joint torques u1, u2 as output, rounded to counts, N·m.
-    pub torque_nm: [f32; 2],
+    pub torque_nm: JointTorque<f32>,
     /// The contact decision: the tip touches the belt.
     pub contact: bool,
     /// Certainty of the contact decision, 0 … 1.
@@ -105,14 +105,14 @@ impl<'a> TelemetrySink<'a> {
             tick,
             state: supervision.state(),
             fault: supervision.fault(),
-            theta_rad: model.theta_rad.into(),
-            theta_dot_rad_s: model.theta_dot_rad_s.into(),
+            theta_rad: model.theta_rad,
+            theta_dot_rad_s: model.theta_dot_rad_s,
             tip_t_m: model.tip_m.x,
             reference_m: target.reference.position_m,
             requested_m: target.requested_m,
             normal_force_n: contact.force_n.y,
             tangential_force_n: contact.force_n.x,
-            torque_nm: command.torque_nm.into(),
+            torque_nm: command.torque_nm,
             contact: contact.touches,
             contact_confidence: contact.confidence,
             friction: contact.friction.coefficient,
@@ -135,7 +135,7 @@ impl<'a> TelemetrySink<'a> {
             *telemetry = Telemetry {
                 state: supervision.state(),
                 fault: supervision.fault(),
-                torque_nm: [0.0; 2],
+                torque_nm: JointTorque::zeros(),
                 at_edge: false,
                 recovering: false,
                 guarded: false,

@@ -1,4 +1,4 @@
-//! Plant, controller and runs for Python; the package `painleve` names what is here.
+//! Plant, controller and runs for Python. The package `painleve` exports them.
 
 use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
@@ -41,7 +41,7 @@ fn load(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Scena
     }
 }
 
-/// Python's truth values as TOML has them.
+/// Converts Python's truth values to TOML's.
 fn toml_value(value: &str) -> &str {
     match value {
         "True" => "true",
@@ -118,7 +118,7 @@ impl Monitor for Columns {
 }
 
 /// Runs a scenario to its end and returns its quantities as columns: `time_s` and `topic.field`, as
-/// `painleve run --csv` names them. Numbers that are not known are NaN.
+/// `painleve run --csv` names them. Unknown numbers are NaN.
 #[pyfunction]
 #[pyo3(signature = (scenario = "hybrid-elbow-down", overrides = None))]
 fn run<'py>(
@@ -166,7 +166,7 @@ fn put_finite(values: &Bound<'_, PyDict>, name: &str, value: f64) -> PyResult<()
     Ok(())
 }
 
-/// Returns quantities at one tick; a number that is not finite is left out.
+/// Returns quantities at one tick; omits numbers that are not finite.
 fn quantities<'py>(
     py: Python<'py>,
     fields: &[RecordField],
@@ -201,7 +201,7 @@ fn state<'py>(py: Python<'py>, plant: Snapshot) -> PyResult<Bound<'py, PyDict>> 
     Ok(values)
 }
 
-/// The arm on its belt without converters: torques in N·m, one control tick a step.
+/// The arm on its belt without converters: torques in N·m, one control tick per step.
 #[pyclass(name = "Plant", unsendable)]
 struct PyPlant {
     plant: BuiltInPlant,
@@ -280,7 +280,7 @@ impl PySimulation {
         Ok((sensor, self.0.sensor_frame_is_lost()))
     }
 
-    /// Gives the controller's answer to the torque stages, or none, and goes on to the next tick.
+    /// Passes the controller's answer, or `None`, to the torque stages and advances to the next tick.
     #[pyo3(signature = (answer))]
     fn advance(&mut self, answer: Option<Actuator>) -> PyResult<()> {
         let frame = answer.map(

@@ -97,6 +97,18 @@ macro_rules! pair {
                 Self(vector)
             }
 
+            /// Takes a plain array, such as one value for each joint, as these coordinates.
+            #[inline]
+            pub fn from_array(pair: [T; 2]) -> Self {
+                Self(pair.into())
+            }
+
+            /// Returns a plain array, for loops over both and for formats without types.
+            #[inline]
+            pub fn to_array(self) -> [T; 2] {
+                self.0.into()
+            }
+
             /// Returns a plain vector, for matrix algebra.
             #[inline]
             pub fn vector(&self) -> &Vector2<T> {
@@ -122,15 +134,10 @@ macro_rules! pair {
             }
         }
 
-        impl<T: Real> From<[T; 2]> for $name<T> {
-            fn from(pair: [T; 2]) -> Self {
-                Self(pair.into())
-            }
-        }
-
-        impl<T: Real> From<$name<T>> for [T; 2] {
-            fn from(pair: $name<T>) -> Self {
-                pair.0.into()
+        #[cfg(feature = "defmt")]
+        impl<T: Real + defmt::Format> defmt::Format for $name<T> {
+            fn format(&self, formatter: defmt::Formatter<'_>) {
+                defmt::write!(formatter, "({}, {})", self.first(), self.second());
             }
         }
 

@@ -36,6 +36,12 @@ impl SupervisorState {
     pub fn name(self) -> &'static str {
         self.into()
     }
+
+    /// Returns whether torque may be applied in this state.
+    #[inline]
+    pub fn drives(self) -> bool {
+        matches!(self, Self::Armed | Self::Tracking | Self::LiftOff)
+    }
 }
 
 /// Reason for a stop of the controller. Numbers are stable and never reused.

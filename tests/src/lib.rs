@@ -1,4 +1,4 @@
-//! Starts the `painleve` program in end-to-end tests and inspects what it leaves.
+//! Starts the `painleve` program in end-to-end tests and inspects its results and leftovers.
 //!
 //! - [`line`]: a serial line that can be disturbed, with the image at its end
 //! - [`printed`]: figures in the documentation against measured ones

@@ -27,7 +27,7 @@ const FRAMES: &str = "random_frames";
 const BUS: [&str; 4] = ["--package", "painleve-link", "--lib", "both_ends"];
 const BUS_SHARE: u32 = 20;
 
-/// Runs all tests with random input for as many cases as asked for.
+/// Runs all tests with random input for the requested number of cases.
 ///
 /// # Errors
 /// If a test fails; its input is printed.

@@ -20,7 +20,7 @@ pub struct SoakArguments {
 /// Runs the soak.
 ///
 /// # Errors
-/// If a counter is wrong, or the arm has done anything but what it must.
+/// If a counter is wrong or the arm moves wrongly.
 pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
     let minutes = |hours: f64| ((60.0 * hours).round() as u32).to_string();
     run_with(

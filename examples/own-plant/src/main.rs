@@ -32,7 +32,7 @@ impl MassOnBelt {
         };
         now.theta_rad = arm
             .link_angles_on_belt_rad(tip_t_m, Posture::ElbowDown)
-            .map_or([0.0; 2], Into::into);
+            .unwrap_or_default();
         Self { arm, now }
     }
 }
@@ -43,7 +43,7 @@ impl Plant for MassOnBelt {
     }
 
     fn command_torque(&mut self, target_nm: JointTorque<f64>, _lag_s: f64) {
-        self.now.torque_nm = target_nm.into();
+        self.now.torque_nm = target_nm;
     }
 
     fn advance(&mut self, until_s: f64, _: &mut impl Probe) -> Result<(), PlantError> {
@@ -51,8 +51,8 @@ impl Plant for MassOnBelt {
         let (arm, now) = (&self.arm, &mut self.now);
         while now.time_s < until_s {
             let step_s = STEP_S.min(until_s - now.time_s);
-            let jacobian = arm.jacobian(&Pose::new(&now.theta_rad.into()));
-            let torque_nm = JointTorque::from(now.torque_nm).to_links();
+            let jacobian = arm.jacobian(&Pose::new(&now.theta_rad));
+            let torque_nm = now.torque_nm.to_links();
             let push_n = jacobian.transpose().lu().solve(torque_nm.vector());
             let push_n = push_n.ok_or_else(stretched)?;
             now.normal_force_n = (MASS_KG * 9.81 - push_n.y).max(0.0);
@@ -62,7 +62,7 @@ impl Plant for MassOnBelt {
             now.slip_velocity_m_s += step_s * force_n / MASS_KG;
             now.tip_t_m += step_s * (now.slip_velocity_m_s + now.belt_speed_m_s);
             let theta_rad = arm.link_angles_on_belt_rad(now.tip_t_m, Posture::ElbowDown);
-            now.theta_rad = theta_rad.ok_or_else(stretched)?.into();
+            now.theta_rad = theta_rad.ok_or_else(stretched)?;
             now.time_s += step_s;
         }
         now.time_s = until_s;

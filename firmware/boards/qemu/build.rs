@@ -11,7 +11,7 @@ fn main() {
     }
     let folder = env::var("CARGO_MANIFEST_DIR").unwrap_or_else(|_| ".".into());
     println!("cargo:rustc-link-search={folder}");
-    // defmt logs errors only unless told otherwise.
+    // By default, defmt logs only errors.
     println!("cargo:rerun-if-env-changed=DEFMT_LOG");
     if env::var_os("DEFMT_LOG").is_none() {
         println!("cargo:rustc-env=DEFMT_LOG=info");

@@ -45,7 +45,7 @@ pub trait Board {
     where
         Self: Sized;
 
-    /// Returns the reason for the present start of the processor, and forgets it.
+    /// Returns the reason for the processor's last reset, and clears it.
     fn reset_cause() -> ResetCause {
         ResetCause::Unknown
     }

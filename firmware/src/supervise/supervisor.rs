@@ -83,16 +83,8 @@ pub struct Phase {
 impl Phase {
     /// Returns whether torque may be applied.
     pub fn drives(&self) -> bool {
-        drives(self.state)
+        self.state.drives()
     }
-}
-
-/// Returns whether torque may be applied in this state.
-fn drives(state: SupervisorState) -> bool {
-    matches!(
-        state,
-        SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff
-    )
 }
 
 impl Supervisor {
@@ -206,7 +198,7 @@ impl Supervision {
 
     /// Returns whether torque may be applied.
     pub fn drives(&self) -> bool {
-        drives(self.state)
+        self.state.drives()
     }
 
     /// Latches a fault unless one is latched already.

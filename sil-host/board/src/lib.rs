@@ -101,12 +101,12 @@ pub enum BoardError {
     #[error("no image at {}: build it with `cargo xtask build-fw`, or give its path with --elf", .0.display())]
     ImageMissing(PathBuf),
     /// The image cannot be read.
-    #[error("cannot use the image {}: {reason}", path.display())]
+    #[error("cannot use the image {}: {source}", path.display())]
     Image {
         /// The image.
         path: PathBuf,
         /// What is wrong with the image.
-        reason: String,
+        source: log::LogTableError,
     },
     /// The emulator is not installed.
     #[error(

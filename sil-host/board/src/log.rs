@@ -8,6 +8,20 @@ use painleve_system::terminal::warn;
 
 use super::BoardError;
 
+/// Why an image gives no table of messages.
+#[derive(Debug, thiserror::Error)]
+pub enum LogTableError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] std::io::Error),
+    /// The table cannot be decoded.
+    #[error(transparent)]
+    Damaged(Box<dyn std::error::Error + Send + Sync>),
+    /// The image has no table.
+    #[error("no defmt table in it")]
+    Missing,
+}
+
 /// The table of an image's messages. The image sends numbers; the text is in the table.
 pub struct LogTable(defmt_decoder::Table);
 
@@ -17,15 +31,18 @@ impl LogTable {
     /// # Errors
     /// [`BoardError::Image`] if the image has no table.
     pub fn of_image(image: &Path) -> Result<Self, BoardError> {
-        let error = |reason: String| BoardError::Image {
+        Self::read(image).map_err(|source| BoardError::Image {
             path: image.into(),
-            reason,
-        };
-        let bytes = std::fs::read(image).map_err(|cause| error(cause.to_string()))?;
+            source,
+        })
+    }
+
+    fn read(image: &Path) -> Result<Self, LogTableError> {
+        let bytes = std::fs::read(image)?;
         defmt_decoder::Table::parse(&bytes)
-            .map_err(|cause| error(cause.to_string()))?
+            .map_err(|error| LogTableError::Damaged(error.into()))?
             .map(Self)
-            .ok_or_else(|| error("no defmt table in it".into()))
+            .ok_or(LogTableError::Missing)
     }
 
     /// Prints the log in `output` on stderr until it ends, in its own thread.

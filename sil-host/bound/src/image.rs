@@ -5,7 +5,7 @@ use std::path::Path;
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
-use crate::BoundError;
+use crate::{BoundError, ImageError};
 
 /// The code of an ELF file.
 pub struct Image {
@@ -36,12 +36,15 @@ impl Image {
     /// # Errors
     /// [`BoundError::Image`] naming the file.
     pub fn read(path: &Path) -> Result<Self, BoundError> {
-        let refused = |error: &dyn std::fmt::Display| BoundError::Image {
+        Self::read_elf(path).map_err(|source| BoundError::Image {
             path: path.to_owned(),
-            reason: error.to_string(),
-        };
-        let bytes = std::fs::read(path).map_err(|error| refused(&error))?;
-        let file = object::File::parse(&*bytes).map_err(|error| refused(&error))?;
+            source,
+        })
+    }
+
+    fn read_elf(path: &Path) -> Result<Self, ImageError> {
+        let bytes = std::fs::read(path)?;
+        let file = object::File::parse(&*bytes)?;
         let mut sections = Vec::new();
         for section in file.sections().filter(|section| {
             matches!(
@@ -49,7 +52,7 @@ impl Image {
                 SectionKind::Text | SectionKind::ReadOnlyData
             ) && section.address() != 0
         }) {
-            let data = section.data().map_err(|error| refused(&error))?;
+            let data = section.data()?;
             sections.push((section.address() as u32, data.to_vec()));
         }
         let (mut functions, mut marks) = (BTreeMap::new(), BTreeMap::new());
@@ -68,7 +71,7 @@ impl Image {
                 _ => {}
             }
         }
-        let lines = addr2line::Loader::new(path).map_err(|error| refused(&error))?;
+        let lines = addr2line::Loader::new(path).map_err(ImageError::Lines)?;
         Ok(Self {
             sections,
             functions,

@@ -23,12 +23,12 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum BoundError {
     /// The image cannot be read.
-    #[error("{path}: {reason}")]
+    #[error("{path}: {source}")]
     Image {
         /// Path of the image.
         path: PathBuf,
-        /// Reason.
-        reason: String,
+        /// The reason.
+        source: ImageError,
     },
     /// The decoder failed.
     #[error("decoder: {0}")]
@@ -75,5 +75,25 @@ pub enum BoundError {
     },
     /// The linear programme has no solution.
     #[error("linear programme: {0}")]
-    Programme(String),
+    Programme(#[from] microlp::Error),
+    /// The solver of the linear programme ended without an optimum.
+    #[error("linear programme: no optimum")]
+    NoOptimum,
+}
+
+/// Why an image cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] std::io::Error),
+    /// The file is not an ELF file.
+    #[error(transparent)]
+    Elf(#[from] object::Error),
+    /// The source locations cannot be read.
+    #[error("source locations: {0}")]
+    Lines(Box<dyn std::error::Error>),
+    /// The image has no function of this name.
+    #[error("there is no function {0}")]
+    NoFunction(String),
 }

@@ -9,11 +9,11 @@ use painleve_drivers::exchange::{Dialogue, SelectTiming};
 use painleve_drivers::force_cell::ForceCellDriver;
 use serde::Serialize;
 
-use crate::BoundError;
 use crate::cycles::around;
 use crate::image::Image;
 use crate::loops::Limits;
 use crate::worst::{Analysis, Loop, Visit, Worst};
+use crate::{BoundError, ImageError};
 
 /// Handler of the control timer.
 pub const CONTROL_INTERRUPT: &str = "TIM2";
@@ -99,7 +99,7 @@ impl Bound {
             let entry = image.function(handler);
             let entry = entry.ok_or_else(|| BoundError::Image {
                 path: path.to_owned(),
-                reason: format!("there is no function {handler}"),
+                source: ImageError::NoFunction(handler.to_owned()),
             })?;
             let worst = analysis.of(entry)?;
             worst.ok_or(BoundError::NeverReturns { address: entry })

@@ -248,14 +248,12 @@ impl<'a> Analysis<'a> {
             }
             problem.add_constraint(rounds, ComparisonOp::Le, 0.0);
         }
-        let outcome = problem
-            .solve()
-            .map_err(|error| BoundError::Programme(error.to_string()))?;
+        let outcome = problem.solve()?;
         let SolveOutcome::Solution(solution) = outcome else {
-            return Err(BoundError::Programme("no optimum".to_owned()));
+            return Err(BoundError::NoOptimum);
         };
         if solution.status() != SolutionStatus::Optimal {
-            return Err(BoundError::Programme("no optimum".to_owned()));
+            return Err(BoundError::NoOptimum);
         }
 
         let mut worst = Worst {

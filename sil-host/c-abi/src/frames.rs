@@ -132,15 +132,15 @@ impl From<Snapshot> for PainleveSnapshot {
     fn from(plant: Snapshot) -> Self {
         Self {
             time_s: plant.time_s,
-            theta_rad: plant.theta_rad,
-            theta_dot_rad_s: plant.theta_dot_rad_s,
+            theta_rad: plant.theta_rad.to_array(),
+            theta_dot_rad_s: plant.theta_dot_rad_s.to_array(),
             tip_t_m: plant.tip_t_m,
             gap_m: plant.gap_m,
             slip_velocity_m_s: plant.slip_velocity_m_s,
             belt_speed_m_s: plant.belt_speed_m_s,
             normal_force_n: plant.normal_force_n,
             tangential_force_n: plant.tangential_force_n,
-            torque_nm: plant.torque_nm,
+            torque_nm: plant.torque_nm.to_array(),
             contact_mode: plant.mode as u8,
         }
     }

@@ -15,7 +15,8 @@ use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 
-use super::patience::PatienceArguments;
+use super::output_error::output;
+use super::patience::{PatienceArguments, WAIT_S};
 use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
 
@@ -64,7 +65,7 @@ struct BusArguments {
     #[arg(long)]
     bus: BusName,
     /// Longest wait for the plant, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = WAIT_S, value_parser = super::seconds)]
     wait_s: f64,
     #[command(flatten)]
     patience: PatienceArguments,
@@ -217,9 +218,8 @@ fn carry_until<B: ConnectedBoard>(
 }
 
 fn write(path: &Path, report: &TimingReport) -> Result<(), CommandError> {
-    let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
-    let text = serde_json::to_string_pretty(report).map_err(|error| output(&error))?;
-    let mut file = AtomicFile::create(path).map_err(|error| output(&error))?;
-    writeln!(file, "{text}").map_err(|error| output(&error))?;
-    file.commit().map_err(|error| output(&error))
+    let text = serde_json::to_string_pretty(report).map_err(output)?;
+    let mut file = AtomicFile::create(path).map_err(output)?;
+    writeln!(file, "{text}").map_err(output)?;
+    file.commit().map_err(output)
 }

@@ -1,10 +1,11 @@
-//! `painleve completions` and `painleve man`: what shells and `man` know about the command.
+//! `painleve completions` and `painleve man`: shell completions and manual pages.
 
 use std::path::PathBuf;
 
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 
+use super::output_error::{OutputError, output};
 use super::{Cli, CommandError};
 
 /// Options of `painleve completions`.
@@ -36,8 +37,11 @@ pub fn print(arguments: &CompletionsArguments) -> Result<(), CommandError> {
 /// Writes `painleve.1` and one page for each subcommand.
 pub fn write_manual(arguments: &ManArguments) -> Result<(), CommandError> {
     let folder = &arguments.folder;
-    let refuse = |error: std::io::Error| {
-        CommandError::Output(format!("cannot write to {}: {error}", folder.display()))
+    let refuse = |source| {
+        output(OutputError::Folder {
+            folder: folder.clone(),
+            source,
+        })
     };
     std::fs::create_dir_all(folder).map_err(refuse)?;
     clap_mangen::generate_to(Cli::command(), folder).map_err(refuse)

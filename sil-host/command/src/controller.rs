@@ -11,7 +11,7 @@ use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
 
-use super::patience::PatienceArguments;
+use super::patience::{PatienceArguments, WAIT_S};
 use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
 
@@ -22,7 +22,7 @@ pub struct ControllerArguments {
     #[arg(long)]
     bus: BusName,
     /// Longest wait for the plant, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = WAIT_S, value_parser = super::seconds)]
     wait_s: f64,
     #[command(flatten)]
     patience: PatienceArguments,

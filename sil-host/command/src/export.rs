@@ -9,6 +9,7 @@ use painleve_system::atomic_file;
 use painleve_system::terminal::warn;
 
 use super::CommandError;
+use super::output_error::{InputError, RecordFileError, output};
 
 /// Options of `painleve export`.
 #[derive(Debug, Args)]
@@ -26,12 +27,10 @@ pub struct ExportArguments {
 /// Writes one row per control tick and one column per quantity.
 pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
     let record = &arguments.record;
-    let unreadable = |reason: &dyn std::fmt::Display| {
-        CommandError::Input(format!("cannot read {}: {reason}", record.display()))
-    };
-    let bytes = std::fs::read(record).map_err(|error| unreadable(&error))?;
-    let mut table = Vec::new();
-    ticks_to_csv(&bytes, &mut table).map_err(|error| unreadable(&error))?;
+    let table = read(record).map_err(|source| InputError::Record {
+        path: record.clone(),
+        source,
+    })?;
     if let Some(path) = &arguments.csv {
         write(&beside(record, path.as_deref(), "csv"), &table)?;
     }
@@ -42,27 +41,30 @@ pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
     Ok(())
 }
 
+/// Returns the ticks of a record as CSV.
+fn read(record: &Path) -> Result<Vec<u8>, RecordFileError> {
+    let mut table = Vec::new();
+    ticks_to_csv(&std::fs::read(record)?, &mut table)?;
+    Ok(table)
+}
+
 /// Returns the given path, or the record's with another extension.
 fn beside(record: &Path, path: Option<&Path>, extension: impl AsRef<OsStr>) -> PathBuf {
     path.map_or_else(|| record.with_extension(extension), Path::to_path_buf)
 }
 
 fn write(path: &Path, contents: &[u8]) -> Result<(), CommandError> {
-    atomic_file::write(path, contents).map_err(|error| CommandError::Output(error.to_string()))?;
+    atomic_file::write(path, contents).map_err(output)?;
     warn(format_args!("wrote {}", path.display()));
     Ok(())
 }
 
 #[cfg(feature = "parquet")]
 fn parquet(table: &[u8]) -> Result<Vec<u8>, CommandError> {
-    painleve_study::sweep::parquet::from_csv(table)
-        .map_err(|error| CommandError::Output(error.to_string()))
+    painleve_study::sweep::parquet::from_csv(table).map_err(output)
 }
 
 #[cfg(not(feature = "parquet"))]
 fn parquet(_: &[u8]) -> Result<Vec<u8>, CommandError> {
-    Err(CommandError::Input(
-        "this build writes no Parquet: build it with `cargo build --release --features parquet`"
-            .into(),
-    ))
+    Err(InputError::NoParquet.into())
 }

@@ -1,8 +1,11 @@
 //! Conditions under which a finished run counts as failed: `painleve run --fail-on
 //! fault,lift-off,missed-deadline`.
 
+use std::fmt;
+
 use clap::ValueEnum;
 use painleve_record::report::RunReport;
+use painleve_shared::status::Fault;
 
 use super::CommandError;
 
@@ -18,21 +21,42 @@ pub enum FailOn {
 }
 
 impl FailOn {
-    /// Returns the report's wording of this event, if it happened.
-    fn found(self, report: &RunReport) -> Option<String> {
+    /// Returns the event, if it happened.
+    fn found(self, report: &RunReport) -> Option<FailedCondition> {
         match self {
-            Self::Fault => report.fault.map(|fault| {
-                let description = report.fault_description.as_deref().unwrap_or_default();
-                format!("fault {fault} ({description})")
-            }),
+            Self::Fault => report.fault.map(FailedCondition::Fault),
             Self::LiftOff => {
                 let count = report.lift_offs;
-                (count > 0).then(|| format!("lift-offs: {count}"))
+                (count > 0).then_some(FailedCondition::LiftOffs(count))
             }
             Self::MissedDeadline => {
                 let count = report.missed_deadlines.unwrap_or(0);
-                (count > 0).then(|| format!("missed deadlines: {count}"))
+                (count > 0).then_some(FailedCondition::MissedDeadlines(count))
             }
+        }
+    }
+}
+
+/// An event that failed a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailedCondition {
+    /// The latched fault's number.
+    Fault(u8),
+    /// Number of lift-offs.
+    LiftOffs(u64),
+    /// Number of missed deadlines.
+    MissedDeadlines(u64),
+}
+
+impl fmt::Display for FailedCondition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fault(number) => {
+                let description = Fault::from_code(*number).map_or("", Fault::description);
+                write!(f, "fault {number} ({description})")
+            }
+            Self::LiftOffs(count) => write!(f, "lift-offs: {count}"),
+            Self::MissedDeadlines(count) => write!(f, "missed deadlines: {count}"),
         }
     }
 }
@@ -42,10 +66,10 @@ impl FailOn {
 /// # Errors
 /// [`CommandError::FailedOn`], naming all of them.
 pub fn check(asked: &[FailOn], report: &RunReport) -> Result<(), CommandError> {
-    let found: Vec<String> = asked.iter().filter_map(|one| one.found(report)).collect();
+    let found: Vec<FailedCondition> = asked.iter().filter_map(|one| one.found(report)).collect();
     if found.is_empty() {
         Ok(())
     } else {
-        Err(CommandError::FailedOn(found.join(", ")))
+        Err(CommandError::FailedOn(found))
     }
 }

@@ -17,7 +17,8 @@ use painleve_study::figures::page_maker::{Fineness, PageMaker};
 use painleve_study::figures::{self, Page, Section};
 use painleve_system::atomic_file::{self, AtomicFile};
 
-use super::study::outcome::{Threads, output, progress_bar};
+use super::output_error::output;
+use super::study::outcome::{Threads, progress_bar};
 use super::{CommandError, say};
 
 /// Options of `painleve figures`.

@@ -11,10 +11,12 @@ mod fail_on;
 mod figures;
 mod live;
 mod output;
+mod output_error;
 mod patience;
 mod plant;
 mod process_error;
 mod run;
+mod run_process;
 mod scenarios;
 mod study;
 mod sweep;
@@ -43,6 +45,8 @@ use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_siz
 use painleve_system::memory_full::exit_when_shared_memory_is_full;
 use painleve_system::terminal::{self, warn};
 
+use fail_on::FailedCondition;
+use output_error::{InputError, OutputError, output};
 use process_error::ProcessError;
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
@@ -131,11 +135,11 @@ pub enum CommandError {
     #[error("{0}")]
     Mounting(Mistake),
     /// A file cannot be written.
-    #[error("{0}")]
-    Output(String),
-    /// A file or option given is of no use.
-    #[error("{0}")]
-    Input(String),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// A file or option cannot be used.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// Two files would replace each other.
     #[error("--{} and --{} both name `{}`: choose different files", options[0], options[1], path.display())]
     SameFile {
@@ -163,8 +167,8 @@ pub enum CommandError {
     #[error("the drive has latched fault {}: {}", *.0 as u8, .0.description())]
     Faulted(Fault),
     /// The run met a condition of --fail-on.
-    #[error("--fail-on: {0}")]
-    FailedOn(String),
+    #[error("--fail-on: {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
+    FailedOn(Vec<FailedCondition>),
     /// In real time, too many consecutive ticks were late or lost.
     #[error("the controller missed its deadlines and removed the torque: {}", .0.description())]
     DeadlinesMissed(Fault),
@@ -181,7 +185,11 @@ impl CommandError {
     /// 4: an output cannot be written; 5: deadlines missed; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Scenario(_) | Self::SameFile { .. } | Self::Input(_) | Self::Bound(_) => 2,
+            Self::Scenario(_)
+            | Self::SameFile { .. }
+            | Self::Input(_)
+            | Self::Cyclictest(CyclictestError::OtherHost)
+            | Self::Bound(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
                 StudyError::Unwritable { .. } => 4,
@@ -225,7 +233,7 @@ impl From<std::io::Error> for CommandError {
 fn say(line: impl std::fmt::Display) -> Result<(), CommandError> {
     terminal::say(line).map_err(|error| match error.kind() {
         std::io::ErrorKind::BrokenPipe => CommandError::Unread,
-        _ => CommandError::Output(format!("cannot write to stdout: {error}")),
+        _ => output(OutputError::StandardOutput(error)),
     })
 }
 

@@ -22,6 +22,7 @@ use painleve_view::server::{Hub, Server, ViewerRequest};
 use serde_json::{Value, json};
 
 use super::CommandError;
+use super::output_error::InputError;
 
 /// Time between two looks at orders and clock.
 const SLICE: Duration = Duration::from_millis(4);
@@ -38,11 +39,8 @@ const MOST_EVENTS: usize = 50;
 pub fn run(scenario: &Scenario, port: u16, interrupt: &Interrupt) -> Result<(), CommandError> {
     let mut page = description(scenario);
     page["parameters"] = parameters(scenario);
-    let server = Server::start(port, html(&page)).map_err(|error| {
-        CommandError::Input(format!(
-            "cannot serve on port {port} of this machine: {error}; choose another with --live PORT"
-        ))
-    })?;
+    let server =
+        Server::start(port, html(&page)).map_err(|source| InputError::Port { port, source })?;
     let mut live = Live::new(scenario.clone(), server.hub.clone())?;
     warn(format_args!(
         "open http://localhost:{}/ in a browser; the run starts with the first viewer and ends with Ctrl-C",
@@ -230,7 +228,7 @@ impl Live {
         };
     }
 
-    /// Obeys an order; what cannot be done is said to the viewers.
+    /// Executes a viewer's request; reports to the viewers if it is impossible.
     fn obey(&mut self, order: ViewerRequest) -> Result<(), CommandError> {
         match order {
             ViewerRequest::Pause => self.paused = true,

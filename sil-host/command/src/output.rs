@@ -14,7 +14,7 @@ use painleve_record::csv_table::CsvTable;
 use painleve_record::mcap_log::Source;
 use painleve_record::plot::PlotFile;
 use painleve_record::recorder::Sinks;
-use painleve_record::{McapLog, RecordError, Recorder, RunPlot};
+use painleve_record::{McapLog, Recorder, RunPlot};
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
@@ -22,6 +22,7 @@ use painleve_system::terminal::warn;
 use painleve_view::PageFile;
 
 use super::CommandError;
+use super::output_error::output;
 
 /// The files that a run writes.
 #[derive(Clone, Debug, Args)]
@@ -88,8 +89,7 @@ impl OutputArguments {
         let mut options = BTreeMap::new();
         let mut sinks: Sinks = Vec::new();
         for (option, path) in self.files() {
-            let file = AtomicFile::create(path)
-                .map_err(|error| CommandError::Output(error.to_string()))?;
+            let file = AtomicFile::create(path).map_err(output)?;
             if let Some(first) = options.insert(file.target().to_path_buf(), option) {
                 return Err(CommandError::SameFile {
                     options: [first, option],
@@ -98,9 +98,9 @@ impl OutputArguments {
             }
             sinks.push(match option {
                 "record" => {
-                    Box::new(McapLog::to(file, scenario, Source::Simulation).map_err(output_error)?)
+                    Box::new(McapLog::to(file, scenario, Source::Simulation).map_err(output)?)
                 }
-                "csv" => Box::new(CsvTable::to(file).map_err(output_error)?),
+                "csv" => Box::new(CsvTable::to(file).map_err(output)?),
                 "html" => Box::new(PageFile::new(file, scenario)),
                 _ => Box::new(PlotFile {
                     plot: RunPlot::new(scenario),
@@ -157,7 +157,7 @@ impl Output {
             None
         } else {
             let configuration = scenario.controller_configuration();
-            Some(Recorder::start(&configuration, sinks).map_err(output_error)?)
+            Some(Recorder::start(&configuration, sinks).map_err(output)?)
         };
         let paths = arguments.files().into_iter().map(|(_, path)| path.into());
         Ok(Self {
@@ -195,14 +195,10 @@ impl Output {
     pub fn finish(self) -> Result<Vec<PathBuf>, CommandError> {
         self.progress.finish_and_clear();
         if let Some(recorder) = self.recorder {
-            recorder.finish().map_err(output_error)?;
+            recorder.finish().map_err(output)?;
         }
         Ok(self.paths)
     }
-}
-
-fn output_error(error: RecordError) -> CommandError {
-    CommandError::Output(error.to_string())
 }
 
 /// A bar on stderr, where it is a terminal; nothing elsewhere.

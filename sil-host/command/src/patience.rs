@@ -1,4 +1,4 @@
-//! Longest wait of a run for a silent peer or board.
+//! Longest waits for a peer that is missing, and for a peer or board that is silent.
 
 use std::ffi::OsString;
 use std::time::Duration;
@@ -6,6 +6,10 @@ use std::time::Duration;
 use clap::Args;
 use painleve_board::SILENCE_LIMIT;
 use painleve_link::DEFAULT_SILENCE_LIMIT;
+
+/// Default longest wait for a missing peer, s: a process that waits in vain has ended after 2 s, its
+/// start and end included.
+pub const WAIT_S: f64 = 1.7;
 
 /// The option `--silence-limit-s`.
 #[derive(Clone, Debug, Args)]

@@ -18,7 +18,7 @@ use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
 
 use super::output::{Output, OutputArguments};
-use super::patience::PatienceArguments;
+use super::patience::{PatienceArguments, WAIT_S};
 use super::process_error::ProcessError;
 use super::run::ScenarioArguments;
 use super::{CommandError, INTERRUPTED, PEER_FAILED, or_interrupted, say};
@@ -37,7 +37,7 @@ pub struct PlantArguments {
     #[arg(long)]
     json: bool,
     /// Longest wait for the controller, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.8, value_parser = super::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = WAIT_S, value_parser = super::seconds)]
     wait_s: f64,
     #[command(flatten)]
     patience: PatienceArguments,

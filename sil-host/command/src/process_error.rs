@@ -6,7 +6,7 @@ use std::process::ExitStatus;
 use painleve_link::BusName;
 use painleve_shared::range::OutOfRange;
 
-/// Failure of a process, or of what it was sent.
+/// Failure of a process, or of a message to it.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcessError {
     /// The operating system refuses something outside files and links.

@@ -1,10 +1,8 @@
 //! `painleve run`: plant and controller as two processes, started, monitored and ended together.
 
 use std::ffi::OsString;
-use std::io::Read;
 use std::path::PathBuf;
-use std::process::{Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
@@ -14,7 +12,6 @@ use painleve_plant::scenario::{Scenario, built_in};
 use painleve_record::report::RunReport;
 use painleve_study::robustness::{self, Arms};
 use painleve_system::interrupt::Interrupt;
-use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
 use painleve_system::terminal::{self, warn};
 use tempfile::NamedTempFile;
 
@@ -22,8 +19,10 @@ use super::bridge::{ImageArguments, SensorLineArguments};
 use super::fail_on::{self, FailOn};
 use super::live;
 use super::output::OutputArguments;
+use super::output_error::{InputError, output};
 use super::patience::PatienceArguments;
 use super::process_error::ProcessError;
+use super::run_process::{RunProcess, WATCH};
 use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
 
 /// A run of the robustness campaign.
@@ -183,13 +182,6 @@ pub struct RunArguments {
     json: bool,
 }
 
-/// Start-up time of a child, s. The processes of a run notice each other's end, so this can be
-/// generous.
-const START_WAIT_S: &str = "10";
-
-/// Interval between two checks of the children.
-const WATCH: Duration = Duration::from_millis(10);
-
 /// Time for the plant to notice and report that the controller is gone. Even with a forced stop
 /// after that, all processes end within 2 s.
 const PLANT_NOTICE: Duration = Duration::from_millis(1000);
@@ -207,9 +199,7 @@ const BRIDGE_END: Duration = Duration::from_millis(300);
 /// Runs a scenario that is watched and steered from a page.
 fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), CommandError> {
     if arguments.host != Host::Native {
-        return Err(CommandError::Input(
-            "--live runs the controller in this process: leave out --host".into(),
-        ));
+        return Err(InputError::LiveHost.into());
     }
     live::run(scenario, port, &Interrupt::catch()?)
 }
@@ -405,106 +395,6 @@ fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
     line
 }
 
-/// A child process with its output.
-struct RunProcess {
-    child: Guarded,
-    stdout: Reader,
-    stderr: Reader,
-    stopped: Duration,
-}
-
-impl RunProcess {
-    fn start(arguments: Vec<OsString>, bus: &BusName, stderr: Stdio) -> Result<Self, CommandError> {
-        let program = std::env::current_exe()?;
-        let mut command = Command::new(&program);
-        command
-            .args(arguments)
-            .args(["--bus", bus.as_str()])
-            .args(["--wait-s", START_WAIT_S])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(stderr);
-        let mut child = end_with_parent(&mut command, Signal::SIGTERM)
-            .spawn()
-            .map_err(|source| ProcessError::Start { program, source })?;
-        Ok(Self {
-            stdout: Reader::start(child.stdout.take())?,
-            stderr: Reader::start(child.stderr.take())?,
-            child: Guarded::new(child),
-            stopped: Duration::ZERO,
-        })
-    }
-
-    fn wait(&mut self, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
-        let start = std::time::Instant::now();
-        while start.elapsed() < limit {
-            if let Some(status) = self.child.ended()? {
-                return Ok(Some(status));
-            }
-            std::thread::sleep(WATCH);
-        }
-        Ok(None)
-    }
-
-    /// Returns how long the process has been stopped, if it is checked every `interval`. The
-    /// function counts checks rather than time, because this process may be stopped together with
-    /// its children.
-    fn stopped_for(&mut self, interval: Duration) -> Duration {
-        self.stopped = if self.child.is_stopped() {
-            self.stopped + interval
-        } else {
-            Duration::ZERO
-        };
-        self.stopped
-    }
-
-    /// Returns the error output of an ended process, as a suffix of another message.
-    fn complaint(&mut self) -> String {
-        let text = self.stderr.text();
-        let text = text.trim().trim_start_matches("error: ");
-        if text.is_empty() {
-            String::new()
-        } else {
-            format!(": {text}")
-        }
-    }
-}
-
-/// Reads a pipe while its process runs: a pipe that is not read blocks its writer once it is full.
-struct Reader(Option<Receiver<Vec<u8>>>);
-
-impl Reader {
-    /// Bytes of a pipe to keep; the rest is read and discarded.
-    const KEPT: u64 = 4 << 20;
-    /// How long a pipe may stay open after its process has ended: on a busy machine, reading the
-    /// output takes a while.
-    const PATIENCE: Duration = Duration::from_secs(3);
-
-    fn start(pipe: Option<impl Read + Send + 'static>) -> std::io::Result<Self> {
-        let Some(mut pipe) = pipe else {
-            return Ok(Self(None));
-        };
-        let (sender, receiver) = channel();
-        std::thread::Builder::new().spawn(move || {
-            let mut text = Vec::new();
-            // Unreadable output is left out.
-            let _ = pipe.by_ref().take(Self::KEPT).read_to_end(&mut text);
-            let _ = std::io::copy(&mut pipe, &mut std::io::sink());
-            let _ = sender.send(text);
-        })?;
-        Ok(Self(Some(receiver)))
-    }
-
-    /// Returns the whole output once the process has ended; empty on a second call.
-    fn text(&mut self) -> String {
-        let text = self
-            .0
-            .take()
-            .and_then(|text| text.recv_timeout(Self::PATIENCE).ok());
-        String::from_utf8_lossy(&text.unwrap_or_default()).into_owned()
-    }
-}
-
 /// Returns the error of an ended plant: one that exited with a code has printed its error, one that
 /// was killed has not.
 fn failure(status: ExitStatus) -> CommandError {
@@ -522,7 +412,7 @@ fn failure(status: ExitStatus) -> CommandError {
 /// Prints a report as JSON or as a table.
 pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
     let text = if json {
-        serde_json::to_string(report).map_err(|error| CommandError::Output(error.to_string()))?
+        serde_json::to_string(report).map_err(output)?
     } else {
         terminal::readable(report.table())
     };

@@ -13,8 +13,9 @@ use painleve_study::sweep::{SweepError, array, folder, shard_file};
 use painleve_system::atomic_file;
 use painleve_system::terminal::warn;
 
+use super::output_error::output;
 use super::study::campaign::understand;
-use super::study::outcome::{Threads, output};
+use super::study::outcome::Threads;
 use super::{CommandError, say};
 
 /// Options of `painleve sweep`.
@@ -140,9 +141,9 @@ pub fn run(arguments: &SweepArguments) -> Result<(), CommandError> {
 fn plan(arguments: &PlanArguments) -> Result<(), CommandError> {
     let path = &arguments.campaign;
     let campaign = Campaign::load(path)?;
-    let understood = understand(&campaign).map_err(|message| SweepError::Campaign {
+    let understood = understand(&campaign).map_err(|source| SweepError::Campaign {
         path: path.clone(),
-        message,
+        source,
     })?;
     let manifest = Manifest::new(campaign, &understood, arguments.shards.get())?;
     let folder = &arguments.place.folder;
@@ -160,9 +161,9 @@ fn plan(arguments: &PlanArguments) -> Result<(), CommandError> {
 /// Returns the manifest and the study that it describes.
 fn load(folder: &Path) -> Result<(Manifest, Understood), SweepError> {
     let manifest = Manifest::load(folder)?;
-    let understood = understand(&manifest.campaign).map_err(|message| SweepError::Manifest {
+    let understood = understand(&manifest.campaign).map_err(|source| SweepError::Manifest {
         path: Manifest::path(folder),
-        message,
+        source: source.into(),
     })?;
     manifest.check(folder, &understood)?;
     Ok((manifest, understood))
@@ -236,7 +237,7 @@ fn status(arguments: &StatusArguments) -> Result<(), CommandError> {
     };
     table.add_row(["missing shards", missing]);
     for file in &status.unusable {
-        table.add_row([&file.file.display().to_string(), &file.reason]);
+        table.add_row([file.file.display().to_string(), file.reason.to_string()]);
     }
     for duplicate in &status.duplicates {
         for file in &duplicate.files {

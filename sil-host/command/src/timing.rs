@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
-use painleve_board::timing::{Cyclictest, Metronome, TimingReport, Unit, report};
+use painleve_board::timing::{Cyclictest, CyclictestError, Metronome, TimingReport, Unit, report};
 use painleve_board::{ConnectedBoard, Drivers, OnBoard, SILENCE_LIMIT, Serial};
 use painleve_bound::report::Bound;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
@@ -19,6 +19,7 @@ use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::{FIFO_PRIORITY, request_realtime};
 use painleve_system::terminal::{self, warn};
 
+use super::output_error::output;
 use super::run::Host;
 use super::{CommandError, say};
 
@@ -59,13 +60,12 @@ pub struct TimingArguments {
 
 /// Runs every scenario and reports the cost of its ticks.
 pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
-    let output = |error: &dyn std::fmt::Display| CommandError::Output(error.to_string());
     if arguments.bound {
         let image = arguments.elf.clone();
         let image = image.unwrap_or_else(|| emulator::built_image("painleve-f405"));
         let bound = Bound::of(&image)?;
         return if arguments.json {
-            say(serde_json::to_string(&bound).map_err(|error| output(&error))?)
+            say(serde_json::to_string(&bound).map_err(output)?)
         } else {
             say(terminal::readable(bound.text()))
         };
@@ -80,13 +80,11 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         .map(|name| Scenario::load(name, &arguments.overrides))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(path) = &arguments.svg {
-        AtomicFile::create(path).map_err(|error| output(&error))?;
+        AtomicFile::create(path).map_err(output)?;
     }
     let interrupt = Interrupt::catch()?;
     if arguments.cyclictest && arguments.host != Host::Native {
-        let reason =
-            "--cyclictest needs --host native: other hosts do not wait for this machine's clock";
-        return Err(output(&reason));
+        return Err(CyclictestError::OtherHost.into());
     }
     let mut priority = None;
     if arguments.host == Host::Native {
@@ -106,11 +104,10 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         }
     }
     if let Some(path) = &arguments.svg {
-        atomic_file::write(path, figure::svg(&reports).as_bytes())
-            .map_err(|error| output(&error))?;
+        atomic_file::write(path, figure::svg(&reports).as_bytes()).map_err(output)?;
     }
     if arguments.json {
-        let text = serde_json::to_string(&reports).map_err(|error| output(&error))?;
+        let text = serde_json::to_string(&reports).map_err(output)?;
         say(text)
     } else {
         say(terminal::readable(report::table(&reports)))

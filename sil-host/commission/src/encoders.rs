@@ -2,8 +2,9 @@
 //! operator holds the arm clear of the belt, with plumb line and spirit level.
 //!
 //! From the first pose to the second, joint 1 turns by +90° and the elbow by −90°; from the second to the
-//! third, only the elbow, by −90°. That tells the encoders and their directions apart.
+//! third, only the elbow, by −90°. This identifies the encoders and their directions.
 
+use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts};
 
 use crate::readings::{MeanReadings, Session, forward};
@@ -47,7 +48,7 @@ pub(crate) fn measure<R: Rig>(
     let mut held = Vec::new();
     for plumb_deg in POSES_DEG {
         session.instruct(Instruction::Hold { plumb_deg })?;
-        held.push(session.mean([0.0; 2])?);
+        held.push(session.mean(JointTorque::zeros())?);
     }
     let scales = session.expected.converters.encoders;
     let reversed = directions(&scales, &held)?;

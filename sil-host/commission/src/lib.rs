@@ -179,7 +179,7 @@ pub struct Commissioned {
     /// Friction coefficient; `None` if the tip did not slide within the torque limit.
     pub friction: Option<f64>,
     /// Link angles of the arm at rest on the belt, rad.
-    pub rest_rad: [f64; 2],
+    pub rest_rad: LinkMotion<f64>,
     /// Deviations from the scenario that the result corrects.
     pub deviations: Vec<Deviation>,
 }
@@ -203,10 +203,9 @@ impl Commissioned {
         }
         // The file's start must lie on the belt at its new height.
         let arm = Arm::new(corrected.arm)?;
-        let rest = LinkMotion::new(self.rest_rad[0], self.rest_rad[1]);
-        let tip = arm.tip_m(&painleve_shared::kinematics::Pose::new(&rest));
-        if let Some(start) = arm.link_angles_on_belt_rad(tip.x, Posture::of(&rest)) {
-            let [theta_1, theta_2] = <[f64; 2]>::from(start).map(f64::to_degrees);
+        let tip = arm.tip_m(&painleve_shared::kinematics::Pose::new(&self.rest_rad));
+        if let Some(start) = arm.link_angles_on_belt_rad(tip.x, Posture::of(&self.rest_rad)) {
+            let [theta_1, theta_2] = start.to_array().map(f64::to_degrees);
             corrected.initial = InitialState::at_rest(theta_1, theta_2);
         }
         Ok(corrected)
@@ -224,7 +223,7 @@ pub fn commission<R: Rig>(
 ) -> Result<Commissioned, CommissionError<R::Error>> {
     let mut session = Session::new(rig, expected);
     let encoders = encoders::measure(&mut session)?;
-    session.set_encoders(&encoders);
+    session.set_encoders(encoders.reversed, encoders.offsets);
     let rest = rest::measure(&mut session, &encoders.tare)?;
     let stages = stages::measure(&mut session, &rest)?;
     session.set_stages(stages.reversed);
@@ -242,7 +241,7 @@ pub fn commission<R: Rig>(
         encoder_offsets: encoders.offsets,
         height_m: rest.height_m,
         friction,
-        rest_rad: rest.theta_rad.into(),
+        rest_rad: rest.theta_rad,
         deviations,
     })
 }

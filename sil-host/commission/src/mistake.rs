@@ -145,7 +145,7 @@ pub enum Mistake {
         /// Force expected from the weight, N.
         expected_n: f64,
     },
-    /// The tip is not where it was asked to be.
+    /// The tip is not at the requested position.
     #[error(
         "arm: its tip rests {tip_mm:.0} mm from the point below joint 1 and {gap_mm:.0} mm from the belt of the scenario; set it down below joint 1, and check arm.link_length_m"
     )]

@@ -2,9 +2,8 @@
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, TorqueCounts};
-use painleve_shared::{JointMotion, LinkMotion};
+use painleve_shared::{JointMotion, JointTorque, LinkMotion};
 
-use crate::encoders::EncodersFound;
 use crate::{CommissionError, Expected, Mistake, RawReadings, Rig};
 
 /// Duration of a measurement, s.
@@ -22,7 +21,7 @@ pub(crate) struct MeanReadings {
     pub forces: [f64; 2],
 }
 
-/// A rig with what is known about it.
+/// A rig and its properties measured until now.
 pub(crate) struct Session<'a, R> {
     rig: &'a mut R,
     pub expected: &'a Expected,
@@ -43,9 +42,9 @@ impl<'a, R: Rig> Session<'a, R> {
     }
 
     /// Uses these directions and zeros from now on.
-    pub fn set_encoders(&mut self, found: &EncodersFound) {
-        self.reversed = found.reversed;
-        self.offsets = found.offsets;
+    pub fn set_encoders(&mut self, reversed: [bool; 2], offsets: [u32; 2]) {
+        self.reversed = reversed;
+        self.offsets = offsets;
     }
 
     /// Uses these polarities from now on.
@@ -69,13 +68,14 @@ impl<'a, R: Rig> Session<'a, R> {
     /// Commands joint torques, N·m, limited, and returns the readings.
     pub fn exchange(
         &mut self,
-        torque_nm: [f64; 2],
+        torque_nm: JointTorque<f64>,
     ) -> Result<RawReadings, CommissionError<R::Error>> {
         let scale = &self.expected.converters.torque;
         let limit = self.expected.torque_limit_nm;
+        let torques_nm = torque_nm.to_array();
         let mut counts = [TorqueCounts(0); 2];
         for (joint, count) in counts.iter_mut().enumerate() {
-            let torque_nm = torque_nm[joint].clamp(-limit, limit);
+            let torque_nm = torques_nm[joint].clamp(-limit, limit);
             let signed = if self.stage_reversed[joint] {
                 -torque_nm
             } else {
@@ -87,7 +87,10 @@ impl<'a, R: Rig> Session<'a, R> {
     }
 
     /// Returns the mean readings under a torque, after the arm has settled.
-    pub fn mean(&mut self, torque_nm: [f64; 2]) -> Result<MeanReadings, CommissionError<R::Error>> {
+    pub fn mean(
+        &mut self,
+        torque_nm: JointTorque<f64>,
+    ) -> Result<MeanReadings, CommissionError<R::Error>> {
         let ticks = self.ticks(MEAN_S);
         for _ in 0..ticks {
             self.exchange(torque_nm)?;

@@ -54,13 +54,12 @@ pub struct RestFound {
 pub(crate) fn force_at_rest_n(
     arm: &Arm<f64>,
     theta: &LinkMotion<f64>,
-    torque_nm: [f64; 2],
+    torque_nm: JointTorque<f64>,
 ) -> Option<Vector2<f64>> {
     let pose = Pose::new(theta);
     let load_nm = arm.passive_torque_nm(theta, &LinkMotion::zeros(), &pose);
-    let torque_nm = JointTorque::new(torque_nm[0], torque_nm[1]).to_links();
     let inverse = arm.jacobian(&pose).transpose().try_inverse()?;
-    Some(inverse * (load_nm.vector() - torque_nm.vector()))
+    Some(inverse * (load_nm - torque_nm.to_links()).vector())
 }
 
 /// Measures height and weight.
@@ -70,7 +69,7 @@ pub(crate) fn measure<R: Rig>(
 ) -> Result<RestFound, CommissionError<R::Error>> {
     let posture = session.expected.posture;
     session.instruct(Instruction::SetDown { posture })?;
-    let readings = session.mean([0.0; 2])?;
+    let readings = session.mean(JointTorque::zeros())?;
     let expected = session.expected;
     let theta_rad = session
         .theta_rad(readings.joints)
@@ -93,7 +92,8 @@ pub(crate) fn measure<R: Rig>(
         deviations.push(Deviation::BeltHeight { error_m });
     }
     let net_n = session.net_force_n(readings.forces, *tare);
-    let expected_n = force_at_rest_n(&expected.arm, &theta_rad, [0.0; 2]).map_or(0.0, |it| it.y);
+    let expected_n =
+        force_at_rest_n(&expected.arm, &theta_rad, JointTorque::zeros()).map_or(0.0, |it| it.y);
     let range_n = f64::from(expected.converters.force.range);
     if expected_n < LEAST_N.max(LEAST_SHARE * range_n) {
         return Err(Mistake::TooLight { expected_n }.into());

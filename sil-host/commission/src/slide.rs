@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use nalgebra::Vector2;
 use painleve_shared::counts::ForceCounts;
 use painleve_shared::kinematics::Pose;
-use painleve_shared::{GeneralisedTorque, LinkMotion};
+use painleve_shared::{GeneralisedTorque, JointTorque, LinkMotion};
 
 use crate::readings::Session;
 use crate::rest::RestFound;
@@ -47,7 +47,7 @@ pub(crate) fn measure<R: Rig>(
     for direction in [1.0, -1.0] {
         ratios.extend(slide(session, rest, force_reversed, direction)?);
         for _ in 0..session.ticks(PAUSE_S) {
-            session.exchange([0.0; 2])?;
+            session.exchange(JointTorque::zeros())?;
         }
     }
     let count = ratios.len();
@@ -69,7 +69,7 @@ fn slide<R: Rig>(
     let reach = |share: f64| {
         let is_allowed = |ratio| {
             let torque_nm = torque_for(session, &rest.theta_rad, &force_n(share, ratio));
-            torque_nm.iter().all(|it| it.abs() < limit_nm)
+            torque_nm.amax() < limit_nm
         };
         let steps = (0..30).map(|step| f64::from(step) * LARGEST_RATIO / 30.0);
         steps.take_while(|ratio| is_allowed(*ratio)).count()
@@ -85,11 +85,11 @@ fn slide<R: Rig>(
     for tick in 0..(LARGEST_RATIO / step) as u32 {
         let ratio = f64::from(tick) * step;
         let torque_nm = torque_for(session, &theta, &force_n(share, ratio));
-        if torque_nm.iter().any(|it| it.abs() > limit_nm) {
+        if torque_nm.amax() > limit_nm {
             return Ok(None);
         }
         let part = (f64::from(tick) / f64::from(session.ticks(RELIEF_S))).min(1.0);
-        let raw = session.exchange(torque_nm.map(|it| it * part))?;
+        let raw = session.exchange(torque_nm * part)?;
         let Some(now) = session.theta_rad(raw.joints) else {
             continue;
         };
@@ -122,10 +122,10 @@ fn torque_for<R: Rig>(
     session: &Session<'_, R>,
     theta: &LinkMotion<f64>,
     force_n: &Vector2<f64>,
-) -> [f64; 2] {
+) -> JointTorque<f64> {
     let arm = &session.expected.arm;
     let pose = Pose::new(theta);
     let load_nm = arm.passive_torque_nm(theta, &LinkMotion::zeros(), &pose);
-    let torque_nm = load_nm.vector() - arm.jacobian(&pose).transpose() * force_n;
-    GeneralisedTorque::from_vector(torque_nm).to_joints().into()
+    let held_nm = GeneralisedTorque::from_vector(arm.jacobian(&pose).transpose() * force_n);
+    (load_nm - held_nm).to_joints()
 }

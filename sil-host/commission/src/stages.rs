@@ -5,8 +5,8 @@
 //! links: the first joint's torque acts along link 2, the elbow's along the line from joint 1 to the tip.
 
 use nalgebra::{Matrix2, Vector2};
-use painleve_shared::LinkMotion;
 use painleve_shared::kinematics::Pose;
+use painleve_shared::{JointTorque, LinkMotion};
 
 use crate::readings::Session;
 use crate::rest::{RestFound, force_at_rest_n};
@@ -55,7 +55,7 @@ pub(crate) fn measure<R: Rig>(
         let [plus, minus] = [1.0, -1.0].map(|sign| {
             let mut torques = [0.0; 2];
             torques[joint] = sign * torque_nm;
-            force_under(session, rest, torques)
+            force_under(session, rest, JointTorque::from_array(torques))
         });
         let change = (plus? - minus?) / (2.0 * torque_nm);
         measured.set_column(joint, &change);
@@ -88,7 +88,11 @@ fn effects<R: Rig>(
     theta: &LinkMotion<f64>,
 ) -> Result<Matrix2<f64>, Mistake> {
     let force_n = |torque_nm| force_at_rest_n(&session.expected.arm, theta, torque_nm);
-    match (force_n([0.0; 2]), force_n([1.0, 0.0]), force_n([0.0, 1.0])) {
+    match (
+        force_n(JointTorque::zeros()),
+        force_n(JointTorque::new(1.0, 0.0)),
+        force_n(JointTorque::new(0.0, 1.0)),
+    ) {
         (Some(rest), Some(first), Some(elbow)) => {
             Ok(Matrix2::from_columns(&[first - rest, elbow - rest]))
         }
@@ -101,17 +105,17 @@ fn effects<R: Rig>(
 fn force_under<R: Rig>(
     session: &mut Session<'_, R>,
     rest: &RestFound,
-    torque_nm: [f64; 2],
+    torque_nm: JointTorque<f64>,
 ) -> Result<Vector2<f64>, CommissionError<R::Error>> {
     let ticks = session.ticks(RISE_S);
     for tick in 0..ticks {
         let part = f64::from(tick) / f64::from(ticks);
-        session.exchange(torque_nm.map(|it| it * part))?;
+        session.exchange(torque_nm * part)?;
     }
     let readings = session.mean(torque_nm)?;
     for tick in 0..ticks {
         let part = 1.0 - f64::from(tick) / f64::from(ticks);
-        session.exchange(torque_nm.map(|it| it * part))?;
+        session.exchange(torque_nm * part)?;
     }
     let moved_m = session.theta_rad(readings.joints).map_or(0.0, |theta| {
         let arm = &session.expected.arm;

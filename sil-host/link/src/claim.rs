@@ -47,10 +47,10 @@ impl Bus {
         self.folder().join(LOCK)
     }
 
-    fn refuse(&self, error: &io::Error) -> LinkError {
+    fn refuse(&self, error: io::Error) -> LinkError {
         LinkError::Folder {
             folder: self.folder(),
-            reason: error.to_string(),
+            source: error.into(),
         }
     }
 
@@ -69,9 +69,9 @@ impl Bus {
                 Ok(file) => file,
                 // The last process on the bus has just left and removed the folder.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-                Err(error) => return Err(self.refuse(&error)),
+                Err(error) => return Err(self.refuse(error)),
             };
-            while !file.try_lock(GATE).map_err(|error| self.refuse(&error))? {
+            while !file.try_lock(GATE).map_err(|error| self.refuse(error))? {
                 if waited >= GATE_PATIENCE {
                     return Err(LinkError::Held {
                         bus: self.name.clone(),
@@ -104,9 +104,9 @@ impl Bus {
                 return Ok(Err(Taken::ByEarlierRun));
             }
             RunFiles::remove_all(&self.folder(), &self.place)
-                .map_err(|error| self.refuse(&error))?;
+                .map_err(|error| self.refuse(error))?;
         }
-        let refuse = |error| self.refuse(&error);
+        let refuse = |error| self.refuse(error);
         if !gate.0.try_lock(role.byte()).map_err(refuse)? {
             return Ok(Err(Taken::ByAnother));
         }

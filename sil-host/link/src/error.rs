@@ -1,15 +1,15 @@
 //! Errors of the link, worded for the user at the terminal.
 
+use std::error::Error;
+use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
-
-use thiserror::Error;
 
 use super::bus::BusName;
 use super::session::ConfigurationTooLong;
 
 /// A failure of the link. The message names the bus and the remedy.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
     /// Another plant is alive on the bus.
@@ -120,14 +120,14 @@ pub enum LinkError {
 
     /// The folder of a bus cannot be used.
     #[error(
-        "cannot use `{folder}` for a bus: {reason}; \
+        "cannot use `{folder}` for a bus: {source}; \
          set XDG_RUNTIME_DIR to a folder that only you can write to"
     )]
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// Reason.
-        reason: String,
+        /// The reason.
+        source: FolderError,
     },
 
     /// Another process keeps the folder of the bus locked.
@@ -162,7 +162,7 @@ pub enum LinkError {
 
     /// iceoryx2 or the operating system reported an error.
     #[error(
-        "bus `{bus}`: could not {action} ({cause}); \
+        "bus `{bus}`: could not {action} ({source}); \
          check that /dev/shm is writable and not full, and `ulimit -n`"
     )]
     Transport {
@@ -170,9 +170,26 @@ pub enum LinkError {
         bus: BusName,
         /// Attempted action.
         action: &'static str,
-        /// Cause as reported by iceoryx2 or the system.
-        cause: String,
+        /// The error of iceoryx2 or of the system.
+        source: Box<dyn Error + Send + Sync>,
     },
+}
+
+/// Why a folder cannot be used for a bus.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// The system refuses access to it.
+    #[error(transparent)]
+    System(#[from] io::Error),
+    /// It is not a folder.
+    #[error("it is not a folder")]
+    NotAFolder,
+    /// It belongs to another user.
+    #[error("it belongs to user {0}")]
+    Foreign(u32),
+    /// Names of shared memory contain its name.
+    #[error("its name is too long for shared memory")]
+    NameTooLong,
 }
 
 fn holder(process: Option<u32>) -> String {

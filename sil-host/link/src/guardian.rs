@@ -1,7 +1,7 @@
 //! A thread that bounds the time of every call into iceoryx2.
 //!
 //! Every such call goes through [`Guardian::during`]. If a call takes long and the peer is dead,
-//! the guardian removes what the peer left half-made, which ends the call (see
+//! the guardian removes the peer's incomplete files, which ends the call (see
 //! [`RunFiles::remove_half_made`]). If the peer is alive but was stopped while it created
 //! something, or if the call blocks for another reason, the process reports this and exits, because
 //! a call into iceoryx2 cannot be cancelled.
@@ -22,7 +22,7 @@ const PEER_FAILED: i32 = 3;
 /// Interval between two checks. The limits count checks rather than time, because stopping this
 /// process stops both of its threads.
 const LOOK: Duration = Duration::from_millis(25);
-/// Checks before the guardian removes what a dead peer left half-made. By then nothing that this
+/// Checks before the guardian removes a dead peer's incomplete files. By then nothing that this
 /// process itself creates is still half-made, even on a busy machine.
 const LOOKS_UNTIL_REMOVAL: u32 = 40;
 /// Checks before the process exits.

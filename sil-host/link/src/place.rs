@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use nix::unistd::getuid;
 
-use super::LinkError;
+use super::{FolderError, LinkError};
 
 /// Folder in which Linux keeps POSIX shared memory.
 pub(super) const SHARED_MEMORY: &str = "/dev/shm";
@@ -69,26 +69,26 @@ fn is_own(metadata: &Metadata) -> bool {
 /// # Errors
 /// [`LinkError::Folder`] if it belongs to another user, is not a folder, or cannot be created.
 pub(super) fn make_private(folder: &Path) -> Result<(), LinkError> {
-    let refuse = |reason: String| LinkError::Folder {
+    let refuse = |source: FolderError| LinkError::Folder {
         folder: folder.to_path_buf(),
-        reason,
+        source,
     };
     match DirBuilder::new().mode(PRIVATE).create(folder) {
         Ok(()) => return Ok(()),
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-        Err(error) => return Err(refuse(error.to_string())),
+        Err(error) => return Err(refuse(error.into())),
     }
     // Does not follow a symbolic link, which another user may have placed there.
-    let found = fs::symlink_metadata(folder).map_err(|error| refuse(error.to_string()))?;
+    let found = fs::symlink_metadata(folder).map_err(|error| refuse(error.into()))?;
     if !found.is_dir() {
-        return Err(refuse("it is not a folder".into()));
+        return Err(refuse(FolderError::NotAFolder));
     }
     if !is_own(&found) {
-        return Err(refuse(format!("it belongs to user {}", found.uid())));
+        return Err(refuse(FolderError::Foreign(found.uid())));
     }
     if found.mode() & 0o777 != PRIVATE {
         fs::set_permissions(folder, fs::Permissions::from_mode(PRIVATE))
-            .map_err(|error| refuse(error.to_string()))?;
+            .map_err(|error| refuse(error.into()))?;
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! The plant's end of the link.
 
+use std::error::Error;
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -310,7 +311,11 @@ impl PlantEnd {
     }
 
     #[cold]
-    fn transport(&self, action: &'static str, cause: impl ToString) -> LinkError {
+    fn transport(
+        &self,
+        action: &'static str,
+        cause: impl Into<Box<dyn Error + Send + Sync>>,
+    ) -> LinkError {
         self.ports.presence.transport(action, cause)
     }
 

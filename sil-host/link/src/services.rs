@@ -1,5 +1,7 @@
 //! The iceoryx2 side of a run: a node, its three services, and their ports.
 
+use std::error::Error;
+
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
@@ -67,7 +69,11 @@ impl Presence {
     }
 
     /// Returns a [`LinkError::Transport`] on this bus.
-    pub(super) fn transport(&self, action: &'static str, cause: impl ToString) -> LinkError {
+    pub(super) fn transport(
+        &self,
+        action: &'static str,
+        cause: impl Into<Box<dyn Error + Send + Sync>>,
+    ) -> LinkError {
         transport(&self.bus, action, cause)
     }
 
@@ -107,11 +113,15 @@ fn quieten() {
     }
 }
 
-pub(super) fn transport(bus: &BusName, action: &'static str, cause: impl ToString) -> LinkError {
+pub(super) fn transport(
+    bus: &BusName,
+    action: &'static str,
+    cause: impl Into<Box<dyn Error + Send + Sync>>,
+) -> LinkError {
     LinkError::Transport {
         bus: bus.clone(),
         action,
-        cause: cause.to_string(),
+        source: cause.into(),
     }
 }
 

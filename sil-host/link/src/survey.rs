@@ -68,7 +68,7 @@ impl Survey {
             .map(|name| state_of(name, &place))
             .collect();
         buses.sort_by(|one, other| one.name.as_str().cmp(other.name.as_str()));
-        let segments = prefixes(&place).map_err(|cause| refuse(&place, &cause))?;
+        let segments = prefixes(&place).map_err(|cause| refuse(&place, cause))?;
         let segments = segments.into_iter().map(|prefix| Segments {
             state: match lock_of(&prefix) {
                 None => SegmentState::Unknown,
@@ -91,7 +91,7 @@ impl Survey {
     pub fn repair() -> Result<(), LinkError> {
         let place = Place::of_user()?;
         remove_dead(&place);
-        for prefix in prefixes(&place).map_err(|cause| refuse(&place, &cause))? {
+        for prefix in prefixes(&place).map_err(|cause| refuse(&place, cause))? {
             // The next survey shows what could not be removed.
             let _ = remove_if_dead(&prefix);
         }
@@ -124,9 +124,9 @@ fn remove_if_dead(prefix: &str) -> io::Result<()> {
     Ok(())
 }
 
-fn refuse(place: &Place, cause: &io::Error) -> LinkError {
+fn refuse(place: &Place, cause: io::Error) -> LinkError {
     LinkError::Folder {
         folder: place.folder.clone(),
-        reason: cause.to_string(),
+        source: cause.into(),
     }
 }

@@ -41,7 +41,7 @@ pub enum LoopError {
     /// A monitor of the run failed: its record cannot be written, for example.
     #[error(transparent)]
     Monitor(Box<dyn std::error::Error + Send + Sync>),
-    /// The process has been asked to end.
+    /// A request to end has been received.
     #[error("interrupted")]
     Interrupted,
 }

@@ -1,8 +1,21 @@
 //! One control tick for records: a [`Sample`].
 
+use painleve_shared::status::SupervisorState;
 use painleve_shared::{ActuatorFrame, SensorFrame};
 
 use crate::plant::Snapshot;
+
+/// Returns the reference z_t* that the controller follows, m; NaN while it follows none.
+pub fn reference_tip_t_m(answer: &ActuatorFrame) -> f64 {
+    let follows = answer
+        .supervisor_state()
+        .is_some_and(SupervisorState::drives);
+    if follows {
+        answer.reference_tip.to_metres()
+    } else {
+        f64::NAN
+    }
+}
 
 /// Both frames of a control tick and the plant's true state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -9,7 +9,6 @@ use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::kinematics::Pose;
 use painleve_shared::range::OutOfRange;
 use painleve_shared::settings::Settings;
-use painleve_shared::status::SupervisorState;
 use painleve_shared::{ActuatorFrame, Arm, GeneralisedTorque, JointTorque};
 
 use crate::converters::encoder::Encoders;
@@ -19,7 +18,7 @@ use crate::converters::torque_stage::TorqueStages;
 use crate::mechanics::BuiltInPlant;
 use crate::mechanics::belt::BeltSettings;
 use crate::plant::{Plant, PlantError, Probe};
-use crate::sample::Sample;
+use crate::sample::{Sample, reference_tip_t_m};
 use crate::scenario::Scenario;
 use crate::tick_clock::TickClock;
 
@@ -167,7 +166,7 @@ impl<P: Plant> Simulation<P> {
             plant: self.plant.snapshot(),
             sensor: *sensor,
             actuator: *actuator,
-            reference_tip_t_m: reference_m(actuator),
+            reference_tip_t_m: reference_tip_t_m(actuator),
             delivered: !self.lost.sensor,
             answered: false,
         }
@@ -215,15 +214,5 @@ impl<P: Plant> Simulation<P> {
         let next_s = self.clock.before_next_s(0.0);
         self.clock.advance();
         self.plant.advance(next_s, probe)
-    }
-}
-
-/// Returns the reference that the controller follows, m; NaN while it follows no reference.
-fn reference_m(actuator: &ActuatorFrame) -> f64 {
-    match actuator.supervisor_state() {
-        Some(SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff) => {
-            actuator.reference_tip.to_metres()
-        }
-        _ => f64::NAN,
     }
 }

@@ -76,9 +76,8 @@ impl Probe for Statistics {
             self.contact_s += duration;
         }
         for at in [step.start(), step.end()] {
-            let [u1, u2] = at.torque_nm;
             self.max_tip_t_m = self.max_tip_t_m.max(at.tip_t_m);
-            self.peak_torque_nm = self.peak_torque_nm.max(u1.abs()).max(u2.abs());
+            self.peak_torque_nm = self.peak_torque_nm.max(at.torque_nm.amax());
             if at.time_s >= self.settling_s {
                 self.min_normal_force_n = smaller(self.min_normal_force_n, at.normal_force_n);
             }

@@ -33,8 +33,8 @@ fn every_arm_agrees_with_mujoco() {
             gravity_m_s2: column("gravity"),
         })
         .unwrap();
-        let theta = JointMotion::from(pair("q")).to_links();
-        let theta_dot = JointMotion::from(pair("qd")).to_links();
+        let theta = JointMotion::from_array(pair("q")).to_links();
+        let theta_dot = JointMotion::from_array(pair("qd")).to_links();
         let pose = Pose::new(&theta);
 
         // θ = T q' and θ̇ = T q̇' with this T.

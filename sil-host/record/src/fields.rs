@@ -89,13 +89,13 @@ pub const PLANT: Topic = Topic {
     needs_estimates: false,
     fields: fields! { |sample|
         /// Angle of the first link from the belt's inward normal, rad.
-        theta1_rad: Number = sample.plant.theta_rad[0];
+        theta1_rad: Number = sample.plant.theta_rad.first();
         /// Angle of the second link from the belt's inward normal, rad.
-        theta2_rad: Number = sample.plant.theta_rad[1];
+        theta2_rad: Number = sample.plant.theta_rad.second();
         /// Rate of the first angle, rad/s.
-        theta1_dot_rad_s: Number = sample.plant.theta_dot_rad_s[0];
+        theta1_dot_rad_s: Number = sample.plant.theta_dot_rad_s.first();
         /// Rate of the second angle, rad/s.
-        theta2_dot_rad_s: Number = sample.plant.theta_dot_rad_s[1];
+        theta2_dot_rad_s: Number = sample.plant.theta_dot_rad_s.second();
         /// Position of the tip along the belt z_t, m.
         tip_t_m: Number = sample.plant.tip_t_m;
         /// Reference z_t* that the controller follows, m; absent while it follows none.
@@ -115,9 +115,9 @@ pub const PLANT: Topic = Topic {
         /// Contact coefficient p for the present direction of slip, 1/kg.
         p_per_kg: Number = sample.plant.p_per_kg;
         /// Torque on the first joint, N·m.
-        u1_nm: Number = sample.plant.torque_nm[0];
+        u1_nm: Number = sample.plant.torque_nm.first();
         /// Torque on the second joint, N·m.
-        u2_nm: Number = sample.plant.torque_nm[1];
+        u2_nm: Number = sample.plant.torque_nm.second();
         /// Contact mode of the tip: flight, slide-positive, slide-negative or stick.
         mode: Text = sample.plant.mode.name();
         /// Contact mode as a number: 0 flight, 1 slide-positive, 2 slide-negative, 3 stick.
@@ -194,13 +194,13 @@ pub const ESTIMATES: Topic = Topic {
     needs_estimates: true,
     fields: fields! { estimates |now|
         /// Estimated angle θ1, rad.
-        theta1_rad: Single = now.theta_rad[0];
+        theta1_rad: Single = now.theta_rad.first();
         /// Estimated angle θ2, rad.
-        theta2_rad: Single = now.theta_rad[1];
+        theta2_rad: Single = now.theta_rad.second();
         /// Estimated rate of θ1, rad/s.
-        theta1_dot_rad_s: Single = now.theta_dot_rad_s[0];
+        theta1_dot_rad_s: Single = now.theta_dot_rad_s.first();
         /// Estimated rate of θ2, rad/s.
-        theta2_dot_rad_s: Single = now.theta_dot_rad_s[1];
+        theta2_dot_rad_s: Single = now.theta_dot_rad_s.second();
         /// Estimated position of the tip along the belt, m.
         tip_t_m: Single = now.tip_t_m;
         /// Reference after the edge governor, m.
@@ -212,9 +212,9 @@ pub const ESTIMATES: Topic = Topic {
         /// Measured tangential force, N.
         tangential_force_n: Single = now.tangential_force_n;
         /// Torque on the first joint as output, N·m.
-        u1_nm: Single = now.torque_nm[0];
+        u1_nm: Single = now.torque_nm.first();
         /// Torque on the second joint as output, N·m.
-        u2_nm: Single = now.torque_nm[1];
+        u2_nm: Single = now.torque_nm.second();
         /// The contact decision: the tip touches the belt.
         contact: Truth = now.contact;
         /// Certainty of the contact decision, 0 to 1.

@@ -95,8 +95,8 @@ impl RunPlot {
         let (plant, answer) = (&tick.sample.plant, &tick.sample.actuator);
         let reference_m = tick.sample.reference_tip_t_m;
         let mut values = [f64::NAN; signal::COUNT];
-        [values[signal::THETA1], values[signal::THETA2]] = plant.theta_rad;
-        [values[signal::U1], values[signal::U2]] = plant.torque_nm;
+        [values[signal::THETA1], values[signal::THETA2]] = plant.theta_rad.to_array();
+        [values[signal::U1], values[signal::U2]] = plant.torque_nm.to_array();
         values[signal::TIP] = plant.tip_t_m;
         values[signal::REFERENCE] = reference_m;
         values[signal::ERROR] = 1e3 * (plant.tip_t_m - reference_m);

@@ -40,9 +40,6 @@ pub enum RecordError {
         /// The reason.
         source: io::Error,
     },
-    /// A figure or page cannot be drawn, which is not expected.
-    #[error("cannot draw the run: {0}")]
-    Draw(String),
     /// The recording thread cannot be started.
     #[error("cannot start the recording thread: {0}; end other processes or run without recording")]
     Thread(io::Error),
@@ -93,7 +90,7 @@ pub trait Sink: Send {
     fn finish(self: Box<Self>) -> Result<(), RecordError>;
 
     /// Keeps the file of a run that ended early under a name that marks it as partial, which is
-    /// returned; `None` if such a file is of no use.
+    /// returned; `None` if a partial file has no use.
     ///
     /// # Errors
     /// [`RecordError`] if the file cannot be written.

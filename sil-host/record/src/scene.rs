@@ -71,7 +71,7 @@ impl Scene {
         let plant = &tick.sample.plant;
         let time = timestamp(plant.time_s);
         let [length_1, length_2] = self.arm.link_length_m;
-        let [theta_1, theta_2] = plant.theta_rad;
+        let [theta_1, theta_2] = plant.theta_rad.to_array();
         let transform = |parent: &str, child: &str, at: [f64; 3], about_y: f64| {
             json!({
                 "timestamp": time,

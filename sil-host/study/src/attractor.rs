@@ -88,7 +88,7 @@ impl Probe for Attractor {
     fn step(&mut self, step: &impl Step) {
         let (start, end) = (step.start(), step.end());
         let duration_s = end.time_s - start.time_s;
-        let rate = |at: &Snapshot| [at.theta_dot_rad_s[0], at.theta_ddot_rad_s2[0]];
+        let rate = |at: &Snapshot| [at.theta_dot_rad_s.first(), at.theta_ddot_rad_s2.first()];
         let fastest = cubic_maximum(duration_s, rate(&start), rate(&end));
         self.max_theta1_dot_rad_s = self.max_theta1_dot_rad_s.max(fastest);
         if step.mode() == ContactMode::Flight {

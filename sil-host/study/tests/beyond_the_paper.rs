@@ -270,7 +270,7 @@ fn an_arm_without_any_force_cell_slides_with_given_friction_and_is_captured() {
     }
 }
 
-/// The arm with a spring that is `stiffness` times what the controller believes, taken elbow up
+/// The arm with a spring of `stiffness` times the modelled stiffness, taken elbow up
 /// through the middle of the belt, where p is a thirtieth of Q22 at μ = 0.85.
 fn with_a_wrong_spring(stiffness: f64, overrides: &[&str]) -> (LoopResult, Course) {
     let reference = minimum_jerk(0.1);

@@ -20,7 +20,7 @@ static SIGNALLED: AtomicBool = AtomicBool::new(false);
 static EXIT_CODE: AtomicU8 = AtomicU8::new(1);
 const FAREWELL: &str = "error: interrupted\n";
 
-/// Whether the process has been asked to end.
+/// Whether a request to end has been received.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     hears_signals: bool,

@@ -51,8 +51,8 @@ impl Row {
         let estimates = |read: fn(&painleve_firmware::telemetry::Telemetry) -> f32| {
             tick.estimates.map_or(f32::NAN, read)
         };
-        let [theta_1, theta_2] = plant.theta_rad;
-        let [u_1, u_2] = plant.torque_nm;
+        let [theta_1, theta_2] = plant.theta_rad.to_array();
+        let [u_1, u_2] = plant.torque_nm.to_array();
         Self {
             time_s: plant.time_s,
             numbers: [

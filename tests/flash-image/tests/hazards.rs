@@ -418,7 +418,7 @@ fn arming_on_implausible_readings_is_refused_with_a_fault() {
     }
 }
 
-/// What the image has recorded, asked for after its start.
+/// The records of the image, requested after its start.
 fn black_box(board: &mut FlashedBoard) -> BlackBox {
     board.send(&Request::BlackBox);
     match board.reply(20 * MILLISECOND) {

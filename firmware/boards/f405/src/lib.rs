@@ -138,7 +138,7 @@ impl Board for F405 {
             polarity: Polarity::IdleLow,
             phase: Phase::CaptureOnSecondTransition,
         };
-        // Two of these pins belong to the debugger at reset; it needs them for JTAG only.
+        // At reset, two of these pins belong to the debugger, which uses them only for JTAG.
         let pins = (
             Some(b.pb3.into_alternate::<5>()),
             Some(b.pb4.into_alternate::<5>()),
@@ -324,7 +324,7 @@ impl Drive for F405Drive {
     fn actuate(&mut self, answer: &ActuatorFrame) {
         let is_active = answer
             .supervisor_state()
-            .is_some_and(|state| !matches!(state, SupervisorState::Idle | SupervisorState::Fault));
+            .is_some_and(SupervisorState::drives);
         self.front_end.note_active(is_active);
         if is_active && self.source == FrameSource::Sensors && self.front_end.is_fit() {
             let [torque_1, torque_2] = answer.torques;

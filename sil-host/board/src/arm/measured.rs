@@ -1,12 +1,11 @@
 //! A tick of a real arm in SI units: converter counts through the controller's own scalings and arm model.
 
-use painleve_plant::sample::Sample;
+use painleve_plant::sample::{Sample, reference_tip_t_m};
 use painleve_plant::{Configuration, ContactMode, Snapshot};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::kinematics::Pose;
 use painleve_shared::range::OutOfRange;
-use painleve_shared::status::SupervisorState;
-use painleve_shared::{Arm, JointMotion};
+use painleve_shared::{Arm, JointMotion, JointTorque, LinkMotion};
 
 /// Scalings of a configured arm.
 #[derive(Clone, Debug)]
@@ -30,17 +29,11 @@ impl Measured {
     /// Returns a tick as it is recorded. Angles, tip, gap, forces and torques are measured or
     /// commanded; quantities without a sensor are NaN.
     pub fn sample(&self, sensor: &SensorFrame, answer: &ActuatorFrame) -> Sample {
-        let reference_tip_t_m = match answer.supervisor_state() {
-            Some(SupervisorState::Armed | SupervisorState::Tracking | SupervisorState::LiftOff) => {
-                answer.reference_tip.to_metres()
-            }
-            _ => f64::NAN,
-        };
         Sample {
             plant: self.snapshot(sensor, answer),
             sensor: *sensor,
             actuator: *answer,
-            reference_tip_t_m,
+            reference_tip_t_m: reference_tip_t_m(answer),
             delivered: true,
             answered: answer.tick == sensor.tick,
         }
@@ -70,9 +63,9 @@ impl Measured {
         };
         Snapshot {
             time_s: f64::from(sensor.tick) / f64::from(self.configuration.tick_hz),
-            theta_rad: theta.into(),
-            theta_dot_rad_s: [f64::NAN; 2],
-            theta_ddot_rad_s2: [f64::NAN; 2],
+            theta_rad: theta,
+            theta_dot_rad_s: LinkMotion::new(f64::NAN, f64::NAN),
+            theta_ddot_rad_s2: LinkMotion::new(f64::NAN, f64::NAN),
             tip_t_m: tip_m.x,
             gap_m: self.arm.gap_m(&pose),
             gap_rate_m_s: f64::NAN,
@@ -82,7 +75,7 @@ impl Measured {
             tangential_force_n: force_n(sensor.tangential_force.0),
             b_m_s2: f64::NAN,
             p_per_kg: f64::NAN,
-            torque_nm,
+            torque_nm: JointTorque::from_array(torque_nm),
             mode,
         }
     }
@@ -107,9 +100,7 @@ mod tests {
         let answer = ActuatorFrame::default();
         let truth = simulation.describe(&sensor, &answer).plant;
         let sample = measured.sample(&sensor, &answer).plant;
-        for joint in 0..2 {
-            assert!((sample.theta_rad[joint] - truth.theta_rad[joint]).abs() < 1e-3);
-        }
+        assert!((sample.theta_rad - truth.theta_rad).amax() < 1e-3);
         assert!((sample.tip_t_m - truth.tip_t_m).abs() < 5e-4);
         assert!((sample.normal_force_n - truth.normal_force_n).abs() < 0.1);
         assert!(sample.slip_velocity_m_s.is_nan());

@@ -11,6 +11,9 @@ const PROGRAM: &str = "cyclictest";
 /// Why there is no comparison.
 #[derive(Debug, thiserror::Error)]
 pub enum CyclictestError {
+    /// The controller does not wait for this machine's clock.
+    #[error("--cyclictest needs --host native: other hosts do not wait for this machine's clock")]
+    OtherHost,
     /// It does not start.
     #[error("{PROGRAM} does not start ({0}): install Debian's package rt-tests")]
     Start(std::io::Error),

@@ -13,6 +13,7 @@ use painleve_shared::range::OutOfRange;
 use painleve_system::atomic_file;
 use painleve_system::terminal::warn;
 
+use super::output_error::output;
 use super::{CommandError, say};
 
 /// Options of `painleve commission`.
@@ -87,14 +88,13 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         arguments.seed,
     ));
     let commissioned = commission(&mut rig, &expected).map_err(|error| match error {
-        CommissionError::Rig(error) => CommandError::Input(error.to_string()),
+        CommissionError::Rig(error) => CommandError::Input(error.into()),
         CommissionError::Refused(mistake) => CommandError::Mounting(mistake),
         CommissionError::Range(source) => range(source),
     })?;
     let corrected = commissioned.applied_to(&scenario).map_err(range)?;
     let text = corrected.to_commented_toml();
-    atomic_file::write(&arguments.output, text.as_bytes())
-        .map_err(|error| CommandError::Output(error.to_string()))?;
+    atomic_file::write(&arguments.output, text.as_bytes()).map_err(output)?;
     report(arguments, &commissioned)
 }
 

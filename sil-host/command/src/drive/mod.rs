@@ -20,6 +20,7 @@ use serde::Serialize;
 
 use self::operator::{Operator, OperatorCommand};
 use self::view::View;
+use super::output_error::output;
 use super::process_error::ProcessError;
 use super::{CommandError, say};
 
@@ -83,7 +84,7 @@ pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     let mut recorder = recorder(arguments, &scenario)?;
     let mut drive = Drive::open(arguments, &scenario)?;
     let watched = drive.watch(arguments, &interrupt, &mut recorder);
-    // Whatever ended the drive, remove the torque; a board that cannot be reached stops by itself.
+    // Remove the torque in every case; a board that cannot be reached stops by itself.
     let stopped = drive.arm.stop();
     drive.view.finish();
     if let Err(error) = watched.and(stopped.map_err(CommandError::from)) {
@@ -104,10 +105,6 @@ pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     })?;
     painleve_shared::status::Fault::from_code(report.fault)
         .map_or(Ok(()), |fault| Err(CommandError::Faulted(fault)))
-}
-
-fn output(error: impl std::fmt::Display) -> CommandError {
-    CommandError::Output(error.to_string())
 }
 
 /// Opens the record, so that an unwritable path is reported before anything moves.
@@ -202,7 +199,9 @@ impl Drive {
                 Some(OperatorCommand::Disarm) => self.arm.permit_arming(false)?,
                 Some(OperatorCommand::Stop) => return Ok(()),
                 Some(OperatorCommand::Unknown(text)) => {
-                    warn(format_args!("unknown order {text:?}: arm, disarm or stop"));
+                    warn(format_args!(
+                        "unknown command {text:?}: arm, disarm or stop"
+                    ));
                 }
             }
             if health.elapsed() >= HEALTH_INTERVAL {
@@ -253,7 +252,7 @@ impl Drive {
         let step = before.map_or(1, |before| sensor.sequence.wrapping_sub(before));
         self.report.ticks += 1;
         self.report.lost_ticks += u64::from(step.saturating_sub(1));
-        self.report.active_ticks += u64::from(view::is_active(state));
+        self.report.active_ticks += u64::from(state.drives());
         let sample = self.measured.sample(&sensor, answer);
         if let Some(recorder) = recorder {
             recorder.push(&sample).map_err(output)?;

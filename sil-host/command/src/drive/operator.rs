@@ -1,9 +1,9 @@
-//! The operator's orders: lines on standard input.
+//! The operator's commands: lines on standard input.
 
 use std::io::{self, BufRead};
 use std::sync::mpsc::{Receiver, channel};
 
-/// An order to the drive.
+/// A command to the drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum OperatorCommand {
     /// Permit the drive to arm.
@@ -28,7 +28,7 @@ impl OperatorCommand {
     }
 }
 
-/// Reads orders without holding up the drive.
+/// Reads commands without blocking the drive.
 pub struct Operator(Receiver<OperatorCommand>);
 
 impl Operator {
@@ -51,7 +51,7 @@ impl Operator {
         Ok(Self(receiver))
     }
 
-    /// Returns the next order, if one has been given.
+    /// Returns the next command, if there is one.
     pub fn order(&self) -> Option<OperatorCommand> {
         self.0.try_recv().ok()
     }

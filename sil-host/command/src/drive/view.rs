@@ -16,11 +16,6 @@ use painleve_system::terminal::warn;
 /// Time between two redraws.
 const REDRAW: Duration = Duration::from_millis(100);
 
-/// Returns whether torque may be applied in this state.
-pub fn is_active(state: SupervisorState) -> bool {
-    !matches!(state, SupervisorState::Idle | SupervisorState::Fault)
-}
-
 /// The table.
 pub struct View {
     /// `None` if standard error is not a terminal.
@@ -63,7 +58,7 @@ impl View {
         });
     }
 
-    /// Shows the board's counters, and the line's at this end.
+    /// Shows the counters of the board, and of this end of the line.
     pub fn show_health(&mut self, health: &Health, line: LineHealth) {
         let lapses: Vec<String> = Lapse::ALL
             .iter()
@@ -90,7 +85,7 @@ impl View {
             self.log(&status(answer));
         }
         // The board withdraws the permission when the drive stops.
-        let is_active = is_active(answer.supervisor_state().unwrap_or_default());
+        let is_active = answer.supervisor_state().unwrap_or_default().drives();
         self.permitted &= is_active || !self.was_active;
         self.was_active = is_active;
     }
@@ -138,8 +133,8 @@ fn status(answer: &ActuatorFrame) -> String {
 
 fn text(sample: &Sample, permitted: bool, counters: &str) -> String {
     let plant = &sample.plant;
-    let [theta_1, theta_2] = plant.theta_rad.map(f64::to_degrees);
-    let [torque_1, torque_2] = plant.torque_nm;
+    let [theta_1, theta_2] = plant.theta_rad.to_array().map(f64::to_degrees);
+    let [torque_1, torque_2] = plant.torque_nm.to_array();
     let switch = sample.sensor.inputs.contains(DigitalInputs::ENABLE);
     let flags: Vec<String> = sample
         .actuator

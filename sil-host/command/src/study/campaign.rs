@@ -5,45 +5,43 @@ use std::collections::BTreeMap;
 use clap::{ArgAction, Command};
 use painleve_plant::scenario::Scenario;
 use painleve_study::catalogue::{CatalogueEntry, STUDIES};
-use painleve_study::sweep::campaign::{Campaign, Understood};
+use painleve_study::sweep::campaign::{Campaign, CampaignError, Understood};
 
 /// Returns the study of a campaign.
 ///
 /// # Errors
-/// One sentence about the mistake and the allowed values.
-pub fn understand(campaign: &Campaign) -> Result<Understood, String> {
+/// [`CampaignError`] with the allowed values.
+pub fn understand(campaign: &Campaign) -> Result<Understood, CampaignError> {
     let name = campaign.study.as_str();
+    let not_shardable = || {
+        let all = STUDIES.iter().filter(|entry| entry.has_shards);
+        CampaignError::NotShardable {
+            study: name.to_owned(),
+            shardable: all.map(|entry| entry.name).collect(),
+        }
+    };
     let entry = CatalogueEntry::find(name)
         .filter(|entry| entry.has_shards)
-        .ok_or_else(|| {
-            let all = STUDIES.iter().filter(|entry| entry.has_shards);
-            let all: Vec<&str> = all.map(|entry| entry.name).collect();
-            format!(
-                "study = \"{name}\" cannot be computed in shards; these can: {}",
-                all.join(", ")
-            )
-        })?;
+        .ok_or_else(not_shardable)?;
     let command = entry.command().no_binary_name(true);
     let arguments = arguments(campaign, command.clone())?;
     let matches = command.try_get_matches_from(arguments);
-    let options = matches.and_then(|matches| (entry.read)(&matches));
-    let options = options.map_err(|error| first_sentence(&error))?;
-    let table = options.table().map_err(|error| error.to_string())?;
-    let table = table.ok_or_else(|| format!("{name} cannot be computed in shards"))?;
+    let options = matches.and_then(|matches| (entry.read)(&matches))?;
+    let table = options.table()?.ok_or_else(not_shardable)?;
     let text = |name: String| {
-        let scenario = Scenario::load_unplaced(&name, &[]).map_err(|error| error.to_string())?;
-        let text = toml::to_string(&scenario).map_err(|error| error.to_string())?;
+        let scenario = Scenario::load_unplaced(&name, &[])?;
+        let text = toml::to_string(&scenario)?;
         Ok((name, text))
     };
     let scenarios = options.scenarios().into_iter().map(text);
     Ok(Understood {
         table,
-        scenarios: scenarios.collect::<Result<_, String>>()?,
+        scenarios: scenarios.collect::<Result<_, CampaignError>>()?,
     })
 }
 
 /// Returns the campaign's options as a command line.
-fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, String> {
+fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, CampaignError> {
     study.build();
     let options: BTreeMap<&str, &clap::Arg> = study
         .get_arguments()
@@ -53,12 +51,11 @@ fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, Str
     let mut line = Vec::new();
     for (key, values) in &campaign.options {
         let Some(option) = options.get(key.as_str()) else {
-            let known: Vec<&str> = options.keys().copied().collect();
-            return Err(format!(
-                "unknown option '{key}' in a campaign of the study {}; known: {}",
-                campaign.study,
-                known.join(", ")
-            ));
+            return Err(CampaignError::UnknownOption {
+                key: key.clone(),
+                study: campaign.study.clone(),
+                known: options.keys().map(ToString::to_string).collect(),
+            });
         };
         // Repeated options become `--set a --set b`, lists become `--mu a,b`.
         let is_repeated = matches!(option.get_action(), ArgAction::Append)
@@ -70,13 +67,6 @@ fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, Str
         }
     }
     Ok(line)
-}
-
-/// Returns clap's message without its hints for the command line.
-fn first_sentence(error: &clap::Error) -> String {
-    let text = error.to_string();
-    let sentence = text.lines().next().unwrap_or_default();
-    sentence.trim_start_matches("error: ").to_owned()
 }
 
 #[cfg(test)]
@@ -163,7 +153,7 @@ mod tests {
                 "'no'",
             ),
         ] {
-            let message = understand(&campaign).err().unwrap();
+            let message = understand(&campaign).err().unwrap().to_string();
             assert!(message.contains(part), "{message}");
             assert_eq!(message.lines().count(), 1, "{message}");
         }

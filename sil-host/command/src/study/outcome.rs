@@ -13,6 +13,7 @@ use painleve_study::catalogue::{AnyOutcome, AnyStudy};
 use painleve_system::atomic_file::{self, AtomicFile};
 
 use crate::output::figure_path;
+use crate::output_error::output;
 use crate::process_error::ProcessError;
 use crate::{CommandError, say};
 
@@ -110,11 +111,6 @@ impl OutcomeOptions {
             say(terminal::readable(outcome.table()))
         }
     }
-}
-
-/// Converts an error of an output file.
-pub fn output(error: impl std::fmt::Display) -> CommandError {
-    CommandError::Output(error.to_string())
 }
 
 /// Returns a progress bar on stderr if it is a terminal, otherwise a hidden one.

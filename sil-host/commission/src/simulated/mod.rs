@@ -91,8 +91,7 @@ impl SimulatedRig {
         let arm = Arm::new(self.actual.arm)?;
         let tip_t_m = self.draw(HAND_M);
         let start = arm.link_angles_on_belt_rad(tip_t_m, posture);
-        let start = <[f64; 2]>::from(start.unwrap_or_else(LinkMotion::zeros));
-        let [theta_1, theta_2] = start.map(f64::to_degrees);
+        let [theta_1, theta_2] = start.unwrap_or_default().to_array().map(f64::to_degrees);
         self.actual.initial = InitialState::at_rest(theta_1, theta_2);
         self.simulation = Some(Simulation::new(&self.actual)?);
         self.held_rad = None;
@@ -107,7 +106,7 @@ impl SimulatedRig {
             }
             (held_rad, _) => {
                 let held_rad = held_rad.unwrap_or_else(LinkMotion::zeros);
-                let angles: [f64; 2] = held_rad.to_joints().into();
+                let angles = held_rad.to_joints().to_array();
                 let joints = [0, 1].map(|joint| self.encoders[joint].reading(angles[joint]));
                 (joints, [ForceCounts(0); 2])
             }

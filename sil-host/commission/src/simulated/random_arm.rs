@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_shared::counts::ForceCounts;
-use painleve_shared::{Arm, ArmParameters, OutOfRange, Posture};
+use painleve_shared::{Arm, ArmParameters, JointTorque, OutOfRange, Posture};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -53,9 +53,9 @@ pub fn random_arm(seed: u64) -> Result<Scenario, OutOfRange> {
     };
     let arm = Arm::new(scenario.arm)?;
     let start = arm.link_angles_on_belt_rad(0.0, posture);
-    let weight_n = start.and_then(|start| force_at_rest_n(&arm, &start, [0.0; 2]));
+    let weight_n = start.and_then(|start| force_at_rest_n(&arm, &start, JointTorque::zeros()));
     if let Some(start) = start {
-        let [theta_1, theta_2] = <[f64; 2]>::from(start).map(f64::to_degrees);
+        let [theta_1, theta_2] = start.to_array().map(f64::to_degrees);
         scenario.initial = InitialState::at_rest(theta_1, theta_2);
     }
     let converters = &mut scenario.converters;

@@ -1,4 +1,4 @@
-//! How the parts of a simulated arm are mounted and wired: what it reads and does instead of the perfect arm.
+//! Mounting and wiring of a simulated arm's parts, and their effect on its readings and torques.
 
 use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::{
@@ -54,7 +54,7 @@ impl Wiring {
         }
     }
 
-    /// Returns what the encoders read for perfect readings.
+    /// Returns the encoders' readings for the readings of a perfectly mounted arm.
     pub fn encoders(
         &self,
         scales: &[EncoderScale; 2],
@@ -86,7 +86,7 @@ impl Wiring {
         raw
     }
 
-    /// Returns what the force cell reads for perfect readings of f_t and f_n.
+    /// Returns the force cell's readings for those of a perfectly mounted one, f_t and f_n.
     pub fn forces(
         &self,
         scale: &LinearScale<f32>,

@@ -102,7 +102,7 @@ impl Encoders {
 
     /// Captures the link angles, rad; called once per tick.
     pub fn capture(&mut self, theta_rad: &LinkMotion<f64>) {
-        let joints: [f64; 2] = theta_rad.to_joints().into();
+        let joints = theta_rad.to_joints().to_array();
         let mut readings = [EncoderCounts(0); 2];
         for (joint, reading) in readings.iter_mut().enumerate() {
             let error_rad = self.settings.error_rad(joint, joints[joint]);

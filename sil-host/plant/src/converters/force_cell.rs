@@ -122,7 +122,7 @@ impl ForceCell {
         let (normal, _) = self.scale.counts(output.y + self.normal_noise.draw());
         let reading = (ForceCounts(tangential), ForceCounts(normal));
         self.delayed.push_back(reading);
-        // Before the first sample the cell read what it reads first.
+        // Before the first sample, the delay line holds the first reading.
         let (tangential, normal) = if self.delayed.len() > usize::from(settings.delay_ticks) {
             self.delayed.pop_front().unwrap_or(reading)
         } else {

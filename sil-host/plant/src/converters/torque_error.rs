@@ -44,8 +44,8 @@ impl TorqueErrorSettings {
         }
         let is_pulse =
             time_s >= self.pulse_at_s && time_s < self.pulse_at_s + self.pulse_duration_s;
-        let commands: [f64; 2] = command_nm.into();
-        let angles: [f64; 2] = (*joints_rad).into();
+        let commands = command_nm.to_array();
+        let angles = joints_rad.to_array();
         let mut applied = [0.0; 2];
         for (joint, torque_nm) in applied.iter_mut().enumerate() {
             let command_nm = commands[joint];
@@ -60,7 +60,7 @@ impl TorqueErrorSettings {
                 *torque_nm += self.pulse_nm[joint];
             }
         }
-        applied.into()
+        JointTorque::from_array(applied)
     }
 }
 

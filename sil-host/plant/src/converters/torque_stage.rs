@@ -129,7 +129,7 @@ impl TorqueStages {
             let limited = passed.clamp(i64::from(-maximum - 1), i64::from(maximum));
             *torque_nm = self.scale.value(limited as i32);
         }
-        self.commands[self.next] = torques_nm.into();
+        self.commands[self.next] = JointTorque::from_array(torques_nm);
         self.next = (self.next + 1) % MAXIMUM_DELAY_TICKS;
         self.watchdog.tick(counts.is_some());
         if self.watchdog.tripped {

@@ -11,7 +11,7 @@ use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
 
 use super::belt::{BeltProfile, BeltSettings};
 use super::cash_karp::ShortStep;
-use super::dop853::{Step, Tolerance};
+use super::dop853::{Dop853Step, Tolerance};
 use super::impact::ImpactLaw;
 use super::motion::{Evaluation, Motion, theta};
 use super::motion_error::MotionError;
@@ -55,7 +55,7 @@ pub struct ArmOnBelt {
     /// The equations evaluated at the present state, if known; cleared by any change of the state
     /// or of the equations.
     evaluation: Option<Evaluation>,
-    step: Box<Step<4>>,
+    step: Box<Dop853Step<4>>,
 }
 
 impl ArmOnBelt {
@@ -87,7 +87,7 @@ impl ArmOnBelt {
             budget: StepBudget::default(),
             short_size_s: LONGEST_SHORT_STEP_S,
             evaluation: None,
-            step: Box::new(Step::empty()),
+            step: Box::new(Dop853Step::empty()),
         };
         let motion = plant.motion();
         let gap_m = motion.gap_m(&initial);
@@ -288,7 +288,7 @@ impl ArmOnBelt {
             self.step
                 .take(&derivative, start_s, &start, &here.slope, size, &tolerance);
             if self.step.error <= 1.0 {
-                // A truncated step is no reason against a longer one.
+                // A truncated step does not limit the next one.
                 let proposed = self.step.proposed_size();
                 self.step_size_s = if size < wanted {
                     wanted.max(proposed)

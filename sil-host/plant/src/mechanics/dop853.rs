@@ -21,7 +21,7 @@ pub struct Tolerance {
 
 /// The stages of one step from (`t`, `x`) to (`t + h`, `end`).
 #[derive(Clone, Debug)]
-pub struct Step<const N: usize> {
+pub struct Dop853Step<const N: usize> {
     /// Start time, s.
     pub t: f64,
     /// Step size, s.
@@ -35,8 +35,8 @@ pub struct Step<const N: usize> {
     stages: [SVector<f64, N>; 16],
 }
 
-impl<const N: usize> Step<N> {
-    /// Returns an empty step, as memory for [`Step::take`].
+impl<const N: usize> Dop853Step<N> {
+    /// Returns an empty step, as memory for [`Dop853Step::take`].
     pub fn empty() -> Self {
         Self {
             t: 0.0,
@@ -206,7 +206,7 @@ impl<const N: usize> Step<N> {
         self.stages[12] = *end_slope;
     }
 
-    /// Returns the polynomial through the step; call it after [`Step::finish`]. Costs three
+    /// Returns the polynomial through the step; call it after [`Dop853Step::finish`]. Costs three
     /// evaluations.
     pub fn dense<F>(&mut self, derivative: &F) -> DenseStep<N>
     where
@@ -351,9 +351,9 @@ mod tests {
         Vector2::new(x.y, -x.x)
     }
 
-    fn step_of(h: f64) -> Step<2> {
+    fn step_of(h: f64) -> Dop853Step<2> {
         let x = Vector2::new(0.3, 0.8);
-        let mut step = Step::empty();
+        let mut step = Dop853Step::empty();
         step.take(&oscillator, 0.0, &x, &oscillator(0.0, &x), h, &TOLERANCE);
         let end_slope = oscillator(h, &step.end);
         step.finish(&end_slope);
@@ -389,7 +389,7 @@ mod tests {
     fn steps_of_the_proposed_size_meet_the_tolerance() {
         let mut x = Vector2::new(2.0, 0.0);
         let (mut t, mut h) = (0.0, 0.01);
-        let mut step = Step::empty();
+        let mut step = Dop853Step::empty();
         while t < 100.0 {
             step.take(&pendulum, t, &x, &pendulum(t, &x), h, &TOLERANCE);
             if step.error <= 1.0 {
@@ -409,7 +409,7 @@ mod tests {
     #[test]
     fn a_nan_step_is_rejected() {
         let x = Vector2::new(f64::NAN, 0.0);
-        let mut step = Step::empty();
+        let mut step = Dop853Step::empty();
         step.take(&oscillator, 0.0, &x, &oscillator(0.0, &x), 0.1, &TOLERANCE);
         assert!(step.error.is_nan());
     }

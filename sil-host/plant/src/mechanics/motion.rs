@@ -101,9 +101,9 @@ impl Motion<'_> {
     ) -> Snapshot {
         Snapshot {
             time_s: t_s,
-            theta_rad: [state[0], state[1]],
-            theta_dot_rad_s: [state[2], state[3]],
-            theta_ddot_rad_s2: [here.slope[2], here.slope[3]],
+            theta_rad: LinkMotion::new(state[0], state[1]),
+            theta_dot_rad_s: LinkMotion::new(state[2], state[3]),
+            theta_ddot_rad_s2: LinkMotion::new(here.slope[2], here.slope[3]),
             tip_t_m: here.tip_t_m,
             gap_m: here.gap[0],
             gap_rate_m_s: here.gap[1],
@@ -113,7 +113,7 @@ impl Motion<'_> {
             tangential_force_n: here.force_n.x,
             b_m_s2: here.b_m_s2,
             p_per_kg: here.p_per_kg,
-            torque_nm: self.torque.at(t_s).into(),
+            torque_nm: self.torque.at(t_s),
             mode,
         }
     }

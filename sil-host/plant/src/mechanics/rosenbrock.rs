@@ -68,14 +68,14 @@ pub trait Equations<const N: usize> {
 
 /// Result of a step.
 #[derive(Clone, Copy, Debug)]
-pub struct Step<const N: usize> {
+pub struct RosenbrockStep<const N: usize> {
     /// State at the end, of order 4.
     pub end: SVector<f64, N>,
     /// Error relative to the tolerance: the step is accepted if this is at most 1.
     pub error: f64,
 }
 
-impl<const N: usize> Step<N> {
+impl<const N: usize> RosenbrockStep<N> {
     /// Returns the factor from this step's size to that of the next step or attempt.
     pub fn growth(&self) -> f64 {
         if !self.error.is_finite() {
@@ -131,8 +131,8 @@ where
     }
 
     /// Integrates over `h`, with the error of every component weighted by `tolerance` · (1 + |x|).
-    pub fn step(&self, equations: &impl Equations<N>, h: f64, tolerance: f64) -> Step<N> {
-        let failed = Step {
+    pub fn step(&self, equations: &impl Equations<N>, h: f64, tolerance: f64) -> RosenbrockStep<N> {
+        let failed = RosenbrockStep {
             end: self.start,
             error: f64::NAN,
         };
@@ -181,7 +181,7 @@ where
             let scale = tolerance * (1.0 + self.start[i].abs().max(end[i].abs()));
             square += (k[5][i] / scale) * (k[5][i] / scale);
         }
-        Step {
+        RosenbrockStep {
             end,
             error: (square / N as f64).sqrt(),
         }

@@ -2,7 +2,7 @@
 
 use painleve_shared::{ContactTerms, Pose, Slip, SolutionMode, settings};
 
-use super::dop853::{DenseStep, Step};
+use super::dop853::{DenseStep, Dop853Step};
 use super::event::{first_negative, stays_above};
 use super::motion::{Evaluation, Motion, theta, theta_dot};
 use crate::plant::{ContactMode, State};
@@ -184,7 +184,7 @@ fn side_of(guarded_p: f64) -> f64 {
 pub fn first_event_s(
     motion: &Motion<'_>,
     mode: ContactMode,
-    step: &mut Step<4>,
+    step: &mut Dop853Step<4>,
     start: &Evaluation,
     end: &Evaluation,
 ) -> Option<f64> {
@@ -207,7 +207,11 @@ pub fn first_event_s(
     }
 }
 
-fn first_landing_s(motion: &Motion<'_>, step: &mut Step<4>, start: &Evaluation) -> Option<f64> {
+fn first_landing_s(
+    motion: &Motion<'_>,
+    step: &mut Dop853Step<4>,
+    start: &Evaluation,
+) -> Option<f64> {
     let start = start.gap;
     let (t, h) = (step.t, step.h);
     let dense = step.dense(&|t, x: &State| motion.derivative(ContactMode::Flight, t, x));
@@ -293,7 +297,7 @@ pub fn landing_correction_s(motion: &Motion<'_>, mode: ContactMode, state: &Stat
 fn first_end_of_slide_s(
     motion: &Motion<'_>,
     mode: ContactMode,
-    step: &mut Step<4>,
+    step: &mut Dop853Step<4>,
     start: &Evaluation,
 ) -> Option<f64> {
     let side = side_of(start.p_per_kg - P_GUARD * start.q22_per_kg);
@@ -309,7 +313,7 @@ fn first_end_of_slide_s(
 
 /// Returns the first time in a step at which a margin is negative, searched part by part.
 fn first_in_parts(
-    step: &Step<4>,
+    step: &Dop853Step<4>,
     dense: &DenseStep<4>,
     margin: &impl Fn(f64, &State) -> f64,
 ) -> Option<f64> {

@@ -19,7 +19,7 @@ pub type State = Vector4<f64>;
 ///
 /// ```
 /// use painleve_plant::{Plant, PlantError, Probe, Snapshot};
-/// use painleve_shared::JointTorque;
+/// use painleve_shared::{JointTorque, LinkMotion};
 ///
 /// /// Two flywheels.
 /// struct Flywheels(Snapshot);
@@ -30,16 +30,16 @@ pub type State = Vector4<f64>;
 ///     }
 ///
 ///     fn command_torque(&mut self, target_nm: JointTorque<f64>, _lag_s: f64) {
-///         self.0.torque_nm = target_nm.into();
+///         self.0.torque_nm = target_nm;
 ///     }
 ///
 ///     fn advance(&mut self, until_s: f64, _: &mut impl Probe) -> Result<(), PlantError> {
 ///         const INERTIA_KG_M2: f64 = 0.01;
 ///         let step_s = until_s - self.0.time_s;
-///         for joint in 0..2 {
-///             self.0.theta_dot_rad_s[joint] += step_s * self.0.torque_nm[joint] / INERTIA_KG_M2;
-///             self.0.theta_rad[joint] += step_s * self.0.theta_dot_rad_s[joint];
-///         }
+///         let torque_nm = self.0.torque_nm.to_links();
+///         let acceleration = LinkMotion::from_vector(torque_nm.vector() / INERTIA_KG_M2);
+///         self.0.theta_dot_rad_s += acceleration * step_s;
+///         self.0.theta_rad += self.0.theta_dot_rad_s * step_s;
 ///         self.0.time_s = until_s;
 ///         Ok(())
 ///     }
@@ -76,7 +76,7 @@ pub trait Plant {
 
     /// Returns the angles of the links, rad, from which the encoders derive those of the joints.
     fn link_angles_rad(&self) -> LinkMotion<f64> {
-        self.snapshot().theta_rad.into()
+        self.snapshot().theta_rad
     }
 
     /// Returns the force of the surface on the tip (f_t, f_n), N, without impulses.
@@ -104,11 +104,11 @@ pub struct Snapshot {
     /// Simulated time, s.
     pub time_s: f64,
     /// Angles θ1, θ2 from the belt's inward normal, rad.
-    pub theta_rad: [f64; 2],
+    pub theta_rad: LinkMotion<f64>,
     /// Their rates, rad/s.
-    pub theta_dot_rad_s: [f64; 2],
+    pub theta_dot_rad_s: LinkMotion<f64>,
     /// Their accelerations, rad/s².
-    pub theta_ddot_rad_s2: [f64; 2],
+    pub theta_ddot_rad_s2: LinkMotion<f64>,
     /// Position of the tip along the belt z_t, m.
     pub tip_t_m: f64,
     /// Height of the tip above the belt, m.
@@ -128,7 +128,7 @@ pub struct Snapshot {
     /// p for the present direction of slip, 1/kg.
     pub p_per_kg: f64,
     /// Torques u1, u2 that act on the joints, N·m.
-    pub torque_nm: [f64; 2],
+    pub torque_nm: JointTorque<f64>,
     /// Contact mode.
     pub mode: ContactMode,
 }

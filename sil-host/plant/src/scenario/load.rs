@@ -17,12 +17,13 @@ const MOST_LEVELS: usize = 16;
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
     /// The name is neither a built-in scenario nor a file.
-    #[error("no built-in scenario and no file is called '{name}'; built in are: {known}")]
+    #[error(
+        "no built-in scenario and no file is called '{name}'; built in are: {}",
+        built_in::names().collect::<Vec<_>>().join(", ")
+    )]
     Unknown {
         /// The requested name.
         name: String,
-        /// The built-in names.
-        known: String,
     },
     /// The file cannot be read.
     #[error("cannot read scenario file {}: {source}", path.display())]
@@ -39,22 +40,22 @@ pub enum ScenarioError {
         path: PathBuf,
     },
     /// The text is not TOML.
-    #[error("{origin} is not TOML: {message}")]
+    #[error("{origin} is not TOML: {source}")]
     Syntax {
         /// File or scenario.
         origin: String,
         /// What is wrong, and where.
-        message: String,
+        source: TomlError,
     },
     /// A key is unknown or has the wrong type.
-    #[error("{origin}: {key}: {message}")]
+    #[error("{origin}: {key}: {source}")]
     Key {
         /// File, scenario or option.
         origin: String,
         /// Path of the key.
         key: String,
         /// What is wrong, and what is allowed.
-        message: String,
+        source: KeyError,
     },
     /// An override is not of the form key=value.
     #[error("--set '{text}' is not of the form key=value; example: --set belt.friction=0.4")]
@@ -73,6 +74,54 @@ pub enum ScenarioError {
         /// The value and the allowed range.
         source: OutOfRange,
     },
+}
+
+/// What is wrong with a TOML text, and in which line.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{}", .line.map_or(String::new(), |line| format!("line {line}: ")), source.message())]
+pub struct TomlError {
+    line: Option<usize>,
+    source: toml::de::Error,
+}
+
+impl TomlError {
+    /// Returns the error of a parser in a text.
+    pub fn new(source: toml::de::Error, text: &str) -> Self {
+        let line = source
+            .span()
+            .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
+        Self { line, source }
+    }
+}
+
+/// What is wrong with a key.
+#[derive(Debug, thiserror::Error)]
+pub enum KeyError {
+    /// The key is unknown or its value has the wrong type.
+    #[error("{}", .0.message().replace('\n', " "))]
+    Value(toml::de::Error),
+    /// The scenario cannot be written as a table.
+    #[error(transparent)]
+    Table(#[from] toml::ser::Error),
+    /// A part of the key is unknown.
+    #[error("unknown key '{part}'; known: {}", known.join(", "))]
+    Unknown {
+        /// The part.
+        part: String,
+        /// The keys at its level.
+        known: Vec<String>,
+    },
+    /// A part of the key is not a number of a list's items.
+    #[error("'{part}' is not one of its {count} items, from 0")]
+    NoItem {
+        /// The part.
+        part: String,
+        /// Number of items.
+        count: usize,
+    },
+    /// A part of the key lies inside a number, a text or a switch.
+    #[error("'{0}' would be inside a single value")]
+    InsideValue(String),
 }
 
 impl Scenario {
@@ -146,10 +195,7 @@ fn read(name: &str) -> Result<Table, ScenarioError> {
     }
     let path = PathBuf::from(name);
     if !path.exists() {
-        return Err(ScenarioError::Unknown {
-            name: name.into(),
-            known: built_in::names().collect::<Vec<_>>().join(", "),
-        });
+        return Err(ScenarioError::Unknown { name: name.into() });
     }
     let text = input_file::read(&path).map_err(|source| ScenarioError::Unreadable {
         path: path.clone(),
@@ -166,17 +212,9 @@ fn read(name: &str) -> Result<Table, ScenarioError> {
 }
 
 fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
-    text.parse().map_err(|error: toml::de::Error| {
-        let line = error
-            .span()
-            .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
-        ScenarioError::Syntax {
-            origin: origin.into(),
-            message: match line {
-                Some(line) => format!("line {line}: {}", error.message()),
-                None => error.message().into(),
-            },
-        }
+    text.parse().map_err(|error| ScenarioError::Syntax {
+        origin: origin.into(),
+        source: TomlError::new(error, text),
     })
 }
 
@@ -184,7 +222,7 @@ fn from_table(origin: &str, table: Table) -> Result<Scenario, ScenarioError> {
     serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
         origin: origin.into(),
         key: error.path().to_string(),
-        message: error.inner().message().replace('\n', " "),
+        source: KeyError::Value(error.into_inner()),
     })
 }
 
@@ -208,12 +246,12 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
         .ok()
         .and_then(|mut table| table.remove("value"))
         .unwrap_or_else(|| Value::String(value.into()));
-    let wrong_key = |message| ScenarioError::Key {
+    let wrong_key = |source| ScenarioError::Key {
         origin: "--set".into(),
         key: key.into(),
-        message,
+        source,
     };
-    let mut root = Value::try_from(&scenario).map_err(|error| wrong_key(error.to_string()))?;
+    let mut root = Value::try_from(&scenario).map_err(|error| wrong_key(error.into()))?;
     // Message on the first part of the key that is missing, unless an optional setting is absent.
     let mut missing = None;
     let parts: Vec<&str> = key.split('.').collect();
@@ -222,8 +260,10 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
         let next = match place {
             Value::Table(table) => {
                 if !table.contains_key(part) && missing.is_none() {
-                    let known = table.keys().cloned().collect::<Vec<_>>().join(", ");
-                    let unknown = format!("unknown key '{part}'; known: {known}");
+                    let unknown = KeyError::Unknown {
+                        part: part.into(),
+                        known: table.keys().cloned().collect(),
+                    };
                     let is_optional = describe::is_optional(&parts[..=index]);
                     missing = Some((!is_optional).then_some(unknown));
                 }
@@ -235,9 +275,12 @@ fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioErr
                 part.parse::<usize>()
                     .ok()
                     .and_then(|index| array.get_mut(index))
-                    .ok_or(format!("'{part}' is not one of its {count} items, from 0"))
+                    .ok_or_else(|| KeyError::NoItem {
+                        part: part.into(),
+                        count,
+                    })
             }
-            _ => Err(format!("'{part}' would be inside a single value")),
+            _ => Err(KeyError::InsideValue(part.into())),
         };
         place = next.map_err(wrong_key)?;
     }

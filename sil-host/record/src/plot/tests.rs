@@ -5,6 +5,7 @@ use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::Snapshot;
 use painleve_plant::sample::Sample;
 use painleve_shared::frame::ActuatorFrame;
+use painleve_shared::{JointTorque, LinkMotion};
 use proptest::prelude::*;
 
 /// Creates a run whose tip follows its reference, then leaves the belt for one tick.
@@ -16,7 +17,7 @@ fn sample(tick: u32) -> Sample {
             tip_t_m: 0.1 * time_s,
             gap_m: if tick == 501 { 1e-3 } else { 0.0 },
             normal_force_n: if tick == 500 { 480.0 } else { 10.0 },
-            torque_nm: [1.0, 2.0],
+            torque_nm: JointTorque::new(1.0, 2.0),
             b_m_s2: -5.0,
             p_per_kg: 0.4,
             mode: if tick == 501 {
@@ -130,7 +131,7 @@ fn panels_without_content_are_left_out() {
     for tick in 0..100 {
         let mut sample = sample(tick);
         sample.reference_tip_t_m = f64::NAN;
-        sample.plant.torque_nm = [0.0; 2];
+        sample.plant.torque_nm = JointTorque::zeros();
         sample.plant.normal_force_n = 0.0;
         plot.tick(&RecordedTick {
             sample: &sample,
@@ -211,11 +212,11 @@ proptest! {
                 sample: &Sample {
                     plant: Snapshot {
                         time_s,
-                        theta_rad: [value, other],
+                        theta_rad: LinkMotion::new(value, other),
                         tip_t_m: value,
                         gap_m: other,
                         normal_force_n: other,
-                        torque_nm: [value, other],
+                        torque_nm: JointTorque::new(value, other),
                         b_m_s2: -value,
                         p_per_kg: other,
                         ..Snapshot::default()

@@ -1,6 +1,6 @@
 //! Deviation of a neighbouring motion of the simulated arm.
 
-use painleve_plant::mechanics::dop853::{Step, Tolerance};
+use painleve_plant::mechanics::dop853::{Dop853Step, Tolerance};
 use painleve_plant::mechanics::impact::{ImpactKind, ImpactLaw, state_after};
 use painleve_plant::mechanics::motion::{Motion, theta};
 use painleve_plant::mechanics::transition::event_functions;
@@ -19,7 +19,7 @@ pub struct ArmTangent {
     before: Option<(ContactMode, State)>,
     /// Impacts since the last step, in order.
     impacts: Vec<ImpactKind>,
-    step: Box<Step<4>>,
+    step: Box<Dop853Step<4>>,
 }
 
 /// Tolerances with which no step is rejected: the plant has chosen the step size.
@@ -44,7 +44,7 @@ impl ArmTangent {
             tangent,
             before: None,
             impacts: Vec::new(),
-            step: Box::new(Step::empty()),
+            step: Box::new(Dop853Step::empty()),
         }
     }
 

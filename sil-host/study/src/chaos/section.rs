@@ -1,6 +1,6 @@
 //! Returns of the arm to θ̇1 = 0 from below: the section of the paper's Fig. 5.
 
-use painleve_plant::mechanics::dop853::{Step, Tolerance};
+use painleve_plant::mechanics::dop853::{Dop853Step, Tolerance};
 use painleve_plant::mechanics::event::first_negative;
 use painleve_plant::mechanics::impact::ImpactLaw;
 use painleve_plant::mechanics::{ArmProbe, ArmStep};
@@ -26,7 +26,7 @@ const RATE: usize = 2;
 pub struct Returns {
     tangent: ArmTangent,
     went_down: bool,
-    step: Box<Step<4>>,
+    step: Box<Dop853Step<4>>,
     returns: Vec<Return<4>>,
 }
 
@@ -36,7 +36,7 @@ impl Returns {
         Self {
             tangent: ArmTangent::new(impact, Tangent::default()),
             went_down: false,
-            step: Box::new(Step::empty()),
+            step: Box::new(Dop853Step::empty()),
             returns: Vec::new(),
         }
     }

@@ -8,7 +8,7 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 use super::effect::Drawn;
-use super::{Contact, EffectsStudy, Place};
+use super::{Contact, EffectCell, EffectsStudy};
 use crate::StudyError;
 use crate::case::{self, ConverterChoice};
 use crate::robustness::Journey;
@@ -23,7 +23,7 @@ impl EffectsStudy {
     ///
     /// # Errors
     /// [`StudyError`] if an override is invalid.
-    pub fn scenario(&self, place: Place<'_>, run: usize) -> Result<Scenario, StudyError> {
+    pub fn scenario(&self, place: EffectCell<'_>, run: usize) -> Result<Scenario, StudyError> {
         let mut generator = ChaCha8Rng::seed_from_u64(self.seed);
         generator.set_stream(run as u64);
         let mut draw = |range: Range<f64>| generator.random_range(range);

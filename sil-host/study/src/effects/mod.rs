@@ -50,7 +50,7 @@ pub struct EffectsStudy {
 
 /// Controller, contact, effect and level of one cell.
 #[derive(Clone, Copy)]
-pub struct Place<'a> {
+pub struct EffectCell<'a> {
     /// The controller.
     pub controller: &'a ControllerChoice,
     /// The contact.
@@ -98,13 +98,13 @@ pub struct Row {
 
 impl EffectsStudy {
     /// Returns every cell, in the order of the rows.
-    pub fn cells(&self) -> Vec<Place<'_>> {
+    pub fn cells(&self) -> Vec<EffectCell<'_>> {
         let mut cells = Vec::new();
         for controller in &self.controllers {
             for &contact in &self.contacts {
                 for effect in self.effects.iter().filter_map(|name| find(name)) {
                     let levels = effect.levels.iter().filter(|_| effect.acts_on(contact));
-                    cells.extend(levels.map(|&level| Place {
+                    cells.extend(levels.map(|&level| EffectCell {
                         controller,
                         contact,
                         effect,

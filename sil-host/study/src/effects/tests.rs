@@ -22,7 +22,7 @@ fn every_effect_at_every_level_is_a_valid_scenario_of_its_own() {
     let study = study(&all, 1);
     study.check().unwrap();
     for place in study.cells() {
-        let none = Place {
+        let none = EffectCell {
             effect: EFFECTS[0],
             level: 0.0,
             ..place
@@ -81,7 +81,7 @@ fn rows_do_not_depend_on_threads_and_more_effect_is_worse() {
 #[test]
 fn the_table_interpolates_between_levels() {
     let study = study(&["none", "joint-friction", "gear-stiffness"], 4);
-    let success = |place: &Place<'_>, run: usize| match place.effect.name {
+    let success = |place: &EffectCell<'_>, run: usize| match place.effect.name {
         "joint-friction" => place.level * (run + 1) as f64 <= 0.2,
         "gear-stiffness" => place.level >= 1000.0 || run < 2,
         _ => true,

@@ -19,9 +19,9 @@ pub struct OfEvidence {
     pub lift_offs: usize,
     /// Number of flights longer than the limit.
     pub long_flights: usize,
-    /// Number of those detected in time.
+    /// Number of flights longer than the limit that were detected in time.
     pub in_time: usize,
-    /// Number of those never detected.
+    /// Number of flights longer than the limit that were never detected.
     pub missed: usize,
     /// Number of runs whose plant could not be solved; only their false alarms and sliding time count.
     pub unsolved: usize,

@@ -33,9 +33,9 @@ const SHORT_P_RATIO: f64 = 0.1;
 /// How lift-offs after the capture are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LiftOffRule {
-    /// A single one fails the run.
+    /// A single lift-off fails the run.
     Fail,
-    /// They are only counted, because the effect throws the tip off, not the controller.
+    /// Lift-offs are only counted, because the effect throws the tip off, not the controller.
     Counted,
 }
 

@@ -45,11 +45,11 @@ pub struct Row {
     pub capture_s: Option<f64>,
     /// Number of lift-offs after the capture.
     pub lift_offs: u64,
-    /// Time of the first of them, s.
+    /// Time of the first lift-off after the capture, s.
     pub first_lift_off_s: Option<f64>,
     /// Largest final distance from target or governed edge, m.
     pub error_m: f64,
-    /// Tolerance of that distance, m.
+    /// Tolerance of the final distance, m.
     pub tolerance_m: f64,
     /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.
     pub to_edge_m: f64,

@@ -79,11 +79,11 @@ pub struct Row {
     pub deviation_rad: f64,
     /// Farthest tip position on which a static torque holds the pressed tip, elbow up, m.
     pub edge_up_m: f64,
-    /// The same, elbow down, m.
+    /// Farthest tip position on which a static torque holds the pressed tip, elbow down, m.
     pub edge_down_m: f64,
-    /// Slowest and fastest belt speed at which the arm keeps bouncing from x0,a, m/s.
+    /// Most negative belt speed at which the arm keeps bouncing from x0,a, m/s.
     pub bounces_from_m_s: Option<f64>,
-    /// The other end.
+    /// Least negative belt speed at which the arm keeps bouncing from x0,a, m/s.
     pub bounces_to_m_s: Option<f64>,
     /// The first contact from x0,a over time.
     #[serde(skip)]
@@ -161,7 +161,7 @@ impl Stiffness {
         quiet.advance(QUIET_S, &mut ()).map_err(failed)?;
         let now = quiet.snapshot();
         let [theta, rates] = [now.theta_rad, now.theta_dot_rad_s];
-        let start = State::new(theta[0], theta[1], rates[0], rates[1]);
+        let start = State::new(theta.first(), theta.second(), rates.first(), rates.second());
         let mut rigid = self.plant(None, speed_m_s, start, mass_kg)?;
         let mut soft = self.plant(stiffness_n_m, speed_m_s, start, mass_kg)?;
         let mut largest = 0.0_f64;

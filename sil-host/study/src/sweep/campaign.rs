@@ -14,9 +14,76 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 use xxhash_rust::xxh3::xxh3_128;
 
+use painleve_plant::scenario::ScenarioError;
 use painleve_system::input_file;
 
 use super::SweepError;
+use crate::StudyError;
+
+/// What is wrong with a campaign.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// The text is not TOML.
+    #[error("line {line} is not TOML: {}", source.message())]
+    Syntax {
+        /// The line, from 1.
+        line: usize,
+        /// The reason.
+        source: toml::de::Error,
+    },
+    /// The study is not given as a text.
+    #[error("study: the value must be a name in quotes")]
+    StudyName,
+    /// An option's value cannot appear on a command line.
+    #[error("{key}: the value must be a text, a number or a list of these, as on the command line")]
+    Value {
+        /// The option.
+        key: String,
+    },
+    /// No study is given.
+    #[error("no study is given; add one, for example study = \"bifurcation\"")]
+    NoStudy,
+    /// The study does not exist or has no rows to share.
+    #[error("study = \"{study}\" cannot be computed in shards; these can: {}", shardable.join(", "))]
+    NotShardable {
+        /// The given study.
+        study: String,
+        /// The studies that can be computed in shards.
+        shardable: Vec<&'static str>,
+    },
+    /// The study has no such option.
+    #[error(
+        "unknown option '{key}' in a campaign of the study {study}; known: {}",
+        known.join(", ")
+    )]
+    UnknownOption {
+        /// The given option.
+        key: String,
+        /// The study.
+        study: String,
+        /// The study's options.
+        known: Vec<String>,
+    },
+    /// An option's value is invalid.
+    #[error("{}", first_sentence(.0))]
+    Option(#[from] clap::Error),
+    /// The study is invalid.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A scenario that it starts from is invalid.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A scenario cannot be written as text.
+    #[error(transparent)]
+    Text(#[from] toml::ser::Error),
+}
+
+/// Returns clap's message without its hints for the command line.
+fn first_sentence(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let sentence = text.lines().next().unwrap_or_default();
+    sentence.trim_start_matches("error: ").to_owned()
+}
 
 /// A study and its options.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -44,38 +111,38 @@ impl Campaign {
     pub fn load(path: &Path) -> Result<Self, SweepError> {
         let text = input_file::read(path)
             .map_err(|source| SweepError::unreadable("campaign file", path, source))?;
-        Self::parse(&text).map_err(|message| SweepError::Campaign {
+        Self::parse(&text).map_err(|source| SweepError::Campaign {
             path: path.into(),
-            message,
+            source,
         })
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
-        let table: Table = text.parse().map_err(|error: toml::de::Error| {
-            let line = error.span().map_or(1, |span| {
+    fn parse(text: &str) -> Result<Self, CampaignError> {
+        let table: Table = text.parse().map_err(|source: toml::de::Error| {
+            let line = source.span().map_or(1, |span| {
                 1 + text
                     .bytes()
                     .take(span.start)
                     .filter(|&byte| byte == b'\n')
                     .count()
             });
-            format!("line {line} is not TOML: {}", error.message())
+            CampaignError::Syntax { line, source }
         })?;
         let mut campaign = Self::default();
         for (key, value) in table {
             match (key.as_str(), value) {
                 ("study", Value::String(study)) => campaign.study = study,
-                ("study", _) => return Err("study: the value must be a name in quotes".into()),
+                ("study", _) => return Err(CampaignError::StudyName),
                 (_, value) => {
-                    let values = texts(&value).ok_or(format!(
-                        "{key}: the value must be a text, a number or a list of these, as on the command line"
-                    ))?;
+                    let Some(values) = texts(&value) else {
+                        return Err(CampaignError::Value { key });
+                    };
                     campaign.options.insert(key, values);
                 }
             }
         }
         if campaign.study.is_empty() {
-            return Err("no study is given; add one, for example study = \"bifurcation\"".into());
+            return Err(CampaignError::NoStudy);
         }
         Ok(campaign)
     }
@@ -138,7 +205,7 @@ mod tests {
             ("study = 'a'\nmu = [[1]]", "mu: the value must be"),
             ("study = 'a'\nmu = = 1", "line 2"),
         ] {
-            let message = Campaign::parse(text).unwrap_err();
+            let message = Campaign::parse(text).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
     }

@@ -3,14 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::manifest::Manifest;
-use super::shard_file::{self, Shard};
+use super::shard_file::{self, Shard, ShardFileError};
 use super::{MismatchError, SweepError, array};
 
 /// State of the folder, shard by shard.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct SweepStatus {
     /// Number of shards.
     pub shards: usize,
@@ -27,12 +27,17 @@ pub struct SweepStatus {
 }
 
 /// A file that is not a shard of this sweep.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct Unusable {
     /// The file.
     pub file: PathBuf,
     /// The reason.
-    pub reason: String,
+    #[serde(serialize_with = "as_text")]
+    pub reason: ShardFileError,
+}
+
+fn as_text<S: Serializer>(reason: &ShardFileError, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(reason)
 }
 
 /// A shard with more than one file.
@@ -103,32 +108,36 @@ fn missing_in(contents: &Contents, manifest: &Manifest) -> Vec<usize> {
 /// # Errors
 /// [`SweepError::Unreadable`] if the folder cannot be listed.
 pub fn status(folder: &Path, manifest: &Manifest) -> Result<SweepStatus, SweepError> {
-    Ok(status_of(&Contents::read(folder, manifest)?, manifest))
+    Ok(status_of(Contents::read(folder, manifest)?, manifest).0)
 }
 
-fn status_of(contents: &Contents, manifest: &Manifest) -> SweepStatus {
-    let missing = missing_in(contents, manifest);
+/// Returns the progress, and the usable shards.
+fn status_of(contents: Contents, manifest: &Manifest) -> (SweepStatus, Vec<Shard>) {
+    let missing = missing_in(&contents, manifest);
     let mut shards: Vec<usize> = contents
         .whole
         .iter()
         .map(|(_, whole)| whole.shard)
         .collect();
     shards.sort_unstable();
-    let duplicates = shards
+    let duplicates: Vec<Duplicate> = shards
         .chunk_by(|one, next| one == next)
         .filter(|same| same.len() > 1)
         .map(|same| Duplicate {
             shard: same[0],
             files: contents.files_of(same[0]),
-        });
-    SweepStatus {
+        })
+        .collect();
+    let status = SweepStatus {
         shards: manifest.shards,
         rows: manifest.rows,
         finished: manifest.shards - missing.len(),
         missing: array::syntax(&missing),
-        duplicates: duplicates.collect(),
-        unusable: contents.unusable.clone(),
-    }
+        duplicates,
+        unusable: contents.unusable,
+    };
+    let whole = contents.whole.into_iter();
+    (status, whole.map(|(_, shard)| shard).collect())
 }
 
 /// Returns the CSV file of the whole study, byte for byte as the study itself writes it.
@@ -136,40 +145,42 @@ fn status_of(contents: &Contents, manifest: &Manifest) -> SweepStatus {
 /// # Errors
 /// [`SweepError::Incomplete`] unless every shard is present exactly once.
 pub fn merge(folder: &Path, manifest: &Manifest) -> Result<Vec<u8>, SweepError> {
-    let contents = Contents::read(folder, manifest)?;
-    refuse(&status_of(&contents, manifest), folder)?;
-    let shards = contents.whole.into_iter().map(|(_, shard)| shard);
-    Ok(together(shards.collect(), manifest.rows)?)
+    let (status, shards) = status_of(Contents::read(folder, manifest)?, manifest);
+    if !status.is_complete() {
+        return Err(SweepError::Incomplete {
+            folder: folder.to_path_buf(),
+            status: Box::new(status),
+        });
+    }
+    Ok(together(shards, manifest.rows)?)
 }
 
-fn refuse(status: &SweepStatus, folder: &Path) -> Result<(), SweepError> {
-    let mut reasons = Vec::new();
-    if !status.missing.is_empty() {
-        reasons.push(format!(
-            "shards {} of {} are missing",
-            status.missing, status.shards
-        ));
+impl SweepStatus {
+    /// Whether every shard is present exactly once, and nothing else.
+    pub fn is_complete(&self) -> bool {
+        self.missing.is_empty() && self.duplicates.is_empty() && self.unusable.is_empty()
     }
-    for Duplicate { shard, files } in &status.duplicates {
-        let names: Vec<String> = files
-            .iter()
-            .map(|file| file.display().to_string())
-            .collect();
-        reasons.push(format!(
-            "shard {shard} is present twice, as {}",
-            names.join(" and ")
-        ));
+
+    /// Returns a sentence for everything that is missing, duplicated or broken.
+    pub fn defects(&self) -> Vec<String> {
+        let missing = (!self.missing.is_empty())
+            .then(|| format!("shards {} of {} are missing", self.missing, self.shards));
+        let duplicates = self.duplicates.iter().map(|Duplicate { shard, files }| {
+            let names: Vec<_> = files
+                .iter()
+                .map(|file| file.display().to_string())
+                .collect();
+            format!("shard {shard} is present twice, as {}", names.join(" and "))
+        });
+        let unusable = self.unusable.iter();
+        let unusable =
+            unusable.map(|Unusable { file, reason }| format!("{} {reason}", file.display()));
+        missing
+            .into_iter()
+            .chain(duplicates)
+            .chain(unusable)
+            .collect()
     }
-    for Unusable { file, reason } in &status.unusable {
-        reasons.push(format!("{} {reason}", file.display()));
-    }
-    if reasons.is_empty() {
-        return Ok(());
-    }
-    Err(SweepError::Incomplete {
-        folder: folder.to_path_buf(),
-        reasons,
-    })
 }
 
 fn together(shards: Vec<Shard>, rows: usize) -> Result<Vec<u8>, MismatchError> {
@@ -277,7 +288,10 @@ mod tests {
         fs::write(path("shard-4.csv"), "row\n").unwrap();
         let status = status(folder.path(), &manifest).unwrap();
         assert_eq!((status.finished, status.missing.as_str()), (4, "4"));
-        assert!(status.unusable[0].reason.contains("truncated"));
+        assert!(matches!(
+            status.unusable[0].reason,
+            ShardFileError::Truncated
+        ));
         assert!(
             message().contains("shard-4.csv is truncated"),
             "{}",

@@ -12,7 +12,7 @@ use xxhash_rust::xxh3::xxh3_128;
 
 use crate::{MOST_ROWS, StudyError};
 
-use super::campaign::{Campaign, Understood};
+use super::campaign::{Campaign, CampaignError, Understood};
 use super::share::MOST_SHARDS;
 use super::{ShardError, SweepError};
 
@@ -25,6 +25,52 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Git revision of this build; `…-changed` if it has uncommitted
 /// changes, `unknown` outside a repository.
 const REVISION: &str = env!("PAINLEVE_REVISION");
+
+/// What is wrong with a manifest, and how to correct it.
+#[derive(Debug, thiserror::Error)]
+pub enum ManifestError {
+    /// The folder holds the manifest of another sweep.
+    #[error("another sweep is planned here; choose another --folder or remove that sweep")]
+    OtherSweep,
+    /// There is no manifest.
+    #[error(
+        "the file does not exist; plan the sweep first, with `painleve sweep plan`, or give its --folder"
+    )]
+    Missing,
+    /// The file is not a manifest.
+    #[error("is not a manifest: {}", .0.message())]
+    Syntax(toml::de::Error),
+    /// Another version of the program wrote it.
+    #[error(
+        "is of another version: {key} is {}, this program's is {ours}; \
+         use the program that planned the sweep, or plan it again elsewhere",
+        found.as_deref().unwrap_or("nothing")
+    )]
+    OtherVersion {
+        /// The key that differs.
+        key: &'static str,
+        /// Its value in the manifest.
+        found: Option<String>,
+        /// Its value of this program.
+        ours: String,
+    },
+    /// The number of shards does not suit the rows.
+    #[error("has been changed: it has more shards than rows, or none")]
+    ShardCount,
+    /// The campaign or a scenario has been changed.
+    #[error(
+        "it or a scenario that it starts from ({}) has been changed since the sweep was planned; \
+         plan it again elsewhere",
+        scenarios.join(", ")
+    )]
+    Changed {
+        /// The scenarios.
+        scenarios: Vec<String>,
+    },
+    /// The campaign is invalid.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+}
 
 /// Everything that the rows of a sweep depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -111,8 +157,7 @@ impl Manifest {
         }
         Err(SweepError::Manifest {
             path,
-            message: "another sweep is planned here; choose another --folder or remove that sweep"
-                .into(),
+            source: ManifestError::OtherSweep,
         })
     }
 
@@ -131,38 +176,31 @@ impl Manifest {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Err(SweepError::Manifest {
                     path,
-                    message: "the file does not exist; plan the sweep first, with `painleve sweep plan`, \
-                        or give its --folder"
-                        .into(),
+                    source: ManifestError::Missing,
                 });
             }
             Err(source) => return Err(SweepError::unreadable("manifest", path, source)),
         };
-        Self::parse(&text).map_err(|message| SweepError::Manifest { path, message })
+        Self::parse(&text).map_err(|source| SweepError::Manifest { path, source })
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
-        let not_one = |error: &toml::de::Error| format!("is not a manifest: {}", error.message());
-        let table: Table = text.parse().map_err(|error| not_one(&error))?;
+    fn parse(text: &str) -> Result<Self, ManifestError> {
+        let table: Table = text.parse().map_err(ManifestError::Syntax)?;
         // Checked first, because the other fields may differ between versions.
         let of = |key: &str| table.get(key).map(|value| value.to_string());
-        let value = |key: &str| of(key).unwrap_or_else(|| "nothing".into());
         for (key, ours) in [
             ("format", FORMAT.to_string()),
             ("version", format!("{VERSION:?}")),
             ("git_revision", format!("{REVISION:?}")),
         ] {
-            if of(key).as_ref() != Some(&ours) {
-                return Err(format!(
-                    "is of another version: {key} is {}, this program's is {ours}; \
-                     use the program that planned the sweep, or plan it again elsewhere",
-                    value(key)
-                ));
+            let found = of(key);
+            if found.as_ref() != Some(&ours) {
+                return Err(ManifestError::OtherVersion { key, found, ours });
             }
         }
-        let manifest: Self = table.try_into().map_err(|error| not_one(&error))?;
+        let manifest: Self = table.try_into().map_err(ManifestError::Syntax)?;
         if manifest.shards == 0 || manifest.shards > manifest.rows {
-            return Err("has been changed: it has more shards than rows, or none".into());
+            return Err(ManifestError::ShardCount);
         }
         Ok(manifest)
     }
@@ -177,14 +215,11 @@ impl Manifest {
         {
             return Ok(());
         }
-        let names: Vec<&str> = understood.scenarios.keys().map(String::as_str).collect();
         Err(SweepError::Manifest {
             path: Self::path(folder),
-            message: format!(
-                "it or a scenario that it starts from ({}) has been changed since the sweep was \
-                 planned; plan it again elsewhere",
-                names.join(", ")
-            ),
+            source: ManifestError::Changed {
+                scenarios: understood.scenarios.keys().cloned().collect(),
+            },
         })
     }
 }
@@ -227,7 +262,7 @@ pub(crate) mod tests {
                 Ok(read) => prop_assert!(
                     read.rows <= MOST_ROWS && (1..=MOST_SHARDS).contains(&read.shards)
                 ),
-                Err(message) => prop_assert!(!message.is_empty()),
+                Err(error) => prop_assert!(!error.to_string().is_empty()),
             }
         }
     }
@@ -250,7 +285,9 @@ pub(crate) mod tests {
         let text = manifest(10, 3).text();
         let parse = |from: &str, to: &str| {
             assert!(text.contains(from), "{text}");
-            Manifest::parse(&text.replace(from, to)).unwrap_err()
+            Manifest::parse(&text.replace(from, to))
+                .unwrap_err()
+                .to_string()
         };
         let version = format!("\"{VERSION}\"");
         assert!(parse(&version, "\"9.9.9\"").contains("version is \"9.9.9\""));
@@ -259,6 +296,7 @@ pub(crate) mod tests {
         assert!(parse(REVISION, "feed").contains("git_revision is \"feed\""));
         assert!(parse("shards = 3", "shards = 11").contains("more shards"));
         assert!(parse("shards = 3", "shard = 3").contains("not a manifest"));
-        assert!(Manifest::parse("").unwrap_err().contains("another version"));
+        let error = Manifest::parse("").unwrap_err().to_string();
+        assert!(error.contains("another version"));
     }
 }

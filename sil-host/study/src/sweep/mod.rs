@@ -43,31 +43,31 @@ pub enum SweepError {
         source: std::io::Error,
     },
     /// The campaign file is invalid.
-    #[error("campaign file {}: {message}", path.display())]
+    #[error("campaign file {}: {source}", path.display())]
     Campaign {
         /// The file.
         path: PathBuf,
         /// The error and the allowed values.
-        message: String,
+        source: campaign::CampaignError,
     },
     /// The manifest is invalid, or belongs to another program.
-    #[error("manifest {}: {message}", path.display())]
+    #[error("manifest {}: {source}", path.display())]
     Manifest {
         /// The file.
         path: PathBuf,
         /// The error and how to correct it.
-        message: String,
+        source: manifest::ManifestError,
     },
     /// No shard is given, or it does not exist.
     #[error(transparent)]
     Shard(#[from] ShardError),
     /// A shard is missing, duplicated or broken.
-    #[error("{} cannot be merged: {}", folder.display(), reasons.join("; "))]
+    #[error("{} cannot be merged: {}", folder.display(), status.defects().join("; "))]
     Incomplete {
         /// The folder of the sweep.
         folder: PathBuf,
-        /// What is missing, duplicated or broken, file by file.
-        reasons: Vec<String>,
+        /// What is missing, duplicated or broken.
+        status: Box<folder::SweepStatus>,
     },
     /// The script for a scheduler cannot be written.
     #[error(transparent)]

@@ -24,6 +24,35 @@ use crate::tabular::Records;
 
 const CHECKSUM: &str = ", xxh3 ";
 
+/// Why a file is not a shard of a sweep, in words that follow the file's name.
+#[derive(Debug, thiserror::Error)]
+pub enum ShardFileError {
+    /// The file cannot be read.
+    #[error("cannot be read: {0}")]
+    Unreadable(#[from] std::io::Error),
+    /// The end is missing.
+    #[error("is truncated")]
+    Truncated,
+    /// The content has been changed.
+    #[error("does not match its checksum")]
+    Checksum,
+    /// The last line names no shard of the sweep.
+    #[error("is not a shard of this sweep")]
+    NotAShard,
+    /// The last line names another sweep.
+    #[error("belongs to another sweep")]
+    OtherSweep,
+    /// The rows are not CSV.
+    #[error("is not a table: {0}")]
+    Table(#[from] csv::Error),
+    /// A line does not begin with a row's number.
+    #[error("is not a table: a line has no row number")]
+    NoRowNumber,
+    /// A row is missing or present twice.
+    #[error("does not hold every row of shard {0} exactly once")]
+    Rows(usize),
+}
+
 /// Contents of a finished shard.
 #[derive(Debug, PartialEq)]
 pub struct Shard {
@@ -92,37 +121,34 @@ fn text(
 /// Reads a shard and checks it against the manifest.
 ///
 /// # Errors
-/// The error as words that follow the file's name.
-pub fn read(path: &Path, manifest: &Manifest) -> Result<Shard, String> {
-    let text = fs::read(path).map_err(|error| format!("cannot be read: {error}"))?;
-    let truncated = || "is truncated".to_owned();
-    let whole = text.strip_suffix(b"\n").ok_or_else(truncated)?;
+/// [`ShardFileError`] if the file is not a shard of this sweep.
+pub fn read(path: &Path, manifest: &Manifest) -> Result<Shard, ShardFileError> {
+    let text = fs::read(path)?;
+    let whole = text.strip_suffix(b"\n").ok_or(ShardFileError::Truncated)?;
     let start = whole
         .iter()
         .rposition(|&byte| byte == b'\n')
         .map_or(0, |at| at + 1);
     let (body, line) = whole.split_at(start);
-    let line = std::str::from_utf8(line).map_err(|_| truncated())?;
-    let (claim, checksum) = line.split_once(CHECKSUM).ok_or_else(truncated)?;
+    let line = std::str::from_utf8(line).map_err(|_| ShardFileError::Truncated)?;
+    let (claim, checksum) = line.split_once(CHECKSUM).ok_or(ShardFileError::Truncated)?;
     let covered = &text[..start + claim.len() + CHECKSUM.len()];
     if format!("{:032x}", xxh3_128(covered)) != checksum {
-        return Err("does not match its checksum".into());
+        return Err(ShardFileError::Checksum);
     }
     let shard = claim
         .strip_prefix("# shard ")
         .and_then(|rest| rest.split_once('/'))
         .and_then(|(shard, _)| shard.parse::<usize>().ok())
         .filter(|&shard| shard < manifest.shards)
-        .ok_or("is not a shard of this sweep")?;
+        .ok_or(ShardFileError::NotAShard)?;
     let numbers: Vec<usize> = rows_of(shard, manifest.shards, manifest.rows).collect();
     if format!("{claim}{CHECKSUM}") != footer(manifest, shard, numbers.len()) {
-        return Err("belongs to another sweep".into());
+        return Err(ShardFileError::OtherSweep);
     }
-    let (header, rows) = parse(body).map_err(|error| format!("is not a table: {error}"))?;
+    let (header, rows) = parse(body)?;
     if rows.iter().map(|(row, _)| row).ne(&numbers) {
-        return Err(format!(
-            "does not hold every row of shard {shard} exactly once"
-        ));
+        return Err(ShardFileError::Rows(shard));
     }
     Ok(Shard {
         shard,
@@ -133,19 +159,19 @@ pub fn read(path: &Path, manifest: &Manifest) -> Result<Shard, String> {
 
 type Rows = Vec<(usize, Vec<ByteRecord>)>;
 
-fn parse(body: &[u8]) -> Result<(ByteRecord, Rows), String> {
+fn parse(body: &[u8]) -> Result<(ByteRecord, Rows), ShardFileError> {
     let mut reader = csv::Reader::from_reader(body);
     let rest = |record: &ByteRecord| -> ByteRecord { record.iter().skip(1).collect() };
-    let header = reader.byte_headers().map_err(|error| error.to_string())?;
+    let header = reader.byte_headers()?;
     let header = rest(header);
     let mut rows: Rows = Vec::new();
     for record in reader.byte_records() {
-        let record = record.map_err(|error| error.to_string())?;
+        let record = record?;
         let row = record
             .get(0)
             .and_then(|field| std::str::from_utf8(field).ok())
             .and_then(|field| field.parse().ok())
-            .ok_or("a line has no row number")?;
+            .ok_or(ShardFileError::NoRowNumber)?;
         match rows.last_mut() {
             Some((last, lines)) if *last == row => lines.push(rest(&record)),
             _ => rows.push((row, vec![rest(&record)])),
@@ -203,7 +229,7 @@ mod tests {
                     let rows: Vec<_> = shard.rows.iter().map(|(row, _)| *row).collect();
                     prop_assert_eq!(rows, rows_of(1, 3, 10).collect::<Vec<_>>());
                 }
-                Err(message) => prop_assert!(!message.is_empty()),
+                Err(error) => prop_assert!(!error.to_string().is_empty()),
             }
         }
     }
@@ -266,7 +292,7 @@ mod tests {
         let (ours, other) = (manifest(10, 3), manifest(11, 3));
         written(folder.path(), &other, 0);
         let error = read(&path(folder.path(), 0), &ours).unwrap_err();
-        assert!(error.contains("another sweep"), "{error}");
+        assert!(matches!(error, ShardFileError::OtherSweep), "{error}");
         let few: Vec<usize> = rows_of(1, 3, 10).skip(1).collect();
         let records: Vec<Records> = few.iter().map(|&row| records(row)).collect();
         write(folder.path(), &ours, 1, &few, &records).unwrap();

@@ -128,7 +128,7 @@ impl<const N: usize> Equations<N> for CompliantMotion<'_> {
         let velocity = jacobian * rates.vector();
         let touch = self.touch(t_s, &pose, &velocity, x[4]);
         let mut derivative = SVector::<f64, N>::zeros();
-        let mut joint_nm: [f64; 2] = self.torque.at(t_s).into();
+        let mut joint_nm = self.torque.at(t_s).to_array();
         if N == FULL {
             let joints = [(x[0], x[2]), (x[1] - x[0], x[3] - x[2])];
             let friction = &self.effects.joints;
@@ -150,7 +150,7 @@ impl<const N: usize> Equations<N> for CompliantMotion<'_> {
             }
         }
         let tip_force_n = touch.force_n + self.effects.push.force_n(t_s);
-        let load = JointTorque::from(joint_nm).to_links()
+        let load = JointTorque::from_array(joint_nm).to_links()
             - self.arm.passive_torque_nm(&angles, &rates, &pose)
             - self.arm.centrifugal_torque_nm(&rates, &pose)
             + GeneralisedTorque::from_vector(jacobian.transpose() * tip_force_n);

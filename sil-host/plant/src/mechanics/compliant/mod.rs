@@ -198,7 +198,7 @@ impl CompliantArmOnBelt {
                 let step = linearised.step(&motion, tried, self.local_error);
                 let next = tried * step.growth();
                 if step.error <= 1.0 {
-                    // A truncated step is no reason against a longer one.
+                    // A truncated step does not limit the next one.
                     size = if tried < size { size.max(next) } else { next };
                     break (step.end, tried);
                 }

@@ -63,7 +63,7 @@ impl<'a> CompliantMotion<'a> {
         let touch = self.touch_at(t_s, x);
         let slope: SVector<f64, FULL> = self.derivative(t_s, x);
         Snapshot {
-            theta_ddot_rad_s2: [slope[2], slope[3]],
+            theta_ddot_rad_s2: LinkMotion::new(slope[2], slope[3]),
             gap_m: here.gap[0] - touch.surface_m,
             gap_rate_m_s: -touch.closing_m_s,
             normal_force_n: touch.force_n.y,

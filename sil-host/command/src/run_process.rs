@@ -1,0 +1,135 @@
+//! A child process of a run, with its output.
+
+use std::ffi::OsString;
+use std::io::Read;
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use painleve_link::BusName;
+use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
+
+use super::CommandError;
+use super::process_error::ProcessError;
+
+/// Start-up time of a child, s. The processes of a run notice each other's end, so this can be
+/// generous.
+const START_WAIT_S: &str = "10";
+
+/// Interval between two checks of the children.
+pub const WATCH: Duration = Duration::from_millis(10);
+
+/// A child process with its output.
+pub struct RunProcess {
+    /// The process, which is killed when this is dropped.
+    pub child: Guarded,
+    /// Its standard output, if it is piped.
+    pub stdout: Reader,
+    /// Its standard error, if it is piped.
+    pub stderr: Reader,
+    stopped: Duration,
+}
+
+impl RunProcess {
+    /// Starts this program with these arguments on a bus.
+    ///
+    /// # Errors
+    /// [`CommandError::Process`] if the process or the threads that read its output cannot be started.
+    pub fn start(
+        arguments: Vec<OsString>,
+        bus: &BusName,
+        stderr: Stdio,
+    ) -> Result<Self, CommandError> {
+        let program = std::env::current_exe()?;
+        let mut command = Command::new(&program);
+        command
+            .args(arguments)
+            .args(["--bus", bus.as_str()])
+            .args(["--wait-s", START_WAIT_S])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(stderr);
+        let mut child = end_with_parent(&mut command, Signal::SIGTERM)
+            .spawn()
+            .map_err(|source| ProcessError::Start { program, source })?;
+        Ok(Self {
+            stdout: Reader::start(child.stdout.take())?,
+            stderr: Reader::start(child.stderr.take())?,
+            child: Guarded::new(child),
+            stopped: Duration::ZERO,
+        })
+    }
+
+    /// Waits until the process has ended, at most for `limit`; `None` if it still runs.
+    ///
+    /// # Errors
+    /// Those of the operating system.
+    pub fn wait(&mut self, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
+        let start = std::time::Instant::now();
+        while start.elapsed() < limit {
+            if let Some(status) = self.child.ended()? {
+                return Ok(Some(status));
+            }
+            std::thread::sleep(WATCH);
+        }
+        Ok(None)
+    }
+
+    /// Returns how long the process has been stopped, if it is checked every `interval`. The
+    /// function counts checks rather than time, because this process may be stopped together with
+    /// its children.
+    pub fn stopped_for(&mut self, interval: Duration) -> Duration {
+        self.stopped = if self.child.is_stopped() {
+            self.stopped + interval
+        } else {
+            Duration::ZERO
+        };
+        self.stopped
+    }
+
+    /// Returns the error output of an ended process, as a suffix of another message.
+    pub fn complaint(&mut self) -> String {
+        let text = self.stderr.text();
+        let text = text.trim().trim_start_matches("error: ");
+        if text.is_empty() {
+            String::new()
+        } else {
+            format!(": {text}")
+        }
+    }
+}
+
+/// Reads a pipe while its process runs: a pipe that is not read blocks its writer once it is full.
+pub struct Reader(Option<Receiver<Vec<u8>>>);
+
+impl Reader {
+    /// Bytes of a pipe to keep; the rest is read and discarded.
+    const KEPT: u64 = 4 << 20;
+    /// How long a pipe may stay open after its process has ended: on a busy machine, reading the
+    /// output takes a while.
+    const PATIENCE: Duration = Duration::from_secs(3);
+
+    fn start(pipe: Option<impl Read + Send + 'static>) -> std::io::Result<Self> {
+        let Some(mut pipe) = pipe else {
+            return Ok(Self(None));
+        };
+        let (sender, receiver) = channel();
+        std::thread::Builder::new().spawn(move || {
+            let mut text = Vec::new();
+            // Unreadable output is left out.
+            let _ = pipe.by_ref().take(Self::KEPT).read_to_end(&mut text);
+            let _ = std::io::copy(&mut pipe, &mut std::io::sink());
+            let _ = sender.send(text);
+        })?;
+        Ok(Self(Some(receiver)))
+    }
+
+    /// Returns the whole output once the process has ended; empty on a second call.
+    pub fn text(&mut self) -> String {
+        let text = self
+            .0
+            .take()
+            .and_then(|text| text.recv_timeout(Self::PATIENCE).ok());
+        String::from_utf8_lossy(&text.unwrap_or_default()).into_owned()
+    }
+}
