@@ -6,12 +6,13 @@
 use serde::{Deserialize, Serialize};
 
 use crate::black_box::BlackBox;
+use crate::counts::TorqueCounts;
 use crate::frame::{ActuatorFrame, SensorFrame};
 use crate::lapse::LapseCounts;
 
 /// Version of the messages' meaning: of [`Request`], [`Response`] and their encoding. New variants are
 /// added at the end, so that a host and a board of different versions can still compare this number.
-pub const PROTOCOL: u16 = 2;
+pub const PROTOCOL: u16 = 3;
 
 /// Longest encoded message, in bytes: a configuration with a full reference.
 pub const MAXIMUM_LENGTH: usize = 768;
@@ -48,6 +49,9 @@ pub enum Request<'a> {
     PermitArming(bool),
     /// Asks for the record of the last reset, crash and fault; answered by [`Response::BlackBox`].
     BlackBox,
+    /// Commands torques with [`FrameSource::Commissioning`]; no response. The board limits them by its
+    /// configuration, and they expire after 50 ms unless they are repeated.
+    Torque([TorqueCounts; 2]),
 }
 
 /// Source of a controller's sensor frames.
@@ -61,12 +65,14 @@ pub enum FrameSource {
     Sensors,
     /// The same with the torque stages off, whatever the controller requests.
     DryRun,
+    /// The same without a law: the host commands torques, by [`Request::Torque`], to commission the arm.
+    Commissioning,
 }
 
 impl FrameSource {
     /// Returns whether the board reads its own sensors.
     pub fn is_on_board(self) -> bool {
-        matches!(self, Self::Sensors | Self::DryRun)
+        matches!(self, Self::Sensors | Self::DryRun | Self::Commissioning)
     }
 }
 
@@ -139,7 +145,7 @@ pub struct Health {
 mod tests {
     use super::*;
     use crate::black_box::{Crash, FILE_LENGTH, FaultRecord, ResetCause};
-    use crate::counts::{Micrometres, TorqueCounts};
+    use crate::counts::Micrometres;
     use crate::frame::StatusFlags;
     use crate::wire;
 

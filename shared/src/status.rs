@@ -79,6 +79,8 @@ pub enum Fault {
     StageNotReady = 14,
     /// encoders and force cell contradict each other
     GapAgainstForce = 15,
+    /// joint moved too far while being commissioned
+    MovedTooFar = 16,
 }
 
 impl Fault {

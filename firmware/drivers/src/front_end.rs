@@ -36,8 +36,9 @@ pub struct FrontEndSettings {
     pub force: LinearScale<f32>,
     /// Directions and zeros of the parts.
     pub mounting: Mounting,
-    /// The arm on its belt.
-    pub arm: Arm<f32>,
+    /// The arm on its belt; `None` if the mounting is still unknown, so that encoders and force cell cannot be
+    /// checked against each other.
+    pub arm: Option<Arm<f32>>,
 }
 
 /// Assembles the sensor frames of an arm.
@@ -58,7 +59,7 @@ impl FrontEnd {
     pub fn new(settings: Option<FrontEndSettings>) -> Self {
         let gap = settings
             .as_ref()
-            .map(|it| GapCheck::new(it.arm, it.encoders, it.force));
+            .and_then(|it| Some(GapCheck::new(it.arm?, it.encoders, it.force)));
         Self {
             settings,
             gap,

@@ -76,7 +76,9 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
     fn note_silence(&mut self) -> bool {
         self.silent_ticks = self.silent_ticks.saturating_add(1);
         let limit_ms = match self.task.source() {
-            FrameSource::Sensors | FrameSource::DryRun => SENSORS_SILENCE_MS,
+            FrameSource::Sensors | FrameSource::DryRun | FrameSource::Commissioning => {
+                SENSORS_SILENCE_MS
+            }
             FrameSource::Lockstep | FrameSource::Realtime => FRAMES_SILENCE_MS,
         };
         // 32 bits hold 5 s at 100 kHz; dividing 64 would be a loop without a declared limit.
@@ -253,6 +255,10 @@ pub fn link<D, L, P>(
                 }
                 Ok(Request::BlackBox) => Response::BlackBox(black_box::read()),
                 Ok(Request::Alive) => continue,
+                Ok(Request::Torque(torques)) => {
+                    control.lock(|control| control.task.request_torques(torques));
+                    continue;
+                }
                 Ok(Request::Identify) => Response::Identity {
                     protocol: PROTOCOL,
                     build: BUILD,

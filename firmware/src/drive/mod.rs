@@ -1,8 +1,10 @@
 //! The hardware interface of a tick, and the task that runs ticks on it.
 //!
+//! - [`open_loop`]: torques from the host instead of a law
 //! - [`Drive`]: the hardware interface of the control task
 //! - [`ControlTask`]: one control tick with sampling, actuation and monitoring, on every host
 
+pub mod open_loop;
 mod task;
 
 pub use self::task::{Answered, ControlTask, TaskCounts};

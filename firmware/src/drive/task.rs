@@ -4,7 +4,10 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::range::OutOfRange;
 
+use painleve_shared::counts::TorqueCounts;
+
 use super::Drive;
+use super::open_loop::OpenLoop;
 use crate::configuration::Configuration;
 use crate::controller::Controller;
 use crate::law::{Law, LawSettings};
@@ -79,6 +82,8 @@ pub struct ControlTask<D, L: Law = LawSettings> {
     drive: D,
     /// `None` until the task is configured.
     controller: Option<Controller<L>>,
+    /// Replaces the controller's ticks with [`FrameSource::Commissioning`].
+    open_loop: Option<OpenLoop>,
     source: FrameSource,
     counts: TaskCounts,
 }
@@ -89,6 +94,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         Self {
             drive,
             controller: None,
+            open_loop: None,
             source: FrameSource::Lockstep,
             counts: TaskCounts {
                 ticks: 0,
@@ -113,6 +119,9 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         self.source = source;
         self.counts = TaskCounts::default();
         self.controller = Some(Controller::new(configuration)?);
+        if source == FrameSource::Commissioning {
+            self.open_loop = Some(OpenLoop::new(configuration));
+        }
         Ok(())
     }
 
@@ -120,6 +129,14 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
     pub fn stop(&mut self) {
         self.drive.actuate(&ActuatorFrame::default());
         self.controller = None;
+        self.open_loop = None;
+    }
+
+    /// Commands torques; without effect unless the source is [`FrameSource::Commissioning`].
+    pub fn request_torques(&mut self, torques: [TorqueCounts; 2]) {
+        if let Some(open_loop) = &mut self.open_loop {
+            open_loop.request(torques);
+        }
     }
 
     /// Stops as [`stop`](Self::stop) does, when a tick is due.
@@ -148,15 +165,18 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
             });
         };
         let start = self.drive.stopwatch();
-        let mut answer = controller.tick(&frame);
+        let mut answer = match &mut self.open_loop {
+            None => controller.tick(&frame),
+            Some(open_loop) => open_loop.tick(&frame),
+        };
         let elapsed = self.drive.stopwatch().wrapping_sub(start);
         self.drive.actuate(&answer);
         self.counts.ticks = self.counts.ticks.wrapping_add(1);
         self.counts.worst_elapsed = self.counts.worst_elapsed.max(elapsed);
         let overrun = self.drive.next_tick_is_due();
         if let Some(stopped) = controller.note(Lapse::Overrun, u32::from(overrun)) {
-            self.drive.actuate(&stopped);
-            answer = stopped;
+            answer = stop(&mut self.open_loop, stopped);
+            self.drive.actuate(&answer);
         }
         Some(Answered {
             sensor: Some(frame),
@@ -171,7 +191,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         if let Some(controller) = &mut self.controller
             && let Some(stopped) = controller.note(lapse, times)
         {
-            self.drive.actuate(&stopped);
+            self.drive.actuate(&stop(&mut self.open_loop, stopped));
         }
     }
 
@@ -198,6 +218,14 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
     /// Returns the drive for changes, for example to offer it a frame.
     pub fn drive_mut(&mut self) -> &mut D {
         &mut self.drive
+    }
+}
+
+/// Latches the fault of a stopped controller in the open loop, too, and returns the answer.
+fn stop(open_loop: &mut Option<OpenLoop>, stopped: ActuatorFrame) -> ActuatorFrame {
+    match (open_loop, stopped.latched_fault()) {
+        (Some(open_loop), Some(fault)) => open_loop.latch(fault),
+        _ => stopped,
     }
 }
 

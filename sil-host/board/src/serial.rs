@@ -147,7 +147,10 @@ impl Serial {
             REALTIME_PATIENCE_TICKS * Duration::from_secs_f32(1.0 / configuration.tick_hz);
         self.frame_patience = match source {
             FrameSource::Lockstep => LOCKSTEP_PATIENCE.max(patience),
-            FrameSource::Realtime | FrameSource::Sensors | FrameSource::DryRun => patience,
+            FrameSource::Realtime
+            | FrameSource::Sensors
+            | FrameSource::DryRun
+            | FrameSource::Commissioning => patience,
         };
         let configuration = super::encode(configuration)?;
         let request = Request::Configure {

@@ -71,7 +71,7 @@ impl Graph {
                         leaders.insert(next);
                     }
                     Flow::Table => {
-                        let targets = table(image, &instructions[&at])?;
+                        let targets = table(image, &instructions, at)?;
                         leaders.extend(&targets);
                         open.extend(targets.iter().map(|target| (*target, 0)));
                         tables.insert(at, targets);
@@ -94,12 +94,18 @@ impl Graph {
     }
 }
 
-fn table(image: &Image, branch: &Instruction) -> Result<Vec<u32>, BoundError> {
-    let start = branch.address + branch.size;
+/// Returns the targets of the table branch at an address, whose predecessors are in `instructions`.
+fn table(
+    image: &Image,
+    instructions: &BTreeMap<u32, Instruction>,
+    at: u32,
+) -> Result<Vec<u32>, BoundError> {
+    let branch = &instructions[&at];
     let unknown = || BoundError::UnknownInstruction {
         address: branch.address,
         text: branch.text.clone(),
     };
+    let start = start_of_table(instructions, branch).ok_or_else(unknown)?;
     let width = if branch.text.starts_with("tbh") { 2 } else { 1 };
     let end = image.end_of_data(start).ok_or_else(unknown)?;
     let bytes = image.bytes(start).ok_or_else(unknown)?;
@@ -117,9 +123,37 @@ fn table(image: &Image, branch: &Instruction) -> Result<Vec<u32>, BoundError> {
         }
         targets.push(target);
     }
+    if targets.is_empty() {
+        return Err(unknown());
+    }
     targets.sort_unstable();
     targets.dedup();
     Ok(targets)
+}
+
+/// Returns the address of a branch's table: behind the branch, or, if a literal lies between them, the address
+/// that an `adr` (or `addw` with the program counter) shortly before the branch has put into its base register.
+fn start_of_table(instructions: &BTreeMap<u32, Instruction>, branch: &Instruction) -> Option<u32> {
+    const SHORTLY: usize = 8;
+    let base = branch.text.split(['[', ',']).nth(1)?;
+    if base == "pc" {
+        return Some(branch.address + branch.size);
+    }
+    let mut before = instructions.range(..branch.address).rev().take(SHORTLY);
+    let (from, offset) = before.find_map(|(from, instruction)| {
+        let (mnemonic, operands) = instruction.text.split_once(' ')?;
+        let (register, offset) = operands.split_once(", ")?;
+        let offset = match mnemonic {
+            "adr" | "adr.w" => offset.strip_prefix('#')?,
+            _ => offset.strip_prefix("pc, #")?,
+        };
+        let offset = match offset.strip_prefix("0x") {
+            Some(digits) => u32::from_str_radix(digits, 16),
+            None => offset.parse(),
+        };
+        (register == base).then_some((from, offset.ok()?))
+    })?;
+    Some(((from + 4) & !3) + offset)
 }
 
 fn blocks(
@@ -197,7 +231,26 @@ mod tests {
         image.mark(0x104, false);
         image.mark(0x110, true);
         let branch = Decoder::new().unwrap().at(&image, 0x100, false).unwrap();
-        let targets = table(&image, &branch).unwrap();
+        let targets = table(&image, &BTreeMap::from([(0x100, branch)]), 0x100).unwrap();
         assert_eq!(targets, [0x110, 0x112, 0x114, 0x116]);
+    }
+
+    /// The base of the table is a register, because a literal lies between branch and table.
+    #[test]
+    fn a_table_behind_a_literal_is_found_by_its_adr() {
+        let mut code = vec![0x02, 0xa0]; // adr r0, #8
+        code.extend([0x00, 0xbf]); // nop
+        code.extend([0xd0, 0xe8, 0x01, 0xf0]); // tbb [r0, r1]
+        code.extend([0x00; 4]); // 0.0
+        code.extend([2, 3]);
+        code.extend([0x00, 0xbf]);
+        code.extend([0x70, 0x47].repeat(4)); // bx lr
+        let mut image = Image::of_code(0x100, &code, "switch");
+        image.mark(0x100, true);
+        image.mark(0x108, false);
+        image.mark(0x110, true);
+        let graph = Graph::of(&image, &Decoder::new().unwrap(), 0x100).unwrap();
+        let leaders: Vec<u32> = graph.blocks.keys().copied().collect();
+        assert_eq!(leaders, [0x100, 0x110, 0x112]);
     }
 }

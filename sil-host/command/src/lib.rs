@@ -45,6 +45,7 @@ use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_siz
 use painleve_system::memory_full::exit_when_shared_memory_is_full;
 use painleve_system::terminal::{self, warn};
 
+use commission::BoardRigError;
 use fail_on::FailedCondition;
 use output_error::{InputError, OutputError, output};
 use process_error::ProcessError;
@@ -134,6 +135,9 @@ pub enum CommandError {
     /// The arm has a mistake that no setting can describe.
     #[error("{0}")]
     Mounting(Mistake),
+    /// A real arm cannot be commissioned: its torque stages do not come on or stay on.
+    #[error(transparent)]
+    Rig(BoardRigError),
     /// A file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -211,6 +215,7 @@ impl CommandError {
             | Self::Link(_)
             | Self::Board(_)
             | Self::Cyclictest(_)
+            | Self::Rig(_)
             | Self::Process(_) => PEER_FAILED,
             Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => 4,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => INTERRUPTED,

@@ -130,6 +130,17 @@ pub enum CommissionError<E: std::error::Error> {
     Range(#[from] OutOfRange),
 }
 
+impl<E: std::error::Error> CommissionError<E> {
+    /// Converts a failure of the rig.
+    pub fn map_rig<F: std::error::Error>(self, convert: impl FnOnce(E) -> F) -> CommissionError<F> {
+        match self {
+            Self::Rig(error) => CommissionError::Rig(convert(error)),
+            Self::Refused(mistake) => CommissionError::Refused(mistake),
+            Self::Range(error) => CommissionError::Range(error),
+        }
+    }
+}
+
 /// What the procedure assumes about the arm.
 #[derive(Clone, Debug)]
 pub struct Expected {

@@ -3,7 +3,8 @@
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
-use painleve_shared::counts::TorqueCounts;
+use painleve_shared::LinkMotion;
+use painleve_shared::counts::{EncoderScale, ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Request, Response};
 use painleve_shared::mounting::Mounting;
@@ -45,6 +46,8 @@ pub struct BoardBench {
     pub is_frozen: [bool; 2],
     /// The arm is held until it is first driven.
     is_held: bool,
+    /// Link angles at which an operator holds the arm, rad.
+    held_rad: Option<LinkMotion<f64>>,
 }
 
 /// State of a bench at one instant.
@@ -120,6 +123,7 @@ impl BoardBench {
             encoder_offset: [0; 2],
             is_frozen: [false; 2],
             is_held: true,
+            held_rad: None,
         };
         bench.present();
         bench
@@ -129,6 +133,12 @@ impl BoardBench {
     pub fn present(&mut self) {
         let frame = self.simulation.sample(&mut self.statistics);
         self.frame = frame.unwrap_or_else(|error| panic!("{error}"));
+        if let Some(held_rad) = self.held_rad {
+            let angles = held_rad.to_joints().to_array();
+            self.frame.joints = angles.map(|it| EncoderScale::default().reading(it));
+            self.frame.normal_force = ForceCounts(0);
+            self.frame.tangential_force = ForceCounts(0);
+        }
         let mounted = self.mounted;
         let wiring = self.board.wiring();
         for joint in 0..2 {
@@ -154,6 +164,26 @@ impl BoardBench {
         wiring.force.channels[3] = middle;
     }
 
+    /// An operator holds the arm in the air with its links at these angles from the plumb line, degrees.
+    pub fn hold(&mut self, plumb_deg: [f64; 2]) {
+        let [one, two] = plumb_deg.map(f64::to_radians);
+        self.held_rad = Some(LinkMotion::new(one, two));
+        self.present();
+    }
+
+    /// An operator sets the tip on the belt of this scenario at its start, and lets go.
+    ///
+    /// # Panics
+    /// If the scenario is out of range.
+    pub fn set_down(&mut self, scenario: &Scenario) {
+        let mut simulated = scenario.clone();
+        simulated.converters.torque.delay_ticks = 0.0;
+        self.simulation = Simulation::new(&simulated).unwrap_or_else(|error| panic!("{error}"));
+        self.held_rad = None;
+        self.is_held = false;
+        self.present();
+    }
+
     /// Runs one control tick of the image. Closes the switch after a while; holds the arm until it
     /// is first driven.
     pub fn tick(&mut self) {
@@ -163,7 +193,7 @@ impl BoardBench {
             self.board.enable(true);
         }
         self.is_held &= self.board.torque().enabled != Some(true);
-        if self.is_held {
+        if self.is_held || self.held_rad.is_some() {
             return;
         }
         let torque = self.board.torque();

@@ -317,7 +317,7 @@ impl Drive for F405Drive {
     fn sample(&mut self) -> Option<SensorFrame> {
         match self.source {
             FrameSource::Lockstep | FrameSource::Realtime => self.from_host.take(),
-            FrameSource::Sensors | FrameSource::DryRun => Some(self.read_sensors()),
+            _ => Some(self.read_sensors()),
         }
     }
 
@@ -326,7 +326,11 @@ impl Drive for F405Drive {
             .supervisor_state()
             .is_some_and(SupervisorState::drives);
         self.front_end.note_active(is_active);
-        if is_active && self.source == FrameSource::Sensors && self.front_end.is_fit() {
+        let is_driven = matches!(
+            self.source,
+            FrameSource::Sensors | FrameSource::Commissioning
+        );
+        if is_active && is_driven && self.front_end.is_fit() {
             let [torque_1, torque_2] = answer.torques;
             let [reversed_1, reversed_2] = self.stage_reversed;
             let codes = [
@@ -354,8 +358,9 @@ impl BoardDrive for F405Drive {
         self.source = source;
         self.from_host = None;
         // The switch has to be opened and closed again, and the sensors are checked anew.
-        let arm = Arm::new(configuration.arm).ok();
-        self.front_end = FrontEnd::new(arm.map(|arm| FrontEndSettings {
+        let is_mounted = source != FrameSource::Commissioning;
+        let arm = Arm::new(configuration.arm).ok().filter(|_| is_mounted);
+        self.front_end = FrontEnd::new(Some(FrontEndSettings {
             encoders: converters.encoders,
             force: converters.force,
             mounting: converters.mounting,

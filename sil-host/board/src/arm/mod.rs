@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use painleve_plant::Configuration;
 use painleve_shared::black_box::BlackBox;
+use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Health, Request, Response};
 
@@ -52,8 +53,8 @@ pub struct ConnectedArm {
 }
 
 impl ConnectedArm {
-    /// Connects, compares protocol and build, and configures the board. With `dry_run` the torque stages
-    /// stay off.
+    /// Connects, compares protocol and build, and configures the board with one of the sources of frames that
+    /// read its own sensors.
     ///
     /// # Errors
     /// [`BoardError::Port`], [`BoardError::Silent`], [`BoardError::OtherProtocol`],
@@ -61,16 +62,11 @@ impl ConnectedArm {
     pub fn open(
         path: &Path,
         configuration: &Configuration,
-        dry_run: bool,
+        source: FrameSource,
     ) -> Result<Self, BoardError> {
         let mut serial = Serial::connect(path)?;
         serial.identify()?;
         let black_box = serial.black_box()?;
-        let source = if dry_run {
-            FrameSource::DryRun
-        } else {
-            FrameSource::Sensors
-        };
         serial.configure(configuration, source)?;
         let now = Instant::now();
         Ok(Self {
@@ -88,6 +84,16 @@ impl ConnectedArm {
     /// [`BoardError::System`] if the port fails.
     pub fn permit_arming(&mut self, permitted: bool) -> Result<(), BoardError> {
         self.serial.send(&Request::PermitArming(permitted))
+    }
+
+    /// Commands raw torques; without effect unless the source is [`FrameSource::Commissioning`]. They
+    /// expire after 50 ms unless they are repeated.
+    ///
+    /// # Errors
+    /// [`BoardError::System`] if the port fails.
+    pub fn command(&mut self, torques: [TorqueCounts; 2]) -> Result<(), BoardError> {
+        self.heartbeat = Instant::now();
+        self.serial.send(&Request::Torque(torques))
     }
 
     /// Requests the board's counters; the answer is [`ArmEvent::Health`].

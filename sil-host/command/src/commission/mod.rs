@@ -1,18 +1,20 @@
 //! `painleve commission`: measures how the parts of an arm are mounted, and writes its corrected scenario.
 
-use std::path::PathBuf;
+mod board_rig;
+mod rehearsal;
+
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use painleve_commission::simulated::{BuiltInMistake, SimulatedError, SimulatedRig};
-use painleve_commission::{
-    CommissionError, Commissioned, Expected, Instruction, RawReadings, Rig, commission,
-};
+use painleve_commission::simulated::{BuiltInMistake, SimulatedRig};
+use painleve_commission::{CommissionError, Commissioned, Expected, commission};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
-use painleve_shared::counts::TorqueCounts;
 use painleve_shared::range::OutOfRange;
 use painleve_system::atomic_file;
-use painleve_system::terminal::warn;
 
+use self::board_rig::BoardRig;
+pub use self::board_rig::BoardRigError;
+use self::rehearsal::Rehearsal;
 use super::output_error::output;
 use super::{CommandError, say};
 
@@ -25,14 +27,17 @@ pub struct CommissionArguments {
     /// Override one key, for example converters.force.bits=13; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// Serial port of the board, for example /dev/ttyUSB0.
+    #[arg(long, value_name = "PATH", required_unless_present = "rehearse")]
+    port: Option<PathBuf>,
     /// Rehearse on a simulated arm, with a simulated operator.
-    #[arg(long, required = true)]
+    #[arg(long, conflicts_with = "port")]
     rehearse: bool,
     /// Mistake of the simulated arm.
-    #[arg(long, value_name = "MISTAKE", value_parser = mistakes())]
+    #[arg(long, value_name = "MISTAKE", value_parser = mistakes(), requires = "rehearse")]
     mistake: Option<String>,
     /// Seed of the simulated operator's hands and of the noise.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, requires = "rehearse")]
     seed: u64,
     /// Largest torque on either joint, N·m; by default, a fifth of the torque stages' range.
     #[arg(long, value_name = "N·m")]
@@ -45,6 +50,9 @@ pub struct CommissionArguments {
 /// Share of the stages' range that commissioning uses by default.
 const DEFAULT_SHARE: f64 = 0.2;
 
+/// Highest control rate while commissioning, Hz: the line carries the readings of every tick.
+const FASTEST_HZ: u32 = 1000;
+
 fn mistakes() -> clap::builder::PossibleValuesParser {
     BuiltInMistake::ALL
         .iter()
@@ -53,25 +61,11 @@ fn mistakes() -> clap::builder::PossibleValuesParser {
         .into()
 }
 
-/// Shows the operator's tasks of a rehearsal.
-struct Rehearsal(SimulatedRig);
-
-impl Rig for Rehearsal {
-    type Error = SimulatedError;
-
-    fn instruct(&mut self, instruction: Instruction) -> Result<(), SimulatedError> {
-        warn(format_args!("operator: {instruction}"));
-        self.0.instruct(instruction)
-    }
-
-    fn exchange(&mut self, torques: [TorqueCounts; 2]) -> Result<RawReadings, SimulatedError> {
-        self.0.exchange(torques)
-    }
-}
-
 /// Commissions the arm and writes its corrected scenario; after a refusal, nothing is written.
 pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
-    let scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
+    let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
+    let tick_hz = scenario.run.tick_hz;
+    scenario.run.tick_hz = tick_hz.min(FASTEST_HZ);
     let range = |source: OutOfRange| {
         CommandError::Scenario(ScenarioError::Range {
             origin: arguments.scenario.clone(),
@@ -80,22 +74,41 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     };
     let torque_limit_nm = torque_limit_nm(arguments, &scenario).map_err(range)?;
     let expected = Expected::new(&scenario, torque_limit_nm).map_err(range)?;
-    let name = arguments.mistake.as_deref();
-    let mistake = name.and_then(|name| BuiltInMistake::ALL.iter().find(|it| it.name() == name));
-    let mut rig = Rehearsal(SimulatedRig::new(
-        &scenario,
-        mistake.copied(),
-        arguments.seed,
-    ));
-    let commissioned = commission(&mut rig, &expected).map_err(|error| match error {
-        CommissionError::Rig(error) => CommandError::Input(error.into()),
+    let commissioned = match &arguments.port {
+        None => rehearse(arguments, &scenario, &expected),
+        Some(port) => on_board(port, &scenario, &expected),
+    }
+    .map_err(|error| match error {
+        CommissionError::Rig(error) => error,
         CommissionError::Refused(mistake) => CommandError::Mounting(mistake),
         CommissionError::Range(source) => range(source),
     })?;
-    let corrected = commissioned.applied_to(&scenario).map_err(range)?;
+    let mut corrected = commissioned.applied_to(&scenario).map_err(range)?;
+    corrected.run.tick_hz = tick_hz;
     let text = corrected.to_commented_toml();
     atomic_file::write(&arguments.output, text.as_bytes()).map_err(output)?;
     report(arguments, &commissioned)
+}
+
+type Outcome = Result<Commissioned, CommissionError<CommandError>>;
+
+fn rehearse(arguments: &CommissionArguments, scenario: &Scenario, expected: &Expected) -> Outcome {
+    let name = arguments.mistake.as_deref();
+    let mistake = name.and_then(|name| BuiltInMistake::ALL.iter().find(|it| it.name() == name));
+    let simulated = SimulatedRig::new(scenario, mistake.copied(), arguments.seed);
+    commission(&mut Rehearsal(simulated), expected)
+        .map_err(|error| error.map_rig(|error| CommandError::Input(error.into())))
+}
+
+/// Commissions the arm behind a board; whatever ends it, the torque is off.
+fn on_board(port: &Path, scenario: &Scenario, expected: &Expected) -> Outcome {
+    let rig = BoardRig::open(port, scenario, expected.torque_limit_nm);
+    let mut rig = rig.map_err(CommissionError::Rig)?;
+    let outcome = commission(&mut rig, expected);
+    let stopped = rig.stop();
+    let commissioned = outcome.map_err(|error| error.map_rig(CommandError::from))?;
+    stopped.map_err(|error| CommissionError::Rig(error.into()))?;
+    Ok(commissioned)
 }
 
 /// Returns the torque limit, which the stages must reach.

@@ -14,11 +14,12 @@ use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_record::mcap_log::Source;
 use painleve_record::{McapLog, Recorder};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::message::FrameSource;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 use serde::Serialize;
 
-use self::operator::{Operator, OperatorCommand};
+pub use self::operator::{Operator, OperatorCommand};
 use self::view::View;
 use super::output_error::output;
 use super::process_error::ProcessError;
@@ -153,7 +154,12 @@ impl Drive {
             origin: scenario.name.clone(),
             source,
         })?;
-        let arm = ConnectedArm::open(&arguments.port, &configuration, arguments.dry_run)?;
+        let source = if arguments.dry_run {
+            FrameSource::DryRun
+        } else {
+            FrameSource::Sensors
+        };
+        let arm = ConnectedArm::open(&arguments.port, &configuration, source)?;
         for line in history::lines(&arm.black_box) {
             warn(line);
         }
@@ -194,7 +200,7 @@ impl Drive {
         let mut health = Instant::now();
         while !interrupt.is_requested() {
             match operator.order() {
-                None => {}
+                None | Some(OperatorCommand::Confirm) => {}
                 Some(OperatorCommand::Arm) => self.arm.permit_arming(true)?,
                 Some(OperatorCommand::Disarm) => self.arm.permit_arming(false)?,
                 Some(OperatorCommand::Stop) => return Ok(()),

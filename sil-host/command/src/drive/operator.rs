@@ -12,18 +12,20 @@ pub enum OperatorCommand {
     Disarm,
     /// Stop the drive and end.
     Stop,
+    /// The return key alone: confirms a task.
+    Confirm,
     /// Anything else.
     Unknown(String),
 }
 
 impl OperatorCommand {
-    fn of(line: &str) -> Option<Self> {
+    fn of(line: &str) -> Self {
         match line.trim() {
-            "" => None,
-            "arm" => Some(Self::Arm),
-            "disarm" => Some(Self::Disarm),
-            "stop" => Some(Self::Stop),
-            other => Some(Self::Unknown(other.to_owned())),
+            "" => Self::Confirm,
+            "arm" => Self::Arm,
+            "disarm" => Self::Disarm,
+            "stop" => Self::Stop,
+            other => Self::Unknown(other.to_owned()),
         }
     }
 }
@@ -41,9 +43,7 @@ impl Operator {
         std::thread::Builder::new().spawn(move || {
             for line in io::stdin().lock().lines() {
                 let Ok(line) = line else { return };
-                if let Some(order) = OperatorCommand::of(&line)
-                    && sender.send(order).is_err()
-                {
+                if sender.send(OperatorCommand::of(&line)).is_err() {
                     return;
                 }
             }
@@ -63,16 +63,12 @@ mod tests {
 
     #[test]
     fn only_the_whole_word_is_an_order() {
-        assert_eq!(OperatorCommand::of("arm\n"), Some(OperatorCommand::Arm));
-        assert_eq!(OperatorCommand::of(" stop "), Some(OperatorCommand::Stop));
-        assert_eq!(OperatorCommand::of("\n"), None);
-        assert_eq!(
-            OperatorCommand::of("armed"),
-            Some(OperatorCommand::Unknown("armed".into()))
-        );
-        assert_eq!(
-            OperatorCommand::of("ARM"),
-            Some(OperatorCommand::Unknown("ARM".into()))
-        );
+        assert_eq!(OperatorCommand::of("arm\n"), OperatorCommand::Arm);
+        assert_eq!(OperatorCommand::of(" stop "), OperatorCommand::Stop);
+        assert_eq!(OperatorCommand::of("\n"), OperatorCommand::Confirm);
+        for other in ["armed", "ARM"] {
+            let unknown = OperatorCommand::Unknown(other.into());
+            assert_eq!(OperatorCommand::of(other), unknown);
+        }
     }
 }

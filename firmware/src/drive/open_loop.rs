@@ -1,0 +1,199 @@
+//! Torques from the host instead of a law, for commissioning an arm whose mounting is unknown.
+//!
+//! Nothing here depends on the directions of encoders or stages. Torques are limited, expire unless they are
+//! repeated, and a joint that moves far from where the drive was armed latches a fault.
+
+use painleve_shared::counts::{EncoderCounts, EncoderScale, TorqueCounts};
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
+use painleve_shared::status::{Fault, SupervisorState};
+
+use crate::configuration::Configuration;
+use crate::law::Law;
+
+/// Time after which a torque that is not repeated expires, s.
+const LIFETIME_S: f32 = 0.05;
+
+/// Largest turn of a joint from where the drive was armed, as a part of a turn: 11°.
+const FARTHEST: u32 = 32;
+
+/// A drive in open loop.
+#[derive(Clone, Debug)]
+pub struct OpenLoop {
+    encoders: [EncoderScale; 2],
+    /// Largest torque, counts.
+    limit: i32,
+    /// Ticks after which a torque expires.
+    lifetime: u32,
+    torques: [TorqueCounts; 2],
+    /// Ticks since the torques were requested.
+    age: u32,
+    /// Readings when the drive was armed; `None` while it is not.
+    armed_at: Option<[EncoderCounts; 2]>,
+    fault: Option<Fault>,
+    last: ActuatorFrame,
+}
+
+impl OpenLoop {
+    /// Makes a drive that is not armed, with the configuration's torque limit.
+    pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
+        let torque = &configuration.converters.torque;
+        Self {
+            encoders: configuration.converters.encoders,
+            limit: torque.counts(configuration.settings.torque_limit_nm).0,
+            lifetime: (LIFETIME_S * configuration.tick_hz) as u32,
+            torques: [TorqueCounts(0); 2],
+            age: 0,
+            armed_at: None,
+            fault: None,
+            last: ActuatorFrame::default(),
+        }
+    }
+
+    /// Requests torques from now on; without effect while the drive is not armed.
+    pub fn request(&mut self, torques: [TorqueCounts; 2]) {
+        if self.armed_at.is_some() {
+            let limited = |it: TorqueCounts| TorqueCounts(it.0.clamp(-self.limit, self.limit));
+            self.torques = torques.map(limited);
+            self.age = 0;
+        }
+    }
+
+    /// Answers one sensor frame.
+    // Out of line: it must not take the place of the law in the control interrupt.
+    #[cold]
+    #[inline(never)]
+    pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
+        let is_enabled = frame.inputs.contains(DigitalInputs::ENABLE) && self.fault.is_none();
+        if is_enabled {
+            let start = *self.armed_at.get_or_insert(frame.joints);
+            if self.has_moved_far(start, frame.joints) {
+                self.latch(Fault::MovedTooFar);
+            }
+        } else {
+            self.release();
+        }
+        self.age = self.age.saturating_add(1);
+        if self.age > self.lifetime {
+            self.torques = [TorqueCounts(0); 2];
+        }
+        self.last.tick = frame.tick;
+        self.last.sequence = self.last.sequence.wrapping_add(1);
+        self.report()
+    }
+
+    /// Takes the torque off until the next configuration, and returns the answer that says so.
+    #[cold]
+    #[inline(never)]
+    pub fn latch(&mut self, fault: Fault) -> ActuatorFrame {
+        self.fault = self.fault.or(Some(fault));
+        self.release();
+        self.report()
+    }
+
+    fn release(&mut self) {
+        self.armed_at = None;
+        self.torques = [TorqueCounts(0); 2];
+    }
+
+    /// Returns whether a joint has turned too far; a missing reading counts as no motion.
+    fn has_moved_far(&self, from: [EncoderCounts; 2], to: [EncoderCounts; 2]) -> bool {
+        let moved = |scale: &EncoderScale, from: EncoderCounts, to: EncoderCounts| {
+            let turned = scale.difference(from, to).unsigned_abs();
+            scale.contains(from) && scale.contains(to) && turned > scale.modulus() / FARTHEST
+        };
+        let ([scale_1, scale_2], [from_1, from_2], [to_1, to_2]) = (&self.encoders, from, to);
+        moved(scale_1, from_1, to_1) || moved(scale_2, from_2, to_2)
+    }
+
+    fn report(&mut self) -> ActuatorFrame {
+        let state = match (self.fault, self.armed_at) {
+            (Some(_), _) => SupervisorState::Fault,
+            (None, Some(_)) => SupervisorState::Armed,
+            (None, None) => SupervisorState::Idle,
+        };
+        self.last.torques = self.torques;
+        self.last.state = state as u8;
+        self.last.fault = self.fault.map_or(0, |fault| fault as u8);
+        self.last
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::LawSettings;
+
+    const REQUEST: [TorqueCounts; 2] = [TorqueCounts(100), TorqueCounts(-2000)];
+
+    fn open_loop() -> OpenLoop {
+        let mut configuration = Configuration::<LawSettings>::default();
+        configuration.settings.torque_limit_nm = 1.0;
+        OpenLoop::new(&configuration)
+    }
+
+    fn frame(tick: u32, joint: u32, inputs: DigitalInputs) -> SensorFrame {
+        SensorFrame {
+            tick,
+            joints: [EncoderCounts(joint), EncoderCounts(7)],
+            inputs,
+            ..SensorFrame::default()
+        }
+    }
+
+    #[test]
+    fn torques_are_limited_and_expire() {
+        let mut open_loop = open_loop();
+        open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
+        open_loop.request(REQUEST);
+        for tick in 1..=50 {
+            let answer = open_loop.tick(&frame(tick, 100, DigitalInputs::ENABLE));
+            assert_eq!(answer.torques, [TorqueCounts(100), TorqueCounts(-410)]);
+            assert_eq!(answer.supervisor_state(), Some(SupervisorState::Armed));
+            assert_eq!(answer.tick, tick);
+        }
+        let answer = open_loop.tick(&frame(51, 100, DigitalInputs::ENABLE));
+        assert_eq!(answer.torques, [TorqueCounts(0); 2]);
+    }
+
+    #[test]
+    fn without_enable_there_is_no_torque_before_or_after() {
+        let mut open_loop = open_loop();
+        open_loop.request(REQUEST);
+        let armed = open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
+        assert_eq!(armed.torques, [TorqueCounts(0); 2]);
+        open_loop.request(REQUEST);
+        let open = open_loop.tick(&frame(1, 100, DigitalInputs::default()));
+        assert_eq!(open.torques, [TorqueCounts(0); 2]);
+        assert_eq!(open.supervisor_state(), Some(SupervisorState::Idle));
+    }
+
+    #[test]
+    fn a_joint_that_moves_far_in_either_direction_latches_a_fault() {
+        // 512 of 16,384 counts are allowed, across zero as well.
+        for (start, there, is_far) in [
+            (100, 612, false),
+            (100, 613, true),
+            (100, 15_972, false),
+            (100, 15_971, true),
+        ] {
+            let mut open_loop = open_loop();
+            open_loop.tick(&frame(0, start, DigitalInputs::ENABLE));
+            open_loop.request(REQUEST);
+            let answer = open_loop.tick(&frame(1, there, DigitalInputs::ENABLE));
+            let fault = is_far.then_some(Fault::MovedTooFar);
+            assert_eq!(answer.latched_fault(), fault, "{there}");
+            assert_eq!(answer.torques == [TorqueCounts(0); 2], is_far);
+            open_loop.request(REQUEST);
+            let answer = open_loop.tick(&frame(2, start, DigitalInputs::ENABLE));
+            assert_eq!(answer.latched_fault(), fault, "latched");
+        }
+    }
+
+    #[test]
+    fn a_missing_reading_is_no_motion() {
+        let mut open_loop = open_loop();
+        open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
+        let answer = open_loop.tick(&frame(1, u32::MAX, DigitalInputs::ENABLE));
+        assert_eq!(answer.latched_fault(), None);
+    }
+}

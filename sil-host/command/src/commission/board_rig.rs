@@ -1,0 +1,182 @@
+//! A real arm behind its board, with its operator at the keyboard.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use painleve_board::BoardError;
+use painleve_board::arm::{ArmEvent, ConnectedArm};
+use painleve_commission::{Instruction, RawReadings, Rig};
+use painleve_plant::scenario::Scenario;
+use painleve_shared::counts::TorqueCounts;
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
+use painleve_shared::message::FrameSource;
+use painleve_shared::mounting::Mounting;
+use painleve_shared::status::{Fault, SupervisorState};
+use painleve_system::interrupt::Interrupt;
+use painleve_system::terminal::warn;
+
+use crate::CommandError;
+use crate::drive::{Operator, OperatorCommand};
+
+/// Longest wait for the board before checking for the operator and signals.
+const PATIENCE: Duration = Duration::from_millis(20);
+
+/// Longest time between the operator's task to close the switch and torque.
+const ENABLE_LIMIT: Duration = Duration::from_secs(60);
+
+/// Failure of a real arm.
+#[derive(Debug, thiserror::Error)]
+pub enum BoardRigError {
+    /// The board or its line failed.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+    /// The operator or a signal has ended the procedure.
+    #[error("interrupted")]
+    Interrupted,
+    /// The board does not arm.
+    #[error(
+        "the board refuses to arm: a sensor's line, magnet or amplifier is at its limit, or a torque stage is not ready"
+    )]
+    Refused,
+    /// The stages were not enabled.
+    #[error("the torque stages were not enabled within {} s", ENABLE_LIMIT.as_secs())]
+    NotEnabled,
+    /// The stages went off.
+    #[error("the torque stages went off: the switch was opened, or a sensor or a stage failed")]
+    Off,
+    /// The board has latched a fault.
+    #[error("the board has latched fault {}: {}", *.0 as u8, .0.description())]
+    Faulted(Fault),
+}
+
+impl From<BoardRigError> for CommandError {
+    fn from(error: BoardRigError) -> Self {
+        match error {
+            BoardRigError::Board(error) => Self::Board(error),
+            BoardRigError::Interrupted => Self::Interrupted,
+            BoardRigError::Faulted(fault) => Self::Faulted(fault),
+            other => Self::Rig(other),
+        }
+    }
+}
+
+/// A real arm.
+pub struct BoardRig {
+    arm: ConnectedArm,
+    operator: Operator,
+    interrupt: Interrupt,
+    /// Whether the stages have been enabled.
+    is_enabled: bool,
+}
+
+impl BoardRig {
+    /// Connects to a board and configures it for raw readings and torques of at most `torque_limit_nm`.
+    pub fn open(
+        port: &Path,
+        scenario: &Scenario,
+        torque_limit_nm: f64,
+    ) -> Result<Self, CommandError> {
+        let interrupt = Interrupt::catch()?;
+        let operator = Operator::listen()?;
+        let mut configuration = scenario.controller_configuration();
+        configuration.converters.mounting = Mounting::default();
+        configuration.settings.torque_limit_nm = torque_limit_nm as f32;
+        let arm = ConnectedArm::open(port, &configuration, FrameSource::Commissioning)?;
+        Ok(Self {
+            arm,
+            operator,
+            interrupt,
+            is_enabled: false,
+        })
+    }
+
+    /// Takes the torque off.
+    pub fn stop(&mut self) -> Result<(), BoardError> {
+        self.arm.stop()
+    }
+
+    /// Returns the next tick with readings, if one arrives soon.
+    fn next_tick(&mut self) -> Result<Option<(SensorFrame, ActuatorFrame)>, BoardRigError> {
+        if self.interrupt.is_requested() {
+            return Err(BoardRigError::Interrupted);
+        }
+        let Some(ArmEvent::Tick { sensor, answer }) = self.arm.next_event(PATIENCE)? else {
+            return Ok(None);
+        };
+        if let Some(fault) = answer.latched_fault() {
+            return Err(BoardRigError::Faulted(fault));
+        }
+        Ok(sensor.map(|sensor| (sensor, answer)))
+    }
+
+    /// Returns whether the operator has pressed the return key since the last call.
+    fn is_confirmed(&mut self) -> Result<bool, BoardRigError> {
+        match self.operator.order() {
+            Some(OperatorCommand::Stop) => Err(BoardRigError::Interrupted),
+            Some(OperatorCommand::Confirm) => Ok(true),
+            _ => Ok(false),
+        }
+    }
+
+    /// Waits until the operator has done a task.
+    fn wait_for_operator(&mut self) -> Result<(), BoardRigError> {
+        while !self.is_confirmed()? {
+            self.next_tick()?;
+        }
+        Ok(())
+    }
+
+    /// Waits until the board has armed.
+    fn wait_for_enable(&mut self) -> Result<(), BoardRigError> {
+        self.arm.permit_arming(true)?;
+        let start = Instant::now();
+        while start.elapsed() < ENABLE_LIMIT {
+            // The return key has no meaning here; `stop` has.
+            self.is_confirmed()?;
+            let Some((sensor, answer)) = self.next_tick()? else {
+                continue;
+            };
+            if answer.supervisor_state() == Some(SupervisorState::Armed) {
+                return Ok(());
+            }
+            if sensor.inputs.contains(DigitalInputs::ARMING_REFUSED) {
+                return Err(BoardRigError::Refused);
+            }
+        }
+        Err(BoardRigError::NotEnabled)
+    }
+}
+
+impl Rig for BoardRig {
+    type Error = BoardRigError;
+
+    fn instruct(&mut self, instruction: Instruction) -> Result<(), BoardRigError> {
+        if instruction == Instruction::Enable {
+            warn(format_args!("operator: {instruction}"));
+            self.wait_for_enable()?;
+            self.is_enabled = true;
+            return Ok(());
+        }
+        warn(format_args!("operator: {instruction}; then press Return"));
+        self.wait_for_operator()
+    }
+
+    fn exchange(&mut self, torques: [TorqueCounts; 2]) -> Result<RawReadings, BoardRigError> {
+        if self.is_enabled {
+            self.arm.command(torques)?;
+        }
+        loop {
+            let Some((sensor, answer)) = self.next_tick()? else {
+                continue;
+            };
+            if self.is_enabled && answer.supervisor_state() != Some(SupervisorState::Armed) {
+                return Err(BoardRigError::Off);
+            }
+            return Ok(RawReadings {
+                tick: sensor.tick,
+                joints: sensor.joints,
+                forces: [sensor.tangential_force, sensor.normal_force],
+            });
+        }
+    }
+}
