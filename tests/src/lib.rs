@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use painleve_system::interrupt::restore_default_actions;
 use serde_json::Value;
 
 /// Returns the path of the release program, which is built if missing or out of date.
@@ -129,8 +130,14 @@ impl Bench {
         found
     }
 
-    /// Returns a command that runs the program with arguments in the folder.
+    /// Returns a command that runs the program with arguments in the folder. The program reacts to
+    /// signals even if the tests were started in the background, where SIGINT is ignored.
+    ///
+    /// # Panics
+    /// If the system refuses to reset the signals.
     pub fn command(&self, arguments: &[&str]) -> Command {
+        restore_default_actions()
+            .unwrap_or_else(|error| panic!("cannot reset the signals: {error}"));
         let mut command = Command::new(program());
         command.args(arguments).current_dir(self.folder.path());
         command

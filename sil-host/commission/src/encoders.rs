@@ -8,7 +8,7 @@ use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts};
 
 use crate::readings::{MeanReadings, Session, forward};
-use crate::{CommissionError, Deviation, Instruction, Mistake, Rig};
+use crate::{CommissionError, Deviation, Mistake, OperatorTask, Rig};
 
 /// Angles of both links from the plumb line, degrees.
 const POSES_DEG: [[f64; 2]; 3] = [[0.0, 90.0], [90.0, 90.0], [90.0, 0.0]];
@@ -47,7 +47,7 @@ pub(crate) fn measure<R: Rig>(
 ) -> Result<EncodersFound, CommissionError<R::Error>> {
     let mut held = Vec::new();
     for plumb_deg in POSES_DEG {
-        session.instruct(Instruction::Hold { plumb_deg })?;
+        session.instruct(OperatorTask::Hold { plumb_deg })?;
         held.push(session.mean(JointTorque::zeros())?);
     }
     let scales = session.expected.converters.encoders;

@@ -47,7 +47,7 @@ pub struct RawReadings {
 
 /// A task for the operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Instruction {
+pub enum OperatorTask {
     /// Hold the arm still, clear of the belt, with both links at these angles from the plumb line, degrees,
     /// positive in the belt's direction +t.
     Hold {
@@ -63,7 +63,7 @@ pub enum Instruction {
     Enable,
 }
 
-impl core::fmt::Display for Instruction {
+impl core::fmt::Display for OperatorTask {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let direction = |degrees: f64| match degrees {
             0.0 => "straight down".to_owned(),
@@ -106,7 +106,7 @@ pub trait Rig {
     ///
     /// # Errors
     /// If the operator gives up or the rig fails.
-    fn instruct(&mut self, instruction: Instruction) -> Result<(), Self::Error>;
+    fn instruct(&mut self, instruction: OperatorTask) -> Result<(), Self::Error>;
 
     /// Commands raw torques and returns the readings of a later tick. The torques last until the next call
     /// or, without one, for a short time.

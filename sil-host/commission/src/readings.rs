@@ -55,7 +55,7 @@ impl<'a, R: Rig> Session<'a, R> {
     /// Gives the operator a task.
     pub fn instruct(
         &mut self,
-        instruction: crate::Instruction,
+        instruction: crate::OperatorTask,
     ) -> Result<(), CommissionError<R::Error>> {
         self.rig.instruct(instruction).map_err(CommissionError::Rig)
     }

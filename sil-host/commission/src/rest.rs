@@ -9,7 +9,7 @@ use painleve_shared::kinematics::Pose;
 use painleve_shared::{Arm, JointTorque, LinkMotion};
 
 use crate::readings::Session;
-use crate::{CommissionError, Deviation, Instruction, Mistake, Rig};
+use crate::{CommissionError, Deviation, Mistake, OperatorTask, Rig};
 
 /// Largest error of the belt's height that counts as the scenario's own, m: 0.5° of each encoder's zero.
 const HEIGHT_TOLERANCE_M: f64 = 0.005;
@@ -68,7 +68,7 @@ pub(crate) fn measure<R: Rig>(
     tare: &[ForceCounts; 2],
 ) -> Result<RestFound, CommissionError<R::Error>> {
     let posture = session.expected.posture;
-    session.instruct(Instruction::SetDown { posture })?;
+    session.instruct(OperatorTask::SetDown { posture })?;
     let readings = session.mean(JointTorque::zeros())?;
     let expected = session.expected;
     let theta_rad = session

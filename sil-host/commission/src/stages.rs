@@ -10,7 +10,7 @@ use painleve_shared::{JointTorque, LinkMotion};
 
 use crate::readings::Session;
 use crate::rest::{RestFound, force_at_rest_n};
-use crate::{CommissionError, Deviation, Instruction, Mistake, Rig};
+use crate::{CommissionError, Deviation, Mistake, OperatorTask, Rig};
 
 /// Change of f_n, as a part of its value at rest.
 const CHANGE: f64 = 0.2;
@@ -46,7 +46,7 @@ pub(crate) fn measure<R: Rig>(
     session: &mut Session<'_, R>,
     rest: &RestFound,
 ) -> Result<StagesFound, CommissionError<R::Error>> {
-    session.instruct(Instruction::Enable)?;
+    session.instruct(OperatorTask::Enable)?;
     let model = effects(session, &rest.theta_rad)?;
     let mut measured = Matrix2::zeros();
     for joint in 0..2 {

@@ -86,6 +86,18 @@ fn handle(handler: extern "C" fn(c_int)) -> io::Result<()> {
     Ok(())
 }
 
+/// Gives SIGINT, SIGTERM and SIGHUP their default action in this process and in the children that
+/// it starts from now on. A shell's background jobs ignore SIGINT, and their children with them.
+///
+/// # Errors
+/// If the system refuses the setting.
+pub fn restore_default_actions() -> io::Result<()> {
+    for signal in REQUESTS {
+        set(signal, SigHandler::SigDfl)?;
+    }
+    Ok(())
+}
+
 /// Makes a write beyond `ulimit -f` fail like a write to a full disk, instead of killing the
 /// process without a message.
 ///

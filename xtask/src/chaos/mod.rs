@@ -117,6 +117,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     std::fs::copy(workspace().join("target/release/painleve"), &program).map_err(system)?;
     // This process adopts orphans, as systemd or a container would.
     set_child_subreaper(true).map_err(|error| system(error.into()))?;
+    tracer::restore_default_actions().map_err(|error| system(error.into()))?;
     let runtime = tempfile::tempdir().map_err(system)?;
     let segments_before = unused_segments()?;
 

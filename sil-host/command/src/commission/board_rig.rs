@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use painleve_board::BoardError;
 use painleve_board::arm::{ArmEvent, ConnectedArm};
-use painleve_commission::{Instruction, RawReadings, Rig};
+use painleve_commission::{OperatorTask, RawReadings, Rig};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
@@ -150,8 +150,8 @@ impl BoardRig {
 impl Rig for BoardRig {
     type Error = BoardRigError;
 
-    fn instruct(&mut self, instruction: Instruction) -> Result<(), BoardRigError> {
-        if instruction == Instruction::Enable {
+    fn instruct(&mut self, instruction: OperatorTask) -> Result<(), BoardRigError> {
+        if instruction == OperatorTask::Enable {
             warn(format_args!("operator: {instruction}"));
             self.wait_for_enable()?;
             self.is_enabled = true;

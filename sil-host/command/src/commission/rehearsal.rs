@@ -1,7 +1,7 @@
 //! A simulated arm whose operator's tasks are shown.
 
 use painleve_commission::simulated::{SimulatedError, SimulatedRig};
-use painleve_commission::{Instruction, RawReadings, Rig};
+use painleve_commission::{OperatorTask, RawReadings, Rig};
 use painleve_shared::counts::TorqueCounts;
 use painleve_system::terminal::warn;
 
@@ -11,7 +11,7 @@ pub struct Rehearsal(pub SimulatedRig);
 impl Rig for Rehearsal {
     type Error = SimulatedError;
 
-    fn instruct(&mut self, instruction: Instruction) -> Result<(), SimulatedError> {
+    fn instruct(&mut self, instruction: OperatorTask) -> Result<(), SimulatedError> {
         warn(format_args!("operator: {instruction}"));
         self.0.instruct(instruction)
     }

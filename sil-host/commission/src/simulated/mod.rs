@@ -17,7 +17,7 @@ pub use built_in_mistake::BuiltInMistake;
 pub use random_arm::random_arm;
 pub use wiring::Wiring;
 
-use crate::{Instruction, RawReadings, Rig};
+use crate::{OperatorTask, RawReadings, Rig};
 
 /// Largest error of a held angle, degrees.
 const HAND_DEG: f64 = 0.5;
@@ -125,16 +125,16 @@ impl SimulatedRig {
 impl Rig for SimulatedRig {
     type Error = SimulatedError;
 
-    fn instruct(&mut self, instruction: Instruction) -> Result<(), SimulatedError> {
+    fn instruct(&mut self, instruction: OperatorTask) -> Result<(), SimulatedError> {
         match instruction {
-            Instruction::Hold { plumb_deg } => {
+            OperatorTask::Hold { plumb_deg } => {
                 let tilt_rad = self.actual.arm.belt_tilt_rad;
                 let [one, two] =
                     plumb_deg.map(|it| (it + self.draw(HAND_DEG)).to_radians() - tilt_rad);
                 self.held_rad = Some(LinkMotion::new(one, two));
             }
-            Instruction::SetDown { posture } => self.set_down(posture)?,
-            Instruction::Enable => self.stages_are_on = true,
+            OperatorTask::SetDown { posture } => self.set_down(posture)?,
+            OperatorTask::Enable => self.stages_are_on = true,
         }
         Ok(())
     }
