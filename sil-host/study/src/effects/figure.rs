@@ -6,12 +6,13 @@ use painleve_chart::{Chart, Mark, Panel};
 use super::outcome::{EffectsOutcome, Fall, RATES, Series, number};
 use crate::outcome::{self, Figure};
 
-/// Ends of the axis of severity, log2 of the level over the typical one, and where names begin.
+/// Ends of the axis of severity, log2 of the level over the typical one.
 const LEAST: f64 = -4.0;
 const MOST: f64 = 6.0;
-const NAMES: f64 = -13.0;
-/// Height of a line, drawn units.
-const LINE: i32 = 52;
+/// Height of a line, drawn units: an effect's name above its levels.
+const LINE: i32 = 84;
+/// Distance of a name above the line of its levels, lines.
+const NAME: f64 = 0.42;
 
 impl Figure for EffectsOutcome {
     fn svg(&self) -> String {
@@ -34,7 +35,7 @@ impl Figure for EffectsOutcome {
             ),
             x_title: "Doublings of the level of a typical rig, which is given with each name"
                 .into(),
-            x: Some(NAMES - 0.2..MOST),
+            x: Some(LEAST - 0.2..MOST),
             panels,
             ..Chart::default()
         }
@@ -46,7 +47,7 @@ impl Figure for EffectsOutcome {
 fn panel(all: &[Series], is_first: bool) -> Panel {
     let shown: Vec<&Series> = all.iter().filter(|series| series.key != "–").collect();
     let count = shown.len().max(1);
-    let line = |index: usize| (count - index) as f64 - 0.5;
+    let line = |index: usize| (count - index) as f64 - 0.72;
     let place = |series: &Series, level: f64| {
         let severity = series.effect().severity(level);
         libm::log2(severity).clamp(LEAST, MOST)
@@ -71,7 +72,7 @@ fn panel(all: &[Series], is_first: bool) -> Panel {
         });
         let unit = series.unit;
         marks.push(Mark::Label {
-            at: (NAMES, y),
+            at: (LEAST, y + NAME),
             centred: false,
             text: format!("{}, {} {unit}", series.effect, number(series.typical)),
         });
