@@ -28,7 +28,7 @@ const BYTE: Picoseconds = 10 * SECOND / 921_600;
 
 /// The parts on the pins.
 #[derive(Clone, Debug, Default)]
-pub struct Wiring {
+pub struct BoardWiring {
     /// Encoders of θ1 and of the elbow.
     pub encoders: [As5048a; 2],
     /// Converter of the force cell.
@@ -38,7 +38,7 @@ pub struct Wiring {
     pub stages: Option<bool>,
 }
 
-impl Wiring {
+impl BoardWiring {
     fn part(&mut self, index: usize) -> &mut dyn SpiPart {
         match index {
             0 | 1 => &mut self.encoders[index],
@@ -53,7 +53,7 @@ impl Wiring {
     }
 }
 
-impl Outside for Wiring {
+impl Outside for BoardWiring {
     fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds) {
         if pin == STAGES {
             self.stages = level;
@@ -107,7 +107,7 @@ impl Torque {
 
 /// State of a board at one instant.
 pub struct BoardSnapshot {
-    machine: MachineSnapshot<Stm32f4<Wiring>>,
+    machine: MachineSnapshot<Stm32f4<BoardWiring>>,
     inbox: Inbox,
     heard: usize,
     line_free: Picoseconds,
@@ -116,7 +116,7 @@ pub struct BoardSnapshot {
 /// A powered board on a bench with the image in its flash.
 pub struct FlashedBoard {
     /// The microcontroller.
-    pub machine: Machine<Stm32f4<Wiring>>,
+    pub machine: Machine<Stm32f4<BoardWiring>>,
     inbox: Inbox,
     heard: usize,
     /// Time until which the line to the board is busy.
@@ -163,7 +163,7 @@ impl Default for FlashedBoard {
 impl FlashedBoard {
     /// Creates a powered board with a healthy arm that is not enabled; nothing has been executed.
     pub fn with_oscillator(watchdog_hz: u64) -> Self {
-        let mut chip = Stm32f4::new(Wiring::default(), watchdog_hz);
+        let mut chip = Stm32f4::new(BoardWiring::default(), watchdog_hz);
         chip.drive_pin(ENABLE, Some(false));
         chip.drive_pin(RESET, Some(false));
         chip.drive_pin(STAGES_READY, Some(true));
@@ -187,7 +187,7 @@ impl FlashedBoard {
     }
 
     /// Returns the parts on the pins.
-    pub fn wiring(&mut self) -> &mut Wiring {
+    pub fn wiring(&mut self) -> &mut BoardWiring {
         &mut self.machine.chip_mut().outside
     }
 

@@ -11,7 +11,7 @@ use painleve_shared::counts::ForceCounts;
 use painleve_shared::{Arm, Posture};
 use painleve_tests::Bench;
 
-use crate::rig::{DEFAULT, Program, Rig};
+use crate::rig::{DEFAULT, EmulatedRig, StartedProgram};
 
 /// The arm with its tip on the standing belt, 10 mm from the point below joint 1.
 fn set_down() -> Scenario {
@@ -35,9 +35,9 @@ fn mount_wrongly(bench: &mut BoardBench) {
 }
 
 /// Follows the program's tasks until it ends. Returns what it has printed on standard error, too.
-fn commission(rig: &Rig, folder: Bench, scenario: &str) -> (Output, String, Bench) {
+fn commission(rig: &EmulatedRig, folder: Bench, scenario: &str) -> (Output, String, Bench) {
     let arguments = ["commission", scenario, "--output", "commissioned.toml"];
-    let mut program = Program::start(folder, &rig.port, &arguments);
+    let mut program = StartedProgram::start(folder, &rig.port, &arguments);
     let stderr = program.child.stderr.take().unwrap();
     let mut text = String::new();
     for line in BufReader::new(stderr).lines() {
@@ -71,7 +71,7 @@ fn commission(rig: &Rig, folder: Bench, scenario: &str) -> (Output, String, Benc
 
 #[test]
 fn an_arm_is_commissioned_and_its_corrected_scenario_describes_it() {
-    let rig = Rig::new();
+    let rig = EmulatedRig::new();
     rig.act(mount_wrongly);
     let (output, text, folder) = commission(&rig, Bench::new("commission"), DEFAULT);
     assert!(output.status.success(), "{text}");
@@ -91,7 +91,7 @@ fn an_arm_is_commissioned_and_its_corrected_scenario_describes_it() {
     }
     drop(rig);
     // The same arm with its corrected scenario: nothing is left to correct.
-    let rig = Rig::new();
+    let rig = EmulatedRig::new();
     rig.act(mount_wrongly);
     let corrected = folder.path("commissioned.toml");
     let (output, text, _) = commission(&rig, Bench::new("again"), corrected.to_str().unwrap());
@@ -105,7 +105,7 @@ fn an_arm_is_commissioned_and_its_corrected_scenario_describes_it() {
 
 #[test]
 fn a_dead_force_line_is_named_and_nothing_is_written() {
-    let rig = Rig::new();
+    let rig = EmulatedRig::new();
     rig.act(|bench| bench.board.wiring().force.dead = Some(false));
     let (output, text, folder) = commission(&rig, Bench::new("commission"), DEFAULT);
     assert_eq!(output.status.code(), Some(1), "{text}");

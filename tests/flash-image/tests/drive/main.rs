@@ -15,7 +15,7 @@ use painleve_shared::wire::{self, Inbox};
 use painleve_tests::line::terminal;
 use painleve_tests::{errors, signal};
 
-use crate::rig::{Program, Rig};
+use crate::rig::{EmulatedRig, StartedProgram};
 
 fn report(output: &Output) -> serde_json::Value {
     assert!(output.status.success(), "{}", errors(output));
@@ -24,8 +24,8 @@ fn report(output: &Output) -> serde_json::Value {
 
 #[test]
 fn an_arm_is_driven_after_the_order_and_the_switch_and_recorded() {
-    let rig = Rig::new();
-    let mut program = Program::drive(&rig.port, &["--record", "drive.mcap"]);
+    let rig = EmulatedRig::new();
+    let mut program = StartedProgram::drive(&rig.port, &["--record", "drive.mcap"]);
     // The switch alone does not arm the drive.
     rig.wait_for_work();
     rig.close_switch();
@@ -35,7 +35,7 @@ fn an_arm_is_driven_after_the_order_and_the_switch_and_recorded() {
     });
     assert!(!rig.is_on());
     program.order("arm");
-    rig.wait_until("the arm is driven", Rig::is_on);
+    rig.wait_until("the arm is driven", EmulatedRig::is_on);
     let ticks = rig.ticks();
     rig.wait_until("it has been driven for a while", |rig| {
         rig.ticks() > ticks + 300
@@ -66,8 +66,8 @@ fn an_arm_is_driven_after_the_order_and_the_switch_and_recorded() {
 
 #[test]
 fn a_dry_run_keeps_the_stages_off() {
-    let rig = Rig::new();
-    let mut program = Program::drive(
+    let rig = EmulatedRig::new();
+    let mut program = StartedProgram::drive(
         &rig.port,
         &["--dry-run", "--no-record", "--duration", "0.5"],
     );
@@ -82,12 +82,12 @@ fn a_dry_run_keeps_the_stages_off() {
 #[test]
 fn ctrl_c_and_a_killed_program_take_the_torque_off() {
     for (by, limit_ticks) in [(Signal::SIGINT, 60), (Signal::SIGKILL, 260)] {
-        let rig = Rig::new();
-        let mut program = Program::drive(&rig.port, &["--no-record"]);
+        let rig = EmulatedRig::new();
+        let mut program = StartedProgram::drive(&rig.port, &["--no-record"]);
         program.order("arm");
         rig.wait_for_work();
         rig.close_switch();
-        rig.wait_until("the arm is driven", Rig::is_on);
+        rig.wait_until("the arm is driven", EmulatedRig::is_on);
         let ticks = rig.ticks();
         signal(program.child.id().cast_signed(), by);
         rig.wait_until("the torque is off", |rig| !rig.is_on());
@@ -117,7 +117,7 @@ fn another_build_or_protocol_is_refused_and_both_are_named() {
         ),
     ] {
         let (mut line, _far, port) = terminal();
-        let program = Program::drive(&port, &["--no-record"]);
+        let program = StartedProgram::drive(&port, &["--no-record"]);
         let mut inbox = Inbox::new();
         let mut bytes = [0; 1024];
         'asked: loop {

@@ -38,7 +38,7 @@ struct Observed {
 type Act = Box<dyn FnOnce(&mut BoardBench) + Send>;
 
 /// The emulated board with its arm in its own thread, no faster than real time.
-pub struct Rig {
+pub struct EmulatedRig {
     /// The program's end of the line.
     pub port: PathBuf,
     observed: Arc<Observed>,
@@ -47,7 +47,7 @@ pub struct Rig {
     _far_end: OwnedFd,
 }
 
-impl Rig {
+impl EmulatedRig {
     pub fn new() -> Self {
         // Building the program takes longer than the board's start.
         painleve_tests::program();
@@ -103,7 +103,7 @@ impl Rig {
     }
 }
 
-impl Drop for Rig {
+impl Drop for EmulatedRig {
     fn drop(&mut self) {
         self.observed.is_over.store(true, Ordering::SeqCst);
         if let Some(thread) = self.thread.take() {
@@ -153,12 +153,12 @@ fn is_readable(line: &File) -> bool {
 }
 
 /// A running `painleve`.
-pub struct Program {
+pub struct StartedProgram {
     pub child: Child,
     pub folder: painleve_tests::Bench,
 }
 
-impl Program {
+impl StartedProgram {
     /// Starts `painleve drive` with further options.
     pub fn drive(port: &Path, more: &[&str]) -> Self {
         let folder = painleve_tests::Bench::new("drive");
