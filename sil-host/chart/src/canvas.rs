@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use crate::dark;
 use crate::style::{Colour, DRAWN_PER_SHOWN, FONT, Look, WHITE};
+use crate::{dark, markup};
 
 /// A point in drawn units, (right, down).
 pub type At = (i32, i32);
@@ -200,18 +200,7 @@ fn joined(points: &[At]) -> String {
 
 /// Escapes text for XML, which does not allow control characters.
 fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            control if control.is_control() => escaped.push(' '),
-            other => escaped.push(other),
-        }
-    }
-    escaped
+    markup::escaped(&text.replace(char::is_control, " "))
 }
 
 /// Returns a text in which the dot of a time derivative is a full stop raised over its letter. Few

@@ -2,6 +2,7 @@
 
 use comfy_table::Table;
 use core::fmt::Write;
+use painleve_chart::markup;
 
 /// The page.
 #[derive(Clone, Debug, Default)]
@@ -235,18 +236,8 @@ fn write_table(html: &mut String, table: &Table) -> core::fmt::Result {
 
 /// Escapes text for HTML; removes control characters, which HTML does not allow.
 fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            control if control.is_control() && control != '\n' => {}
-            other => escaped.push(other),
-        }
-    }
-    escaped
+    let is_kept = |character: &char| !character.is_control() || *character == '\n';
+    markup::escaped(&text.chars().filter(is_kept).collect::<String>())
 }
 
 #[cfg(test)]
