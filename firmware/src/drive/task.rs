@@ -1,10 +1,9 @@
 //! The control task: one tick with sampling, actuation and monitoring.
 
+use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::range::OutOfRange;
-
-use painleve_shared::counts::TorqueCounts;
 
 use super::Drive;
 use super::open_loop::OpenLoop;
