@@ -2,22 +2,20 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::{TickTimes, TimingReport};
 use painleve_board::{BoardError, ConnectedBoard, Drivers, LineHealth, Serial};
-use painleve_link::{BusName, ControllerEnd, Pacing, Received};
+use painleve_link::{Pacing, Received};
 use painleve_plant::Configuration;
 use painleve_shared::message::FrameSource;
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 
+use super::join::JoinArguments;
 use super::output_error::output;
-use super::patience::{PatienceArguments, WAIT_S};
-use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve bridge`.
@@ -61,14 +59,8 @@ enum BridgeTarget {
 
 #[derive(Debug, Args)]
 struct BusArguments {
-    /// Bus of the plant.
-    #[arg(long)]
-    bus: BusName,
-    /// Longest wait for the plant, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = WAIT_S, value_parser = super::seconds)]
-    wait_s: f64,
     #[command(flatten)]
-    patience: PatienceArguments,
+    plant: JoinArguments,
     /// Scenario of the plant, for the report.
     #[arg(long, hide = true, default_value = "")]
     scenario_name: String,
@@ -133,7 +125,7 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
                     &image.path(),
                     configuration,
                     image.log,
-                    bus.patience.board(),
+                    bus.plant.patience.board(),
                 )
             })
         }
@@ -148,7 +140,7 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
                     port,
                     configuration,
                     frame_source(pacing),
-                    bus.patience.board(),
+                    bus.plant.patience.board(),
                 )
             })
         }
@@ -178,16 +170,7 @@ fn carry_until<B: ConnectedBoard>(
     start: impl FnOnce(&Configuration, Pacing) -> Result<B, BoardError>,
     interrupt: &Interrupt,
 ) -> Result<(), CommandError> {
-    let wait = Duration::from_secs_f64(bus.wait_s);
-    let (mut end, session) = ControllerEnd::open(&bus.bus, wait, interrupt)?;
-    end.set_silence_limit(bus.patience.peer());
-    let configuration: Configuration =
-        postcard::from_bytes(&session.configuration).map_err(|source| {
-            ProcessError::Unreadable {
-                bus: bus.bus.clone(),
-                source,
-            }
-        })?;
+    let (mut end, session, configuration) = bus.plant.join(interrupt)?;
     let mut board = start(&configuration, session.pacing)?;
     let mut times = TickTimes::default();
     while let Received::Frame(frame) = end.receive()? {

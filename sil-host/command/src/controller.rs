@@ -1,31 +1,22 @@
 //! `painleve controller`: the firmware's controller in its own process.
 
-use std::time::Duration;
-
 use clap::Args;
 use painleve_firmware::drive::ControlTask;
-use painleve_link::{BusDrive, BusName, ControllerEnd, Pacing};
-use painleve_plant::Configuration;
+use painleve_link::{BusDrive, Pacing};
 use painleve_plant::law_choice::LawChoice;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::realtime::request_realtime;
 use painleve_system::terminal::warn;
 
-use super::patience::{PatienceArguments, WAIT_S};
+use super::join::JoinArguments;
 use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve controller`.
 #[derive(Debug, Args)]
 pub struct ControllerArguments {
-    /// Bus of the plant.
-    #[arg(long)]
-    bus: BusName,
-    /// Longest wait for the plant, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = WAIT_S, value_parser = super::seconds)]
-    wait_s: f64,
     #[command(flatten)]
-    patience: PatienceArguments,
+    plant: JoinArguments,
 }
 
 /// Answers the plant's frames until its session ends.
@@ -38,16 +29,7 @@ fn answer_until(
     arguments: &ControllerArguments,
     interrupt: &Interrupt,
 ) -> Result<(), CommandError> {
-    let wait = Duration::from_secs_f64(arguments.wait_s);
-    let (mut end, session) = ControllerEnd::open(&arguments.bus, wait, interrupt)?;
-    end.set_silence_limit(arguments.patience.peer());
-    let configuration: Configuration =
-        postcard::from_bytes(&session.configuration).map_err(|source| {
-            ProcessError::Unreadable {
-                bus: arguments.bus.clone(),
-                source,
-            }
-        })?;
+    let (end, session, configuration) = arguments.plant.join(interrupt)?;
     if session.pacing == Pacing::Realtime {
         warn(format_args!("controller: {}", request_realtime()));
     }
@@ -56,7 +38,7 @@ fn answer_until(
     let mut task: ControlTask<BusDrive, LawChoice> = ControlTask::new(drive);
     task.configure(&configuration, source)
         .map_err(|source| ProcessError::Refused {
-            bus: arguments.bus.clone(),
+            bus: arguments.plant.bus.clone(),
             source,
         })?;
     loop {

@@ -9,6 +9,7 @@ mod drive;
 mod export;
 mod fail_on;
 mod figures;
+mod join;
 mod live;
 mod output;
 mod output_error;

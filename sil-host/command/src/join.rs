@@ -1,0 +1,44 @@
+//! How a controller joins the bus of its plant.
+
+use std::time::Duration;
+
+use clap::Args;
+use painleve_link::{BusName, ControllerEnd, Session};
+use painleve_plant::Configuration;
+use painleve_system::interrupt::Interrupt;
+
+use super::CommandError;
+use super::patience::{PatienceArguments, WAIT_S};
+use super::process_error::ProcessError;
+
+/// The plant to join.
+#[derive(Debug, Args)]
+pub struct JoinArguments {
+    /// Bus of the plant.
+    #[arg(long)]
+    pub bus: BusName,
+    /// Longest wait for the plant, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = WAIT_S, value_parser = super::seconds)]
+    wait_s: f64,
+    #[command(flatten)]
+    pub patience: PatienceArguments,
+}
+
+impl JoinArguments {
+    /// Waits for the plant and joins its session; returns the plant's configuration, too.
+    pub fn join(
+        &self,
+        interrupt: &Interrupt,
+    ) -> Result<(ControllerEnd, Session, Configuration), CommandError> {
+        let wait = Duration::from_secs_f64(self.wait_s);
+        let (mut end, session) = ControllerEnd::open(&self.bus, wait, interrupt)?;
+        end.set_silence_limit(self.patience.peer());
+        let configuration = postcard::from_bytes(&session.configuration).map_err(|source| {
+            ProcessError::Unreadable {
+                bus: self.bus.clone(),
+                source,
+            }
+        })?;
+        Ok((end, session, configuration))
+    }
+}
