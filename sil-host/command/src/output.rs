@@ -169,25 +169,14 @@ impl Output {
         })
     }
 
-    /// Keeps the partial record of a run that ended early, and reports its path.
+    /// Keeps the partial record, if the run has begun.
     pub fn keep_partial(self, reason: &str) {
         self.progress.finish_and_clear();
         if self.tick == 0 {
             return;
         }
-        match self
-            .recorder
-            .map(|recorder| recorder.finish_partial(reason))
-        {
-            None => {}
-            Some(Ok(paths)) => {
-                for path in paths {
-                    warn(format_args!("the partial record is in {}", path.display()));
-                }
-            }
-            Some(Err(error)) => warn(format_args!(
-                "the partial record could not be kept: {error}"
-            )),
+        if let Some(recorder) = self.recorder {
+            keep_partial(recorder, reason);
         }
     }
 
@@ -198,6 +187,20 @@ impl Output {
             recorder.finish().map_err(output)?;
         }
         Ok(self.paths)
+    }
+}
+
+/// Keeps the partial record of a run that ended early, and reports its path.
+pub fn keep_partial(recorder: Recorder, reason: &str) {
+    match recorder.finish_partial(reason) {
+        Ok(paths) => {
+            for path in paths {
+                warn(format_args!("the partial record is in {}", path.display()));
+            }
+        }
+        Err(error) => warn(format_args!(
+            "the partial record could not be kept: {error}"
+        )),
     }
 }
 

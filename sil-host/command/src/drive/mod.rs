@@ -21,6 +21,7 @@ use serde::Serialize;
 
 pub use self::operator::{Operator, OperatorCommand};
 use self::view::View;
+use super::output::keep_partial;
 use super::output_error::output;
 use super::process_error::ProcessError;
 use super::{CommandError, say};
@@ -89,7 +90,9 @@ pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     let stopped = drive.arm.stop();
     drive.view.finish();
     if let Err(error) = watched.and(stopped.map_err(CommandError::from)) {
-        keep_partial(recorder, &error.to_string());
+        if let Some(recorder) = recorder {
+            keep_partial(recorder, &error.to_string());
+        }
         return Err(error);
     }
     if let Some(recorder) = recorder {
@@ -121,20 +124,6 @@ fn recorder(
     Recorder::start(&configuration, vec![Box::new(log)])
         .map(Some)
         .map_err(output)
-}
-
-fn keep_partial(recorder: Option<Recorder>, reason: &str) {
-    match recorder.map(|recorder| recorder.finish_partial(reason)) {
-        None => {}
-        Some(Ok(paths)) => {
-            for path in paths {
-                warn(format_args!("the partial record is in {}", path.display()));
-            }
-        }
-        Some(Err(error)) => warn(format_args!(
-            "the partial record could not be kept: {error}"
-        )),
-    }
 }
 
 /// A running board and its record.
