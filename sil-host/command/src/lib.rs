@@ -314,6 +314,9 @@ static PANIC_IN_ICEORYX2: AtomicBool = AtomicBool::new(false);
 /// Nothing can catch this panic.
 const THREAD_START: &str = "library/std/src/sys/pal/unix/";
 
+/// Set by the first thread that the system refuses.
+static THREAD_REFUSED: AtomicBool = AtomicBool::new(false);
+
 /// Reports a panic in one line instead of a backtrace.
 fn tell_panic(panic: &PanicHookInfo) {
     let place = panic.location().map_or("", |location| location.file());
@@ -328,6 +331,10 @@ fn tell_panic(panic: &PanicHookInfo) {
         PANIC_IN_ICEORYX2.store(true, Ordering::Relaxed);
         warn(format_args!("error: iceoryx2 has failed: {message}"));
     } else if place.contains(THREAD_START) {
+        // Several threads may be refused at once: the first reports it and ends the process.
+        while THREAD_REFUSED.swap(true, Ordering::Relaxed) {
+            std::thread::park();
+        }
         warn(format_args!(
             "error: the system refuses a thread: {message}"
         ));
