@@ -36,8 +36,8 @@ enum Chore {
     BuildFw,
     /// Print flash, RAM and stack use of the images, with their limits.
     Size,
-    /// Build the image for the STM32F405 and flash it with probe-rs.
-    Flash,
+    /// Build the image for a board and flash it with probe-rs.
+    Flash(flash::FlashArguments),
     /// Build and run every example.
     Examples,
     /// Build the Python package, install its wheel in a virtual environment, and test it.
@@ -58,7 +58,7 @@ fn main() -> ExitCode {
         Chore::Setup => setup::run(),
         Chore::BuildFw => build_fw::run(),
         Chore::Size => size::run(),
-        Chore::Flash => flash::run(),
+        Chore::Flash(arguments) => flash::run(&arguments),
         Chore::Examples => examples::run(),
         Chore::Python => python::run_chore(),
         Chore::Fuzz(arguments) => fuzz::run(&arguments),

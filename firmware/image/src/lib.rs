@@ -9,11 +9,16 @@
 #![no_std]
 #![cfg(target_os = "none")]
 
+pub mod arm_drive;
 pub mod black_box;
 pub mod board;
+pub mod crash;
+pub mod dma_serial;
+pub mod sensor_bus;
 pub mod stack;
 pub mod tasks;
 mod watch;
+pub mod watchdogs;
 
 #[doc(hidden)]
 pub use {cortex_m, heapless, painleve_firmware, painleve_shared, rtic};

@@ -11,15 +11,15 @@ const PAINT: u32 = 0xdead_57ac;
 const MARGIN_BYTES: usize = 128;
 
 unsafe extern "C" {
-    /// End of static memory, lowest address of the stack (cortex-m-rt).
-    static mut __sheap: u32;
+    /// Lowest address of the stack (cortex-m-rt).
+    static mut _stack_end: u32;
     /// One past the highest address of the stack.
     static mut _stack_start: u32;
 }
 
 /// Paints the unused part of the stack. Must be called first.
 pub fn paint() {
-    let mut word = addr_of_mut!(__sheap);
+    let mut word = addr_of_mut!(_stack_end);
     let top = (cortex_m::register::msp::read() as usize - MARGIN_BYTES) as *mut u32;
     while word < top {
         // SAFETY: nothing uses the memory between static memory and the margin below the stack
@@ -33,7 +33,7 @@ pub fn paint() {
 
 /// Returns the largest stack use since [`paint`], bytes.
 pub fn high_water_bytes() -> u32 {
-    let mut word = addr_of_mut!(__sheap);
+    let mut word = addr_of_mut!(_stack_end);
     let top = addr_of_mut!(_stack_start);
     // SAFETY: reads words of RAM from the end of static memory to the start of the stack; a value
     // that changes during the read does no harm.

@@ -9,8 +9,8 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Request, Response};
 use painleve_shared::mounting::Mounting;
 
-use crate::board::{BoardSnapshot, FlashedBoard};
-use crate::stm32f4::Pin;
+use crate::board::{BoardChip, BoardSnapshot, EmulatedBoard, F405, G474};
+use crate::stm32::Pin;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 /// Bits of the force cell's converter.
@@ -22,10 +22,16 @@ const BEFORE_ENABLE: u32 = 100;
 /// Ticks between two alive messages of the host.
 const ALIVE_TICKS: u32 = 50;
 
+/// The board with the STM32F405 and its arm.
+pub type BoardBench = Bench<F405>;
+
+/// The board NUCLEO-G474RE and its arm.
+pub type NucleoBench = Bench<G474>;
+
 /// A board that controls a simulated arm with its own sensors.
-pub struct BoardBench {
+pub struct Bench<C: BoardChip> {
     /// The board.
-    pub board: FlashedBoard,
+    pub board: EmulatedBoard<C>,
     /// The arm.
     pub simulation: Simulation,
     statistics: Statistics,
@@ -51,8 +57,8 @@ pub struct BoardBench {
 }
 
 /// State of a bench at one instant.
-pub struct BenchSnapshot {
-    board: BoardSnapshot,
+pub struct BenchSnapshot<C = F405> {
+    board: BoardSnapshot<C>,
     simulation: Simulation,
     frame: SensorFrame,
 }
@@ -75,18 +81,18 @@ pub fn encoded(scenario: &Scenario) -> Vec<u8> {
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
-impl BoardBench {
+impl<C: BoardChip> Bench<C> {
     /// Creates a bench with a board that is booted and configured for the arm on its own sensors,
     /// but not enabled.
     pub fn new(scenario: &Scenario) -> Self {
-        Self::with_board(scenario, FlashedBoard::booted())
+        Self::with_board(scenario, EmulatedBoard::booted())
     }
 
     /// Creates a bench with a board that has booted.
     ///
     /// # Panics
     /// If the scenario is out of range, or the image rejects it.
-    pub fn with_board(scenario: &Scenario, board: FlashedBoard) -> Self {
+    pub fn with_board(scenario: &Scenario, board: EmulatedBoard<C>) -> Self {
         let mut bench = Self::without_configuration(scenario, board);
         bench.host_is_there = true;
         let response = bench
@@ -104,7 +110,7 @@ impl BoardBench {
     ///
     /// # Panics
     /// If the scenario is out of range.
-    pub fn without_configuration(scenario: &Scenario, board: FlashedBoard) -> Self {
+    pub fn without_configuration(scenario: &Scenario, board: EmulatedBoard<C>) -> Self {
         // The board itself takes one tick from the sample to the torque.
         let mut simulated = scenario.clone();
         simulated.converters.torque.delay_ticks = 0.0;
@@ -299,7 +305,7 @@ impl BoardBench {
     }
 
     /// Returns the complete state.
-    pub fn snapshot(&self) -> BenchSnapshot {
+    pub fn snapshot(&self) -> BenchSnapshot<C> {
         BenchSnapshot {
             board: self.board.snapshot(),
             simulation: self.simulation.clone(),
@@ -308,7 +314,7 @@ impl BoardBench {
     }
 
     /// Restores a snapshot.
-    pub fn restore(&mut self, snapshot: &BenchSnapshot) {
+    pub fn restore(&mut self, snapshot: &BenchSnapshot<C>) {
         self.board.restore(&snapshot.board);
         self.simulation = snapshot.simulation.clone();
         self.frame = snapshot.frame;

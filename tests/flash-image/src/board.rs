@@ -9,7 +9,9 @@ use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox};
 
 use crate::machine::{Machine, MachineSnapshot, Reset};
-use crate::stm32f4::{Outside, Pin, PinMode, Stm32f4};
+use crate::stm32::{Outside, Pin, PinMode, WiredChip};
+use crate::stm32f4::Stm32f4;
+use crate::stm32g4::Stm32g4;
 use crate::{MILLISECOND, Picoseconds, SECOND};
 
 /// The pin that enables the torque stages.
@@ -105,18 +107,44 @@ impl Torque {
     }
 }
 
+/// A chip on a board: which image it executes.
+pub trait BoardChip: WiredChip<Outside = BoardWiring> {
+    /// Name of its image.
+    const IMAGE: &'static str;
+}
+
+/// The STM32F405 of a wired board.
+pub type F405 = Stm32f4<BoardWiring>;
+
+/// The STM32G474 of a wired board.
+pub type G474 = Stm32g4<BoardWiring>;
+
+impl BoardChip for F405 {
+    const IMAGE: &'static str = "painleve-f405";
+}
+
+impl BoardChip for G474 {
+    const IMAGE: &'static str = "painleve-g474";
+}
+
+/// The board with the STM32F405.
+pub type FlashedBoard = EmulatedBoard<F405>;
+
+/// The board NUCLEO-G474RE.
+pub type FlashedNucleo = EmulatedBoard<G474>;
+
 /// State of a board at one instant.
-pub struct BoardSnapshot {
-    machine: MachineSnapshot<Stm32f4<BoardWiring>>,
+pub struct BoardSnapshot<C = F405> {
+    machine: MachineSnapshot<C>,
     inbox: Inbox,
     heard: usize,
     line_free: Picoseconds,
 }
 
 /// A powered board on a bench with the image in its flash.
-pub struct FlashedBoard {
+pub struct EmulatedBoard<C: BoardChip> {
     /// The microcontroller.
-    pub machine: Machine<Stm32f4<BoardWiring>>,
+    pub machine: Machine<C>,
     inbox: Inbox,
     heard: usize,
     /// Time until which the line to the board is busy.
@@ -142,33 +170,34 @@ pub fn library() -> PathBuf {
         .unwrap_or_else(|| panic!("Unicorn is not installed: run `cargo xtask setup`"))
 }
 
-/// Returns the path of the image: `PAINLEVE_F405`, or where `cargo xtask build-fw` writes it.
-pub fn image() -> PathBuf {
-    std::env::var_os("PAINLEVE_F405").map_or_else(
-        || workspace().join("target/thumbv7em-none-eabihf/firmware/painleve-f405"),
+/// Returns the path of an image, in the folder `PAINLEVE_IMAGES` or where `cargo xtask build-fw` writes it.
+pub fn image(name: &str) -> PathBuf {
+    let folder = std::env::var_os("PAINLEVE_IMAGES").map_or_else(
+        || workspace().join("target/thumbv7em-none-eabihf/firmware"),
         PathBuf::from,
-    )
+    );
+    folder.join(name)
 }
 
 fn workspace() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
-impl Default for FlashedBoard {
+impl<C: BoardChip> Default for EmulatedBoard<C> {
     fn default() -> Self {
         Self::with_oscillator(32_000)
     }
 }
 
-impl FlashedBoard {
+impl<C: BoardChip> EmulatedBoard<C> {
     /// Creates a powered board with a healthy arm that is not enabled; nothing has been executed.
     pub fn with_oscillator(watchdog_hz: u64) -> Self {
-        let mut chip = Stm32f4::new(BoardWiring::default(), watchdog_hz);
+        let mut chip = C::without_power(BoardWiring::default(), watchdog_hz);
         chip.drive_pin(ENABLE, Some(false));
         chip.drive_pin(RESET, Some(false));
         chip.drive_pin(STAGES_READY, Some(true));
         Self {
-            machine: Machine::new(&library(), &image(), chip),
+            machine: Machine::new(&library(), &image(C::IMAGE), chip),
             inbox: Inbox::new(),
             heard: 0,
             line_free: 0,
@@ -188,7 +217,7 @@ impl FlashedBoard {
 
     /// Returns the parts on the pins.
     pub fn wiring(&mut self) -> &mut BoardWiring {
-        &mut self.machine.chip_mut().outside
+        self.machine.chip_mut().outside_mut()
     }
 
     /// Returns the inputs of the torque stages.
@@ -205,7 +234,7 @@ impl FlashedBoard {
     }
 
     /// Returns the complete state.
-    pub fn snapshot(&self) -> BoardSnapshot {
+    pub fn snapshot(&self) -> BoardSnapshot<C> {
         BoardSnapshot {
             machine: self.machine.snapshot(),
             inbox: self.inbox.clone(),
@@ -215,7 +244,7 @@ impl FlashedBoard {
     }
 
     /// Restores a snapshot.
-    pub fn restore(&mut self, snapshot: &BoardSnapshot) {
+    pub fn restore(&mut self, snapshot: &BoardSnapshot<C>) {
         self.machine.restore(&snapshot.machine);
         self.inbox = snapshot.inbox.clone();
         self.heard = snapshot.heard;
@@ -240,7 +269,7 @@ impl FlashedBoard {
     /// Queues bytes on the line to the board.
     pub fn send_bytes(&mut self, bytes: &[u8]) {
         let start = self.machine.now().max(self.line_free);
-        let usart = &mut self.machine.chip_mut().usart;
+        let usart = self.machine.chip_mut().usart_mut();
         let mut at = start;
         for byte in bytes {
             at += BYTE;
@@ -256,7 +285,7 @@ impl FlashedBoard {
             at += apart;
             self.machine
                 .chip_mut()
-                .usart
+                .usart_mut()
                 .incoming
                 .push_back((at, *byte));
         }
@@ -288,7 +317,7 @@ impl FlashedBoard {
 
     /// Takes the bytes that the board has sent since the last call.
     pub fn take_sent(&mut self) -> Vec<u8> {
-        let sent = self.machine.chip().usart.outgoing[self.heard..].to_vec();
+        let sent = self.machine.chip().usart().outgoing[self.heard..].to_vec();
         self.heard += sent.len();
         sent
     }
@@ -308,7 +337,14 @@ impl FlashedBoard {
     pub fn response(&mut self, limit: Picoseconds) -> Option<Response> {
         let end = self.machine.now() + limit;
         loop {
-            while let Some(byte) = self.machine.chip().usart.outgoing.get(self.heard).copied() {
+            while let Some(byte) = self
+                .machine
+                .chip()
+                .usart()
+                .outgoing
+                .get(self.heard)
+                .copied()
+            {
                 self.heard += 1;
                 if let Some(message) = self.inbox.push(byte)
                     && let Ok(response) = wire::decode(message)

@@ -2,8 +2,8 @@
 //!
 //! - [`unicorn`]: executes instructions
 //! - [`machine`]: exceptions, sleep, resets, time
-//! - [`stm32f4`]: the microcontroller's peripherals; the sensors on its buses are in
-//!   [`painleve_parts`]
+//! - [`stm32f4`], [`stm32g4`]: the microcontrollers' peripherals, [`stm32`] what they have in common; the
+//!   sensors on their buses are in [`painleve_parts`]
 //! - [`board`]: the board's wiring, the host's end of its serial line, the arm's torques
 //! - [`bench`]: the board with the simulated arm on its sensors and stages
 //!
@@ -13,7 +13,9 @@
 pub mod bench;
 pub mod board;
 pub mod machine;
+pub mod stm32;
 pub mod stm32f4;
+pub mod stm32g4;
 pub mod system_control;
 pub mod unicorn;
 

@@ -30,7 +30,7 @@ pub trait Chip: Clone {
     const FLASH: (u32, usize);
     /// Start and length of its RAM.
     const RAM: (u32, usize);
-    /// Bytes of the RAM that can be mapped to address 0.
+    /// Bytes of the RAM that can be mapped to address 0, where the flash is otherwise.
     const ALIASED_RAM: usize;
 
     /// Resets the peripherals for the given cause.
@@ -342,10 +342,16 @@ impl<C: Chip> Machine<C> {
         let mut unicorn = Unicorn::new(library, core)
             .unwrap_or_else(|error| panic!("{}: {error}", library.display()));
         unicorn.map(C::FLASH.0, C::FLASH.1);
-        unicorn.map_with_alias(C::RAM.0, C::RAM.1, 0, C::ALIASED_RAM);
+        if C::ALIASED_RAM > 0 {
+            unicorn.map_with_alias(C::RAM.0, C::RAM.1, 0, C::ALIASED_RAM);
+        } else {
+            unicorn.map(C::RAM.0, C::RAM.1);
+        }
         unicorn.map_peripherals(&[
             (0x4000_0000, 0x0010_0000),
             (0x4200_0000, 0x0200_0000),
+            (0x4800_0000, 0x0000_2000),
+            (0x5000_0000, 0x0000_2000),
             (0x1fff_7000, 0x0000_1000),
             (0xe000_0000, 0x0010_0000),
         ]);
@@ -631,7 +637,7 @@ impl<C: Chip> Machine<C> {
         core.is_dirty = true;
         core.conditional = 0;
         let mut vector = core.system.vector_table + 4 * exception as u32;
-        if (vector as usize) < C::ALIASED_RAM && !core.chip.ram_is_at_zero() {
+        if vector < C::FLASH.0 && !core.chip.ram_is_at_zero() {
             vector += C::FLASH.0;
         }
         let mut handler = [0; 4];

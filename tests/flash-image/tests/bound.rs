@@ -82,8 +82,8 @@ impl<'a> BoundCheck<'a> {
 }
 
 fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
-    let image = Image::read(&board::image()).unwrap();
-    let bound = Bound::of(&board::image()).unwrap_or_else(|error| panic!("{error}"));
+    let image = Image::read(&board::image("painleve-f405")).unwrap();
+    let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
     let mut watch = BoundCheck::new(&image, &bound);
     run(&mut watch);
     println!(

@@ -5,17 +5,27 @@
 
 use painleve_drivers::switches::Switches;
 use painleve_firmware::Controller;
-use painleve_flash_image::bench::{BoardBench, scenario};
+use painleve_flash_image::bench::{Bench, scenario};
+use painleve_flash_image::board::{BoardChip, F405, G474};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::status::SupervisorState;
 
 #[test]
 fn the_board_with_its_own_sensors_gives_the_torques_of_a_pc() {
+    gives_the_torques_of_a_pc::<F405>();
+}
+
+#[test]
+fn the_nucleo_with_its_own_sensors_gives_the_torques_of_a_pc() {
+    gives_the_torques_of_a_pc::<G474>();
+}
+
+fn gives_the_torques_of_a_pc<C: BoardChip>() {
     for name in ["hybrid-elbow-down", "edge"] {
         let scenario = scenario(name);
         let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
         let mut switches = Switches::default();
-        let mut bench = BoardBench::new(&scenario);
+        let mut bench = Bench::<C>::new(&scenario);
         let mut answer = |tick, closed, sampled| {
             controller.tick(&SensorFrame {
                 tick,
@@ -46,5 +56,7 @@ fn the_board_with_its_own_sensors_gives_the_torques_of_a_pc() {
             driven += u32::from(drives);
         }
         assert!(driven > 800, "{name}: {driven} ticks");
+        let violations = bench.board.wiring().violations();
+        assert!(violations.is_empty(), "{name}: {violations:?}");
     }
 }

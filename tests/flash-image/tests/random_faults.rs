@@ -1,6 +1,7 @@
 //! Injects a thousand random faults at random instructions.
 
 use painleve_flash_image::bench::{BoardBench, scenario};
+use painleve_flash_image::stm32::WiredChip as _;
 use painleve_parts::BitErrors;
 
 /// Number of faults.

@@ -6,11 +6,12 @@
 
 #![allow(unsafe_code)] // registers, whatever the program was doing
 
-use cortex_m::peripheral::SCB;
-use cortex_m_rt::{ExceptionFrame, exception};
-use painleve_image::black_box;
-use painleve_shared::black_box::{Crash, ResetCause};
+use painleve_image::arm_drive::NO_TORQUE;
+use painleve_image::watchdogs::{IndependentLimit, WindowLimit, key};
+use painleve_shared::black_box::ResetCause;
 use stm32f4xx_hal::pac;
+
+painleve_image::crash_handlers!(crate::F405);
 
 /// Keys that open the option bytes (RM0090, section 3.6.2).
 const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
@@ -21,8 +22,8 @@ const PATIENCE: u32 = 100_000;
 /// Highest frequency of the independent watchdog's oscillator, Hz (the lowest is 17 kHz).
 const FASTEST_OSCILLATOR_HZ: f32 = 47_000.0;
 
-/// Cycles of the slow peripherals' clock per count of the window watchdog.
-const WINDOW_CYCLES: f32 = 4096.0;
+/// Largest prescaler of the window watchdog.
+const LARGEST_WINDOW_PRESCALER: u8 = 3;
 
 // The first instructions after a reset, in assembly because memory is not initialised yet: enable the clock
 // of port B, set PB0 low, then make it an output. Then `program_memory` copies the program.
@@ -61,19 +62,12 @@ pub fn take_torque_off() {
         port.bsrr().write(|w| w.br0().set_bit());
         port.moder().modify(|_, w| w.moder0().output());
         if rcc.apb1enr().read().dacen().bit_is_set() {
-            let code = u32::from(crate::NO_TORQUE);
+            let code = u32::from(NO_TORQUE);
             (*pac::DAC::ptr())
                 .dhr12rd()
                 .write(|w| w.bits(code << 16 | code));
         }
     }
-}
-
-/// Takes the torque off, records the crash and resets the chip.
-pub fn reset(crash: Crash) -> ! {
-    take_torque_off();
-    black_box::note_crash(crash);
-    SCB::sys_reset()
 }
 
 /// Returns the reason for the present start of the processor, and clears it for the next.
@@ -96,37 +90,13 @@ pub fn reset_cause() -> ResetCause {
     cause
 }
 
-/// Handles an instruction that cannot be executed, a bus that does not answer or a stack overflow.
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    // SAFETY: reads a register of the processor.
-    let status = unsafe { (*SCB::PTR).cfsr.read() };
-    reset(Crash::HardFault {
-        program_counter: frame.pc(),
-        link_register: frame.lr(),
-        status,
-    })
-}
-
-/// Handles a crystal failure; the chip continues on its internal oscillator.
-#[exception]
-unsafe fn NonMaskableInt() -> ! {
-    reset(Crash::Clock)
-}
-
-/// Handles low supply voltage, or an interrupt that no peripheral in use can have raised.
-#[exception]
-unsafe fn DefaultHandler(number: i16) -> ! {
-    reset(Crash::Interrupt { number })
-}
-
-/// Starts monitoring the crystal: if it stops, [`NonMaskableInt`] is raised at once.
+/// Starts monitoring the crystal: if it stops, the non-maskable interrupt is raised at once.
 pub fn watch_crystal(rcc: &pac::rcc::RegisterBlock) {
     rcc.cr().modify(|_, w| w.csson().set_bit());
 }
 
-/// Starts monitoring the supply: below 2.9 V the interrupt PVD is raised, whose handler is
-/// [`DefaultHandler`]; below 2.7 V the chip is held in reset.
+/// Starts monitoring the supply: below 2.9 V the interrupt PVD is raised, which is handled as a
+/// crash; below 2.7 V the chip is held in reset.
 pub fn watch_supply(
     power: &pac::PWR,
     lines: &pac::EXTI,
@@ -165,11 +135,6 @@ fn raise_brown_out_level(flash: &pac::FLASH) {
     flash.optcr().modify(|_, w| w.optlock().set_bit());
 }
 
-/// Keys of the independent watchdog.
-const START: u16 = 0xcccc;
-const OPEN: u16 = 0x5555;
-const FEED: u16 = 0xaaaa;
-
 fn write_key(watchdog: &pac::IWDG, key: u16) {
     // SAFETY: one of the three keys.
     watchdog.kr().write(|w| unsafe { w.key().bits(key) });
@@ -177,39 +142,30 @@ fn write_key(watchdog: &pac::IWDG, key: u16) {
 
 /// The two watchdogs, fed at the end of every control tick.
 ///
-/// The window watchdog runs on the processor's clock and resets the chip one and a half periods after the
-/// last finished tick. The independent watchdog runs on its own oscillator of 17 to 47 kHz and covers a
-/// failure of the clock itself: it resets the chip after 2 to 6 periods.
+/// The independent watchdog's oscillator has 17 to 47 kHz: it resets the chip after 2 to 6 periods.
 pub struct Watchdogs {
     independent: pac::IWDG,
     window: pac::WWDG,
     slow_bus_hz: f32,
-    /// Counter of the window watchdog after feeding; `None` for rates too low for it.
-    counter: Option<u8>,
+    /// `None` for rates too low for the window watchdog.
+    limit: Option<WindowLimit>,
 }
 
 impl Watchdogs {
     /// Starts the independent watchdog with a timeout of at least `limit_s`. Call it before anything that
     /// may hang.
     pub fn start_independent(independent: &pac::IWDG, limit_s: f32) {
-        // Counts of four cycles, doubled until they fit into twelve bits.
-        let mut counts = limit_s * FASTEST_OSCILLATOR_HZ / 4.0;
-        let mut prescaler = 0;
-        while counts > 4096.0 && prescaler < 6 {
-            counts /= 2.0;
-            prescaler += 1;
-        }
-        let reload = (counts as u16).clamp(1, 4095);
-        write_key(independent, START);
-        write_key(independent, OPEN);
+        let limit = IndependentLimit::new(limit_s, FASTEST_OSCILLATOR_HZ);
+        write_key(independent, key::START);
+        write_key(independent, key::OPEN);
         // SAFETY: every value of three bits up to 6 is a prescaler, and of twelve bits a reload.
         unsafe {
-            independent.pr().write(|w| w.bits(prescaler));
-            independent.rlr().write(|w| w.bits(reload.into()));
+            independent.pr().write(|w| w.bits(limit.prescaler.into()));
+            independent.rlr().write(|w| w.bits(limit.reload.into()));
         }
         // Both registers take effect in the oscillator's time, after some 200 µs.
         let _ = (0..PATIENCE).any(|_| independent.sr().read().bits() == 0);
-        write_key(independent, FEED);
+        write_key(independent, key::FEED);
     }
 
     /// Takes ownership of both watchdogs; `slow_bus_hz` is the clock of APB1. The window watchdog's own
@@ -219,37 +175,30 @@ impl Watchdogs {
             independent,
             window,
             slow_bus_hz: slow_bus_hz as f32,
-            counter: None,
+            limit: None,
         }
     }
 
     /// Sets the timeout to one and a half of these periods.
     pub fn set_period(&mut self, period_s: f32) {
         Self::start_independent(&self.independent, 2.0 * period_s);
-        let mut counts = 1.5 * period_s * self.slow_bus_hz / WINDOW_CYCLES;
-        let mut prescaler = 0;
-        while counts > 63.0 && prescaler < 3 {
-            counts /= 2.0;
-            prescaler += 1;
-        }
-        if counts > 63.0 {
+        let Some(limit) = WindowLimit::new(period_s, self.slow_bus_hz, LARGEST_WINDOW_PRESCALER)
+        else {
             // The running window watchdog cannot be stopped, and would reset the chip too early.
             return;
-        }
-        // The chip is reset when bit 6 falls.
-        let counter = 0x40 | counts as u8;
-        self.counter = Some(counter);
+        };
+        self.limit = Some(limit);
         // SAFETY: prescalers have two bits; a window of 0x7f disables the window.
         self.window
             .cfr()
-            .write(|w| unsafe { w.wdgtb().bits(prescaler).w().bits(0x7f) });
+            .write(|w| unsafe { w.wdgtb().bits(limit.prescaler).w().bits(0x7f) });
         self.feed();
     }
 
     /// Feeds both watchdogs when a tick is finished.
     pub fn feed(&mut self) {
-        write_key(&self.independent, FEED);
-        if let Some(counter) = self.counter {
+        write_key(&self.independent, key::FEED);
+        if let Some(WindowLimit { counter, .. }) = self.limit {
             // SAFETY: seven bits.
             self.window
                 .cr()

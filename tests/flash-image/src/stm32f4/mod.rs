@@ -2,25 +2,18 @@
 //! the test.
 
 mod dma;
-mod gpio;
 mod rcc;
 mod spi;
-mod timer;
-mod usart;
-mod watchdog;
-
-pub use usart::Usart;
-
-use painleve_parts::Transfer;
 
 use self::dma::Dma;
-use self::gpio::Gpio;
 use self::rcc::Rcc;
 use self::spi::Spi;
-use self::timer::Timer;
-use self::watchdog::{Watchdog, WindowWatchdog};
 use crate::Picoseconds;
 use crate::machine::{Chip, Reset};
+use crate::stm32::{
+    Crystal, Dac, Gpio, GpioReset, Outside, Pin, PinMode, Timer, Usart, UsartLayout, Watchdog,
+    WindowWatchdog, WiredChip, bit_band, store_port,
+};
 use crate::unicorn::Processor;
 
 /// Interrupt numbers.
@@ -34,37 +27,13 @@ const DMA2_STREAMS: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
 /// Addresses of data registers that DMA serves.
 const USART1_DATA: u32 = 0x4001_1004;
 
-/// A pin: port (0 for A) and number.
-pub type Pin = (usize, usize);
-
-/// Mode of a pin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PinMode {
-    /// Drives nothing.
-    Input,
-    /// Driven high or low.
-    Output(bool),
-    /// Driven by the peripheral of this number.
-    Alternate(u8),
-    /// Not driven, or an analogue output.
-    Analog,
-}
-
-/// The parts on the pins.
-pub trait Outside: Clone {
-    /// Called when the microcontroller starts or stops driving a pin.
-    fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds);
-
-    /// Called at the end of a transfer on an SPI bus (0 for SPI1); returns the answer.
-    fn transfer(&mut self, bus: usize, transfer: Transfer, now: Picoseconds) -> u16;
-}
-
-/// The digital-to-analog converter of two channels (RM0090, section 14).
-#[derive(Clone, Debug, Default)]
-struct Dac {
-    control: u32,
-    codes: [u32; 2],
-    writes: u64,
+/// After a reset the debugger's pins of ports A and B are alternate functions.
+fn gpio_reset(port: usize) -> GpioReset {
+    match port {
+        0 => (0xa800_0000, 0x0c00_0000, 0x6400_0000),
+        1 => (0x0000_0280, 0x0000_00c0, 0x0000_0100),
+        _ => (0, 0, 0),
+    }
 }
 
 /// The chip with the parts on its pins.
@@ -101,12 +70,12 @@ impl<O: Outside> Stm32f4<O> {
         Self {
             outside,
             rcc: Rcc::new(),
-            ports: std::array::from_fn(Gpio::new),
+            ports: std::array::from_fn(|port| Gpio::new(gpio_reset(port))),
             spis: Default::default(),
-            usart: Usart::default(),
+            usart: Usart::new(UsartLayout::SharedData),
             timer: Timer::default(),
             watchdog: Watchdog::new(oscillator_hz),
-            window_watchdog: WindowWatchdog::default(),
+            window_watchdog: WindowWatchdog::new(7, 2),
             dac: Dac::default(),
             dma: Default::default(),
             power: [0x4000, 0],
@@ -116,16 +85,6 @@ impl<O: Outside> Stm32f4<O> {
             external_interrupts: [0; 8],
             reset: None,
         }
-    }
-
-    /// Returns the mode of a pin.
-    pub fn pin(&self, (port, number): Pin) -> PinMode {
-        self.ports[port].pin(number)
-    }
-
-    /// Drives a pin from outside, or releases it.
-    pub fn drive_pin(&mut self, (port, number): Pin, level: Option<bool>) {
-        self.ports[port].external[number] = level;
     }
 
     /// Returns the voltage of a converter's channel as a fraction of the supply; `None` while it is
@@ -142,49 +101,11 @@ impl<O: Outside> Stm32f4<O> {
         Some(fraction.clamp(margin, 1.0 - margin))
     }
 
-    /// Returns whether an output buffer limits the converter's range.
-    pub fn dac_is_buffered(&self) -> bool {
-        self.dac.control & 0x0002_0002 != 0x0002_0002
-    }
-
-    /// Returns the converter's codes.
-    pub fn dac_codes(&self) -> [u32; 2] {
-        self.dac.codes
-    }
-
-    /// Returns how often codes were written.
-    pub fn dac_writes(&self) -> u64 {
-        self.dac.writes
-    }
-
-    /// Changes the supply. The chip is reset below the brown-out threshold.
-    pub fn set_supply(&mut self, millivolts: u32) {
-        self.supply_mv = millivolts;
-        let level = self.flash_control[5] >> 2 & 3;
-        let threshold = [2700, 2400, 2100, 1800][level as usize];
-        if millivolts < threshold {
-            self.reset = Some(Reset::BrownOut);
-        }
-        if self.supply_is_low() && self.external_interrupts[2] & 1 << 16 != 0 {
-            self.external_interrupts[5] |= 1 << 16;
-        }
-    }
-
     /// Returns the state of the supply supervisor.
     fn supply_is_low(&self) -> bool {
         let thresholds = [2000, 2100, 2300, 2500, 2600, 2700, 2800, 2900];
         let threshold = thresholds[(self.power[0] >> 5 & 7) as usize];
         self.power[0] & 1 << 4 != 0 && self.supply_mv < threshold
-    }
-
-    /// Returns the time of the control timer's next interrupt.
-    pub fn next_tick(&self) -> Picoseconds {
-        self.timer.next_event(self.rcc.slow_timer_hz())
-    }
-
-    /// Pulls the reset pin low for a moment.
-    pub fn reset_pin(&mut self) {
-        self.reset = Some(Reset::Pin);
     }
 
     fn load(&mut self, address: u32, now: Picoseconds) -> u32 {
@@ -201,13 +122,7 @@ impl<O: Outside> Stm32f4<O> {
                 0x04 => self.power[1] | 0x4000 | u32::from(self.supply_is_low()) << 2,
                 _ => self.power[0],
             },
-            0x4000_7400 if self.rcc.is_on(0x40, 29) => match offset {
-                0x00 => self.dac.control,
-                0x08 | 0x2c => self.dac.codes[0],
-                0x14 | 0x30 => self.dac.codes[1],
-                0x20 => self.dac.codes[0] | self.dac.codes[1] << 16,
-                _ => 0,
-            },
+            0x4000_7400 if self.rcc.is_on(0x40, 29) => self.dac.read(offset),
             0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.read(offset),
             0x4001_3000 if self.rcc.is_on(0x44, 12) => self.spis[0].read(offset),
             0x4001_3800 => self.syscfg[((offset / 4) & 15) as usize],
@@ -252,7 +167,7 @@ impl<O: Outside> Stm32f4<O> {
                 0x00 => self.power[0] = value,
                 _ => self.power[1] = value,
             },
-            0x4000_7400 if self.rcc.is_on(0x40, 29) => self.store_dac(offset, value),
+            0x4000_7400 if self.rcc.is_on(0x40, 29) => self.dac.write(offset, value),
             0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.write(offset, value, fast, now),
             0x4001_3000 if self.rcc.is_on(0x44, 12) => {
                 self.spis[0].write(offset, value, fast, now);
@@ -265,7 +180,8 @@ impl<O: Outside> Stm32f4<O> {
             0x4002_0000..0x4002_2000 => {
                 let port = ((address - 0x4002_0000) / 0x400) as usize;
                 if self.rcc.is_on(0x30, port as u32) {
-                    self.store_port(port, offset, value, now);
+                    let gpio = &mut self.ports[port];
+                    store_port(gpio, port, (offset, value), &mut self.outside, now);
                 }
             }
             0x4002_3800 => self.rcc.write(offset, value, now),
@@ -277,35 +193,6 @@ impl<O: Outside> Stm32f4<O> {
             // Debug control.
             0xe004_2000 => {}
             _ => panic!("store of {value:#x} to {address:#010x}, which is not modelled"),
-        }
-    }
-
-    fn store_dac(&mut self, offset: u32, value: u32) {
-        self.dac.writes += 1;
-        match offset {
-            0x00 => {
-                self.dac.writes -= 1;
-                self.dac.control = value;
-            }
-            0x08 => self.dac.codes[0] = value & 0xfff,
-            0x14 => self.dac.codes[1] = value & 0xfff,
-            0x20 => self.dac.codes = [value & 0xfff, value >> 16 & 0xfff],
-            _ => {}
-        }
-    }
-
-    fn store_port(&mut self, port: usize, offset: u32, value: u32, now: Picoseconds) {
-        let level = |gpio: &Gpio, pin: usize| match gpio.pin(pin) {
-            PinMode::Output(level) => Some(level),
-            _ => None,
-        };
-        let before = self.ports[port].clone();
-        self.ports[port].write(offset, value);
-        for pin in 0..16 {
-            let now_is = level(&self.ports[port], pin);
-            if now_is != level(&before, pin) {
-                self.outside.pin((port, pin), now_is, now);
-            }
         }
     }
 
@@ -328,10 +215,8 @@ impl<O: Outside> Chip for Stm32f4<O> {
     const ALIASED_RAM: usize = 112 << 10;
 
     fn reset(&mut self, reset: Reset, now: Picoseconds) {
-        let external = self.ports.each_ref().map(|it| it.external);
-        self.ports = std::array::from_fn(Gpio::new);
-        for (port, external) in self.ports.iter_mut().zip(external) {
-            port.external = external;
+        for (number, port) in self.ports.iter_mut().enumerate() {
+            port.reset(gpio_reset(number));
         }
         for pin in (0..8).flat_map(|port| (0..16).map(move |pin| (port, pin))) {
             self.outside.pin(pin, None, now);
@@ -341,11 +226,8 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.usart.reset();
         self.timer = Timer::default();
         self.watchdog = Watchdog::new(self.watchdog.oscillator_hz);
-        self.window_watchdog = WindowWatchdog::default();
-        self.dac = Dac {
-            writes: self.dac.writes,
-            ..Dac::default()
-        };
+        self.window_watchdog.reset();
+        self.dac.reset();
         self.dma = Default::default();
         self.power = [0x4000, 0];
         self.flash_control[2] = 0;
@@ -356,8 +238,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
     }
 
     fn read(&mut self, address: u32, size: u32, now: Picoseconds) -> u32 {
-        if (0x4200_0000..0x4400_0000).contains(&address) {
-            let (word, bit) = bit_band(address);
+        if let Some((word, bit)) = bit_band(address) {
             return self.load(word, now) >> bit & 1;
         }
         let word = self.load(address & !3, now);
@@ -370,8 +251,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
     }
 
     fn write(&mut self, address: u32, size: u32, value: u32, now: Picoseconds) {
-        if (0x4200_0000..0x4400_0000).contains(&address) {
-            let (word, bit) = bit_band(address);
+        if let Some((word, bit)) = bit_band(address) {
             let before = self.load(word, now);
             return self.store(word, before & !(1 << bit) | (value & 1) << bit, now);
         }
@@ -458,8 +338,75 @@ impl<O: Outside> Chip for Stm32f4<O> {
     }
 }
 
-/// Returns the word and the bit for an address of the bit-band alias.
-fn bit_band(address: u32) -> (u32, u32) {
-    let bit = (address - 0x4200_0000) / 4;
-    (0x4000_0000 + bit / 32 * 4, bit % 32)
+impl<O: Outside> WiredChip for Stm32f4<O> {
+    type Outside = O;
+
+    const OSCILLATOR_HZ: [u64; 3] = [17_000, 32_000, 47_000];
+
+    fn without_power(outside: O, oscillator_hz: u64) -> Self {
+        Self::new(outside, oscillator_hz)
+    }
+
+    fn outside_mut(&mut self) -> &mut O {
+        &mut self.outside
+    }
+
+    fn pin(&self, (port, number): Pin) -> PinMode {
+        self.ports[port].pin(number)
+    }
+
+    fn drive_pin(&mut self, (port, number): Pin, level: Option<bool>) {
+        self.ports[port].external[number] = level;
+    }
+
+    fn dac_codes(&self) -> [u32; 2] {
+        self.dac.codes
+    }
+
+    fn dac_is_buffered(&self) -> bool {
+        self.dac.control & 0x0002_0002 != 0x0002_0002
+    }
+
+    fn dac_writes(&self) -> u64 {
+        self.dac.writes
+    }
+
+    fn set_supply(&mut self, millivolts: u32) {
+        self.supply_mv = millivolts;
+        let level = self.flash_control[5] >> 2 & 3;
+        let threshold = [2700, 2400, 2100, 1800][level as usize];
+        if millivolts < threshold {
+            self.reset = Some(Reset::BrownOut);
+        }
+        if self.supply_is_low() && self.external_interrupts[2] & 1 << 16 != 0 {
+            self.external_interrupts[5] |= 1 << 16;
+        }
+    }
+
+    fn reset_pin(&mut self) {
+        self.reset = Some(Reset::Pin);
+    }
+
+    fn set_crystal(&mut self, failure: Crystal) {
+        match failure {
+            Crystal::Dead => self.rcc.crystal_works = false,
+            Crystal::Stops => self.rcc.stop_crystal(),
+        }
+    }
+
+    fn stop_control_timer(&mut self) {
+        self.timer = Timer::default();
+    }
+
+    fn usart(&self) -> &Usart {
+        &self.usart
+    }
+
+    fn usart_mut(&mut self) -> &mut Usart {
+        &mut self.usart
+    }
+
+    fn next_tick(&self) -> Picoseconds {
+        self.timer.next_event(self.rcc.slow_timer_hz())
+    }
 }

@@ -1,4 +1,4 @@
-//! One GPIO port (RM0090, section 8).
+//! One GPIO port (RM0090, section 8; RM0440, chapter GPIO).
 
 use super::PinMode;
 
@@ -15,15 +15,12 @@ pub struct Gpio {
     pub external: [Option<bool>; 16],
 }
 
+/// Registers of a port after a reset that are not zero: mode, speed, pull.
+pub type GpioReset = (u32, u32, u32);
+
 impl Gpio {
-    /// Creates the port in its reset state: the debugger's pins of ports A and B are alternate
-    /// functions.
-    pub fn new(port: usize) -> Self {
-        let (mode, speed, pull) = match port {
-            0 => (0xa800_0000, 0x0c00_0000, 0x6400_0000),
-            1 => (0x0000_0280, 0x0000_00c0, 0x0000_0100),
-            _ => (0, 0, 0),
-        };
+    /// Creates the port in its reset state.
+    pub fn new((mode, speed, pull): GpioReset) -> Self {
         Self {
             mode,
             output_type: 0,
@@ -33,6 +30,13 @@ impl Gpio {
             alternate: [0; 2],
             external: [None; 16],
         }
+    }
+
+    /// Resets the registers; what drives the pins from outside stays.
+    pub fn reset(&mut self, state: GpioReset) {
+        let external = self.external;
+        *self = Self::new(state);
+        self.external = external;
     }
 
     /// Returns the mode of a pin.

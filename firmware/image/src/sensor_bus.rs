@@ -3,12 +3,29 @@
 //! The interrupt comes with every received word. Between two exchanges it waits for the parts' set-up, hold
 //! and pause times, a microsecond together.
 
-use core::ops::Deref;
-
 use cortex_m::peripheral::DWT;
 use embedded_hal::digital::OutputPin;
 use painleve_drivers::exchange::{Dialogue, Exchange};
-use stm32f4xx_hal::pac::spi1::RegisterBlock;
+
+/// A SPI master that sends and receives words of a fixed length, and raises its interrupt with every received
+/// word.
+pub trait SpiWords {
+    /// Switches the port and its interrupt on.
+    fn start(&mut self);
+
+    /// Sends a word, right-aligned.
+    fn send(&mut self, word: u16);
+
+    /// Takes the received word; `None` if there is none.
+    fn receive(&mut self) -> Option<Result<u16, Overrun>>;
+
+    /// Discards received words.
+    fn discard(&mut self);
+}
+
+/// A word was lost because the one before had not been taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Overrun;
 
 /// Words and waits of a bus.
 #[derive(Clone, Copy, Debug)]
@@ -30,13 +47,12 @@ struct Waits {
 }
 
 /// A bus with its driver.
-pub struct SensorBus<I, S, D, const N: usize> {
-    spi: I,
+pub struct SensorBus<W, S, D, const N: usize> {
+    words: W,
     selects: [S; N],
     dialogue: D,
     word_bits: u8,
-    /// Words of an exchange.
-    words: u8,
+    words_per_exchange: u8,
     waits: Waits,
     /// Bits still to send, and received so far.
     sending: u32,
@@ -48,26 +64,25 @@ pub struct SensorBus<I, S, D, const N: usize> {
     is_complete: bool,
 }
 
-impl<I, S, D, const N: usize> SensorBus<I, S, D, N>
+impl<W, S, D, const N: usize> SensorBus<W, S, D, N>
 where
-    I: Deref<Target = RegisterBlock>,
+    W: SpiWords,
     S: OutputPin,
     D: Dialogue,
 {
     /// Takes a SPI that is configured as a master, and select pins that are high.
-    pub fn new(spi: I, selects: [S; N], dialogue: D, timing: BusTiming) -> Self {
+    pub fn new(mut words: W, selects: [S; N], dialogue: D, timing: BusTiming) -> Self {
         let cycles = |ns: u32| ns * (timing.core_hz / 1_000_000) / 1000 + 1;
         // The last word is received at its last sampling edge, half a period before the clock rests.
         let half_period_ns = 500_000_000 / timing.bus_hz.max(1) + 1;
         let times = D::TIMING;
-        spi.cr2().modify(|_, w| w.rxneie().set_bit());
-        spi.cr1().modify(|_, w| w.spe().set_bit());
+        words.start();
         Self {
-            spi,
+            words,
             selects,
             dialogue,
             word_bits: timing.word_bits,
-            words: D::BITS / timing.word_bits.max(1),
+            words_per_exchange: D::BITS / timing.word_bits.max(1),
             waits: Waits {
                 setup: cycles(times.setup_ns),
                 hold: cycles(times.hold_ns + half_period_ns),
@@ -103,21 +118,19 @@ where
         for select in &mut self.selects {
             let _ = select.set_high();
         }
-        let _ = self.spi.dr().read();
+        self.words.discard();
         self.is_busy = false;
         self.start();
     }
 
     /// Serves the interrupt: takes a received word, sends the next.
     pub fn serve(&mut self) {
-        let flags = self.spi.sr().read();
-        if flags.rxne().bit_is_clear() {
+        let Some(received) = self.words.receive() else {
             return;
-        }
-        // Reading data, then flags, clears an overrun.
-        let word = self.spi.dr().read().bits();
-        self.has_failed |= flags.ovr().bit_is_set() && self.spi.sr().read().ovr().bit_is_set();
-        self.received = self.received << self.word_bits | u32::from(word as u16);
+        };
+        self.has_failed |= received.is_err();
+        let word = received.unwrap_or_default();
+        self.received = self.received << self.word_bits | u32::from(word);
         self.words_left = self.words_left.saturating_sub(1);
         if self.words_left > 0 {
             self.send();
@@ -140,7 +153,7 @@ where
         self.sending = exchange.data << (32 - u32::from(D::BITS));
         self.received = 0;
         self.has_failed = false;
-        self.words_left = self.words;
+        self.words_left = self.words_per_exchange;
         if let Some(select) = self.selects.get_mut(self.selected) {
             let _ = select.set_low();
         }
@@ -177,7 +190,7 @@ where
     fn send(&mut self) {
         let word = self.sending >> (32 - u32::from(self.word_bits));
         self.sending <<= self.word_bits;
-        self.spi.dr().write(|w| w.dr().set(word as u16));
+        self.words.send(word as u16);
     }
 }
 

@@ -1,4 +1,4 @@
-//! A USART (RM0090, section 30) and the host's end of its line.
+//! A USART (RM0090, section 30; RM0440, chapter USART) and the host's end of its line.
 
 use std::collections::VecDeque;
 
@@ -11,9 +11,54 @@ const RECEIVED: u32 = 1 << 5;
 const COMPLETE: u32 = 1 << 6;
 const EMPTY: u32 = 1 << 7;
 
+/// The two arrangements of a USART's registers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UsartLayout {
+    /// One data register; flags are cleared by reading them and the data.
+    SharedData,
+    /// Two data registers; flags are cleared by a register of their own.
+    SeparateData,
+}
+
+/// A register.
+enum Register {
+    Flags,
+    Clear,
+    Received,
+    ToSend,
+    Baud,
+    Control(usize),
+    Other,
+}
+
+impl UsartLayout {
+    fn register(self, offset: u32, is_load: bool) -> Register {
+        match (self, offset) {
+            (Self::SharedData, 0x00) | (Self::SeparateData, 0x1c) => Register::Flags,
+            (Self::SeparateData, 0x20) => Register::Clear,
+            (Self::SharedData, 0x04) if is_load => Register::Received,
+            (Self::SharedData, 0x04) | (Self::SeparateData, 0x28) => Register::ToSend,
+            (Self::SeparateData, 0x24) => Register::Received,
+            (Self::SharedData, 0x08) | (Self::SeparateData, 0x0c) => Register::Baud,
+            (Self::SharedData, 0x0c..0x18) => Register::Control((offset / 4 - 3) as usize),
+            (Self::SeparateData, 0x00..0x0c) => Register::Control((offset / 4) as usize),
+            _ => Register::Other,
+        }
+    }
+
+    /// The bit of the first control register that switches the port on.
+    fn enable(self) -> u32 {
+        match self {
+            Self::SharedData => 1 << 13,
+            Self::SeparateData => 1,
+        }
+    }
+}
+
 /// Registers of a USART.
 #[derive(Clone, Debug)]
 pub struct Usart {
+    layout: UsartLayout,
     flags: u32,
     baud: u32,
     control: [u32; 3],
@@ -31,9 +76,11 @@ pub struct Usart {
     pub overruns: u32,
 }
 
-impl Default for Usart {
-    fn default() -> Self {
+impl Usart {
+    /// Creates the port in its reset state.
+    pub fn new(layout: UsartLayout) -> Self {
         Self {
+            layout,
             flags: EMPTY | COMPLETE,
             baud: 0,
             control: [0; 3],
@@ -47,21 +94,19 @@ impl Default for Usart {
             overruns: 0,
         }
     }
-}
 
-impl Usart {
     /// Resets the registers; the bytes on the line stay.
     pub fn reset(&mut self) {
         *self = Self {
             incoming: std::mem::take(&mut self.incoming),
             outgoing: std::mem::take(&mut self.outgoing),
             overruns: self.overruns,
-            ..Self::default()
+            ..Self::new(self.layout)
         };
     }
 
     fn is_enabled(&self) -> bool {
-        self.control[0] & 1 << 13 != 0
+        self.control[0] & self.layout.enable() != 0
     }
 
     /// Returns the duration of a byte on the line.
@@ -71,35 +116,36 @@ impl Usart {
 
     /// Handles a load.
     pub fn read(&mut self, offset: u32) -> u32 {
-        match offset {
-            0x00 => {
-                self.armed = true;
+        match self.layout.register(offset, true) {
+            Register::Flags => {
+                self.armed = self.layout == UsartLayout::SharedData;
                 self.flags
             }
-            0x04 => {
+            Register::Received => {
                 self.flags &= !RECEIVED;
                 if std::mem::take(&mut self.armed) {
                     self.flags &= !(OVERRUN | FRAMING | IDLE | 5);
                 }
                 self.received
             }
-            0x08 => self.baud,
-            0x0c => self.control[0],
-            0x10 => self.control[1],
-            0x14 => self.control[2],
+            Register::Baud => self.baud,
+            Register::Control(number) => self.control[number],
             _ => 0,
         }
     }
 
     /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32, clock_hz: u64, now: Picoseconds) {
-        match offset {
-            0x00 => self.flags &= value | !(RECEIVED | COMPLETE),
-            0x04 if self.is_enabled() => self.send(value as u8, clock_hz, now),
-            0x08 => self.baud = value,
-            0x0c => self.control[0] = value,
-            0x10 => self.control[1] = value,
-            0x14 => self.control[2] = value,
+        match self.layout.register(offset, false) {
+            Register::Flags if self.layout == UsartLayout::SharedData => {
+                self.flags &= value | !(RECEIVED | COMPLETE);
+            }
+            Register::Clear => {
+                self.flags &= !(value & (OVERRUN | FRAMING | IDLE | COMPLETE | 5));
+            }
+            Register::ToSend if self.is_enabled() => self.send(value as u8, clock_hz, now),
+            Register::Baud => self.baud = value,
+            Register::Control(number) => self.control[number] = value,
             _ => {}
         }
     }

@@ -1,4 +1,4 @@
-//! TIM2, counting up (RM0090, section 18).
+//! TIM2, counting up (RM0090, section 18; RM0440, chapter TIM2).
 
 use crate::{Picoseconds, SECOND};
 

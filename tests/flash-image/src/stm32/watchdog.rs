@@ -1,5 +1,5 @@
-//! The watchdogs: the independent one (RM0090, section 21) runs on an oscillator of 17 to 47 kHz,
-//! the window watchdog (section 22) on the slow peripherals' clock.
+//! The watchdogs: the independent one (RM0090, section 21; RM0440, chapter IWDG) runs on an oscillator of its
+//! own, the window watchdog (section 22; chapter WWDG) on the slow peripherals' clock.
 
 use crate::{Picoseconds, SECOND};
 
@@ -72,14 +72,33 @@ impl Watchdog {
 }
 
 /// Registers of the window watchdog; the window is not modelled.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct WindowWatchdog {
+    /// Position and mask of the prescaler in the configuration.
+    prescaler: (u32, u32),
     control: u32,
     configuration: u32,
     expires: Option<Picoseconds>,
 }
 
 impl WindowWatchdog {
+    /// Creates a stopped watchdog with its prescaler at this bit of the configuration, of `bits` bits.
+    pub fn new(position: u32, bits: u32) -> Self {
+        Self {
+            prescaler: (position, (1 << bits) - 1),
+            control: 0,
+            configuration: 0,
+            expires: None,
+        }
+    }
+
+    /// Resets the registers.
+    pub fn reset(&mut self) {
+        self.control = 0;
+        self.configuration = 0;
+        self.expires = None;
+    }
+
     /// Handles a load.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
@@ -97,7 +116,8 @@ impl WindowWatchdog {
                 self.control = value & 0x7f | (self.control | value) & 0x80;
                 if self.control & 0x80 != 0 {
                     let counts = u64::from(self.control & 0x3f) + 1;
-                    let cycles = counts << (12 + (self.configuration >> 7 & 3));
+                    let (position, mask) = self.prescaler;
+                    let cycles = counts << (12 + (self.configuration >> position & mask));
                     self.expires = Some(now + cycles * SECOND / clock_hz.max(1));
                 }
             }

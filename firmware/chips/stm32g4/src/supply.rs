@@ -1,0 +1,59 @@
+//! Monitoring of the supply (RM0440, chapter PWR: "Power supply supervisor").
+
+#![allow(unsafe_code)] // keys, interrupt priorities
+
+use cortex_m::peripheral::NVIC;
+
+use crate::{PATIENCE, comes, pac};
+
+/// Keys that open the flash's control register, and those that open the option bytes (RM0440, chapter FLASH: "Option bytes programming").
+const FLASH_KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
+const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
+
+/// Starts monitoring the supply: below 2.9 V the interrupt PVD_PVM is raised; below 2.8 V the chip is held in
+/// reset. The clock of the power control must be on.
+pub fn watch(power: &pac::PWR, lines: &pac::EXTI, flash: &pac::FLASH, interrupts: &mut NVIC) {
+    const BELOW_2_9_V: u8 = 6;
+    // SAFETY: PWR_CR2: a threshold.
+    power
+        .cr2()
+        .modify(|_, w| unsafe { w.pvdls().bits(BELOW_2_9_V) }.pvde().set_bit());
+    lines.rtsr1().modify(|_, w| w.rt16().set_bit());
+    lines.imr1().modify(|_, w| w.im16().set_bit());
+    // SAFETY: the handler takes the torque off and shares nothing; its priority is the highest, which
+    // no critical section masks.
+    unsafe {
+        interrupts.set_priority(pac::Interrupt::PVD_PVM, 0);
+        NVIC::unmask(pac::Interrupt::PVD_PVM);
+    }
+    raise_brown_out_level(flash);
+}
+
+/// Stops the pull-downs of USB's dead-battery detection, which are on PB4 and PB6 after a reset (PWR_CR3).
+pub fn stop_dead_battery_detection(power: &pac::PWR) {
+    power.cr3().modify(|_, w| w.ucpd1_dbdis().set_bit());
+}
+
+/// Programs the brown-out level once in a chip's life: it is stored in the option bytes, and takes effect when
+/// power comes up.
+fn raise_brown_out_level(flash: &pac::FLASH) {
+    const HIGHEST: u8 = 4;
+    if flash.optr().read().bor_lev().bits() == HIGHEST {
+        return;
+    }
+    // SAFETY: the keys of the manual, in its order, with no programming in progress.
+    unsafe {
+        for key in FLASH_KEYS {
+            flash.keyr().write(|w| w.bits(key));
+        }
+        for key in OPTION_KEYS {
+            flash.optkeyr().write(|w| w.bits(key));
+        }
+        flash.optr().modify(|_, w| w.bor_lev().bits(HIGHEST));
+    }
+    flash.cr().modify(|_, w| w.optstrt().set_bit());
+    comes(PATIENCE, || flash.sr().read().bsy().bit_is_clear());
+    flash
+        .cr()
+        .modify(|_, w| w.optlock().set_bit().lock().set_bit());
+}

@@ -1,0 +1,215 @@
+//! The control task's part of a board that drives an arm: its own sensors, switches and torque stages.
+//!
+//! The sensors' buses are read by interrupts, for the next tick: readings are one tick old, which is the delay
+//! from sample to torque that scenarios simulate (`converters.torque.delay_ticks`).
+//!
+//! The torque stages are on only with the real plant: with frames from the host they stay off.
+
+use cortex_m::peripheral::DWT;
+use embedded_hal::digital::OutputPin;
+use painleve_drivers::encoders::EncoderDriver;
+use painleve_drivers::force_cell::ForceCellDriver;
+use painleve_drivers::front_end::{FrontEnd, FrontEndSettings, InputLevels};
+use painleve_firmware::Configuration;
+use painleve_firmware::drive::Drive;
+use painleve_firmware::law::Law;
+use painleve_shared::Arm;
+use painleve_shared::counts::TorqueCounts;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::message::FrameSource;
+use painleve_shared::status::SupervisorState;
+
+use crate::board::BoardDrive;
+use crate::sensor_bus::{SensorBus, SpiWords};
+
+/// Control rate while there is no configuration, Hz. The control timer runs from the start, so that only
+/// finished control ticks feed the watchdogs.
+const IDLE_HZ: f32 = 1000.0;
+
+/// Bits of the torque stages' digital-to-analog converter.
+pub const CONVERTER_BITS: u8 = 12;
+
+/// The converter's code for zero torque.
+pub const NO_TORQUE: u16 = 1 << (CONVERTER_BITS - 1);
+
+/// The registers and pins of a board that drives an arm.
+pub trait ArmPins {
+    /// SPI of the encoders.
+    type EncoderSpi: SpiWords;
+    /// SPI of the force cell.
+    type ForceSpi: SpiWords;
+    /// A pin that selects a sensor, low.
+    type Select: OutputPin;
+
+    /// Sets the rate of the control timer's interrupt, and the watchdogs' limit to one and a half periods.
+    fn start_timer(&mut self, tick_hz: f32);
+
+    /// Clears the control timer's interrupt and feeds the watchdogs.
+    fn begin_tick(&mut self);
+
+    /// Returns whether the control timer's interrupt has occurred again.
+    fn next_tick_is_due(&self) -> bool;
+
+    /// Returns the levels of the input pins.
+    fn levels(&self) -> InputLevels;
+
+    /// Enables the torque stages, with these codes of the converter.
+    fn switch_stages_on(&mut self, codes: [u16; 2]);
+
+    /// Disables the torque stages; the converter puts out zero torque.
+    fn switch_stages_off(&mut self);
+
+    /// Returns the processor's clock, Hz, which the cycle counter counts.
+    fn core_hz(&self) -> u32;
+}
+
+/// The control task's part of a board.
+pub struct ArmDrive<P: ArmPins> {
+    pins: P,
+    encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 2>,
+    force_cell: SensorBus<P::ForceSpi, P::Select, ForceCellDriver, 1>,
+    front_end: FrontEnd,
+    /// Resolution of the controller's torques, bits.
+    torque_bits: u8,
+    /// Whether the torque stages turn their joints backwards.
+    stage_reversed: [bool; 2],
+    source: FrameSource,
+    /// Newest frame from the host, if the host is the source of frames.
+    from_host: Option<SensorFrame>,
+}
+
+impl<P: ArmPins> ArmDrive<P> {
+    /// Starts the control timer. The cycle counter must run.
+    pub fn new(
+        mut pins: P,
+        encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 2>,
+        force_cell: SensorBus<P::ForceSpi, P::Select, ForceCellDriver, 1>,
+    ) -> Self {
+        pins.start_timer(IDLE_HZ);
+        Self {
+            pins,
+            encoders,
+            force_cell,
+            front_end: FrontEnd::new(None),
+            torque_bits: CONVERTER_BITS,
+            stage_reversed: [false; 2],
+            source: FrameSource::Lockstep,
+            from_host: None,
+        }
+    }
+
+    /// Returns the readings that were started at the last tick, and starts the next.
+    fn read_sensors(&mut self) -> SensorFrame {
+        let levels = self.pins.levels();
+        let (encoders, force_cell) = (self.encoders.complete(), self.force_cell.complete());
+        let frame = self.front_end.frame(encoders, force_cell, levels);
+        self.encoders.start();
+        self.force_cell.start();
+        frame
+    }
+
+    /// Returns the converter's code for a torque: offset binary.
+    fn code(&self, torque: TorqueCounts, reversed: bool) -> u16 {
+        let counts = if self.torque_bits > CONVERTER_BITS {
+            torque.0 >> (self.torque_bits - CONVERTER_BITS)
+        } else {
+            torque.0 << (CONVERTER_BITS - self.torque_bits)
+        };
+        let counts = if reversed { -counts } else { counts };
+        (counts + i32::from(NO_TORQUE)).clamp(0, (1 << CONVERTER_BITS) - 1) as u16
+    }
+}
+
+impl<P: ArmPins> Drive for ArmDrive<P> {
+    fn begin_tick(&mut self) {
+        // The previous tick is finished, and this one is not too early.
+        self.pins.begin_tick();
+    }
+
+    fn next_tick_is_due(&self) -> bool {
+        self.pins.next_tick_is_due()
+    }
+
+    fn sample(&mut self) -> Option<SensorFrame> {
+        match self.source {
+            FrameSource::Lockstep | FrameSource::Realtime => self.from_host.take(),
+            _ => Some(self.read_sensors()),
+        }
+    }
+
+    fn actuate(&mut self, answer: &ActuatorFrame) {
+        let is_active = answer
+            .supervisor_state()
+            .is_some_and(SupervisorState::drives);
+        self.front_end.note_active(is_active);
+        let is_driven = matches!(
+            self.source,
+            FrameSource::Sensors | FrameSource::Commissioning
+        );
+        if is_active && is_driven && self.front_end.is_fit() {
+            let [torque_1, torque_2] = answer.torques;
+            let [reversed_1, reversed_2] = self.stage_reversed;
+            let codes = [
+                self.code(torque_1, reversed_1),
+                self.code(torque_2, reversed_2),
+            ];
+            self.pins.switch_stages_on(codes);
+        } else {
+            self.pins.switch_stages_off();
+        }
+    }
+
+    fn stopwatch(&self) -> u32 {
+        DWT::cycle_count()
+    }
+}
+
+impl<P: ArmPins> BoardDrive for ArmDrive<P> {
+    fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource) {
+        let converters = &configuration.converters;
+        self.torque_bits = converters.torque.bits;
+        self.stage_reversed = converters.mounting.stage_reversed;
+        self.source = source;
+        self.from_host = None;
+        // The switch has to be opened and closed again, and the sensors are checked anew.
+        let is_mounted = source != FrameSource::Commissioning;
+        let arm = Arm::new(configuration.arm).ok().filter(|_| is_mounted);
+        self.front_end = FrontEnd::new(Some(FrontEndSettings {
+            encoders: converters.encoders,
+            force: converters.force,
+            mounting: converters.mounting,
+            arm,
+        }));
+        self.encoders.restart();
+        self.force_cell.restart();
+        self.pins.start_timer(configuration.tick_hz);
+    }
+
+    fn idle(&mut self) {
+        self.pins.start_timer(IDLE_HZ);
+    }
+
+    fn offer(&mut self, frame: SensorFrame) {
+        self.from_host = Some(frame);
+    }
+
+    fn permit_arming(&mut self, permitted: bool) -> bool {
+        let is_permitted = permitted && self.source.is_on_board();
+        self.front_end.permit_arming(is_permitted);
+        is_permitted
+    }
+
+    // In line: each interrupt contains its own bus only.
+    #[inline(always)]
+    fn serve_sensor_bus(&mut self, bus: usize) {
+        if bus == 0 {
+            self.encoders.serve();
+        } else {
+            self.force_cell.serve();
+        }
+    }
+
+    fn stopwatch_hz(&self) -> u32 {
+        self.pins.core_hz()
+    }
+}

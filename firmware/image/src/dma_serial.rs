@@ -1,0 +1,146 @@
+//! A serial port with DMA for both directions: no byte is lost while the control task runs.
+//!
+//! Received bytes go to a ring buffer. The idle line and every control tick wake the link task, which may be
+//! late by a whole buffer: 11 ms at 921,600 baud.
+
+#![allow(unsafe_code)] // a buffer that DMA writes
+
+use core::marker::PhantomData;
+
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use crate::board::{Bytes, Port};
+
+/// Line speed of the link to the host, bit/s.
+pub const BAUD: u32 = 921_600;
+
+/// Number of received bytes that may wait.
+const RECEIVED: usize = 1024;
+
+/// Number of bytes that may wait to be sent.
+const TO_SEND: usize = 512;
+
+/// Largest number of bytes in one transfer.
+const CHUNK: usize = 128;
+
+/// The registers of a serial port and of its two DMA channels.
+pub trait DmaRegisters {
+    /// Starts to receive into this buffer, round and round, and to raise the interrupt when the line is idle.
+    fn receive_into(&mut self, buffer: &'static [u8]);
+
+    /// Returns the number of bytes to the end of the receiver's buffer.
+    fn bytes_to_end() -> usize;
+
+    /// Clears the flags of an idle line and of lost bytes.
+    fn acknowledge(&mut self);
+
+    /// Returns whether the last transfer has left the port.
+    fn has_sent(&self) -> bool;
+
+    /// Starts to send; raises the interrupt when done. The last transfer has left the port, and the bytes stay
+    /// unchanged until this one has.
+    fn send(&mut self, bytes: &[u8]);
+
+    /// Stops the interrupt of completed transfers.
+    fn rest(&mut self);
+
+    /// Raises the port's interrupt.
+    fn pend();
+}
+
+/// The interrupt's end of the port.
+pub struct DmaBytes<R> {
+    registers: R,
+    chunk: &'static mut [u8; CHUNK],
+    to_send: Consumer<'static, u8>,
+    is_sending: bool,
+}
+
+/// The link task's end of the port.
+pub struct DmaPort<R> {
+    received: &'static [u8; RECEIVED],
+    /// Index of the next byte to read.
+    taken: usize,
+    to_send: Producer<'static, u8>,
+    registers: PhantomData<R>,
+}
+
+/// Takes ownership of a configured serial port; `None` on the second call.
+pub fn split<R: DmaRegisters>(mut registers: R) -> Option<(DmaBytes<R>, DmaPort<R>)> {
+    let received = cortex_m::singleton!(RECEIVED_BYTES: [u8; RECEIVED] = [0; RECEIVED])?;
+    let chunk = cortex_m::singleton!(SENT_BYTES: [u8; CHUNK] = [0; CHUNK])?;
+    let queue = cortex_m::singleton!(TO_SEND_BYTES: Queue<u8, TO_SEND> = Queue::new())?;
+    let (producer, consumer) = queue.split();
+    let received: &'static [u8; RECEIVED] = received;
+    registers.receive_into(received);
+    let bytes = DmaBytes {
+        registers,
+        chunk,
+        to_send: consumer,
+        is_sending: false,
+    };
+    let port = DmaPort {
+        received,
+        taken: 0,
+        to_send: producer,
+        registers: PhantomData,
+    };
+    Some((bytes, port))
+}
+
+impl<R: DmaRegisters> Bytes for DmaBytes<R> {
+    fn serve(&mut self) {
+        self.registers.acknowledge();
+        if self.is_sending && !self.registers.has_sent() {
+            return;
+        }
+        self.is_sending = false;
+        let mut length = 0;
+        for place in self.chunk.iter_mut() {
+            let Some(byte) = self.to_send.dequeue() else {
+                break;
+            };
+            *place = byte;
+            length += 1;
+        }
+        match self.chunk.get(..length) {
+            Some(bytes) if length > 0 => {
+                self.is_sending = true;
+                // Complete the stores to memory before DMA reads it.
+                cortex_m::asm::dmb();
+                self.registers.send(bytes);
+            }
+            _ => self.registers.rest(),
+        }
+    }
+}
+
+impl<R: DmaRegisters> Port for DmaPort<R> {
+    const HALF_DUPLEX: bool = false;
+
+    fn receive(&mut self, buffer: &mut [u8]) -> usize {
+        let filled = RECEIVED.saturating_sub(R::bytes_to_end());
+        let mut length = 0;
+        for place in buffer {
+            if self.taken == filled % RECEIVED {
+                break;
+            }
+            // SAFETY: within the buffer; DMA writes elsewhere, unless this is late by a whole buffer.
+            *place = unsafe { self.received.as_ptr().add(self.taken).read_volatile() };
+            self.taken = (self.taken + 1) % RECEIVED;
+            length += 1;
+        }
+        length
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> bool {
+        if self.to_send.capacity() - self.to_send.len() < bytes.len() {
+            return false;
+        }
+        for byte in bytes {
+            let _ = self.to_send.enqueue(*byte);
+        }
+        R::pend();
+        true
+    }
+}

@@ -1,0 +1,416 @@
+//! The STM32G474's peripherals that the image uses (RM0440). An access to any other address ends the test.
+
+mod dma;
+mod rcc;
+mod spi;
+
+use self::dma::{Dma, Request};
+use self::rcc::{Rcc, bus};
+use self::spi::Spi;
+use crate::Picoseconds;
+use crate::machine::{Chip, Reset};
+use crate::stm32::{
+    Crystal, Dac, Gpio, GpioReset, Outside, Pin, PinMode, Timer, Usart, UsartLayout, Watchdog,
+    WindowWatchdog, WiredChip, bit_band, store_port,
+};
+use crate::unicorn::Processor;
+
+/// Interrupt numbers.
+const PVD: usize = 1;
+const TIM2: usize = 28;
+const SPIS: [usize; 2] = [35, 36];
+const USART2: usize = 38;
+
+/// Requests of USART2.
+const RECEIVED: Request = Request {
+    number: 26,
+    data: 0x4000_4424,
+    to_memory: true,
+};
+const TO_SEND: Request = Request {
+    number: 27,
+    data: 0x4000_4428,
+    to_memory: false,
+};
+
+/// Highest clock without the regulator's boost mode, Hz.
+const WITHOUT_BOOST_HZ: u64 = 150_000_000;
+
+/// Highest clock per wait state of the flash, in boost mode, Hz.
+const PER_WAIT_STATE_HZ: u64 = 34_000_000;
+
+/// After a reset all pins are analogue, except the debugger's.
+fn gpio_reset(port: usize) -> GpioReset {
+    match port {
+        0 => (0xabff_ffff, 0x0c00_0000, 0x6400_0000),
+        1 => (0xffff_febf, 0x0000_00c0, 0x0000_0100),
+        _ => (0xffff_ffff, 0, 0),
+    }
+}
+
+/// The chip with the parts on its pins.
+#[derive(Clone)]
+pub struct Stm32g4<O> {
+    /// The parts on the pins.
+    pub outside: O,
+    /// Clocks.
+    pub rcc: Rcc,
+    ports: [Gpio; 7],
+    spis: [Spi; 2],
+    /// The serial port to the host.
+    pub usart: Usart,
+    timer: Timer,
+    watchdog: Watchdog,
+    window_watchdog: WindowWatchdog,
+    dac: Dac,
+    dma: Dma,
+    power: [u32; 33],
+    /// Supply voltage, mV.
+    supply_mv: u32,
+    flash_control: [u32; 16],
+    /// Number of keys that have opened the flash's control register and the option bytes.
+    keys: [usize; 2],
+    external_interrupts: [u32; 16],
+    reset: Option<Reset>,
+}
+
+impl<O: Outside> Stm32g4<O> {
+    /// Returns the level of the brown-out reset.
+    fn brown_out_level(&self) -> usize {
+        (self.flash_control[8] >> 8 & 7) as usize
+    }
+
+    /// Returns the state of the supply supervisor.
+    fn supply_is_low(&self) -> bool {
+        let thresholds = [2000, 2200, 2400, 2500, 2600, 2800, 2900, 0];
+        let threshold = thresholds[(self.power[1] >> 1 & 7) as usize];
+        self.power[1] & 1 != 0 && self.supply_mv < threshold
+    }
+
+    fn is_on(&self, address: u32) -> bool {
+        let on = |register, bit| self.rcc.is_on(register, bit);
+        match address & !0x3ff {
+            0x4000_0000 => on(bus::APB1, 0),
+            0x4000_2c00 => on(bus::APB1, 11),
+            0x4000_3800 => on(bus::APB1, 14),
+            0x4000_4400 => on(bus::APB1, 17),
+            0x4000_7000 => on(bus::APB1, 28),
+            0x4001_3000 => on(bus::APB2, 12),
+            0x4002_0000 => on(bus::AHB1, 0),
+            0x4002_0800 => on(bus::AHB1, 2),
+            0x5000_0800 => on(bus::AHB2, 16),
+            0x4800_0000..0x4800_1c00 => on(bus::AHB2, address >> 10 & 7),
+            // Independent watchdog, interrupt lines, clock control, flash.
+            0x4000_3000 | 0x4001_0400 | 0x4002_1000 | 0x4002_2000 => true,
+            _ => panic!("access to {address:#010x}, which is not modelled"),
+        }
+    }
+
+    fn load(&mut self, address: u32, size: u32, now: Picoseconds) -> u32 {
+        let offset = address & 0x3ff;
+        if !self.is_on(address) {
+            return 0;
+        }
+        match address & !0x3ff {
+            0x4000_0000 => self.timer.read(offset, self.rcc.bus_hz(), now),
+            0x4000_2c00 => self.window_watchdog.read(offset),
+            0x4000_3000 => self.watchdog.read(offset),
+            0x4000_3800 => self.spis[1].read(offset, size),
+            0x4000_4400 => self.usart.read(offset),
+            0x4000_7000 => match offset {
+                0x14 => u32::from(self.supply_is_low()) << 11,
+                _ => self.power[((offset / 4) as usize).min(32)],
+            },
+            0x4001_0400 => self.external_interrupts[((offset / 4) & 15) as usize],
+            0x4001_3000 => self.spis[0].read(offset, size),
+            0x4002_0000 => self.dma.read(offset),
+            0x4002_0800 => self.dma.read_multiplexer(offset),
+            0x4002_1000 => self.rcc.read(offset, now),
+            0x4002_2000 => self.flash_control[((offset / 4) & 15) as usize],
+            0x5000_0800 => self.dac.read(offset),
+            _ => self.ports[(address >> 10 & 7) as usize].read(offset),
+        }
+    }
+
+    fn store(&mut self, address: u32, value: u32, size: u32, now: Picoseconds) {
+        let offset = address & 0x3ff;
+        if !self.is_on(address) {
+            return;
+        }
+        let hz = self.rcc.bus_hz();
+        match address & !0x3ff {
+            0x4000_0000 => self.timer.write(offset, value, hz, now),
+            0x4000_2c00 => self.window_watchdog.write(offset, value, hz, now),
+            0x4000_3000 => self.watchdog.write(offset, value, now),
+            0x4000_3800 => self.spis[1].write(offset, (value, size), hz, now),
+            0x4000_4400 => self.usart.write(offset, value, hz, now),
+            0x4000_7000 => self.power[((offset / 4) as usize).min(32)] = value,
+            0x4001_0400 if offset == 0x14 => self.external_interrupts[5] &= !value,
+            0x4001_0400 => self.external_interrupts[((offset / 4) & 15) as usize] = value,
+            0x4001_3000 => self.spis[0].write(offset, (value, size), hz, now),
+            0x4002_0000 => self.dma.write(offset, value),
+            0x4002_0800 => self.dma.write_multiplexer(offset, value),
+            0x4002_1000 => {
+                let before = self.rcc.system_hz();
+                self.rcc.write(offset, value, now);
+                self.check_clock(before);
+            }
+            0x4002_2000 => self.store_flash(offset, value),
+            0x5000_0800 => self.dac.write(offset, value),
+            _ => {
+                let port = (address >> 10 & 7) as usize;
+                let gpio = &mut self.ports[port];
+                store_port(gpio, port, (offset, value), &mut self.outside, now);
+            }
+        }
+    }
+
+    /// Checks regulator, flash and divider for the clock (RM0440, chapters PWR and FLASH).
+    fn check_clock(&self, before_hz: u64) {
+        const BOOST_OFF: u32 = 1 << 8;
+        let (system_hz, core_hz) = (self.rcc.system_hz(), self.rcc.core_hz());
+        assert!(
+            system_hz <= WITHOUT_BOOST_HZ || self.power[32] & BOOST_OFF == 0,
+            "{system_hz} Hz without the regulator's boost mode"
+        );
+        let wait_states = u64::from(self.flash_control[0] & 15);
+        assert!(
+            core_hz <= (wait_states + 1) * PER_WAIT_STATE_HZ,
+            "{core_hz} Hz with {wait_states} wait states"
+        );
+        assert!(
+            before_hz == system_hz || system_hz <= 80_000_000 || core_hz < system_hz,
+            "the bus clock has to be halved for the change to {system_hz} Hz"
+        );
+    }
+
+    /// Handles the keys that unlock the option bytes, which hold the brown-out level.
+    fn store_flash(&mut self, offset: u32, value: u32) {
+        const LOCK: u32 = 1 << 31;
+        const OPTION_LOCK: u32 = 1 << 30;
+        match (offset, value, self.keys) {
+            (0x08, 0x4567_0123, _) => self.keys[0] = 1,
+            (0x08, 0xcdef_89ab, [1, _]) => self.flash_control[5] &= !LOCK,
+            (0x0c, 0x0819_2a3b, _) if self.flash_control[5] & LOCK == 0 => self.keys[1] = 1,
+            (0x0c, 0x4c5d_6e7f, [_, 1]) => self.flash_control[5] &= !OPTION_LOCK,
+            (0x20, ..) if self.flash_control[5] & OPTION_LOCK == 0 => {
+                self.flash_control[8] = value;
+            }
+            (0x00, ..) => self.flash_control[0] = value,
+            (0x14, ..) if self.flash_control[5] & LOCK == 0 => self.flash_control[5] = value,
+            _ => {}
+        }
+    }
+}
+
+impl<O: Outside> Chip for Stm32g4<O> {
+    const FLASH: (u32, usize) = (0x0800_0000, 512 << 10);
+    const RAM: (u32, usize) = (0x2000_0000, 96 << 10);
+    const ALIASED_RAM: usize = 0;
+
+    fn reset(&mut self, reset: Reset, now: Picoseconds) {
+        for (number, port) in self.ports.iter_mut().enumerate() {
+            port.reset(gpio_reset(number));
+        }
+        for pin in (0..7).flat_map(|port| (0..16).map(move |pin| (port, pin))) {
+            self.outside.pin(pin, None, now);
+        }
+        self.rcc.reset(reset);
+        self.spis = Default::default();
+        self.usart.reset();
+        self.timer = Timer::default();
+        self.watchdog = Watchdog::new(self.watchdog.oscillator_hz);
+        self.window_watchdog.reset();
+        self.dac.reset();
+        self.dma = Dma::default();
+        self.power = [0; 33];
+        // The regulator's range 1 without boost.
+        self.power[0] = 0x200;
+        self.power[32] = 0x100;
+        self.flash_control[0] = 0x600;
+        self.flash_control[5] = 0xc000_0000;
+        self.keys = [0; 2];
+        self.external_interrupts = [0; 16];
+        self.reset = None;
+    }
+
+    fn read(&mut self, address: u32, size: u32, now: Picoseconds) -> u32 {
+        if let Some((word, bit)) = bit_band(address) {
+            return self.load(word, 4, now) >> bit & 1;
+        }
+        let word = self.load(address & !3, size, now);
+        let value = word >> (8 * (address & 3));
+        match size {
+            1 => value & 0xff,
+            2 => value & 0xffff,
+            _ => value,
+        }
+    }
+
+    fn write(&mut self, address: u32, size: u32, value: u32, now: Picoseconds) {
+        assert!(bit_band(address).is_none(), "store to {address:#010x}");
+        assert!(address & 3 == 0 || size == 4, "store to {address:#010x}");
+        self.store(address, value, size, now);
+    }
+
+    fn advance(&mut self, now: Picoseconds, memory: &Processor) {
+        let hz = self.rcc.bus_hz();
+        self.timer.advance(hz, now);
+        for bus in 0..2 {
+            while let Some(transfer) = self.spis[bus].ended(now) {
+                let received = self.outside.transfer(bus, transfer, now);
+                self.spis[bus].complete(received, hz);
+            }
+        }
+        loop {
+            self.usart.advance(hz, now);
+            if self.usart.wants_reading() && self.dma.serves(RECEIVED) {
+                let byte = self.usart.take();
+                self.dma.store_byte(RECEIVED, byte, memory);
+            }
+            if self.usart.wants_writing()
+                && let Some(byte) = self.dma.load_byte(TO_SEND, memory)
+            {
+                self.usart.bring(byte, hz, now);
+            }
+            if self.usart.next_event() > now {
+                break;
+            }
+        }
+        if self.watchdog.expires().min(self.window_watchdog.expires()) <= now {
+            self.reset = Some(Reset::Watchdog);
+        }
+    }
+
+    fn next_event(&self) -> Picoseconds {
+        let sends = self.usart.wants_writing() && self.dma.serves(TO_SEND);
+        let spis = self.spis[0].next_event().min(self.spis[1].next_event());
+        self.next_tick()
+            .min(spis)
+            .min(self.usart.next_event())
+            .min(self.watchdog.expires())
+            .min(self.window_watchdog.expires())
+            .min(if sends { 0 } else { Picoseconds::MAX })
+    }
+
+    fn ram_is_at_zero(&self) -> bool {
+        false
+    }
+
+    fn interrupt_lines(&self) -> u128 {
+        let lines = &self.external_interrupts;
+        let supply = lines[5] & lines[0] & 1 << 16 != 0;
+        u128::from(self.timer.interrupts()) << TIM2
+            | u128::from(self.usart.interrupts()) << USART2
+            | u128::from(supply) << PVD
+            | u128::from(self.spis[0].interrupts()) << SPIS[0]
+            | u128::from(self.spis[1].interrupts()) << SPIS[1]
+    }
+
+    fn take_nmi(&mut self) -> bool {
+        self.rcc.nmi
+    }
+
+    fn wants_reset(&self) -> bool {
+        self.reset.is_some()
+    }
+
+    fn take_reset(&mut self) -> Option<Reset> {
+        self.reset.take()
+    }
+
+    fn core_hz(&self) -> u64 {
+        self.rcc.core_hz()
+    }
+}
+
+impl<O: Outside> WiredChip for Stm32g4<O> {
+    type Outside = O;
+
+    const OSCILLATOR_HZ: [u64; 3] = [29_500, 32_000, 34_000];
+
+    fn without_power(outside: O, oscillator_hz: u64) -> Self {
+        let mut flash_control = [0; 16];
+        flash_control[8] = 0xffef_f8aa;
+        Self {
+            outside,
+            rcc: Rcc::new(),
+            ports: std::array::from_fn(|port| Gpio::new(gpio_reset(port))),
+            spis: Default::default(),
+            usart: Usart::new(UsartLayout::SeparateData),
+            timer: Timer::default(),
+            watchdog: Watchdog::new(oscillator_hz),
+            window_watchdog: WindowWatchdog::new(11, 3),
+            dac: Dac::default(),
+            dma: Dma::default(),
+            power: [0; 33],
+            supply_mv: 3300,
+            flash_control,
+            keys: [0; 2],
+            external_interrupts: [0; 16],
+            reset: None,
+        }
+    }
+
+    fn outside_mut(&mut self) -> &mut O {
+        &mut self.outside
+    }
+
+    fn pin(&self, (port, number): Pin) -> PinMode {
+        self.ports[port].pin(number)
+    }
+
+    fn drive_pin(&mut self, (port, number): Pin, level: Option<bool>) {
+        self.ports[port].external[number] = level;
+    }
+
+    fn dac_codes(&self) -> [u32; 2] {
+        self.dac.codes
+    }
+
+    fn dac_is_buffered(&self) -> bool {
+        self.dac.modes & 0x0007_0007 != 0x0002_0002
+    }
+
+    fn dac_writes(&self) -> u64 {
+        self.dac.writes
+    }
+
+    fn set_supply(&mut self, millivolts: u32) {
+        self.supply_mv = millivolts;
+        let threshold = [1700, 2000, 2200, 2500, 2800][self.brown_out_level().min(4)];
+        if millivolts < threshold {
+            self.reset = Some(Reset::BrownOut);
+        }
+        if self.supply_is_low() && self.external_interrupts[2] & 1 << 16 != 0 {
+            self.external_interrupts[5] |= 1 << 16;
+        }
+    }
+
+    fn reset_pin(&mut self) {
+        self.reset = Some(Reset::Pin);
+    }
+
+    fn set_crystal(&mut self, failure: Crystal) {
+        match failure {
+            Crystal::Dead => self.rcc.crystal_works = false,
+            Crystal::Stops => self.rcc.stop_crystal(),
+        }
+    }
+
+    fn stop_control_timer(&mut self) {
+        self.timer = Timer::default();
+    }
+
+    fn usart(&self) -> &Usart {
+        &self.usart
+    }
+
+    fn usart_mut(&mut self) -> &mut Usart {
+        &mut self.usart
+    }
+
+    fn next_tick(&self) -> Picoseconds {
+        self.timer.next_event(self.rcc.bus_hz())
+    }
+}

@@ -1,0 +1,187 @@
+//! Reset and clock control (RM0440, chapter RCC).
+
+use crate::machine::Reset;
+use crate::{MILLISECOND, Picoseconds};
+
+const HSE_ON: u32 = 1 << 16;
+const HSE_READY: u32 = 1 << 17;
+const SECURITY_ON: u32 = 1 << 19;
+const PLL_ON: u32 = 1 << 24;
+const PLL_READY: u32 = 1 << 25;
+
+/// Frequency of the internal oscillator, Hz.
+const INTERNAL_HZ: u64 = 16_000_000;
+
+/// Frequency of the crystal, Hz.
+const CRYSTAL_HZ: u64 = 24_000_000;
+
+/// Start-up time of the crystal.
+const CRYSTAL_START: Picoseconds = 2 * MILLISECOND;
+
+/// Offsets of the registers that switch peripherals' clocks on.
+pub mod bus {
+    /// AHB1.
+    pub const AHB1: u32 = 0x48;
+    /// AHB2.
+    pub const AHB2: u32 = 0x4c;
+    /// APB1.
+    pub const APB1: u32 = 0x58;
+    /// APB2.
+    pub const APB2: u32 = 0x60;
+}
+
+/// Registers of the clock control.
+#[derive(Clone, Debug)]
+pub struct Rcc {
+    control: u32,
+    pll: u32,
+    configuration: u32,
+    registers: [u32; 40],
+    flags: u32,
+    hse_ready_at: Picoseconds,
+    /// Whether the crystal oscillates when switched on.
+    pub crystal_works: bool,
+    /// Set when the clock security system has detected a stopped crystal.
+    pub nmi: bool,
+}
+
+impl Rcc {
+    /// Creates the registers in their state after the first reset.
+    pub fn new() -> Self {
+        let mut registers = [0; 40];
+        // The flash's clock is on.
+        registers[(bus::AHB1 / 4) as usize] = 0x100;
+        Self {
+            control: 0x63,
+            pll: 0x1000,
+            configuration: 0x5,
+            registers,
+            flags: 0,
+            hse_ready_at: Picoseconds::MAX,
+            crystal_works: true,
+            nmi: false,
+        }
+    }
+
+    /// Resets the registers; the reset causes accumulate until they are cleared.
+    pub fn reset(&mut self, reset: Reset) {
+        let reason = match reset {
+            Reset::Power | Reset::BrownOut => 0x0c00_0000,
+            Reset::Watchdog => 0x2400_0000,
+            Reset::Software => 0x1400_0000,
+            Reset::Pin => 0x0400_0000,
+        };
+        *self = Self {
+            crystal_works: self.crystal_works,
+            flags: self.flags | reason,
+            ..Self::new()
+        };
+    }
+
+    /// Returns whether a peripheral's clock is on, given the offset of its enable register and the bit.
+    pub fn is_on(&self, register: u32, bit: u32) -> bool {
+        self.registers[(register / 4) as usize] & 1 << bit != 0
+    }
+
+    fn crystal_is_ready(&self, now: Picoseconds) -> bool {
+        self.crystal_works && self.control & HSE_ON != 0 && now >= self.hse_ready_at
+    }
+
+    /// Handles a load.
+    pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
+        match offset {
+            0x00 => {
+                let flag = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
+                self.control & !(HSE_READY | PLL_READY)
+                    | flag(self.crystal_is_ready(now), HSE_READY)
+                    | flag(self.control & PLL_ON != 0, PLL_READY)
+            }
+            0x08 => self.configuration & !0xc | (self.configuration & 3) << 2,
+            0x0c => self.pll,
+            0x1c => u32::from(self.nmi) << 8,
+            0x94 => self.flags,
+            0x28..0xa0 => self.registers[(offset / 4) as usize],
+            _ => 0,
+        }
+    }
+
+    /// Handles a store.
+    pub fn write(&mut self, offset: u32, value: u32, now: Picoseconds) {
+        match offset {
+            0x00 => {
+                if value & !self.control & HSE_ON != 0 {
+                    self.hse_ready_at = now + CRYSTAL_START;
+                }
+                self.control = value;
+            }
+            0x08 => self.configuration = value,
+            0x0c => self.pll = value,
+            0x20 if value & 1 << 8 != 0 => self.nmi = false,
+            0x94 if value & 1 << 23 != 0 => self.flags = 0,
+            0x28..0x94 => self.registers[(offset / 4) as usize] = value,
+            _ => {}
+        }
+    }
+
+    /// Stops the crystal; with the clock security system on, the processor continues on the internal
+    /// oscillator.
+    pub fn stop_crystal(&mut self) {
+        self.crystal_works = false;
+        if self.control & SECURITY_ON != 0 && self.control & HSE_ON != 0 {
+            self.nmi = true;
+            self.configuration = self.configuration & !3 | 1;
+            self.control &= !(HSE_ON | PLL_ON);
+        }
+    }
+
+    fn pll_hz(&self) -> u64 {
+        const OUTPUT_ON: u32 = 1 << 24;
+        let input = match (self.pll & 3, self.crystal_works) {
+            (2, _) => INTERNAL_HZ,
+            (3, true) => CRYSTAL_HZ,
+            _ => 0,
+        };
+        if self.pll & OUTPUT_ON == 0 {
+            return 0;
+        }
+        let divisor = u64::from(self.pll >> 4 & 15) + 1;
+        let multiplier = u64::from(self.pll >> 8 & 0x7f);
+        let output = 2 * (u64::from(self.pll >> 25 & 3) + 1);
+        input / divisor * multiplier / output
+    }
+
+    /// Returns the system clock before its divider, Hz; 0 if it has stopped.
+    pub fn system_hz(&self) -> u64 {
+        match self.configuration & 3 {
+            1 => INTERNAL_HZ,
+            2 if self.crystal_works => CRYSTAL_HZ,
+            3 => self.pll_hz(),
+            _ => 0,
+        }
+    }
+
+    /// Returns the processor's clock, Hz.
+    pub fn core_hz(&self) -> u64 {
+        let divisor = match self.configuration >> 4 & 15 {
+            small @ 0..8 => u64::from(small / 8 + 1),
+            large @ 8..12 => 2 << (large - 8),
+            large => 64 << (large - 12),
+        };
+        self.system_hz() / divisor
+    }
+
+    /// Returns the clock of the peripherals' buses and timers, Hz.
+    ///
+    /// # Panics
+    /// If the image divides it: this is not modelled.
+    pub fn bus_hz(&self) -> u64 {
+        assert_eq!(self.configuration >> 8 & 0x3f, 0, "divided buses");
+        self.core_hz()
+    }
+}
+
+impl Default for Rcc {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,164 @@
+//! The microcontroller itself fails: reset, clock, supply, program.
+
+use painleve_flash_image::MILLISECOND;
+use painleve_flash_image::bench::{Bench, scenario};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard};
+use painleve_flash_image::machine::Reset;
+use painleve_flash_image::stm32::Crystal;
+use painleve_shared::black_box::{BlackBox, Crash, ResetCause};
+use painleve_shared::message::{Request, Response};
+use painleve_shared::status::Fault;
+
+use super::{DEFAULT, assert_off_in_time, driven};
+
+crate::on_each_board! {
+    the_first_instructions_switch_the_stages_off,
+    a_dead_crystal_leaves_the_stages_off,
+    a_hard_fault_takes_the_torque_off,
+    an_unexpected_interrupt_takes_the_torque_off,
+    a_control_timer_that_stops_takes_the_torque_off,
+    a_program_that_hangs_takes_the_torque_off,
+    a_crystal_that_stops_takes_the_torque_off,
+    a_low_supply_takes_the_torque_off,
+    a_reset_takes_the_torque_off,
+    the_black_box_outlives_a_reset_and_names_its_reason,
+    an_unread_log_does_not_block_the_image,
+    both_torques_change_at_once_over_the_whole_range,
+}
+
+fn the_first_instructions_switch_the_stages_off<C: BoardChip>() {
+    let mut board = EmulatedBoard::<C>::default();
+    board.machine.run_instructions(40, MILLISECOND);
+    assert!(board.torque().is_off(), "{:?}", board.torque());
+    // From then on the pin is never high, and floats only briefly.
+    let mut floating = 0;
+    for _ in 0..100_000 {
+        board.machine.run_instructions(1, MILLISECOND);
+        let enabled = board.torque().enabled;
+        assert_ne!(enabled, Some(true));
+        floating += u32::from(enabled.is_none());
+    }
+    assert!(floating < 300, "{floating} instructions");
+}
+
+fn a_dead_crystal_leaves_the_stages_off<C: BoardChip>() {
+    let mut board = EmulatedBoard::<C>::default();
+    board.machine.chip_mut().set_crystal(Crystal::Dead);
+    for _ in 0..200 {
+        board.machine.run_for(10 * MILLISECOND);
+        assert!(board.torque().is_off(), "{:?}", board.torque());
+    }
+}
+
+fn a_hard_fault_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.machine.hard_fault();
+    assert_off_in_time(bench);
+}
+
+fn an_unexpected_interrupt_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.machine.raise(16 + 40);
+    assert_off_in_time(bench);
+}
+
+/// Tested over the whole range of the independent watchdog's oscillator.
+fn a_control_timer_that_stops_takes_the_torque_off<C: BoardChip>() {
+    for oscillator_hz in C::OSCILLATOR_HZ {
+        let mut board = EmulatedBoard::<C>::with_oscillator(oscillator_hz);
+        board.machine.run_for(20 * MILLISECOND);
+        let mut bench = Bench::<C>::with_board(&scenario(DEFAULT), board);
+        bench.drive();
+        for _ in 0..500 {
+            bench.tick();
+        }
+        assert_eq!(bench.board.resets(), [], "fed in time");
+        bench.board.machine.chip_mut().stop_control_timer();
+        assert_off_in_time(bench);
+    }
+}
+
+fn a_program_that_hangs_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.machine.hang();
+    assert_off_in_time(bench);
+}
+
+fn a_crystal_that_stops_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.machine.chip_mut().set_crystal(Crystal::Stops);
+    assert_off_in_time(bench);
+}
+
+fn a_low_supply_takes_the_torque_off<C: BoardChip>() {
+    for millivolts in [2850, 2600] {
+        let mut bench = driven::<C>();
+        bench.board.machine.chip_mut().set_supply(millivolts);
+        assert_off_in_time(bench);
+    }
+}
+
+fn a_reset_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.machine.chip_mut().reset_pin();
+    bench.run_ms(1);
+    assert_eq!(bench.board.resets(), [Reset::Pin]);
+    assert_off_in_time(bench);
+}
+
+/// The records of the image, requested after its start.
+fn black_box<C: BoardChip>(board: &mut EmulatedBoard<C>) -> BlackBox {
+    board.send(&Request::BlackBox);
+    match board.reply(20 * MILLISECOND) {
+        Some(Response::BlackBox(content)) => content,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn the_black_box_outlives_a_reset_and_names_its_reason<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    assert_eq!(black_box(&mut bench.board).reset, ResetCause::Power);
+    assert_eq!(black_box(&mut bench.board).starts, 1);
+    bench.board.wiring().force.dead = Some(true);
+    assert!(bench.time_until_off().is_some());
+    bench.assert_stays_off(5);
+    let before = bench.board.machine.program_counter();
+    bench.board.machine.hard_fault();
+    bench.run_ms(30);
+    let content = black_box(&mut bench.board);
+    assert_eq!(content.reset, ResetCause::Software);
+    assert_eq!(content.starts, 2);
+    let fault = content.fault.expect("the fault of the force cell");
+    assert_eq!(fault.answer.latched_fault(), Some(Fault::ForceOutOfRange));
+    assert!(fault.sensor.normal_force.0 > 1 << 20);
+    let is_there = |crash| matches!(crash, Some(Crash::HardFault { program_counter, .. }) if program_counter == before);
+    assert!(is_there(content.crash), "{content:?}, {before:#x}");
+    bench.board.machine.hang();
+    bench.run_ms(30);
+    assert_eq!(black_box(&mut bench.board).reset, ResetCause::Watchdog);
+}
+
+/// A debugger has attached to the log and then disconnected.
+fn an_unread_log_does_not_block_the_image<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    let control_block = bench.board.machine.symbol("_SEGGER_RTT").unwrap();
+    // Flags of the first channel: block if full.
+    bench.board.machine.write_word(control_block + 44, 2);
+    for n in 0..3000_u32 {
+        if n % 10 == 0 {
+            bench.board.enable(n % 20 == 0);
+        }
+        bench.wait_for_tick();
+        assert_eq!(bench.board.resets(), [], "tick {n}");
+    }
+}
+
+fn both_torques_change_at_once_over_the_whole_range<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    assert!(!bench.board.machine.chip().dac_is_buffered());
+    let before = bench.board.machine.chip().dac_writes();
+    for _ in 0..10 {
+        bench.tick();
+    }
+    assert_eq!(bench.board.machine.chip().dac_writes() - before, 10);
+}

@@ -1,0 +1,229 @@
+//! The host fails, or asks for what must not be.
+
+use std::collections::BTreeSet;
+
+use painleve_firmware::BUILD;
+use painleve_flash_image::bench::{Bench, encoded, scenario};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405};
+use painleve_flash_image::stm32::WiredChip as _;
+use painleve_flash_image::{MICROSECOND, MILLISECOND};
+use painleve_plant::statistics::Statistics;
+use painleve_shared::message::{FrameSource, PROTOCOL, Request, Response};
+use painleve_shared::status::SupervisorState;
+use painleve_shared::wire;
+
+use super::{DEFAULT, assert_off_in_time, driven, in_lockstep};
+
+/// Number of the control timer's interrupt.
+const CONTROL_TIMER: usize = 28;
+
+crate::on_each_board! {
+    a_simulated_plant_never_switches_the_stages_on,
+    a_lost_host_takes_the_torque_off,
+    the_image_says_its_protocol_and_build_while_the_arm_is_driven,
+    a_request_to_stop_takes_the_torque_off,
+    nothing_arms_without_the_hosts_permission,
+    a_drive_that_was_switched_off_needs_a_new_permission,
+    a_dry_run_controls_with_the_stages_off,
+    a_configuration_of_another_build_is_refused,
+    a_configuration_is_accepted_while_the_arm_is_driven,
+    a_board_without_a_configuration_waits,
+}
+
+fn a_simulated_plant_never_switches_the_stages_on<C: BoardChip>() {
+    let (mut board, mut simulation) = in_lockstep::<C>();
+    let mut statistics = Statistics::new(0.05);
+    for _ in 0..400 {
+        let frame = simulation.sample(&mut statistics).unwrap();
+        let answer = board.exchange(&frame).expect("an answer");
+        simulation.advance(Some(&answer), &mut statistics).unwrap();
+        assert!(board.torque().is_off());
+        assert_eq!(board.torque().counts, [0; 2]);
+    }
+    // No more frames.
+    board.machine.run_for(5000 * MILLISECOND);
+    assert!(board.torque().is_off());
+    assert_eq!(board.torque().counts, [0; 2]);
+}
+
+/// Runs a tick of the control timer at every instruction of the reconfiguration at which one is
+/// possible.
+#[test]
+fn a_refused_configuration_leaves_the_torque_off_at_any_time_of_a_tick() {
+    const THREADS: usize = 4;
+    let results = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..THREADS)
+            .map(|share| scope.spawn(move || torque_on_after_ticks(share, THREADS)))
+            .collect();
+        let join = |thread: std::thread::ScopedJoinHandle<'_, _>| thread.join().unwrap();
+        threads.into_iter().map(join).collect::<Vec<_>>()
+    });
+    let instants: usize = results.iter().map(|(instants, _)| instants).sum();
+    assert!(instants > 1000, "{instants}");
+    let on: BTreeSet<_> = results.into_iter().flat_map(|(_, on)| on).collect();
+    assert!(on.is_empty(), "{on:?}");
+}
+
+/// Tests every `of`-th instant, starting with `share`. Returns their number, and the functions in
+/// which a tick left the torque on.
+fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
+    let mut bench = driven::<F405>();
+    let mut bytes = encoded(&scenario(DEFAULT));
+    // The control rate is the first field of the configuration.
+    bytes[..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    let board = &mut bench.board;
+    while board.response(0).is_some() {}
+    let mut buffer = [0; 1024];
+    let request = Request::Configure {
+        build: BUILD,
+        source: FrameSource::Sensors,
+        configuration: &bytes,
+    };
+    let message = wire::encode(&request, &mut buffer).unwrap().to_vec();
+    board.send_slowly(&message, 150 * MICROSECOND);
+    while !board.machine.chip().usart().incoming.is_empty() {
+        board.machine.run_for(5 * MICROSECOND);
+    }
+    let received = board.machine.snapshot();
+    assert_eq!(board.reply(20 * MILLISECOND), Some(Response::Refused));
+    let end = board.machine.now();
+    board.machine.restore(&received);
+    let (mut instant, mut tried, mut on) = (0, 0, BTreeSet::new());
+    while board.machine.now() < end {
+        board.machine.run_instructions(1, MICROSECOND);
+        if !board.machine.would_take(CONTROL_TIMER) {
+            continue;
+        }
+        instant += 1;
+        if instant % of != share {
+            continue;
+        }
+        tried += 1;
+        let here = board.machine.snapshot();
+        board.machine.pend(CONTROL_TIMER);
+        board.machine.run_for(1200 * MICROSECOND);
+        if !board.torque().is_off() {
+            let place = board.machine.symbol_at(here.program_counter());
+            on.insert(place.to_owned());
+        }
+        board.machine.restore(&here);
+    }
+    (tried, on)
+}
+
+/// The host's process has ended, or its cable is disconnected.
+fn a_lost_host_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    for _ in 0..600 {
+        bench.tick();
+    }
+    assert_eq!(
+        bench.board.torque().enabled,
+        Some(true),
+        "the host is there"
+    );
+    bench.host_is_there = false;
+    for _ in 0..210 {
+        bench.wait_for_tick();
+    }
+    assert!(bench.board.torque().is_off());
+    bench.assert_stays_off(100);
+}
+
+fn the_image_says_its_protocol_and_build_while_the_arm_is_driven<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.send(&Request::Identify);
+    let identity = Response::Identity {
+        protocol: PROTOCOL,
+        build: BUILD,
+    };
+    assert_eq!(bench.board.reply(5 * MILLISECOND), Some(identity));
+    bench.tick();
+    assert_eq!(bench.board.torque().enabled, Some(true));
+}
+
+fn a_request_to_stop_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.send(&Request::Stop);
+    assert_eq!(bench.board.reply(5 * MILLISECOND), Some(Response::Stopped));
+    assert!(bench.board.torque().is_off());
+    bench.assert_stays_off(100);
+}
+
+fn nothing_arms_without_the_hosts_permission<C: BoardChip>() {
+    let mut board = EmulatedBoard::<C>::booted();
+    let response = board.configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
+    assert!(matches!(response, Some(Response::Ready { .. })));
+    for n in 0..300 {
+        if n % 50 == 0 {
+            board.send(&Request::Alive);
+        }
+        board.enable(n > 100);
+        board.machine.run_for(MILLISECOND);
+        assert!(board.torque().is_off());
+    }
+}
+
+/// A drive that has stopped needs a new permission: closing the switch again is not enough.
+fn a_drive_that_was_switched_off_needs_a_new_permission<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.enable(false);
+    assert!(bench.time_until_off().is_some());
+    bench.assert_stays_off(20);
+    bench.board.enable(true);
+    bench.assert_stays_off(100);
+}
+
+fn a_dry_run_controls_with_the_stages_off<C: BoardChip>() {
+    let Bench::<C> { mut board, .. } =
+        Bench::<C>::without_configuration(&scenario(DEFAULT), EmulatedBoard::<C>::booted());
+    let response = board.configure(FrameSource::DryRun, &encoded(&scenario(DEFAULT)));
+    assert!(matches!(response, Some(Response::Ready { .. })));
+    assert!(board.permit_arming());
+    let mut was_armed = false;
+    for n in 0..300 {
+        if n % 50 == 0 {
+            board.send(&Request::Alive);
+        }
+        board.enable(n > 100);
+        board.machine.run_for(MILLISECOND);
+        assert!(board.torque().is_off());
+        while let Some(response) = board.response(0) {
+            if let Response::Tick { answer, .. } = response {
+                was_armed |= answer.supervisor_state() == Some(SupervisorState::Armed);
+            }
+        }
+    }
+    assert!(was_armed);
+}
+
+fn a_configuration_of_another_build_is_refused<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.send(&Request::Configure {
+        build: BUILD ^ 1,
+        source: FrameSource::Sensors,
+        configuration: &encoded(&scenario(DEFAULT)),
+    });
+    let reply = bench.board.reply(20 * MILLISECOND);
+    assert_eq!(reply, Some(Response::OtherBuild { build: BUILD }));
+    assert_off_in_time(bench);
+}
+
+fn a_configuration_is_accepted_while_the_arm_is_driven<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    let response = bench
+        .board
+        .configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
+    assert_eq!(bench.board.machine.chip().usart().overruns, 0);
+    assert!(
+        matches!(response, Some(Response::Ready { .. })),
+        "{response:?}"
+    );
+    assert_off_in_time(bench);
+}
+
+fn a_board_without_a_configuration_waits<C: BoardChip>() {
+    let mut board = EmulatedBoard::<C>::booted();
+    board.machine.run_for(5000 * MILLISECOND);
+    assert_eq!(board.resets(), []);
+}

@@ -1,0 +1,188 @@
+//! Sensors, switches and torque stages fail.
+
+use painleve_flash_image::MILLISECOND;
+use painleve_flash_image::bench::{Bench, encoded, scenario};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard, STAGES_READY};
+use painleve_plant::plant::Plant as _;
+use painleve_plant::scenario::Scenario;
+use painleve_shared::counts::ForceCounts;
+use painleve_shared::message::{FrameSource, Response};
+use painleve_shared::mounting::Mounting;
+use painleve_shared::status::Fault;
+
+use super::{DEFAULT, assert_off_in_time, driven, latched_fault};
+
+crate::on_each_board! {
+    the_switch_takes_the_torque_off_and_a_bounce_does_not_put_it_on,
+    sensors_that_die_take_the_torque_off,
+    an_encoder_that_freezes_takes_the_torque_off,
+    a_torque_stage_that_is_not_ready_takes_the_torque_off,
+    arming_on_implausible_readings_is_refused_with_a_fault,
+    parts_mounted_backwards_drive_the_same_arm,
+    the_image_respects_the_limits_of_the_data_sheets,
+    forces_of_either_sign_are_converted,
+    one_disturbed_transfer_is_no_fault,
+    nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before,
+}
+
+fn the_switch_takes_the_torque_off_and_a_bounce_does_not_put_it_on<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.enable(false);
+    assert!(bench.time_until_off().is_some());
+    assert!(bench.board.permit_arming());
+    for n in 0..40 {
+        // The switch opens for two ticks at a time.
+        bench.board.enable(n % 10 > 1);
+        bench.wait_for_tick();
+        assert!(bench.board.torque().is_off());
+    }
+}
+
+fn sensors_that_die_take_the_torque_off<C: BoardChip>() {
+    for level in [false, true] {
+        for encoder in 0..2 {
+            let mut bench = driven::<C>();
+            bench.board.wiring().encoders[encoder].dead = Some(level);
+            assert_off_in_time(bench);
+        }
+    }
+    let mut bench = driven::<C>();
+    bench.board.wiring().force.dead = Some(true);
+    assert_off_in_time(bench);
+}
+
+/// The tip moves on the belt; the encoder repeats a plausible angle.
+fn an_encoder_that_freezes_takes_the_torque_off<C: BoardChip>() {
+    for encoder in 0..2 {
+        let mut bench = driven::<C>();
+        bench.is_frozen[encoder] = true;
+        let mut ticks = 0;
+        while !bench.board.torque().is_off() {
+            bench.tick();
+            ticks += 1;
+            assert!(ticks < 2000, "encoder {encoder}");
+        }
+        let fault = latched_fault(&mut bench);
+        println!("encoder {encoder}: {fault:?} after {ticks} ticks");
+        assert!(fault.is_some());
+        bench.assert_stays_off(100);
+    }
+}
+
+fn a_torque_stage_that_is_not_ready_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.drive_pin(STAGES_READY, Some(false));
+    assert!(bench.time_until_off().is_some());
+    bench.assert_stays_off(10);
+    assert_eq!(latched_fault(&mut bench), Some(Fault::StageNotReady));
+    bench.drive_pin(STAGES_READY, Some(true));
+    bench.assert_stays_off(100);
+}
+
+/// An encoder that is zeroed 30° wrongly, a torque stage that is not ready.
+fn arming_on_implausible_readings_is_refused_with_a_fault<C: BoardChip>() {
+    for (offsets, ready) in [([1365, 0], true), ([0, 1365], true), ([0, 0], false)] {
+        let mut bench =
+            Bench::<C>::without_configuration(&scenario(DEFAULT), EmulatedBoard::<C>::booted());
+        bench.host_is_there = true;
+        bench.encoder_offset = offsets;
+        bench.present();
+        bench.drive_pin(STAGES_READY, Some(ready));
+        let configuration = encoded(&scenario(DEFAULT));
+        let response = bench.board.configure(FrameSource::Sensors, &configuration);
+        assert!(matches!(response, Some(Response::Ready { .. })));
+        assert!(bench.board.permit_arming());
+        for _ in 0..150 {
+            bench.tick();
+            assert!(bench.board.torque().is_off());
+        }
+        let fault = latched_fault(&mut bench);
+        assert_eq!(fault, Some(Fault::ArmingRefused), "{offsets:?} {ready}");
+    }
+}
+
+/// Every part mounted backwards and the force cell not at zero: the settings make it the same arm.
+fn parts_mounted_backwards_drive_the_same_arm<C: BoardChip>() {
+    let mounted = Mounting {
+        encoder_reversed: [true; 2],
+        stage_reversed: [true; 2],
+        force_reversed: [true; 2],
+        force_tare: [ForceCounts(37), ForceCounts(-55)],
+    };
+    let mut scenario = scenario(DEFAULT);
+    let tip_m = |scenario: &Scenario, mounted| {
+        let mut bench = Bench::<C>::without_configuration(scenario, EmulatedBoard::<C>::booted());
+        bench.host_is_there = true;
+        bench.mounted = mounted;
+        bench.present();
+        let response = bench
+            .board
+            .configure(FrameSource::Sensors, &encoded(scenario));
+        assert!(matches!(response, Some(Response::Ready { .. })));
+        assert!(bench.board.permit_arming());
+        bench.drive();
+        for _ in 0..300 {
+            bench.tick();
+        }
+        bench.simulation.plant().snapshot().tip_t_m
+    };
+    let straight = tip_m(&scenario, Mounting::default());
+    scenario.converters.mounting = mounted;
+    assert!((tip_m(&scenario, mounted) - straight).abs() < 1e-3);
+}
+
+fn the_image_respects_the_limits_of_the_data_sheets<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    for _ in 0..200 {
+        bench.tick();
+    }
+    assert_eq!(bench.board.wiring().violations(), [""; 0]);
+}
+
+fn forces_of_either_sign_are_converted<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    let conversions = &bench.board.wiring().force.conversions;
+    assert!(conversions.iter().any(|it| *it < 0), "{conversions:?}");
+}
+
+fn one_disturbed_transfer_is_no_fault<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.wiring().encoders[0].errors |= 4;
+    for _ in 0..50 {
+        bench.tick();
+    }
+    assert_eq!(bench.board.torque().enabled, Some(true));
+}
+
+fn nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before<C: BoardChip>() {
+    for level in [false, true] {
+        let mut board = EmulatedBoard::<C>::default();
+        board.enable(true);
+        for encoder in &mut board.wiring().encoders {
+            encoder.dead = Some(level);
+        }
+        board.wiring().force.dead = Some(level);
+        board.machine.run_for(20 * MILLISECOND);
+        let response = board.configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
+        assert!(matches!(response, Some(Response::Ready { .. })));
+        for n in 0..600 {
+            if n % 100 == 0 {
+                assert!(board.permit_arming());
+            }
+            // It is opened and closed, too.
+            board.enable(n % 100 > 20);
+            board.machine.run_for(MILLISECOND);
+            assert!(board.torque().is_off());
+        }
+    }
+    // Healthy sensors, but a switch that has been closed from the start.
+    let mut board = EmulatedBoard::<C>::default();
+    board.enable(true);
+    board.machine.run_for(20 * MILLISECOND);
+    let mut bench = Bench::<C>::with_board(&scenario(DEFAULT), board);
+    for _ in 0..300 {
+        bench.board.enable(true);
+        bench.wait_for_tick();
+        assert!(bench.board.torque().is_off());
+    }
+}
