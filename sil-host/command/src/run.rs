@@ -169,11 +169,15 @@ pub struct RunArguments {
     /// Exit with code 6 if one of these events happened; the report is still complete.
     #[arg(long, value_enum, value_name = "EVENTS", value_delimiter = ',')]
     fail_on: Vec<FailOn>,
-    /// Serve a page on this machine from which the run is watched and steered, in one process and
-    /// without files; until Ctrl-C.
+    /// Serve the run to a page in the browser and to Foxglove on this machine, which watch and steer
+    /// it, in one process and without files; until Ctrl-C.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     #[arg(conflicts_with_all = ["bus", "port", "fail_on"])]
     live: Option<u16>,
+    /// Let pages of another origin connect to --live as Foxglove does, for example
+    /// http://localhost:8080; may be repeated.
+    #[arg(long, value_name = "ORIGIN", requires = "live")]
+    live_origin: Vec<String>,
     /// Print errors and warnings only.
     #[arg(short, long, conflicts_with = "json")]
     quiet: bool,
@@ -201,7 +205,7 @@ fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), 
     if arguments.host != Host::Native {
         return Err(InputError::LiveHost.into());
     }
-    live::run(scenario, port, &Interrupt::catch()?)
+    live::run(scenario, port, &arguments.live_origin, &Interrupt::catch()?)
 }
 
 /// Runs a scenario as two processes and reports.

@@ -1,6 +1,7 @@
 //! Records of a run.
 //!
 //! - [`recorder`]: the thread that passes ticks and events of a run to its [`Sink`]s
+//! - [`messages`]: topics, schemas and messages of a run
 //! - [`mcap_log`]: every tick as an MCAP file for Foxglove, PlotJuggler and scripts
 //! - [`csv_table`]: every tick as a row of a CSV file
 //! - [`plot`]: the run over time as a figure
@@ -12,6 +13,7 @@ pub mod events;
 pub mod export;
 pub mod fields;
 pub mod mcap_log;
+pub mod messages;
 pub mod plot;
 pub mod recorder;
 pub mod replica;

@@ -55,6 +55,14 @@ impl Scene {
 
     /// Receives a tick; returns a picture 60 times a second.
     pub fn tick(&mut self, tick: &RecordedTick<'_>) -> Option<Picture> {
+        self.advance(tick);
+        let is_due = self.tick.is_multiple_of(self.ticks_per_picture);
+        self.tick += 1;
+        is_due.then(|| self.picture(tick))
+    }
+
+    /// Moves the belt to a tick.
+    pub fn advance(&mut self, tick: &RecordedTick<'_>) {
         let plant = &tick.sample.plant;
         let elapsed_s = plant.time_s - self.last_s.unwrap_or(plant.time_s);
         // Unknown on a real arm.
@@ -62,12 +70,10 @@ impl Scene {
             self.travel_m += plant.belt_speed_m_s * elapsed_s;
         }
         self.last_s = Some(plant.time_s);
-        let is_due = self.tick.is_multiple_of(self.ticks_per_picture);
-        self.tick += 1;
-        is_due.then(|| self.picture(tick))
     }
 
-    fn picture(&self, tick: &RecordedTick<'_>) -> Picture {
+    /// Draws the tick to which the belt was last [advanced](Self::advance).
+    pub fn picture(&self, tick: &RecordedTick<'_>) -> Picture {
         let plant = &tick.sample.plant;
         let time = timestamp(plant.time_s);
         let [length_1, length_2] = self.arm.link_length_m;

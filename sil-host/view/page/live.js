@@ -28,7 +28,11 @@ function connect(page) {
     if (message.reset) clear();
     if (message.error || message.note) show(message.error ?? message.note, Boolean(message.error));
     if (message.status) {
-      const { paused, factor, ticks_per_s, real_time_factor } = message.status;
+      const { paused, factor, ticks_per_s, real_time_factor, settings } = message.status;
+      for (const { key, value } of settings) {
+        const input = form.elements[key];
+        if (input && input !== document.activeElement) input.value = value ?? "";
+      }
       setPlaying(!paused);
       $("speed").value = String(factor);
       status.textContent = paused ? "paused" : `${real_time_factor.toPrecision(3)}× real time, ${Math.round(ticks_per_s)} ticks/s`;

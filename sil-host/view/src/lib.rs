@@ -3,11 +3,16 @@
 //! - [`row`]: the data of one tick for the page, as bytes
 //! - [`thinning`]: limits the number of rows and keeps the extremes of the contact force
 //! - [`page`]: the page of a recorded run as one file that needs no network
-//! - [`server`]: the page of a run that goes on, served to this machine
+//! - [`server`]: the viewers of a live run on this machine: the same page, and Foxglove
+//! - [`hub`], [`request`]: data on their way to the viewers, and their requests
+//! - [`foxglove`]: Foxglove's WebSocket protocol
 //!
 //! `page/` contains the page itself; its scripts need no build step.
 
+pub mod foxglove;
+pub mod hub;
 pub mod page;
+pub mod request;
 pub mod row;
 pub mod server;
 pub mod thinning;

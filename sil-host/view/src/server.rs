@@ -1,154 +1,60 @@
 //! The live page on this machine: HTTP and WebSocket on one port of the loopback interface.
 //!
-//! Only pages that this server itself has sent may connect: requests for another host (DNS rebinding) and
-//! from another origin are refused. Each viewer has a thread of its own, which sends what the run has
-//! [published](Hub::publish) about 60 times a second; a viewer that is too slow loses rows, never
-//! the run time.
+//! Requests for another host (DNS rebinding) are refused, and so are connections from pages of another
+//! origin: the live page is open to itself only, and the [`foxglove`](crate::foxglove) service to the
+//! Foxglove app and the origins that the user names. Each viewer has a thread of its own, which sends
+//! about 60 times a second what the run has published to the [`Hub`].
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-use serde::Deserialize;
-use serde_json::Value;
 use tungstenite::handshake::derive_accept_key;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Message, WebSocket};
 
-/// Most viewers at once.
-const MOST_VIEWERS: usize = 8;
+use crate::foxglove;
+use crate::hub::{Hub, PageQueue, locked};
+use crate::request::{Order, Orders};
+
 /// Time between two messages to a viewer.
 const INTERVAL: Duration = Duration::from_millis(16);
 /// How long a connection may take to send its request.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Longest request head and longest order, bytes.
 const MOST_BYTES: usize = 16 << 10;
-/// Bytes that may wait for a viewer.
-const MOST_WAITING: usize = 4 << 20;
-
-/// What a viewer orders.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "order", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum ViewerRequest {
-    /// Stops simulated time.
-    Pause,
-    /// Lets simulated time go on.
-    Resume,
-    /// Runs some ticks and pauses.
-    Step {
-        /// Number of control ticks.
-        ticks: u32,
-    },
-    /// Changes the speed.
-    Speed {
-        /// Simulated seconds per second; 0 for as fast as possible.
-        factor: f64,
-    },
-    /// Starts the run again.
-    Reset,
-    /// Changes a key of the scenario.
-    Set {
-        /// The key, as in `belt.friction`.
-        key: String,
-        /// The value in TOML.
-        value: String,
-    },
-    /// Pushes the tip.
-    Push {
-        /// Force along the belt and away from it, N.
-        force_n: [f64; 2],
-        /// How long, s.
-        duration_s: f64,
-    },
-}
-
-/// What waits for one viewer.
-#[derive(Debug, Default)]
-struct Waiting {
-    rows: Vec<u8>,
-    messages: Vec<String>,
-}
-
-/// The viewers of a run.
-#[derive(Debug, Default)]
-pub struct Hub {
-    count: AtomicUsize,
-    viewers: Mutex<Vec<Arc<Mutex<Waiting>>>>,
-}
-
-impl Hub {
-    /// Returns the number of viewers.
-    pub fn viewers(&self) -> usize {
-        self.count.load(Ordering::Relaxed)
-    }
-
-    /// Passes rows and messages to every viewer.
-    pub fn publish(&self, rows: &[u8], messages: &[Value]) {
-        for viewer in locked(&self.viewers).iter() {
-            let mut waiting = locked(viewer);
-            if waiting.rows.len() + rows.len() > MOST_WAITING {
-                waiting.rows.clear();
-            }
-            waiting.rows.extend_from_slice(rows);
-            waiting
-                .messages
-                .extend(messages.iter().map(Value::to_string));
-        }
-    }
-
-    fn join(&self) -> Option<Arc<Mutex<Waiting>>> {
-        let mut viewers = locked(&self.viewers);
-        if viewers.len() >= MOST_VIEWERS {
-            return None;
-        }
-        let viewer = Arc::<Mutex<Waiting>>::default();
-        viewers.push(viewer.clone());
-        self.count.store(viewers.len(), Ordering::Relaxed);
-        Some(viewer)
-    }
-
-    fn leave(&self, viewer: &Arc<Mutex<Waiting>>) {
-        let mut viewers = locked(&self.viewers);
-        viewers.retain(|other| !Arc::ptr_eq(other, viewer));
-        self.count.store(viewers.len(), Ordering::Relaxed);
-    }
-}
-
-/// A thread that panicked has left nothing half-done here.
-fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// Serves the page until the process ends.
 #[derive(Debug)]
 pub struct Server {
     /// The viewers.
     pub hub: Arc<Hub>,
-    /// What they order.
-    pub orders: Receiver<ViewerRequest>,
+    /// Their requests.
+    pub orders: Receiver<Order>,
     /// Where the page is.
     pub address: SocketAddr,
 }
 
 impl Server {
-    /// Starts to serve `page` on a port of the loopback interface; 0 for any free one.
+    /// Starts to serve `page` on a port of the loopback interface; 0 for any free one. Pages of
+    /// `origins` may connect as Foxglove does.
     ///
     /// # Errors
     /// If the port is taken or a thread cannot be started.
-    pub fn start(port: u16, page: String) -> io::Result<Self> {
+    pub fn start(port: u16, page: String, origins: &[String]) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         let address = listener.local_addr()?;
         let hub = Arc::<Hub>::default();
-        let (sender, orders) = channel();
+        let (sender, orders) = Orders::channel();
         let service = Service {
             page: page.into(),
             port: address.port(),
             hub: hub.clone(),
             orders: sender,
+            origins: origins.into(),
         };
         let accept = move || {
             for stream in listener.incoming().flatten() {
@@ -176,7 +82,9 @@ struct Service {
     page: Arc<str>,
     port: u16,
     hub: Arc<Hub>,
-    orders: Sender<ViewerRequest>,
+    orders: Orders,
+    /// Origins of further pages that may connect as Foxglove does.
+    origins: Arc<[String]>,
 }
 
 impl Service {
@@ -205,23 +113,33 @@ impl Service {
                 .iter()
                 .any(|name| authority == format!("{name}:{}", self.port))
         };
+        let origin = header("origin");
         let is_own_host = header("host").is_some_and(own);
         let is_own_origin =
-            header("origin").is_none_or(|origin| origin.strip_prefix("http://").is_some_and(own));
-        if !is_own_host || !is_own_origin {
+            origin.is_none_or(|origin| origin.strip_prefix("http://").is_some_and(own));
+        let protocol = foxglove::subprotocol(header("sec-websocket-protocol").unwrap_or_default());
+        let is_allowed = is_own_origin
+            || protocol.is_some()
+                && origin.is_some_and(|origin| {
+                    foxglove::ORIGINS.contains(&origin)
+                        || self.origins.iter().any(|own| own == origin)
+                });
+        if !is_own_host || !is_allowed {
             return refuse(&mut stream, "403 Forbidden");
         }
-        match (request.method, request.path, header("sec-websocket-key")) {
-            (Some("GET"), Some("/live"), Some(key)) => {
-                let accept = derive_accept_key(key.as_bytes());
-                let answer = format!(
-                    "HTTP/1.1 101 Switching Protocols\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-                     Sec-WebSocket-Accept: {accept}\r\n\r\n"
-                );
-                stream.write_all(answer.as_bytes())?;
+        let key = header("sec-websocket-key");
+        match (request.method, request.path, key, protocol) {
+            (Some("GET"), Some("/live"), Some(key), _) if is_own_origin => {
+                stream.write_all(upgrade(key, "").as_bytes())?;
                 self.view(stream)
             }
-            (Some("GET"), Some("/"), _) => {
+            (Some("GET"), Some("/"), Some(key), Some(protocol)) => {
+                let protocol = format!("Sec-WebSocket-Protocol: {protocol}\r\n");
+                stream.write_all(upgrade(key, &protocol).as_bytes())?;
+                foxglove::serve(web_socket(stream)?, &self.hub, &self.orders);
+                Ok(())
+            }
+            (Some("GET"), Some("/"), _, _) => {
                 let answer = format!(
                     "HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\n\
                      Content-Length: {}\r\nCache-Control: no-store\r\nX-Frame-Options: DENY\r\n\
@@ -237,38 +155,30 @@ impl Service {
 
     /// Sends to one viewer and takes its orders until it leaves.
     fn view(&self, stream: TcpStream) -> io::Result<()> {
-        stream.set_read_timeout(Some(INTERVAL))?;
-        stream.set_write_timeout(Some(PATIENCE))?;
-        let limits = WebSocketConfig::default().max_message_size(Some(MOST_BYTES));
-        let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(limits));
-        let Some(waiting) = self.hub.join() else {
+        let mut socket = web_socket(stream)?;
+        let Some(waiting) = self.hub.pages.join() else {
             return Ok(());
         };
         while self.exchange(&mut socket, &waiting).is_ok() {}
-        self.hub.leave(&waiting);
+        self.hub.pages.leave(&waiting);
         Ok(())
     }
 
     fn exchange(
         &self,
         socket: &mut WebSocket<TcpStream>,
-        waiting: &Mutex<Waiting>,
+        waiting: &Mutex<PageQueue>,
     ) -> Result<(), tungstenite::Error> {
-        match socket.read() {
-            Ok(Message::Text(text)) => match serde_json::from_str(&text) {
-                Ok(order) => drop(self.orders.send(order)),
+        if let Some(Message::Text(text)) = receive(socket)? {
+            match serde_json::from_str(&text) {
+                Ok(request) => self.orders.send(request),
                 Err(error) => {
                     let message = serde_json::json!({ "error": error.to_string() });
                     socket.send(Message::text(message.to_string()))?;
                 }
-            },
-            Ok(Message::Close(_)) => return Err(tungstenite::Error::ConnectionClosed),
-            Ok(_) => {}
-            Err(tungstenite::Error::Io(error))
-                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-            Err(error) => return Err(error),
+            }
         }
-        let Waiting { rows, messages } = std::mem::take(&mut *locked(waiting));
+        let PageQueue { rows, messages } = std::mem::take(&mut *locked(waiting));
         if !rows.is_empty() {
             socket.send(Message::binary(rows))?;
         }
@@ -276,6 +186,42 @@ impl Service {
             socket.send(Message::text(message))?;
         }
         Ok(())
+    }
+}
+
+/// Returns the answer that turns a connection into a WebSocket, with a further header.
+fn upgrade(key: &str, header: &str) -> String {
+    let accept = derive_accept_key(key.as_bytes());
+    format!(
+        "HTTP/1.1 101 Switching Protocols\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         {header}Sec-WebSocket-Accept: {accept}\r\n\r\n"
+    )
+}
+
+fn web_socket(stream: TcpStream) -> io::Result<WebSocket<TcpStream>> {
+    stream.set_read_timeout(Some(INTERVAL))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let limits = WebSocketConfig::default().max_message_size(Some(MOST_BYTES));
+    Ok(WebSocket::from_raw_socket(
+        stream,
+        Role::Server,
+        Some(limits),
+    ))
+}
+
+/// Waits for a viewer's message until it is time to send to it.
+pub(crate) fn receive(
+    socket: &mut WebSocket<TcpStream>,
+) -> Result<Option<Message>, tungstenite::Error> {
+    match socket.read() {
+        Ok(Message::Close(_)) => Err(tungstenite::Error::ConnectionClosed),
+        Ok(message) => Ok(Some(message)),
+        Err(tungstenite::Error::Io(error))
+            if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
+        {
+            Ok(None)
+        }
+        Err(error) => Err(error),
     }
 }
 
@@ -301,6 +247,7 @@ fn refuse(stream: &mut TcpStream, status: &str) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::request::ViewerRequest;
 
     /// Sends a request and returns the first line of the answer.
     fn status(server: &Server, request: &str) -> String {
@@ -317,7 +264,7 @@ mod tests {
 
     #[test]
     fn only_this_machines_own_pages_are_served() {
-        let server = Server::start(0, "page".into()).unwrap();
+        let server = Server::start(0, "page".into(), &["http://localhost:8080".into()]).unwrap();
         assert!(server.address.ip().is_loopback());
         for (request, expected) in [
             (
@@ -363,7 +310,7 @@ mod tests {
 
     #[test]
     fn a_viewer_gets_what_is_published_and_its_orders_arrive() {
-        let server = Server::start(0, String::new()).unwrap();
+        let server = Server::start(0, String::new(), &[]).unwrap();
         let stream = TcpStream::connect(server.address).unwrap();
         let url = format!("ws://localhost:{}/live", server.address.port());
         let (mut socket, _) = tungstenite::client(url, stream).unwrap();
@@ -379,7 +326,7 @@ mod tests {
             .send(Message::text("{\"order\":\"step\",\"ticks\":3}"))
             .unwrap();
         let order = server.orders.recv_timeout(PATIENCE).unwrap();
-        assert_eq!(order, ViewerRequest::Step { ticks: 3 });
+        assert_eq!(order.request, ViewerRequest::Step { ticks: 3 });
         socket
             .send(Message::text("{\"order\":\"explode\"}"))
             .unwrap();

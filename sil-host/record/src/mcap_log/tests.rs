@@ -8,9 +8,11 @@ use painleve_plant::controller_host::InProcess;
 use painleve_plant::sample::Sample;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Event, Snapshot};
+use serde_json::{Value, json};
 
 use crate::csv_table::CsvTable;
 use crate::export::ticks_to_csv;
+use crate::messages::event_schema;
 use crate::recorder::Recorder;
 
 /// Records a run of the closed loop.

@@ -1,28 +1,28 @@
-//! `painleve run --live`: plant and controller in this process, watched and steered from a page.
+//! `painleve run --live`: plant and controller in this process, watched and steered from a page or from
+//! Foxglove.
 
-use std::cell::{Cell, RefCell};
-use std::rc::Rc;
+mod page_settings;
+mod viewers;
+
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use painleve_firmware::telemetry::Telemetry;
-use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
-use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
-use painleve_plant::sample::Sample;
+use painleve_plant::Controller;
+use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
-use painleve_plant::{Controller, Event};
-use painleve_record::RecordedTick;
-use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
-use painleve_shared::frame::SensorFrame;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
-use painleve_view::page::{BeltTravel, description, event_entry, html};
-use painleve_view::row::Row;
-use painleve_view::server::{Hub, Server, ViewerRequest};
-use serde_json::{Value, json};
+use painleve_view::foxglove::parameters::parameters;
+use painleve_view::hub::Hub;
+use painleve_view::page::{description, html};
+use painleve_view::request::{Order, Outcome, ViewerRequest};
+use painleve_view::server::Server;
+use serde_json::json;
 
 use super::CommandError;
 use super::output_error::InputError;
+use viewers::{Host, Viewers};
 
 /// Time between two looks at orders and clock.
 const SLICE: Duration = Duration::from_millis(4);
@@ -32,122 +32,38 @@ const ROWS_PER_S: f64 = 2000.0;
 const TICKS_PER_LOOK: u32 = 64;
 /// Time between two messages about the speed.
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
-/// Most events that wait for the viewers; more are left out.
-const MOST_EVENTS: usize = 50;
 
-/// Serves the page of a run that goes on until it is interrupted.
-pub fn run(scenario: &Scenario, port: u16, interrupt: &Interrupt) -> Result<(), CommandError> {
+/// Serves a run that goes on until it is interrupted, to its page and to Foxglove; pages of `origins`
+/// may connect as Foxglove does.
+pub fn run(
+    scenario: &Scenario,
+    port: u16,
+    origins: &[String],
+    interrupt: &Interrupt,
+) -> Result<(), CommandError> {
     let mut page = description(scenario);
-    page["parameters"] = parameters(scenario);
-    let server =
-        Server::start(port, html(&page)).map_err(|source| InputError::Port { port, source })?;
+    page["parameters"] = page_settings::settings(scenario);
+    let server = Server::start(port, html(&page), origins)
+        .map_err(|source| InputError::Port { port, source })?;
     let mut live = Live::new(scenario.clone(), server.hub.clone())?;
     warn(format_args!(
-        "open http://localhost:{}/ in a browser; the run starts with the first viewer and ends with Ctrl-C",
-        server.address.port()
+        "open http://localhost:{port}/ in a browser or ws://localhost:{port} in Foxglove; the run starts with the \
+         first viewer and ends with Ctrl-C",
+        port = server.address.port()
     ));
     while !interrupt.is_requested() {
         while let Ok(order) = server.orders.try_recv() {
-            live.obey(order)?;
+            live.execute(order)?;
         }
         live.slice()?;
         live.report();
         if live.is_waiting()
             && let Ok(order) = server.orders.recv_timeout(SLICE)
         {
-            live.obey(order)?;
+            live.execute(order)?;
         }
     }
     Err(CommandError::Interrupted)
-}
-
-/// The settings that the page offers; every other key can be set by name.
-fn parameters(scenario: &Scenario) -> Value {
-    let mut parameters = vec![
-        json!({ "key": "belt.friction", "label": "belt friction μ", "value": scenario.belt.friction, "minimum": 0, "maximum": 2, "step": 0.01 }),
-        json!({ "key": "belt.profile", "label": "belt speed, m/s", "value": scenario.belt.profile.speed_m_s(0.0), "minimum": -2, "maximum": 2, "step": 0.05, "template": "{ kind = \"constant\", speed_m_s = % }" }),
-        json!({ "key": "controller.reference", "label": "target of the tip, m", "value": 0, "minimum": -1, "maximum": 1, "step": 0.005, "template": "[{ minimum-jerk = { target_m = %, duration_s = 1.0 } }]" }),
-    ];
-    if scenario.controller.law.name() == "hybrid" {
-        for (key, label, value, maximum) in [
-            ("normal_force_n", "normal force f_n*, N", 10.0, 100.0),
-            ("position_gain_per_s2", "position gain, 1/s²", 3000.0, 1e6),
-            ("velocity_gain_per_s", "velocity gain, 1/s", 100.0, 1e4),
-        ] {
-            parameters.push(json!({ "key": format!("controller.law.hybrid.{key}"), "label": label, "value": value, "minimum": 0, "maximum": maximum, "step": "any" }));
-        }
-    }
-    parameters.into()
-}
-
-/// The controller in this process, with its telemetry within reach of the monitor.
-struct Host {
-    controller: Controller,
-    telemetry: Rc<Cell<Telemetry>>,
-    is_watched: Rc<Cell<bool>>,
-}
-
-impl ControllerHost for Host {
-    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
-        let frame = if self.is_watched.get() {
-            let mut telemetry = self.telemetry.get();
-            let answer = self.controller.tick_with_telemetry(frame, &mut telemetry);
-            self.telemetry.set(telemetry);
-            answer
-        } else {
-            self.controller.tick(frame)
-        };
-        Ok(Answer {
-            frame: Some(frame),
-            round_trip: Duration::ZERO,
-        })
-    }
-}
-
-/// Collects rows and events for the viewers.
-struct Viewers {
-    telemetry: Rc<Cell<Telemetry>>,
-    /// Whether this tick becomes a row.
-    is_watched: Rc<Cell<bool>>,
-    travel: BeltTravel,
-    events: ControllerEvents,
-    rows: Vec<u8>,
-    messages: RefCell<Vec<Value>>,
-}
-
-impl Viewers {
-    fn tell(&self, event: &RunEvent) {
-        let mut messages = self.messages.borrow_mut();
-        if messages.len() < MOST_EVENTS {
-            messages.push(json!({ "event": event_entry(event) }));
-        }
-    }
-}
-
-impl Monitor for Viewers {
-    fn wants_samples(&self) -> bool {
-        self.is_watched.get()
-    }
-
-    fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
-        let telemetry = self.telemetry.get();
-        let tick = RecordedTick {
-            sample,
-            estimates: Some(&telemetry),
-        };
-        let travel_m = self.travel.advance(&tick);
-        Row::new(&tick, travel_m).write(&mut self.rows);
-        let time_s = sample.plant.time_s;
-        for kind in self.events.take_in(sample).into_iter().flatten() {
-            self.tell(&RunEvent { time_s, kind });
-        }
-        Ok(())
-    }
-
-    fn event(&mut self, time_s: f64, event: Event) {
-        let kind = EventKind::Plant(event);
-        self.tell(&RunEvent { time_s, kind });
-    }
 }
 
 /// A run that can be steered.
@@ -156,7 +72,7 @@ struct Live {
     scenario: Scenario,
     closed_loop: ClosedLoop<Host>,
     viewers: Viewers,
-    hub: std::sync::Arc<Hub>,
+    hub: Arc<Hub>,
     paused: bool,
     started: bool,
     /// Ticks to run before the next pause.
@@ -179,19 +95,10 @@ struct Clock {
 }
 
 impl Live {
-    fn new(scenario: Scenario, hub: std::sync::Arc<Hub>) -> Result<Self, CommandError> {
-        let telemetry = Rc::<Cell<Telemetry>>::default();
-        let is_watched = Rc::<Cell<bool>>::default();
-        let viewers = Viewers {
-            telemetry,
-            is_watched,
-            travel: BeltTravel::default(),
-            events: ControllerEvents::default(),
-            rows: Vec::new(),
-            messages: RefCell::default(),
-        };
+    fn new(scenario: Scenario, hub: Arc<Hub>) -> Result<Self, CommandError> {
+        let viewers = Viewers::new(&scenario, hub.clone());
         let now = Instant::now();
-        Ok(Self {
+        let live = Self {
             closed_loop: start(&scenario, &viewers)?,
             scenario,
             viewers,
@@ -209,7 +116,9 @@ impl Live {
             status: now,
             ticks_at_status: 0,
             is_idle: true,
-        })
+        };
+        live.publish_parameters();
+        Ok(live)
     }
 
     fn tick_hz(&self) -> f64 {
@@ -228,9 +137,21 @@ impl Live {
         };
     }
 
-    /// Executes a viewer's request; reports to the viewers if it is impossible.
-    fn obey(&mut self, order: ViewerRequest) -> Result<(), CommandError> {
-        match order {
+    /// Executes a viewer's request and reports the outcome to the viewers.
+    fn execute(&mut self, order: Order) -> Result<(), CommandError> {
+        let outcome = self.obey(&order.request)?;
+        if let Err(reason) = &outcome {
+            self.hub.refuse(reason);
+        }
+        self.publish_parameters();
+        self.send_status();
+        order.reply(outcome);
+        Ok(())
+    }
+
+    /// Executes a request; the outcome is a sentence for the viewer if it is impossible.
+    fn obey(&mut self, request: &ViewerRequest) -> Result<Outcome, CommandError> {
+        match *request {
             ViewerRequest::Pause => self.paused = true,
             ViewerRequest::Resume => {
                 self.paused = false;
@@ -240,60 +161,57 @@ impl Live {
                 self.paused = true;
                 self.steps = ticks.min(100_000);
             }
-            ViewerRequest::Speed { factor } if (0.0..=1000.0).contains(&factor) => {
+            ViewerRequest::Speed { factor } => {
+                if !(0.0..=1000.0).contains(&factor) {
+                    return Ok(Err("the speed is 0 to 1000".into()));
+                }
                 self.factor = factor;
                 self.restart_clock();
             }
-            ViewerRequest::Speed { .. } => self.say("the speed is 0 to 1000"),
             ViewerRequest::Reset => self.reset()?,
-            ViewerRequest::Set { key, value } => self.set(&key, &value)?,
+            ViewerRequest::Set { ref key, ref value } => return self.set(key, value),
             ViewerRequest::Push {
                 force_n,
                 duration_s,
             } => {
                 let is_sane = force_n.iter().all(|force| force.abs() <= 1000.0)
                     && (0.0..=10.0).contains(&duration_s);
-                if is_sane {
-                    let ticks = (duration_s * self.tick_hz()).ceil() as u32;
-                    self.closed_loop.simulation_mut().push(force_n, ticks);
-                } else {
-                    self.say("a push has at most 1000 N and lasts at most 10 s");
+                if !is_sane {
+                    let text = "a push has at most 1000 N and lasts at most 10 s";
+                    return Ok(Err(text.into()));
                 }
+                let ticks = (duration_s * self.tick_hz()).ceil() as u32;
+                self.closed_loop.simulation_mut().push(force_n, ticks);
             }
         }
-        self.send_status();
-        Ok(())
+        Ok(Ok(()))
     }
 
-    fn say(&self, text: &str) {
-        self.hub.publish(&[], &[json!({ "error": text })]);
+    fn publish_parameters(&self) {
+        self.hub
+            .set_parameters(parameters(&self.scenario, self.paused, self.factor));
     }
 
     fn reset(&mut self) -> Result<(), CommandError> {
+        self.viewers = Viewers::new(&self.scenario, self.hub.clone());
         self.closed_loop = start(&self.scenario, &self.viewers)?;
-        self.viewers.travel = BeltTravel::default();
-        self.viewers.events = ControllerEvents::default();
-        self.viewers.rows.clear();
         self.ticks = 0;
         self.ticks_at_status = 0;
         self.restart_clock();
-        self.hub.publish(&[], &[json!({ "reset": true })]);
+        self.hub.restart();
         Ok(())
     }
 
     /// Sets a key. The belt changes at once; a changed controller starts anew where the arm is; any
     /// other part waits for the next reset.
-    fn set(&mut self, key: &str, value: &str) -> Result<(), CommandError> {
+    fn set(&mut self, key: &str, value: &str) -> Result<Outcome, CommandError> {
         let changed = self
             .scenario
             .clone()
             .with_overrides("live run", &[format!("{key}={value}")]);
         let changed = match changed {
             Ok(changed) => changed,
-            Err(error) => {
-                self.say(&error.to_string());
-                return Ok(());
-            }
+            Err(error) => return Ok(Err(error.to_string())),
         };
         let before = std::mem::replace(&mut self.scenario, changed);
         let scenario = &self.scenario;
@@ -315,9 +233,8 @@ impl Live {
         } else {
             "set; takes effect at the next reset"
         };
-        self.hub
-            .publish(&[], &[json!({ "note": format!("{key}: {note}") })]);
-        Ok(())
+        self.hub.note(&format!("{key}: {note}"));
+        Ok(Ok(()))
     }
 
     /// Runs the ticks that are due, for at most a slice of time.
@@ -342,10 +259,10 @@ impl Live {
         let mut done = 0;
         while done < due {
             let is_row = watched && (self.paused || self.ticks.is_multiple_of(self.stride));
-            self.viewers.is_watched.set(is_row);
+            self.viewers.watch(is_row);
             if let Err(error) = self.closed_loop.tick(&mut self.viewers) {
                 // A plant that cannot go on may be reset.
-                self.say(&error.to_string());
+                self.hub.refuse(&error.to_string());
                 self.paused = true;
                 break;
             }
@@ -364,12 +281,7 @@ impl Live {
         self.is_idle = done == due;
         let ticks_per_s = done as f64 / start.elapsed().max(SLICE).as_secs_f64();
         self.stride = ((ticks_per_s / ROWS_PER_S).ceil() as u64).max(1);
-        if watched && (!self.viewers.rows.is_empty() || !self.viewers.messages.borrow().is_empty())
-        {
-            let messages = self.viewers.messages.take();
-            self.hub.publish(&self.viewers.rows, &messages);
-        }
-        self.viewers.rows.clear();
+        self.viewers.publish();
         Ok(())
     }
 
@@ -390,6 +302,7 @@ impl Live {
             "factor": self.factor,
             "ticks_per_s": rate,
             "real_time_factor": rate / self.tick_hz(),
+            "settings": page_settings::settings(&self.scenario),
         }});
         self.hub.publish(&[], &[status]);
     }
@@ -405,13 +318,9 @@ fn in_run(scenario: &Scenario, source: painleve_shared::OutOfRange) -> CommandEr
 /// Starts plant and controller of a scenario.
 fn start(scenario: &Scenario, viewers: &Viewers) -> Result<ClosedLoop<Host>, CommandError> {
     let range = |source| in_run(scenario, source);
-    let host = Host {
-        controller: Controller::new(&scenario.controller_configuration()).map_err(range)?,
-        telemetry: viewers.telemetry.clone(),
-        is_watched: viewers.is_watched.clone(),
-    };
+    let controller = Controller::new(&scenario.controller_configuration()).map_err(range)?;
     Ok(ClosedLoop::new(
         Simulation::new(scenario).map_err(range)?,
-        host,
+        viewers.host(controller),
     ))
 }

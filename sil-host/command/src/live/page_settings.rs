@@ -1,0 +1,59 @@
+//! The settings that the page of a live run offers; every other key can be set by name.
+
+use painleve_plant::scenario::Scenario;
+use serde_json::{Value, json};
+
+/// Settings of the hybrid law: key, label, largest value.
+const HYBRID: [(&str, &str, f64); 3] = [
+    ("normal_force_n", "normal force f_n*, N", 100.0),
+    ("position_gain_per_s2", "position gain, 1/s²", 1e6),
+    ("velocity_gain_per_s", "velocity gain, 1/s", 1e4),
+];
+
+/// Returns the settings with their present values. In a template, `%` stands for the number.
+pub fn settings(scenario: &Scenario) -> Value {
+    let segments = &scenario.controller.reference.segments;
+    let target_m = segments.iter().rev().find_map(|segment| segment.target_m());
+    let mut settings = vec![
+        json!({ "key": "belt.friction", "label": "belt friction μ", "value": scenario.belt.friction, "minimum": 0, "maximum": 2, "step": 0.01 }),
+        json!({ "key": "belt.profile", "label": "belt speed, m/s", "value": scenario.belt.profile.speed_m_s(0.0), "minimum": -2, "maximum": 2, "step": 0.05, "template": "{ kind = \"constant\", speed_m_s = % }" }),
+        json!({ "key": "controller.reference", "label": "target of the tip, m", "value": target_m, "minimum": -1, "maximum": 1, "step": 0.005, "template": "[{ minimum-jerk = { target_m = %, duration_s = 1.0 } }]" }),
+    ];
+    let law = serde_json::to_value(&scenario.controller.law).unwrap_or_default();
+    for (key, label, maximum) in HYBRID {
+        let value = &law["hybrid"][key];
+        if value.is_number() {
+            settings.push(json!({ "key": format!("controller.law.hybrid.{key}"), "label": label, "value": value, "minimum": 0, "maximum": maximum, "step": "any" }));
+        }
+    }
+    settings.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_values_are_those_of_the_scenario() {
+        let overrides = [
+            "belt.friction=0.3",
+            "belt.profile.speed_m_s=-0.25",
+            "controller.reference.0.minimum-jerk.target_m=0.125",
+            "controller.law.hybrid.normal_force_n=12.5",
+            "controller.law.hybrid.position_gain_per_s2=2000",
+        ];
+        let overrides = overrides.map(str::to_owned);
+        let scenario = Scenario::load("hybrid-elbow-down", &overrides).unwrap();
+        let settings = settings(&scenario);
+        let values = settings.as_array().unwrap().iter();
+        let values: Vec<_> = values.map(|setting| setting["value"].as_f64()).collect();
+        let expected = [0.3, -0.25, 0.125, 12.5, 2000.0, 100.0].map(Some);
+        assert_eq!(values, expected);
+    }
+
+    #[test]
+    fn settings_of_another_law_are_not_offered() {
+        let scenario = Scenario::load("pid-elbow-up", &[]).unwrap();
+        assert_eq!(settings(&scenario).as_array().unwrap().len(), 3);
+    }
+}

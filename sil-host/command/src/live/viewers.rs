@@ -1,0 +1,139 @@
+//! The monitor of a live run: what the viewers see of its ticks and events.
+
+use std::cell::Cell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use painleve_firmware::telemetry::Telemetry;
+use painleve_plant::closed_loop::{LoopError, Monitor};
+use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
+use painleve_plant::sample::Sample;
+use painleve_plant::scenario::Scenario;
+use painleve_plant::{Controller, Event};
+use painleve_record::RecordedTick;
+use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
+use painleve_shared::frame::SensorFrame;
+use painleve_view::foxglove::feed::Feed;
+use painleve_view::hub::Hub;
+use painleve_view::page::{BeltTravel, event_entry};
+use painleve_view::row::Row;
+use serde_json::{Value, json};
+
+/// Most events that wait for the viewers; more are left out.
+const MOST_EVENTS: usize = 50;
+
+/// The controller in this process, with its telemetry within reach of the monitor.
+pub(super) struct Host {
+    pub(super) controller: Controller,
+    telemetry: Rc<Cell<Telemetry>>,
+    is_watched: Rc<Cell<bool>>,
+}
+
+impl ControllerHost for Host {
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
+        let frame = if self.is_watched.get() {
+            let mut telemetry = self.telemetry.get();
+            let answer = self.controller.tick_with_telemetry(frame, &mut telemetry);
+            self.telemetry.set(telemetry);
+            answer
+        } else {
+            self.controller.tick(frame)
+        };
+        Ok(Answer {
+            frame: Some(frame),
+            round_trip: Duration::ZERO,
+        })
+    }
+}
+
+/// Collects rows, messages and events for the viewers.
+pub(super) struct Viewers {
+    hub: Arc<Hub>,
+    telemetry: Rc<Cell<Telemetry>>,
+    /// Whether this tick is shown.
+    is_watched: Rc<Cell<bool>>,
+    travel: BeltTravel,
+    events: ControllerEvents,
+    rows: Vec<u8>,
+    messages: Vec<Value>,
+    feed: Feed,
+}
+
+impl Viewers {
+    /// Creates the viewers of a scenario's run.
+    pub(super) fn new(scenario: &Scenario, hub: Arc<Hub>) -> Self {
+        Self {
+            telemetry: Rc::default(),
+            is_watched: Rc::default(),
+            travel: BeltTravel::default(),
+            events: ControllerEvents::default(),
+            rows: Vec::new(),
+            messages: Vec::new(),
+            feed: Feed::new(hub.clone(), scenario),
+            hub,
+        }
+    }
+
+    /// Creates the host of a controller that these viewers watch.
+    pub(super) fn host(&self, controller: Controller) -> Host {
+        Host {
+            controller,
+            telemetry: self.telemetry.clone(),
+            is_watched: self.is_watched.clone(),
+        }
+    }
+
+    /// Sets whether the next tick is shown.
+    pub(super) fn watch(&self, is_watched: bool) {
+        self.is_watched.set(is_watched);
+    }
+
+    /// Passes everything on to the viewers.
+    pub(super) fn publish(&mut self) {
+        if !self.rows.is_empty() || !self.messages.is_empty() {
+            self.hub.publish(&self.rows, &self.messages);
+        }
+        self.rows.clear();
+        self.messages.clear();
+        self.feed.send();
+    }
+
+    fn show(&mut self, event: &RunEvent) {
+        if self.messages.len() < MOST_EVENTS {
+            self.messages.push(json!({ "event": event_entry(event) }));
+            self.feed.event(event);
+        }
+    }
+}
+
+impl Monitor for Viewers {
+    fn wants_samples(&self) -> bool {
+        self.is_watched.get()
+    }
+
+    fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
+        let telemetry = self.telemetry.get();
+        let tick = RecordedTick {
+            sample,
+            estimates: Some(&telemetry),
+        };
+        let travel_m = self.travel.advance(&tick);
+        if self.hub.has_pages() {
+            Row::new(&tick, travel_m).write(&mut self.rows);
+        }
+        if self.hub.has_clients() {
+            self.feed.tick(&tick);
+        }
+        let time_s = sample.plant.time_s;
+        for kind in self.events.take_in(sample).into_iter().flatten() {
+            self.show(&RunEvent { time_s, kind });
+        }
+        Ok(())
+    }
+
+    fn event(&mut self, time_s: f64, event: Event) {
+        let kind = EventKind::Plant(event);
+        self.show(&RunEvent { time_s, kind });
+    }
+}

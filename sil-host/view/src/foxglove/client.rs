@@ -1,0 +1,311 @@
+//! The conversation with one Foxglove client.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::net::TcpStream;
+use std::sync::{Arc, Mutex};
+
+use painleve_record::messages::{CHANNELS, channels};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tungstenite::{Error, Message, WebSocket};
+
+use super::parameters::Parameter;
+use super::services;
+use crate::hub::{ClientQueue, Entry, Hub, Severity, locked};
+use crate::request::Orders;
+use crate::server::receive;
+
+/// First bytes of binary messages.
+const MESSAGE_DATA: u8 = 1;
+const TIME: u8 = 2;
+const SERVICE_CALL_RESPONSE: u8 = 3;
+const SERVICE_CALL_REQUEST: u8 = 2;
+
+/// A client's message in JSON.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+enum Request {
+    Subscribe {
+        subscriptions: Vec<Subscription>,
+    },
+    Unsubscribe {
+        subscription_ids: Vec<u32>,
+    },
+    GetParameters {
+        parameter_names: Vec<String>,
+        id: Option<String>,
+    },
+    SetParameters {
+        parameters: Vec<Parameter>,
+        id: Option<String>,
+    },
+    SubscribeParameterUpdates {
+        parameter_names: Vec<String>,
+    },
+    UnsubscribeParameterUpdates {
+        parameter_names: Vec<String>,
+    },
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Subscription {
+    id: u32,
+    channel_id: usize,
+}
+
+/// Talks to a client until it leaves; one client too many is turned away.
+pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, orders: &Orders) {
+    let Some(queue) = hub.clients.join() else {
+        return;
+    };
+    let mut client = Client {
+        socket,
+        hub,
+        orders,
+        queue: &queue,
+        subscriptions: BTreeMap::new(),
+        watched: BTreeSet::new(),
+    };
+    // Every error means that the client has left.
+    if client.greet().is_ok() {
+        while client.exchange().is_ok() {}
+    }
+    hub.leave(&queue);
+}
+
+struct Client<'a> {
+    socket: WebSocket<TcpStream>,
+    hub: &'a Hub,
+    orders: &'a Orders,
+    queue: &'a Arc<Mutex<ClientQueue>>,
+    /// Channels by the number of the subscription.
+    subscriptions: BTreeMap<u32, usize>,
+    /// Parameters whose changes it wants to know.
+    watched: BTreeSet<String>,
+}
+
+impl Client<'_> {
+    fn greet(&mut self) -> Result<(), Error> {
+        self.introduce()?;
+        let channels = channels().into_iter().enumerate().map(|(id, channel)| {
+            json!({
+                "id": id,
+                "topic": channel.topic,
+                "encoding": "json",
+                "schemaName": channel.schema_name,
+                "schemaEncoding": "jsonschema",
+                "schema": channel.schema,
+            })
+        });
+        let channels: Vec<Value> = channels.collect();
+        self.write(&json!({ "op": "advertise", "channels": channels }))?;
+        self.write(&services::advertisement())?;
+        self.socket.flush()
+    }
+
+    /// Introduces the server; a new session makes the client forget what it has received.
+    fn introduce(&mut self) -> Result<(), Error> {
+        self.write(&json!({
+            "op": "serverInfo",
+            "name": "painleve",
+            "capabilities": ["parameters", "parametersSubscribe", "services", "time"],
+            "supportedEncodings": ["json"],
+            "metadata": {},
+            "sessionId": self.hub.session(),
+        }))
+    }
+
+    /// Takes a request and sends what waits.
+    fn exchange(&mut self) -> Result<(), Error> {
+        match receive(&mut self.socket)? {
+            Some(Message::Text(text)) => match serde_json::from_str(&text) {
+                Ok(request) => self.obey(request)?,
+                Err(error) => self.write(&status(Severity::Error, &error.to_string()))?,
+            },
+            Some(Message::Binary(bytes)) => self.call(&bytes)?,
+            _ => {}
+        }
+        let entries = locked(self.queue).take();
+        for entry in entries {
+            self.pass_on(entry)?;
+        }
+        self.socket.flush()
+    }
+
+    fn obey(&mut self, request: Request) -> Result<(), Error> {
+        match request {
+            Request::Subscribe { subscriptions } => {
+                for Subscription { id, channel_id } in subscriptions {
+                    if channel_id < CHANNELS {
+                        self.subscriptions.insert(id, channel_id);
+                    } else {
+                        let text = format!("there is no channel {channel_id}");
+                        self.write(&status(Severity::Error, &text))?;
+                    }
+                }
+                self.update_subscriptions();
+            }
+            Request::Unsubscribe { subscription_ids } => {
+                for id in subscription_ids {
+                    self.subscriptions.remove(&id);
+                }
+                self.update_subscriptions();
+            }
+            Request::GetParameters {
+                parameter_names,
+                id,
+            } => self.send_parameters(&parameter_names, id)?,
+            Request::SetParameters { parameters, id } => {
+                let names: Vec<String> = parameters.iter().map(|one| one.name.clone()).collect();
+                for parameter in parameters {
+                    // The run itself tells every client about a request that it refuses.
+                    match parameter.request() {
+                        Ok(request) => drop(self.orders.request(request)),
+                        Err(error) => self.write(&status(Severity::Error, &error))?,
+                    }
+                }
+                if id.is_some() {
+                    self.send_parameters(&names, id)?;
+                }
+            }
+            Request::SubscribeParameterUpdates { parameter_names } => {
+                if parameter_names.is_empty() {
+                    let all = self.hub.parameters().into_iter();
+                    self.watched.extend(all.map(|parameter| parameter.name));
+                }
+                self.watched.extend(parameter_names);
+            }
+            Request::UnsubscribeParameterUpdates { parameter_names } => {
+                if parameter_names.is_empty() {
+                    self.watched.clear();
+                }
+                for name in parameter_names {
+                    self.watched.remove(&name);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn update_subscriptions(&self) {
+        let channels = self.subscriptions.values().copied();
+        self.hub.subscribe(self.queue, channels);
+    }
+
+    /// Sends the parameters with these names; all if there are none.
+    fn send_parameters(&mut self, names: &[String], id: Option<String>) -> Result<(), Error> {
+        let mut parameters = self.hub.parameters();
+        parameters.retain(|one| names.is_empty() || names.contains(&one.name));
+        let mut message = json!({ "op": "parameterValues", "parameters": parameters });
+        if let Some(id) = id {
+            message["id"] = id.into();
+        }
+        self.write(&message)
+    }
+
+    /// Answers a call of a service.
+    fn call(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        let Some(call) = ServiceCall::read(bytes) else {
+            return self.write(&status(Severity::Error, "a message cannot be read"));
+        };
+        let outcome = if call.encoding == b"json" {
+            services::request(call.service, call.payload)
+                .and_then(|request| self.orders.request(request))
+        } else {
+            Err("requests to services must be JSON".to_owned())
+        };
+        match outcome {
+            Ok(()) => self.socket.write(Message::binary(call.response(b"{}"))),
+            Err(message) => self.write(&json!({
+                "op": "serviceCallFailure",
+                "serviceId": call.service,
+                "callId": call.call,
+                "message": message,
+            })),
+        }
+    }
+
+    fn pass_on(&mut self, entry: Entry) -> Result<(), Error> {
+        match entry {
+            Entry::Time(time_ns) => {
+                let mut bytes = vec![TIME];
+                bytes.extend(time_ns.to_le_bytes());
+                self.socket.write(Message::binary(bytes))
+            }
+            Entry::Message(message) => {
+                for (id, channel) in &self.subscriptions {
+                    if *channel == message.channel {
+                        let mut bytes = Vec::with_capacity(13 + message.json.len());
+                        bytes.push(MESSAGE_DATA);
+                        bytes.extend(id.to_le_bytes());
+                        bytes.extend(message.time_ns.to_le_bytes());
+                        bytes.extend(&message.json);
+                        self.socket.write(Message::binary(bytes))?;
+                    }
+                }
+                Ok(())
+            }
+            Entry::Parameters(changed) => {
+                let known = |one: &&Parameter| self.watched.contains(&one.name);
+                let parameters: Vec<&Parameter> = changed.iter().filter(known).collect();
+                if parameters.is_empty() {
+                    return Ok(());
+                }
+                self.write(&json!({ "op": "parameterValues", "parameters": parameters }))
+            }
+            Entry::Status(severity, text) => self.write(&status(severity, &text)),
+            Entry::Restarted => self.introduce(),
+        }
+    }
+
+    fn write(&mut self, message: &Value) -> Result<(), Error> {
+        self.socket.write(Message::text(message.to_string()))
+    }
+}
+
+fn status(severity: Severity, text: &str) -> Value {
+    let level = match severity {
+        Severity::Information => 0,
+        Severity::Error => 2,
+    };
+    json!({ "op": "status", "level": level, "message": text })
+}
+
+/// A call of a service.
+struct ServiceCall<'a> {
+    service: u32,
+    call: u32,
+    encoding: &'a [u8],
+    payload: &'a [u8],
+}
+
+impl<'a> ServiceCall<'a> {
+    fn read(bytes: &'a [u8]) -> Option<Self> {
+        let (&SERVICE_CALL_REQUEST, bytes) = bytes.split_first()? else {
+            return None;
+        };
+        let (&service, bytes) = bytes.split_first_chunk()?;
+        let (&call, bytes) = bytes.split_first_chunk()?;
+        let (&length, bytes) = bytes.split_first_chunk()?;
+        let length = usize::try_from(u32::from_le_bytes(length)).ok()?;
+        let (encoding, payload) = bytes.split_at_checked(length)?;
+        Some(Self {
+            service: u32::from_le_bytes(service),
+            call: u32::from_le_bytes(call),
+            encoding,
+            payload,
+        })
+    }
+
+    fn response(&self, payload: &[u8]) -> Vec<u8> {
+        let mut bytes = vec![SERVICE_CALL_RESPONSE];
+        bytes.extend(self.service.to_le_bytes());
+        bytes.extend(self.call.to_le_bytes());
+        // The encoding is `json`, so its length is 4.
+        bytes.extend(4_u32.to_le_bytes());
+        bytes.extend(b"json");
+        bytes.extend(payload);
+        bytes
+    }
+}
