@@ -7,6 +7,7 @@ mod ci;
 mod command;
 mod examples;
 mod flash;
+mod fmu;
 mod fuzz;
 mod python;
 mod setup;
@@ -42,6 +43,8 @@ enum Chore {
     Examples,
     /// Build the Python package, install its wheel in a virtual environment, and test it.
     Python,
+    /// Build the plant as an FMU (FMI 3.0) and check it with FMPy.
+    Fmu,
     /// Disturb plant and controller at every system call and count the flaws.
     Chaos(chaos::ChaosArguments),
     /// Send malformed and random input to parsers, controller and state machines.
@@ -61,6 +64,7 @@ fn main() -> ExitCode {
         Chore::Flash(arguments) => flash::run(&arguments),
         Chore::Examples => examples::run(),
         Chore::Python => python::run_chore(),
+        Chore::Fmu => fmu::run_chore(),
         Chore::Fuzz(arguments) => fuzz::run(&arguments),
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),
