@@ -13,17 +13,24 @@ use super::belt::{BeltProfile, BeltSettings};
 use super::cash_karp::ShortStep;
 use super::dop853::{Dop853Step, Tolerance};
 use super::impact::ImpactLaw;
-use super::motion::{Evaluation, Motion, theta};
+use super::motion::{Evaluation, Motion, StateTerms, theta};
 use super::motion_error::MotionError;
 use super::parameters::{InitialState, PlantParameters, SolverSettings};
 use super::probe::{ArmProbe, ArmStep};
 use super::step_budget::StepBudget;
-use super::torque::TorqueSegment;
+use super::torque::{LagResponse, TorqueSegment};
 use super::transition;
 
 /// Longest step to try at order 5, s: at the default tolerance, the error estimate of a sliding arm
 /// reaches 1 at 2 ms.
 const LONGEST_SHORT_STEP_S: f64 = 4e-3;
+
+/// Longest step to try at order 5, in time constants of the torque stages. Over a longer step the
+/// error estimate does not see how the arm's response to the torque changes with its posture.
+const LONGEST_SHORT_STEP_LAGS: f64 = 4.0;
+
+/// Largest error estimate of such a step, relative to the tolerance: for the same reason.
+const LARGEST_ERROR_WITH_LAG: f64 = 0.1;
 
 /// Largest correction of an event's time for which the first-order change of the state is exact to
 /// rounding, s.
@@ -55,6 +62,8 @@ pub struct ArmOnBelt {
     /// The equations evaluated at the present state, if known; cleared by any change of the state
     /// or of the equations.
     evaluation: Option<Evaluation>,
+    /// The terms of that evaluation.
+    terms: StateTerms,
     step: Box<Dop853Step<4>>,
 }
 
@@ -71,6 +80,7 @@ impl ArmOnBelt {
             .validate()
             .map_err(|error| error.inside("initial"))?;
 
+        let terms = StateTerms::new(&arm, &initial);
         let mut plant = Self {
             arm,
             friction: parameters.friction,
@@ -87,6 +97,7 @@ impl ArmOnBelt {
             budget: StepBudget::default(),
             short_size_s: LONGEST_SHORT_STEP_S,
             evaluation: None,
+            terms,
             step: Box::new(Dop853Step::empty()),
         };
         let motion = plant.motion();
@@ -167,8 +178,11 @@ impl ArmOnBelt {
         if next.at(self.time_s) != self.torque.at(self.time_s) {
             self.unsettled = true;
         }
-        self.evaluation = None;
         self.torque = next;
+        if self.evaluation.is_some() {
+            let motion = self.motion();
+            self.evaluation = Some(motion.with_terms(self.mode, self.time_s, &self.terms));
+        }
     }
 
     /// Decides the contact mode at the present time, so that the forces reflect the last command.
@@ -176,16 +190,28 @@ impl ArmOnBelt {
     /// # Errors
     /// [`MotionError`] if no mode is possible.
     pub fn settle(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
-        if self.unsettled && self.mode.is_contact() {
-            let evaluation = self.evaluation();
-            if transition::slides_on(self.mode, &evaluation) {
-                self.evaluation = Some(evaluation);
-            } else {
-                self.enter_contact(probe)?;
-            }
+        if self.unsettled
+            && self.mode.is_contact()
+            && !transition::slides_on(self.mode, self.evaluate())
+        {
+            self.enter_contact(probe)?;
         }
         self.unsettled = false;
         Ok(())
+    }
+
+    /// Evaluates the equations at the present state, unless they are known.
+    fn evaluate(&mut self) -> &Evaluation {
+        let motion = Motion {
+            arm: &self.arm,
+            belt: &self.belt,
+            friction: self.friction,
+            torque: self.torque,
+        };
+        self.evaluation.get_or_insert_with(|| {
+            self.terms = StateTerms::new(motion.arm, &self.state);
+            motion.with_terms(self.mode, self.time_s, &self.terms)
+        })
     }
 
     fn evaluation(&self) -> Evaluation {
@@ -243,6 +269,7 @@ impl ArmOnBelt {
         until_s: f64,
         probe: &mut impl ArmProbe,
     ) -> Result<Option<f64>, MotionError> {
+        let here = *self.evaluate();
         let motion = Motion {
             arm: &self.arm,
             belt: &self.belt,
@@ -254,15 +281,11 @@ impl ArmOnBelt {
             absolute: self.solver.absolute_tolerance,
         };
         let (mode, start_s, start) = (self.mode, self.time_s, self.state);
-        let here = self
-            .evaluation
-            .take()
-            .unwrap_or_else(|| motion.evaluate(mode, start_s, &start));
         let remaining = until_s - start_s;
         if remaining <= self.short_size_s {
             let (step, longest) = self.short_step(&motion, &here, until_s, &tolerance);
             self.short_size_s = longest;
-            if let Some((end, there)) = step {
+            if let Some((end, terms, there)) = step {
                 probe.step(&ArmStep {
                     motion: &motion,
                     mode,
@@ -275,6 +298,7 @@ impl ArmOnBelt {
                 });
                 self.time_s = until_s;
                 self.state = end;
+                self.terms = terms;
                 self.evaluation = Some(there);
                 return Ok(None);
             }
@@ -309,7 +333,8 @@ impl ArmOnBelt {
                 });
             }
         }
-        let there = motion.evaluate(mode, start_s + self.step.h, &self.step.end);
+        let mut terms = StateTerms::new(motion.arm, &self.step.end);
+        let there = motion.with_terms(mode, start_s + self.step.h, &terms);
         self.step.finish(&there.slope);
 
         let mut event = transition::first_event_s(&motion, mode, &mut self.step, &here, &there);
@@ -345,7 +370,8 @@ impl ArmOnBelt {
         let there = if event.is_none() && mode == ContactMode::Flight {
             there
         } else {
-            motion.evaluate(mode, end_s, &end)
+            terms = StateTerms::new(motion.arm, &end);
+            motion.with_terms(mode, end_s, &terms)
         };
         probe.step(&ArmStep {
             motion: &motion,
@@ -360,35 +386,60 @@ impl ArmOnBelt {
         self.time_s = end_s;
         self.state = end;
         if event.is_some() {
+            self.evaluation = None;
             self.handle_event(probe)?;
         } else {
+            self.terms = terms;
             self.evaluation = Some(there);
         }
         Ok(event)
     }
 
-    /// Tries to reach `until_s` in one step of order 5. Returns the state and the equations there
+    /// Tries to reach `until_s` in one step of order 5. Returns the state with its terms and the equations there
     /// if the error is within the tolerance and no event is near, and the size up to which order 5
     /// is worth another attempt.
+    #[inline]
     fn short_step(
         &self,
         motion: &Motion<'_>,
         here: &Evaluation,
         until_s: f64,
         tolerance: &Tolerance,
-    ) -> (Option<(State, Evaluation)>, f64) {
+    ) -> (Option<(State, StateTerms, Evaluation)>, f64) {
         let (mode, start_s) = (self.mode, self.time_s);
         let size = until_s - start_s;
-        let derivative = |t: f64, x: &State| motion.derivative(mode, t, x);
-        let step = ShortStep::take(
-            derivative,
-            start_s,
-            &self.state,
-            &here.slope,
-            size,
-            tolerance,
-        );
-        if step.error.is_nan() || step.error > 1.0 {
+        let (terms, torque) = (&self.terms, &self.torque);
+        let known = &terms.known;
+        let start = &self.state;
+        let remaining = torque.remaining(start_s);
+        let lags = remaining >= f64::EPSILON;
+        if lags && size > LONGEST_SHORT_STEP_LAGS * torque.lag_s() {
+            return (None, self.short_size_s);
+        }
+        let step = if !lags {
+            let torque_nm = torque.with_remaining(0.0);
+            let derivative = |_, t, x: &State| motion.derivative_near(known, mode, t, torque_nm, x);
+            ShortStep::take(derivative, start_s, start, &here.slope, size, tolerance)
+        } else {
+            let settled = motion.under_torque(mode, start_s, torque.with_remaining(0.0), terms);
+            let decaying = (here.slope - settled.slope) / remaining;
+            let response = LagResponse::new(torque, &decaying);
+            let (at_nodes, at_end) = torque.remaining_in_step(remaining, size);
+            let derivative = |stage: usize, t: f64, x: &State| {
+                let remaining = at_nodes[stage];
+                let torque_nm = torque.with_remaining(remaining);
+                let state = x + response.state(remaining);
+                motion.derivative_near(known, mode, t, torque_nm, &state)
+                    - response.slope(remaining)
+            };
+            let smooth = start - response.state(remaining);
+            let slope = here.slope - response.slope(remaining);
+            let mut step = ShortStep::take(derivative, start_s, &smooth, &slope, size, tolerance);
+            step.end += response.state(at_end);
+            step
+        };
+        let limit = if lags { LARGEST_ERROR_WITH_LAG } else { 1.0 };
+        if step.error.is_nan() || step.error > limit {
             return (None, 0.5 * size);
         }
         // The estimate is of order 5 in the size.
@@ -398,10 +449,15 @@ impl ArmOnBelt {
         } else {
             self.short_size_s
         };
-        let end = self.onto_constraint(motion, until_s, &step.end);
-        let there = motion.evaluate(mode, until_s, &end);
+        let end = if mode.slip().is_some() {
+            motion.onto_belt_from(&known.turned_to(&theta(&step.end)), &step.end)
+        } else {
+            self.onto_constraint(motion, until_s, &step.end)
+        };
+        let terms = StateTerms::new(motion.arm, &end);
+        let there = motion.with_terms(mode, until_s, &terms);
         let goes_on = transition::goes_on(motion, mode, size, here, &there);
-        (goes_on.then_some((end, there)), longest)
+        (goes_on.then_some((end, terms, there)), longest)
     }
 
     /// Returns the nearest state that satisfies the mode's constraint, from which integration

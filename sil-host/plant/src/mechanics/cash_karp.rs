@@ -12,6 +12,9 @@ use nalgebra::SVector;
 
 use super::dop853::Tolerance;
 
+/// Times of the five stages after the start, as fractions of the step.
+pub const NODES: [f64; 5] = [1.0 / 5.0, 3.0 / 10.0, 3.0 / 5.0, 1.0, 7.0 / 8.0];
+
 /// Result of a short step.
 #[derive(Clone, Copy, Debug)]
 pub struct ShortStep<const N: usize> {
@@ -23,7 +26,8 @@ pub struct ShortStep<const N: usize> {
 }
 
 impl<const N: usize> ShortStep<N> {
-    /// Integrates from (`t`, `x`) over `h`; `slope` is the derivative at (`t`, `x`).
+    /// Integrates from (`t`, `x`) over `h`; `slope` is the derivative at (`t`, `x`). `derivative`
+    /// also receives the number of the stage, from 0, whose time is `t` + [`NODES`] `h`.
     #[inline]
     pub fn take<F>(
         derivative: F,
@@ -34,26 +38,24 @@ impl<const N: usize> ShortStep<N> {
         tolerance: &Tolerance,
     ) -> Self
     where
-        F: Fn(f64, &SVector<f64, N>) -> SVector<f64, N>,
+        F: Fn(usize, f64, &SVector<f64, N>) -> SVector<f64, N>,
     {
+        let at = |stage: usize, x: &SVector<f64, N>| derivative(stage, t + h * NODES[stage], x);
         let k1 = *slope;
-        let k2 = derivative(t + h / 5.0, &(x + k1 * (h / 5.0)));
-        let k3 = derivative(
-            t + h * (3.0 / 10.0),
-            &(x + (k1 * (3.0 / 40.0) + k2 * (9.0 / 40.0)) * h),
-        );
-        let k4 = derivative(
-            t + h * (3.0 / 5.0),
+        let k2 = at(0, &(x + k1 * (h / 5.0)));
+        let k3 = at(1, &(x + (k1 * (3.0 / 40.0) + k2 * (9.0 / 40.0)) * h));
+        let k4 = at(
+            2,
             &(x + (k1 * (3.0 / 10.0) - k2 * (9.0 / 10.0) + k3 * (6.0 / 5.0)) * h),
         );
-        let k5 = derivative(
-            t + h,
+        let k5 = at(
+            3,
             &(x + (k1 * (-11.0 / 54.0) + k2 * (5.0 / 2.0) - k3 * (70.0 / 27.0)
                 + k4 * (35.0 / 27.0))
                 * h),
         );
-        let k6 = derivative(
-            t + h * (7.0 / 8.0),
+        let k6 = at(
+            4,
             &(x + (k1 * (1631.0 / 55296.0)
                 + k2 * (175.0 / 512.0)
                 + k3 * (575.0 / 13824.0)
@@ -102,7 +104,14 @@ mod tests {
 
     fn step(h: f64) -> ShortStep<2> {
         let x = Vector2::new(0.36_f64.cos(), 0.36_f64.sin());
-        ShortStep::take(slope, 0.6, &x, &slope(0.6, &x), h, &TOLERANCE)
+        ShortStep::take(
+            |_, t, x| slope(t, x),
+            0.6,
+            &x,
+            &slope(0.6, &x),
+            h,
+            &TOLERANCE,
+        )
     }
 
     fn error(h: f64) -> f64 {
@@ -126,7 +135,7 @@ mod tests {
     #[test]
     fn a_nan_step_is_rejected() {
         let x = Vector2::new(f64::NAN, 0.0);
-        let error = ShortStep::take(slope, 0.0, &x, &x, 0.1, &TOLERANCE).error;
+        let error = ShortStep::take(|_, t, x| slope(t, x), 0.0, &x, &x, 0.1, &TOLERANCE).error;
         assert!(error.is_nan());
     }
 }

@@ -31,6 +31,7 @@ mod step_budget;
 mod tests;
 pub mod torque;
 pub mod transition;
+pub mod turned_pose;
 
 pub use arm_on_belt::ArmOnBelt;
 pub use built_in::BuiltInPlant;

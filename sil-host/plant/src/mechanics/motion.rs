@@ -1,12 +1,13 @@
 //! Equations of motion and contact force in each contact mode.
 
-use nalgebra::Vector2;
-use painleve_shared::{Arm, ContactTerms, LinkMotion, Pose, Slip};
+use nalgebra::{Matrix2, Vector2};
+use painleve_shared::{Arm, ContactTerms, GeneralisedTorque, JointTorque, LinkMotion, Pose, Slip};
 
 use crate::plant::{ContactMode, Snapshot, State};
 
 use super::belt::BeltProfile;
 use super::torque::TorqueSegment;
+use super::turned_pose::KnownPose;
 
 /// Returns the link angles of a state, rad.
 #[inline]
@@ -22,6 +23,42 @@ pub fn theta_dot(state: &State) -> LinkMotion<f64> {
 
 /// Changes of the angles whose squares are below rounding, rad.
 const FIRST_ORDER_RAD: f64 = 1e-9;
+
+/// Terms of the equations at one state, which hold for any torque.
+#[derive(Clone, Copy, Debug)]
+pub struct StateTerms {
+    /// Link angles with their sines and cosines.
+    pub known: KnownPose,
+    /// Link rates, rad/s.
+    rates: LinkMotion<f64>,
+    /// M⁻¹, 1/(kg·m²).
+    mobility: Matrix2<f64>,
+    /// J̇ θ̇, m/s².
+    centripetal_m_s2: Vector2<f64>,
+    /// Passive and centrifugal torques w + c, N·m.
+    resistance_nm: GeneralisedTorque<f64>,
+}
+
+impl StateTerms {
+    /// Evaluates the terms of a state.
+    #[inline(always)]
+    pub fn new(arm: &Arm<f64>, state: &State) -> Self {
+        Self::of(arm, KnownPose::new(&theta(state)), theta_dot(state))
+    }
+
+    #[inline(always)]
+    fn of(arm: &Arm<f64>, known: KnownPose, rates: LinkMotion<f64>) -> Self {
+        let KnownPose { angles, pose } = &known;
+        Self {
+            known,
+            rates,
+            mobility: arm.inverse_mass_matrix(pose),
+            centripetal_m_s2: arm.centripetal_m_s2(pose, &rates),
+            resistance_nm: arm.passive_torque_nm(angles, &rates, pose)
+                + arm.centrifugal_torque_nm(&rates, pose),
+        }
+    }
+}
 
 /// The equations of a mode evaluated at one state.
 #[derive(Clone, Copy, Debug)]
@@ -124,25 +161,80 @@ impl Motion<'_> {
         self.evaluate(mode, t_s, state).slope
     }
 
+    /// Returns the time derivative of the state in a mode at given joint torques, at a state near a
+    /// known pose; for short steps.
+    ///
+    /// A sliding tip moves along the belt, j2 θ̈ = −j̇2 θ̇, and the contact force has no component
+    /// across its direction v = Jᵀ (−μ s, 1): with v⊥ · v = 0, v⊥ᵀ M θ̈ = v⊥ · load. These two
+    /// equations give θ̈ without M⁻¹ and without the force.
+    #[inline(always)]
+    pub fn derivative_near(
+        &self,
+        known: &KnownPose,
+        mode: ContactMode,
+        t_s: f64,
+        torque_nm: JointTorque<f64>,
+        state: &State,
+    ) -> State {
+        let (angles, rates) = (theta(state), theta_dot(state));
+        let pose = known.turned_to(&angles);
+        let Some(slip) = mode.slip() else {
+            let terms = StateTerms::of(self.arm, KnownPose { angles, pose }, rates);
+            return self.under_torque(mode, t_s, torque_nm, &terms).slope;
+        };
+        let jacobian = self.arm.jacobian(&pose);
+        let along = Vector2::new(jacobian.m11, jacobian.m12);
+        let normal = Vector2::new(jacobian.m21, jacobian.m22);
+        let push = normal - along * (self.friction * slip.sign::<f64>());
+        let across = Vector2::new(-push.y, push.x);
+        let inertia = self.arm.mass_matrix(&pose) * across;
+        let load = torque_nm.to_links()
+            - self.arm.passive_torque_nm(&angles, &rates, &pose)
+            - self.arm.centrifugal_torque_nm(&rates, &pose);
+        let moment = across.dot(load.vector());
+        let centripetal = self.arm.centripetal_m_s2(&pose, &rates).y;
+        let scale = 1.0 / (normal.x * inertia.y - normal.y * inertia.x);
+        State::new(
+            rates.first(),
+            rates.second(),
+            -(centripetal * inertia.y + normal.y * moment) * scale,
+            (centripetal * inertia.x + normal.x * moment) * scale,
+        )
+    }
+
     /// Evaluates the equations of a mode at a state.
+    #[inline(always)]
+    pub fn evaluate(&self, mode: ContactMode, t_s: f64, state: &State) -> Evaluation {
+        self.with_terms(mode, t_s, &StateTerms::new(self.arm, state))
+    }
+
+    /// Evaluates the equations of a mode at a state whose terms are known.
+    #[inline(always)]
+    pub fn with_terms(&self, mode: ContactMode, t_s: f64, terms: &StateTerms) -> Evaluation {
+        self.under_torque(mode, t_s, self.torque.at(t_s), terms)
+    }
+
+    /// Evaluates the equations of a mode at a state whose terms are known, at given joint torques.
     ///
     /// A sliding tip needs no Q: with the edge of the friction cone d = (−μ s, 1), f = f_n d,
     /// p = j2 M⁻¹ Jᵀ d and θ̈ = M⁻¹ load + M⁻¹ Jᵀ d f_n, where f_n = −b/p.
     #[inline(always)]
-    pub fn evaluate(&self, mode: ContactMode, t_s: f64, state: &State) -> Evaluation {
-        let (angles, rates) = (theta(state), theta_dot(state));
-        let pose = Pose::new(&angles);
-        let mobility = self.arm.inverse_mass_matrix(&pose);
-        let jacobian = self.arm.jacobian(&pose);
+    pub fn under_torque(
+        &self,
+        mode: ContactMode,
+        t_s: f64,
+        torque_nm: JointTorque<f64>,
+        terms: &StateTerms,
+    ) -> Evaluation {
+        let (pose, mobility) = (&terms.known.pose, terms.mobility);
+        let jacobian = self.arm.jacobian(pose);
         let along = Vector2::new(jacobian.m11, jacobian.m12);
         let normal = Vector2::new(jacobian.m21, jacobian.m22);
-        let centripetal = self.arm.centripetal_m_s2(&pose, &rates);
-        let load = self.torque.at(t_s).to_links()
-            - self.arm.passive_torque_nm(&angles, &rates, &pose)
-            - self.arm.centrifugal_torque_nm(&rates, &pose);
+        let centripetal = terms.centripetal_m_s2;
+        let load = torque_nm.to_links() - terms.resistance_nm;
 
         let free = mobility * load.vector();
-        let rates = rates.vector();
+        let rates = terms.rates.vector();
         let slip_m_s = along.dot(rates) - self.belt.speed_m_s(t_s);
         let direction = mode.slip().unwrap_or_else(|| Slip::of(slip_m_s));
         let friction = self.friction * direction.sign::<f64>();
@@ -159,20 +251,20 @@ impl Motion<'_> {
                 )
             }
             ContactMode::Stick => {
-                let terms = ContactTerms {
+                let contact = ContactTerms {
                     q: jacobian * mobility * jacobian.transpose(),
                     free_acceleration_m_s2: jacobian * free + centripetal,
                 };
-                let force = self.force_n(t_s, mode, &terms);
+                let force = self.force_n(t_s, mode, &contact);
                 (force, free + mobility * (jacobian.transpose() * force))
             }
         };
         Evaluation {
             slope: State::new(rates.x, rates.y, acceleration.x, acceleration.y),
             force_n,
-            tip_t_m: self.arm.tip_m(&pose).x,
+            tip_t_m: self.arm.tip_m(pose).x,
             gap: [
-                self.arm.gap_m(&pose),
+                self.arm.gap_m(pose),
                 normal.dot(rates),
                 normal.dot(&acceleration) + centripetal.y,
             ],
@@ -213,11 +305,17 @@ impl Motion<'_> {
     /// Returns the nearest state, in the metric of kinetic energy, with the tip on the belt and no
     /// normal velocity. Removes integration errors.
     pub fn onto_belt(&self, state: &State) -> State {
+        self.onto_belt_from(&Pose::new(&theta(state)), state)
+    }
+
+    /// Returns [`Motion::onto_belt`] of a state whose pose is known.
+    #[inline]
+    pub fn onto_belt_from(&self, pose: &Pose<f64>, state: &State) -> State {
         let (mut angles, rates) = (theta(state), *theta_dot(state).vector());
-        let [mut along, mut normal, mut direction, mut change] = self.towards_belt(&angles);
+        let [mut along, mut normal, mut direction, mut change] = self.towards_belt(pose);
         if change.amax() > FIRST_ORDER_RAD {
             angles = theta(&self.lowered_onto_belt(state));
-            [along, normal, direction, change] = self.towards_belt(&angles);
+            [along, normal, direction, change] = self.towards_belt(&Pose::new(&angles));
         }
         angles += LinkMotion::from_vector(change);
         // ∂²z_n/∂θ² is the row along the belt.
@@ -229,13 +327,12 @@ impl Motion<'_> {
     /// Returns the Jacobian's rows along and normal to the belt, the direction M⁻¹ j2, and the
     /// change of the angles along it that moves the tip onto the belt, to first order.
     #[inline]
-    fn towards_belt(&self, angles: &LinkMotion<f64>) -> [Vector2<f64>; 4] {
-        let pose = Pose::new(angles);
-        let jacobian = self.arm.jacobian(&pose);
+    fn towards_belt(&self, pose: &Pose<f64>) -> [Vector2<f64>; 4] {
+        let jacobian = self.arm.jacobian(pose);
         let along = Vector2::new(jacobian.m11, jacobian.m12);
         let normal = Vector2::new(jacobian.m21, jacobian.m22);
-        let direction = self.arm.inverse_mass_matrix(&pose) * normal;
-        let change = direction * (-self.arm.gap_m(&pose) / normal.dot(&direction));
+        let direction = self.arm.inverse_mass_matrix(pose) * normal;
+        let change = direction * (-self.arm.gap_m(pose) / normal.dot(&direction));
         [along, normal, direction, change]
     }
 

@@ -107,7 +107,7 @@ fn a_conservative_bouncing_arm_conserves_energy() {
 /// it.
 #[test]
 fn short_steps_meet_the_tolerance() {
-    let end = |relative_tolerance: f64| {
+    let end = |relative_tolerance: f64, lag_s: f64| {
         let solver = SolverSettings {
             relative_tolerance,
             absolute_tolerance: 0.1 * relative_tolerance,
@@ -120,14 +120,17 @@ fn short_steps_meet_the_tolerance() {
         let mut plant = plant(&parameters, x0_d());
         for tick in 1..=2000 {
             let torque = JointTorque::new(0.05 * f64::from(tick % 7), 0.02 * f64::from(tick % 5));
-            plant.command_torque(torque, 0.0);
+            plant.command_torque(torque, lag_s);
             plant.advance(f64::from(tick) * 1e-3, &mut ()).unwrap();
         }
         assert_eq!(plant.mode(), ContactMode::SlidePositive);
         *plant.state()
     };
-    let difference = (end(1e-9) - end(1e-12)).amax();
-    assert!(difference > 0.0 && difference < 1e-9, "{difference:e}");
+    for lag_s in [0.0, 1e-6, 1e-5, 1e-4, 3e-4, 1e-3] {
+        let difference = (end(1e-9, lag_s) - end(1e-12, lag_s)).amax();
+        let met = difference > 0.0 && difference < 1e-9;
+        assert!(met, "{lag_s} s: {difference:e}");
+    }
 }
 
 #[test]
