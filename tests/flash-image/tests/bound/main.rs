@@ -1,8 +1,9 @@
 #![allow(clippy::unwrap_used)]
 //! No executed tick exceeds the bound on the control interrupt under the same cost model: in closed
-//! loops, with random frames, and with frames found by a search for the worst tick.
+//! loops, with random frames and settings, and with frames found by a search for the worst tick.
 //!
-//! `PAINLEVE_TICKS` sets the number of random frames and of search steps.
+//! `PAINLEVE_TICKS` sets the number of random frames and of search steps; random settings use all
+//! processors.
 
 use painleve_bound::image::Image;
 use painleve_bound::loops::Limit;
@@ -13,26 +14,12 @@ use painleve_flash_image::board::{self, FlashedBoard};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
-use painleve_shared::counts::{EncoderCounts, ForceCounts};
-use painleve_shared::frame::{DigitalInputs, SensorFrame};
-use painleve_shared::message::FrameSource;
+use painleve_shared::frame::SensorFrame;
+use painleve_shared::message::{FrameSource, Response};
 
-/// SplitMix64 (Steele, Lea, Flood 2014), a simple random number generator.
-struct Random(u64);
+mod random;
 
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, limit: u64) -> u64 {
-        self.next() % limit
-    }
-}
+use random::{Random, mutated, with_random_settings};
 
 fn tries(otherwise: u64) -> u64 {
     let asked = std::env::var("PAINLEVE_TICKS").ok();
@@ -44,6 +31,7 @@ struct BoundCheck<'a> {
     bound: &'a Bound,
     tracer: Tracer<'a>,
     worst: Executed,
+    most_instructions: Executed,
     ticks: u64,
 }
 
@@ -53,6 +41,7 @@ impl<'a> BoundCheck<'a> {
             bound,
             tracer: Tracer::new(image).unwrap(),
             worst: Executed::default(),
+            most_instructions: Executed::default(),
             ticks: 0,
         }
     }
@@ -68,6 +57,9 @@ impl<'a> BoundCheck<'a> {
                     let gone = rounds(one, &addresses);
                     assert!(gone <= times, "{gone} rounds of {one:?}");
                 }
+            }
+            if cost.instructions > self.most_instructions.instructions {
+                self.most_instructions = cost.clone();
             }
             if cost.cycles > worst.cycles {
                 worst = cost;
@@ -89,7 +81,7 @@ fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
     println!(
         "{} interrupts, worst {} instructions, {} cycles by the model; bound {} cycles, which is {:.2} times as much",
         watch.ticks,
-        watch.worst.instructions,
+        watch.most_instructions.instructions,
         watch.worst.cycles,
         bound.cycles,
         f64::from(bound.cycles) / f64::from(watch.worst.cycles),
@@ -146,32 +138,6 @@ fn ticks_with_sensors_stay_below_the_bound() {
     });
 }
 
-fn mutated(frame: &SensorFrame, random: &mut Random) -> SensorFrame {
-    let mut frame = *frame;
-    for _ in 0..1 + random.below(3) {
-        let value = random.next();
-        let small = value as i32 % 64;
-        match random.below(9) {
-            0 => {
-                frame.joints[0] =
-                    EncoderCounts(frame.joints[0].0.wrapping_add_signed(small) & 0x3fff)
-            }
-            1 => {
-                frame.joints[1] =
-                    EncoderCounts(frame.joints[1].0.wrapping_add_signed(small) & 0x3fff)
-            }
-            2 => frame.joints[(value & 1) as usize] = EncoderCounts(random.next() as u32 & 0x3fff),
-            3 => frame.normal_force = ForceCounts(frame.normal_force.0 + small),
-            4 => frame.tangential_force = ForceCounts(frame.tangential_force.0 + small),
-            5 => frame.normal_force = ForceCounts(random.next() as i32 % 4096),
-            6 => frame.tangential_force = ForceCounts(random.next() as i32 % 4096),
-            7 => frame.inputs = DigitalInputs(value as u32 & 3),
-            _ => frame.sequence = frame.sequence.wrapping_add(random.below(4) as u32),
-        }
-    }
-    frame
-}
-
 /// Frames of a closed loop with random disturbances.
 #[test]
 fn random_frames_stay_below_the_bound() {
@@ -202,6 +168,86 @@ fn random_frames_stay_below_the_bound() {
             }
         }
     });
+}
+
+/// Frames under one set of random settings.
+const FRAMES_PER_SETTINGS: u64 = 100;
+
+/// Executes ticks with random valid settings and random frames, and returns the settings.
+fn random_settings(watch: &mut BoundCheck<'_>, number: u64) -> String {
+    let mut random = Random(number << 32);
+    let names: Vec<&str> = built_in::names().collect();
+    let name = names[(number % names.len() as u64) as usize];
+    let (scenario, settings) = with_random_settings(scenario(name), &mut random);
+    let mut board = FlashedBoard::booted();
+    let response = board.configure(FrameSource::Lockstep, &encoded(&scenario));
+    assert!(
+        matches!(response, Some(Response::Ready { .. })),
+        "{response:?} to{settings}"
+    );
+    let mut board = traced(board);
+    let mut simulation = Simulation::new(&scenario).unwrap();
+    let mut statistics = Statistics::new(0.05);
+    let mut last = SensorFrame::default();
+    let mut continues = true;
+    for _ in 0..FRAMES_PER_SETTINGS {
+        // An arm that jams under random torques leaves its last frame to be disturbed.
+        let sampled = continues.then(|| simulation.sample(&mut statistics).ok());
+        let mut frame = sampled.flatten().unwrap_or(SensorFrame {
+            tick: last.tick.wrapping_add(1),
+            sequence: last.sequence.wrapping_add(1),
+            ..last
+        });
+        last = frame;
+        if !continues || random.below(4) == 0 {
+            frame = mutated(&frame, &mut random);
+        }
+        let answer = board.exchange(&frame);
+        watch.look(&mut board);
+        continues &= simulation.advance(answer.as_ref(), &mut statistics).is_ok();
+    }
+    format!("{name}{settings}")
+}
+
+/// Random valid settings of the controller, with frames of a closed loop with random disturbances.
+/// The settings depend on their number alone, not on the number of threads.
+#[test]
+fn random_settings_stay_below_the_bound() {
+    let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
+    let settings = tries(800).div_ceil(FRAMES_PER_SETTINGS);
+    let threads = std::thread::available_parallelism().map_or(1, |it| it.get() as u64);
+    // Ticks, most instructions, most cycles and the settings with these.
+    let run = |thread: u64| {
+        let image = Image::read(&board::image("painleve-f405")).unwrap();
+        let mut watch = BoundCheck::new(&image, &bound);
+        let mut worst = String::new();
+        for number in (thread..settings).step_by(threads as usize) {
+            let before = watch.worst.cycles;
+            let name = random_settings(&mut watch, number);
+            if watch.worst.cycles > before {
+                worst = name;
+            }
+        }
+        let most = watch.most_instructions.instructions;
+        (watch.ticks, most, watch.worst.cycles, worst)
+    };
+    let found: Vec<_> = std::thread::scope(|scope| {
+        let run = &run;
+        let spawned: Vec<_> = (0..threads)
+            .map(|thread| scope.spawn(move || run(thread)))
+            .collect();
+        let joined = spawned.into_iter().map(|it| it.join());
+        joined.map(Result::unwrap).collect()
+    });
+    let ticks: u64 = found.iter().map(|it| it.0).sum();
+    let instructions = found.iter().map(|it| it.1).max().unwrap();
+    let (_, _, cycles, worst) = found.iter().max_by_key(|it| it.2).unwrap();
+    println!(
+        "{settings} settings, {ticks} interrupts, worst {instructions} instructions, {cycles} cycles by the model; bound {} cycles, which is {:.2} times as much\n{worst}",
+        bound.cycles,
+        f64::from(bound.cycles) / f64::from(*cycles),
+    );
+    assert!(ticks >= settings);
 }
 
 /// Hill climbing: starts in the state before the worst tick of a closed loop and searches for more
