@@ -1,8 +1,6 @@
 //! `painleve doctor`: leftovers of earlier runs, and the machine's capabilities.
 
 use clap::Args;
-use comfy_table::Table;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
 use nix::sys::resource::{Resource, getrlimit};
 use nix::sys::statvfs::statvfs;
 use nix::sys::utsname::uname;
@@ -20,6 +18,9 @@ pub struct DoctorArguments {
     /// Remove what killed processes left behind. Anything in use, or not provably dead, is kept.
     #[arg(long)]
     repair: bool,
+    /// Print one JSON object on stdout instead of the table: the state of each item.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Repairs first if requested, then surveys the machine and prints a table.
@@ -58,11 +59,14 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
         row(what, limit(resource, least));
     }
     row("scheduling", request_realtime().to_string());
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header(["item", "state"]);
-    table.add_rows(rows);
-    say(terminal::readable(table))?;
+    if arguments.json {
+        let states = rows.into_iter().map(|[what, state]| (what, state.into()));
+        say(serde_json::Value::Object(states.collect()))?;
+    } else {
+        let mut table = terminal::table(["item", "state"]);
+        table.add_rows(rows);
+        say(terminal::readable(table))?;
+    }
     survey.map(|_| ()).map_err(LinkError::into)
 }
 

@@ -11,10 +11,11 @@ use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
 use painleve_record::csv_table::CsvTable;
+use painleve_record::events::RunEvent;
 use painleve_record::mcap_log::Source;
 use painleve_record::plot::PlotFile;
 use painleve_record::recorder::Sinks;
-use painleve_record::{McapLog, Recorder, RunPlot};
+use painleve_record::{McapLog, RecordError, RecordedTick, Recorder, RunPlot, Sink};
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
@@ -48,6 +49,10 @@ pub struct OutputArguments {
     /// Table of every tick.
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
+    /// Print the events of the run on standard error: changes of mode and state, lift-offs, impacts,
+    /// faults.
+    #[arg(short, long)]
+    verbose: bool,
 }
 
 impl OutputArguments {
@@ -61,6 +66,7 @@ impl OutputArguments {
             ("--no-record", self.no_record),
             ("--no-html", self.no_html && !self.no_plot),
             ("--no-plot", self.no_plot),
+            ("--verbose", self.verbose),
         ] {
             arguments.extend(given.then(|| option.into()));
         }
@@ -108,7 +114,32 @@ impl OutputArguments {
                 }),
             });
         }
+        if self.verbose {
+            sinks.push(Box::new(EventPrinter));
+        }
         Ok(sinks)
+    }
+}
+
+/// Prints the events of a run.
+struct EventPrinter;
+
+impl Sink for EventPrinter {
+    fn tick(&mut self, _tick: &RecordedTick<'_>) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn event(&mut self, event: &RunEvent) -> Result<(), RecordError> {
+        warn(format_args!(
+            "{:9.4} s  {}",
+            event.time_s,
+            event.kind.describe()
+        ));
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), RecordError> {
+        Ok(())
     }
 }
 

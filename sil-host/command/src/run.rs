@@ -179,7 +179,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "ORIGIN", requires = "live")]
     live_origin: Vec<String>,
     /// Print errors and warnings only.
-    #[arg(short, long, conflicts_with = "json")]
+    #[arg(short, long, conflicts_with_all = ["json", "verbose"])]
     quiet: bool,
     /// Print one JSON object on stdout instead of the table.
     #[arg(long)]

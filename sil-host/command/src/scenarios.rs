@@ -1,12 +1,12 @@
 //! `painleve scenarios`: lists and prints scenarios.
 
 use clap::Args;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{ContentArrangement, Table};
 use painleve_plant::scenario::{Scenario, built_in, describe};
 
 use painleve_system::terminal;
+use serde_json::{Value, json};
 
+use super::output_error::output;
 use super::{CommandError, say};
 
 /// Options of `painleve scenarios`.
@@ -17,6 +17,9 @@ pub struct ScenariosArguments {
     /// Print a JSON Schema of scenario files, with which editors complete and check them.
     #[arg(long, conflicts_with = "scenario")]
     schema: bool,
+    /// Print JSON: names and descriptions, or the whole scenario.
+    #[arg(long, conflicts_with = "schema")]
+    json: bool,
     /// Override one key, for example belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "scenario")]
     overrides: Vec<String>,
@@ -26,18 +29,23 @@ pub struct ScenariosArguments {
 pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     if let Some(name) = &arguments.scenario {
         let scenario = Scenario::load(name, &arguments.overrides)?;
+        if arguments.json {
+            return say(serde_json::to_string(&scenario).map_err(output)?);
+        }
         return say(scenario.to_commented_toml().trim_end());
     }
     if arguments.schema {
         return say(format!("{:#}", describe::json_schema()));
     }
-    let mut table = Table::new();
-    table
-        .load_style(UTF8_FULL_CONDENSED)
-        .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_header(["scenario", "description"]);
-    for name in built_in::names() {
-        table.add_row([name, &Scenario::load(name, &[])?.description]);
+    let load = |name| Scenario::load(name, &[]).map(|scenario| (name, scenario.description));
+    let scenarios: Vec<_> = built_in::names().map(load).collect::<Result<_, _>>()?;
+    if arguments.json {
+        let entry = |(name, text): &(&str, String)| json!({ "name": name, "description": text });
+        return say(Value::from_iter(scenarios.iter().map(entry)));
+    }
+    let mut table = terminal::table(["scenario", "description"]);
+    for (name, description) in &scenarios {
+        table.add_row([*name, description]);
     }
     say(terminal::readable(table))
 }

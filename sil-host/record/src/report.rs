@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{CellAlignment, Table};
+use comfy_table::CellAlignment;
 use hdrhistogram::Histogram;
 use painleve_plant::closed_loop::LoopResult;
 use painleve_plant::scenario::Scenario;
+use painleve_system::terminal;
 use serde::{Deserialize, Serialize};
 
 /// Percentiles of a duration, µs.
@@ -159,9 +159,7 @@ impl RunReport {
 
     /// Returns the report as a table.
     pub fn table(&self) -> String {
-        let mut table = Table::new();
-        table.load_style(UTF8_FULL_CONDENSED);
-        table.set_header([self.scenario.as_str(), ""]);
+        let mut table = terminal::table([self.scenario.as_str(), ""]);
         let mut row = |name: &str, value: String| {
             table.add_row([name, value.as_str()]);
         };

@@ -1,7 +1,6 @@
 //! The outcome of a study as JSON, CSV, table and figure.
 
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{ContentArrangement, Table};
+use comfy_table::Table;
 use serde::Serialize;
 
 /// The outcome of a study. Serialised it is the JSON object of `--json`, whose names are
@@ -34,15 +33,7 @@ pub fn csv(outcome: &impl Outcome) -> Result<Vec<u8>, csv::Error> {
         .map_err(|error| csv::Error::from(error.into_error()))
 }
 
-/// An empty table in the style of all tables.
-pub fn table<T: Into<comfy_table::Row>>(header: T) -> Table {
-    let mut table = Table::new();
-    table
-        .load_style(UTF8_FULL_CONDENSED)
-        .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_header(header);
-    table
-}
+pub use painleve_system::terminal::table;
 
 /// The name under which a value is serialised.
 pub fn name(value: &impl Serialize) -> String {

@@ -1,7 +1,10 @@
-//! Standard output and standard error, of which either may be closed or full.
+//! Standard output and standard error, of which either may be closed or full; tables for readers.
 
 use std::fmt::Display;
 use std::io::{self, Write};
+
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{ContentArrangement, Row, Table};
 
 /// Writes a line to standard output.
 ///
@@ -28,6 +31,21 @@ pub fn is_ascii_only() -> bool {
         .filter_map(std::env::var_os)
         .find(|locale| !locale.is_empty())
         .is_some_and(|locale| locale == "C" || locale == "POSIX")
+}
+
+/// Returns an empty table in the style of all tables. Its lines are broken to fit the terminal, or the
+/// number of columns in `COLUMNS`.
+pub fn table(header: impl Into<Row>) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(UTF8_FULL_CONDENSED)
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_header(header);
+    let columns = std::env::var("COLUMNS").ok();
+    if let Some(columns) = columns.and_then(|columns| columns.parse().ok()) {
+        table.set_width(columns);
+    }
+    table
 }
 
 /// Returns a text for readers: in ASCII where the locale asks for it.

@@ -1,8 +1,8 @@
 //! The report of tick costs, as JSON and as a table.
 
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{CellAlignment, Table};
+use comfy_table::CellAlignment;
 use painleve_shared::message::Health;
+use painleve_system::terminal;
 use serde::{Deserialize, Serialize};
 
 use super::tick_times::WorstTick;
@@ -99,13 +99,11 @@ impl TimingReport {
 
 /// Returns the reports as a table with one row each.
 pub fn table(reports: &[TimingReport]) -> String {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
     let first = reports.first();
     let head = first.map_or(String::new(), |first| {
         format!("{} on {}, {}", first.measured, first.host, first.unit)
     });
-    table.set_header([
+    let mut table = terminal::table([
         head.as_str(),
         "rate",
         "ticks",

@@ -7,11 +7,9 @@ use painleve_shared::settings::Settings;
 use painleve_system::input_file;
 use toml::{Table, Value};
 
-use super::{Scenario, built_in, describe};
+use super::override_key::{MOST_LEVELS, with_override};
+use super::{Scenario, built_in};
 use crate::mechanics::BuiltInPlant;
-
-/// Upper limit of the levels of a key; no scenario key has as many.
-const MOST_LEVELS: usize = 16;
 
 /// Why a scenario cannot be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -104,12 +102,22 @@ pub enum KeyError {
     #[error(transparent)]
     Table(#[from] toml::ser::Error),
     /// A part of the key is unknown.
-    #[error("unknown key '{part}'; known: {}", known.join(", "))]
+    #[error("unknown key '{part}'; {}known: {}", meant(part, known), known.join(", "))]
     Unknown {
         /// The part.
         part: String,
         /// The keys at its level.
         known: Vec<String>,
+    },
+    /// A part of the key names a variant that is not the chosen one.
+    #[error("{key} is {chosen}, which has no '{part}'; choose it first with --set {key}={part}")]
+    NotChosen {
+        /// The choice.
+        key: String,
+        /// The chosen variant.
+        chosen: String,
+        /// The part.
+        part: String,
     },
     /// A part of the key is not a number of a list's items.
     #[error("'{part}' is not one of its {count} items, from 0")]
@@ -122,6 +130,18 @@ pub enum KeyError {
     /// A part of the key lies inside a number, a text or a switch.
     #[error("'{0}' would be inside a single value")]
     InsideValue(String),
+}
+
+/// Smallest similarity of a key that may have been meant, from 0 to 1.
+const SIMILAR: f64 = 0.75;
+
+/// Returns a question about the known key that is most similar to an unknown one; empty if none is.
+fn meant(part: &str, known: &[String]) -> String {
+    let similarity = |key: &&String| strsim::normalized_damerau_levenshtein(part, key);
+    let similar = known.iter().filter(|key| similarity(key) >= SIMILAR);
+    similar
+        .max_by(|one, other| similarity(one).total_cmp(&similarity(other)))
+        .map_or(String::new(), |key| format!("did you mean '{key}'? "))
 }
 
 impl Scenario {
@@ -218,81 +238,12 @@ fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
     })
 }
 
-fn from_table(origin: &str, table: Table) -> Result<Scenario, ScenarioError> {
+pub(super) fn from_table(origin: &str, table: Table) -> Result<Scenario, ScenarioError> {
     serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
         origin: origin.into(),
         key: error.path().to_string(),
         source: KeyError::Value(error.into_inner()),
     })
-}
-
-/// Returns the scenario with one key changed. The key must exist in the scenario or be optional,
-/// such as `controller.belt.given_m_s`.
-fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioError> {
-    let wrong = || ScenarioError::Override { text: text.into() };
-    let (key, value) = text.split_once('=').ok_or_else(wrong)?;
-    let (key, value) = (key.trim(), value.trim());
-    // A line break would start another key, which would not be checked.
-    if key.is_empty() || value.is_empty() || value.contains(['\n', '\r']) {
-        return Err(wrong());
-    }
-    // Each level costs at least one recursive call in everything that visits the values.
-    if key.split('.').count() > MOST_LEVELS {
-        return Err(ScenarioError::TooDeep);
-    }
-    // A bare word is a string, so that names need no nested quotes.
-    let value = format!("value = {value}")
-        .parse::<Table>()
-        .ok()
-        .and_then(|mut table| table.remove("value"))
-        .unwrap_or_else(|| Value::String(value.into()));
-    let wrong_key = |source| ScenarioError::Key {
-        origin: "--set".into(),
-        key: key.into(),
-        source,
-    };
-    let mut root = Value::try_from(&scenario).map_err(|error| wrong_key(error.into()))?;
-    // Message on the first part of the key that is missing, unless an optional setting is absent.
-    let mut missing = None;
-    let parts: Vec<&str> = key.split('.').collect();
-    let mut place = &mut root;
-    for (index, part) in parts.iter().copied().enumerate() {
-        let next = match place {
-            Value::Table(table) => {
-                if !table.contains_key(part) && missing.is_none() {
-                    let unknown = KeyError::Unknown {
-                        part: part.into(),
-                        known: table.keys().cloned().collect(),
-                    };
-                    let is_optional = describe::is_optional(&parts[..=index]);
-                    missing = Some((!is_optional).then_some(unknown));
-                }
-                let empty = || Value::Table(Table::new());
-                Ok(table.entry(part).or_insert_with(empty))
-            }
-            Value::Array(array) => {
-                let count = array.len();
-                part.parse::<usize>()
-                    .ok()
-                    .and_then(|index| array.get_mut(index))
-                    .ok_or_else(|| KeyError::NoItem {
-                        part: part.into(),
-                        count,
-                    })
-            }
-            _ => Err(KeyError::InsideValue(part.into())),
-        };
-        place = next.map_err(wrong_key)?;
-    }
-    *place = match (&*place, value) {
-        // An integer is accepted as a number.
-        (Value::Float(_), Value::Integer(integer)) => Value::Float(integer as f64),
-        (_, value) => value,
-    };
-    let Value::Table(table) = root else {
-        return Err(wrong());
-    };
-    from_table("--set", table).map_err(|error| missing.flatten().map_or(error, wrong_key))
 }
 
 #[cfg(test)]
@@ -325,6 +276,22 @@ mod tests {
     }
 
     #[test]
+    fn the_name_of_a_variant_chooses_it_with_its_defaults() {
+        let pid = load(&[
+            "controller.law=pid",
+            "controller.law.pid.proportional_nm_rad=[30.0, 20.0]",
+        ]);
+        let law = pid.unwrap().controller.law;
+        assert_eq!(law.name(), "pid");
+        let law = toml::to_string(&law).unwrap();
+        assert!(law.contains("proportional_nm_rad = [30.0, 20.0]"), "{law}");
+        let pid = load(&["controller.law.pid={ proportional_nm_rad = [30.0, 20.0] }"]).unwrap();
+        assert_eq!(toml::to_string(&pid.controller.law).unwrap(), law);
+        let off = load(&["controller.law=off"]).unwrap();
+        assert_eq!(off.controller.law.name(), "off");
+    }
+
+    #[test]
     fn overrides_set_keys_that_are_optional() {
         let scenario = load(&[
             "controller.belt.given_m_s=-0.4",
@@ -346,13 +313,30 @@ mod tests {
         for (overrides, parts) in [
             (
                 &["belt.frction=0.4"][..],
-                &["belt.frction", "friction, profile"][..],
+                &[
+                    "belt.frction",
+                    "did you mean 'friction'?",
+                    "friction, profile",
+                ][..],
             ),
             (&["arm_model.lenght_m=0.2"], &["arm_model.lenght_m"]),
             (
                 &["controller.law.pid.integral_gain=1"],
-                &["unknown key 'pid'", "hybrid"],
+                &["controller.law is hybrid", "--set controller.law=pid"],
             ),
+            (
+                &["controller.law=off", "controller.law.pid.integral_gain=1"],
+                &["controller.law is off", "--set controller.law=pid"],
+            ),
+            (
+                &["controller.law=pid", "controller.law.pid.integral_gain=1"],
+                &["integral_gain", "known: ", "proportional_nm_rad"],
+            ),
+            (
+                &["controller.law.pdi.x=1"],
+                &["unknown key 'pdi'", "known: off, pid, hybrid"],
+            ),
+            (&["belt.profile=sine"], &["belt.profile", "mean_m_s"]),
             (&["belt.friction=nan"], &["belt.friction = NaN", "0 to 10"]),
             (&["belt.friction=inf"], &["belt.friction = inf", "0 to 10"]),
             (&["belt.friction=-1"], &["belt.friction = -1", "0 to 10"]),

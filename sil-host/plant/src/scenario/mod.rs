@@ -6,6 +6,7 @@
 pub mod built_in;
 pub mod describe;
 mod load;
+mod override_key;
 mod plant;
 
 use painleve_firmware::configuration::ControllerSettings;

@@ -10,7 +10,7 @@ mod schema;
 
 use std::f64::consts::PI;
 
-use painleve_shared::settings::{Field, Range, Settings, Shape};
+use painleve_shared::settings::{Field, Range, Settings, Shape, Variant};
 use serde::Serialize;
 use toml::{Table, Value};
 
@@ -99,16 +99,56 @@ fn group(shape: &Shape) -> Option<&'static [Field]> {
 
 /// Whether the setting at `path` may be absent.
 pub(super) fn is_optional(path: &[&str]) -> bool {
-    let mut shapes = vec![Shape::Group(Scenario::FIELDS)];
-    for part in path {
-        shapes = shapes
-            .into_iter()
-            .flat_map(|shape| inside(shape, part))
-            .collect();
-    }
-    shapes
+    shapes(path)
         .iter()
         .any(|shape| matches!(shape, Shape::Optional(_)))
+}
+
+/// Returns the names of the variants of the choice at `path` whose settings are in a table under the
+/// variant's name; none if `path` is something else.
+pub(super) fn untagged_variants(path: &[&str]) -> Vec<&'static str> {
+    let choices = shapes(path).into_iter();
+    choices
+        .flat_map(|shape| match shape.resolved() {
+            Shape::Choice {
+                tag: None,
+                variants,
+            } if variants.iter().any(|one| one.content.is_some()) => variants,
+            _ => &[],
+        })
+        .map(|variant| variant.key)
+        .collect()
+}
+
+/// Returns the value of the setting at `path` if its text is the name of a variant with settings: that
+/// variant with their defaults. Any other text is the value itself.
+pub(super) fn chosen(path: &[&str], text: String) -> Value {
+    let has_settings = |variants: &[Variant]| {
+        let named = variants.iter().find(|variant| variant.key == text);
+        named.is_some_and(|variant| variant.content.is_some())
+    };
+    for shape in shapes(path) {
+        match shape.resolved() {
+            Shape::Choice { tag, variants } if has_settings(variants) => {
+                let table = match tag {
+                    Some(tag) => Table::from_iter([(tag.into(), Value::String(text))]),
+                    None => Table::from_iter([(text, Value::Table(Table::new()))]),
+                };
+                return Value::Table(table);
+            }
+            _ => {}
+        }
+    }
+    Value::String(text)
+}
+
+/// Returns the kinds that the value at `path` may have.
+fn shapes(path: &[&str]) -> Vec<Shape> {
+    path.iter()
+        .fold(vec![Shape::Group(Scenario::FIELDS)], |shapes, part| {
+            let parts = shapes.into_iter().flat_map(|shape| inside(shape, part));
+            parts.collect()
+        })
 }
 
 /// Returns the kinds that a value's part may have: several if variants of a choice share its name.
