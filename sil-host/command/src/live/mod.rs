@@ -224,7 +224,7 @@ impl Live {
                 controller.map_err(|source| in_run(scenario, source))?;
         }
         let at_once = Scenario {
-            belt: before.belt,
+            belt: before.belt.clone(),
             controller: before.controller.clone(),
             ..scenario.clone()
         } == before;

@@ -84,7 +84,7 @@ impl ArmOnBelt {
         let mut plant = Self {
             arm,
             friction: parameters.friction,
-            belt: parameters.belt,
+            belt: parameters.belt.clone(),
             impact: parameters.impact,
             solver: parameters.solver,
             torque: TorqueSegment::constant(JointTorque::zeros()),
@@ -166,7 +166,7 @@ impl ArmOnBelt {
     pub fn set_belt(&mut self, belt: &BeltSettings) {
         self.stick_start = (self.time_s, self.motion().tip_t_m(&self.state));
         self.friction = belt.friction;
-        self.belt = belt.profile;
+        self.belt = belt.profile.clone();
         self.unsettled = true;
         self.evaluation = None;
     }

@@ -2,9 +2,10 @@
 
 use painleve_shared::settings;
 
+use super::belt_file::BeltFile;
+
 settings! {
     /// Friction and speed of the belt.
-    #[derive(Copy)]
     pub struct BeltSettings {
         /// Friction coefficient μ between tip and belt.
         friction: f64 = 0.6, 0.0..=10.0;
@@ -15,7 +16,6 @@ settings! {
 
 settings! {
     /// Speed of the belt, v_belt, as a function of time; positive along +t.
-    #[derive(Copy)]
     pub enum BeltProfile by "kind" {
         /// Always the same speed.
         "constant" => Constant {
@@ -51,6 +51,11 @@ settings! {
             /// Frequency.
             frequency_hz: f64, 1e-6..=1e3, "Hz";
         },
+        /// Speeds from a CSV file with the columns `time_s,speed_m_s`, interpolated.
+        "file" => File {
+            /// Path of the file.
+            path: BeltFile;
+        },
     }
 }
 
@@ -66,6 +71,7 @@ impl BeltProfile {
     pub fn speed_m_s(&self, t_s: f64) -> f64 {
         match *self {
             Self::Constant { speed_m_s } => speed_m_s,
+            Self::File { ref path } => path.speed_m_s(t_s),
             Self::Step {
                 from_m_s,
                 to_m_s,
@@ -102,6 +108,7 @@ impl BeltProfile {
     pub fn acceleration_m_s2(&self, t_s: f64) -> f64 {
         match *self {
             Self::Constant { .. } | Self::Step { .. } => 0.0,
+            Self::File { ref path } => path.acceleration_m_s2(t_s),
             Self::Ramp {
                 from_m_s,
                 to_m_s,
@@ -130,10 +137,11 @@ impl BeltProfile {
         self.position_m(to_s) - self.position_m(from_s)
     }
 
-    /// Returns the integral of the speed from time zero, m.
+    /// Returns the integral of the speed from a fixed time, m.
     fn position_m(&self, t_s: f64) -> f64 {
         match *self {
             Self::Constant { speed_m_s } => speed_m_s * t_s,
+            Self::File { ref path } => path.position_m(t_s),
             Self::Step {
                 from_m_s,
                 to_m_s,
@@ -166,6 +174,7 @@ impl BeltProfile {
     pub fn next_corner_s(&self, t_s: f64) -> f64 {
         let corners = match *self {
             Self::Constant { .. } | Self::Sine { .. } => [f64::INFINITY; 2],
+            Self::File { ref path } => [path.next_corner_s(t_s), f64::INFINITY],
             Self::Step { at_s, .. } => [at_s, f64::INFINITY],
             Self::Ramp {
                 start_s,
@@ -217,10 +226,39 @@ mod tests {
         ]
     }
 
+    /// Files with rows at 0.5, 1.5, … s.
+    fn files() -> impl Strategy<Value = BeltProfile> {
+        prop::collection::vec(-1.0_f64..1.0, 2..5).prop_map(|speeds| {
+            let rows = speeds.iter().enumerate();
+            let rows = rows.map(|(row, speed)| format!("{row}.5,{speed}\n"));
+            file(&format!("time_s,speed_m_s\n{}", rows.collect::<String>())).unwrap()
+        })
+    }
+
+    fn file(text: &str) -> Result<BeltProfile, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("belt.csv");
+        std::fs::write(&path, text).unwrap();
+        let path = BeltFile::read(path.to_str().unwrap())?;
+        Ok(BeltProfile::File { path })
+    }
+
+    #[test]
+    fn a_file_gives_the_speed_between_its_rows_and_names_its_mistakes() {
+        let profile = file("time_s,speed_m_s\n1,-0.4\n2,-0.2\n").unwrap();
+        for (t_s, speed_m_s) in [(0.0, -0.4), (1.5, -0.3), (9.0, -0.2)] {
+            assert!((profile.speed_m_s(t_s) - speed_m_s).abs() < 1e-12, "{t_s}");
+        }
+        assert!((profile.displacement_m(0.0, 3.0) - -0.9).abs() < 1e-12);
+        let message = file("time_s,speed_m_s\n0,0\n1,101\n").unwrap_err();
+        let expected = "line 3: speed_m_s = 101 is outside the allowed range -100 to 100";
+        assert!(message.ends_with(expected), "{message}");
+    }
+
     proptest! {
         #[test]
         fn displacement_and_acceleration_belong_to_the_speed(
-            profile in profiles(), t in 0.001_f64..4.0,
+            profile in prop_oneof![profiles(), files()], t in 0.001_f64..4.0,
         ) {
             let step = 1e-6;
             prop_assume!(profile.next_corner_s(t - step) > t + step);

@@ -14,6 +14,7 @@
 
 mod arm_on_belt;
 pub mod belt;
+mod belt_file;
 pub mod built_in;
 pub mod cash_karp;
 pub mod compliant;
@@ -26,6 +27,7 @@ mod motion_error;
 mod parameters;
 mod probe;
 pub mod rosenbrock;
+pub(crate) mod series;
 mod step_budget;
 #[cfg(test)]
 mod tests;

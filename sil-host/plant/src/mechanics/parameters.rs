@@ -9,7 +9,7 @@ use super::transition::Indeterminate;
 use crate::plant::State;
 
 /// All parameters of the plant's equations.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PlantParameters {
     /// The arm.
     pub arm: ArmParameters<f64>,
@@ -44,7 +44,7 @@ impl PlantParameters {
     pub(super) fn validate(&self) -> Result<(), OutOfRange> {
         let belt = BeltSettings {
             friction: self.friction,
-            profile: self.belt,
+            profile: self.belt.clone(),
         };
         belt.validate().map_err(|error| error.inside("belt"))?;
         let impact = self.impact.validate();

@@ -8,7 +8,7 @@ use painleve_system::input_file;
 use toml::{Table, Value};
 
 use super::override_key::{MOST_LEVELS, with_override};
-use super::{Scenario, built_in};
+use super::{Scenario, built_in, reference_file};
 use crate::mechanics::BuiltInPlant;
 
 /// Why a scenario cannot be loaded.
@@ -127,6 +127,9 @@ pub enum KeyError {
         /// Number of items.
         count: usize,
     },
+    /// A file named by the key cannot be used.
+    #[error("{0}")]
+    File(String),
     /// A part of the key lies inside a number, a text or a switch.
     #[error("'{0}' would be inside a single value")]
     InsideValue(String),
@@ -238,7 +241,12 @@ fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
     })
 }
 
-pub(super) fn from_table(origin: &str, table: Table) -> Result<Scenario, ScenarioError> {
+pub(super) fn from_table(origin: &str, mut table: Table) -> Result<Scenario, ScenarioError> {
+    reference_file::expand(&mut table).map_err(|reason| ScenarioError::Key {
+        origin: origin.into(),
+        key: "controller.reference".into(),
+        source: KeyError::File(reason),
+    })?;
     serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
         origin: origin.into(),
         key: error.path().to_string(),

@@ -8,6 +8,7 @@ pub mod describe;
 mod load;
 mod override_key;
 mod plant;
+mod reference_file;
 
 use painleve_firmware::configuration::ControllerSettings;
 use painleve_shared::{ArmParameters, OutOfRange, settings};
@@ -90,7 +91,7 @@ impl Scenario {
         PlantParameters {
             arm: self.arm,
             friction: self.belt.friction,
-            belt: self.belt.profile,
+            belt: self.belt.profile.clone(),
             impact: self.impact,
             solver: self.solver,
         }

@@ -61,7 +61,7 @@ impl CompliantArmOnBelt {
     /// Gives the belt this friction and speed from now on.
     pub fn set_belt(&mut self, belt: &BeltSettings) {
         self.friction = belt.friction;
-        self.belt = belt.profile;
+        self.belt = belt.profile.clone();
     }
 
     /// Creates a plant at time zero with zero torque. A tip at most 0.1 mm above the belt or 1 mm
@@ -91,7 +91,7 @@ impl CompliantArmOnBelt {
         let mut plant = Self {
             arm,
             loaded_arm: effects.payload.is_on().then(|| Box::new(loaded)),
-            belt: parameters.belt,
+            belt: parameters.belt.clone(),
             friction: parameters.friction,
             contact: CompliantContact::new(contact),
             effects: effects.clone(),

@@ -1,17 +1,26 @@
 //! Changes of friction from a CSV file, over time or along the belt.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use painleve_shared::OutOfRange;
 use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape};
-use painleve_system::input_file;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Largest number of rows.
-const MOST_ROWS: usize = 1_000_000;
-/// Largest change of friction.
-const LARGEST_CHANGE: f64 = 2.0;
+use crate::mechanics::series::{self, Columns};
+
+/// The columns of a file over time, or of one along the belt.
+const COLUMNS: [Columns; 2] = [
+    Columns {
+        place: "time_s",
+        value: "change",
+        largest: 2.0,
+    },
+    Columns {
+        place: "along_belt_m",
+        value: "change",
+        largest: 2.0,
+    },
+];
 
 /// A CSV file with two columns, loaded together with its scenario. Scenarios contain its path.
 ///
@@ -27,15 +36,10 @@ pub struct FrictionFile {
 
 #[derive(Clone, Debug, PartialEq)]
 struct Rows {
-    over: Over,
+    /// Whether the first column is a position on the belt instead of a time.
+    along_belt: bool,
     /// Time (s) or position (m), and change of μ.
     points: Vec<(f64, f64)>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Over {
-    Time,
-    Belt,
 }
 
 impl FrictionFile {
@@ -44,12 +48,13 @@ impl FrictionFile {
     /// # Errors
     /// One sentence with the path and the invalid line.
     pub fn read(path: &str) -> Result<Self, String> {
-        let text = input_file::read(Path::new(path))
-            .map_err(|error| format!("cannot read {path}: {error}"))?;
-        let rows = parse(&text).map_err(|reason| format!("{path}: {reason}"))?;
+        let (columns, points) = series::read(path, &COLUMNS)?;
         Ok(Self {
             path: path.into(),
-            rows: Arc::new(rows),
+            rows: Arc::new(Rows {
+                along_belt: columns == 1,
+                points,
+            }),
         })
     }
 
@@ -59,68 +64,13 @@ impl FrictionFile {
         let (Some(&(first, _)), Some(&(last, _))) = (points.first(), points.last()) else {
             return 0.0;
         };
-        let place = match self.rows.over {
-            Over::Time => t_s.clamp(first, last),
-            Over::Belt => first + (along_belt_m - first).rem_euclid(last - first),
+        let place = if self.rows.along_belt {
+            first + (along_belt_m - first).rem_euclid(last - first)
+        } else {
+            t_s
         };
-        let after = points.partition_point(|&(at, _)| at <= place);
-        match (points.get(after.wrapping_sub(1)), points.get(after)) {
-            (Some(&(from, one)), Some(&(to, other))) => {
-                one + (other - one) * ((place - from) / (to - from))
-            }
-            (Some(&(_, value)), None) | (None, Some(&(_, value))) => value,
-            (None, None) => 0.0,
-        }
+        series::interpolated(points, place)
     }
-}
-
-fn parse(text: &str) -> Result<Rows, String> {
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(index, line)| (index + 1, line.trim()));
-    let columns = lines.next().map_or("", |(_, line)| line);
-    let over = match columns.split(',').map(str::trim).collect::<Vec<_>>()[..] {
-        ["time_s", "change"] => Over::Time,
-        ["along_belt_m", "change"] => Over::Belt,
-        _ => {
-            return Err(format!(
-                "line 1 is '{columns}'; it must be time_s,change or along_belt_m,change"
-            ));
-        }
-    };
-    let mut points: Vec<(f64, f64)> = Vec::new();
-    for (number, line) in lines.filter(|(_, line)| !line.is_empty()) {
-        let mut values = line
-            .split(',')
-            .map(|value| value.trim().parse::<f64>().ok());
-        let (Some(Some(place)), Some(Some(change)), None) =
-            (values.next(), values.next(), values.next())
-        else {
-            return Err(format!("line {number} is '{line}'; it must be two numbers"));
-        };
-        if !place.is_finite() || place.abs() > 1e7 {
-            return Err(format!(
-                "line {number}: {place} is outside the allowed range -1e7 to 1e7"
-            ));
-        }
-        if !(-LARGEST_CHANGE..=LARGEST_CHANGE).contains(&change) {
-            return Err(format!(
-                "line {number}: change = {change} is outside the allowed range -{LARGEST_CHANGE} to {LARGEST_CHANGE}"
-            ));
-        }
-        if points.last().is_some_and(|&(before, _)| place <= before) {
-            return Err(format!("line {number}: the first column must rise"));
-        }
-        if points.len() == MOST_ROWS {
-            return Err(format!("it has more than {MOST_ROWS} rows"));
-        }
-        points.push((place, change));
-    }
-    if points.len() < 2 {
-        return Err("it needs at least two rows of numbers".into());
-    }
-    Ok(Rows { over, points })
 }
 
 impl SettingValue for FrictionFile {
@@ -195,10 +145,10 @@ mod tests {
                 "time_s,change\n0,0\n1,3\n",
                 "line 3: change = 3 is outside the allowed range -2 to 2",
             ),
-            ("time_s,change\n0,0\nnan,0\n", "line 3: NaN"),
+            ("time_s,change\n0,0\nnan,0\n", "line 3: time_s = NaN"),
             (
                 "time_s,change\n0,0\n0,0.1\n",
-                "line 3: the first column must rise",
+                "line 3: time_s = 0 is not larger than in the row before",
             ),
             ("time_s,change\n0,0,0\n1,0\n", "line 2"),
         ] {

@@ -1,0 +1,102 @@
+//! CSV files with two columns: a quantity over time or along the belt.
+
+use std::path::Path;
+
+use painleve_system::input_file;
+
+/// Largest number of rows.
+const MOST_ROWS: usize = 1_000_000;
+/// Largest magnitude of a time or position.
+const FARTHEST: f64 = 1e7;
+
+/// The columns of a file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Columns {
+    /// Name of the first column, which must increase.
+    pub place: &'static str,
+    /// Name of the second column.
+    pub value: &'static str,
+    /// Largest magnitude of a value.
+    pub largest: f64,
+}
+
+/// Reads a file whose first line names one of the allowed pairs of columns; returns the index of this
+/// pair and at least two rows.
+///
+/// # Errors
+/// One sentence with the path, the line, the column and what is allowed.
+pub(crate) fn read(path: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, f64)>), String> {
+    let text = input_file::read(Path::new(path))
+        .map_err(|error| format!("cannot read {path}: {error}"))?;
+    parse(&text, allowed).map_err(|reason| format!("{path}: {reason}"))
+}
+
+fn parse(text: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, f64)>), String> {
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .map(|(index, line)| (index + 1, line.trim()));
+    let head = lines.next().map_or("", |(_, line)| line);
+    let names: Vec<&str> = head.split(',').map(str::trim).collect();
+    let pair = allowed
+        .iter()
+        .position(|one| names == [one.place, one.value]);
+    let Some(pair) = pair else {
+        let pairs = allowed
+            .iter()
+            .map(|one| format!("{},{}", one.place, one.value));
+        let pairs: Vec<String> = pairs.collect();
+        return Err(format!(
+            "line 1 is '{head}'; it must be {}",
+            pairs.join(" or ")
+        ));
+    };
+    let columns = allowed[pair];
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for (number, line) in lines.filter(|(_, line)| !line.is_empty()) {
+        let mut values = line.split(',').map(|value| value.trim().parse().ok());
+        let (Some(Some(place)), Some(Some(value)), None) =
+            (values.next(), values.next(), values.next())
+        else {
+            return Err(format!("line {number} is '{line}'; it must be two numbers"));
+        };
+        let check = |column: &str, value: f64, largest: f64| {
+            if value.abs() <= largest {
+                Ok(())
+            } else {
+                Err(format!(
+                    "line {number}: {column} = {value} is outside the allowed range -{largest} to {largest}"
+                ))
+            }
+        };
+        check(columns.place, place, FARTHEST)?;
+        check(columns.value, value, columns.largest)?;
+        if points.last().is_some_and(|&(before, _)| place <= before) {
+            return Err(format!(
+                "line {number}: {} = {place} is not larger than in the row before",
+                columns.place
+            ));
+        }
+        if points.len() == MOST_ROWS {
+            return Err(format!("it has more than {MOST_ROWS} rows"));
+        }
+        points.push((place, value));
+    }
+    if points.len() < 2 {
+        return Err("it needs at least two rows of numbers".into());
+    }
+    Ok((pair, points))
+}
+
+/// Interpolates linearly between the rows; before the first and after the last one the value is
+/// constant.
+pub(crate) fn interpolated(points: &[(f64, f64)], place: f64) -> f64 {
+    let after = points.partition_point(|&(at, _)| at <= place);
+    match (points.get(after.wrapping_sub(1)), points.get(after)) {
+        (Some(&(from, one)), Some(&(to, other))) => {
+            one + (other - one) * ((place - from) / (to - from))
+        }
+        (Some(&(_, value)), None) | (None, Some(&(_, value))) => value,
+        (None, None) => 0.0,
+    }
+}
