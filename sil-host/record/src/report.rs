@@ -194,6 +194,11 @@ impl RunReport {
                 1e3 * self.final_reference_m
             ),
         );
+        // Held back by an edge, or not yet reached.
+        let is_short = |target_m: &f64| (target_m - self.final_reference_m).abs() > 5e-5;
+        if let Some(target_m) = self.requested_target_m.filter(is_short) {
+            row("requested", format!("{:+.2} mm", 1e3 * target_m));
+        }
         row("farthest tip", format!("{:+.2} mm", 1e3 * self.max_tip_t_m));
         let force = self
             .min_normal_force_n
