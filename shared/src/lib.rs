@@ -43,6 +43,7 @@ pub mod real;
 pub mod settings;
 mod square_root;
 pub mod status;
+pub mod stored;
 pub mod wire;
 
 pub use arm::{Arm, ArmParameters};

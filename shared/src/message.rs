@@ -9,10 +9,11 @@ use crate::black_box::BlackBox;
 use crate::counts::TorqueCounts;
 use crate::frame::{ActuatorFrame, SensorFrame};
 use crate::lapse::LapseCounts;
+use crate::stored::StoredConfiguration;
 
 /// Version of the messages' meaning: of [`Request`], [`Response`] and their encoding. New variants are
 /// added at the end, so that a host and a board of different versions can still compare this number.
-pub const PROTOCOL: u16 = 3;
+pub const PROTOCOL: u16 = 4;
 
 /// Longest encoded message, in bytes: a configuration with a full reference.
 pub const MAXIMUM_LENGTH: usize = 768;
@@ -52,6 +53,19 @@ pub enum Request<'a> {
     /// Commands torques with [`FrameSource::Commissioning`]; no response. The board limits them by its
     /// configuration, and they expire after 50 ms unless they are repeated.
     Torque([TorqueCounts; 2]),
+    /// Takes the torque off and stores a configuration, with which the board starts from then on, with
+    /// [`FrameSource::StandAlone`]; answered by [`Response::Stored`], [`Response::Refused`] or
+    /// [`Response::OtherBuild`].
+    Store {
+        /// Identifies the host's build.
+        build: u64,
+        /// Configuration of the controller, encoded by postcard.
+        configuration: &'a [u8],
+    },
+    /// Takes the torque off and erases the stored configuration; answered by [`Response::Stored`].
+    Forget,
+    /// Asks for the stored configuration; answered by [`Response::Stored`]. Changes nothing.
+    Stored,
 }
 
 /// Source of a controller's sensor frames.
@@ -67,12 +81,15 @@ pub enum FrameSource {
     DryRun,
     /// The same without a law: the host commands torques, by [`Request::Torque`], to commission the arm.
     Commissioning,
+    /// The same as [`FrameSource::Sensors`] without a host, with the configuration that the board has stored:
+    /// its own button permits the drive to arm.
+    StandAlone,
 }
 
 impl FrameSource {
     /// Returns whether the board reads its own sensors.
     pub fn is_on_board(self) -> bool {
-        matches!(self, Self::Sensors | Self::DryRun | Self::Commissioning)
+        !matches!(self, Self::Lockstep | Self::Realtime)
     }
 }
 
@@ -125,6 +142,8 @@ pub enum Response {
     },
     /// The record of the last reset, crash and fault.
     BlackBox(BlackBox),
+    /// The stored configuration.
+    Stored(StoredConfiguration),
 }
 
 /// Counters of a board since its configuration. Counters wrap.

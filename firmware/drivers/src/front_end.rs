@@ -39,6 +39,8 @@ pub struct FrontEndSettings {
     /// The arm on its belt; `None` if the mounting is still unknown, so that encoders and force cell cannot be
     /// checked against each other.
     pub arm: Option<Arm<f32>>,
+    /// Ticks for which RESET has to be pressed, with ENABLE open, to permit arming; `None` if only a host may.
+    pub button_ticks: Option<u32>,
 }
 
 /// Assembles the sensor frames of an arm.
@@ -50,6 +52,8 @@ pub struct FrontEnd {
     plausibility: Plausibility,
     sequence: u32,
     may_arm: bool,
+    /// Ticks for which RESET has been pressed, with ENABLE open.
+    pressed_ticks: u32,
     is_active: bool,
     is_fit: bool,
 }
@@ -67,6 +71,7 @@ impl FrontEnd {
             plausibility: Plausibility::default(),
             sequence: 0,
             may_arm: false,
+            pressed_ticks: 0,
             is_active: false,
             is_fit: false,
         }
@@ -101,6 +106,7 @@ impl FrontEnd {
     ) -> SensorFrame {
         let readings = self.readings(encoders, force_cell);
         let mut inputs = self.switches.tick(levels.enable, levels.reset);
+        self.note_button(levels);
         let contradiction = self.contradicts(&readings);
         let plausible = self.plausibility.tick(&readings, self.bits());
         self.is_fit = readings.are_complete() && levels.stages_ready;
@@ -129,6 +135,20 @@ impl FrontEnd {
             tangential_force: tangential.unwrap_or(NO_FORCE),
             inputs,
         }
+    }
+
+    /// Permits arming once the button has been pressed for long enough: a deliberate act of an operator who has
+    /// opened ENABLE.
+    fn note_button(&mut self, levels: InputLevels) {
+        let is_pressed = levels.reset && !levels.enable;
+        self.pressed_ticks = if is_pressed {
+            self.pressed_ticks.saturating_add(1)
+        } else {
+            0
+        };
+        let settings = self.settings.as_ref();
+        let limit = settings.and_then(|it| it.button_ticks);
+        self.may_arm |= limit.is_some_and(|limit| self.pressed_ticks >= limit);
     }
 
     /// Returns the resolutions of encoders and force cell, bits.

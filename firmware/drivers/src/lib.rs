@@ -1,4 +1,5 @@
-//! Drivers of the arm's sensors and switches over `embedded-hal`: the same code on the board and on a PC.
+//! Drivers of the arm's sensors and switches over `embedded-hal`, and of its configuration's memory over
+//! `embedded-storage`: the same code on the board and on a PC.
 //!
 //! - [`exchange`]: carries out a driver's exchanges on a SPI bus
 //! - [`encoders`]: two AS5048A magnetic encoders on one SPI bus
@@ -7,6 +8,7 @@
 //! - [`front_end`]: sensor frames from readings and switches, and the permission to arm
 //! - [`gap`]: checks encoders and force cell against each other
 //! - [`plausibility`]: checks that readings can come from an arm before the drive is armed
+//! - [`slots`]: keeps a configuration in flash over a loss of power
 //!
 //! A reading that a single disturbed bit could have changed is not passed on: each value is read twice, and
 //! again in the same tick if the two differ. If they still differ, the reading is lost for this tick, and
@@ -14,12 +16,16 @@
 
 #![no_std]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod encoders;
 pub mod exchange;
 pub mod force_cell;
 pub mod front_end;
 pub mod gap;
 pub mod plausibility;
+pub mod slots;
 pub mod switches;
 
 /// Reason for a missing reading in this tick.

@@ -26,6 +26,9 @@ use crate::sensor_bus::{SensorBus, SpiWords};
 /// finished control ticks feed the watchdogs.
 const IDLE_HZ: f32 = 1000.0;
 
+/// Time for which RESET has to be pressed to permit arming without a host, s.
+const BUTTON_S: f32 = 1.0;
+
 /// Bits of the torque stages' digital-to-analog converter.
 pub const CONVERTER_BITS: u8 = 12;
 
@@ -144,7 +147,7 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
         self.front_end.note_active(is_active);
         let is_driven = matches!(
             self.source,
-            FrameSource::Sensors | FrameSource::Commissioning
+            FrameSource::Sensors | FrameSource::Commissioning | FrameSource::StandAlone
         );
         if is_active && is_driven && self.front_end.is_fit() {
             let [torque_1, torque_2] = answer.torques;
@@ -179,6 +182,8 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
             force: converters.force,
             mounting: converters.mounting,
             arm,
+            button_ticks: (source == FrameSource::StandAlone)
+                .then_some((BUTTON_S * configuration.tick_hz) as u32),
         }));
         self.encoders.restart();
         self.force_cell.restart();

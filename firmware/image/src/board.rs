@@ -7,6 +7,8 @@ use painleve_shared::black_box::ResetCause;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::FrameSource;
 
+use crate::memory::ConfigurationMemory;
+
 /// Reason for a failed start of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub enum StartFault {
@@ -24,6 +26,8 @@ pub struct Parts<B: Board> {
     pub bytes: B::Bytes,
     /// Part of the link task.
     pub port: B::Port,
+    /// Part of the link task: keeps a configuration.
+    pub memory: B::Memory,
 }
 
 /// A microcontroller board with the arm, or a stand-in for it, on its pins.
@@ -36,6 +40,8 @@ pub trait Board {
     type Bytes: Bytes;
     /// Type that the link task owns.
     type Port: Port;
+    /// Type that keeps a configuration over a loss of power.
+    type Memory: ConfigurationMemory;
 
     /// Name, for the log.
     const NAME: &'static str;
@@ -48,6 +54,12 @@ pub trait Board {
     /// Returns the reason for the processor's last reset, and clears it.
     fn reset_cause() -> ResetCause {
         ResetCause::Unknown
+    }
+
+    /// Handles a non-maskable interrupt of the configuration's memory; returns whether it was one. Any other is
+    /// that of a stopped crystal.
+    fn take_memory_fault() -> bool {
+        false
     }
 
     /// Takes the torque off in any state of the program.

@@ -13,8 +13,7 @@ pub fn reset<B: Board>(crash: Crash) -> ! {
     SCB::sys_reset()
 }
 
-/// Declares the handlers of hard faults, of a stopped crystal (the non-maskable interrupt) and of unexpected
-/// interrupts, among them that of a low supply, for a board.
+/// Declares the handlers of hard faults, of the non-maskable interrupt and of unexpected interrupts, among them that of a low supply, for a board.
 #[macro_export]
 macro_rules! crash_handlers {
     ($board:ty) => {
@@ -32,10 +31,13 @@ macro_rules! crash_handlers {
             })
         }
 
-        /// Handles a crystal failure; the chip continues on its internal oscillator.
+        /// Handles a crystal failure, on which the chip continues on its internal oscillator, and a faulty word of
+        /// the configuration's memory.
         #[::cortex_m_rt::exception]
-        unsafe fn NonMaskableInt() -> ! {
-            $crate::crash::reset::<$board>(Crash::Clock)
+        unsafe fn NonMaskableInt() {
+            if !<$board as $crate::board::Board>::take_memory_fault() {
+                $crate::crash::reset::<$board>(Crash::Clock)
+            }
         }
 
         /// Handles low supply voltage, or an interrupt that no peripheral in use can have raised.

@@ -14,22 +14,15 @@ use core::panic::PanicInfo;
 use heapless::spsc::{Consumer, Producer};
 use painleve_firmware::drive::{Answered, ControlTask, TaskCounts};
 use painleve_firmware::law::Law;
-use painleve_firmware::supervise::lapses::Lapse;
-use painleve_firmware::{BUILD, Configuration};
 use painleve_shared::black_box::{Crash, FaultRecord};
-use painleve_shared::message::{
-    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Request, Response,
-};
+use painleve_shared::message::{FrameSource, Response};
 use painleve_shared::status::Fault;
-use painleve_shared::wire::{self, Inbox, WireError};
 use rtic::Mutex;
-use serde::de::DeserializeOwned;
 
 use crate::black_box;
-use crate::board::{Board, BoardDrive, Parts, Port};
+use crate::board::{Board, BoardDrive, Parts};
 use crate::stack;
 pub use crate::watch::Change;
-use crate::watch::health;
 
 /// Number of answers that may wait for the link.
 pub const ANSWERS: usize = 4;
@@ -56,7 +49,7 @@ pub struct Control<D, L: Law> {
     /// The fault latched at the last tick.
     fault: Option<Fault>,
     /// A newly latched fault, for the black box.
-    fault_to_record: Option<FaultRecord>,
+    pub(crate) fault_to_record: Option<FaultRecord>,
 }
 
 impl<D: BoardDrive, L: Law> Control<D, L> {
@@ -80,34 +73,11 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
                 SENSORS_SILENCE_MS
             }
             FrameSource::Lockstep | FrameSource::Realtime => FRAMES_SILENCE_MS,
+            FrameSource::StandAlone => return false,
         };
         // 32 bits hold 5 s at 100 kHz; dividing 64 would be a loop without a declared limit.
         let limit = limit_ms.saturating_mul(self.tick_hz) / 1000;
         self.tick_hz > 0 && self.silent_ticks > limit
-    }
-}
-
-/// State of the link task between calls.
-pub struct Link<L: Law> {
-    inbox: Inbox,
-    decoded: Option<Configuration<L>>,
-    received: [u8; MAXIMUM_LENGTH],
-}
-
-impl<L: Law> Link<L> {
-    /// Starts with an empty inbox.
-    pub const fn new() -> Self {
-        Self {
-            inbox: Inbox::new(),
-            decoded: None,
-            received: [0; MAXIMUM_LENGTH],
-        }
-    }
-}
-
-impl<L: Law> Default for Link<L> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -168,153 +138,6 @@ pub fn control<D: BoardDrive, L: Law>(
         *reported = change;
     }
     true
-}
-
-/// Sends the waiting answers, then serves requests until no bytes are left.
-pub fn link<D, L, P>(
-    mut control: impl Mutex<T = Control<D, L>>,
-    port: &mut P,
-    answers: &mut Consumer<'static, Response>,
-    state: &mut Link<L>,
-) where
-    D: BoardDrive,
-    L: Law + DeserializeOwned,
-    P: Port,
-{
-    let Link {
-        inbox,
-        decoded,
-        received,
-    } = state;
-    if let Some(fault) = control.lock(|control| control.fault_to_record.take()) {
-        black_box::note_fault(fault);
-    }
-    while let Some(answer) = answers.dequeue() {
-        send(port, &answer);
-    }
-    loop {
-        let length = port.receive(received);
-        if length == 0 {
-            return;
-        }
-        let mut awaits_control = false;
-        for byte in received.iter().take(length) {
-            let Some(message) = inbox.push(*byte) else {
-                continue;
-            };
-            let request = wire::decode(message);
-            control.lock(|control| {
-                note_message(&mut control.task, &request);
-                if request.is_ok() {
-                    control.silent_ticks = 0;
-                }
-            });
-            let response = match request {
-                Ok(Request::Sensor(frame)) => {
-                    control.lock(|control| control.task.drive_mut().offer(frame));
-                    awaits_control = true;
-                    continue;
-                }
-                Ok(Request::Configure { build, .. }) if build != BUILD => {
-                    control.lock(|control| control.task.stop());
-                    Response::OtherBuild { build: BUILD }
-                }
-                Ok(Request::Configure {
-                    source,
-                    configuration,
-                    ..
-                }) => {
-                    control.lock(|control| {
-                        control.task.stop();
-                        control.task.drive_mut().idle();
-                    });
-                    decode(decoded, configuration);
-                    decoded
-                        .as_ref()
-                        .and_then(|configuration| {
-                            control.lock(|control| {
-                                control.dropped_responses = 0;
-                                control.tick_hz = configuration.tick_hz as u32;
-                                control.task.configure(configuration, source).ok()?;
-                                let drive = control.task.drive_mut();
-                                drive.start(configuration, source);
-                                Some(drive.stopwatch_hz())
-                            })
-                        })
-                        .map_or(Response::Refused, |stopwatch_hz| Response::Ready {
-                            stopwatch_hz,
-                        })
-                }
-                Ok(Request::Health) => {
-                    let mut health =
-                        control.lock(|control| health(&control.task, control.dropped_responses));
-                    // Outside the lock: inspecting the stack takes too long to delay the control
-                    // task.
-                    health.stack_bytes = stack::high_water_bytes();
-                    Response::Health(health)
-                }
-                Ok(Request::BlackBox) => Response::BlackBox(black_box::read()),
-                Ok(Request::Alive) => continue,
-                Ok(Request::Torque(torques)) => {
-                    control.lock(|control| control.task.request_torques(torques));
-                    continue;
-                }
-                Ok(Request::Identify) => Response::Identity {
-                    protocol: PROTOCOL,
-                    build: BUILD,
-                },
-                Ok(Request::PermitArming(permitted)) => {
-                    Response::Permission(control.lock(|control| {
-                        let is_configured = control.task.lapse_counts().is_some();
-                        let drive = control.task.drive_mut();
-                        drive.permit_arming(permitted && is_configured)
-                    }))
-                }
-                Ok(Request::Stop) => {
-                    control.lock(|control| control.task.stop());
-                    Response::Stopped
-                }
-                Err(_) => continue,
-            };
-            send(port, &response);
-        }
-        if awaits_control && P::HALF_DUPLEX {
-            // `control` invokes this task again when it has an answer.
-            return;
-        }
-    }
-}
-
-/// Decodes a configuration; stores `None` if decoding fails.
-// Out of line: decoding and building the controller need the most stack, and their stack use must
-// not add up.
-#[inline(never)]
-fn decode<L: Law + DeserializeOwned>(configuration: &mut Option<Configuration<L>>, bytes: &[u8]) {
-    *configuration = None;
-    if let Ok(decoded) = postcard::from_bytes(bytes) {
-        *configuration = Some(decoded);
-    }
-}
-
-/// Counts broken messages; an intact one resets the count.
-fn note_message<D: BoardDrive, L: Law, M>(
-    task: &mut ControlTask<D, L>,
-    request: &Result<M, WireError>,
-) {
-    let broken = |kinds: &[WireError]| request.as_ref().is_err_and(|it| kinds.contains(it));
-    let checksum = broken(&[WireError::Checksum]);
-    let garbage = broken(&[WireError::Garbage, WireError::Content]);
-    task.note(Lapse::FailedChecksum, u32::from(checksum));
-    task.note(Lapse::Garbage, u32::from(garbage));
-}
-
-/// A response that the host does not accept is lost; the host asks again or gives up.
-#[inline(never)]
-fn send(port: &mut impl Port, response: &Response) {
-    let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
-    if let Ok(bytes) = wire::encode(response, &mut buffer) {
-        let _ = port.send(bytes);
-    }
 }
 
 /// Logs events and, once a second, the statistics.
@@ -384,7 +207,8 @@ macro_rules! tasks {
             use $crate::board::{Board, BoardDrive, Bytes, Parts, Port};
             use $crate::heapless::spsc::{Consumer, Producer, Queue};
             use $crate::painleve_shared::message::Response;
-            use $crate::tasks::{ANSWERS, Change, Control, EVENTS, Link};
+            use $crate::link::Link;
+            use $crate::tasks::{ANSWERS, Change, Control, EVENTS};
 
             use super::*;
 
@@ -402,6 +226,7 @@ macro_rules! tasks {
             struct Local {
                 bytes: <Hardware as Board>::Bytes,
                 port: <Hardware as Board>::Port,
+                memory: <Hardware as Board>::Memory,
                 answers_in: Producer<'static, Response>,
                 answers_out: Consumer<'static, Response>,
                 events_in: Producer<'static, Change>,
@@ -414,7 +239,7 @@ macro_rules! tasks {
                 events: Queue<Change, EVENTS> = Queue::new(),
             ])]
             fn init(cx: init::Context) -> (Shared, Local) {
-                let Parts { drive, bytes, port } =
+                let Parts { drive, bytes, port, memory } =
                     $crate::tasks::start::<Hardware>(cx.device, cx.core);
                 let (answers_in, answers_out) = cx.local.answers.split();
                 let (events_in, events_out) = cx.local.events.split();
@@ -423,6 +248,7 @@ macro_rules! tasks {
                 let local = Local {
                     bytes,
                     port,
+                    memory,
                     answers_in,
                     answers_out,
                     events_in,
@@ -462,10 +288,11 @@ macro_rules! tasks {
             }
 
             #[task(binds = $link, priority = 1, shared = [control],
-                   local = [port, answers_out, state: Link<Laws> = Link::new()])]
+                   local = [port, memory, answers_out, state: Link<Laws> = Link::new()])]
             fn link(cx: link::Context) {
                 let local = cx.local;
-                $crate::tasks::link(cx.shared.control, local.port, local.answers_out, local.state);
+                let (port, memory) = (local.port, local.memory);
+                $crate::link::link(cx.shared.control, port, memory, local.answers_out, local.state);
             }
 
             #[idle(shared = [control], local = [events_out])]

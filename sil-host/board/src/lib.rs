@@ -14,6 +14,7 @@ pub mod emulator;
 pub mod log;
 pub mod on_board;
 pub mod serial;
+pub mod stored;
 pub mod timing;
 
 use std::io;
@@ -24,6 +25,7 @@ use std::time::Duration;
 use painleve_plant::Configuration;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{Health, Response};
+use painleve_shared::stored::StoredState;
 use painleve_shared::wire::WireError;
 use serde::{Deserialize, Serialize};
 
@@ -147,6 +149,9 @@ pub enum BoardError {
         /// This program's protocol.
         host: u16,
     },
+    /// The board has not stored its configuration.
+    #[error("stored state {}: {}", .0.code(), .0.text())]
+    NotStored(StoredState),
     /// Image and program were built from different sources.
     #[error(
         "the image is of build {board:016x} and this program of build {host:016x}: build both from the same sources, see `cargo xtask build-fw`, and flash again"

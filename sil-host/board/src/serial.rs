@@ -57,7 +57,7 @@ pub struct Serial {
     pending: Vec<u8>,
     line: LineHealth,
     frame_patience: Duration,
-    silence_limit: Duration,
+    pub(crate) silence_limit: Duration,
     stopwatch_hz: u32,
 }
 
@@ -150,7 +150,8 @@ impl Serial {
             FrameSource::Realtime
             | FrameSource::Sensors
             | FrameSource::DryRun
-            | FrameSource::Commissioning => patience,
+            | FrameSource::Commissioning
+            | FrameSource::StandAlone => patience,
         };
         let configuration = super::encode(configuration)?;
         let request = Request::Configure {
@@ -200,7 +201,7 @@ impl Serial {
     }
 
     /// Sends a request, and repeats it with growing patience until it is answered.
-    fn ask(
+    pub(crate) fn ask(
         &mut self,
         request: &Request<'_>,
         mut patience: Duration,

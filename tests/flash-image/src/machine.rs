@@ -28,6 +28,8 @@ const FRAME_WORDS: usize = 26;
 pub trait Chip: Clone {
     /// Start and length of its flash.
     const FLASH: (u32, usize);
+    /// Start and length of the part of the flash that can be changed, its end.
+    const SLOTS: (u32, usize);
     /// Start and length of its RAM.
     const RAM: (u32, usize);
     /// Bytes of the RAM that can be mapped to address 0, where the flash is otherwise.
@@ -62,6 +64,12 @@ pub trait Chip: Clone {
 
     /// Returns the processor's clock, Hz; 0 if it has stopped.
     fn core_hz(&self) -> u64;
+
+    /// Returns whether the flash is busy, so that no instruction and no vector can be read from it.
+    fn flash_is_stalled(&self, now: Picoseconds) -> bool {
+        let _ = now;
+        false
+    }
 
     /// Returns whether the RAM, rather than the flash, is mapped to address 0.
     fn ram_is_at_zero(&self) -> bool;
@@ -189,6 +197,10 @@ impl<C: Chip> Surroundings for Core<C> {
         assert!(
             address as usize >= C::ALIASED_RAM || self.chip.ram_is_at_zero(),
             "{address:#010x} is executed before the RAM is mapped to it"
+        );
+        assert!(
+            address < C::FLASH.0 || address >= C::RAM.0 || !self.chip.flash_is_stalled(self.now),
+            "{address:#010x} is executed while the flash is busy"
         );
         let mut stop = None;
         if self.conditional == 0 {
@@ -341,13 +353,14 @@ impl<C: Chip> Machine<C> {
         };
         let mut unicorn = Unicorn::new(library, core)
             .unwrap_or_else(|error| panic!("{}: {error}", library.display()));
-        unicorn.map(C::FLASH.0, C::FLASH.1);
+        unicorn.map(C::FLASH.0, C::FLASH.1 - C::SLOTS.1);
         if C::ALIASED_RAM > 0 {
             unicorn.map_with_alias(C::RAM.0, C::RAM.1, 0, C::ALIASED_RAM);
         } else {
             unicorn.map(C::RAM.0, C::RAM.1);
         }
         unicorn.map_peripherals(&[
+            (C::SLOTS.0, C::SLOTS.1 as u32),
             (0x4000_0000, 0x0010_0000),
             (0x4200_0000, 0x0200_0000),
             (0x4800_0000, 0x0000_2000),
@@ -355,7 +368,8 @@ impl<C: Chip> Machine<C> {
             (0x1fff_7000, 0x0000_1000),
             (0xe000_0000, 0x0010_0000),
         ]);
-        unicorn.processor().write_memory(C::FLASH.0, &flash);
+        let program = &flash[..C::FLASH.1 - C::SLOTS.1];
+        unicorn.processor().write_memory(C::FLASH.0, program);
         let mut machine = Self {
             unicorn,
             symbols,
@@ -640,6 +654,10 @@ impl<C: Chip> Machine<C> {
         if vector < C::FLASH.0 && !core.chip.ram_is_at_zero() {
             vector += C::FLASH.0;
         }
+        assert!(
+            vector >= C::RAM.0 || !core.chip.flash_is_stalled(core.now),
+            "exception {exception} while the flash is busy"
+        );
         let mut handler = [0; 4];
         unicorn.processor().read_memory(vector, &mut handler);
         unicorn.set(Register::SP, frame_at);

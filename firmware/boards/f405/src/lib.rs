@@ -17,6 +17,7 @@
 #![no_std]
 #![cfg(target_os = "none")]
 
+pub mod flash;
 pub mod program_memory;
 pub mod safety;
 pub mod uart_dma;
@@ -28,6 +29,7 @@ use painleve_drivers::front_end::InputLevels;
 use painleve_image::arm_drive::{ArmDrive, ArmPins, NO_TORQUE};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
+use painleve_image::memory::FlashMemory;
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_shared::black_box::ResetCause;
 use painleve_stm32f4::spi::SpiPort;
@@ -40,6 +42,7 @@ use stm32f4xx_hal::rcc::{Config, Enable};
 use stm32f4xx_hal::serial::{Serial, config};
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
 
+use crate::flash::ConfigurationFlash;
 use crate::safety::Watchdogs;
 use crate::uart_dma::UartDma;
 
@@ -78,6 +81,7 @@ impl Board for F405 {
     type Drive = ArmDrive<F405Pins>;
     type Bytes = DmaBytes<UartDma>;
     type Port = DmaPort<UartDma>;
+    type Memory = FlashMemory<ConfigurationFlash>;
 
     const NAME: &'static str = "STM32F405";
 
@@ -168,7 +172,13 @@ impl Board for F405 {
             stages_ready: c.pc2.into_pull_down_input().erase(),
         };
         let drive = ArmDrive::new(pins, encoders, force_cell);
-        Ok(Parts { drive, bytes, port })
+        let memory = FlashMemory::new(ConfigurationFlash::new(device.FLASH));
+        Ok(Parts {
+            drive,
+            bytes,
+            port,
+            memory,
+        })
     }
 
     fn reset_cause() -> ResetCause {

@@ -7,8 +7,8 @@
 
 #![allow(unsafe_code)] // the linker's symbols
 
-// In assembly and in flash, because neither memory nor program are in place yet: copy, let exceptions find
-// their vectors in flash, map SRAM1 to address 0. Called by `safety`'s `__pre_init`, returns to its caller.
+// In assembly and in flash, because neither memory nor program are in place yet: copy the program and the
+// vectors, which must not be read from a flash that is being erased, map SRAM1 to address 0. Called by `safety`'s `__pre_init`, returns to its caller.
 core::arch::global_asm!(
     ".section .Reset, \"ax\", %progbits",
     ".global __copy_program",
@@ -25,8 +25,16 @@ core::arch::global_asm!(
     "stm r0!, {{r3, r12}}",
     "b 2b",
     "3:",
+    "ldr r0, ={sram1}",
+    "add r1, r0, #{vector_bytes}",
+    "ldr r2, =__vector_table",
+    "4:",
+    "ldm r2!, {{r3, r12}}",
+    "stm r0!, {{r3, r12}}",
+    "cmp r0, r1",
+    "bne 4b",
     "ldr r0, ={scb_vtor}",
-    "ldr r1, =__vector_table",
+    "ldr r1, ={sram1}",
     "str r1, [r0]",
     "ldr r0, ={rcc_apb2enr}",
     "ldr r1, [r0]",
@@ -42,6 +50,8 @@ core::arch::global_asm!(
     ".ltorg",
     ".size __copy_program, . - __copy_program",
     sram1 = const 0x2000_0000_u32,
+    // Vectors of 16 exceptions and 82 interrupts.
+    vector_bytes = const 4 * (16 + 82),
     scb_vtor = const 0xe000_ed08_u32,
     rcc_apb2enr = const 0x4002_3844_u32,
     syscfgen = const 1_u32 << 14,

@@ -27,9 +27,11 @@ use painleve_drivers::front_end::InputLevels;
 use painleve_image::arm_drive::{ArmDrive, ArmPins, NO_TORQUE};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
+use painleve_image::memory::FlashMemory;
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_shared::black_box::ResetCause;
 use painleve_stm32g4::clock::{self, CORE_HZ};
+use painleve_stm32g4::flash::{self, ConfigurationFlash};
 pub use painleve_stm32g4::pac;
 use painleve_stm32g4::pins::{Input, Output, Pins, Port};
 use painleve_stm32g4::spi::{SampledAt, SpiPort, Word};
@@ -72,6 +74,7 @@ impl Board for G474 {
     type Drive = ArmDrive<G474Pins>;
     type Bytes = DmaBytes<Usart2Dma>;
     type Port = DmaPort<Usart2Dma>;
+    type Memory = FlashMemory<ConfigurationFlash>;
 
     const NAME: &'static str = "NUCLEO-G474RE";
 
@@ -124,11 +127,21 @@ impl Board for G474 {
             stages_ready: pins.pulled_down_input(Port::C, 2),
         };
         let drive = ArmDrive::new(pins, encoders, force_cell);
-        Ok(Parts { drive, bytes, port })
+        let memory = FlashMemory::new(ConfigurationFlash::new(device.FLASH));
+        Ok(Parts {
+            drive,
+            bytes,
+            port,
+            memory,
+        })
     }
 
     fn reset_cause() -> ResetCause {
         clock::reset_cause()
+    }
+
+    fn take_memory_fault() -> bool {
+        flash::take_fault()
     }
 
     fn take_torque_off() {

@@ -20,6 +20,7 @@ use semihosting::io::{Read, Write};
 use stm32f4xx_hal::pac;
 
 use painleve_image::board::{Board, BoardDrive, Bytes, Parts, Port, StartFault};
+use painleve_image::memory::NoMemory;
 use painleve_stm32f4::timer;
 
 /// QEMU's timers count nanoseconds of virtual time, whatever the clock settings are.
@@ -33,6 +34,7 @@ impl Board for Qemu {
     type Drive = Timers;
     type Bytes = NoBytes;
     type Port = Pipes;
+    type Memory = NoMemory;
 
     const NAME: &'static str = "netduinoplus2 under QEMU";
 
@@ -47,6 +49,7 @@ impl Board for Qemu {
                 requests: File::open(c"requests").map_err(|_| StartFault::Link)?,
                 responses: File::create(c"responses").map_err(|_| StartFault::Link)?,
             },
+            memory: NoMemory,
         })
     }
 

@@ -9,6 +9,7 @@ use stm32f4xx_hal::serial::{Serial, config};
 
 use crate::pipes::{Qemu, Timers};
 use painleve_image::board::{Board, Parts, StartFault};
+use painleve_image::memory::NoMemory;
 use painleve_stm32f4::uart::{self, UartBytes, UartPort};
 
 /// The board; see the module's page.
@@ -19,6 +20,7 @@ impl Board for QemuSerial {
     type Drive = Timers;
     type Bytes = UartBytes;
     type Port = UartPort;
+    type Memory = NoMemory;
 
     const NAME: &'static str = "netduinoplus2 under QEMU, serial port";
 
@@ -37,6 +39,7 @@ impl Board for QemuSerial {
             drive: Timers::start(device.TIM2, device.TIM5),
             bytes,
             port,
+            memory: NoMemory,
         })
     }
 

@@ -8,6 +8,7 @@
 #![cfg(target_os = "none")]
 
 pub mod clock;
+pub mod flash;
 pub mod pins;
 pub mod spi;
 pub mod supply;

@@ -7,7 +7,7 @@ use cortex_m::peripheral::NVIC;
 use crate::{PATIENCE, comes, pac};
 
 /// Keys that open the flash's control register, and those that open the option bytes (RM0440, chapter FLASH: "Option bytes programming").
-const FLASH_KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
+pub(crate) const FLASH_KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
 
 /// Starts monitoring the supply: below 2.9 V the interrupt PVD_PVM is raised; below 2.8 V the chip is held in

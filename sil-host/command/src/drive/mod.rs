@@ -2,6 +2,7 @@
 
 mod history;
 mod operator;
+mod stored;
 mod view;
 
 use std::path::PathBuf;
@@ -47,6 +48,16 @@ pub struct DriveArguments {
     /// Run the controller on the arm's sensors with the torque stages off.
     #[arg(long)]
     dry_run: bool,
+    /// Store the configuration in the board's flash instead of driving: from then on the board starts with it
+    /// and needs no host.
+    #[arg(long, conflicts_with_all = ["dry_run", "stored", "forget"])]
+    store: bool,
+    /// Print whether the board has a configuration of its own.
+    #[arg(long, conflicts_with_all = ["dry_run", "forget"])]
+    stored: bool,
+    /// Erase the board's own configuration.
+    #[arg(long, conflicts_with = "dry_run")]
+    forget: bool,
     /// Stop after this time on the board's clock; by default, run until Ctrl-C or the command
     /// `stop`.
     #[arg(long, value_name = "SECONDS", value_parser = super::seconds)]
@@ -82,6 +93,9 @@ struct DriveReport {
 /// Connects to the board, configures it, and monitors it until the operator stops it.
 pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     let scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
+    if arguments.store || arguments.stored || arguments.forget {
+        return stored::run(arguments, &scenario);
+    }
     let interrupt = Interrupt::catch()?;
     let mut recorder = recorder(arguments, &scenario)?;
     let mut drive = Drive::open(arguments, &scenario)?;

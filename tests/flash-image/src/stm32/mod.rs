@@ -1,12 +1,14 @@
 //! What several families of microcontrollers have in common: pins, and peripherals with the same registers.
 
 mod dac;
+mod flash;
 mod gpio;
 mod timer;
 mod usart;
 mod watchdog;
 
 pub use dac::Dac;
+pub use flash::{FlashSlots, Power};
 pub use gpio::{Gpio, GpioReset};
 pub use timer::Timer;
 pub use usart::{Usart, UsartLayout};
@@ -79,6 +81,9 @@ pub trait WiredChip: Chip {
 
     /// Returns how often codes were written to the converter.
     fn dac_writes(&self) -> u64;
+
+    /// Returns the flash that keeps configurations.
+    fn slots_mut(&mut self) -> &mut FlashSlots;
 
     /// Stops the crystal.
     fn set_crystal(&mut self, failure: Crystal);

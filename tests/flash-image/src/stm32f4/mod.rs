@@ -8,13 +8,13 @@ mod spi;
 use self::dma::Dma;
 use self::rcc::Rcc;
 use self::spi::Spi;
-use crate::Picoseconds;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
-    Crystal, Dac, Gpio, GpioReset, Outside, Pin, PinMode, Timer, Usart, UsartLayout, Watchdog,
-    WindowWatchdog, WiredChip, bit_band, store_port,
+    Crystal, Dac, FlashSlots, Gpio, GpioReset, Outside, Pin, PinMode, Power, Timer, Usart,
+    UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band, store_port,
 };
 use crate::unicorn::Processor;
+use crate::{MICROSECOND, Picoseconds};
 
 /// Interrupt numbers.
 const PVD: usize = 1;
@@ -26,6 +26,20 @@ const DMA2_STREAMS: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
 
 /// Addresses of data registers that DMA serves.
 const USART1_DATA: u32 = 0x4001_1004;
+
+/// Bits of the flash's control register (RM0090, section 3.9.5).
+const LOCK: u32 = 1 << 31;
+const START: u32 = 1 << 16;
+const SECTOR_ERASE: u32 = 2;
+const PROGRAM: u32 = 1;
+const WIDTH: u32 = 3 << 8;
+
+/// Stores of four bytes.
+const WORDS: u32 = 2 << 8;
+
+/// First sector of the slots, and its length.
+const FIRST_SECTOR: u32 = 10;
+const SECTOR: usize = 128 << 10;
 
 /// After a reset the debugger's pins of ports A and B are alternate functions.
 fn gpio_reset(port: usize) -> GpioReset {
@@ -59,6 +73,9 @@ pub struct Stm32f4<O> {
     /// Supply voltage, mV.
     supply_mv: u32,
     flash_control: [u32; 8],
+    slots: FlashSlots,
+    /// Number of keys that have opened the flash's control register.
+    keys: usize,
     syscfg: [u32; 16],
     external_interrupts: [u32; 8],
     reset: Option<Reset>,
@@ -80,7 +97,9 @@ impl<O: Outside> Stm32f4<O> {
             dma: Default::default(),
             power: [0x4000, 0],
             supply_mv: 3300,
-            flash_control: [0, 0, 0, 0, 0x8000_0000, 0x0fff_aaed, 0, 0],
+            flash_control: [0, 0, 0, 0, LOCK, 0x0fff_aaed, 0, 0],
+            slots: FlashSlots::new(Self::SLOTS.1),
+            keys: 0,
             syscfg: [0; 16],
             external_interrupts: [0; 8],
             reset: None,
@@ -136,6 +155,7 @@ impl<O: Outside> Stm32f4<O> {
                 }
             }
             0x4002_3800 => self.rcc.read(offset, now),
+            0x4002_3c00 if offset == 0x0c => u32::from(self.slots.is_busy(now)) << 16,
             0x4002_3c00 => self.flash_control[((offset / 4) & 7) as usize],
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].read(offset),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].read(offset),
@@ -185,7 +205,7 @@ impl<O: Outside> Stm32f4<O> {
                 }
             }
             0x4002_3800 => self.rcc.write(offset, value, now),
-            0x4002_3c00 => self.store_flash(offset, value),
+            0x4002_3c00 => self.store_flash(offset, value, now),
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].write(offset, value),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].write(offset, value),
             0x4000_0000 | 0x4000_2c00 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000
@@ -196,9 +216,26 @@ impl<O: Outside> Stm32f4<O> {
         }
     }
 
-    /// Handles the keys that unlock the option bytes, which hold the brown-out level.
-    fn store_flash(&mut self, offset: u32, value: u32) {
+    /// Handles the keys that unlock the option bytes, which hold the brown-out level, and those that unlock the
+    /// control register.
+    fn store_flash(&mut self, offset: u32, value: u32, now: Picoseconds) {
+        let is_open = self.flash_control[4] & LOCK == 0;
         match (offset, value) {
+            (0x04, 0x4567_0123) => self.keys = 1,
+            (0x04, 0xcdef_89ab) if self.keys == 1 => self.flash_control[4] &= !LOCK,
+            (0x04 | 0x0c, _) => {}
+            (0x10, _) if !is_open => {}
+            (0x10, _) => {
+                assert!(!self.slots.is_busy(now), "the flash is busy");
+                self.flash_control[4] = value & !START;
+                self.keys *= usize::from(value & LOCK == 0);
+                if value & START != 0 && value & SECTOR_ERASE != 0 {
+                    assert_eq!(value & WIDTH, WORDS, "the width of an erasure");
+                    let slot = (value >> 3 & 15) - FIRST_SECTOR;
+                    let power = self.slots.erase(slot as usize * SECTOR, SECTOR, now);
+                    self.note_power(power);
+                }
+            }
             (0x08, 0x0819_2a3b) => self.flash_control[2] = 1,
             (0x08, 0x4c5d_6e7f) if self.flash_control[2] == 1 => self.flash_control[5] &= !1,
             (0x14, _) if self.flash_control[5] & 1 == 0 => self.flash_control[5] = value & !2,
@@ -209,8 +246,29 @@ impl<O: Outside> Stm32f4<O> {
     }
 }
 
+impl<O> Stm32f4<O> {
+    fn note_power(&mut self, power: Power) {
+        if power == Power::Failed {
+            self.reset = Some(Reset::Power);
+        }
+    }
+
+    fn store_slot(&mut self, offset: u32, word: u32, size: u32, now: Picoseconds) {
+        let control = self.flash_control[4];
+        assert!(!self.slots.is_busy(now), "the flash is busy");
+        assert_eq!(size, 4, "the width of a store");
+        assert_eq!(control & (LOCK | WIDTH | PROGRAM), WORDS | PROGRAM);
+        let until = now + 16 * MICROSECOND;
+        let power = self
+            .slots
+            .program(offset as usize, &word.to_le_bytes(), until);
+        self.note_power(power);
+    }
+}
+
 impl<O: Outside> Chip for Stm32f4<O> {
     const FLASH: (u32, usize) = (0x0800_0000, 1 << 20);
+    const SLOTS: (u32, usize) = (0x080c_0000, 2 * SECTOR);
     const RAM: (u32, usize) = (0x2000_0000, 128 << 10);
     const ALIASED_RAM: usize = 112 << 10;
 
@@ -231,6 +289,9 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.dma = Default::default();
         self.power = [0x4000, 0];
         self.flash_control[2] = 0;
+        self.flash_control[4] = LOCK;
+        self.keys = 0;
+        self.slots.reset();
         self.flash_control[5] |= 1;
         self.syscfg = [0; 16];
         self.external_interrupts = [0; 8];
@@ -241,7 +302,13 @@ impl<O: Outside> Chip for Stm32f4<O> {
         if let Some((word, bit)) = bit_band(address) {
             return self.load(word, now) >> bit & 1;
         }
-        let word = self.load(address & !3, now);
+        let word = match address.checked_sub(Self::SLOTS.0) {
+            Some(offset) if offset < Self::SLOTS.1 as u32 => {
+                assert!(!self.slots.is_busy(now), "the flash is busy");
+                self.slots.word(offset)
+            }
+            _ => self.load(address & !3, now),
+        };
         let value = word >> (8 * (address & 3));
         match size {
             1 => value & 0xff,
@@ -254,6 +321,11 @@ impl<O: Outside> Chip for Stm32f4<O> {
         if let Some((word, bit)) = bit_band(address) {
             let before = self.load(word, now);
             return self.store(word, before & !(1 << bit) | (value & 1) << bit, now);
+        }
+        if let Some(offset) = address.checked_sub(Self::SLOTS.0)
+            && offset < Self::SLOTS.1 as u32
+        {
+            return self.store_slot(offset, value, size, now);
         }
         // A narrow store to a peripheral writes only its own bytes of the register.
         assert!(address & 3 == 0 || size == 4, "store to {address:#010x}");
@@ -299,6 +371,11 @@ impl<O: Outside> Chip for Stm32f4<O> {
             .min(self.watchdog.expires())
             .min(self.window_watchdog.expires())
             .min(if dma { 0 } else { Picoseconds::MAX })
+    }
+
+    /// The flash has one bank.
+    fn flash_is_stalled(&self, now: Picoseconds) -> bool {
+        self.slots.is_busy(now)
     }
 
     /// Returns whether SYSCFG_MEMRMP maps SRAM1 to address 0 (RM0090, section 9.2.1).
@@ -385,6 +462,10 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
 
     fn reset_pin(&mut self) {
         self.reset = Some(Reset::Pin);
+    }
+
+    fn slots_mut(&mut self) -> &mut FlashSlots {
+        &mut self.slots
     }
 
     fn set_crystal(&mut self, failure: Crystal) {

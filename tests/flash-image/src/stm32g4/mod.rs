@@ -7,13 +7,13 @@ mod spi;
 use self::dma::{Dma, Request};
 use self::rcc::{Rcc, bus};
 use self::spi::Spi;
-use crate::Picoseconds;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
-    Crystal, Dac, Gpio, GpioReset, Outside, Pin, PinMode, Timer, Usart, UsartLayout, Watchdog,
-    WindowWatchdog, WiredChip, bit_band, store_port,
+    Crystal, Dac, FlashSlots, Gpio, GpioReset, Outside, Pin, PinMode, Power, Timer, Usart,
+    UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band, store_port,
 };
 use crate::unicorn::Processor;
+use crate::{MICROSECOND, Picoseconds};
 
 /// Interrupt numbers.
 const PVD: usize = 1;
@@ -38,6 +38,18 @@ const WITHOUT_BOOST_HZ: u64 = 150_000_000;
 
 /// Highest clock per wait state of the flash, in boost mode, Hz.
 const PER_WAIT_STATE_HZ: u64 = 34_000_000;
+
+/// Bits of the flash's control register.
+const LOCK: u32 = 1 << 31;
+const OPTION_LOCK: u32 = 1 << 30;
+const START: u32 = 1 << 16;
+const SECOND_BANK: u32 = 1 << 11;
+const PAGE_ERASE: u32 = 2;
+const PROGRAM: u32 = 1;
+
+/// First page of the slots in the second bank, and its length.
+const FIRST_PAGE: u32 = 126;
+const PAGE: usize = 2 << 10;
 
 /// After a reset all pins are analogue, except the debugger's.
 fn gpio_reset(port: usize) -> GpioReset {
@@ -70,6 +82,12 @@ pub struct Stm32g4<O> {
     flash_control: [u32; 16],
     /// Number of keys that have opened the flash's control register and the option bytes.
     keys: [usize; 2],
+    slots: FlashSlots,
+    /// The first half of a double word that is written.
+    half: Option<(u32, u32)>,
+    /// Whether a word that cannot be corrected has been read, and its interrupt is pending.
+    is_uncorrectable: bool,
+    has_memory_nmi: bool,
     external_interrupts: [u32; 16],
     reset: Option<Reset>,
 }
@@ -126,6 +144,8 @@ impl<O: Outside> Stm32g4<O> {
             0x4002_0000 => self.dma.read(offset),
             0x4002_0800 => self.dma.read_multiplexer(offset),
             0x4002_1000 => self.rcc.read(offset, now),
+            0x4002_2000 if offset == 0x10 => u32::from(self.slots.is_busy(now)) << 16,
+            0x4002_2000 if offset == 0x18 => u32::from(self.is_uncorrectable) << 31,
             0x4002_2000 => self.flash_control[((offset / 4) & 15) as usize],
             0x5000_0800 => self.dac.read(offset),
             _ => self.ports[(address >> 10 & 7) as usize].read(offset),
@@ -155,7 +175,7 @@ impl<O: Outside> Stm32g4<O> {
                 self.rcc.write(offset, value, now);
                 self.check_clock(before);
             }
-            0x4002_2000 => self.store_flash(offset, value),
+            0x4002_2000 => self.store_flash(offset, value, now),
             0x5000_0800 => self.dac.write(offset, value),
             _ => {
                 let port = (address >> 10 & 7) as usize;
@@ -185,9 +205,7 @@ impl<O: Outside> Stm32g4<O> {
     }
 
     /// Handles the keys that unlock the option bytes, which hold the brown-out level.
-    fn store_flash(&mut self, offset: u32, value: u32) {
-        const LOCK: u32 = 1 << 31;
-        const OPTION_LOCK: u32 = 1 << 30;
+    fn store_flash(&mut self, offset: u32, value: u32, now: Picoseconds) {
         match (offset, value, self.keys) {
             (0x08, 0x4567_0123, _) => self.keys[0] = 1,
             (0x08, 0xcdef_89ab, [1, _]) => self.flash_control[5] &= !LOCK,
@@ -197,14 +215,64 @@ impl<O: Outside> Stm32g4<O> {
                 self.flash_control[8] = value;
             }
             (0x00, ..) => self.flash_control[0] = value,
-            (0x14, ..) if self.flash_control[5] & LOCK == 0 => self.flash_control[5] = value,
+            (0x14, ..) if self.flash_control[5] & LOCK == 0 => {
+                assert!(!self.slots.is_busy(now), "the flash is busy");
+                self.flash_control[5] = value & !START;
+                if value & LOCK != 0 {
+                    self.keys[0] = 0;
+                }
+                if value & START != 0 && value & PAGE_ERASE != 0 {
+                    assert!(value & SECOND_BANK != 0, "the program's bank");
+                    let slot = ((value >> 3 & 0x7f) - FIRST_PAGE) as usize;
+                    let power = self.slots.erase(slot * PAGE, PAGE, now);
+                    self.note_power(power);
+                }
+            }
+            (0x18, ..) if value & 1 << 31 != 0 => self.is_uncorrectable = false,
             _ => {}
         }
     }
 }
 
+impl<O> Stm32g4<O> {
+    fn note_power(&mut self, power: Power) {
+        if power == Power::Failed {
+            self.reset = Some(Reset::Power);
+        }
+    }
+
+    fn load_slot(&mut self, offset: u32, now: Picoseconds) -> u32 {
+        assert!(!self.slots.is_busy(now), "the bank is busy");
+        if self.slots.is_uncorrectable(offset) && !self.is_uncorrectable {
+            self.is_uncorrectable = true;
+            self.has_memory_nmi = true;
+        }
+        self.slots.word(offset)
+    }
+
+    /// Two stores of a word write a double word, which must be erased.
+    fn store_slot(&mut self, offset: u32, word: u32, size: u32, now: Picoseconds) {
+        assert!(!self.slots.is_busy(now), "the bank is busy");
+        assert_eq!(size, 4, "the width of a store");
+        assert_eq!(self.flash_control[5] & (LOCK | PROGRAM), PROGRAM);
+        let Some((first, low)) = self.half.take() else {
+            assert_eq!(offset % 8, 0);
+            self.half = Some((offset, word));
+            return;
+        };
+        assert_eq!(offset, first + 4);
+        let is_erased = [first, offset].map(|it| self.slots.word(it)) == [u32::MAX; 2];
+        assert!(is_erased, "a double word is written twice");
+        let unit = (u64::from(word) << 32 | u64::from(low)).to_le_bytes();
+        let until = now + 82 * MICROSECOND;
+        let power = self.slots.program(first as usize, &unit, until);
+        self.note_power(power);
+    }
+}
+
 impl<O: Outside> Chip for Stm32g4<O> {
     const FLASH: (u32, usize) = (0x0800_0000, 512 << 10);
+    const SLOTS: (u32, usize) = (0x0807_f000, 2 * PAGE);
     const RAM: (u32, usize) = (0x2000_0000, 96 << 10);
     const ALIASED_RAM: usize = 0;
 
@@ -230,6 +298,10 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.flash_control[0] = 0x600;
         self.flash_control[5] = 0xc000_0000;
         self.keys = [0; 2];
+        self.slots.reset();
+        self.half = None;
+        self.is_uncorrectable = false;
+        self.has_memory_nmi = false;
         self.external_interrupts = [0; 16];
         self.reset = None;
     }
@@ -238,7 +310,10 @@ impl<O: Outside> Chip for Stm32g4<O> {
         if let Some((word, bit)) = bit_band(address) {
             return self.load(word, 4, now) >> bit & 1;
         }
-        let word = self.load(address & !3, size, now);
+        let word = match address.checked_sub(Self::SLOTS.0) {
+            Some(offset) if offset < Self::SLOTS.1 as u32 => self.load_slot(offset, now),
+            _ => self.load(address & !3, size, now),
+        };
         let value = word >> (8 * (address & 3));
         match size {
             1 => value & 0xff,
@@ -248,6 +323,11 @@ impl<O: Outside> Chip for Stm32g4<O> {
     }
 
     fn write(&mut self, address: u32, size: u32, value: u32, now: Picoseconds) {
+        if let Some(offset) = address.checked_sub(Self::SLOTS.0)
+            && offset < Self::SLOTS.1 as u32
+        {
+            return self.store_slot(offset, value, size, now);
+        }
         assert!(bit_band(address).is_none(), "store to {address:#010x}");
         assert!(address & 3 == 0 || size == 4, "store to {address:#010x}");
         self.store(address, value, size, now);
@@ -308,7 +388,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
     }
 
     fn take_nmi(&mut self) -> bool {
-        self.rcc.nmi
+        std::mem::take(&mut self.has_memory_nmi) || self.rcc.nmi
     }
 
     fn wants_reset(&self) -> bool {
@@ -347,6 +427,10 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
             supply_mv: 3300,
             flash_control,
             keys: [0; 2],
+            slots: FlashSlots::new(Self::SLOTS.1),
+            half: None,
+            is_uncorrectable: false,
+            has_memory_nmi: false,
             external_interrupts: [0; 16],
             reset: None,
         }
@@ -389,6 +473,10 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
 
     fn reset_pin(&mut self) {
         self.reset = Some(Reset::Pin);
+    }
+
+    fn slots_mut(&mut self) -> &mut FlashSlots {
+        &mut self.slots
     }
 
     fn set_crystal(&mut self, failure: Crystal) {

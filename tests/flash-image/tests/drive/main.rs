@@ -5,6 +5,7 @@
 
 mod commissioning;
 mod rig;
+mod stored;
 
 use std::io::{Read, Write};
 use std::process::Output;

@@ -1,0 +1,286 @@
+//! The link task: requests from the host, responses to it; and the start with the board's own configuration.
+
+use heapless::spsc::Consumer;
+use painleve_drivers::slots::NotWritten;
+use painleve_firmware::drive::ControlTask;
+use painleve_firmware::law::Law;
+use painleve_firmware::supervise::lapses::Lapse;
+use painleve_firmware::{BUILD, Configuration};
+use painleve_shared::message::{
+    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Request, Response,
+};
+use painleve_shared::stored::{StoredConfiguration, StoredState};
+use painleve_shared::wire::{self, Inbox, WireError};
+use rtic::Mutex;
+use serde::de::DeserializeOwned;
+
+use crate::black_box;
+use crate::board::{BoardDrive, Port};
+use crate::memory::ConfigurationMemory;
+use crate::stack;
+use crate::tasks::Control;
+use crate::watch::health;
+
+/// State of the link task between calls.
+pub struct Link<L: Law> {
+    inbox: Inbox,
+    decoded: Option<Configuration<L>>,
+    received: [u8; MAXIMUM_LENGTH],
+    /// The stored configuration, as found at the start or stored since; `None` before the first call.
+    stored: Option<StoredConfiguration>,
+}
+
+impl<L: Law> Link<L> {
+    /// Starts with an empty inbox.
+    pub const fn new() -> Self {
+        Self {
+            inbox: Inbox::new(),
+            decoded: None,
+            received: [0; MAXIMUM_LENGTH],
+            stored: None,
+        }
+    }
+}
+
+impl<L: Law> Default for Link<L> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Sends the waiting answers, then serves requests until no bytes are left.
+pub fn link<D, L, P, M>(
+    mut control: impl Mutex<T = Control<D, L>>,
+    port: &mut P,
+    memory: &mut M,
+    answers: &mut Consumer<'static, Response>,
+    state: &mut Link<L>,
+) where
+    D: BoardDrive,
+    L: Law + DeserializeOwned,
+    P: Port,
+    M: ConfigurationMemory,
+{
+    let Link {
+        inbox,
+        decoded,
+        received,
+        stored,
+    } = state;
+    let stored = stored.get_or_insert_with(|| start_alone(&mut control, memory, decoded));
+    if let Some(fault) = control.lock(|control| control.fault_to_record.take()) {
+        black_box::note_fault(fault);
+    }
+    while let Some(answer) = answers.dequeue() {
+        send(port, &answer);
+    }
+    loop {
+        let length = port.receive(received);
+        if length == 0 {
+            return;
+        }
+        let mut awaits_control = false;
+        for byte in received.iter().take(length) {
+            let Some(message) = inbox.push(*byte) else {
+                continue;
+            };
+            let request = wire::decode(message);
+            control.lock(|control| {
+                note_message(&mut control.task, &request);
+                if request.is_ok() {
+                    control.silent_ticks = 0;
+                }
+            });
+            let response = match request {
+                Ok(Request::Sensor(frame)) => {
+                    control.lock(|control| control.task.drive_mut().offer(frame));
+                    awaits_control = true;
+                    continue;
+                }
+                Ok(Request::Configure { build, .. }) if build != BUILD => {
+                    control.lock(|control| control.task.stop());
+                    Response::OtherBuild { build: BUILD }
+                }
+                Ok(Request::Configure {
+                    source,
+                    configuration,
+                    ..
+                }) => {
+                    stop(&mut control);
+                    configure(&mut control, decoded, configuration, source)
+                        .map_or(Response::Refused, |stopwatch_hz| Response::Ready {
+                            stopwatch_hz,
+                        })
+                }
+                Ok(Request::Store { build, .. }) if M::IS_THERE && build != BUILD => {
+                    control.lock(|control| control.task.stop());
+                    Response::OtherBuild { build: BUILD }
+                }
+                Ok(Request::Store { configuration, .. }) if M::IS_THERE => {
+                    stop(&mut control);
+                    let source = FrameSource::StandAlone;
+                    let accepted = configure(&mut control, decoded, configuration, source);
+                    stop(&mut control);
+                    match accepted {
+                        None => Response::Refused,
+                        Some(_) => {
+                            let written = memory.store(BUILD, configuration);
+                            note_written(stored, written)
+                        }
+                    }
+                }
+                Ok(Request::Forget) if M::IS_THERE => {
+                    stop(&mut control);
+                    let written = memory.forget().map(|()| 0);
+                    note_written(stored, written)
+                }
+                Ok(Request::Store { .. } | Request::Forget | Request::Stored) => {
+                    Response::Stored(*stored)
+                }
+                Ok(Request::Health) => {
+                    let mut health =
+                        control.lock(|control| health(&control.task, control.dropped_responses));
+                    // Outside the lock: inspecting the stack takes too long to delay the control
+                    // task.
+                    health.stack_bytes = stack::high_water_bytes();
+                    Response::Health(health)
+                }
+                Ok(Request::BlackBox) => Response::BlackBox(black_box::read()),
+                Ok(Request::Alive) => continue,
+                Ok(Request::Torque(torques)) => {
+                    control.lock(|control| control.task.request_torques(torques));
+                    continue;
+                }
+                Ok(Request::Identify) => Response::Identity {
+                    protocol: PROTOCOL,
+                    build: BUILD,
+                },
+                Ok(Request::PermitArming(permitted)) => {
+                    Response::Permission(control.lock(|control| {
+                        let is_configured = control.task.lapse_counts().is_some();
+                        let drive = control.task.drive_mut();
+                        drive.permit_arming(permitted && is_configured)
+                    }))
+                }
+                Ok(Request::Stop) => {
+                    control.lock(|control| control.task.stop());
+                    Response::Stopped
+                }
+                Err(_) => continue,
+            };
+            send(port, &response);
+        }
+        if awaits_control && P::HALF_DUPLEX {
+            // `control` invokes this task again when it has an answer.
+            return;
+        }
+    }
+}
+
+/// Takes the torque off and waits for a configuration.
+#[inline(never)]
+fn stop<D: BoardDrive, L: Law>(control: &mut impl Mutex<T = Control<D, L>>) {
+    control.lock(|control| {
+        control.task.stop();
+        control.task.drive_mut().idle();
+    });
+}
+
+/// Starts with a configuration, encoded by postcard; returns the frequency of the stopwatch, Hz, or `None` if
+/// it is refused.
+fn configure<D: BoardDrive, L: Law + DeserializeOwned>(
+    control: &mut impl Mutex<T = Control<D, L>>,
+    decoded: &mut Option<Configuration<L>>,
+    bytes: &[u8],
+    source: FrameSource,
+) -> Option<u32> {
+    decode(decoded, bytes);
+    let configuration = decoded.as_ref()?;
+    control.lock(|control| {
+        control.dropped_responses = 0;
+        control.tick_hz = configuration.tick_hz as u32;
+        control.task.configure(configuration, source).ok()?;
+        let drive = control.task.drive_mut();
+        drive.start(configuration, source);
+        Some(drive.stopwatch_hz())
+    })
+}
+
+/// Starts with the configuration that the board has stored, if it has one.
+#[inline(never)]
+fn start_alone<D: BoardDrive, L: Law + DeserializeOwned, M: ConfigurationMemory>(
+    control: &mut impl Mutex<T = Control<D, L>>,
+    memory: &mut M,
+    decoded: &mut Option<Configuration<L>>,
+) -> StoredConfiguration {
+    let Some((content, bytes)) = memory.newest() else {
+        let state = if M::IS_THERE {
+            StoredState::Empty
+        } else {
+            StoredState::NoMemory
+        };
+        return StoredConfiguration { state, version: 0 };
+    };
+    let state = if content.build != BUILD {
+        StoredState::OtherBuild
+    } else if configure(control, decoded, bytes, FrameSource::StandAlone).is_none() {
+        StoredState::Refused
+    } else {
+        StoredState::Intact
+    };
+    let version = content.version;
+    StoredConfiguration { state, version }
+}
+
+/// Records what has been stored, version 0 for nothing.
+fn note_written(stored: &mut StoredConfiguration, written: Result<u32, NotWritten>) -> Response {
+    let written = match written {
+        Ok(0) => StoredConfiguration::default(),
+        Ok(version) => StoredConfiguration {
+            state: StoredState::Intact,
+            version,
+        },
+        Err(NotWritten) => StoredConfiguration {
+            state: StoredState::NotWritten,
+            ..*stored
+        },
+    };
+    *stored = written;
+    Response::Stored(written)
+}
+
+/// Decodes a configuration; stores `None` if decoding fails.
+// Out of line: decoding and building the controller need the most stack, and their stack use must
+// not add up.
+#[inline(never)]
+fn decode<L: Law + DeserializeOwned>(configuration: &mut Option<Configuration<L>>, bytes: &[u8]) {
+    *configuration = None;
+    if let Ok(decoded) = postcard::from_bytes(bytes) {
+        *configuration = Some(decoded);
+    }
+}
+
+/// Counts broken messages; an intact one resets the count.
+fn note_message<D: BoardDrive, L: Law, M>(
+    task: &mut ControlTask<D, L>,
+    request: &Result<M, WireError>,
+) {
+    if task.source() == FrameSource::StandAlone {
+        // Nothing may be connected to the line.
+        return;
+    }
+    let broken = |kinds: &[WireError]| request.as_ref().is_err_and(|it| kinds.contains(it));
+    let checksum = broken(&[WireError::Checksum]);
+    let garbage = broken(&[WireError::Garbage, WireError::Content]);
+    task.note(Lapse::FailedChecksum, u32::from(checksum));
+    task.note(Lapse::Garbage, u32::from(garbage));
+}
+
+/// A response that the host does not accept is lost; the host asks again or gives up.
+#[inline(never)]
+fn send(port: &mut impl Port, response: &Response) {
+    let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
+    if let Ok(bytes) = wire::encode(response, &mut buffer) {
+        let _ = port.send(bytes);
+    }
+}

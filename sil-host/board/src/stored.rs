@@ -1,0 +1,85 @@
+//! The configuration that a board keeps in its flash.
+
+use std::path::Path;
+use std::time::Duration;
+
+use painleve_firmware::BUILD;
+use painleve_plant::Configuration;
+use painleve_shared::message::{Request, Response};
+use painleve_shared::stored::{StoredConfiguration, StoredState};
+
+use crate::{BoardError, Serial};
+
+/// Longest wait for the erasure of two sectors.
+const ERASURE: Duration = Duration::from_secs(10);
+
+/// A board that is asked about its own configuration.
+pub struct StoringBoard(Serial);
+
+impl StoringBoard {
+    /// Connects, and compares protocol and build.
+    ///
+    /// # Errors
+    /// [`BoardError::Port`], [`BoardError::Silent`], [`BoardError::OtherProtocol`] or
+    /// [`BoardError::OtherBuild`].
+    pub fn open(path: &Path) -> Result<Self, BoardError> {
+        let mut serial = Serial::connect(path)?;
+        serial.identify()?;
+        serial.silence_limit = ERASURE;
+        Ok(Self(serial))
+    }
+
+    /// Stores a configuration, with which the board starts from then on. Takes the torque off.
+    ///
+    /// # Errors
+    /// [`BoardError::Refused`], [`BoardError::NotStored`] or [`BoardError::Silent`].
+    pub fn store(
+        &mut self,
+        configuration: &Configuration,
+    ) -> Result<StoredConfiguration, BoardError> {
+        let configuration = super::encode(configuration)?;
+        self.change(&Request::Store {
+            build: BUILD,
+            configuration: &configuration,
+        })
+    }
+
+    /// Erases the stored configuration. Takes the torque off.
+    ///
+    /// # Errors
+    /// [`BoardError::NotStored`] or [`BoardError::Silent`].
+    pub fn forget(&mut self) -> Result<StoredConfiguration, BoardError> {
+        self.change(&Request::Forget)
+    }
+
+    /// Returns what the board has stored.
+    ///
+    /// # Errors
+    /// [`BoardError::Silent`] if the board does not answer.
+    pub fn stored(&mut self) -> Result<StoredConfiguration, BoardError> {
+        self.ask(&Request::Stored)
+    }
+
+    fn change(&mut self, request: &Request<'_>) -> Result<StoredConfiguration, BoardError> {
+        let stored = self.ask(request)?;
+        match stored.state {
+            StoredState::Empty | StoredState::Intact => Ok(stored),
+            state => Err(BoardError::NotStored(state)),
+        }
+    }
+
+    fn ask(&mut self, request: &Request<'_>) -> Result<StoredConfiguration, BoardError> {
+        let is_wanted = |response: &Response| {
+            matches!(
+                response,
+                Response::Stored(_) | Response::Refused | Response::OtherBuild { .. }
+            )
+        };
+        // Not repeated meanwhile: every repetition would store it again.
+        match self.0.ask(request, ERASURE, is_wanted)? {
+            Response::Stored(stored) => Ok(stored),
+            Response::OtherBuild { build } => Err(BoardError::other_build(build)),
+            _ => Err(BoardError::Refused),
+        }
+    }
+}

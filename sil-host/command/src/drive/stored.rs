@@ -1,0 +1,36 @@
+//! `painleve drive --store`, `--stored`, `--forget`: the configuration that the board keeps in its flash.
+
+use painleve_board::stored::StoringBoard;
+use painleve_plant::scenario::Scenario;
+use painleve_shared::stored::StoredState;
+
+use super::DriveArguments;
+use crate::output_error::output;
+use crate::{CommandError, say};
+
+/// Asks the board for its own configuration, or changes it.
+pub fn run(arguments: &DriveArguments, scenario: &Scenario) -> Result<(), CommandError> {
+    let mut board = StoringBoard::open(&arguments.port)?;
+    let stored = if arguments.store {
+        board.store(&scenario.controller_configuration())?
+    } else if arguments.forget {
+        board.forget()?
+    } else {
+        board.stored()?
+    };
+    if arguments.json {
+        return say(serde_json::to_string(&stored).map_err(output)?);
+    }
+    say(format!(
+        "stored state {}: {}",
+        stored.state.code(),
+        stored.state.text()
+    ))?;
+    if stored.state == StoredState::Intact {
+        say(format!(
+            "version {}; to arm the drive: press RESET for a second with ENABLE open, then close ENABLE",
+            stored.version
+        ))?;
+    }
+    Ok(())
+}
