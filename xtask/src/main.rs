@@ -1,5 +1,6 @@
 //! Chores of the workspace, as `cargo xtask …`; one local command equals CI.
 
+mod bench;
 mod boards;
 mod build_fw;
 mod chaos;
@@ -51,6 +52,8 @@ enum Chore {
     Fuzz(fuzz::FuzzArguments),
     /// Simulate a day with a fault in every minute, after which every counter must be exact.
     Soak(soak::SoakArguments),
+    /// Measure the figures of docs/benchmarks.md on this machine, pinned, and write its table.
+    Bench(bench::BenchArguments),
     /// Run the steps of continuous integration: formatting, clippy, every test.
     Ci,
 }
@@ -68,6 +71,7 @@ fn main() -> ExitCode {
         Chore::Fuzz(arguments) => fuzz::run(&arguments),
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),
+        Chore::Bench(arguments) => bench::run(&arguments),
         Chore::Ci => ci::run(),
     };
     match result {
