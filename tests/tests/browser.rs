@@ -1,5 +1,10 @@
 //! The page of a run in headless Chromium, if the machine has Node and Chromium.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "a run that does not start fails its test"
+)]
+
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -53,9 +58,14 @@ fn the_page_of_a_run_plays_zooms_and_has_no_error() {
 
 #[test]
 fn a_live_run_is_watched_paused_stepped_set_pushed_and_reset() {
-    let bench = Bench::new("live");
+    watch_live(&Bench::new("live"), &[], "live.mjs");
+}
+
+/// Operates the page of a live run.
+fn watch_live(bench: &Bench, arguments: &[&str], script: &str) {
     let mut command = bench.command(&["run", "--live", "0"]);
-    let mut run = command.stderr(Stdio::piped()).spawn().unwrap();
+    let command = command.args(arguments).stderr(Stdio::piped());
+    let mut run = command.spawn().unwrap();
     let mut line = String::new();
     BufReader::new(run.stderr.take().unwrap())
         .read_line(&mut line)
@@ -63,9 +73,16 @@ fn a_live_run_is_watched_paused_stepped_set_pushed_and_reset() {
     let url = line
         .split_whitespace()
         .find(|word| word.starts_with("http"));
-    run_script("live.mjs", &[url.unwrap()]);
+    run_script(script, &[url.unwrap()]);
     run.kill().unwrap();
     run.wait().unwrap();
+}
+
+#[test]
+fn a_higher_friction_throws_the_tip_off_while_the_run_is_watched() {
+    let bench = Bench::new("live-friction");
+    let set = ["open-loop-bounce", "--set", "belt.friction=0.3"];
+    watch_live(&bench, &set, "friction.mjs");
 }
 
 #[test]

@@ -1,34 +1,109 @@
-//! The commands of the page "First ten things" work as printed.
+//! The page "First ten things" works as printed: its commands, the schemas of its record, its Python.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::process::Command;
 
+use boon::{Compiler, Schemas};
+use painleve_tests::python::{python, workspace};
 use painleve_tests::{Bench, code, errors};
+
+/// Returns the page.
+fn page() -> String {
+    std::fs::read_to_string(workspace().join("docs/first-ten-things.md")).unwrap_or_default()
+}
+
+/// Returns the blocks in a language.
+fn blocks<'a>(page: &'a str, language: &str) -> Vec<&'a str> {
+    let start = format!("```{language}\n");
+    let blocks = page.match_indices(&start);
+    blocks
+        .filter_map(|(at, _)| page[at + start.len()..].split("```").next())
+        .collect()
+}
 
 /// Returns the commands of the blocks marked `sh`, with their words.
 fn commands(page: &str) -> Vec<Vec<&str>> {
-    let blocks = page.split("```sh\n").skip(1);
-    let blocks = blocks.filter_map(|block| block.split("```").next());
-    let lines = blocks.flat_map(str::lines);
+    let lines = blocks(page, "sh").into_iter().flat_map(str::lines);
     lines
         .map(|line| line.split_whitespace().collect())
         .collect()
 }
 
-#[test]
-fn every_command_for_the_program_alone_succeeds_and_writes_its_files() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/first-ten-things.md");
-    let page = std::fs::read_to_string(page).unwrap();
-    let bench = Bench::new("first-ten-things");
-    let commands = commands(&page);
-    assert!(commands.len() >= 7, "{commands:?}");
-    for words in commands {
+/// Executes the commands that contain a word.
+fn execute(bench: &Bench, page: &str, word: &str) -> usize {
+    let mut count = 0;
+    for words in commands(page) {
         let ["painleve", arguments @ ..] = words.as_slice() else {
             panic!("{words:?} is not a command of this program");
         };
+        if !words.iter().any(|one| one.contains(word)) {
+            continue;
+        }
         let output = bench.run(arguments);
         assert_eq!(code(output.status), 0, "{words:?}: {}", errors(&output));
         for file in words.iter().filter(|word| word.starts_with("out/")) {
             assert!(bench.path(file).exists(), "{words:?} did not write {file}");
         }
+        count += 1;
     }
+    count
+}
+
+#[test]
+fn every_command_for_the_program_alone_succeeds_and_writes_its_files() {
+    let bench = Bench::new("first-ten-things");
+    assert!(execute(&bench, &page(), "") >= 7);
+}
+
+#[test]
+fn foxglove_can_read_every_message_of_the_record() {
+    let bench = Bench::new("first-ten-things-foxglove");
+    execute(&bench, &page(), "out/capture.mcap");
+    let bytes = std::fs::read(bench.path("out/capture.mcap")).unwrap();
+    let mut schemas = Schemas::new();
+    let mut compiler = Compiler::new();
+    let mut known = BTreeMap::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        let topic = message.channel.topic.clone();
+        let schema = *known.entry(topic.clone()).or_insert_with(|| {
+            let schema = message.channel.schema.as_ref().unwrap();
+            let json = serde_json::from_slice(&schema.data).unwrap();
+            compiler.add_resource(&topic, json).unwrap();
+            compiler.compile(&topic, &mut schemas).unwrap()
+        });
+        let json = serde_json::from_slice(&message.data).unwrap();
+        if let Err(error) = schemas.validate(&json, schema) {
+            panic!("{topic} at {}: {error}", message.log_time);
+        }
+    }
+    let topics = [
+        "/actuator",
+        "/estimates",
+        "/events",
+        "/plant",
+        "/scene",
+        "/sensor",
+        "/tf",
+    ];
+    assert_eq!(known.keys().collect::<Vec<_>>(), topics);
+}
+
+#[test]
+fn pandas_reads_and_plots_a_run() {
+    let Some(python) = python("pandas", &["pandas", "matplotlib"]) else {
+        return;
+    };
+    let page = page();
+    let bench = Bench::new("first-ten-things-pandas");
+    assert_eq!(execute(&bench, &page, "out/run.csv"), 1);
+    let snippet = blocks(&page, "python").concat();
+    let check = "assert len(run) == 6000 and abs(run['plant.tip_t_m'].iloc[-1] - 0.148) < 1e-3";
+    let output = Command::new(python)
+        .args(["-c", &format!("{snippet}\n{check}\n")])
+        .current_dir(bench.path("."))
+        .env("MPLBACKEND", "svg")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", errors(&output));
 }

@@ -1,0 +1,32 @@
+// The second of the first ten things on the page of a run that goes on, in headless Chromium:
+// pause, raise the belt's friction, continue, see the tip lift off. node friction.mjs CHROMIUM URL
+
+import { Chromium, pause } from "./chromium.mjs";
+
+const [program, url] = process.argv.slice(2);
+
+function check(holds, what) {
+  if (!holds) throw new Error(what);
+  console.log(`ok: ${what}`);
+}
+
+const browser = await Chromium.start(program, { width: 1200, height: 900, dark: false });
+try {
+  await browser.open(url);
+  await browser.until("typeof page !== 'undefined' && page.columns.end > 0.3", "the run starts with its viewer");
+  const friction = "document.querySelector('input[name=\"belt.friction\"]')";
+  check(await browser.evaluate(`${friction}.value`) === "0.3", "the field shows the scenario's friction");
+  check(await browser.evaluate("page.events.every((event) => event[1] !== 'lift-off')"), "the tip stays on the belt");
+  await browser.click("#play");
+  await browser.until("!page.playing", "a click pauses");
+  await browser.evaluate(`(() => { ${friction}.value = "0.6"; ${friction}.dispatchEvent(new Event("change")); })()`);
+  await browser.until("document.querySelector('#parameters .error').textContent.includes('belt.friction: set')", "the friction is set");
+  check(await browser.evaluate("page.events.every((event) => event[1] !== 'lift-off')"), "nothing happens while the run is paused");
+  await browser.click("#play");
+  await browser.until("page.events.some((event) => event[1] === 'lift-off')", "the tip lifts off");
+  await pause(500);
+  check(await browser.evaluate(`${friction}.value`) === "0.6", "the field keeps the new friction");
+  check(browser.problems.length === 0, `the console is empty ${browser.problems.join("; ")}`);
+} finally {
+  await browser.close();
+}
