@@ -36,6 +36,8 @@ pub struct FrontEndSettings {
     pub force: LinearScale<f32>,
     /// Directions and zeros of the parts.
     pub mounting: Mounting,
+    /// Rate of the readings, Hz.
+    pub tick_hz: f32,
     /// The arm on its belt; `None` if the mounting is still unknown, so that encoders and force cell cannot be
     /// checked against each other.
     pub arm: Option<Arm<f32>>,
@@ -63,7 +65,7 @@ impl FrontEnd {
     pub fn new(settings: Option<FrontEndSettings>) -> Self {
         let gap = settings
             .as_ref()
-            .and_then(|it| Some(GapCheck::new(it.arm?, it.encoders, it.force)));
+            .and_then(|it| Some(GapCheck::new(it.arm?, it.encoders, it.force, it.tick_hz)));
         Self {
             settings,
             gap,
@@ -206,10 +208,10 @@ impl FrontEnd {
     }
 
     /// Returns whether complete readings contradict each other.
-    fn contradicts(&self, readings: &SensorReadings) -> bool {
-        match (&self.gap, readings.joints, readings.forces) {
+    fn contradicts(&mut self, readings: &SensorReadings) -> bool {
+        match (&mut self.gap, readings.joints, readings.forces) {
             (Some(gap), [Some(joint_1), Some(joint_2)], [_, Some(normal)]) => {
-                gap.contradicts([joint_1, joint_2], normal)
+                gap.contradicts([joint_1, joint_2], normal, self.is_active)
             }
             _ => false,
         }

@@ -181,6 +181,7 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
             encoders: converters.encoders,
             force: converters.force,
             mounting: converters.mounting,
+            tick_hz: configuration.tick_hz,
             arm,
             button_ticks: (source == FrameSource::StandAlone)
                 .then_some((BUTTON_S * configuration.tick_hz) as u32),
