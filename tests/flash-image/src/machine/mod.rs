@@ -1,11 +1,16 @@
 //! A microcontroller that executes an image: exceptions, sleep, resets and time around
 //! [`unicorn`](crate::unicorn).
 
+mod exceptions;
+mod program;
+mod trace;
+
 use std::path::Path;
 use std::sync::Arc;
 
-use object::{Object, ObjectSegment, ObjectSymbol};
-
+use self::exceptions::EXCEPTION_RETURN;
+use self::program::Program;
+use self::trace::Trace;
 use crate::Picoseconds;
 use crate::system_control::{Exception, HARD_FAULT, SystemControl};
 use crate::unicorn::{Processor, Register, Surroundings, Unicorn};
@@ -13,16 +18,6 @@ use crate::unicorn::{Processor, Register, Surroundings, Unicorn};
 /// Cycles per instruction, a conservative value for code in flash behind the accelerator. No
 /// assertion depends on its exact value.
 pub const CYCLES_PER_INSTRUCTION: u64 = 2;
-
-/// Return address of an exception whose frame holds floating-point registers.
-const RETURN_TO_HANDLER: u32 = 0xffff_ffe1;
-const RETURN_TO_THREAD: u32 = 0xffff_ffe9;
-
-/// There is no memory at these addresses: a jump to them returns from an exception.
-const EXCEPTION_RETURN: u32 = 0xffff_ff00;
-
-/// Number of words of such a frame.
-const FRAME_WORDS: usize = 26;
 
 /// The microcontroller's peripherals, with the parts on its pins.
 pub trait Chip: Clone {
@@ -123,33 +118,6 @@ struct Core<C> {
     /// Whether the next exception may have changed.
     is_dirty: bool,
     candidate: bool,
-}
-
-/// The executed instructions of one handler.
-#[derive(Clone, Debug)]
-struct Trace {
-    handler: u32,
-    /// The stack pointer before the handler's first instruction, while the handler runs.
-    stack: Option<u32>,
-    now: Vec<u32>,
-    done: Vec<Vec<u32>>,
-}
-
-impl Trace {
-    fn step(&mut self, address: u32, processor: &Processor) {
-        let stack = processor.get(Register::SP);
-        if address == self.handler {
-            self.stack = Some(stack);
-        } else if self.stack.is_some_and(|before| stack >= before) {
-            // The handler has removed its frame: the interrupted program or a tail-chained handler
-            // follows.
-            self.stack = None;
-            self.done.push(std::mem::take(&mut self.now));
-        }
-        if self.stack.is_some() {
-            self.now.push(address);
-        }
-    }
 }
 
 impl<C: Chip> Core<C> {
@@ -312,27 +280,11 @@ impl<C: Chip> Machine<C> {
     /// # Panics
     /// If image or library cannot be used.
     pub fn new(library: &Path, image: &Path, chip: C) -> Self {
-        let file = std::fs::read(image)
-            .unwrap_or_else(|error| panic!("no image at {}: {error}", image.display()));
-        let elf = object::File::parse(&*file).unwrap_or_else(|error| panic!("{error}"));
-        let mut flash = vec![0xff; C::FLASH.1];
-        let mut program = vec![0; C::ALIASED_RAM];
-        for segment in elf.segments() {
-            let bytes = segment.data().unwrap_or_default();
-            let at = segment.address() as usize;
-            if let Some(place) = program.get_mut(at..at + bytes.len()) {
-                place.copy_from_slice(bytes);
-            }
-            // Initial values are in flash, after the code; the image copies them.
-            let at = physical_address(&elf, &segment).wrapping_sub(u64::from(C::FLASH.0)) as usize;
-            if let Some(place) = flash.get_mut(at..at + bytes.len()) {
-                place.copy_from_slice(bytes);
-            }
-        }
-        let symbols = elf
-            .symbols()
-            .filter_map(|it| Some((it.name().ok()?.to_owned(), it.address() as u32)))
-            .collect();
+        let Program {
+            flash,
+            in_ram: program,
+            symbols,
+        } = Program::read::<C>(image);
         let core = Core {
             chip,
             system: SystemControl::new(),
@@ -405,12 +357,7 @@ impl<C: Chip> Machine<C> {
 
     /// Starts recording the addresses of the instructions of a handler.
     pub fn trace(&mut self, handler: u32) {
-        self.unicorn.surroundings_mut().trace = Some(Trace {
-            handler: handler & !1,
-            stack: None,
-            now: Vec::new(),
-            done: Vec::new(),
-        });
+        self.unicorn.surroundings_mut().trace = Some(Trace::new(handler));
     }
 
     /// Returns the executions of the traced handler since the last call.
@@ -621,104 +568,4 @@ impl<C: Chip> Machine<C> {
         core.advance(processor);
         core.now < core.limit
     }
-
-    fn enter(&mut self, exception: Exception, return_address: u32) {
-        let unicorn = &mut self.unicorn;
-        let stack_pointer = unicorn.get(Register::SP);
-        let is_unaligned = stack_pointer & 4 != 0;
-        let frame_at = (stack_pointer - 4 * FRAME_WORDS as u32) & !7;
-        let mut status = unicorn.get(Register::XPSR) & !(1 << 9);
-        status |= u32::from(is_unaligned) << 9 | 1 << 24;
-        let mut frame = [0; FRAME_WORDS];
-        for (n, register) in [0, 1, 2, 3, 12].into_iter().enumerate() {
-            frame[n] = unicorn.get(Register::r(register));
-        }
-        frame[5] = unicorn.get(Register::LR);
-        frame[6] = return_address;
-        frame[7] = status;
-        for n in 0..16 {
-            frame[8 + n] = unicorn.get(Register::s(n as i32));
-        }
-        frame[24] = unicorn.get(Register::FPSCR);
-        let bytes: Vec<u8> = frame.iter().flat_map(|it| it.to_le_bytes()).collect();
-        assert!(
-            unicorn.processor().write_memory(frame_at, &bytes),
-            "the stack has overflowed"
-        );
-        let core = unicorn.surroundings_mut();
-        let nested = !core.system.active.is_empty();
-        core.system.enter(exception);
-        core.is_dirty = true;
-        core.conditional = 0;
-        let mut vector = core.system.vector_table + 4 * exception as u32;
-        if vector < C::FLASH.0 && !core.chip.ram_is_at_zero() {
-            vector += C::FLASH.0;
-        }
-        assert!(
-            vector >= C::RAM.0 || !core.chip.flash_is_stalled(core.now),
-            "exception {exception} while the flash is busy"
-        );
-        let mut handler = [0; 4];
-        unicorn.processor().read_memory(vector, &mut handler);
-        unicorn.set(Register::SP, frame_at);
-        unicorn.set(
-            Register::LR,
-            if nested {
-                RETURN_TO_HANDLER
-            } else {
-                RETURN_TO_THREAD
-            },
-        );
-        unicorn.set(Register::XPSR, 1 << 24);
-        unicorn.set(Register::PC, u32::from_le_bytes(handler));
-    }
-
-    fn leave(&mut self) {
-        let unicorn = &mut self.unicorn;
-        let core = unicorn.surroundings_mut();
-        core.system.leave();
-        core.is_dirty = true;
-        let frame_at = unicorn.get(Register::SP);
-        let mut bytes = [0; 4 * FRAME_WORDS];
-        unicorn.processor().read_memory(frame_at, &mut bytes);
-        let word = |n: usize| {
-            let bytes = &bytes[4 * n..4 * n + 4];
-            u32::from_le_bytes(bytes.try_into().unwrap_or([0; 4]))
-        };
-        for (n, register) in [0, 1, 2, 3, 12].into_iter().enumerate() {
-            unicorn.set(Register::r(register), word(n));
-        }
-        unicorn.set(Register::LR, word(5));
-        for n in 0..16 {
-            unicorn.set(Register::s(n as i32), word(8 + n));
-        }
-        unicorn.set(Register::FPSCR, word(24));
-        let status = word(7);
-        let padding = if status & 1 << 9 != 0 { 4 } else { 0 };
-        unicorn.set(Register::SP, frame_at + 4 * FRAME_WORDS as u32 + padding);
-        unicorn.set(Register::XPSR, status & !(1 << 9) & !0x1ff);
-        unicorn.set(Register::FAULTMASK, 0);
-        unicorn.set(Register::PC, word(6));
-    }
-}
-
-/// Returns the physical address of a segment.
-fn physical_address(elf: &object::File<'_>, segment: &object::Segment<'_, '_>) -> u64 {
-    use object::read::elf::ProgramHeader;
-    let object::File::Elf32(file) = elf else {
-        return segment.address();
-    };
-    let endian = file.endian();
-    let headers = file.elf_program_headers().iter();
-    let same = |it: &&object::elf::ProgramHeader32<object::Endianness>| {
-        u64::from(it.p_vaddr(endian)) == segment.address()
-            && (
-                u64::from(it.p_offset(endian)),
-                u64::from(it.p_filesz(endian)),
-            ) == segment.file_range()
-    };
-    let mut found = headers.filter(same);
-    found
-        .next()
-        .map_or(segment.address(), |it| it.p_paddr(endian).into())
 }
