@@ -1,6 +1,8 @@
-//! The header matches the functions, and a C program works with both.
+//! The header matches the functions, and programs in C and C++ work with both.
 
-use std::path::{Path, PathBuf};
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
 use std::process::Command;
 
 fn folder() -> &'static Path {
@@ -29,22 +31,17 @@ fn the_header_matches_the_functions() {
     );
 }
 
-#[test]
-fn a_program_in_c_closes_the_loop() {
+/// Compiles an example with this command, links it with the shared library, runs it, and returns its
+/// standard output.
+fn run_example(compiler: &[&str], source: &str) -> String {
     // Cargo writes the shared library beside the tests.
     let libraries = std::env::current_exe().unwrap();
     let libraries = libraries.parent().unwrap();
-    let example = folder().join("../../examples/c/closed_loop.c");
-    let program: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join("closed_loop");
-    let compiled = Command::new("cc")
-        .args([
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Wpedantic",
-            "-Werror",
-            "-o",
-        ])
+    let example = folder().join("../../examples").join(source);
+    let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(example.file_stem().unwrap());
+    let compiled = Command::new(compiler[0])
+        .args(&compiler[1..])
+        .args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-o"])
         .arg(&program)
         .arg(&example)
         .arg("-I")
@@ -57,11 +54,27 @@ fn a_program_in_c_closes_the_loop() {
         .unwrap();
     assert!(compiled.success());
     let output = Command::new(&program).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{said}{output:?}");
+    said
+}
+
+#[test]
+fn a_program_in_c_closes_the_loop() {
+    let said = run_example(&["cc", "-std=c99"], "c/closed_loop.c");
     assert!(
         said.contains("refused: ") && said.contains("belt.friction"),
         "{said}"
     );
     assert!(said.contains("tip at 0.14"), "{said}");
+}
+
+#[test]
+fn a_controller_in_cpp_keeps_the_tip_on_the_belt() {
+    if Command::new("c++").arg("--version").output().is_err() {
+        eprintln!("SKIPPED: no C++ compiler");
+        return;
+    }
+    let said = run_example(&["c++", "-std=c++17"], "cpp/own_controller.cpp");
+    assert!(said.contains("highest gap"), "{said}");
 }
