@@ -1,4 +1,5 @@
-//! `cargo xtask python`: builds the Python package, installs its wheel in a virtual environment, and tests it.
+//! `cargo xtask python`: builds the Python package, installs its wheel in a virtual environment, tests it,
+//! and executes its notebook.
 
 use crate::command::{ChoreError, run, run_cargo};
 
@@ -6,9 +7,19 @@ const MANIFEST: &str = "python/Cargo.toml";
 const FOLDER: &str = "target/python/package";
 const WHEELS: &str = "target/python/wheels";
 /// The test's own requirements.
-const TOOLS: [&str; 4] = ["maturin>=1.9,<2", "pytest", "gymnasium", "numpy"];
+const TOOLS: [&str; 7] = [
+    "maturin>=1.9,<2",
+    "pytest",
+    "gymnasium",
+    "numpy",
+    "matplotlib",
+    "nbconvert",
+    "ipykernel",
+];
+const NOTEBOOK_PAGE_FOLDER: &str = "target/python";
+const NOTEBOOK: &str = "python/notebooks/bounce_and_edge.ipynb";
 
-/// Builds, installs and tests the package; needs Python 3.10 with `venv`, and the package index.
+/// Builds, installs and tests the package, and executes its notebook to `target/python`; needs Python 3.10 with `venv`, and the package index.
 ///
 /// # Errors
 /// If a step fails.
@@ -37,7 +48,10 @@ pub fn run_chore() -> Result<(), ChoreError> {
         "painleve",
     ];
     run(&python, &[&pip[..], &install].concat())?;
-    run(&python, &["-m", "pytest", "-q", "python/tests"])
+    run(&python, &["-m", "pytest", "-q", "python/tests"])?;
+    let execute = ["-m", "nbconvert", "--to", "html", "--execute"];
+    let to = ["--output-dir", NOTEBOOK_PAGE_FOLDER, NOTEBOOK];
+    run(&python, &[&execute[..], &to].concat())
 }
 
 /// Compiles the package, which is a workspace of its own, against the present crates; needs no
