@@ -7,6 +7,8 @@ use std::mem;
 use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use painleve_firmware::telemetry::Telemetry;
+use painleve_plant::sample::Sample;
 use serde_json::{Value, json};
 
 use crate::foxglove::parameters::Parameter;
@@ -47,8 +49,8 @@ pub(crate) struct ClientQueue {
 /// An entry of a Foxglove client's queue.
 #[derive(Clone, Debug)]
 pub(crate) enum Entry {
-    /// The simulated time, ns.
-    Time(u64),
+    /// A tick; the client's thread makes its messages, so that they cost the run nothing.
+    Tick(Arc<WatchedTick>),
     /// A message of a channel.
     Message(Arc<ChannelMessage>),
     /// Parameters that have changed.
@@ -57,6 +59,13 @@ pub(crate) enum Entry {
     Status(Severity, Arc<str>),
     /// The run has started again.
     Restarted,
+}
+
+/// Everything about a tick.
+#[derive(Debug)]
+pub(crate) struct WatchedTick {
+    pub(crate) sample: Sample,
+    pub(crate) estimates: Option<Telemetry>,
 }
 
 /// How a text for the user is shown.
@@ -198,13 +207,14 @@ impl ClientQueue {
                 }
                 self.bytes += message.json.len();
             }
-            // Time matters only together with messages.
-            Entry::Time(_) if self.subscribed == 0 => return,
+            // The time matters only together with messages.
+            Entry::Tick(_) if self.subscribed == 0 => return,
+            Entry::Tick(_) => self.bytes += size_of::<WatchedTick>(),
             _ => {}
         }
         if self.bytes > MOST_WAITING {
             self.entries
-                .retain(|entry| !matches!(entry, Entry::Message(_) | Entry::Time(_)));
+                .retain(|entry| !matches!(entry, Entry::Message(_) | Entry::Tick(_)));
             self.bytes = 0;
         }
         self.entries.push_back(entry.clone());

@@ -4,14 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::net::TcpStream;
 use std::sync::{Arc, Mutex};
 
-use painleve_record::messages::{CHANNELS, channels};
+use painleve_record::RecordedTick;
+use painleve_record::fields::TOPICS;
+use painleve_record::messages::{CHANNELS, TickMessage, channels, nanoseconds};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tungstenite::{Error, Message, WebSocket};
 
 use super::parameters::Parameter;
 use super::services;
-use crate::hub::{ClientQueue, Entry, Hub, Severity, locked};
+use crate::hub::{ClientQueue, Entry, Hub, Severity, WatchedTick, locked};
 use crate::request::Orders;
 use crate::server::receive;
 
@@ -228,23 +230,9 @@ impl Client<'_> {
 
     fn pass_on(&mut self, entry: Entry) -> Result<(), Error> {
         match entry {
-            Entry::Time(time_ns) => {
-                let mut bytes = vec![TIME];
-                bytes.extend(time_ns.to_le_bytes());
-                self.socket.write(Message::binary(bytes))
-            }
+            Entry::Tick(tick) => self.send_tick(&tick),
             Entry::Message(message) => {
-                for (id, channel) in &self.subscriptions {
-                    if *channel == message.channel {
-                        let mut bytes = Vec::with_capacity(13 + message.json.len());
-                        bytes.push(MESSAGE_DATA);
-                        bytes.extend(id.to_le_bytes());
-                        bytes.extend(message.time_ns.to_le_bytes());
-                        bytes.extend(&message.json);
-                        self.socket.write(Message::binary(bytes))?;
-                    }
-                }
-                Ok(())
+                self.send_data(message.channel, message.time_ns, &message.json)
             }
             Entry::Parameters(changed) => {
                 let known = |one: &&Parameter| self.watched.contains(&one.name);
@@ -257,6 +245,43 @@ impl Client<'_> {
             Entry::Status(severity, text) => self.write(&status(severity, &text)),
             Entry::Restarted => self.introduce(),
         }
+    }
+
+    fn send_tick(&mut self, tick: &WatchedTick) -> Result<(), Error> {
+        let time_ns = nanoseconds(tick.sample.plant.time_s);
+        let mut bytes = vec![TIME];
+        bytes.extend(time_ns.to_le_bytes());
+        self.socket.write(Message::binary(bytes))?;
+        let tick = RecordedTick {
+            sample: &tick.sample,
+            estimates: tick.estimates.as_ref(),
+        };
+        for (channel, topic) in TOPICS.into_iter().enumerate() {
+            let is_known = tick.estimates.is_some() || !topic.needs_estimates;
+            if is_known && self.subscriptions.values().any(|one| *one == channel) {
+                let message = TickMessage { topic, tick: &tick };
+                // It contains only finite numbers and text keys, so it can be written as JSON.
+                if let Ok(json) = serde_json::to_vec(&message) {
+                    self.send_data(channel, time_ns, &json)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends a message of a channel once for each subscription to it.
+    fn send_data(&mut self, channel: usize, time_ns: u64, json: &[u8]) -> Result<(), Error> {
+        for (id, subscribed) in &self.subscriptions {
+            if *subscribed == channel {
+                let mut bytes = Vec::with_capacity(13 + json.len());
+                bytes.push(MESSAGE_DATA);
+                bytes.extend(id.to_le_bytes());
+                bytes.extend(time_ns.to_le_bytes());
+                bytes.extend(json);
+                self.socket.write(Message::binary(bytes))?;
+            }
+        }
+        Ok(())
     }
 
     fn write(&mut self, message: &Value) -> Result<(), Error> {

@@ -6,19 +6,16 @@ use std::time::{Duration, Instant};
 use painleve_plant::scenario::Scenario;
 use painleve_record::RecordedTick;
 use painleve_record::events::RunEvent;
-use painleve_record::fields::TOPICS;
-use painleve_record::messages::{
-    EVENTS, SCENE, TRANSFORMS, TickMessage, event_message, nanoseconds,
-};
+use painleve_record::messages::{EVENTS, SCENE, TRANSFORMS, event_message, nanoseconds};
 use painleve_record::scene::Scene;
 use serde::Serialize;
 
-use crate::hub::{ChannelMessage, Entry, Hub};
+use crate::hub::{ChannelMessage, Entry, Hub, WatchedTick};
 
 /// Time between two pictures of the 3-D scene.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(16);
 
-/// Makes the messages that any client has subscribed to.
+/// Makes the events and pictures that any client has subscribed to, and passes ticks on.
 #[derive(Debug)]
 pub struct Feed {
     hub: Arc<Hub>,
@@ -42,12 +39,10 @@ impl Feed {
     pub fn tick(&mut self, tick: &RecordedTick<'_>) {
         self.scene.advance(tick);
         let time_ns = nanoseconds(tick.sample.plant.time_s);
-        self.entries.push(Entry::Time(time_ns));
-        for (channel, topic) in TOPICS.into_iter().enumerate() {
-            if tick.estimates.is_some() || !topic.needs_estimates {
-                self.add(channel, time_ns, || TickMessage { topic, tick });
-            }
-        }
+        self.entries.push(Entry::Tick(Arc::new(WatchedTick {
+            sample: *tick.sample,
+            estimates: tick.estimates.copied(),
+        })));
         let is_due = self
             .last_picture
             .is_none_or(|last| last.elapsed() >= PICTURE_INTERVAL);
