@@ -1,7 +1,8 @@
 //! Injects a thousand random faults at random instructions.
 
-use painleve_flash_image::bench::{BoardBench, scenario};
-use painleve_flash_image::stm32::WiredChip as _;
+use painleve_flash_image::bench::{Bench, scenario};
+use painleve_flash_image::board::{BoardChip, F405, G474};
+use painleve_flash_image::stm32::Crystal;
 use painleve_parts::BitErrors;
 
 /// Number of faults.
@@ -54,7 +55,7 @@ impl InjectedFault {
         matches!(self, Self::BitErrors | Self::SerialNoise)
     }
 
-    fn strike(self, bench: &mut BoardBench, random: &mut Random) {
+    fn strike<C: BoardChip>(self, bench: &mut Bench<C>, random: &mut Random) {
         let board = &mut bench.board;
         match self {
             Self::BitErrors => {
@@ -80,8 +81,8 @@ impl InjectedFault {
             }
             Self::BadInstruction => board.machine.hard_fault(),
             Self::Hang => board.machine.hang(),
-            Self::ControlTimer => board.machine.chip_mut().timer = Default::default(),
-            Self::Crystal => board.machine.chip_mut().rcc.stop_crystal(),
+            Self::ControlTimer => board.machine.chip_mut().stop_control_timer(),
+            Self::Crystal => board.machine.chip_mut().set_crystal(Crystal::Stops),
             Self::Supply => {
                 let millivolts = 1500 + random.below(1350) as u32;
                 board.machine.chip_mut().set_supply(millivolts);
@@ -100,12 +101,21 @@ impl InjectedFault {
 /// for others.
 #[test]
 fn a_thousand_random_faults_take_the_torque_off_or_are_survived() {
-    let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));
+    take_the_torque_off_or_are_survived::<F405>(FAULTS);
+}
+
+#[test]
+fn random_faults_on_the_nucleo_take_the_torque_off_or_are_survived() {
+    take_the_torque_off_or_are_survived::<G474>(FAULTS / 4);
+}
+
+fn take_the_torque_off_or_are_survived<C: BoardChip>(faults: u32) {
+    let mut bench = Bench::<C>::new(&scenario("hybrid-elbow-down"));
     bench.drive();
     let healthy = bench.snapshot();
     let mut random = Random(1);
     let mut exceptions = Vec::new();
-    for number in 0..FAULTS {
+    for number in 0..faults {
         bench.restore(&healthy);
         let fault = InjectedFault::ALL[random.below(InjectedFault::ALL.len() as u64) as usize];
         for _ in 0..random.below(5) {
