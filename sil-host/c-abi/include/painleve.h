@@ -1,5 +1,5 @@
 /* Controller and plant of painleve. Generated from the crate painleve-c-abi; its test
-   `the_header_is_that_of_the_functions` says when it is out of date. */
+   `the_header_matches_the_functions` fails when it is out of date. */
 
 #ifndef PAINLEVE_H
 #define PAINLEVE_H
