@@ -14,6 +14,7 @@ pub mod black_box;
 pub mod board;
 pub mod crash;
 pub mod dma_serial;
+pub mod flash;
 pub mod link;
 pub mod memory;
 pub mod sensor_bus;

@@ -29,8 +29,10 @@ use painleve_drivers::front_end::InputLevels;
 use painleve_image::arm_drive::{ArmDrive, ArmPins, NO_TORQUE};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
+use painleve_image::flash::ConfigurationFlash;
 use painleve_image::memory::FlashMemory;
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
+use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
 use painleve_stm32f4::spi::SpiPort;
 use painleve_stm32f4::timer;
@@ -42,8 +44,7 @@ use stm32f4xx_hal::rcc::{Config, Enable};
 use stm32f4xx_hal::serial::{Serial, config};
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
 
-use crate::flash::ConfigurationFlash;
-use crate::safety::Watchdogs;
+use crate::safety::{Independent, Window};
 use crate::uart_dma::UartDma;
 
 /// Crystal, MHz.
@@ -81,7 +82,7 @@ impl Board for F405 {
     type Drive = ArmDrive<F405Pins>;
     type Bytes = DmaBytes<UartDma>;
     type Port = DmaPort<UartDma>;
-    type Memory = FlashMemory<ConfigurationFlash>;
+    type Memory = FlashMemory<ConfigurationFlash<flash::Registers>>;
 
     const NAME: &'static str = "STM32F405";
 
@@ -89,7 +90,8 @@ impl Board for F405 {
         device: pac::Peripherals,
         mut core: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
-        Watchdogs::start_independent(&device.IWDG, START_LIMIT_S);
+        let watchdog = Independent(device.IWDG);
+        watchdog.start(START_LIMIT_S);
         start_crystal(&device.RCC)?;
         let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(168.MHz());
         let mut rcc = device.RCC.freeze(clocks);
@@ -164,7 +166,7 @@ impl Board for F405 {
             timer_hz: rcc.clocks.timclk1().raw() as f32,
             core_hz,
             timer: device.TIM2,
-            watchdogs: Watchdogs::new(device.IWDG, device.WWDG, slow_bus_hz),
+            watchdogs: Watchdogs::new(watchdog, Window(device.WWDG), slow_bus_hz),
             converter: device.DAC,
             enable,
             enable_switch: c.pc0.into_pull_down_input().erase(),
@@ -172,7 +174,7 @@ impl Board for F405 {
             stages_ready: c.pc2.into_pull_down_input().erase(),
         };
         let drive = ArmDrive::new(pins, encoders, force_cell);
-        let memory = FlashMemory::new(ConfigurationFlash::new(device.FLASH));
+        let memory = FlashMemory::new(ConfigurationFlash::new(flash::Registers(device.FLASH)));
         Ok(Parts {
             drive,
             bytes,
@@ -235,7 +237,7 @@ pub struct F405Pins {
     timer: pac::TIM2,
     timer_hz: f32,
     core_hz: u32,
-    watchdogs: Watchdogs,
+    watchdogs: Watchdogs<Independent, Window>,
     converter: pac::DAC,
     enable: ErasedPin<Output>,
     enable_switch: ErasedPin<Input>,

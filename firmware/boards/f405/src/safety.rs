@@ -7,7 +7,7 @@
 #![allow(unsafe_code)] // registers, whatever the program was doing
 
 use painleve_image::arm_drive::NO_TORQUE;
-use painleve_image::watchdogs::{IndependentLimit, WindowLimit, key};
+use painleve_image::watchdogs::{IndependentLimit, IndependentWatchdog, WindowWatchdog};
 use painleve_shared::black_box::ResetCause;
 use stm32f4xx_hal::pac;
 
@@ -18,12 +18,6 @@ const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
 
 /// Number of polls of a flag that should change within microseconds.
 const PATIENCE: u32 = 100_000;
-
-/// Highest frequency of the independent watchdog's oscillator, Hz (the lowest is 17 kHz).
-const FASTEST_OSCILLATOR_HZ: f32 = 47_000.0;
-
-/// Largest prescaler of the window watchdog.
-const LARGEST_WINDOW_PRESCALER: u8 = 3;
 
 // The first instructions after a reset, in assembly because memory is not initialised yet: enable the clock
 // of port B, set PB0 low, then make it an output. Then `program_memory` copies the program.
@@ -135,74 +129,47 @@ fn raise_brown_out_level(flash: &pac::FLASH) {
     flash.optcr().modify(|_, w| w.optlock().set_bit());
 }
 
-fn write_key(watchdog: &pac::IWDG, key: u16) {
-    // SAFETY: one of the three keys.
-    watchdog.kr().write(|w| unsafe { w.key().bits(key) });
-}
+/// The independent watchdog. Its oscillator has 17 to 47 kHz: it resets the chip after 2 to 6 periods.
+pub struct Independent(pub pac::IWDG);
 
-/// The two watchdogs, fed at the end of every control tick.
-///
-/// The independent watchdog's oscillator has 17 to 47 kHz: it resets the chip after 2 to 6 periods.
-pub struct Watchdogs {
-    independent: pac::IWDG,
-    window: pac::WWDG,
-    slow_bus_hz: f32,
-    /// `None` for rates too low for the window watchdog.
-    limit: Option<WindowLimit>,
-}
+impl IndependentWatchdog for Independent {
+    const FASTEST_HZ: f32 = 47_000.0;
 
-impl Watchdogs {
-    /// Starts the independent watchdog with a timeout of at least `limit_s`. Call it before anything that
-    /// may hang.
-    pub fn start_independent(independent: &pac::IWDG, limit_s: f32) {
-        let limit = IndependentLimit::new(limit_s, FASTEST_OSCILLATOR_HZ);
-        write_key(independent, key::START);
-        write_key(independent, key::OPEN);
+    fn write_key(&self, key: u16) {
+        // SAFETY: one of the three keys.
+        self.0.kr().write(|w| unsafe { w.key().bits(key) });
+    }
+
+    fn set(&self, limit: IndependentLimit) {
         // SAFETY: every value of three bits up to 6 is a prescaler, and of twelve bits a reload.
         unsafe {
-            independent.pr().write(|w| w.bits(limit.prescaler.into()));
-            independent.rlr().write(|w| w.bits(limit.reload.into()));
-        }
-        // Both registers take effect in the oscillator's time, after some 200 µs.
-        let _ = (0..PATIENCE).any(|_| independent.sr().read().bits() == 0);
-        write_key(independent, key::FEED);
-    }
-
-    /// Takes ownership of both watchdogs; `slow_bus_hz` is the clock of APB1. The window watchdog's own
-    /// clock must be on.
-    pub fn new(independent: pac::IWDG, window: pac::WWDG, slow_bus_hz: u32) -> Self {
-        Self {
-            independent,
-            window,
-            slow_bus_hz: slow_bus_hz as f32,
-            limit: None,
+            self.0.pr().write(|w| w.bits(limit.prescaler.into()));
+            self.0.rlr().write(|w| w.bits(limit.reload.into()));
         }
     }
 
-    /// Sets the timeout to one and a half of these periods.
-    pub fn set_period(&mut self, period_s: f32) {
-        Self::start_independent(&self.independent, 2.0 * period_s);
-        let Some(limit) = WindowLimit::new(period_s, self.slow_bus_hz, LARGEST_WINDOW_PRESCALER)
-        else {
-            // The running window watchdog cannot be stopped, and would reset the chip too early.
-            return;
-        };
-        self.limit = Some(limit);
+    fn is_set(&self) -> bool {
+        self.0.sr().read().bits() == 0
+    }
+}
+
+/// The window watchdog.
+pub struct Window(pub pac::WWDG);
+
+impl WindowWatchdog for Window {
+    const LARGEST_PRESCALER: u8 = 3;
+
+    fn set_prescaler(&self, prescaler: u8) {
         // SAFETY: prescalers have two bits; a window of 0x7f disables the window.
-        self.window
+        self.0
             .cfr()
-            .write(|w| unsafe { w.wdgtb().bits(limit.prescaler).w().bits(0x7f) });
-        self.feed();
+            .write(|w| unsafe { w.wdgtb().bits(prescaler).w().bits(0x7f) });
     }
 
-    /// Feeds both watchdogs when a tick is finished.
-    pub fn feed(&mut self) {
-        write_key(&self.independent, key::FEED);
-        if let Some(WindowLimit { counter, .. }) = self.limit {
-            // SAFETY: seven bits.
-            self.window
-                .cr()
-                .write(|w| unsafe { w.t().bits(counter).wdga().set_bit() });
-        }
+    fn feed(&self, counter: u8) {
+        // SAFETY: seven bits.
+        self.0
+            .cr()
+            .write(|w| unsafe { w.t().bits(counter).wdga().set_bit() });
     }
 }

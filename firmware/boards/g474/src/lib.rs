@@ -27,16 +27,18 @@ use painleve_drivers::front_end::InputLevels;
 use painleve_image::arm_drive::{ArmDrive, ArmPins, NO_TORQUE};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
+use painleve_image::flash::ConfigurationFlash;
 use painleve_image::memory::FlashMemory;
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
+use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
 use painleve_stm32g4::clock::{self, CORE_HZ};
-use painleve_stm32g4::flash::{self, ConfigurationFlash};
+use painleve_stm32g4::flash;
 pub use painleve_stm32g4::pac;
 use painleve_stm32g4::pins::{Input, Output, Pins, Port};
 use painleve_stm32g4::spi::{SampledAt, SpiPort, Word};
 use painleve_stm32g4::usart2::Usart2Dma;
-use painleve_stm32g4::watchdogs::Watchdogs;
+use painleve_stm32g4::watchdogs::{Independent, Window};
 use painleve_stm32g4::{supply, timer};
 
 /// Crystal, MHz.
@@ -74,7 +76,7 @@ impl Board for G474 {
     type Drive = ArmDrive<G474Pins>;
     type Bytes = DmaBytes<Usart2Dma>;
     type Port = DmaPort<Usart2Dma>;
-    type Memory = FlashMemory<ConfigurationFlash>;
+    type Memory = FlashMemory<ConfigurationFlash<flash::Registers>>;
 
     const NAME: &'static str = "NUCLEO-G474RE";
 
@@ -82,7 +84,8 @@ impl Board for G474 {
         device: pac::Peripherals,
         mut core: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
-        Watchdogs::start_independent(&device.IWDG, START_LIMIT_S);
+        let watchdog = Independent(device.IWDG);
+        watchdog.start(START_LIMIT_S);
         let rcc = device.RCC;
         clock::start(&rcc, &device.PWR, &device.FLASH, CRYSTAL_MHZ)
             .map_err(|_| StartFault::Clock)?;
@@ -119,7 +122,7 @@ impl Board for G474 {
 
         let pins = G474Pins {
             timer: device.TIM2,
-            watchdogs: Watchdogs::new(device.IWDG, device.WWDG, CORE_HZ),
+            watchdogs: Watchdogs::new(watchdog, Window(device.WWDG), CORE_HZ),
             converter: device.DAC1,
             enable,
             enable_switch: pins.pulled_down_input(Port::C, 0),
@@ -127,7 +130,7 @@ impl Board for G474 {
             stages_ready: pins.pulled_down_input(Port::C, 2),
         };
         let drive = ArmDrive::new(pins, encoders, force_cell);
-        let memory = FlashMemory::new(ConfigurationFlash::new(device.FLASH));
+        let memory = FlashMemory::new(ConfigurationFlash::new(flash::Registers(device.FLASH)));
         Ok(Parts {
             drive,
             bytes,
@@ -207,7 +210,7 @@ fn put_out(converter: &pac::DAC1, [code_1, code_2]: [u16; 2]) {
 /// Control timer, watchdogs, torque stages and switches of the board.
 pub struct G474Pins {
     timer: pac::TIM2,
-    watchdogs: Watchdogs,
+    watchdogs: Watchdogs<Independent, Window>,
     converter: pac::DAC1,
     enable: Output,
     enable_switch: Input,

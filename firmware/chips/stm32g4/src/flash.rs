@@ -5,25 +5,15 @@
 //! A double word whose writing was interrupted raises the non-maskable interrupt when it is read:
 //! [`take_fault`].
 
-#![allow(unsafe_code)] // memory-mapped flash
+#![allow(unsafe_code)] // registers, and fields without named values
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
-};
+use embedded_storage::nor_flash::NorFlashErrorKind;
+use painleve_image::flash::FlashRegisters;
 
 use crate::supply::FLASH_KEYS;
 use crate::{comes, pac};
-
-/// Address of the slots, which the board's `memory.x` keeps free of program.
-const START: u32 = 0x0807_f000;
-
-/// Number of the first of their pages in the second bank.
-const FIRST_PAGE: u8 = 126;
-
-/// Length of a page, bytes.
-const PAGE: usize = 2 << 10;
 
 /// Number of polls for an erasure: more than 25 ms, the longest of the data sheet.
 const PATIENCE: u32 = 10_000_000;
@@ -43,20 +33,17 @@ pub fn take_fault() -> bool {
     is_ours
 }
 
-/// The slots.
-pub struct ConfigurationFlash(pac::FLASH);
+/// The flash's registers.
+pub struct Registers(pub pac::FLASH);
 
-impl ConfigurationFlash {
-    /// Takes ownership of the flash's registers.
-    pub fn new(flash: pac::FLASH) -> Self {
-        Self(flash)
-    }
+impl FlashRegisters for Registers {
+    const START: u32 = 0x0807_f000;
+    /// A page of the second bank.
+    const FIRST_SECTOR: u8 = 126;
+    const SECTOR: usize = 2 << 10;
+    const WORD: usize = 8;
 
-    /// Opens the control register, carries out the change, and closes the register.
-    fn change(
-        &mut self,
-        change: impl FnOnce(&mut Self) -> Result<(), NorFlashErrorKind>,
-    ) -> Result<(), NorFlashErrorKind> {
+    fn open(&mut self) -> Result<(), NorFlashErrorKind> {
         // As a single bank, the flash has other pages.
         if self.0.optr().read().dbank().is_single_bank_mode() {
             return Err(NorFlashErrorKind::Other);
@@ -66,18 +53,31 @@ impl ConfigurationFlash {
             // SAFETY: the keys of the manual, in its order.
             self.0.keyr().write(|w| unsafe { w.bits(key) });
         }
-        let result = change(self);
+        Ok(())
+    }
+
+    fn close(&mut self) {
         self.0.cr().write(|w| w.lock().set_bit());
-        // The data cache may hold what was there before.
         self.0.acr().modify(|_, w| w.dcen().clear_bit());
         self.0.acr().modify(|_, w| w.dcrst().set_bit());
         self.0
             .acr()
             .modify(|_, w| w.dcrst().clear_bit().dcen().set_bit());
-        result
     }
 
-    /// Waits for the end of an operation, and takes its errors.
+    fn erase(&mut self, page: u8) {
+        self.0.cr().write(|w| {
+            // SAFETY: the number of a page.
+            unsafe { w.pnb().bits(page) };
+            w.lock().clear_bit().per().set_bit().bker().set_bit()
+        });
+        self.0.cr().modify(|_, w| w.strt().set_bit());
+    }
+
+    fn permit_writing(&mut self) {
+        self.0.cr().write(|w| w.lock().clear_bit().pg().set_bit());
+    }
+
     #[inline(never)]
     fn wait(&mut self) -> Result<(), NorFlashErrorKind> {
         const ERRORS: u32 = 0xc3fa;
@@ -92,72 +92,11 @@ impl ConfigurationFlash {
             Err(NorFlashErrorKind::Other)
         }
     }
-}
 
-impl ErrorType for ConfigurationFlash {
-    type Error = NorFlashErrorKind;
-}
-
-impl ReadNorFlash for ConfigurationFlash {
-    const READ_SIZE: usize = 1;
-
-    #[inline(never)]
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
-        check_read(self, offset, bytes.len())?;
+    fn reading(&mut self, read: impl FnOnce()) {
         IS_READING.store(true, Ordering::Relaxed);
-        let mut address = START + offset;
-        for byte in bytes {
-            // SAFETY: within the slots.
-            *byte = unsafe { (address as *const u8).read_volatile() };
-            address += 1;
-        }
+        read();
         cortex_m::asm::dsb();
         IS_READING.store(false, Ordering::Relaxed);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        2 * PAGE
-    }
-}
-
-impl NorFlash for ConfigurationFlash {
-    const WRITE_SIZE: usize = 8;
-    const ERASE_SIZE: usize = PAGE;
-
-    #[inline(never)]
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
-        check_erase(self, from, to)?;
-        let [first, end] = [from, to].map(|it| FIRST_PAGE + (it / PAGE as u32) as u8);
-        self.change(|flash| {
-            for page in first..end {
-                flash.0.cr().write(|w| {
-                    // SAFETY: the number of a page.
-                    unsafe { w.pnb().bits(page) };
-                    w.lock().clear_bit().per().set_bit().bker().set_bit()
-                });
-                flash.0.cr().modify(|_, w| w.strt().set_bit());
-                flash.wait()?;
-            }
-            Ok(())
-        })
-    }
-
-    #[inline(never)]
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
-        check_write(self, offset, bytes.len())?;
-        self.change(|flash| {
-            flash.0.cr().write(|w| w.lock().clear_bit().pg().set_bit());
-            let mut address = START + offset;
-            for double_word in bytes.as_chunks::<8>().0 {
-                for word in double_word.as_chunks().0 {
-                    // SAFETY: within the slots, which nothing else refers to.
-                    unsafe { (address as *mut u32).write_volatile(u32::from_le_bytes(*word)) };
-                    address += 4;
-                }
-                flash.wait()?;
-            }
-            Ok(())
-        })
     }
 }

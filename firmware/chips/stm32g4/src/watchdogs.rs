@@ -1,83 +1,53 @@
-//! The two watchdogs (RM0440, chapters IWDG and WWDG), fed at the end of every control tick.
+//! Registers of the two watchdogs (RM0440, chapters IWDG and WWDG).
 
 #![allow(unsafe_code)] // fields without named values
 
-use painleve_image::watchdogs::{IndependentLimit, WindowLimit, key};
+use painleve_image::watchdogs::{IndependentLimit, IndependentWatchdog, WindowWatchdog};
 
-use crate::{PATIENCE, comes, pac};
+use crate::pac;
 
-/// Highest frequency of the independent watchdog's oscillator, Hz (the lowest is 29.5 kHz; DS12288,
-/// LSI characteristics).
-const FASTEST_OSCILLATOR_HZ: f32 = 34_000.0;
+/// The independent watchdog. Its oscillator has 29.5 to 34 kHz (DS12288, LSI characteristics): it resets the chip
+/// after 2 to 2.4 periods.
+pub struct Independent(pub pac::IWDG);
 
-/// Largest prescaler of the window watchdog.
-const LARGEST_WINDOW_PRESCALER: u8 = 7;
+impl IndependentWatchdog for Independent {
+    const FASTEST_HZ: f32 = 34_000.0;
 
-fn write_key(watchdog: &pac::IWDG, key: u16) {
-    // SAFETY: one of the three keys.
-    watchdog.kr().write(|w| unsafe { w.key().bits(key) });
-}
+    fn write_key(&self, key: u16) {
+        // SAFETY: one of the three keys.
+        self.0.kr().write(|w| unsafe { w.key().bits(key) });
+    }
 
-/// Both watchdogs. The independent one resets the chip after 2 to 2.4 periods.
-pub struct Watchdogs {
-    independent: pac::IWDG,
-    window: pac::WWDG,
-    bus_hz: f32,
-    /// `None` for rates too low for the window watchdog.
-    limit: Option<WindowLimit>,
-}
-
-impl Watchdogs {
-    /// Starts the independent watchdog with a timeout of at least `limit_s`. Call it before anything that
-    /// may hang.
-    pub fn start_independent(independent: &pac::IWDG, limit_s: f32) {
-        let limit = IndependentLimit::new(limit_s, FASTEST_OSCILLATOR_HZ);
-        write_key(independent, key::START);
-        write_key(independent, key::OPEN);
+    fn set(&self, limit: IndependentLimit) {
         // SAFETY: every value of three bits up to 6 is a prescaler, and of twelve bits a reload.
         unsafe {
-            independent.pr().write(|w| w.pr().bits(limit.prescaler));
-            independent.rlr().write(|w| w.rl().bits(limit.reload));
-        }
-        // Both registers take effect in the oscillator's time, after some 200 µs.
-        comes(PATIENCE, || independent.sr().read().bits() == 0);
-        write_key(independent, key::FEED);
-    }
-
-    /// Takes ownership of both watchdogs; `bus_hz` is the clock of APB1. The window watchdog's own clock must
-    /// be on.
-    pub fn new(independent: pac::IWDG, window: pac::WWDG, bus_hz: u32) -> Self {
-        Self {
-            independent,
-            window,
-            bus_hz: bus_hz as f32,
-            limit: None,
+            self.0.pr().write(|w| w.pr().bits(limit.prescaler));
+            self.0.rlr().write(|w| w.rl().bits(limit.reload));
         }
     }
 
-    /// Sets the timeout to one and a half of these periods.
-    pub fn set_period(&mut self, period_s: f32) {
-        Self::start_independent(&self.independent, 2.0 * period_s);
-        let Some(limit) = WindowLimit::new(period_s, self.bus_hz, LARGEST_WINDOW_PRESCALER) else {
-            // The running window watchdog cannot be stopped, and would reset the chip too early.
-            return;
-        };
-        self.limit = Some(limit);
+    fn is_set(&self) -> bool {
+        self.0.sr().read().bits() == 0
+    }
+}
+
+/// The window watchdog.
+pub struct Window(pub pac::WWDG);
+
+impl WindowWatchdog for Window {
+    const LARGEST_PRESCALER: u8 = 7;
+
+    fn set_prescaler(&self, prescaler: u8) {
         // SAFETY: prescalers have three bits; a window of 0x7f disables the window.
-        self.window
+        self.0
             .cfr()
-            .write(|w| unsafe { w.wdgtb().bits(limit.prescaler).w().bits(0x7f) });
-        self.feed();
+            .write(|w| unsafe { w.wdgtb().bits(prescaler).w().bits(0x7f) });
     }
 
-    /// Feeds both watchdogs when a tick is finished.
-    pub fn feed(&mut self) {
-        write_key(&self.independent, key::FEED);
-        if let Some(WindowLimit { counter, .. }) = self.limit {
-            // SAFETY: seven bits.
-            self.window
-                .cr()
-                .write(|w| unsafe { w.t().bits(counter).wdga().set_bit() });
-        }
+    fn feed(&self, counter: u8) {
+        // SAFETY: seven bits.
+        self.0
+            .cr()
+            .write(|w| unsafe { w.t().bits(counter).wdga().set_bit() });
     }
 }
