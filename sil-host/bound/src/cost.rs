@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use crate::cycles::{
-    FLASH_DATA_WAIT, FLASH_LINE_BYTES, FLASH_READ, InstructionKind, PIPELINE_REFILL, data_wait,
-    fetch_wait, is_in_flash,
+    ADDRESS_STALL, FLASH_DATA_WAIT, FLASH_LINE_BYTES, FLASH_READ, FLOAT_DIVIDE_REST,
+    InstructionKind, PIPELINE_REFILL, data_wait, fetch_wait, is_in_flash,
 };
 use crate::graph::{Block, Graph};
-use crate::instruction::{Effect, Instruction, PROGRAM_COUNTER};
+use crate::instruction::{Effect, Instruction, Overlap, PROGRAM_COUNTER};
 
 /// Registers with known constant values.
 pub type Constants = BTreeMap<u16, u32>;
@@ -95,7 +95,7 @@ pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
         walk.step(instruction, block.instructions.get(place + 1));
     }
     BlockCost {
-        cycles: walk.cycles,
+        cycles: walk.cycles(),
         reading: walk.reading,
     }
 }
@@ -104,18 +104,22 @@ pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
 ///
 /// A program in RAM waits for no line. In flash, while a line is executed, the accelerator reads the next one (RM0090, section 3.5.2, prefetch).
 /// A line therefore takes as long as its instructions or as the read, whichever is longer. Both
-/// grow with the cost of the instructions, so upper bounds of these give an upper bound.
+/// grow with the cost of the instructions, so upper bounds of these give an upper bound. The same holds for a
+/// floating-point division and the integer instructions executed during it.
 #[derive(Clone, Debug, Default)]
-pub struct Walk {
-    /// Cycles.
-    pub cycles: u32,
+pub struct Walk<'a> {
+    cycles: u32,
     constants: Constants,
     line: Option<u32>,
     /// Cycles since the flash began to read the next line.
     reading: u32,
+    /// Remaining cycles of a floating-point division.
+    dividing: u32,
+    /// The instruction executed before, except IT, if no branch was taken since.
+    before: Option<&'a Instruction>,
 }
 
-impl Walk {
+impl<'a> Walk<'a> {
     /// Starts a walk in a line that has been read.
     pub fn from(constants: Constants) -> Self {
         Self {
@@ -124,64 +128,125 @@ impl Walk {
         }
     }
 
+    /// Returns the cycles of all instructions so far.
+    pub fn cycles(&self) -> u32 {
+        self.cycles + self.dividing
+    }
+
     /// Executes an instruction; `next` is the instruction executed after it, if known.
-    pub fn step(&mut self, instruction: &Instruction, next: Option<&Instruction>) {
+    pub fn step(&mut self, instruction: &'a Instruction, next: Option<&Instruction>) {
         let last_byte = instruction.address + instruction.size - 1;
         for touched in [instruction.address, last_byte].map(|at| at / FLASH_LINE_BYTES) {
             match self.line {
                 _ if !is_in_flash(instruction.address) => {}
                 Some(line) if line >= touched => {}
                 Some(_) => {
-                    self.cycles += FLASH_READ.saturating_sub(self.reading);
+                    self.pass(FLASH_READ.saturating_sub(self.reading));
                     self.reading = 0;
                     self.line = Some(touched);
                 }
                 None => self.line = Some(touched),
             }
         }
-        let mut cycles = instruction.kind.cycles();
-        if matches!(
-            instruction.kind,
-            InstructionKind::Float | InstructionKind::FloatMultiplyAdd
-        ) {
-            let uses = |next: &Instruction| {
-                let mut written = instruction.writes.iter();
-                written.any(|register| next.reads.contains(register))
-            };
-            cycles += u32::from(next.is_none_or(uses));
+        if instruction.uses_float() {
+            self.cycles += self.dividing;
+            self.reading += self.dividing;
+            self.dividing = 0;
         }
+        let wait = wait(instruction, &self.constants);
+        let mut cycles = instruction.kind.cycles();
+        cycles -= overlap(self.before, instruction, wait);
+        cycles += stall(self.before, instruction);
         self.reading += cycles;
-        self.cycles += cycles;
-        match wait(instruction, &self.constants) {
-            Some(FLASH_DATA_WAIT) => {
-                self.cycles += FLASH_DATA_WAIT;
-                // The flash reads the data first, then begins with the next line.
-                self.reading = 0;
+        self.pass(cycles);
+        self.pass(wait);
+        if wait == FLASH_DATA_WAIT {
+            // The flash reads the data first, then begins with the next line.
+            self.reading = 0;
+        }
+        let is_used_next = next.is_none_or(|next| {
+            let mut written = instruction.writes.iter();
+            written.any(|register| next.reads.contains(register))
+        });
+        match instruction.kind {
+            InstructionKind::Float | InstructionKind::FloatMultiplyAdd => {
+                self.cycles += u32::from(is_used_next);
+                self.reading += u32::from(is_used_next);
             }
-            Some(cycles) => self.cycles += cycles,
-            None => {}
+            InstructionKind::FloatDivide => {
+                self.dividing = FLOAT_DIVIDE_REST + u32::from(is_used_next);
+            }
+            _ => {}
         }
         follow(&mut self.constants, instruction);
+        if !instruction.is_it() {
+            self.before = Some(instruction);
+        }
     }
 
     /// Takes a branch: the pipeline is refilled, in flash from a line that has to be read.
     pub fn branch(&mut self, target: u32) {
-        self.cycles += branch(target);
+        self.pass(branch(target));
         self.line = None;
         self.reading = 0;
+        self.before = None;
+    }
+
+    /// Lets time pass, during which a division continues.
+    fn pass(&mut self, cycles: u32) {
+        self.cycles += cycles;
+        self.dividing = self.dividing.saturating_sub(cycles);
     }
 }
 
+/// Returns the cycles by which an instruction with this wait for its memory overlaps with its neighbours. A
+/// store to a register's value plus a constant overlaps with the instruction after it, every other load or store with a load
+/// before it, unless this loads the address (TRM, section 3.3.2).
+fn overlap(before: Option<&Instruction>, instruction: &Instruction, wait: u32) -> u32 {
+    let follows_load = before.is_some_and(|before| {
+        before.overlap == Some(Overlap::Load)
+            && !before
+                .writes
+                .iter()
+                .any(|it| instruction.address_from.contains(it))
+    });
+    match instruction.overlap {
+        _ if wait > 0 => 0,
+        Some(Overlap::Store) => 1,
+        Some(Overlap::Load | Overlap::StoreIndexed) => u32::from(follows_load),
+        None => 0,
+    }
+}
+
+/// Returns the delay of an instruction whose address depends on the data-processing instruction before it.
+fn stall(before: Option<&Instruction>, instruction: &Instruction) -> u32 {
+    let depends = before.is_some_and(|before| {
+        let is_memory = matches!(
+            before.kind,
+            InstructionKind::Load(_) | InstructionKind::Store(_)
+        );
+        !is_memory
+            && before
+                .writes
+                .iter()
+                .any(|it| instruction.address_from.contains(it))
+    });
+    u32::from(depends) * ADDRESS_STALL
+}
+
 /// Returns the additional wait of a load or store for its memory.
-fn wait(instruction: &Instruction, now: &Constants) -> Option<u32> {
+fn wait(instruction: &Instruction, now: &Constants) -> u32 {
     if instruction.kind == InstructionKind::TableBranch {
-        return Some(data_wait(instruction.address));
+        return data_wait(instruction.address);
     }
-    let (base, offset) = instruction.memory?;
+    let Some((base, offset)) = instruction.memory else {
+        return 0;
+    };
     if base == PROGRAM_COUNTER {
-        return Some(data_wait(instruction.address));
+        return data_wait(instruction.address);
     }
-    Some(data_wait(now.get(&base)?.wrapping_add_signed(offset)))
+    let address = now.get(&base).map(|base| base.wrapping_add_signed(offset));
+    address.map_or(0, data_wait)
 }
 
 /// Returns the cost of a taken branch beyond its own cycle.
@@ -189,13 +254,17 @@ pub fn branch(target: u32) -> u32 {
     PIPELINE_REFILL + fetch_wait(target)
 }
 
-/// Returns the cost of entering a block. A taken branch refills the pipeline. Without a branch, a line
-/// of the flash may end at the block's start; the next one is then being read already.
-pub fn of_edge(from: &BlockCost, to: &Block, taken: bool) -> u32 {
+/// Returns the cost of entering block `to` with this `cost` of block `from`. A taken branch refills the
+/// pipeline. Without a branch, a line of the flash may end at the block's start; the next one is then being read
+/// already. The first address may depend on the last instruction.
+pub fn of_edge(from: &Block, cost: &BlockCost, to: &Block, taken: bool) -> u32 {
     let address = to.instructions[0].address;
     if taken {
         return branch(address);
     }
     let starts_line = is_in_flash(address) && address.is_multiple_of(FLASH_LINE_BYTES);
-    u32::from(starts_line) * FLASH_READ.saturating_sub(from.reading)
+    let line = u32::from(starts_line) * FLASH_READ.saturating_sub(cost.reading);
+    let last = from.instructions.iter().rfind(|it| !it.is_it());
+    let first = to.instructions.iter().find(|it| !it.is_it());
+    line + first.map_or(0, |first| stall(last, first))
 }

@@ -8,10 +8,11 @@
 //! - RM0090: ST, *STM32F405/415 … reference manual*, section 3.5 (flash accelerator), section 2
 //!   (buses) and section 9.2.1 (memory mapped to address 0).
 //!
-//! Where a table gives a range, the model takes its upper end. It never assumes pipelined loads or
-//! stores, predicted branches or folded instructions. It does assume that data lies in RAM other than
+//! Where a table gives a range, the model takes its upper end. It never assumes predicted branches or
+//! folded instructions. Loads and stores overlap with their neighbours only where TRM section 3.3.2 says that they do
+//! ([`Overlap`](crate::instruction::Overlap)). The model does assume that data lies in RAM other than
 //! the program's, which no other bus master uses at the same time, unless the address is a constant
-//! in flash, in the program or in a peripheral.
+//! in flash, in the program or in a peripheral; and that addresses are aligned.
 
 /// Wait states of the flash: RM0090, table 10, 168 MHz at 2.7 … 3.6 V.
 pub const FLASH_WAIT_STATES: u32 = 5;
@@ -27,6 +28,14 @@ pub const INSTRUCTION_CACHE_LINES: usize = 64;
 
 /// Refill of the pipeline after a branch, P in TRM table 3-1: one to three.
 pub const PIPELINE_REFILL: u32 = 3;
+
+/// Delay of a load or store whose address depends on the result of the data-processing instruction before it
+/// (TRM, section 3.3.2).
+pub const ADDRESS_STALL: u32 = 1;
+
+/// Cycles of a floating-point division or square root after its first, during which integer instructions
+/// are executed (TRM, note to table 7-1).
+pub const FLOAT_DIVIDE_REST: u32 = 13;
 
 /// Longest wait of a load of a constant from flash: the end of an instruction line's read, then its
 /// own.
@@ -104,7 +113,7 @@ pub enum InstructionKind {
     Barrier,
     /// Access to a special register: 1, or 2 for the interrupt masks.
     Special,
-    /// Table branch: the load of the table and the refill.
+    /// Table branch: two cycles for the load, one for the addition (TRM, section 3.3.2), then the refill.
     TableBranch,
     /// Branch; its refill is counted when it is taken.
     Branch,
@@ -113,12 +122,16 @@ pub enum InstructionKind {
     Float,
     /// Floating-point multiplication and addition: 3.
     FloatMultiplyAdd,
-    /// Floating-point division or square root: 14.
+    /// Move between two core registers and two floating-point registers: 2.
+    FloatPair,
+    /// Floating-point division or square root: 14 ([`FLOAT_DIVIDE_REST`]), plus one if the next
+    /// instruction uses the result.
     FloatDivide,
 }
 
 impl InstructionKind {
-    /// Returns the cycles without wait states, excluding the refill of a branch.
+    /// Returns the cycles without wait states, excluding the refill of a branch and the rest of a
+    /// floating-point division.
     pub fn cycles(self) -> u32 {
         match self {
             Self::Simple | Self::Branch | Self::Float => 1,
@@ -126,9 +139,9 @@ impl InstructionKind {
             Self::Load(words) | Self::Store(words) => 1 + words,
             Self::Barrier => 1 + PIPELINE_REFILL,
             Self::Special => 2,
-            Self::TableBranch => 2,
-            Self::FloatMultiplyAdd => 3,
-            Self::FloatDivide => 14,
+            Self::FloatPair => 2,
+            Self::TableBranch | Self::FloatMultiplyAdd => 3,
+            Self::FloatDivide => 1,
         }
     }
 }

@@ -90,7 +90,7 @@ impl Graph {
     /// Returns whether an instruction uses the floating-point unit.
     pub fn uses_float(&self) -> bool {
         let mut instructions = self.blocks.values().flat_map(|block| &block.instructions);
-        instructions.any(|instruction| instruction.text.starts_with('v'))
+        instructions.any(Instruction::uses_float)
     }
 }
 

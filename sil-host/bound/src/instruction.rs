@@ -48,6 +48,20 @@ pub enum Effect {
     Add(u16, u16, i32),
 }
 
+/// Loads and stores of one register of the core that the pipeline overlaps with their neighbours (TRM, section
+/// 3.3.2): without update of the base register, and not relative to the program counter. 32-bit
+/// instructions at an odd half-word, which "might not pipeline optimally" (TRM, table 3-1, note b), are not
+/// counted among them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overlap {
+    /// Load.
+    Load,
+    /// Store to a register's value plus a constant.
+    Store,
+    /// Store to the sum of two registers.
+    StoreIndexed,
+}
+
 /// One decoded instruction.
 #[derive(Clone, Debug)]
 pub struct Instruction {
@@ -61,6 +75,10 @@ pub struct Instruction {
     pub flow: Flow,
     /// Base register and offset of its memory access.
     pub memory: Option<(u16, i32)>,
+    /// Registers from which the address of its memory access is computed.
+    pub address_from: Vec<u16>,
+    /// Whether it is a load or store that the pipeline can overlap with its neighbours.
+    pub overlap: Option<Overlap>,
     /// Its effect on a register used for addresses.
     pub effect: Option<Effect>,
     /// Registers read.
@@ -69,6 +87,18 @@ pub struct Instruction {
     pub writes: Vec<u16>,
     /// Disassembly.
     pub text: String,
+}
+
+impl Instruction {
+    /// Returns whether it uses the floating-point unit.
+    pub fn uses_float(&self) -> bool {
+        self.text.starts_with('v')
+    }
+
+    /// Returns whether it makes the following instructions conditional.
+    pub fn is_it(&self) -> bool {
+        self.text.starts_with("it")
+    }
 }
 
 /// Decodes the instructions of an image.
@@ -134,6 +164,8 @@ impl Decoder {
         let mut reads: Vec<u16> = detail.regs_read().iter().map(|r| r.0).collect();
         let mut writes: Vec<u16> = detail.regs_write().iter().map(|r| r.0).collect();
         let mut memory = None;
+        let mut address_from = Vec::new();
+        let mut has_index = false;
         for operand in &operands {
             match operand.op_type {
                 ArmOperandType::Reg(RegId(register)) => {
@@ -147,6 +179,9 @@ impl Decoder {
                 }
                 ArmOperandType::Mem(at) => {
                     reads.extend([at.base().0, at.index().0]);
+                    has_index = at.index().0 != ArmReg::ARM_REG_INVALID as u16;
+                    address_from = vec![at.base().0];
+                    address_from.extend(has_index.then_some(at.index().0));
                     if arm.writeback() {
                         writes.push(at.base().0);
                     }
@@ -227,6 +262,8 @@ impl Decoder {
             ARM_INS_VFNMS,
         ]) {
             InstructionKind::FloatMultiplyAdd
+        } else if base == "vmov" && registers(0) > 2 {
+            InstructionKind::FloatPair
         } else if any(&[ARM_INS_VLDR, ARM_INS_VPOP]) {
             InstructionKind::Load(doubles(0))
         } else if any(&[ARM_INS_VSTR, ARM_INS_VPUSH]) {
@@ -265,12 +302,35 @@ impl Decoder {
             flow = Flow::Return { conditional };
         }
         let effect = effect(base, &operands, immediate, conditional);
+        if any(&[ARM_INS_PUSH, ARM_INS_POP, ARM_INS_VPUSH, ARM_INS_VPOP]) {
+            address_from = vec![ArmReg::ARM_REG_SP as u16];
+        } else if memory.is_none()
+            && matches!(kind, InstructionKind::Load(_) | InstructionKind::Store(_))
+            && let Some(ArmOperandType::Reg(register)) = operands.first().map(|it| &it.op_type)
+        {
+            address_from = vec![register.0];
+        }
+        let bytes = instruction.bytes().len() as u32;
+        let neighbours = (bytes == 2 || address.is_multiple_of(4))
+            && !arm.writeback()
+            && !base.starts_with('v')
+            && memory.is_some_and(|(base, _)| base != PROGRAM_COUNTER)
+            && matches!(flow, Flow::Next);
+        let overlap = match kind {
+            _ if !neighbours => None,
+            InstructionKind::Load(1) => Some(Overlap::Load),
+            InstructionKind::Store(1) if has_index => Some(Overlap::StoreIndexed),
+            InstructionKind::Store(1) => Some(Overlap::Store),
+            _ => None,
+        };
         Ok(Instruction {
             address,
-            size: instruction.bytes().len() as u32,
+            size: bytes,
             kind,
             flow,
             memory,
+            address_from,
+            overlap,
             effect,
             reads,
             writes,

@@ -63,7 +63,7 @@ impl<'a> Tracer<'a> {
         }
         let handler = addresses.first().copied().unwrap_or_default();
         Ok(Executed {
-            cycles: walk.cycles + around(handler, true),
+            cycles: walk.cycles() + around(handler, true),
             instructions: addresses.len() as u32,
         })
     }

@@ -203,7 +203,7 @@ impl<'a> Analysis<'a> {
                 if !(waits.contains(from) && waits.contains(to)) {
                     // The cost of the call includes the way into the function and back.
                     let taken = *taken && block.call.is_none();
-                    cycles += cost::of_edge(&ends_at[from], &graph.blocks[to], taken);
+                    cycles += cost::of_edge(block, &ends_at[from], &graph.blocks[to], taken);
                 }
                 if !inside {
                     cycles += entered.get(to).copied().unwrap_or(0);
