@@ -106,3 +106,9 @@ export class Chromium {
 }
 
 export function pause(ms) { return new Promise((resolve) => setTimeout(resolve, ms)); }
+
+/** Prints what holds; ends the test with it otherwise. */
+export function check(holds, what) {
+  if (!holds) throw new Error(what);
+  console.log(`ok: ${what}`);
+}

@@ -1,14 +1,9 @@
 // The second of the first ten things on the page of a run that goes on, in headless Chromium:
 // pause, raise the belt's friction, continue, see the tip lift off. node friction.mjs CHROMIUM URL
 
-import { Chromium, pause } from "./chromium.mjs";
+import { Chromium, check, pause } from "./chromium.mjs";
 
 const [program, url] = process.argv.slice(2);
-
-function check(holds, what) {
-  if (!holds) throw new Error(what);
-  console.log(`ok: ${what}`);
-}
 
 const browser = await Chromium.start(program, { width: 1200, height: 900, dark: false });
 try {

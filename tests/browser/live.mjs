@@ -1,14 +1,9 @@
 // Operates the page of a run that goes on, in headless Chromium: node live.mjs CHROMIUM URL
 // Prints what it checked; ends with 1 at the first thing that is wrong.
 
-import { Chromium, pause } from "./chromium.mjs";
+import { Chromium, check, pause } from "./chromium.mjs";
 
 const [program, url] = process.argv.slice(2);
-
-function check(holds, what) {
-  if (!holds) throw new Error(what);
-  console.log(`ok: ${what}`);
-}
 
 const browser = await Chromium.start(program, { width: 1200, height: 900, dark: true });
 try {

@@ -2,14 +2,9 @@
 // Prints what it checked; ends with 1 at the first thing that is wrong.
 
 import { pathToFileURL } from "node:url";
-import { Chromium, pause } from "./chromium.mjs";
+import { Chromium, check, pause } from "./chromium.mjs";
 
 const [program, file] = process.argv.slice(2);
-
-function check(holds, what) {
-  if (!holds) throw new Error(what);
-  console.log(`ok: ${what}`);
-}
 
 const browser = await Chromium.start(program, { width: 1200, height: 900, dark: false });
 try {
