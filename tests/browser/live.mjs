@@ -33,6 +33,7 @@ try {
   await browser.until("page.events.some((event) => event[1] === 'lift-off')", "a push lifts the tip off");
   await browser.evaluate("(() => { const s = document.querySelector('#speed'); s.value = '0'; s.dispatchEvent(new Event('change')); })()");
   await browser.until("/\\d{4,} ticks/.test(document.querySelector('#status').textContent)", "the run goes faster than real time");
+  await browser.until("page.columns.start > 0 && page.charts.plots.every(({ plot }) => plot.scales.x.min > 0)", "the charts follow the run");
   await browser.evaluate("(() => { const s = document.querySelector('#speed'); s.value = '1'; s.dispatchEvent(new Event('change')); })()");
   await pause(300);
   await browser.click("#reset");

@@ -50,6 +50,12 @@ try {
   await browser.until("page.charts.range !== null", "dragging zooms");
   const shown = await browser.evaluate("page.charts.plots.map(({ plot }) => [plot.scales.x.min, plot.scales.x.max])");
   check(shown.every(([from, to]) => from === shown[0][0] && to === shown[0][1] && to - from < 0.3 * end), "all charts show the stretch");
+  const double = (type) => browser.send("Input.dispatchMouseEvent", { type, x: box.x + 0.5 * box.width, y: box.y + 0.5 * box.height, button: "left", clickCount: 2 });
+  await double("mousePressed");
+  await double("mouseReleased");
+  check(await browser.evaluate("page.charts.range === null"), "a double click zooms out");
+  await browser.key("+");
+  check(await browser.evaluate("page.charts.range !== null"), "+ zooms");
   await browser.key("0");
   check(await browser.evaluate("page.charts.range === null"), "0 shows the whole run");
 

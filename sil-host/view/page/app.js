@@ -16,7 +16,6 @@ class Page {
       this.columns.append(bytesOfBase64(run.rows));
       this.events = run.events;
     }
-    this.derive(0);
     this.time = this.columns.start;
     this.header();
     this.arm = new ArmView($("arm"), run.arm, this.columns);
@@ -37,23 +36,6 @@ class Page {
     this.listEvents();
     new ResizeObserver(() => { this.arm.resize(); this.charts.resize(); this.drawRibbons(); this.dirty = true; }).observe($("stage"));
     requestAnimationFrame((now) => this.frame(now));
-  }
-
-  /** Columns that follow from others. */
-  derive(from) {
-    const c = this.columns;
-    if (!c.friction_low || c.friction_low.length < c.room) {
-      for (const name of ["friction_low", "friction_high"]) {
-        const grown = new Float32Array(c.room);
-        if (c[name]) grown.set(c[name].subarray(0, c.length));
-        c[name] = grown;
-      }
-      from = 0;
-    }
-    for (let i = from; i < c.length; i++) {
-      c.friction_low[i] = c.friction[i] - c.friction_deviation[i];
-      c.friction_high[i] = c.friction[i] + c.friction_deviation[i];
-    }
   }
 
   header() {

@@ -60,14 +60,14 @@ class Charts {
       width: Math.max(holder.clientWidth, 200),
       height: 130,
       legend: { show: false },
-      cursor: { sync: { key: "run" }, drag: { x: true, y: false }, points: { size: 6 } },
+      cursor: { sync: { key: "run" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 }, bind: { dblclick: () => () => this.zoom(0) } },
       scales: { x: { time: false }, y: { range: (_, low, high) => span(low, high, chart) } },
       axes: [{ ...axis, size: 30 }, { ...axis, size: 58 }],
       series: [{}, ...chart.curves.map(([, , colour, , dashed, width]) => ({ stroke: ink(colour), width: width ?? (dashed ? 1 : 1.5), dash: dashed ? [5, 4] : undefined, spanGaps: false, points: { show: false } }))],
       bands: chart.band ? [{ series: chart.band, fill: ink("--purple") + "33" }] : [],
       hooks: {
         drawClear: [(u) => this.shadeFlights(u)],
-        setScale: [(u, key) => { if (key === "x") this.synchronise(u); }],
+        setSelect: [(u) => this.zoomToSelection(u)],
         init: [(u) => u.over.addEventListener("click", () => { if (u.select.width < 2) this.seek(u.posToVal(u.cursor.left, "x")); })],
       },
     }, this.data(chart), holder);
@@ -84,24 +84,26 @@ class Charts {
 
   /** Draws the present columns. */
   update(window_s = null) {
-    this.updating = true;
-    for (const { chart, plot } of this.plots) {
-      plot.setData(this.data(chart), false);
-      const { start, end } = this.columns;
-      const [from, to] = this.range ?? [window_s ? Math.max(end - window_s, start) : start, end];
-      plot.setScale("x", { min: from, max: to > from ? to : from + 1 });
-    }
-    this.updating = false;
+    for (let number = 0; number < this.plots.length; number++) this.updateOne(number, window_s);
   }
 
-  /** All charts show the stretch of time that one of them was zoomed to. */
-  synchronise(source) {
-    if (this.updating) return;
-    this.updating = true;
-    const { min, max } = source.scales.x, { start, end } = this.columns;
-    this.range = min <= start && max >= end ? null : [min, max];
-    for (const { plot } of this.plots) if (plot !== source) plot.setScale("x", { min, max });
-    this.updating = false;
+  /** Draws the present columns of one chart. */
+  updateOne(number, window_s = null) {
+    const { chart, plot } = this.plots[number], { start, end } = this.columns;
+    const [from, to] = this.range ?? [window_s ? Math.max(end - window_s, start) : start, end];
+    plot.setData(this.data(chart), false);
+    plot.setScale("x", { min: from, max: to > from ? to : from + 1 });
+  }
+
+  /** Shows the stretch of time that was selected in one chart in all of them. */
+  zoomToSelection({ select, posToVal }) {
+    if (select.width < 2) return;
+    const [min, max] = [select.left, select.left + select.width].map((at) => posToVal(at, "x"));
+    this.range = [min, max];
+    for (const { plot } of this.plots) {
+      plot.setScale("x", { min, max });
+      plot.setSelect({ left: 0, width: 0 }, false);
+    }
     this.zoomed();
   }
 

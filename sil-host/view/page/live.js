@@ -1,14 +1,14 @@
 "use strict";
 // A live run: receives rows and events from the program, and sends commands to it.
 
-/** Rows and events that stay on the page, simulated time that the charts show, time between two drawings of them. */
-const KEPT_ROWS = 12000, KEPT_EVENTS = 500, SHOWN_S = 10, CHARTS_MS = 50;
+/** Rows and events that stay on the page, simulated time that the charts show. */
+const KEPT_ROWS = 12000, KEPT_EVENTS = 500, SHOWN_S = 10;
 
 function connect(page) {
   const socket = new WebSocket(`ws://${location.host}/live`);
   socket.binaryType = "arraybuffer";
   const rows = [];
-  let listed = 0, drawn = 0, fresh = false;
+  let listed = 0, turn = 0, outdated = 0;
   const send = (order, more = {}) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ order, ...more })); };
 
   const status = document.createElement("p");
@@ -46,8 +46,11 @@ function connect(page) {
     listed = 0;
     page.listEvents();
     page.charts.range = null;
-    page.follow = fresh = true;
+    page.follow = true;
+    outdateAll();
   }
+
+  function outdateAll() { outdated = page.charts.plots.length + 1; }
 
   function setPlaying(playing) { if (page.playing !== playing) page.play(playing); }
 
@@ -62,17 +65,18 @@ function connect(page) {
   $("reset").addEventListener("click", () => send("reset"));
 
   /** Called before every picture. */
-  page.incoming = (now) => {
+  page.incoming = () => {
     if (rows.length) {
       for (const buffer of rows.splice(0)) page.columns.append(buffer, KEPT_ROWS);
       if (page.follow) page.time = page.columns.end;
-      page.dirty = fresh = true;
+      page.dirty = true;
+      outdateAll();
     }
-    if (!fresh || now - drawn < CHARTS_MS) return;
-    fresh = false;
-    drawn = now;
-    page.derive(0);
-    page.charts.update(SHOWN_S);
+    if (outdated === 0) return;
+    // One chart, or the bands and events, for each picture: all at once would delay it.
+    outdated -= 1;
+    turn = (turn + 1) % (page.charts.plots.length + 1);
+    if (turn > 0) { page.charts.updateOne(turn - 1, SHOWN_S); return; }
     const { start, end } = page.columns, [from, to] = page.charts.range ?? [Math.max(end - SHOWN_S, start), end];
     for (const ribbon of page.ribbons) ribbon.draw(from, to);
     if (page.events.length > KEPT_EVENTS) { page.events.splice(0, page.events.length - KEPT_EVENTS / 2); listed = 0; }

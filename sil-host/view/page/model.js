@@ -6,6 +6,9 @@ const MODES = [["flight", "--red"], ["slide +", "--blue"], ["slide −", "--sky"
 const STATES = [["idle", "--faint"], ["armed", "--orange"], ["tracking", "--green"], ["lift-off", "--red"], ["fault", "--purple"]];
 const FLAGS = { contact: 1, saturated: 2, done: 4, guarded: 8, edge: 16, recovering: 32, negative: 64, sticks: 128 };
 
+/** Columns that follow from others. */
+const DERIVED = ["friction_low", "friction_high"];
+
 /** Rows of 8-byte time, 4-byte numbers and single bytes, in columns that grow. */
 class Columns {
   constructor(names, bytes) {
@@ -17,6 +20,8 @@ class Columns {
     this.t = new Float64Array(this.room);
     for (const name of names) this[name] = new Float32Array(this.room);
     for (const name of bytes) this[name] = new Uint8Array(this.room);
+    for (const name of DERIVED) this[name] = new Float32Array(this.room);
+    this.all = ["t", ...names, ...bytes, ...DERIVED];
   }
 
   /** Appends the rows in a buffer; the oldest rows go once there are more than `most`. */
@@ -24,11 +29,14 @@ class Columns {
     const view = new DataView(buffer);
     const rows = Math.floor(buffer.byteLength / this.rowBytes);
     this.reserve(this.length + rows);
+    const { friction, friction_deviation, friction_low, friction_high } = this;
     for (let row = 0, at = 0; row < rows; row++, at += this.rowBytes) {
       const i = this.length++;
       this.t[i] = view.getFloat64(at, true);
       this.names.forEach((name, k) => { this[name][i] = view.getFloat32(at + 8 + 4 * k, true); });
       this.byteNames.forEach((name, k) => { this[name][i] = view.getUint8(at + 8 + 4 * this.names.length + k); });
+      friction_low[i] = friction[i] - friction_deviation[i];
+      friction_high[i] = friction[i] + friction_deviation[i];
     }
     if (this.length > 1.25 * most) this.drop(this.length - most);
   }
@@ -36,7 +44,7 @@ class Columns {
   reserve(length) {
     if (length <= this.room) return;
     while (this.room < length) this.room *= 2;
-    for (const name of ["t", ...this.names, ...this.byteNames]) {
+    for (const name of this.all) {
       const grown = new this[name].constructor(this.room);
       grown.set(this[name].subarray(0, this.length));
       this[name] = grown;
@@ -44,7 +52,7 @@ class Columns {
   }
 
   drop(rows) {
-    for (const name of ["t", ...this.names, ...this.byteNames]) this[name].copyWithin(0, rows, this.length);
+    for (const name of this.all) this[name].copyWithin(0, rows, this.length);
     this.length -= rows;
   }
 
