@@ -21,6 +21,7 @@ pub mod compliant;
 pub mod dop853;
 pub mod effects;
 pub mod event;
+mod from_file;
 pub mod impact;
 pub mod motion;
 mod motion_error;

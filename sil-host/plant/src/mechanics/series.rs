@@ -32,12 +32,15 @@ pub(crate) fn read(path: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, 
 }
 
 fn parse(text: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, f64)>), String> {
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(index, line)| (index + 1, line.trim()));
-    let head = lines.next().map_or("", |(_, line)| line);
-    let names: Vec<&str> = head.split(',').map(str::trim).collect();
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let mut records = reader.records();
+    let head = records.next().transpose().map_err(|it| it.to_string())?;
+    let head = head.unwrap_or_default();
+    let names: Vec<&str> = head.iter().collect();
     let pair = allowed
         .iter()
         .position(|one| names == [one.place, one.value]);
@@ -47,17 +50,21 @@ fn parse(text: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, f64)>), St
             .map(|one| format!("{},{}", one.place, one.value));
         let pairs: Vec<String> = pairs.collect();
         return Err(format!(
-            "line 1 is '{head}'; it must be {}",
+            "line 1 is '{}'; it must be {}",
+            names.join(","),
             pairs.join(" or ")
         ));
     };
     let columns = allowed[pair];
     let mut points: Vec<(f64, f64)> = Vec::new();
-    for (number, line) in lines.filter(|(_, line)| !line.is_empty()) {
-        let mut values = line.split(',').map(|value| value.trim().parse().ok());
+    for record in records {
+        let record = record.map_err(|error| error.to_string())?;
+        let number = record.position().map_or(0, csv::Position::line);
+        let mut values = record.iter().map(|value| value.parse().ok());
         let (Some(Some(place)), Some(Some(value)), None) =
             (values.next(), values.next(), values.next())
         else {
+            let line = record.iter().collect::<Vec<_>>().join(",");
             return Err(format!("line {number} is '{line}'; it must be two numbers"));
         };
         let check = |column: &str, value: f64, largest: f64| {

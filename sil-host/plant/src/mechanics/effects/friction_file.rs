@@ -1,11 +1,6 @@
 //! Changes of friction from a CSV file, over time or along the belt.
 
-use std::sync::Arc;
-
-use painleve_shared::OutOfRange;
-use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
+use crate::mechanics::from_file::{Content, FromFile};
 use crate::mechanics::series::{self, Columns};
 
 /// The columns of a file over time, or of one along the belt.
@@ -22,76 +17,46 @@ const COLUMNS: [Columns; 2] = [
     },
 ];
 
-/// A CSV file with two columns, loaded together with its scenario. Scenarios contain its path.
+/// A CSV file with two columns.
+pub type FrictionFile = FromFile<FrictionRows>;
+
+/// The rows of a [`FrictionFile`].
 ///
 /// The first line names the columns: `time_s,change` or `along_belt_m,change`. The first column
 /// must increase. Between the rows the change of μ is interpolated linearly. Before the first time
 /// and after the last one it is constant; along the belt the rows repeat, with the distance from
 /// the first to the last position as the length of the belt.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FrictionFile {
-    path: String,
-    rows: Arc<Rows>,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-struct Rows {
+pub struct FrictionRows {
     /// Whether the first column is a position on the belt instead of a time.
     along_belt: bool,
     /// Time (s) or position (m), and change of μ.
     points: Vec<(f64, f64)>,
 }
 
-impl FrictionFile {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// One sentence with the path and the invalid line.
-    pub fn read(path: &str) -> Result<Self, String> {
+impl Content for FrictionRows {
+    fn read(path: &str) -> Result<Self, String> {
         let (columns, points) = series::read(path, &COLUMNS)?;
         Ok(Self {
-            path: path.into(),
-            rows: Arc::new(Rows {
-                along_belt: columns == 1,
-                points,
-            }),
+            along_belt: columns == 1,
+            points,
         })
     }
+}
 
+impl FrictionRows {
     /// Returns the change of μ at time `t_s` and position `along_belt_m` on the belt.
     pub fn at(&self, t_s: f64, along_belt_m: f64) -> f64 {
-        let points = &self.rows.points;
+        let points = &self.points;
         let (Some(&(first, _)), Some(&(last, _))) = (points.first(), points.last()) else {
             return 0.0;
         };
-        let place = if self.rows.along_belt {
+        let place = if self.along_belt {
             first + (along_belt_m - first).rem_euclid(last - first)
         } else {
             t_s
         };
         series::interpolated(points, place)
-    }
-}
-
-impl SettingValue for FrictionFile {
-    const SHAPE: Shape = Shape::Text;
-
-    /// The file was checked when it was read.
-    fn check(&self, _: &Bounds, _: &mut OutOfRange) -> Result<(), Refused> {
-        Ok(())
-    }
-}
-
-impl Serialize for FrictionFile {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&self.path)
-    }
-}
-
-impl<'de> Deserialize<'de> for FrictionFile {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let path = String::deserialize(deserializer)?;
-        Self::read(&path).map_err(serde::de::Error::custom)
     }
 }
 
