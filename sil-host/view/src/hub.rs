@@ -4,27 +4,31 @@
 
 use std::collections::VecDeque;
 use std::mem;
-use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::sample::Sample;
+use painleve_record::events::RunEvent;
+use painleve_record::scene::Scene;
 use serde_json::{Value, json};
 
 use crate::foxglove::parameters::Parameter;
 
 /// Most viewers of each kind at once.
 const MOST_VIEWERS: usize = 8;
-/// Bytes that may wait for a viewer.
-const MOST_WAITING: usize = 4 << 20;
+/// Bytes that may wait for a page.
+const MOST_BYTES: usize = 4 << 20;
+/// Ticks and events that may wait for a Foxglove client: a few seconds.
+const MOST_ENTRIES: usize = 8192;
 
 /// The viewers of a run.
 #[derive(Debug, Default)]
 pub struct Hub {
     pub(crate) pages: Group<PageQueue>,
     pub(crate) clients: Group<ClientQueue>,
-    /// Channels to which any client has subscribed, one bit each.
-    wanted: AtomicU32,
+    /// Whether any Foxglove client has subscribed to a channel.
+    has_subscribers: AtomicBool,
     /// Number of resets of the run.
     session: AtomicU64,
     parameters: Mutex<Vec<Parameter>>,
@@ -40,19 +44,18 @@ pub(crate) struct PageQueue {
 /// What waits for a Foxglove client.
 #[derive(Debug, Default)]
 pub(crate) struct ClientQueue {
-    /// Channels to which it has subscribed, one bit each.
-    subscribed: u32,
+    /// Whether it has subscribed to any channel.
+    is_subscribed: bool,
     entries: VecDeque<Entry>,
-    bytes: usize,
 }
 
 /// An entry of a Foxglove client's queue.
 #[derive(Clone, Debug)]
 pub(crate) enum Entry {
-    /// A tick; the client's thread makes its messages, so that they cost the run nothing.
+    /// A tick. The client's thread makes its messages and its picture, so that they cost the run nothing.
     Tick(Arc<WatchedTick>),
-    /// A message of a channel.
-    Message(Arc<ChannelMessage>),
+    /// An event of the run.
+    Event(RunEvent),
     /// Parameters that have changed.
     Parameters(Arc<[Parameter]>),
     /// A text for the user.
@@ -66,6 +69,8 @@ pub(crate) enum Entry {
 pub(crate) struct WatchedTick {
     pub(crate) sample: Sample,
     pub(crate) estimates: Option<Telemetry>,
+    /// The scene at this tick, if a picture of it is due.
+    pub(crate) scene: Option<Scene>,
 }
 
 /// How a text for the user is shown.
@@ -73,17 +78,6 @@ pub(crate) struct WatchedTick {
 pub(crate) enum Severity {
     Information,
     Error,
-}
-
-/// A message of one channel.
-#[derive(Debug)]
-pub(crate) struct ChannelMessage {
-    /// Index into [`channels`](painleve_record::messages::channels).
-    pub(crate) channel: usize,
-    /// Simulated time.
-    pub(crate) time_ns: u64,
-    /// The message as JSON.
-    pub(crate) json: Vec<u8>,
 }
 
 impl Hub {
@@ -97,15 +91,15 @@ impl Hub {
         self.pages.count() > 0
     }
 
-    /// Returns whether any Foxglove client is connected.
-    pub fn has_clients(&self) -> bool {
-        self.clients.count() > 0
+    /// Returns whether any Foxglove client has subscribed to a channel.
+    pub fn has_subscribers(&self) -> bool {
+        self.has_subscribers.load(Ordering::Relaxed)
     }
 
     /// Passes rows and messages to every page.
     pub fn publish(&self, rows: &[u8], messages: &[Value]) {
         self.pages.each(|waiting| {
-            if waiting.rows.len() + rows.len() > MOST_WAITING {
+            if waiting.rows.len() + rows.len() > MOST_BYTES {
                 waiting.rows.clear();
             }
             waiting.rows.extend_from_slice(rows);
@@ -160,69 +154,54 @@ impl Hub {
         format!("{}-{resets}", std::process::id())
     }
 
-    /// Returns whether a Foxglove client has subscribed to a channel.
-    pub(crate) fn wants(&self, channel: usize) -> bool {
-        self.wanted.load(Ordering::Relaxed) & bit(channel) != 0
-    }
-
-    /// Passes entries to the Foxglove clients that have subscribed to them.
+    /// Passes entries to the Foxglove clients; ticks and events only to those that have subscribed to a
+    /// channel.
     pub(crate) fn send(&self, entries: &[Entry]) {
         self.clients
             .each(|queue| entries.iter().for_each(|entry| queue.push(entry)));
     }
 
-    /// Sets the channels to which a client has subscribed.
-    pub(crate) fn subscribe(
-        &self,
-        queue: &Mutex<ClientQueue>,
-        channels: impl Iterator<Item = usize>,
-    ) {
-        locked(queue).subscribed = channels.fold(0, |bits, channel| bits | bit(channel));
-        self.update_wanted();
+    /// Sets whether a client has subscribed to any channel.
+    pub(crate) fn set_subscribed(&self, queue: &Mutex<ClientQueue>, is_subscribed: bool) {
+        locked(queue).is_subscribed = is_subscribed;
+        self.update_subscribers();
     }
 
     /// Forgets a client.
     pub(crate) fn leave(&self, queue: &Arc<Mutex<ClientQueue>>) {
         self.clients.leave(queue);
-        self.update_wanted();
+        self.update_subscribers();
     }
 
-    fn update_wanted(&self) {
-        let mut wanted = 0;
-        self.clients.each(|queue| wanted |= queue.subscribed);
-        self.wanted.store(wanted, Ordering::Relaxed);
+    fn update_subscribers(&self) {
+        let mut any = false;
+        self.clients.each(|queue| any |= queue.is_subscribed);
+        self.has_subscribers.store(any, Ordering::Relaxed);
     }
 }
 
-fn bit(channel: usize) -> u32 {
-    1 << channel
+impl Entry {
+    /// Whether it belongs to a channel, and may be lost.
+    fn is_data(&self) -> bool {
+        matches!(self, Self::Tick(_) | Self::Event(_))
+    }
 }
 
 impl ClientQueue {
     fn push(&mut self, entry: &Entry) {
-        match entry {
-            Entry::Message(message) => {
-                if self.subscribed & bit(message.channel) == 0 {
-                    return;
-                }
-                self.bytes += message.json.len();
+        if entry.is_data() {
+            if !self.is_subscribed {
+                return;
             }
-            // The time matters only together with messages.
-            Entry::Tick(_) if self.subscribed == 0 => return,
-            Entry::Tick(_) => self.bytes += size_of::<WatchedTick>(),
-            _ => {}
-        }
-        if self.bytes > MOST_WAITING {
-            self.entries
-                .retain(|entry| !matches!(entry, Entry::Message(_) | Entry::Tick(_)));
-            self.bytes = 0;
+            if self.entries.len() >= MOST_ENTRIES {
+                self.entries.retain(|waiting| !waiting.is_data());
+            }
         }
         self.entries.push_back(entry.clone());
     }
 
     /// Takes everything that waits.
     pub(crate) fn take(&mut self) -> VecDeque<Entry> {
-        self.bytes = 0;
         mem::take(&mut self.entries)
     }
 }

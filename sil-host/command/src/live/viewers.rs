@@ -122,7 +122,7 @@ impl Monitor for Viewers {
         if self.hub.has_pages() {
             Row::new(&tick, travel_m).write(&mut self.rows);
         }
-        if self.hub.has_clients() {
+        if self.hub.has_subscribers() {
             self.feed.tick(&tick);
         }
         let time_s = sample.plant.time_s;

@@ -6,8 +6,10 @@ use std::sync::{Arc, Mutex};
 
 use painleve_record::RecordedTick;
 use painleve_record::fields::TOPICS;
-use painleve_record::messages::{CHANNELS, TickMessage, channels, nanoseconds};
-use serde::Deserialize;
+use painleve_record::messages::{
+    CHANNELS, EVENTS, SCENE, TRANSFORMS, TickMessage, channels, event_message, nanoseconds,
+};
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use tungstenite::{Error, Message, WebSocket};
 
@@ -191,8 +193,8 @@ impl Client<'_> {
     }
 
     fn update_subscriptions(&self) {
-        let channels = self.subscriptions.values().copied();
-        self.hub.subscribe(self.queue, channels);
+        self.hub
+            .set_subscribed(self.queue, !self.subscriptions.is_empty());
     }
 
     /// Sends the parameters with these names; all if there are none.
@@ -231,9 +233,7 @@ impl Client<'_> {
     fn pass_on(&mut self, entry: Entry) -> Result<(), Error> {
         match entry {
             Entry::Tick(tick) => self.send_tick(&tick),
-            Entry::Message(message) => {
-                self.send_data(message.channel, message.time_ns, &message.json)
-            }
+            Entry::Event(event) => self.send_data(EVENTS, event.time_s, || event_message(&event)),
             Entry::Parameters(changed) => {
                 let known = |one: &&Parameter| self.watched.contains(&one.name);
                 let parameters: Vec<&Parameter> = changed.iter().filter(known).collect();
@@ -247,37 +247,55 @@ impl Client<'_> {
         }
     }
 
-    fn send_tick(&mut self, tick: &WatchedTick) -> Result<(), Error> {
-        let time_ns = nanoseconds(tick.sample.plant.time_s);
+    fn send_tick(&mut self, watched: &WatchedTick) -> Result<(), Error> {
+        let time_s = watched.sample.plant.time_s;
         let mut bytes = vec![TIME];
-        bytes.extend(time_ns.to_le_bytes());
+        bytes.extend(nanoseconds(time_s).to_le_bytes());
         self.socket.write(Message::binary(bytes))?;
         let tick = RecordedTick {
-            sample: &tick.sample,
-            estimates: tick.estimates.as_ref(),
+            sample: &watched.sample,
+            estimates: watched.estimates.as_ref(),
         };
         for (channel, topic) in TOPICS.into_iter().enumerate() {
-            let is_known = tick.estimates.is_some() || !topic.needs_estimates;
-            if is_known && self.subscriptions.values().any(|one| *one == channel) {
-                let message = TickMessage { topic, tick: &tick };
-                // It contains only finite numbers and text keys, so it can be written as JSON.
-                if let Ok(json) = serde_json::to_vec(&message) {
-                    self.send_data(channel, time_ns, &json)?;
-                }
+            if tick.estimates.is_some() || !topic.needs_estimates {
+                self.send_data(channel, time_s, || TickMessage { topic, tick: &tick })?;
             }
+        }
+        if let Some(scene) = &watched.scene
+            && (self.wants(TRANSFORMS) || self.wants(SCENE))
+        {
+            let picture = scene.picture(&tick);
+            self.send_data(TRANSFORMS, time_s, || &picture.transforms)?;
+            self.send_data(SCENE, time_s, || &picture.scene)?;
         }
         Ok(())
     }
 
+    fn wants(&self, channel: usize) -> bool {
+        self.subscriptions.values().any(|one| *one == channel)
+    }
+
     /// Sends a message of a channel once for each subscription to it.
-    fn send_data(&mut self, channel: usize, time_ns: u64, json: &[u8]) -> Result<(), Error> {
+    fn send_data<M: Serialize>(
+        &mut self,
+        channel: usize,
+        time_s: f64,
+        message: impl FnOnce() -> M,
+    ) -> Result<(), Error> {
+        if !self.wants(channel) {
+            return Ok(());
+        }
+        // It contains only finite numbers and text keys, so it can be written as JSON.
+        let Ok(json) = serde_json::to_vec(&message()) else {
+            return Ok(());
+        };
         for (id, subscribed) in &self.subscriptions {
             if *subscribed == channel {
                 let mut bytes = Vec::with_capacity(13 + json.len());
                 bytes.push(MESSAGE_DATA);
                 bytes.extend(id.to_le_bytes());
-                bytes.extend(time_ns.to_le_bytes());
-                bytes.extend(json);
+                bytes.extend(nanoseconds(time_s).to_le_bytes());
+                bytes.extend(&json);
                 self.socket.write(Message::binary(bytes))?;
             }
         }
