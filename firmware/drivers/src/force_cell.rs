@@ -1,17 +1,23 @@
 //! A Microchip MCP3304 converter (13 bits, signed) behind the bridge amplifiers of a two-axis force cell,
 //! SPI mode 0 (data sheet DS21697).
 //!
-//! Each axis is a differential pair, the amplifier's output against its reference, so that forces of either
-//! sign are read; single-ended, the converter has no sign. The converter runs on 4.5 to 5.5 V: its inputs
-//! need a level shifter (74AHCT125), and its output needs a pin that tolerates 5 V.
+//! Each axis is a differential pair, the amplifier's output against its ground, with a live zero: without a
+//! force, the output is at half the reference. A dead supply, an open or shorted wire and a dead converter
+//! therefore give a code that no force gives. The converter runs on 4.5 to 5.5 V: its inputs need a level
+//! shifter (74AHCT125), and its output needs a pin that tolerates 5 V.
 
 use painleve_shared::counts::ForceCounts;
+use painleve_shared::mounting::Mounting;
 
 use crate::exchange::{Dialogue, Exchange, SelectTiming};
 use crate::{ReadError, rescale};
 
-/// Resolution, bits.
-pub const BITS: u8 = 13;
+/// Resolution over the forces of both signs, bits. The converter's thirteenth bit is the sign of its pair's
+/// voltage, which is never negative.
+pub const BITS: u8 = 12;
+
+/// Code without a force, if the bridge is in balance: half the reference.
+pub const LIVE_ZERO: i32 = 1 << (BITS - 1);
 
 /// Highest clock frequency at 5 V, Hz.
 pub const FASTEST_HZ: u32 = 2_100_000;
@@ -55,18 +61,26 @@ impl ForceCellDriver {
         }
     }
 
-    /// Returns (f_t, f_n) of the last set of readings as counts of `bits` bits. Each force takes two
-    /// conversions, and a third if these two disagree.
+    /// Returns (f_t, f_n) of the last set of readings, from the live zero, as counts of `bits` bits. Each
+    /// force takes two conversions, and a third if these two disagree. A code outside the range that
+    /// `mounting` allows is no reading.
     pub fn readings(
         &self,
         bits: u8,
+        mounting: &Mounting,
     ) -> (
         Result<ForceCounts, ReadError>,
         Result<ForceCounts, ReadError>,
     ) {
-        let [normal, tangential] = self
-            .readings
-            .map(|reading| reading.map(|it| ForceCounts(rescale(it, BITS, bits))));
+        let plausible = mounting.force_lowest_code.into()..=mounting.force_highest_code.into();
+        let [normal, tangential] = self.readings.map(|reading| {
+            let code = reading?;
+            let force = ForceCounts(rescale(code - LIVE_ZERO, BITS, bits));
+            plausible
+                .contains(&code)
+                .then_some(force)
+                .ok_or(ReadError::Implausible)
+        });
         (tangential, normal)
     }
 

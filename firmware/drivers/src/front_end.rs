@@ -180,7 +180,7 @@ impl FrontEnd {
             (joint_1.ok(), joint_2.ok())
         });
         let (tangential, normal) = force_cell.map_or((None, None), |it| {
-            let (tangential, normal) = it.readings(force_bits);
+            let (tangential, normal) = it.readings(force_bits, &settings.mounting);
             (tangential.ok(), normal.ok())
         });
         let turned = |counts: EncoderCounts, reversed: bool| {

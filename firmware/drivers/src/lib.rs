@@ -41,6 +41,8 @@ pub enum ReadError {
     NotZero,
     /// Two readings of the same value differ.
     Disagreement,
+    /// No force gives this code: a supply or a wire is dead.
+    Implausible,
 }
 
 /// Scales a reading of `from` bits to `to` bits.

@@ -13,11 +13,12 @@ use painleve_drivers::exchange::PolledDriver;
 use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_firmware::supervise::lapses::Lapse;
 use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
-use painleve_parts::{As5048a, BitErrors, Mcp3304};
+use painleve_parts::{As5048a, BitErrors, BridgeAmplifier, Mcp3304};
 use painleve_plant::{Configuration, Controller};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::Health;
+use painleve_shared::mounting::Mounting;
 
 use super::{BoardError, ConnectedBoard, TimedAnswer};
 use crate::timing::Unit;
@@ -30,9 +31,6 @@ const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
 const ENCODER_BUS_HZ: u64 = 5_250_000;
 const FORCE_BUS_HZ: u64 = 1_312_500;
 
-/// Output of a bridge amplifier at zero force, and its reference, counts.
-const BRIDGE_MIDDLE: i32 = 2048;
-
 /// A driver over a modelled bus with `N` parts.
 type Modelled<D, P, const N: usize> = PolledDriver<D, ModelledBus<P>, SelectPin<P>, Clock, N>;
 
@@ -43,8 +41,11 @@ pub struct Drivers {
     force_cell: Modelled<ForceCellDriver, Mcp3304, 1>,
     encoder_parts: [SharedPart<As5048a>; 2],
     force_part: SharedPart<Mcp3304>,
+    /// Bridge amplifiers of f_n and f_t, whose failures can be simulated.
+    pub bridges: [BridgeAmplifier; 2],
     encoder_bits: u8,
     force_bits: u8,
+    mounting: Mounting,
     ticks: u32,
 }
 
@@ -87,8 +88,10 @@ impl Drivers {
             force_cell: PolledDriver::new(ForceCellDriver::new(), force_bus, [select], clock),
             encoder_parts,
             force_part,
+            bridges: Default::default(),
             encoder_bits: encoder.bits,
             force_bits: force.bits,
+            mounting: configuration.converters.mounting,
             ticks: 0,
         })
     }
@@ -107,17 +110,20 @@ impl Drivers {
             part.borrow_mut().angle = (joint.0 << up) as u16;
         }
         let up = force_cell::BITS - self.force_bits;
-        let [normal, tangential] = [frame.normal_force, frame.tangential_force]
-            .map(|force| BRIDGE_MIDDLE + (force.0 << up));
-        self.force_part.borrow_mut().channels =
-            [normal, BRIDGE_MIDDLE, tangential, BRIDGE_MIDDLE, 0, 0, 0, 0];
+        let [normal, tangential] = self.bridges;
+        let [n_plus, n_minus] = normal.channels(frame.normal_force.0 << up);
+        let [t_plus, t_minus] = tangential.channels(frame.tangential_force.0 << up);
+        self.force_part.borrow_mut().channels = [n_plus, n_minus, t_plus, t_minus, 0, 0, 0, 0];
     }
 
     /// Returns the frame as the drivers read it.
     fn read(&mut self, frame: &SensorFrame) -> SensorFrame {
         self.present(frame);
         let joints = self.encoders.read().readings(self.encoder_bits);
-        let (tangential, normal) = self.force_cell.read().readings(self.force_bits);
+        let (tangential, normal) = self
+            .force_cell
+            .read()
+            .readings(self.force_bits, &self.mounting);
         SensorFrame {
             joints: joints.map(|it| it.unwrap_or(NO_ENCODER)),
             normal_force: normal.unwrap_or(NO_FORCE),

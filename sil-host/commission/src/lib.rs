@@ -248,6 +248,7 @@ pub fn commission<R: Rig>(
             stage_reversed: stages.reversed,
             force_reversed: stages.force_reversed,
             force_tare: encoders.tare,
+            ..expected.converters.mounting
         },
         encoder_offsets: encoders.offsets,
         height_m: rest.height_m,

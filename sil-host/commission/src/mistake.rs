@@ -94,8 +94,10 @@ pub enum Mistake {
         /// Angle by which the encoder turned, degrees.
         turned_deg: f64,
     },
-    /// The force cell gives no readings.
-    #[error("force cell: no readings; check its supply and its select line")]
+    /// The force cell gives no readings, or codes that no force gives.
+    #[error(
+        "force cell: no readings between the codes converters.mounting.force_lowest_code and force_highest_code; check its supply, its wires and its select line"
+    )]
     ForceSilent,
     /// The force cell's zero leaves too little of its range.
     #[error(

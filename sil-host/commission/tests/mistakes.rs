@@ -76,7 +76,8 @@ fn named(mistake: BuiltInMistake) -> (bool, &'static [&'static str]) {
         TangentialForceMirrored => (false, &["force cell: f_t has the other sign"]),
         ForceAxesSwapped => (true, &["force cell: f_t and f_n are exchanged"]),
         ForceCellOutOfBalance => (true, &["force cell: f_n reads"]),
-        ForceLineDead => (true, &["force cell: f_n did not change"]),
+        ForceCellWithoutSupply => (true, &["force cell: no readings"]),
+        ForceCellStuck => (true, &["force cell: f_n did not change"]),
         ForceCellOfAnotherRange => (true, &["force cell: reads 0.3"]),
         BeltTooHigh => (false, &["belt: it is"]),
     }

@@ -2,16 +2,19 @@
 //! timing.
 //!
 //! - [`As5048a`], [`Mcp3304`]: the parts, on an SPI bus
+//! - [`BridgeAmplifier`]: what the force cell puts on the inputs of its converter
 //! - [`BitErrors`]: disturbs the bits on their wires
 //! - [`wires`]: the parts behind `embedded-hal`, for drivers that run on a PC
 
 mod as5048a;
 mod bit_errors;
+mod bridge_amplifier;
 mod mcp3304;
 pub mod wires;
 
 pub use as5048a::As5048a;
 pub use bit_errors::BitErrors;
+pub use bridge_amplifier::{BridgeAmplifier, BridgeFailure};
 pub use mcp3304::Mcp3304;
 
 /// Picoseconds.

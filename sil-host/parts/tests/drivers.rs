@@ -9,8 +9,9 @@ use painleve_drivers::encoders::{self, EncoderDriver};
 use painleve_drivers::exchange::PolledDriver;
 use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
-use painleve_parts::{As5048a, BitErrors, Mcp3304, SpiPart};
+use painleve_parts::{As5048a, BitErrors, BridgeAmplifier, BridgeFailure, Mcp3304, SpiPart};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
+use painleve_shared::mounting::Mounting;
 
 type Tested<D, P, const N: usize> = PolledDriver<D, ModelledBus<P>, SelectPin<P>, Clock, N>;
 type TestedEncoders = Tested<EncoderDriver, As5048a, 2>;
@@ -36,6 +37,26 @@ fn force_cell() -> (TestedForceCell, SharedPart<Mcp3304>) {
     )
 }
 
+/// An axis of the force cell without a failure.
+const BRIDGE: BridgeAmplifier = BridgeAmplifier { failure: None };
+
+/// The converter's channels for the pairs of both axes.
+fn channels([n_plus, n_minus]: [i32; 2], [t_plus, t_minus]: [i32; 2]) -> [i32; 8] {
+    [n_plus, n_minus, t_plus, t_minus, 0, 0, 0, 0]
+}
+
+/// Reads f_t and f_n.
+fn forces(
+    driver: &mut TestedForceCell,
+) -> (
+    Result<ForceCounts, ReadError>,
+    Result<ForceCounts, ReadError>,
+) {
+    driver
+        .read()
+        .readings(force_cell::BITS, &Mounting::default())
+}
+
 #[test]
 fn every_angle_is_read_within_the_encoders_limits() {
     let (mut driver, parts) = encoders();
@@ -51,13 +72,39 @@ fn every_angle_is_read_within_the_encoders_limits() {
 #[test]
 fn forces_of_either_sign_are_read() {
     let (mut driver, part) = force_cell();
-    for force in -4096..4096 {
-        part.borrow_mut().channels = [force, 0, 0, force + 1, 0, 0, 0, 0];
-        let tangential = (-force - 1).clamp(-4096, 4095);
-        let expected = (Ok(ForceCounts(tangential)), Ok(ForceCounts(force)));
-        assert_eq!(driver.read().readings(force_cell::BITS), expected);
+    for force in -1966..=1965 {
+        let (normal, tangential) = (BRIDGE.channels(force), BRIDGE.channels(-force - 1));
+        part.borrow_mut().channels = channels(normal, tangential);
+        let expected = (Ok(ForceCounts(-force - 1)), Ok(ForceCounts(force)));
+        assert_eq!(forces(&mut driver), expected);
     }
     assert!(part.borrow().violations().is_empty());
+}
+
+/// Whatever the force, a dead axis gives no reading, and the other axis is read.
+#[test]
+fn a_dead_axis_of_the_force_cell_gives_no_reading() {
+    let (mut driver, part) = force_cell();
+    for failure in BridgeFailure::ALL {
+        let dead = BridgeAmplifier {
+            failure: Some(*failure),
+        };
+        for force in (-1966..=1965).step_by(100) {
+            part.borrow_mut().channels = channels(dead.channels(force), BRIDGE.channels(7));
+            let expected = (Ok(ForceCounts(7)), Err(ReadError::Implausible));
+            assert_eq!(forces(&mut driver), expected, "{failure:?} at {force}");
+        }
+    }
+}
+
+/// Saturation of the amplifier is no measurement.
+#[test]
+fn a_force_beyond_the_range_gives_no_reading() {
+    let (mut driver, part) = force_cell();
+    for force in [-2100, -1967, 1966, 2100] {
+        part.borrow_mut().channels = channels(BRIDGE.channels(force), BRIDGE.channels(0));
+        assert_eq!(forces(&mut driver).1, Err(ReadError::Implausible));
+    }
 }
 
 #[test]
@@ -83,7 +130,9 @@ fn dead_lines_give_no_reading_or_a_recognisably_dead_one() {
     );
     let (mut driver, part) = force_cell();
     part.borrow_mut().dead = Some(true);
-    assert_eq!(driver.read().readings(13).0, Err(ReadError::NotZero));
+    assert_eq!(forces(&mut driver).0, Err(ReadError::NotZero));
+    part.borrow_mut().dead = Some(false);
+    assert_eq!(forces(&mut driver).0, Err(ReadError::Implausible));
 }
 
 #[test]
@@ -117,8 +166,9 @@ fn with_bit_errors_a_reading_is_correct_or_missing() {
         for (part, angle) in parts.iter().zip(angles) {
             part.borrow_mut().angle = angle as u16;
         }
-        let (normal, tangential) = ((tick * 11 % 8192) as i32 - 4096, (tick * 3 % 4096) as i32);
-        force_part.borrow_mut().channels = [normal, 0, tangential, 0, 0, 0, 0, 0];
+        let [normal, tangential] = [tick * 11, tick * 3].map(|it| (it % 3900) as i32 - 1950);
+        let pairs = [normal, tangential].map(|it| BRIDGE.channels(it));
+        force_part.borrow_mut().channels = channels(pairs[0], pairs[1]);
         for (reading, angle) in driver
             .read()
             .readings(encoders::BITS)
@@ -130,7 +180,7 @@ fn with_bit_errors_a_reading_is_correct_or_missing() {
                 Err(_) => lost += 1,
             }
         }
-        let (t, n) = force_driver.read().readings(force_cell::BITS);
+        let (t, n) = forces(&mut force_driver);
         for (reading, force) in [(t, tangential), (n, normal)] {
             match reading {
                 Ok(counts) => assert_eq!(counts.0, force, "tick {tick}"),

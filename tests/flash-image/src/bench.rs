@@ -13,9 +13,6 @@ use crate::board::{BoardChip, BoardSnapshot, EmulatedBoard, F405, G474};
 use crate::stm32::Pin;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
-/// Bits of the force cell's converter.
-pub const FORCE_BITS: u8 = 13;
-
 /// Ticks before the switch is closed.
 const BEFORE_ENABLE: u32 = 100;
 
@@ -50,6 +47,8 @@ pub struct Bench<C: BoardChip> {
     pub encoder_offset: [u16; 2],
     /// Encoders that repeat their last angle.
     pub is_frozen: [bool; 2],
+    /// Reading at which both axes of the force cell are stuck, counts.
+    pub force_is_stuck_at: Option<i32>,
     /// The arm is held until it is first driven.
     is_held: bool,
     /// Link angles at which an operator holds the arm, rad.
@@ -63,13 +62,12 @@ pub struct BenchSnapshot<C = F405> {
     frame: SensorFrame,
 }
 
-/// Loads a built-in scenario with this board's converters.
+/// Loads a built-in scenario.
 ///
 /// # Panics
 /// If there is no scenario of this name.
 pub fn scenario(name: &str) -> Scenario {
-    let overrides = [format!("converters.force.bits={FORCE_BITS}")];
-    Scenario::load(name, &overrides).unwrap_or_else(|error| panic!("{error}"))
+    Scenario::load(name, &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Encodes a scenario's configuration for the board.
@@ -128,6 +126,7 @@ impl<C: BoardChip> Bench<C> {
             mounted: Mounting::default(),
             encoder_offset: [0; 2],
             is_frozen: [false; 2],
+            force_is_stuck_at: None,
             is_held: true,
             held_rad: None,
         };
@@ -159,15 +158,15 @@ impl<C: BoardChip> Bench<C> {
                 wiring.encoders[joint].angle = angle & 0x3fff;
             }
         }
-        let middle = 2048;
+        let stuck_at = self.force_is_stuck_at;
         let signed = |counts: i32, axis: usize| {
             let sign = if mounted.force_reversed[axis] { -1 } else { 1 };
-            middle + sign * counts + mounted.force_tare[axis].0
+            stuck_at.unwrap_or(sign * counts + mounted.force_tare[axis].0)
         };
-        wiring.force.channels[0] = signed(self.frame.normal_force.0, 1);
-        wiring.force.channels[1] = middle;
-        wiring.force.channels[2] = signed(self.frame.tangential_force.0, 0);
-        wiring.force.channels[3] = middle;
+        let [normal, tangential] = wiring.bridges;
+        let [n_plus, n_minus] = normal.channels(signed(self.frame.normal_force.0, 1));
+        let [t_plus, t_minus] = tangential.channels(signed(self.frame.tangential_force.0, 0));
+        wiring.force.channels = [n_plus, n_minus, t_plus, t_minus, 0, 0, 0, 0];
     }
 
     /// An operator holds the arm in the air with its links at these angles from the plumb line, degrees.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use painleve_firmware::BUILD;
-use painleve_parts::{As5048a, Mcp3304, SpiPart, Transfer};
+use painleve_parts::{As5048a, BridgeAmplifier, Mcp3304, SpiPart, Transfer};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox};
@@ -35,6 +35,8 @@ pub struct BoardWiring {
     pub encoders: [As5048a; 2],
     /// Converter of the force cell.
     pub force: Mcp3304,
+    /// Bridge amplifiers of f_n and f_t.
+    pub bridges: [BridgeAmplifier; 2],
     selected: [bool; 3],
     /// Level at which the image drives the torque stages' pin; `None` while the pin floats.
     pub stages: Option<bool>,

@@ -3,7 +3,7 @@
 use painleve_flash_image::bench::{Bench, scenario};
 use painleve_flash_image::board::{BoardChip, F405, G474};
 use painleve_flash_image::stm32::Crystal;
-use painleve_parts::BitErrors;
+use painleve_parts::{BitErrors, BridgeFailure};
 
 /// Number of faults.
 const FAULTS: u32 = 1000;
@@ -33,10 +33,11 @@ enum InjectedFault {
     Supply,
     EncoderDies,
     ForceCellDies,
+    ForceAxisDies,
 }
 
 impl InjectedFault {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::BitErrors,
         Self::SerialNoise,
         Self::ResetPin,
@@ -48,6 +49,7 @@ impl InjectedFault {
         Self::Supply,
         Self::EncoderDies,
         Self::ForceCellDies,
+        Self::ForceAxisDies,
     ];
 
     /// Returns whether the arm must continue.
@@ -92,7 +94,17 @@ impl InjectedFault {
                 let level = random.below(2) == 0;
                 board.wiring().encoders[encoder].dead = Some(level);
             }
-            Self::ForceCellDies => board.wiring().force.dead = Some(true),
+            Self::ForceCellDies => {
+                let level = random.below(2) == 0;
+                board.wiring().force.dead = Some(level);
+            }
+            Self::ForceAxisDies => {
+                let failures = BridgeFailure::ALL;
+                let failure = failures[random.below(failures.len() as u64) as usize];
+                let axis = random.below(2) as usize;
+                board.wiring().bridges[axis].failure = Some(failure);
+                bench.present();
+            }
         }
     }
 }

@@ -79,7 +79,12 @@ impl BoardRig {
         let interrupt = Interrupt::catch()?;
         let operator = Operator::listen()?;
         let mut configuration = scenario.controller_configuration();
-        configuration.converters.mounting = Mounting::default();
+        let mounting = &mut configuration.converters.mounting;
+        *mounting = Mounting {
+            force_lowest_code: mounting.force_lowest_code,
+            force_highest_code: mounting.force_highest_code,
+            ..Mounting::default()
+        };
         configuration.settings.torque_limit_nm = torque_limit_nm as f32;
         let arm = ConnectedArm::open(port, &configuration, FrameSource::Commissioning)?;
         Ok(Self {

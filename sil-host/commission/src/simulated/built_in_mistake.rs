@@ -46,8 +46,10 @@ pub enum BuiltInMistake {
     ForceAxesSwapped,
     /// The bridge of f_n is out of balance by 40 % of the range.
     ForceCellOutOfBalance,
-    /// The force cell's amplifier gives its middle voltage.
-    ForceLineDead,
+    /// The force cell has no supply: its live zero is gone.
+    ForceCellWithoutSupply,
+    /// The force cell repeats its reading without a load.
+    ForceCellStuck,
     /// The force cell has three times its range.
     ForceCellOfAnotherRange,
     /// The belt is 12 mm higher.
@@ -93,7 +95,8 @@ impl BuiltInMistake {
             Self::ForceCellOutOfBalance => {
                 mounting.force_tare[1] = ForceCounts(force_range_counts * 2 / 5);
             }
-            Self::ForceLineDead => wiring.force_dead = true,
+            Self::ForceCellWithoutSupply => wiring.force_silent = true,
+            Self::ForceCellStuck => wiring.force_stuck = true,
             Self::ForceCellOfAnotherRange => wiring.force_gain = 1.0 / 3.0,
             Self::BeltTooHigh => actual.arm.height_m -= 0.012,
         }

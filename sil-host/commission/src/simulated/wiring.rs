@@ -6,8 +6,9 @@ use painleve_shared::counts::{
 };
 use painleve_shared::mounting::Mounting;
 
-/// Reading of a part that does not answer: out of every range, as the board's drivers report it.
+/// Readings of parts that do not answer: out of every range, as the board's drivers report them.
 const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
+const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
 
 /// Mounting and wiring of an arm.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,8 +31,10 @@ pub struct Wiring {
     pub stage_gain: [f64; 2],
     /// Whether f_t and f_n are exchanged.
     pub forces_swapped: bool,
+    /// Whether the force cell gives codes that no force gives.
+    pub force_silent: bool,
     /// Whether the force cell always reads its tare.
-    pub force_dead: bool,
+    pub force_stuck: bool,
     /// Force cell reading divided by the force.
     pub force_gain: f64,
 }
@@ -49,7 +52,8 @@ impl Wiring {
             stages_swapped: false,
             stage_gain: [1.0; 2],
             forces_swapped: false,
-            force_dead: false,
+            force_silent: false,
+            force_stuck: false,
             force_gain: 1.0,
         }
     }
@@ -92,6 +96,9 @@ impl Wiring {
         scale: &LinearScale<f32>,
         mut forces: [ForceCounts; 2],
     ) -> [ForceCounts; 2] {
+        if self.force_silent {
+            return [NO_FORCE; 2];
+        }
         if self.forces_swapped {
             forces.swap(0, 1);
         }
@@ -99,7 +106,7 @@ impl Wiring {
         let mut raw = [ForceCounts(0); 2];
         for axis in 0..2 {
             let counts = (f64::from(forces[axis].0) * self.force_gain).round() as i32;
-            let signed = match (self.force_dead, self.mounting.force_reversed[axis]) {
+            let signed = match (self.force_stuck, self.mounting.force_reversed[axis]) {
                 (true, _) => 0,
                 (false, true) => -counts,
                 (false, false) => counts,

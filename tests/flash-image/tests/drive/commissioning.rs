@@ -110,7 +110,7 @@ fn a_dead_force_line_is_named_and_nothing_is_written() {
     let (output, text, folder) = commission(&rig, Bench::new("commission"), DEFAULT);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(
-        text.contains("force cell: f_n did not change when the tip was set down"),
+        text.contains("force cell: no readings between the codes"),
         "{text}"
     );
     assert_eq!(rig.ticks_on(), 0);

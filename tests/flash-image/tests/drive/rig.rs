@@ -173,7 +173,7 @@ impl StartedProgram {
     pub fn start(folder: painleve_tests::Bench, port: &Path, arguments: &[&str]) -> Self {
         let mut command = folder.command(arguments);
         command
-            .args(["--set", "converters.force.bits=13", "--port"])
+            .arg("--port")
             .arg(port)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

@@ -1,8 +1,10 @@
 //! Sensors, switches and torque stages fail.
 
+use painleve_drivers::force_cell::LIVE_ZERO;
 use painleve_flash_image::MILLISECOND;
 use painleve_flash_image::bench::{Bench, encoded, scenario};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard, STAGES_READY};
+use painleve_parts::BridgeFailure;
 use painleve_plant::plant::Plant as _;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::ForceCounts;
@@ -15,6 +17,7 @@ use super::{DEFAULT, assert_off_in_time, driven, latched_fault};
 crate::on_each_board! {
     the_switch_takes_the_torque_off_and_a_bounce_does_not_put_it_on,
     sensors_that_die_take_the_torque_off,
+    a_force_cell_that_dies_takes_the_torque_off,
     an_encoder_that_freezes_takes_the_torque_off,
     a_torque_stage_that_is_not_ready_takes_the_torque_off,
     arming_on_implausible_readings_is_refused_with_a_fault,
@@ -46,9 +49,28 @@ fn sensors_that_die_take_the_torque_off<C: BoardChip>() {
             assert_off_in_time(bench);
         }
     }
+}
+
+/// Every single failure between the strain gauges and the processor, on either axis.
+fn a_force_cell_that_dies_takes_the_torque_off<C: BoardChip>() {
+    for level in [false, true] {
+        let mut bench = driven::<C>();
+        bench.board.wiring().force.dead = Some(level);
+        assert_off_in_time(bench);
+    }
     let mut bench = driven::<C>();
-    bench.board.wiring().force.dead = Some(true);
-    assert_off_in_time(bench);
+    let driven = bench.snapshot();
+    for axis in 0..2 {
+        for failure in BridgeFailure::ALL {
+            bench.restore(&driven);
+            bench.board.wiring().bridges[axis].failure = Some(*failure);
+            bench.present();
+            let off = bench.time_until_off();
+            assert!(off.is_some(), "{axis} {failure:?}");
+            bench.assert_stays_off(10);
+            assert_eq!(latched_fault(&mut bench), Some(Fault::ForceOutOfRange));
+        }
+    }
 }
 
 /// The tip moves on the belt; the encoder repeats a plausible angle.
@@ -108,6 +130,7 @@ fn parts_mounted_backwards_drive_the_same_arm<C: BoardChip>() {
         stage_reversed: [true; 2],
         force_reversed: [true; 2],
         force_tare: [ForceCounts(37), ForceCounts(-55)],
+        ..Mounting::default()
     };
     let mut scenario = scenario(DEFAULT);
     let tip_m = |scenario: &Scenario, mounted| {
@@ -142,7 +165,11 @@ fn the_image_respects_the_limits_of_the_data_sheets<C: BoardChip>() {
 fn forces_of_either_sign_are_converted<C: BoardChip>() {
     let mut bench = driven::<C>();
     let conversions = &bench.board.wiring().force.conversions;
-    assert!(conversions.iter().any(|it| *it < 0), "{conversions:?}");
+    assert!(
+        conversions.iter().any(|it| *it < LIVE_ZERO)
+            && conversions.iter().any(|it| *it > LIVE_ZERO),
+        "{conversions:?}"
+    );
 }
 
 fn one_disturbed_transfer_is_no_fault<C: BoardChip>() {
