@@ -80,7 +80,7 @@ fn an_arm_is_commissioned_and_its_corrected_scenario_describes_it() {
     let corrected = [
         "encoder of joint 1: counts in the other direction",
         "encoder of the elbow: its zero is 30.0° off",
-        "force cell: without a load, f_n reads -1.22 N",
+        "force cell: without a load, f_n reads -2.44 N",
         "force cell: f_n has the other sign",
         "torque stage of the elbow: turns its joint in the other direction",
         "force cell: f_t has the other sign",
