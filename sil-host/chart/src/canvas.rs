@@ -125,7 +125,20 @@ impl Canvas {
     }
 
     /// Draws a text whose middle height is at a point.
-    pub fn text(&mut self, words: &str, look: &Look, (x, y): At, anchor: Anchor) {
+    pub fn text(&mut self, words: &str, look: &Look, at: At, anchor: Anchor) {
+        self.write(words, look, at, anchor, "");
+    }
+
+    /// Draws a text with a margin in the ground's colour, so that lines below it do not cross it.
+    pub fn text_over_lines(&mut self, words: &str, look: &Look, at: At, anchor: Anchor) {
+        let margin = format!(
+            r#" stroke="{}" stroke-width="10" paint-order="stroke""#,
+            hex(WHITE)
+        );
+        self.write(words, look, at, anchor, &margin);
+    }
+
+    fn write(&mut self, words: &str, look: &Look, (x, y): At, anchor: Anchor, margin: &str) {
         if words.is_empty() {
             return;
         }
@@ -142,7 +155,7 @@ impl Canvas {
         let fill = self.fill(Fill::solid(look.colour));
         let (size, words) = (look.size, spans(words));
         self.element(format_args!(
-            r#"<text x="{x}" y="{y}" dy=".35em" text-anchor="{anchor}" font-size="{size}"{weight} {fill}>{words}</text>"#
+            r#"<text x="{x}" y="{y}" dy=".35em" text-anchor="{anchor}" font-size="{size}"{weight} {fill}{margin}>{words}</text>"#
         ));
     }
 

@@ -78,7 +78,7 @@ pub struct Panel {
     pub y_labels: Option<Vec<(f64, String)>>,
     /// Height in drawn units; a whole figure is [`WIDTH`] wide.
     pub height: i32,
-    /// Contents, from bottom to top.
+    /// Contents, from bottom to top; maps are below and labels above everything else.
     pub marks: Vec<Mark>,
 }
 

@@ -124,7 +124,7 @@ impl Frame<'_, '_> {
 
     fn draw(&self, canvas: &mut Canvas) {
         let panel = self.placed.panel;
-        // Maps cover the grid lines; everything else is drawn over them.
+        // Maps cover the grid lines; everything else is drawn over them, the labels last.
         let (maps, others): (Vec<&Mark>, Vec<&Mark>) = panel
             .marks
             .iter()
@@ -145,7 +145,10 @@ impl Frame<'_, '_> {
             }
             canvas.text(&name, &LABEL, (start - LABEL_GAP, y), Anchor::Right);
         }
-        for mark in others {
+        let (labels, others): (Vec<&Mark>, Vec<&Mark>) = others
+            .into_iter()
+            .partition(|mark| matches!(mark, Mark::Label { .. }));
+        for mark in others.into_iter().chain(labels) {
             self.draw_mark(canvas, mark);
         }
         let corners = [
@@ -264,7 +267,7 @@ impl Frame<'_, '_> {
                 } else {
                     Anchor::Left
                 };
-                canvas.text(text, &LABEL, at, anchor);
+                canvas.text_over_lines(text, &LABEL, at, anchor);
             }
         }
     }

@@ -163,3 +163,22 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_label_is_drawn_over_the_lines_with_a_margin_around_its_letters() {
+    let svg = chart(vec![
+        Mark::Label {
+            at: (0.5, 0.5),
+            centred: true,
+            text: "name".into(),
+        },
+        Mark::Level {
+            value: 0.5,
+            colour: BLUE_INK,
+        },
+    ])
+    .svg();
+    let label = svg.find(r#"paint-order="stroke">name</text>"#).unwrap();
+    let line = svg.find(r##"stroke="#0072B2""##).unwrap();
+    assert!(line < label, "{svg}");
+}

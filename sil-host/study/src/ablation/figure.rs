@@ -27,10 +27,11 @@ impl Figure for Ablation {
         let mut marks = vec![Mark::line("", GREY, vec![(0.0, 0.0), (0.0, count as f64)])];
         for (index, (row, change)) in rows.iter().enumerate() {
             let top = (count - index) as f64;
+            let points = format!("{:+.1}", 100.0 * change.difference).replace('-', "−");
             marks.push(Mark::Label {
                 at: (x.start + 0.01 * (x.end - x.start), top - 0.3),
                 centred: false,
-                text: format!("{}: {:+.1} %", row.name(), 100.0 * change.difference),
+                text: format!("{}: {points} %", row.name()),
             });
             let line = |name: &str, colour, width, from: f64, to: f64| Mark::Line {
                 name: name.into(),
