@@ -27,6 +27,7 @@ extern crate std;
 // The macro `settings!` needs this crate's name where `$crate` is not allowed.
 extern crate self as painleve_shared;
 
+mod arc_cosine;
 pub mod arm;
 pub mod black_box;
 pub mod contact;

@@ -5,12 +5,14 @@
 //! their inverses: C libraries round them differently. These functions therefore never come from
 //! the host's library. In `f64` (plant) they come from the `libm` crate. In `f32` (controller) sine
 //! and cosine are polynomials, because `libm` evaluates them in `f64`, which a Cortex-M4F computes
-//! in software: about 2,100 instructions against a few dozen.
+//! in software: about 2,100 instructions against a few dozen. The arc cosine has the bits of `libm`, with the
+//! processor's square root.
 
 use core::cmp::Ordering;
 
 use nalgebra::RealField;
 
+use crate::arc_cosine::arc_cosine;
 use crate::settings::SettingValue;
 use crate::square_root::square_root;
 
@@ -44,12 +46,11 @@ pub trait Real: RealField + Copy + SettingValue {
         }
     }
 
-    /// Clamps this number to `±limit`, where `limit` is at least zero; NaN stays NaN. It needs one
-    /// comparison, [`limited`](Self::limited) two.
+    /// Clamps this number to `±limit`, where `limit` is at least zero; NaN stays NaN.
     #[inline]
     fn within(self, limit: Self) -> Self {
         if self.abs() > limit {
-            bounded(limit, self)
+            if self > Self::zero() { limit } else { -limit }
         } else {
             self
         }
@@ -79,14 +80,6 @@ pub trait Real: RealField + Copy + SettingValue {
 
     /// Square root, correctly rounded; NaN below zero.
     fn square_root(self) -> Self;
-}
-
-/// Returns `limit` with the sign of `value`. Kept out of line because limits are rarely reached:
-/// when inlined, the compiler computes it every time instead of branching.
-#[cold]
-#[inline(never)]
-fn bounded<T: Real>(limit: T, value: T) -> T {
-    limit.copysign(value)
 }
 
 impl Real for f64 {
@@ -169,7 +162,7 @@ impl Real for f32 {
 
     #[inline]
     fn arc_cosine(self) -> Self {
-        libm::acosf(self)
+        arc_cosine(self)
     }
 
     #[inline]

@@ -72,10 +72,11 @@ impl Plausibility {
             }
         };
         self.complete = count(self.complete, readings.are_complete());
-        for (ticks, joint) in self.dead.iter_mut().zip(readings.joints) {
-            *ticks = count(*ticks, joint.is_none_or(|it| it.0 == 0 || it.0 == ones));
-        }
         let [one, two] = readings.joints;
+        let is_dead =
+            |joint: Option<EncoderCounts>| joint.is_none_or(|it| it.0 == 0 || it.0 == ones);
+        let [dead_1, dead_2] = self.dead;
+        self.dead = [count(dead_1, is_dead(one)), count(dead_2, is_dead(two))];
         self.same = count(self.same, one.is_some() && one == two);
         if self.dead.iter().any(|it| *it >= TICKS) {
             return Err(Implausible::DeadLine);

@@ -20,7 +20,7 @@ use painleve_shared::message::FrameSource;
 use painleve_shared::status::SupervisorState;
 
 use crate::board::BoardDrive;
-use crate::sensor_bus::{SensorBus, SpiWords};
+use crate::sensor_bus::{self, SensorBus, SpiWords};
 
 /// Control rate while there is no configuration, Hz. The control timer runs from the start, so that only
 /// finished control ticks feed the watchdogs.
@@ -106,8 +106,7 @@ impl<P: ArmPins> ArmDrive<P> {
         let levels = self.pins.levels();
         let (encoders, force_cell) = (self.encoders.complete(), self.force_cell.complete());
         let frame = self.front_end.frame(encoders, force_cell, levels);
-        self.encoders.start();
-        self.force_cell.start();
+        sensor_bus::start_both(&mut self.encoders, &mut self.force_cell);
         frame
     }
 

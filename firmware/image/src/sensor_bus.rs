@@ -103,14 +103,17 @@ where
         self.is_complete.then_some(&self.dialogue)
     }
 
-    /// Starts a new set of readings, unless the last one is still under way.
-    pub fn start(&mut self) {
-        if !self.is_busy {
+    /// Selects the first part of a new set of readings, unless the last one is still under way. Returns
+    /// whether it did: [`send`](Self::send) is then due after the set-up time.
+    fn select_first(&mut self) -> bool {
+        let starts = !self.is_busy;
+        if starts {
             self.is_busy = true;
             self.is_complete = false;
             let exchange = self.dialogue.begin();
-            self.open(exchange);
+            self.select(exchange);
         }
+        starts
     }
 
     /// Gives up whatever is under way, and starts a new set of readings.
@@ -120,7 +123,9 @@ where
         }
         self.words.discard();
         self.is_busy = false;
-        self.start();
+        self.select_first();
+        set_up(self.waits.setup);
+        self.send();
     }
 
     /// Serves the interrupt: takes a received word, sends the next.
@@ -139,7 +144,11 @@ where
         self.close();
         let answer = (!self.has_failed).then_some(self.received);
         match self.dialogue.proceed(answer) {
-            Some(exchange) => self.open(exchange),
+            Some(exchange) => {
+                self.select(exchange);
+                set_up(self.waits.setup);
+                self.send();
+            }
             None => {
                 self.is_busy = false;
                 self.is_complete = true;
@@ -148,7 +157,7 @@ where
     }
 
     #[inline]
-    fn open(&mut self, exchange: Exchange) {
+    fn select(&mut self, exchange: Exchange) {
         self.selected = exchange.select;
         self.sending = exchange.data << (32 - u32::from(D::BITS));
         self.received = 0;
@@ -157,8 +166,6 @@ where
         if let Some(select) = self.selects.get_mut(self.selected) {
             let _ = select.set_low();
         }
-        self.set_up();
-        self.send();
     }
 
     #[inline]
@@ -171,11 +178,6 @@ where
     }
 
     // One function for each wait, so that the bound of the interrupt finds them by their names.
-
-    #[inline]
-    fn set_up(&self) {
-        wait(self.waits.setup);
-    }
 
     #[inline]
     fn hold(&self) {
@@ -192,6 +194,35 @@ where
         self.sending <<= self.word_bits;
         self.words.send(word as u16);
     }
+}
+
+/// Starts new sets of readings on two buses, except where the last one is still under way. The parts' set-up times
+/// pass together.
+pub fn start_both<W1, S1, D1, const N1: usize, W2, S2, D2, const N2: usize>(
+    one: &mut SensorBus<W1, S1, D1, N1>,
+    other: &mut SensorBus<W2, S2, D2, N2>,
+) where
+    W1: SpiWords,
+    S1: OutputPin,
+    D1: Dialogue,
+    W2: SpiWords,
+    S2: OutputPin,
+    D2: Dialogue,
+{
+    let (one_starts, other_starts) = (one.select_first(), other.select_first());
+    set_up(one.waits.setup.max(other.waits.setup));
+    if one_starts {
+        one.send();
+    }
+    if other_starts {
+        other.send();
+    }
+}
+
+/// Waits for a part's set-up time.
+#[inline]
+fn set_up(cycles: u32) {
+    wait(cycles);
 }
 
 /// Waits for at least this many processor cycles by the cycle counter, which must run.

@@ -172,15 +172,30 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         self.drive.actuate(&answer);
         self.counts.ticks = self.counts.ticks.wrapping_add(1);
         self.counts.worst_elapsed = self.counts.worst_elapsed.max(elapsed);
-        let overrun = self.drive.next_tick_is_due();
-        if let Some(stopped) = controller.note(Lapse::Overrun, u32::from(overrun)) {
-            answer = stop(&mut self.open_loop, stopped);
-            self.drive.actuate(&answer);
+        if self.drive.next_tick_is_due() {
+            answer = self.note_overrun(answer);
+        } else {
+            controller.note(Lapse::Overrun, 0);
         }
         Some(Answered {
             sensor: Some(frame),
             frame: answer,
             elapsed,
+        })
+    }
+
+    /// Records an overrun after this answer. If overruns have now occurred too often in a row, the torque is off
+    /// on return. Returns the answer that holds.
+    // Out of line: the bound on a tick's cycles leaves it out, because it proves that no tick overruns.
+    #[cold]
+    #[inline(never)]
+    fn note_overrun(&mut self, answer: ActuatorFrame) -> ActuatorFrame {
+        let controller = self.controller.as_mut();
+        let stopped = controller.and_then(|it| it.note(Lapse::Overrun, 1));
+        stopped.map_or(answer, |stopped| {
+            let answer = stop(&mut self.open_loop, stopped);
+            self.drive.actuate(&answer);
+            answer
         })
     }
 

@@ -121,6 +121,15 @@ impl Image {
         self.addresses.get(name).copied()
     }
 
+    /// Returns the address of the only function whose name contains `part`; `None` if there are several, or if
+    /// the linker gives another function the same address because their code is equal.
+    pub fn only_function(&self, part: &str) -> Option<u32> {
+        let mut named = self.addresses.iter().filter(|(it, _)| it.contains(part));
+        let (_, address) = named.next()?;
+        let mut there = self.addresses.values().filter(|it| *it == address);
+        (named.next().is_none() && there.nth(1).is_none()).then_some(*address)
+    }
+
     /// Returns the name of the function that contains an address.
     pub fn name(&self, address: u32) -> &str {
         let before = self.functions.range(..=address).next_back();

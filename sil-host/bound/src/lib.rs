@@ -93,6 +93,9 @@ pub enum ImageError {
     /// The source locations cannot be read.
     #[error("source locations: {0}")]
     Lines(Box<dyn std::error::Error>),
+    /// The image has no function of its own whose name contains this, or several.
+    #[error("there is not exactly one function {0} with code of its own")]
+    NotOneFunction(String),
     /// The image has no function of this name.
     #[error("there is no function {0}")]
     NoFunction(String),

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::cycles::around;
 use crate::image::Image;
-use crate::loops::Limits;
+use crate::loops::{Limits, NOT_CALLED};
 use crate::worst::{Analysis, Loop, Visit, Worst};
 use crate::{BoundError, ImageError};
 
@@ -69,6 +69,9 @@ pub struct Bound {
     pub instructions: u32,
     /// The path, in order of execution.
     pub path: Vec<PathStretch>,
+    /// Functions that the bound leaves out ([`NOT_CALLED`]).
+    #[serde(skip)]
+    pub not_called: BTreeSet<u32>,
     /// Loops of the interrupt and of the functions that it calls.
     #[serde(skip)]
     pub loops: Vec<Loop>,
@@ -105,7 +108,15 @@ impl Bound {
             worst.ok_or(BoundError::NeverReturns { address: entry })
         };
         let limits = Limits::of_control();
-        let mut analysis = Analysis::new(&image, &limits)?;
+        let mut not_called = BTreeSet::new();
+        for (function, _) in NOT_CALLED {
+            let address = image.only_function(function);
+            not_called.insert(address.ok_or_else(|| BoundError::Image {
+                path: path.to_owned(),
+                source: ImageError::NotOneFunction(function.to_owned()),
+            })?);
+        }
+        let mut analysis = Analysis::new(&image, &limits)?.without(&not_called);
         let worst = worst_of(CONTROL_INTERRUPT, &mut analysis)?;
         let cycles = with_entry(&worst);
         let (mut sensor_cycles, mut longest_sensor_cycles) = (0, 0);
@@ -128,6 +139,7 @@ impl Bound {
             around_cycles: cycles - worst.cycles,
             instructions: worst.instructions,
             path,
+            not_called,
             loops: analysis
                 .functions()
                 .flat_map(|function| function.loops.iter().cloned())

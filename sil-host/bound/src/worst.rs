@@ -77,6 +77,7 @@ pub struct Analysis<'a> {
     decoder: Decoder,
     limits: &'a Limits,
     known: BTreeMap<u32, Option<Worst>>,
+    not_called: BTreeSet<u32>,
 }
 
 impl<'a> Analysis<'a> {
@@ -90,7 +91,14 @@ impl<'a> Analysis<'a> {
             decoder: Decoder::new()?,
             limits,
             known: BTreeMap::new(),
+            not_called: BTreeSet::new(),
         })
+    }
+
+    /// Excludes paths that call one of these functions.
+    pub fn without(mut self, functions: &BTreeSet<u32>) -> Self {
+        self.not_called.clone_from(functions);
+        self
     }
 
     /// Returns the analysed functions.
@@ -103,6 +111,10 @@ impl<'a> Analysis<'a> {
     /// # Errors
     /// [`BoundError`] for code that cannot be bounded.
     pub fn of(&mut self, entry: u32) -> Result<Option<Worst>, BoundError> {
+        if self.not_called.contains(&entry) {
+            // As if it did not return: no path leads on from the call.
+            return Ok(None);
+        }
         match self.known.get(&entry) {
             Some(worst) => return Ok(worst.clone()),
             None => self.known.insert(entry, None),

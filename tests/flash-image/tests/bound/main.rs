@@ -50,6 +50,9 @@ impl<'a> BoundCheck<'a> {
     fn look(&mut self, board: &mut FlashedBoard) -> Executed {
         let mut worst = Executed::default();
         for addresses in board.machine.take_traces() {
+            let mut executed = addresses.iter();
+            let left_out = executed.any(|it| self.bound.not_called.contains(it));
+            assert!(!left_out, "a tick calls what the bound leaves out");
             let cost = self.tracer.cost(&addresses).unwrap();
             assert!(cost.cycles <= self.bound.cycles, "{cost:?}");
             for one in &self.bound.loops {
