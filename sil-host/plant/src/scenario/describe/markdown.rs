@@ -11,87 +11,107 @@ use crate::scenario::Scenario;
 /// Returns a Markdown table of all settings in the groups `sections` of a scenario. Keys are full,
 /// or relative to the section if there is only one.
 pub fn settings_table(sections: &[&str]) -> String {
-    let mut text = "| key | default | allowed | meaning |\n|---|---|---|---|\n".to_string();
-    for field in Scenario::FIELDS {
-        if !sections.contains(&field.key) {
-            continue;
-        }
-        let hidden = usize::from(sections.len() == 1);
-        rows(&mut text, &mut vec![field.key], hidden, field);
+    let mut table = SettingsTable {
+        text: "| key | default | allowed | meaning |\n|---|---|---|---|\n".to_string(),
+        path: Vec::new(),
+        hidden: usize::from(sections.len() == 1),
+        kinds: Vec::new(),
+    };
+    let listed = Scenario::FIELDS
+        .iter()
+        .filter(|field| sections.contains(&field.key));
+    for field in listed {
+        table.add(field);
     }
-    text
+    table.text
 }
 
-fn rows(text: &mut String, path: &mut Vec<&'static str>, hidden: usize, field: &Field) {
-    let field = &resolved(field);
-    if let Some(fields) = group(&field.shape) {
-        if matches!(field.shape, Shape::Optional(_)) {
-            row(text, &path[hidden..], "absent", "a group", field.meaning);
-        } else {
-            inner_rows(text, path, hidden, fields);
-        }
-        return;
-    }
-    let default = match default_at(path) {
-        Some(Value::Table(table)) => match &field.shape {
-            Shape::Choice { tag: None, .. } => table.keys().next().cloned().unwrap_or_default(),
-            _ => Value::Table(table).to_string(),
-        },
-        Some(value) => value.to_string(),
-        None if matches!(field.shape, Shape::Optional(_)) => "absent".into(),
-        None => String::new(),
-    };
-    let code = |text: &str| match text {
-        "" | "absent" => text.to_string(),
-        _ => format!("`{text}`"),
-    };
-    row(
-        text,
-        &path[hidden..],
-        &code(&default),
-        &allowed(field),
-        field.meaning,
-    );
-    variant_rows(text, path, hidden, &field.shape);
+/// The rows so far, and the place of the next one.
+struct SettingsTable {
+    text: String,
+    /// Key of the settings that are being added, in parts.
+    path: Vec<&'static str>,
+    /// Parts of the key that are left out.
+    hidden: usize,
+    /// Names of the variants to which the settings belong whose names are not in their keys.
+    kinds: Vec<&'static str>,
 }
 
-/// Appends the settings of the variants of a choice, or of the choices in a list.
-fn variant_rows(text: &mut String, path: &mut Vec<&'static str>, hidden: usize, shape: &Shape) {
-    match shape {
-        Shape::Choice { variants, tag } => {
-            for variant in *variants {
-                let Some(Shape::Group(fields)) = variant.content else {
-                    continue;
-                };
-                // Settings of a tagged variant are at the same level as its name.
-                let name = tag.is_none().then_some(variant.key);
-                path.extend(name);
-                inner_rows(text, path, hidden, fields);
-                path.truncate(path.len() - name.iter().len());
+impl SettingsTable {
+    /// Adds the rows of a setting, and of those inside it.
+    fn add(&mut self, field: &Field) {
+        self.path.push(field.key);
+        self.add_here(&resolved(field));
+        self.path.pop();
+    }
+
+    fn add_here(&mut self, field: &Field) {
+        if let Some(fields) = group(&field.shape) {
+            if matches!(field.shape, Shape::Optional(_)) {
+                self.row("absent", "a group", field.meaning);
+            } else {
+                fields.iter().for_each(|field| self.add(field));
             }
+            return;
         }
-        Shape::List { item, .. } => {
-            path.push("N");
-            variant_rows(text, path, hidden, item);
-            path.pop();
+        let default = match default_at(&self.path) {
+            Some(Value::Table(table)) => match &field.shape {
+                Shape::Choice { tag: None, .. } => table.keys().next().cloned().unwrap_or_default(),
+                _ => Value::Table(table).to_string(),
+            },
+            Some(value) => value.to_string(),
+            None if matches!(field.shape, Shape::Optional(_)) => "absent".into(),
+            None => String::new(),
+        };
+        let default = match default.as_str() {
+            "" | "absent" => default,
+            _ => format!("`{default}`"),
+        };
+        self.row(&default, &allowed(field), field.meaning);
+        self.add_variants(&field.shape);
+    }
+
+    /// Adds the settings of the variants of a choice, or of the choices in a list.
+    fn add_variants(&mut self, shape: &Shape) {
+        match shape {
+            Shape::Choice { variants, tag } => {
+                for variant in *variants {
+                    let Some(Shape::Group(fields)) = variant.content else {
+                        continue;
+                    };
+                    self.names(tag).push(variant.key);
+                    fields.iter().for_each(|field| self.add(field));
+                    self.names(tag).pop();
+                }
+            }
+            Shape::List { item, .. } => {
+                self.path.push("N");
+                self.add_variants(item);
+                self.path.pop();
+            }
+            _ => {}
         }
-        _ => {}
     }
-}
 
-fn inner_rows(text: &mut String, path: &mut Vec<&'static str>, hidden: usize, fields: &[Field]) {
-    for field in fields {
-        path.push(field.key);
-        rows(text, path, hidden, field);
-        path.pop();
+    /// Returns the names to which that of a variant belongs. Settings of a tagged variant are at the same
+    /// level as its name.
+    fn names(&mut self, tag: &Option<&'static str>) -> &mut Vec<&'static str> {
+        match tag {
+            None => &mut self.path,
+            Some(_) => &mut self.kinds,
+        }
     }
-}
 
-fn row(text: &mut String, path: &[&str], default: &str, allowed: &str, meaning: &str) {
-    // Writing to a string cannot fail.
-    let _ = writeln!(
-        text,
-        "| `{}` | {default} | {allowed} | {meaning} |",
-        path.join(".")
-    );
+    fn row(&mut self, default: &str, allowed: &str, meaning: &str) {
+        let key = self.path[self.hidden..].join(".");
+        let kinds = match self.kinds.as_slice() {
+            [] => String::new(),
+            kinds => format!(" ({})", kinds.join(", ")),
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            self.text,
+            "| `{key}`{kinds} | {default} | {allowed} | {meaning} |"
+        );
+    }
 }
