@@ -16,6 +16,7 @@ use crate::estimate::contact::ContactSettings;
 use crate::estimate::disturbance::DisturbanceSettings;
 use crate::estimate::friction::FrictionSettings;
 use crate::estimate::joints::JointEstimatorSettings;
+use crate::estimate::response::ResponseSettings;
 use crate::guard::GuardSettings;
 use crate::law::{Law, LawSettings};
 use crate::recover::RecoverySettings;
@@ -54,6 +55,8 @@ settings! {
         belt: BeltSpeedSettings = BeltSpeedSettings::default();
         /// Estimation of unknown torques.
         disturbance: DisturbanceSettings = DisturbanceSettings::default();
+        /// Estimation of how much the contact gives.
+        response: ResponseSettings = ResponseSettings::default();
         /// Calibration of the links' length.
         calibration: CalibrationSettings = CalibrationSettings::default();
         /// Arming, recovery and shutdown of the drive.

@@ -105,6 +105,7 @@ impl<L: Law> TorqueDemand<L> {
             force_n: contact.force_n,
             friction: contact.friction,
             p_per_kg: contact.p_per_kg,
+            response: contact.response,
             contact: contact.touches,
             saturated: last.is_constrained() && !starts,
             reference: target.reference,

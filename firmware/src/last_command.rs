@@ -21,6 +21,10 @@ pub struct LastCommand {
     pub expected_acceleration_rad_s2: JointMotion<f32>,
     /// Part of that acceleration due to the contact force, rad/s².
     pub contact_acceleration_rad_s2: JointMotion<f32>,
+    /// Velocity of the reference that the command follows, m/s.
+    pub reference_velocity_m_s: f32,
+    /// Whether an edge holds that reference back.
+    pub at_edge: bool,
     /// Torque withheld by rounding to counts, to be added at the next tick, N·m.
     pub(crate) rounding_nm: JointTorque<f32>,
 }
@@ -36,15 +40,18 @@ impl LastCommand {
             guarded,
             expected_acceleration_rad_s2,
             contact_acceleration_rad_s2,
+            reference_velocity_m_s,
+            at_edge,
             rounding_nm,
         } = self;
         *counts = [TorqueCounts(0); 2];
         *torque_nm = JointTorque::zeros();
-        (*saturated, *guarded) = (false, false);
+        (*saturated, *guarded, *at_edge) = (false, false, false);
         // Stored in line in two parts; as one, the compiler calls a loop that takes six times as long.
         compiler_fence(Ordering::SeqCst);
         *expected_acceleration_rad_s2 = JointMotion::zeros();
         *contact_acceleration_rad_s2 = JointMotion::zeros();
+        *reference_velocity_m_s = 0.0;
         *rounding_nm = JointTorque::zeros();
     }
 
@@ -68,6 +75,8 @@ mod tests {
             guarded: true,
             expected_acceleration_rad_s2: JointMotion::new(1.0, 1.0),
             contact_acceleration_rad_s2: JointMotion::new(1.0, 1.0),
+            reference_velocity_m_s: 1.0,
+            at_edge: true,
             rounding_nm: ones,
         };
         command.clear();

@@ -255,6 +255,7 @@ impl<L: Law> Stages<L> {
                 contact: &settings.contact,
                 friction: &settings.friction,
                 belt: &settings.belt,
+                response: &settings.response,
                 disturbance: &settings.disturbance,
                 calibration: &settings.calibration,
             }),
@@ -335,6 +336,8 @@ impl<L: Law> Stages<L> {
                 state.supervision.latch(Fault::NotFinite);
             }
         }
+        state.command.reference_velocity_m_s = target.reference.velocity_m_s;
+        state.command.at_edge = target.at_edge;
         if !state.supervision.drives() {
             state.release();
         }

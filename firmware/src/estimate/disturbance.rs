@@ -14,8 +14,10 @@ use painleve_shared::{GeneralisedTorque, JointTorque, LinkMotion, Real, settings
 
 use crate::estimate::model::Model;
 
-/// Largest fraction of the residual adopted in one tick, per unit of p/Q22.
-const SHARE: f32 = 0.05;
+/// Largest fraction of the residual adopted at once, per unit of p/Q22.
+const SHARE: f32 = 0.1;
+/// The same per unit of the share that the contact allows.
+const CONTACT_SHARE: f32 = 0.333;
 
 settings! {
     /// Settings of the disturbance observer.
@@ -37,9 +39,11 @@ pub struct Balance {
     pub torque_nm: JointTorque<f32>,
     /// Contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
-    /// p of a tip in contact, 1/kg.
-    pub p_per_kg: Option<f32>,
-    /// Time since the previous tick, s.
+    /// p/Q22 of a tip in contact.
+    pub p_ratio: Option<f32>,
+    /// Part of the force error that a loop through the contact may remove in a tick.
+    pub loop_share: f32,
+    /// Time since the previous readings, s.
     pub elapsed_s: f32,
 }
 
@@ -47,7 +51,7 @@ pub struct Balance {
 #[derive(Clone, Copy, Debug)]
 pub struct DisturbanceEstimator {
     settings: DisturbanceSettings,
-    tick_s: f32,
+    period_s: f32,
 }
 
 /// Estimate of a [`DisturbanceEstimator`]; initially zero.
@@ -55,46 +59,77 @@ pub struct DisturbanceEstimator {
 pub struct DisturbanceState {
     /// Generalised torque d on the arm in addition to the model's torques, N·m.
     pub torque_nm: GeneralisedTorque<f32>,
-    /// θ̇ at the previous tick, rad/s.
+    /// θ̇ at the previous update, rad/s.
     rate_rad_s: Option<LinkMotion<f32>>,
+    /// The tick skipped since then.
+    skipped: Option<Skipped>,
+}
+
+/// What acted during a skipped tick.
+#[derive(Clone, Copy, Debug)]
+struct Skipped {
+    torque_nm: JointTorque<f32>,
+    force_n: Vector2<f32>,
+    elapsed_s: f32,
 }
 
 impl DisturbanceEstimator {
-    /// Makes an estimator that is called every `tick_s`.
-    pub fn new(settings: &DisturbanceSettings, tick_s: f32) -> Self {
+    /// Makes an estimator that is updated every `period_s`.
+    pub fn new(settings: &DisturbanceSettings, period_s: f32) -> Self {
         Self {
             settings: *settings,
-            tick_s,
+            period_s,
         }
     }
 
     /// Updates the estimate with one tick of an arm whose `model` includes the present d.
     pub fn update(&self, state: &mut DisturbanceState, model: &Model, balance: &Balance) {
+        let skipped = state.skipped.take();
         let before = state.rate_rad_s.replace(model.theta_dot_rad_s);
         let Some(before) = before.filter(|_| self.settings.enabled) else {
             return;
         };
-        let acceleration = (model.theta_dot_rad_s - before) / balance.elapsed_s;
-        let needed_nm = model.inverse_dynamics_nm(&acceleration, &balance.force_n);
-        let residual_nm = (needed_nm - balance.torque_nm).to_links();
+        let (mut torque_nm, mut force_n) = (balance.torque_nm, balance.force_n);
+        let mut elapsed_s = balance.elapsed_s;
+        if let Some(skipped) = skipped {
+            // The means over both ticks.
+            torque_nm = (torque_nm + skipped.torque_nm) * 0.5;
+            force_n = (force_n + skipped.force_n) * 0.5;
+            elapsed_s += skipped.elapsed_s;
+        }
+        let acceleration = (model.theta_dot_rad_s - before) / elapsed_s;
+        let needed_nm = model.inverse_dynamics_nm(&acceleration, &force_n);
+        let residual_nm = (needed_nm - torque_nm).to_links();
         let limit = self.settings.limit_nm;
         // Estimate and disturbance may be at the limit with opposite signs; more is an impact.
         if residual_nm.amax() > 2.0 * limit {
             return;
         }
-        let share = balance
-            .p_per_kg
-            .map_or(1.0, |p| SHARE * (p / model.q22_per_kg).at_least(0.0));
-        let weight = (self.settings.bandwidth_rad_s * self.tick_s).at_most(share);
+        let share = balance.p_ratio.map_or(1.0, |p_ratio| {
+            (SHARE * p_ratio).limited(0.0, CONTACT_SHARE * balance.loop_share)
+        });
+        let weight = (self.settings.bandwidth_rad_s * self.period_s).at_most(share);
         state.torque_nm =
             (state.torque_nm + residual_nm * weight).map(|torque| torque.within(limit));
     }
 }
 
 impl DisturbanceState {
+    /// Leaves out a tick that began `elapsed_s` (s) after the previous one, whose torque (N·m) and
+    /// contact force (N) count at the next update.
+    #[inline]
+    pub fn skip(&mut self, torque_nm: &JointTorque<f32>, force_n: &Vector2<f32>, elapsed_s: f32) {
+        self.skipped = Some(Skipped {
+            torque_nm: *torque_nm,
+            force_n: *force_n,
+            elapsed_s,
+        });
+    }
+
     /// Skips a tick without information, because contact or a reading is in doubt.
     pub fn pause(&mut self) {
         self.rate_rad_s = None;
+        self.skipped = None;
     }
 }
 
@@ -129,7 +164,8 @@ mod tests {
                 &Balance {
                     torque_nm: truth.inverse_dynamics_nm(&acceleration, &force_n),
                     force_n,
-                    p_per_kg: p_ratio.map(|ratio| ratio * model.q22_per_kg),
+                    p_ratio,
+                    loop_share: 1.0,
                     elapsed_s: TICK_S,
                 },
             );
@@ -157,9 +193,9 @@ mod tests {
             let (rest, unloaded) = (LinkMotion::zeros(), Vector2::zeros());
             observed(truth, rest, unloaded, Some(p_ratio), 50).amax() / truth.amax()
         };
-        // 1 − (1 − 0.02)⁴⁹ and 1 − (1 − 0.05 · 0.02)⁴⁹.
+        // 1 − (1 − 0.02)⁴⁹ and 1 − (1 − 0.1 · 0.02)⁴⁹.
         assert!((after(1.0) - 0.628).abs() < 2e-3, "{}", after(1.0));
-        assert!((after(0.02) - 0.0478).abs() < 2e-3, "{}", after(0.02));
+        assert!((after(0.02) - 0.0934).abs() < 2e-3, "{}", after(0.02));
         assert_eq!(after(-0.1), 0.0);
     }
 
@@ -190,7 +226,8 @@ mod tests {
             let balance = Balance {
                 torque_nm: model.inverse_dynamics_nm(&LinkMotion::zeros(), &Vector2::zeros()),
                 force_n: Vector2::zeros(),
-                p_per_kg: None,
+                p_ratio: None,
+                loop_share: 1.0,
                 elapsed_s: TICK_S,
             };
             estimator.update(&mut state, &model, &balance);

@@ -29,6 +29,11 @@ const REVERSAL_TICKS: u8 = 3;
 /// stick and sliding, and switching between them at every tick would shake the tip off.
 const STICK_TICKS: u8 = 3;
 
+/// Averaging time of the innovations, s.
+const MEAN_S: f32 = 0.02;
+/// Square of the number of standard deviations at which that average is significant.
+const SIGNIFICANT_SQUARE: f32 = 8.0;
+
 settings! {
     /// Settings of the friction estimator.
     #[derive(Copy)]
@@ -67,6 +72,8 @@ pub struct FrictionEstimator {
     settings: FrictionSettings,
     force_variance_n2: f32,
     tick_s: f32,
+    /// Weight of one innovation in their average.
+    mean_weight: f32,
 }
 
 /// The filter's state.
@@ -81,6 +88,12 @@ pub struct FrictionState {
     /// Remaining ticks for which the tip counts as sticking.
     stick_ticks: u8,
     sticking_s: f32,
+    /// Average of the last innovations.
+    mean_innovation: f32,
+    /// Last innovation.
+    innovation: f32,
+    /// Variance of the noise of the ratio.
+    noise_variance: f32,
 }
 
 impl FrictionEstimator {
@@ -91,6 +104,7 @@ impl FrictionEstimator {
             settings: *settings,
             force_variance_n2: force_noise_n * force_noise_n,
             tick_s,
+            mean_weight: tick_s / (MEAN_S + tick_s),
         }
     }
 
@@ -104,6 +118,9 @@ impl FrictionEstimator {
             contrary_ticks: 0,
             stick_ticks: 0,
             sticking_s: 0.0,
+            mean_innovation: 0.0,
+            innovation: 0.0,
+            noise_variance: 1.0,
         }
     }
 
@@ -112,7 +129,7 @@ impl FrictionEstimator {
     }
 
     /// Updates the estimate with one reading (f_t, f_n), N, of a tip in contact.
-    pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
+    pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>, dragged: bool) {
         let first_variance = self.first_variance();
         let drift = self.settings.drift_per_sqrt_s;
         state.variance = (state.variance + drift * drift * self.tick_s).at_most(first_variance);
@@ -127,7 +144,7 @@ impl FrictionEstimator {
         let innovation = ratio - state.coefficient;
         let gate = STICK_DEVIATIONS * (state.variance + ratio_variance).square_root()
             + STICK_FRACTION * state.coefficient;
-        if innovation < -gate {
+        if innovation < -gate && (dragged || state.stick_ticks > 0) {
             state.sticking_s += self.tick_s;
             if state.sticking_s < self.settings.stick_limit_s {
                 state.stick_ticks = STICK_TICKS;
@@ -135,7 +152,7 @@ impl FrictionEstimator {
             }
             state.stick_ticks = 0;
             state.variance = first_variance;
-        } else if innovation > gate {
+        } else if innovation.abs() > gate {
             state.stick_ticks = 0;
             state.variance = first_variance;
         } else if state.stick_ticks > 0 {
@@ -143,6 +160,19 @@ impl FrictionEstimator {
             return;
         }
         state.sticking_s = 0.0;
+        // Innovations that keep their sign are not noise: μ has changed.
+        let weight = self.mean_weight;
+        let change = innovation - state.innovation;
+        state.innovation = innovation;
+        state.noise_variance += 0.25 * weight * (0.5 * change * change - state.noise_variance);
+        let ratio_variance = state
+            .noise_variance
+            .limited(0.01 * ratio_variance, ratio_variance);
+        state.mean_innovation += weight * (innovation - state.mean_innovation);
+        let square = state.mean_innovation * state.mean_innovation;
+        if square > SIGNIFICANT_SQUARE * (state.variance + ratio_variance) * weight {
+            state.variance = state.variance.at_least(square).at_most(first_variance);
+        }
         let gain = state.variance / (state.variance + ratio_variance);
         state.coefficient = (state.coefficient + gain * innovation).at_least(0.0);
         state.variance *= 1.0 - gain;
@@ -184,6 +214,11 @@ impl FrictionState {
         self.slip_seen = true;
     }
 
+    /// Returns the direction of slip.
+    pub fn slip(&self) -> Slip {
+        self.slip
+    }
+
     /// Returns the present estimate.
     pub fn estimate(&self) -> FrictionEstimate {
         FrictionEstimate {
@@ -219,8 +254,8 @@ mod tests {
         }
     }
 
-    /// An estimator with its state.
-    struct Tested(FrictionEstimator, FrictionState);
+    /// An estimator with its state, and whether the tip is dragged along by the belt.
+    struct Tested(FrictionEstimator, FrictionState, bool);
 
     impl Tested {
         fn new(first_guess: f32) -> Self {
@@ -229,11 +264,11 @@ mod tests {
                 ..Default::default()
             };
             let estimator = FrictionEstimator::new(&settings, NOISE_N, 1e-3);
-            Self(estimator, estimator.start())
+            Self(estimator, estimator.start(), false)
         }
 
         fn update(&mut self, force_n: &Vector2<f32>) {
-            self.0.update(&mut self.1, force_n);
+            self.0.update(&mut self.1, force_n, self.2);
         }
 
         fn estimate(&self) -> FrictionEstimate {
@@ -271,6 +306,7 @@ mod tests {
     fn stick_does_not_lower_the_friction_estimate_but_a_slippery_belt_does() {
         let mut tested = Tested::new(0.6);
         slide(&mut tested, 0.6, Slip::Positive, 200);
+        tested.2 = true;
         slide(&mut tested, 0.1, Slip::Positive, 400);
         assert!(tested.estimate().sticks);
         assert!((tested.estimate().coefficient - 0.6).abs() < 0.01);
@@ -283,6 +319,7 @@ mod tests {
     fn only_friction_near_the_other_side_of_the_cone_reverses_the_slip() {
         let mut tested = Tested::new(0.6);
         slide(&mut tested, 0.6, Slip::Positive, 200);
+        tested.2 = true;
         slide(&mut tested, 0.4, Slip::Negative, 100);
         let found = tested.estimate();
         assert!(found.slip == Slip::Positive && found.sticks);
@@ -292,11 +329,33 @@ mod tests {
     }
 
     #[test]
+    fn less_friction_is_learnt_at_once_unless_the_belt_drags_the_tip() {
+        let mut tested = Tested::new(0.6);
+        slide(&mut tested, 0.6, Slip::Positive, 2000);
+        slide(&mut tested, 0.4, Slip::Positive, 5);
+        assert!(!tested.estimate().sticks);
+        assert!((tested.estimate().coefficient - 0.4).abs() < 0.02);
+    }
+
+    #[test]
+    fn friction_that_drifts_is_followed() {
+        let mut tested = Tested::new(0.6);
+        slide(&mut tested, 0.6, Slip::Positive, 2000);
+        for tick in 0..500 {
+            let friction = 0.6 + 0.1 * tick as f32 / 500.0;
+            slide(&mut tested, friction, Slip::Positive, 1);
+        }
+        let found = tested.estimate();
+        assert!((found.coefficient - 0.7).abs() < 0.03, "{found:?}");
+    }
+
+    #[test]
     fn more_friction_is_learnt_at_once() {
         let mut tested = Tested::new(0.3);
         slide(&mut tested, 0.3, Slip::Positive, 2000);
         slide(&mut tested, 0.7, Slip::Positive, 5);
-        assert!((tested.estimate().coefficient - 0.7).abs() < 0.02);
+        let found = tested.estimate();
+        assert!((found.coefficient - 0.7).abs() < 0.03, "{found:?}");
     }
 
     #[test]

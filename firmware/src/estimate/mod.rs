@@ -5,6 +5,7 @@
 //! - [`contact`]: contact decision
 //! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
 //! - [`calibration`]: length of the links
+//! - [`response`]: how much the contact gives
 //! - [`disturbance`]: torques that the model does not explain
 
 pub mod belt;
@@ -14,6 +15,7 @@ pub mod disturbance;
 pub mod friction;
 pub mod joints;
 pub mod model;
+pub mod response;
 
 use nalgebra::Vector2;
 use painleve_shared::Arm;
@@ -27,10 +29,22 @@ use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceSettings, Dist
 use self::friction::{FrictionEstimate, FrictionEstimator, FrictionSettings, FrictionState};
 use self::joints::{EncoderJump, JointEstimator, JointEstimatorSettings, JointState};
 use self::model::Model;
+use self::response::{
+    ContactResponse, ForceReading, ResponseEstimator, ResponseSettings, ResponseState,
+};
 use crate::last_command::LastCommand;
 
 /// Largest friction above the estimate that may explain a throw.
 const THROWN_BY_FRICTION: f32 = 0.4;
+
+/// Disturbance and calibration are updated at every other tick. The search for the edges takes the ticks
+/// between, so that no tick is long.
+const HEAVY_EVERY_TICKS: f32 = 2.0;
+
+/// Least velocity by which a sticking tip falls behind its reference, m/s.
+const DRAGGED_M_S: f32 = 0.02;
+/// Speed below which a reference that an edge holds back waits there, m/s.
+const WAITING_M_S: f32 = 0.01;
 
 /// The contact estimate after a tick's readings.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +63,11 @@ pub struct ContactEstimate {
     pub friction: FrictionEstimate,
     /// p with that friction, 1/kg.
     pub p_per_kg: f32,
+    /// What the contact's response to torque allows.
+    pub response: ContactResponse,
+    /// Whether there is time for the search for the edges, because disturbance and calibration are not
+    /// updated at this tick.
+    pub has_spare_time: bool,
 }
 
 /// One frame's readings.
@@ -79,6 +98,8 @@ pub struct EstimateSettings<'a> {
     pub friction: &'a FrictionSettings,
     /// Bounds of the belt's speed.
     pub belt: &'a BeltSpeedSettings,
+    /// Response of the contact.
+    pub response: &'a ResponseSettings,
     /// Unknown torques.
     pub disturbance: &'a DisturbanceSettings,
     /// Calibration of the links' length.
@@ -94,6 +115,7 @@ pub struct Estimators {
     contact: ContactDetector,
     friction: FrictionEstimator,
     belt: BeltEstimator,
+    response: ResponseEstimator,
     disturbance: DisturbanceEstimator,
     calibrator: LengthCalibrator,
 }
@@ -107,6 +129,7 @@ pub struct EstimatesState {
     contact: ContactState,
     friction: FrictionState,
     belt: BeltState,
+    response: ResponseState,
     disturbance: DisturbanceState,
     calibration: CalibrationState,
 }
@@ -139,8 +162,16 @@ impl Estimators {
                 tick_s,
             ),
             belt: BeltEstimator::new(settings.belt, tick_s),
-            disturbance: DisturbanceEstimator::new(settings.disturbance, tick_s),
-            calibrator: LengthCalibrator::new(settings.calibration, settings.link_length_m, tick_s),
+            response: ResponseEstimator::new(settings.response, tick_s),
+            disturbance: DisturbanceEstimator::new(
+                settings.disturbance,
+                HEAVY_EVERY_TICKS * tick_s,
+            ),
+            calibrator: LengthCalibrator::new(
+                settings.calibration,
+                settings.link_length_m,
+                HEAVY_EVERY_TICKS * tick_s,
+            ),
         }
     }
 
@@ -152,6 +183,7 @@ impl Estimators {
             contact: ContactState::default(),
             friction: self.friction.start(),
             belt: BeltState::default(),
+            response: self.response.start(),
             disturbance: DisturbanceState::default(),
             calibration: CalibrationState::default(),
         }
@@ -218,16 +250,21 @@ impl Estimators {
             }
         };
         let certain = state.contact.is_certain();
+        let is_light = frame.tick & 1 == 0;
+        let mut has_spare_time = is_light;
         let tip_velocity_m_s = model.tip_velocity_m_s.x;
         if contact {
             if !touched && let Some(slip) = self.belt.slip(&state.belt, tip_velocity_m_s) {
                 state.friction.expect_slip(slip);
             }
             if force_in_range {
-                self.friction.update(&mut state.friction, &force_n);
+                let slip = state.friction.slip().sign::<f32>();
+                let lag_m_s = last.reference_velocity_m_s - tip_velocity_m_s;
+                let dragged = slip * lag_m_s > DRAGGED_M_S;
+                self.friction.update(&mut state.friction, &force_n, dragged);
             }
             // An unchanged reading would gain weight merely with time.
-            if certain && state.joints.has_moved() {
+            if certain && !is_light && state.joints.has_moved() {
                 self.calibrator
                     .update(&mut state.calibration, &mut state.arm, gap_m);
             }
@@ -239,15 +276,38 @@ impl Estimators {
         let sliding = contact.then_some(&friction);
         self.belt.update(&mut state.belt, tip_velocity_m_s, sliding);
         let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
-        if certain && force_in_range && drives {
+        let p_ratio = p_per_kg / model.q22_per_kg;
+        let informative = certain && force_in_range && drives;
+        let slides = contact && p_per_kg > 0.0 && !friction.sticks;
+        if informative && slides && !last.is_constrained() && self.response.is_enabled() {
+            let (_, slope) = model.free_normal_acceleration();
+            let reading = ForceReading {
+                normal_force_n: force_n.y,
+                withheld_n: last.rounding_nm.vector().dot(&slope) / p_per_kg,
+                p_ratio,
+                waits_at_edge: last.at_edge && last.reference_velocity_m_s.abs() < WAITING_M_S,
+                has_spare_time,
+            };
+            if self.response.update(&mut state.response, &reading) {
+                has_spare_time = false;
+            }
+        } else {
+            state.response.pause();
+        }
+        let response = self.response.response(&state.response, p_per_kg, p_ratio);
+        let elapsed_s = elapsed_ticks as f32 * self.tick_s;
+        if informative && is_light {
+            state.disturbance.skip(&last.torque_nm, &force_n, elapsed_s);
+        } else if informative {
             self.disturbance.update(
                 &mut state.disturbance,
                 model,
                 &Balance {
                     torque_nm: last.torque_nm,
                     force_n,
-                    p_per_kg: contact.then_some(p_per_kg),
-                    elapsed_s: elapsed_ticks as f32 * self.tick_s,
+                    p_ratio: contact.then_some(p_ratio),
+                    loop_share: response.loop_share,
+                    elapsed_s,
                 },
             );
         } else {
@@ -261,6 +321,8 @@ impl Estimators {
             force_n,
             friction,
             p_per_kg,
+            response,
+            has_spare_time,
         }
     }
 

@@ -5,6 +5,7 @@ use painleve_shared::{Arm, JointTorque, Posture};
 
 use crate::estimate::friction::FrictionEstimate;
 use crate::estimate::model::Model;
+use crate::estimate::response::ContactResponse;
 use crate::refer::reference::TipReference;
 
 /// Inputs of a law at one tick.
@@ -22,6 +23,8 @@ pub struct LawInput<'a> {
     pub friction: FrictionEstimate,
     /// p with the estimated friction, 1/kg.
     pub p_per_kg: f32,
+    /// What the contact's response to torque allows.
+    pub response: ContactResponse,
     /// Whether the tip touches the belt.
     pub contact: bool,
     /// Whether the torque of the previous tick was limited.

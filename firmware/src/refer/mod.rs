@@ -9,7 +9,7 @@ pub mod reference;
 use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, Posture};
 
-use self::governor::{EdgeGovernor, GovernorSettings, GovernorState};
+use self::governor::{EdgeGovernor, GovernorSettings, GovernorState, LeastPRatio};
 use self::reference::{Program, ReferenceGenerator, ReferenceState, TipReference};
 use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
@@ -115,19 +115,24 @@ impl References {
             // position has changed with the links' length.
             state.generator.start_from(tip_t_m);
         }
-        let minimum_p_ratio = if recovering || landing.is_some() {
+        let landing_p_ratio = if recovering || landing.is_some() {
             self.landing_p_ratio
         } else {
             0.0
         };
-        self.governor.search(
-            &mut state.governor,
-            arm,
-            state.posture,
-            tip_t_m,
-            &contact.friction,
-            minimum_p_ratio,
-        );
+        if contact.has_spare_time || (landing_p_ratio > 0.0 && !contact.touches) {
+            self.governor.search(
+                &mut state.governor,
+                arm,
+                state.posture,
+                tip_t_m,
+                &contact.friction,
+                LeastPRatio {
+                    landing: landing_p_ratio,
+                    contact: contact.response.least_p_ratio,
+                },
+            );
+        }
         let wanted = match phase.state {
             SupervisorState::Armed => state.generator.start(),
             // The reference waits for a tip that is being returned to the belt.

@@ -132,28 +132,30 @@ fn table(
 }
 
 /// Returns the address of a branch's table: behind the branch, or, if a literal lies between them, the address
-/// that an `adr` (or `addw` with the program counter) shortly before the branch has put into its base register.
+/// that an `adr` (or `addw` with the program counter) before the branch has put into its base register.
 fn start_of_table(instructions: &BTreeMap<u32, Instruction>, branch: &Instruction) -> Option<u32> {
-    const SHORTLY: usize = 8;
+    /// The compiler may schedule a polynomial between the two.
+    const FARTHEST: usize = 64;
     let base = branch.text.split(['[', ',']).nth(1)?;
     if base == "pc" {
         return Some(branch.address + branch.size);
     }
-    let mut before = instructions.range(..branch.address).rev().take(SHORTLY);
-    let (from, offset) = before.find_map(|(from, instruction)| {
+    let mut before = instructions.range(..branch.address).rev().take(FARTHEST);
+    // The last instruction that names the base first; if it is another one, the table is unknown.
+    let (from, mnemonic, offset) = before.find_map(|(from, instruction)| {
         let (mnemonic, operands) = instruction.text.split_once(' ')?;
         let (register, offset) = operands.split_once(", ")?;
-        let offset = match mnemonic {
-            "adr" | "adr.w" => offset.strip_prefix('#')?,
-            _ => offset.strip_prefix("pc, #")?,
-        };
-        let offset = match offset.strip_prefix("0x") {
-            Some(digits) => u32::from_str_radix(digits, 16),
-            None => offset.parse(),
-        };
-        (register == base).then_some((from, offset.ok()?))
+        (register == base).then_some((from, mnemonic, offset))
     })?;
-    Some(((from + 4) & !3) + offset)
+    let offset = match mnemonic {
+        "adr" | "adr.w" => offset.strip_prefix('#')?,
+        _ => offset.strip_prefix("pc, #")?,
+    };
+    let offset = match offset.strip_prefix("0x") {
+        Some(digits) => u32::from_str_radix(digits, 16),
+        None => offset.parse(),
+    };
+    Some(((from + 4) & !3) + offset.ok()?)
 }
 
 fn blocks(

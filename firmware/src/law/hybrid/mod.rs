@@ -24,6 +24,8 @@ use super::{Law, LawInput, LawOutput};
 
 /// Largest share of the loop through the contact per sample: its pole is 1 − ½ p̂/p.
 const OBSERVER_SHARE: f32 = 0.5;
+/// The same for the integral of the force.
+const FORCE_INTEGRAL_SHARE: f32 = 0.165;
 
 /// Rate limit of the friction feed-forward, as a fraction of f_n, 1/s: at a reversal of slip it
 /// passes through stick without a jerk.
@@ -86,6 +88,8 @@ pub struct HybridState {
     fed_ratio: f32,
     /// Fraction of the wanted contact force for which torque is available.
     pressing: f32,
+    /// Low-passed normal force, N.
+    slow_force_n: f32,
 }
 
 impl Default for HybridState {
@@ -98,6 +102,7 @@ impl Default for HybridState {
             slip: None,
             fed_ratio: 0.0,
             pressing: 1.0,
+            slow_force_n: 0.0,
         }
     }
 }
@@ -113,6 +118,7 @@ impl Law for HybridSettings {
         *state = HybridState {
             wanted_force_n: (self.force_time_constant_s > 0.0).then_some(force_n),
             filtered_friction_n: input.force_n.x.within(cone_n),
+            slow_force_n: input.force_n.y,
             ..HybridState::default()
         };
     }
@@ -169,13 +175,23 @@ impl HybridSettings {
         // Anti-windup: no integration in the air, where there is no force to control, nor while the
         // torque is limited.
         if input.contact && !input.saturated {
-            let step = self.force_integral_gain_per_s
-                * (state.pressing * wanted_n - input.force_n.y)
-                * input.tick_s;
+            let weight = (self.force_integral_gain_per_s * input.tick_s)
+                .at_most(FORCE_INTEGRAL_SHARE * input.response.loop_share);
+            let step = weight * (state.pressing * wanted_n - input.force_n.y);
             let limit = self.force_integral_limit_n;
             state.force_integral_n = (state.force_integral_n + step).within(limit);
         }
-        wanted_n + state.force_integral_n
+        let response = &input.response;
+        let damping_n = if response.give > 0.0 {
+            // Press less while the force rises: this damps a contact that gives.
+            let rate = input.tick_s * self.contact_damping_rad_s;
+            state.slow_force_n += rate / (1.0 + rate) * (input.force_n.y - state.slow_force_n);
+            self.contact_damping * response.give * (input.force_n.y - state.slow_force_n)
+        } else {
+            state.slow_force_n = input.force_n.y;
+            0.0
+        };
+        wanted_n + state.force_integral_n - damping_n + response.probe_n
     }
 
     /// Returns the f_t to feed forward, N, for α_f (N) and α_v (m/s²).
@@ -216,10 +232,8 @@ impl HybridSettings {
                 let step = FRICTION_SLEW_PER_S * input.tick_s;
                 state.fed_ratio += (ratio - state.fed_ratio).within(step);
                 let expected = state.fed_ratio * normal_force_n;
-                let share = OBSERVER_SHARE * input.p_per_kg / input.model.q22_per_kg;
                 let weight = (input.tick_s / (time_constant_s + input.tick_s))
-                    .at_most(share)
-                    .at_least(0.0);
+                    .at_most(OBSERVER_SHARE * input.response.loop_share);
                 let rest = input.force_n.x - expected;
                 state.filtered_friction_n += weight * (rest - state.filtered_friction_n);
                 expected + state.filtered_friction_n
@@ -240,6 +254,7 @@ mod tests {
     use super::*;
     use crate::estimate::friction::FrictionEstimate;
     use crate::estimate::model::Model;
+    use crate::estimate::response::ContactResponse;
     use crate::refer::reference::TipReference;
     use painleve_shared::{Arm, ArmParameters, GeneralisedTorque, Pose, Posture};
     use proptest::prelude::*;
@@ -270,7 +285,7 @@ mod tests {
                 friction: FrictionEstimate {
                     coefficient: friction, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
                 },
-                p_per_kg: model.p_per_kg(friction, Slip::Positive),
+                p_per_kg: model.p_per_kg(friction, Slip::Positive), response: ContactResponse::rigid(1.0),
                 force_n: Vector2::zeros(), contact: true, saturated: false,
                 reference, torque_limit_nm: 50.0, tick_s: 1e-3,
             };

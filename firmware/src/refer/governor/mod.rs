@@ -34,6 +34,15 @@ const CAUGHT_M: f32 = 2e-5;
 /// Rate at which the remaining distance to a target decays, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
 
+/// Least p/Q22 required in addition to the setting.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LeastPRatio {
+    /// Where a thrown tip may land. A change of it makes the edges unknown.
+    pub landing: f32,
+    /// What the contact's response asks for. The edges follow it.
+    pub contact: f32,
+}
+
 /// The governor's settings for one arm and rate.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeGovernor {
@@ -111,7 +120,9 @@ impl EdgeGovernor {
         Self {
             settings: *settings,
             tick_s,
-            least_p_ratio: settings.minimum_p_ratio + settings.p_ratio_per_s2 * tick_s * tick_s,
+            least_p_ratio: settings
+                .minimum_p_ratio
+                .at_least(settings.p_ratio_per_s2 * tick_s * tick_s),
             distance_m: settings.distance_m + settings.distance_counts * count_m,
         }
     }
@@ -125,10 +136,10 @@ impl EdgeGovernor {
         posture: Posture,
         tip_t_m: f32,
         friction: &FrictionEstimate,
-        minimum_p_ratio: f32,
+        least: LeastPRatio,
     ) {
-        if minimum_p_ratio != state.asked_p_ratio {
-            state.asked_p_ratio = minimum_p_ratio;
+        if least.landing != state.asked_p_ratio {
+            state.asked_p_ratio = least.landing;
             state.search = None;
             state.is_fresh = false;
         }
@@ -138,7 +149,10 @@ impl EdgeGovernor {
             posture,
             friction: friction.coefficient + margin,
             slip: friction.slip_seen.then_some(friction.slip),
-            minimum_p_ratio: self.least_p_ratio.at_least(minimum_p_ratio),
+            minimum_p_ratio: self
+                .least_p_ratio
+                .at_least(least.landing)
+                .at_least(least.contact),
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
@@ -252,7 +266,14 @@ mod tests {
     fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> GovernorState {
         let mut state = GovernorState::new(arm().reach_on_belt_m());
         for _ in 0..300 {
-            governor().search(&mut state, &arm(), posture, tip_t_m, friction, 0.0);
+            governor().search(
+                &mut state,
+                &arm(),
+                posture,
+                tip_t_m,
+                friction,
+                LeastPRatio::default(),
+            );
         }
         state
     }

@@ -9,10 +9,10 @@ settings! {
         /// Whether the governor is active; if not, the reference must be within reach.
         enabled: bool = true;
         /// Least p/Q22.
-        minimum_p_ratio: f32 = 0.01, 0.0..=0.9;
-        /// Added to the least p/Q22, times the square of the control period: the distance by which a
+        minimum_p_ratio: f32 = 0.012, 0.0..=0.9;
+        /// The same, times the square of the control period, if that is more: the distance by which a
         /// disturbance moves the tip before the controller reacts grows with that square.
-        p_ratio_per_s2: f32 = 1e4, 0.0..=1e6, "1/s²";
+        p_ratio_per_s2: f32 = 2e4, 0.0..=1e6, "1/s²";
         /// Number of standard deviations added to the friction estimate.
         friction_deviations: f32 = 1.5, 0.0..=10.0;
         /// Distance kept from the point where p/Q22 has its least value.

@@ -1,0 +1,469 @@
+//! Estimates how much the contact gives, from the response of the contact force to small changes of torque.
+//!
+//! On a rigid contact f_n = −b/p: the force follows a change of torque at once. On a spring and damper
+//! the tip must move first, and within a tick T only the fraction ρ ≈ c p T + ½ k p T² shows. The
+//! rounding of the torque to counts changes the torque like noise at every tick, by a known amount; near
+//! the edge, a small probe is added. ρ is the correlation of the measured changes of force with those
+//! that a rigid contact would show.
+//!
+//! An observer that feeds the measured force back at the rate λ takes damping away from the contact. It
+//! is stable while λ < c p²/(Q22 − p), near the edge λ T < ρ p/Q22. ρ therefore limits the part of the
+//! force error that observers and integrals may remove in a tick. Until the response is that of a rigid
+//! contact, the tip is also kept away from the edge.
+
+use painleve_shared::{Real, settings};
+
+settings! {
+    /// Settings of the estimate of the contact's response.
+    #[derive(Copy)]
+    pub struct ResponseSettings {
+        /// Whether the response is estimated; if not, the contact is taken to be rigid.
+        enabled: bool = true;
+        /// Averaging time of the correlation.
+        averaging_s: f32 = 0.25, 1e-3..=1e3, "s";
+        /// Number of standard deviations from the estimated response to its bounds.
+        deviations: f32 = 3.0, 0.0..=10.0;
+        /// Lower bound of the response that allows the observers their full gain.
+        full_gain: f32 = 0.5, 1e-3..=10.0;
+        /// Lower bound of the response above which the contact is taken to be rigid.
+        rigid: f32 = 0.5, 1e-3..=1.0;
+        /// Upper bound of the response below which the law damps the contact.
+        gives: f32 = 0.2, 1e-3..=1.0;
+        /// Amplitude of the probe, a noise-like force that is added to the wanted normal force near the
+        /// edge until the contact is known to be rigid.
+        probe_n: f32 = 0.1, 0.0..=10.0, "N";
+        /// Least contact damping c that is assumed.
+        least_damping_ns_m: f32 = 15.0, 1e-3..=1e9, "N·s/m";
+        /// Least p/Q22 where the contact is not known to be rigid.
+        minimum_p_ratio: f32 = 0.08, 0.0..=0.9;
+        /// Time of observation near that p/Q22 before the tip may go closer to the edge.
+        observation_s: f32 = 0.3, 0.0..=100.0, "s";
+        /// Speed at which the least p/Q22 then falls while the contact is rigid. It rises four times as
+        /// fast while the contact gives.
+        approach_per_s: f32 = 0.1, 0.0..=100.0, "1/s";
+    }
+}
+
+/// Number of delays between torque and force that are considered, in ticks.
+const DELAYS: usize = 3;
+/// Ticks of one block of sums. After a block, averages and bounds are updated in the next two ticks with
+/// spare time, so that no tick does all of it.
+const BLOCK_TICKS: u8 = 15;
+/// Value of the counter of ticks at which a block is evaluated.
+const END_TICKS: u8 = BLOCK_TICKS + 2;
+/// Ticks from one block to the next, if every other tick has spare time.
+const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
+/// Least 1 − p/Q22 in the stability limit: where p is greater, that limit does not matter.
+const LEAST_REST: f32 = 0.05;
+/// Time in contact before the correlation starts, s.
+const SETTLING_S: f32 = 0.05;
+/// Multiple of `minimum_p_ratio` below which the contact is observed.
+const NEAR: f32 = 3.0;
+/// Retreat from the edge as a multiple of the approach.
+const RETREAT: f32 = 4.0;
+
+/// Inputs of one tick in which the tip slides in contact.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceReading {
+    /// Measured normal force, N.
+    pub normal_force_n: f32,
+    /// Normal force that the torque withheld by rounding would cause on a rigid contact, N.
+    pub withheld_n: f32,
+    /// p/Q22.
+    pub p_ratio: f32,
+    /// Whether the reference waits at an edge for a smaller least p/Q22.
+    pub waits_at_edge: bool,
+    /// Whether there is time to update averages and bounds at this tick.
+    pub has_spare_time: bool,
+}
+
+/// What the response allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactResponse {
+    /// Part of the force error that loops through the contact force may remove in a tick, before the
+    /// factor of each loop: p/Q22 on a rigid contact.
+    pub loop_share: f32,
+    /// How much the contact gives, 0 … 1: 0 if it is rigid.
+    pub give: f32,
+    /// Least p/Q22 at which the tip may be.
+    pub least_p_ratio: f32,
+    /// Probe to be added to the wanted normal force, N.
+    pub probe_n: f32,
+}
+
+impl ContactResponse {
+    /// The response of a rigid contact at this p/Q22.
+    pub fn rigid(p_ratio: f32) -> Self {
+        Self {
+            loop_share: p_ratio.at_least(0.0),
+            give: 0.0,
+            least_p_ratio: 0.0,
+            probe_n: 0.0,
+        }
+    }
+}
+
+/// The estimator's settings.
+#[derive(Clone, Copy, Debug)]
+pub struct ResponseEstimator {
+    settings: ResponseSettings,
+    tick_s: f32,
+    /// Weight of one block in the averages.
+    weight: f32,
+    near_p_ratio: f32,
+    /// Time from one block to the next, s.
+    period_s: f32,
+    /// Approach to the edge in one block, as a change of p/Q22.
+    approach: f32,
+    /// Share for each unit of p that is always allowed, kg.
+    least_share_kg: f32,
+}
+
+/// Sums or averages over blocks of ticks, N².
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    /// Change of force times expected change, for each delay.
+    products: [f32; DELAYS],
+    /// Square of the expected change.
+    expected: f32,
+    /// Square of the change of force.
+    measured: f32,
+}
+
+/// The estimator's state.
+#[derive(Clone, Copy, Debug)]
+pub struct ResponseState {
+    /// Last normal force, N.
+    force_n: f32,
+    /// Last withheld force, N.
+    withheld_n: f32,
+    /// Last change of force that was commanded in addition to the law's, N.
+    excitation_n: f32,
+    /// Present probe, N, and the random numbers from which it is drawn.
+    probe_n: f32,
+    random: u16,
+    /// Expected changes of force, N, the latest first.
+    expected_n: [f32; DELAYS],
+    /// Sums over the present block.
+    block: Moments,
+    block_ticks: u8,
+    /// Averages of the blocks.
+    averages: Moments,
+    blocks: f32,
+    /// Weight of the last block.
+    block_weight: f32,
+    /// Bounds of ρ.
+    lower: f32,
+    upper: f32,
+    /// Fraction of the observers' full gain that the lower bound allows.
+    gain: f32,
+    /// How much the contact gives, from the upper bound.
+    give: f32,
+    /// Time since the tip touched, s.
+    touched_s: f32,
+    /// Time of observation near the edge, s.
+    near_s: f32,
+    /// Least p/Q22 at which the tip may be.
+    least_p_ratio: f32,
+}
+
+impl ResponseEstimator {
+    /// Makes an estimator that is called every `tick_s`.
+    pub fn new(settings: &ResponseSettings, tick_s: f32) -> Self {
+        let period_s = f32::from(PERIOD_TICKS) * tick_s;
+        Self {
+            settings: *settings,
+            tick_s,
+            weight: period_s / settings.averaging_s,
+            near_p_ratio: NEAR * settings.minimum_p_ratio,
+            period_s,
+            approach: period_s * settings.approach_per_s,
+            least_share_kg: settings.least_damping_ns_m * tick_s,
+        }
+    }
+
+    /// Starts without knowledge of the contact.
+    pub fn start(&self) -> ResponseState {
+        ResponseState {
+            force_n: 0.0,
+            withheld_n: 0.0,
+            excitation_n: 0.0,
+            probe_n: 0.0,
+            random: 1,
+            expected_n: [0.0; DELAYS],
+            block: Moments::default(),
+            block_ticks: 0,
+            averages: Moments::default(),
+            blocks: 0.0,
+            block_weight: 1.0,
+            lower: 0.0,
+            upper: 1.0,
+            gain: 0.0,
+            give: 0.0,
+            touched_s: 0.0,
+            near_s: 0.0,
+            least_p_ratio: self.settings.minimum_p_ratio,
+        }
+    }
+
+    /// Returns whether the response is estimated.
+    pub fn is_enabled(&self) -> bool {
+        self.settings.enabled
+    }
+
+    /// Returns what the response allows where p is `p_per_kg` and `p_ratio` of Q22.
+    #[inline]
+    pub fn response(&self, state: &ResponseState, p_per_kg: f32, p_ratio: f32) -> ContactResponse {
+        if !self.settings.enabled {
+            return ContactResponse::rigid(p_ratio);
+        }
+        let gain = state.gain.at_least(self.least_share_kg * p_per_kg);
+        ContactResponse {
+            loop_share: (gain * p_ratio / (1.0 - p_ratio).at_least(LEAST_REST))
+                .limited(0.0, p_ratio.at_least(0.0)),
+            give: state.give,
+            least_p_ratio: state.least_p_ratio,
+            probe_n: state.probe_n,
+        }
+    }
+
+    /// Updates the estimate with one tick of a tip that slides in contact, and returns whether it has
+    /// used the spare time.
+    #[inline]
+    pub fn update(&self, state: &mut ResponseState, reading: &ForceReading) -> bool {
+        let excitation_n = reading.withheld_n - state.withheld_n + state.probe_n;
+        let expected_n = excitation_n - state.excitation_n;
+        state.withheld_n = reading.withheld_n;
+        state.excitation_n = excitation_n;
+        let [e0, e1, _] = state.expected_n;
+        state.expected_n = [expected_n, e0, e1];
+        let change = reading.normal_force_n - state.force_n;
+        state.force_n = reading.normal_force_n;
+        state.touched_s += self.tick_s;
+        state.probe_n = 0.0;
+        if state.touched_s < SETTLING_S {
+            return false;
+        }
+        if state.lower < self.settings.rigid {
+            state.draw_probe(self.settings.probe_n);
+        }
+        if state.block_ticks < BLOCK_TICKS {
+            state.block_ticks += 1;
+            let sums = &mut state.block;
+            for (product, expected) in sums.products.iter_mut().zip(&state.expected_n) {
+                *product += change * expected;
+            }
+            sums.expected += e0 * e0;
+            sums.measured += change * change;
+            return false;
+        }
+        if !reading.has_spare_time {
+            return false;
+        }
+        state.block_ticks += 1;
+        if state.block_ticks < END_TICKS {
+            self.average(state);
+        } else {
+            self.bound(state);
+            self.move_limit(state, reading);
+        }
+        true
+    }
+
+    /// Adds a block to the averages.
+    #[inline(never)]
+    fn average(&self, state: &mut ResponseState) {
+        let sums = core::mem::take(&mut state.block);
+        state.blocks += 1.0;
+        // The plain mean of the first blocks, until it covers the averaging time.
+        let weight = (1.0 / state.blocks).at_least(self.weight).at_most(1.0);
+        state.block_weight = weight;
+        let averages = &mut state.averages;
+        for (average, sum) in averages.products.iter_mut().zip(sums.products) {
+            *average += weight * (sum - *average);
+        }
+        averages.expected += weight * (sums.expected - averages.expected);
+        averages.measured += weight * (sums.measured - averages.measured);
+    }
+
+    /// Updates the bounds of ρ from the averages.
+    #[inline(never)]
+    fn bound(&self, state: &mut ResponseState) {
+        state.block_ticks = 0;
+        let weight = state.block_weight;
+        let averages = &state.averages;
+        let largest = |most: f32, product: &f32| product.at_least(most);
+        let most = averages.products.iter().fold(0.0, largest);
+        let square = averages.expected.at_least(1e-12);
+        let variance = weight / (2.0 - weight) * averages.measured * square;
+        let deviation = (variance / f32::from(BLOCK_TICKS)).square_root() / square;
+        let response = most / square;
+        let settings = &self.settings;
+        state.lower = response - settings.deviations * deviation;
+        state.upper = response + settings.deviations * deviation;
+        state.gain = state.lower / settings.full_gain;
+        state.give = (1.0 - state.upper / settings.gives).at_least(0.0);
+    }
+
+    /// Lets the tip closer to the edge while the contact there is rigid, and less close while it gives.
+    fn move_limit(&self, state: &mut ResponseState, reading: &ForceReading) {
+        let settings = &self.settings;
+        if reading.p_ratio > self.near_p_ratio {
+            return;
+        }
+        state.near_s += self.period_s;
+        if state.near_s < settings.observation_s {
+            return;
+        }
+        let least = &mut state.least_p_ratio;
+        if state.upper < settings.gives {
+            *least += RETREAT * self.approach;
+        } else if state.lower > settings.rigid && reading.waits_at_edge {
+            *least -= self.approach;
+        }
+        *least = least.limited(0.0, settings.minimum_p_ratio);
+    }
+}
+
+impl ResponseState {
+    /// Skips a tick without information: in the air, or with a reading in doubt.
+    #[inline]
+    pub fn pause(&mut self) {
+        if self.touched_s > 0.0 {
+            self.touched_s = 0.0;
+            self.probe_n = 0.0;
+            self.give = 0.0;
+            self.block = Moments::default();
+            self.block_ticks = 0;
+        }
+    }
+
+    /// Draws the next probe, ±`amplitude_n` (N), from a shift register of 16 bits with the longest
+    /// period.
+    #[inline(never)]
+    fn draw_probe(&mut self, amplitude_n: f32) {
+        let feedback = if self.random & 1 == 1 { 0xb400 } else { 0 };
+        self.random = (self.random >> 1) ^ feedback;
+        self.probe_n = if self.random & 1 == 1 {
+            amplitude_n
+        } else {
+            -amplitude_n
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TICK_S: f32 = 1e-3;
+    const P_PER_KG: f32 = 2.4;
+    const P_RATIO: f32 = 0.09;
+
+    /// Returns uniform noise in −1 … 1 from a fixed stream.
+    fn noise(step: u32) -> f32 {
+        let bits = step
+            .wrapping_mul(2_654_435_761)
+            .rotate_left(13)
+            .wrapping_mul(2_246_822_519);
+        (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    /// Returns the response after `ticks` near the edge, for a contact that gives the force (N) in
+    /// answer to the force commanded at the previous tick.
+    fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
+        let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
+        let mut state = estimator.start();
+        let (mut withheld, mut commanded) = (0.0, 10.0);
+        for tick in 0..ticks {
+            let reading = ForceReading {
+                normal_force_n: contact(commanded) + 0.03 * noise(3 * tick),
+                withheld_n: withheld,
+                // The tip stands where it may.
+                p_ratio: state.least_p_ratio,
+                waits_at_edge: true,
+                has_spare_time: tick % 2 == 0,
+            };
+            estimator.update(&mut state, &reading);
+            let next = 0.05 * noise(3 * tick + 1);
+            commanded = 10.0 + next - withheld + state.probe_n;
+            withheld = next;
+        }
+        estimator.response(&state, P_PER_KG, P_RATIO)
+    }
+
+    /// A spring and damper under an arm of mobility p, in small steps.
+    fn compliant(stiffness_n_m: f32, damping_ns_m: f32) -> impl FnMut(f32) -> f32 {
+        let (mut depth, mut rate) = (10.0 / stiffness_n_m, 0.0);
+        move |commanded| {
+            let force = |depth: f32, rate: f32| stiffness_n_m * depth + damping_ns_m * rate;
+            for _ in 0..100 {
+                rate += P_PER_KG * (commanded - force(depth, rate)) * TICK_S / 100.0;
+                depth += rate * TICK_S / 100.0;
+            }
+            force(depth, rate)
+        }
+    }
+
+    #[test]
+    fn a_rigid_contact_is_found_and_costs_nothing() {
+        let minimum = ResponseSettings::default().minimum_p_ratio;
+        assert_eq!(observed(250, |commanded| commanded).least_p_ratio, minimum);
+        let found = observed(1500, |commanded| commanded);
+        assert_eq!(found, ContactResponse::rigid(P_RATIO));
+    }
+
+    #[test]
+    fn a_rigid_contact_behind_a_slow_torque_stage_is_rigid() {
+        let mut force = 10.0;
+        let share = 1.0 - libm::expf(-TICK_S / 0.5e-3);
+        let found = observed(1500, |commanded| {
+            force += share * (commanded - force);
+            force
+        });
+        assert_eq!((found.give, found.least_p_ratio), (0.0, 0.0), "{found:?}");
+    }
+
+    #[test]
+    fn the_share_of_a_contact_that_gives_falls_with_its_damping_and_keeps_the_tip_from_the_edge() {
+        let of = |damping| observed(1500, compliant(1e5, damping));
+        let (firm, soft) = (of(60.0), of(20.0));
+        assert!(soft.loop_share < firm.loop_share && firm.loop_share < P_RATIO);
+        assert!(soft.loop_share < 0.5 * P_RATIO, "{soft:?}");
+        let softest = observed(1500, compliant(1e4, 5.0));
+        assert!(softest.give > 0.0, "{softest:?}");
+        let minimum = ResponseSettings::default().minimum_p_ratio;
+        for found in [firm, soft, softest] {
+            assert_eq!(found.least_p_ratio, minimum, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn the_tip_returns_from_the_edge_if_the_contact_starts_to_give() {
+        let mut soft = compliant(1e4, 5.0);
+        let mut ticks = 0;
+        let found = observed(3000, |commanded| {
+            ticks += 1;
+            if ticks < 1500 {
+                commanded
+            } else {
+                soft(commanded)
+            }
+        });
+        assert_eq!(
+            found.least_p_ratio,
+            ResponseSettings::default().minimum_p_ratio
+        );
+    }
+
+    #[test]
+    fn all_is_allowed_if_it_is_off() {
+        let settings = ResponseSettings {
+            enabled: false,
+            ..Default::default()
+        };
+        let estimator = ResponseEstimator::new(&settings, TICK_S);
+        let found = estimator.response(&estimator.start(), P_PER_KG, P_RATIO);
+        assert_eq!(found, ContactResponse::rigid(P_RATIO));
+    }
+}
