@@ -9,6 +9,7 @@ pub mod printed;
 pub mod python;
 
 use std::ffi::OsStr;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::OnceLock;
@@ -18,6 +19,13 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use painleve_system::interrupt::restore_default_actions;
 use serde_json::Value;
+
+/// Says that a test does nothing, and why. Printed past the test harness, which shows no output of tests
+/// that pass.
+pub fn skipped(reason: &str) {
+    // A notice that cannot be printed must not fail the test.
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {reason}");
+}
 
 /// Returns the path of the release program, which is built if missing or out of date.
 ///

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::skipped;
+
 /// Returns the folder of the repository.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -22,7 +24,9 @@ pub fn python(environment: &str, packages: &[&str]) -> Option<PathBuf> {
         let created = quietly(Command::new("python3").args(["-m", "venv"]).arg(&folder));
         let pip = ["-m", "pip", "install", "--quiet", "--retries", "1"];
         if !created || !quietly(Command::new(&python).args(pip).args(packages)) {
-            eprintln!("SKIPPED: no python3-venv, or {packages:?} cannot be installed");
+            skipped(&format!(
+                "no python3-venv, or {packages:?} cannot be installed"
+            ));
             return None;
         }
         std::fs::write(&installed, packages.join("\n")).ok()?;

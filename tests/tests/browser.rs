@@ -9,7 +9,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use painleve_tests::Bench;
+use painleve_tests::{Bench, skipped};
 
 /// Returns the name of the first program that starts; prints a notice if there is none.
 fn program(names: &[&'static str]) -> Option<&'static str> {
@@ -19,7 +19,9 @@ fn program(names: &[&'static str]) -> Option<&'static str> {
     };
     let found = names.iter().find(starts).copied();
     if found.is_none() {
-        eprintln!("SKIPPED: {names:?} not found; on Debian: apt-get install nodejs chromium");
+        skipped(&format!(
+            "{names:?} not found; on Debian: apt-get install nodejs chromium"
+        ));
     }
     found
 }

@@ -99,3 +99,20 @@ fn the_commands_of_the_tutorials_succeed() {
     let merged = fs::read_to_string(bench.path("out/sweep/merged.csv")).unwrap();
     assert!(merged.lines().count() > 10, "{merged}");
 }
+
+#[test]
+fn commissioning_prints_json() {
+    let bench = Bench::new("commission-json");
+    let arguments = [
+        "commission",
+        "--rehearse",
+        "--mistake",
+        "first-encoder-mirrored",
+    ];
+    let found = bench.report(&[&arguments[..], &["--json"]].concat());
+    let keys: Vec<_> = found.as_object().unwrap().keys().collect();
+    let documented = ["corrections", "friction", "output"];
+    assert_eq!(keys, documented);
+    assert_eq!(found["corrections"].as_array().unwrap().len(), 1, "{found}");
+    assert!(bench.path(found["output"].as_str().unwrap()).exists());
+}

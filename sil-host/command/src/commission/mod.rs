@@ -11,6 +11,7 @@ use painleve_commission::{CommissionError, Commissioned, Expected, commission};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_shared::range::OutOfRange;
 use painleve_system::atomic_file;
+use serde_json::json;
 
 use self::board_rig::BoardRig;
 pub use self::board_rig::BoardRigError;
@@ -45,6 +46,9 @@ pub struct CommissionArguments {
     /// File for the corrected scenario.
     #[arg(long, value_name = "PATH", default_value = "out/commissioned.toml")]
     output: PathBuf,
+    /// Print one JSON object on stdout instead of the text.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Share of the stages' range that commissioning uses by default.
@@ -129,6 +133,14 @@ fn report(
     arguments: &CommissionArguments,
     commissioned: &Commissioned,
 ) -> Result<(), CommandError> {
+    if arguments.json {
+        let corrections = commissioned.deviations.iter().map(ToString::to_string);
+        return say(json!({
+            "corrections": corrections.collect::<Vec<_>>(),
+            "friction": commissioned.friction,
+            "output": arguments.output,
+        }));
+    }
     for deviation in &commissioned.deviations {
         say(format_args!("corrected: {deviation}"))?;
     }
