@@ -7,6 +7,7 @@ use painleve_shared::counts::{EncoderScale, LinearScale};
 use painleve_shared::mounting::Mounting;
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::settings::Settings;
+use painleve_shared::winding::WindingSettings;
 use painleve_shared::{Arm, ArmParameters, Real, check_setting, settings};
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,8 @@ settings! {
         torque: LinearScale<f32> = LinearScale { bits: 12, range: 5.0 };
         /// Directions and zeros of the parts of a real arm.
         mounting: Mounting = Mounting::default();
+        /// Protection of the torque stages' windings.
+        winding: WindingSettings = WindingSettings::default();
     }
 }
 

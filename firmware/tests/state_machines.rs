@@ -355,6 +355,7 @@ impl StateMachineTest for LapseTest {
             arming_refused: limit,
             stage_not_ready: limit,
             gap_against_force: limit,
+            winding_hot: limit,
             garbage: limit,
             failed_checksums: limit,
         })

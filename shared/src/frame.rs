@@ -37,6 +37,8 @@ bitflags! {
         const STAGE_NOT_READY = 1 << 3;
         /// Encoders and force cell contradict each other while the drive is armed.
         const GAP_AGAINST_FORCE = 1 << 4;
+        /// A torque stage's winding is too hot while the drive is armed.
+        const WINDING_HOT = 1 << 5;
         /// Prolongs the tick until the next one is due, to test the lapse monitor. Only an emulated
         /// board and a real-time process have this input.
         const OVERLOAD = 1 << 31;

@@ -121,8 +121,10 @@ lapses! {
         ArmingRefused => arming_refused = 1, ArmingRefused;
         /// Frames with a torque stage that is not ready.
         StageNotReady => stage_not_ready = 1, StageNotReady;
-        /// Frames whose encoders and force cell contradict each other.
+        /// Frames whose force cell contradicts the encoders or the torques.
         GapAgainstForce => gap_against_force = 5, GapAgainstForce;
+        /// Frames with a winding that is too hot.
+        WindingHot => winding_hot = 1, WindingTooHot;
     }
     /// Lapses of the link that carries messages as bytes.
     OF_MESSAGES: {
@@ -157,6 +159,6 @@ mod tests {
             }
             assert_eq!(limits.of(*lapse), before + 1);
         }
-        assert_eq!((counts.overruns, counts.failed_checksums), (0, 10));
+        assert_eq!((counts.overruns, counts.failed_checksums), (0, 11));
     }
 }

@@ -45,6 +45,7 @@ pub mod settings;
 mod square_root;
 pub mod status;
 pub mod stored;
+pub mod winding;
 pub mod wire;
 
 pub use arm::{Arm, ArmParameters};

@@ -77,10 +77,12 @@ pub enum Fault {
     ArmingRefused = 13,
     /// torque stage not ready
     StageNotReady = 14,
-    /// encoders and force cell contradict each other
+    /// force cell contradicts the encoders or the torques
     GapAgainstForce = 15,
     /// joint moved too far while being commissioned
     MovedTooFar = 16,
+    /// winding of a torque stage too hot
+    WindingTooHot = 17,
 }
 
 impl Fault {

@@ -2,13 +2,17 @@
 //! depends on no chip.
 
 use painleve_shared::Arm;
-use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
+use painleve_shared::counts::{
+    EncoderCounts, EncoderScale, ForceCounts, LinearScale, TorqueCounts,
+};
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::mounting::Mounting;
+use painleve_shared::winding::WindingSettings;
 
 use crate::encoders::{self, EncoderDriver};
 use crate::force_cell::{self, ForceCellDriver};
-use crate::gap::GapCheck;
+use crate::gap::{GapCheck, Scales};
+use crate::heating::{Heating, HeatingModel};
 use crate::plausibility::{Implausible, Plausibility, SensorReadings};
 use crate::switches::Switches;
 
@@ -34,6 +38,10 @@ pub struct FrontEndSettings {
     pub encoders: [EncoderScale; 2],
     /// Force cell, N.
     pub force: LinearScale<f32>,
+    /// Torque stages, N·m.
+    pub torque: LinearScale<f32>,
+    /// Protection of their windings.
+    pub winding: WindingSettings,
     /// Directions and zeros of the parts.
     pub mounting: Mounting,
     /// Rate of the readings, Hz.
@@ -57,15 +65,28 @@ pub struct FrontEnd {
     /// Ticks for which RESET has been pressed, with ENABLE open.
     pressed_ticks: u32,
     is_active: bool,
+    /// Torques put out since the last frame.
+    torques: [TorqueCounts; 2],
+    heating_model: Option<HeatingModel>,
+    heating: Heating,
     is_fit: bool,
 }
 
 impl FrontEnd {
     /// Makes a front end that does not permit arming; without settings its frames have no readings.
     pub fn new(settings: Option<FrontEndSettings>) -> Self {
-        let gap = settings
+        let gap = settings.as_ref().and_then(|it| {
+            let scales = Scales {
+                encoders: it.encoders,
+                force: it.force,
+                torque: it.torque,
+                tick_hz: it.tick_hz,
+            };
+            Some(GapCheck::new(it.arm?, scales))
+        });
+        let heating_model = settings
             .as_ref()
-            .and_then(|it| Some(GapCheck::new(it.arm?, it.encoders, it.force, it.tick_hz)));
+            .and_then(|it| HeatingModel::new(&it.winding, &it.torque, it.tick_hz));
         Self {
             settings,
             gap,
@@ -75,8 +96,18 @@ impl FrontEnd {
             may_arm: false,
             pressed_ticks: 0,
             is_active: false,
+            torques: [TorqueCounts(0); 2],
+            heating_model,
+            heating: Heating::default(),
             is_fit: false,
         }
+    }
+
+    /// Starts afresh with these settings; the windings are as hot as they were.
+    pub fn restart(&mut self, settings: FrontEndSettings) {
+        let heating = self.heating;
+        *self = Self::new(Some(settings));
+        self.heating = heating;
     }
 
     /// Permits or forbids the drive to arm.
@@ -91,11 +122,12 @@ impl FrontEnd {
         self.is_fit
     }
 
-    /// Records whether the controller's last answer is in a state in which torque may be applied. A drive
-    /// that has stopped needs a new permission.
-    pub fn note_active(&mut self, is_active: bool) {
+    /// Records whether the controller's last answer is in a state in which torque may be applied, and the
+    /// torques that are put out, zero with the stages off. A drive that has stopped needs a new permission.
+    pub fn note_output(&mut self, is_active: bool, torques: [TorqueCounts; 2]) {
         self.may_arm &= is_active || !self.is_active;
         self.is_active = is_active;
+        self.torques = torques;
     }
 
     /// Returns the frame of one tick. Sensors whose readings are not complete are `None`. ENABLE is high
@@ -110,13 +142,18 @@ impl FrontEnd {
         let mut inputs = self.switches.tick(levels.enable, levels.reset);
         self.note_button(levels);
         let contradiction = self.contradicts(&readings);
+        if let Some(model) = &self.heating_model {
+            self.heating.tick(model, self.torques);
+        }
+        let is_hot = self.heating_model.is_some() && self.heating.is_hot();
         let plausible = self.plausibility.tick(&readings, self.bits());
         self.is_fit = readings.are_complete() && levels.stages_ready;
         if self.is_active {
             inputs.set(DigitalInputs::STAGE_NOT_READY, !levels.stages_ready);
             inputs.set(DigitalInputs::GAP_AGAINST_FORCE, contradiction);
+            inputs.set(DigitalInputs::WINDING_HOT, is_hot);
         } else {
-            let is_ready = plausible.is_ok() && levels.stages_ready && !contradiction;
+            let is_ready = plausible.is_ok() && levels.stages_ready && !contradiction && !is_hot;
             // Readings that have not been checked for long enough are no refusal yet.
             let is_refused = !is_ready && plausible != Err(Implausible::NotYet);
             let is_wanted = self.may_arm && inputs.contains(DigitalInputs::ENABLE);
@@ -211,7 +248,8 @@ impl FrontEnd {
     fn contradicts(&mut self, readings: &SensorReadings) -> bool {
         match (&mut self.gap, readings.joints, readings.forces) {
             (Some(gap), [Some(joint_1), Some(joint_2)], [_, Some(normal)]) => {
-                gap.contradicts([joint_1, joint_2], normal, self.is_active)
+                let torques = self.is_active.then_some(self.torques);
+                gap.contradicts([joint_1, joint_2], normal, torques)
             }
             _ => false,
         }

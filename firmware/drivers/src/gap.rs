@@ -1,12 +1,16 @@
-//! Checks encoders and force cell against each other: the belt is where the model says.
+//! Checks encoders, force cell and torques against each other: the belt is where the model says.
 //!
 //! A tip deep inside the belt, or a force on a tip far above it, cannot be: an encoder is frozen at a plausible
 //! angle, slips on its shaft or is zeroed wrongly, or the force cell is.
 //!
 //! Nor can a tip rest near the belt without a force on it: it falls, or the drive presses it down. Then the force
 //! cell or its line is dead and reads zero, or both encoders are frozen.
+//!
+//! Nor can a force stay the same to the count while the torques of a driven arm change: the force cell is stuck.
 
-use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, LinearScale};
+use painleve_shared::counts::{
+    EncoderCounts, EncoderScale, ForceCounts, LinearScale, TorqueCounts,
+};
 use painleve_shared::kinematics::Pose;
 use painleve_shared::{Arm, JointMotion};
 
@@ -27,6 +31,27 @@ const REST_TOLERANCE: f32 = 0.002;
 /// Time for which a tip may rest near the belt without a force, s.
 const REST_LIMIT_S: f32 = 0.2;
 
+/// Time for which a force may stay the same to the count, s. In the built-in scenarios it is 4 ms, or 39 ms with
+/// a cell without noise.
+const STUCK_LIMIT_S: f32 = 0.2;
+
+/// Change of a torque during this time, as a part of the torque stages' range, from which the force has to
+/// change.
+const STUCK_TORQUE: f32 = 0.01;
+
+/// Scalings of an arm's converters, and their rate.
+#[derive(Clone, Copy, Debug)]
+pub struct Scales {
+    /// Encoders of θ1 and of the elbow.
+    pub encoders: [EncoderScale; 2],
+    /// Force cell, N.
+    pub force: LinearScale<f32>,
+    /// Torque stages, N·m.
+    pub torque: LinearScale<f32>,
+    /// Rate of the readings, Hz.
+    pub tick_hz: f32,
+}
+
 /// Model and scalings of an arm on its belt.
 #[derive(Clone, Debug)]
 pub struct GapCheck {
@@ -40,34 +65,66 @@ pub struct GapCheck {
     /// Ticks for which it has, and its height over the belt at the first of them, m.
     rest_ticks: u32,
     rest_gap_m: f32,
+    /// Ticks for which a force may stay the same.
+    stuck_limit_ticks: u32,
+    /// Change of a torque, counts, from which a force has to change.
+    stuck_torque: i32,
+    unchanged: UnchangedForce,
 }
 
-impl GapCheck {
-    /// Makes a check of this arm, for `tick_hz` readings a second.
-    pub fn new(
-        arm: Arm<f32>,
-        encoders: [EncoderScale; 2],
-        force: LinearScale<f32>,
-        tick_hz: f32,
-    ) -> Self {
+/// A force that has not changed.
+#[derive(Clone, Copy, Debug, Default)]
+struct UnchangedForce {
+    force: ForceCounts,
+    /// Ticks since it changed.
+    ticks: u32,
+    /// Smallest and largest torques meanwhile.
+    lowest: [TorqueCounts; 2],
+    highest: [TorqueCounts; 2],
+}
+
+impl UnchangedForce {
+    fn new(force: ForceCounts, torques: [TorqueCounts; 2]) -> Self {
         Self {
-            arm,
-            encoders,
-            rad_per_count: encoders.map(|scale| scale.rad_per_count()),
             force,
-            rest_limit_ticks: (REST_LIMIT_S * tick_hz) as u32,
-            rest_ticks: 0,
-            rest_gap_m: 0.0,
+            ticks: 0,
+            lowest: torques,
+            highest: torques,
         }
     }
 
-    /// Returns whether the readings of this tick contradict each other, or those before. A tip may rest without a
-    /// force while the drive is not active: somebody may hold the arm.
+    /// Returns the largest change of a torque, counts.
+    fn torque_change(&self) -> i32 {
+        let [low_1, low_2] = self.lowest;
+        let [high_1, high_2] = self.highest;
+        (high_1.0 - low_1.0).max(high_2.0 - low_2.0)
+    }
+}
+
+impl GapCheck {
+    /// Makes a check of this arm.
+    pub fn new(arm: Arm<f32>, scales: Scales) -> Self {
+        Self {
+            arm,
+            encoders: scales.encoders,
+            rad_per_count: scales.encoders.map(|scale| scale.rad_per_count()),
+            force: scales.force,
+            rest_limit_ticks: (REST_LIMIT_S * scales.tick_hz) as u32,
+            rest_ticks: 0,
+            rest_gap_m: 0.0,
+            stuck_limit_ticks: (STUCK_LIMIT_S * scales.tick_hz) as u32,
+            stuck_torque: (STUCK_TORQUE * scales.torque.maximum_counts() as f32) as i32,
+            unchanged: UnchangedForce::default(),
+        }
+    }
+
+    /// Returns whether the readings of this tick contradict each other, or those before, or the torques; `None`
+    /// while the drive is not active: a tip may rest without a force then, because somebody may hold the arm.
     pub fn contradicts(
         &mut self,
         joints: [EncoderCounts; 2],
         normal_force: ForceCounts,
-        is_active: bool,
+        torques: Option<[TorqueCounts; 2]>,
     ) -> bool {
         let [scale_1, scale_2] = &self.encoders;
         let [rad_1, rad_2] = self.rad_per_count;
@@ -80,7 +137,7 @@ impl GapCheck {
         let tolerance_m = HEIGHT_TOLERANCE * self.arm.height_m();
         let force_n = self.force.value(normal_force.0);
         let touches = force_n > FORCE_TOLERANCE * self.force.range;
-        let rests = is_active
+        let rests = torques.is_some()
             && force_n < NO_FORCE * self.force.range
             && gap_m < tolerance_m
             && (gap_m - self.rest_gap_m).abs() < REST_TOLERANCE * self.arm.height_m();
@@ -91,7 +148,28 @@ impl GapCheck {
             0
         };
         let is_dead = self.rest_ticks > self.rest_limit_ticks;
-        gap_m < -tolerance_m || touches && gap_m > tolerance_m || is_dead
+        let is_stuck = self.is_stuck(normal_force, torques.filter(|_| touches));
+        gap_m < -tolerance_m || touches && gap_m > tolerance_m || is_dead || is_stuck
+    }
+
+    /// Returns whether the force has stayed the same for too long under changing torques of a drive that presses.
+    fn is_stuck(&mut self, force: ForceCounts, torques: Option<[TorqueCounts; 2]>) -> bool {
+        let unchanged = &mut self.unchanged;
+        match torques {
+            Some(torques) if force == unchanged.force => {
+                for (joint, torque) in torques.into_iter().enumerate() {
+                    unchanged.lowest[joint] = unchanged.lowest[joint].min(torque);
+                    unchanged.highest[joint] = unchanged.highest[joint].max(torque);
+                }
+                unchanged.ticks = unchanged.ticks.saturating_add(1);
+                unchanged.ticks > self.stuck_limit_ticks
+                    && unchanged.torque_change() > self.stuck_torque
+            }
+            _ => {
+                *unchanged = UnchangedForce::new(force, torques.unwrap_or_default());
+                false
+            }
+        }
     }
 }
 
@@ -100,39 +178,74 @@ mod tests {
     use super::*;
     use painleve_shared::ArmParameters;
 
-    fn contradicts(degrees: [f64; 2], force_n: f32) -> bool {
-        let scale = EncoderScale::default();
-        let force = LinearScale {
-            bits: 13,
-            range: 20.0,
-        };
+    const FORCE: LinearScale<f32> = LinearScale {
+        bits: 12,
+        range: 20.0,
+    };
+    const TORQUE: LinearScale<f32> = LinearScale {
+        bits: 12,
+        range: 5.0,
+    };
+
+    fn check() -> GapCheck {
         let arm = Arm::new(ArmParameters::default()).expect("the paper's arm");
-        let mut check = GapCheck::new(arm, [scale; 2], force, 1000.0);
+        let scales = Scales {
+            encoders: [EncoderScale::default(); 2],
+            force: FORCE,
+            torque: TORQUE,
+            tick_hz: 1000.0,
+        };
+        GapCheck::new(arm, scales)
+    }
+
+    fn joints(degrees: [f64; 2]) -> [EncoderCounts; 2] {
+        let scale = EncoderScale::default();
         let [theta_1, theta_2] = degrees.map(f64::to_radians);
-        let joints = [scale.reading(theta_1), scale.reading(theta_2 - theta_1)];
-        check.contradicts(joints, ForceCounts(force.counts(force_n).0), true)
+        [scale.reading(theta_1), scale.reading(theta_2 - theta_1)]
+    }
+
+    fn counts(force_n: f32) -> ForceCounts {
+        ForceCounts(FORCE.counts(force_n).0)
+    }
+
+    fn torques(counts: i32) -> Option<[TorqueCounts; 2]> {
+        Some([TorqueCounts(counts), TorqueCounts(7)])
+    }
+
+    fn contradicts(degrees: [f64; 2], force_n: f32) -> bool {
+        check().contradicts(joints(degrees), counts(force_n), torques(0))
     }
 
     /// Returns the tick, of 1 kHz, at which a tip that rests on the belt for a second is found implausible.
-    fn found_at(force_n: f32, is_active: bool) -> Option<u32> {
-        let scale = EncoderScale::default();
-        let force = LinearScale {
-            bits: 13,
-            range: 20.0,
-        };
-        let arm = Arm::new(ArmParameters::default()).expect("the paper's arm");
-        let mut check = GapCheck::new(arm, [scale; 2], force, 1000.0);
-        let [theta_1, theta_2] = ON_BELT.map(f64::to_radians);
-        let joints = [scale.reading(theta_1), scale.reading(theta_2 - theta_1)];
-        let counts = ForceCounts(force.counts(force_n).0);
-        (0..1000).find(|_| check.contradicts(joints, counts, is_active))
+    fn found_at(force_n: f32, torques: Option<[TorqueCounts; 2]>) -> Option<u32> {
+        let mut check = check();
+        (0..1000).find(|_| check.contradicts(joints(ON_BELT), counts(force_n), torques))
+    }
+
+    /// Returns the same for a force, counts, and a torque, counts, of each tick.
+    fn stuck_at(force: impl Fn(i32) -> i32, torque: impl Fn(i32) -> i32) -> Option<i32> {
+        let mut check = check();
+        (0..1000).find(|tick| {
+            let force = ForceCounts(force(*tick));
+            check.contradicts(joints(ON_BELT), force, torques(torque(*tick)))
+        })
+    }
+
+    #[test]
+    fn a_force_that_stays_the_same_while_torques_change_is_not_plausible() {
+        let swing = |tick: i32| 2 * (tick % 20);
+        assert_eq!(stuck_at(|_| 1000, swing), Some(201));
+        // The torques change by less, the force changes by a count now and then, or the tip is in the air.
+        assert_eq!(stuck_at(|_| 1000, |tick| tick % 20), None);
+        assert_eq!(stuck_at(|tick| 1000 + tick / 200 % 2, swing), None);
+        assert_eq!(stuck_at(|_| 60, swing), None);
     }
 
     #[test]
     fn a_driven_tip_that_rests_on_the_belt_without_a_force_is_not_plausible() {
-        assert_eq!(found_at(0.0, true), Some(200));
-        assert_eq!(found_at(0.0, false), None);
-        assert_eq!(found_at(0.5, true), None);
+        assert_eq!(found_at(0.0, torques(0)), Some(200));
+        assert_eq!(found_at(0.0, None), None);
+        assert_eq!(found_at(0.5, torques(0)), None);
     }
 
     /// x0,d of the paper: the tip is on the belt.

@@ -6,7 +6,8 @@
 //! - [`force_cell`]: an MCP3304 converter behind the force cell's bridge amplifiers
 //! - [`switches`]: ENABLE and RESET, debounced
 //! - [`front_end`]: sensor frames from readings and switches, and the permission to arm
-//! - [`gap`]: checks encoders and force cell against each other
+//! - [`gap`]: checks encoders, force cell and torques against each other
+//! - [`heating`]: estimates the temperature of the torque stages' windings
 //! - [`plausibility`]: checks that readings can come from an arm before the drive is armed
 //! - [`slots`]: keeps a configuration in flash over a loss of power
 //!
@@ -24,6 +25,7 @@ pub mod exchange;
 pub mod force_cell;
 pub mod front_end;
 pub mod gap;
+pub mod heating;
 pub mod plausibility;
 pub mod slots;
 pub mod switches;

@@ -143,13 +143,19 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
         let is_active = answer
             .supervisor_state()
             .is_some_and(SupervisorState::drives);
-        self.front_end.note_active(is_active);
         let is_driven = matches!(
             self.source,
             FrameSource::Sensors | FrameSource::Commissioning | FrameSource::StandAlone
         );
-        if is_active && is_driven && self.front_end.is_fit() {
-            let [torque_1, torque_2] = answer.torques;
+        let is_on = is_active && is_driven && self.front_end.is_fit();
+        let torques = if is_on {
+            answer.torques
+        } else {
+            [TorqueCounts(0); 2]
+        };
+        self.front_end.note_output(is_active, torques);
+        if is_on {
+            let [torque_1, torque_2] = torques;
             let [reversed_1, reversed_2] = self.stage_reversed;
             let codes = [
                 self.code(torque_1, reversed_1),
@@ -176,15 +182,17 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
         // The switch has to be opened and closed again, and the sensors are checked anew.
         let is_mounted = source != FrameSource::Commissioning;
         let arm = Arm::new(configuration.arm).ok().filter(|_| is_mounted);
-        self.front_end = FrontEnd::new(Some(FrontEndSettings {
+        self.front_end.restart(FrontEndSettings {
             encoders: converters.encoders,
             force: converters.force,
+            torque: converters.torque,
+            winding: converters.winding,
             mounting: converters.mounting,
             tick_hz: configuration.tick_hz,
             arm,
             button_ticks: (source == FrameSource::StandAlone)
                 .then_some((BUTTON_S * configuration.tick_hz) as u32),
-        }));
+        });
         self.encoders.restart();
         self.force_cell.restart();
         self.pins.start_timer(configuration.tick_hz);

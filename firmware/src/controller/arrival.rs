@@ -13,7 +13,8 @@ const UNREAD_TICKS_LIMIT: u32 = 1 << 16;
 /// Faults that a board detects by itself.
 const BOARD_FAULTS: DigitalInputs = DigitalInputs::ARMING_REFUSED
     .union(DigitalInputs::STAGE_NOT_READY)
-    .union(DigitalInputs::GAP_AGAINST_FORCE);
+    .union(DigitalInputs::GAP_AGAINST_FORCE)
+    .union(DigitalInputs::WINDING_HOT);
 
 /// Result of the checks of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,21 +132,19 @@ fn irregular(
 ) -> Arrival {
     // More than half the counter's range ahead means behind.
     let stale = ahead == 0 || ahead > u32::MAX / 2;
-    let [refused, not_ready, against_force] = [
+    let of_board = [
         (DigitalInputs::ARMING_REFUSED, Lapse::ArmingRefused),
         (DigitalInputs::STAGE_NOT_READY, Lapse::StageNotReady),
         (DigitalInputs::GAP_AGAINST_FORCE, Lapse::GapAgainstForce),
-    ]
-    .map(|(bit, lapse)| (lapse, u32::from(board_faults.contains(bit))));
+        (DigitalInputs::WINDING_HOT, Lapse::WindingHot),
+    ];
+    lapses.note_all(of_board.map(|(bit, lapse)| (lapse, u32::from(board_faults.contains(bit)))));
     if stale {
-        lapses.note_all([refused, not_ready, against_force, (Lapse::StaleFrame, 1)]);
+        lapses.note_all([(Lapse::StaleFrame, 1)]);
         return Arrival::Stale;
     }
     state.last_sequence = Some(sequence);
     lapses.note_all([
-        refused,
-        not_ready,
-        against_force,
         (Lapse::StaleFrame, 0),
         (Lapse::LostFrame, ahead - 1),
         (Lapse::EncoderOutOfRange, u32::from(!encoders)),

@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use painleve_drivers::gap::GapCheck;
+use painleve_drivers::gap::{GapCheck, Scales};
+use painleve_drivers::heating::{Heating, HeatingModel};
 use painleve_firmware::Controller;
 use painleve_flash_image::bench::{Bench, scenario};
 use painleve_flash_image::board::{BoardChip, F405, G474};
@@ -16,10 +17,12 @@ use painleve_shared::status::{Fault, SupervisorState};
 /// Ticks within which the torque is off: the check's 0.2 s, after the tip has come to rest.
 const LIMIT_TICKS: u32 = 400;
 
-fn takes_the_torque_off<C: BoardChip>() {
+/// The reading at which the force cell is stuck: that without a force, or the present one.
+fn takes_the_torque_off<C: BoardChip>(is_zero: bool) {
     let mut bench = Bench::<C>::new(&scenario("hybrid-elbow-down"));
     bench.drive();
-    bench.force_is_stuck_at = Some(0);
+    let present = bench.frame.normal_force.0;
+    bench.force_is_stuck_at = Some(if is_zero { 0 } else { present });
     let mut ticks = 0;
     while !bench.board.torque().is_off() {
         bench.tick();
@@ -42,15 +45,23 @@ fn takes_the_torque_off<C: BoardChip>() {
 
 #[test]
 fn a_force_cell_that_is_stuck_at_zero_takes_the_torque_off() {
-    takes_the_torque_off::<F405>();
-    takes_the_torque_off::<G474>();
+    takes_the_torque_off::<F405>(true);
+    takes_the_torque_off::<G474>(true);
 }
 
-/// No healthy run looks like that: not in flight, at the edge, nor during capture.
+#[test]
+fn a_force_cell_that_is_stuck_in_contact_takes_the_torque_off() {
+    takes_the_torque_off::<F405>(false);
+    takes_the_torque_off::<G474>(false);
+}
+
+/// No healthy run looks like that: not in flight, at the edge, nor during capture, with or without noise. No
+/// winding becomes hot.
 #[test]
 fn healthy_readings_of_every_scenario_are_plausible() {
-    for name in built_in::names() {
-        let scenario = scenario(name);
+    for (name, noise_n) in built_in::names().flat_map(|it| [(it, 0.02), (it, 0.0)]) {
+        let mut scenario = scenario(name);
+        scenario.converters.force.noise_n = noise_n;
         let configuration = scenario.controller_configuration();
         let mut controller = Controller::new(&configuration).unwrap();
         let mut simulation = Simulation::new(&scenario).unwrap();
@@ -58,15 +69,26 @@ fn healthy_readings_of_every_scenario_are_plausible() {
         let converters = &configuration.converters;
         let arm = Arm::new(configuration.arm).unwrap();
         let tick_hz = configuration.tick_hz;
-        let mut check = GapCheck::new(arm, converters.encoders, converters.force, tick_hz);
-        let mut is_active = false;
+        let scales = Scales {
+            encoders: converters.encoders,
+            force: converters.force,
+            torque: converters.torque,
+            tick_hz,
+        };
+        let mut check = GapCheck::new(arm, scales);
+        let model = HeatingModel::new(&converters.winding, &converters.torque, tick_hz).unwrap();
+        let mut heating = Heating::default();
+        let mut torques = None;
         for tick in 0..(scenario.run.duration_s * f64::from(tick_hz)) as u32 {
             let frame = simulation.sample(&mut statistics).unwrap();
-            let contradicts = check.contradicts(frame.joints, frame.normal_force, is_active);
+            let contradicts = check.contradicts(frame.joints, frame.normal_force, torques);
             assert!(!contradicts, "{name}, tick {tick}");
+            heating.tick(&model, torques.unwrap_or_default());
+            assert!(!heating.is_hot(), "{name}, tick {tick}");
             let answer = controller.tick(&frame);
             let state = answer.supervisor_state();
-            is_active = state.is_some_and(SupervisorState::drives);
+            let is_active = state.is_some_and(SupervisorState::drives);
+            torques = is_active.then_some(answer.torques);
             simulation.advance(Some(&answer), &mut statistics).unwrap();
         }
     }

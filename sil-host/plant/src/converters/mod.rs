@@ -22,6 +22,7 @@ use painleve_firmware::configuration::Converters;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, LinearScale};
 use painleve_shared::mounting::Mounting;
 use painleve_shared::settings;
+use painleve_shared::winding::WindingSettings;
 
 use encoder::EncoderSettings;
 use fault::ChannelFaults;
@@ -45,6 +46,8 @@ settings! {
         faults: ChannelFaults = ChannelFaults::default();
         /// Directions and zeros of the parts of a real arm; the simulated arm has none of them.
         mounting: Mounting = Mounting::default();
+        /// Protection of a real arm's windings; the simulated stages stay cold.
+        winding: WindingSettings = WindingSettings::default();
     }
 }
 
@@ -62,6 +65,7 @@ impl ConverterSettings {
                 range: self.torque.range_nm as f32,
             },
             mounting: self.mounting,
+            winding: self.winding,
         }
     }
 }

@@ -20,6 +20,7 @@ crate::on_each_board! {
     a_force_cell_that_dies_takes_the_torque_off,
     an_encoder_that_freezes_takes_the_torque_off,
     a_torque_stage_that_is_not_ready_takes_the_torque_off,
+    a_winding_that_becomes_too_hot_takes_the_torque_off,
     arming_on_implausible_readings_is_refused_with_a_fault,
     parts_mounted_backwards_drive_the_same_arm,
     the_image_respects_the_limits_of_the_data_sheets,
@@ -99,6 +100,35 @@ fn a_torque_stage_that_is_not_ready_takes_the_torque_off<C: BoardChip>() {
     assert_eq!(latched_fault(&mut bench), Some(Fault::StageNotReady));
     bench.drive_pin(STAGES_READY, Some(true));
     bench.assert_stays_off(100);
+}
+
+/// A continuous torque far below what the arm needs; then the drive does not arm until the winding has cooled.
+fn a_winding_that_becomes_too_hot_takes_the_torque_off<C: BoardChip>() {
+    let mut scenario = scenario(DEFAULT);
+    scenario.converters.winding.continuous_torque_nm = Some([0.3; 2]);
+    scenario.converters.winding.time_constant_s = [1.0; 2];
+    let mut bench = Bench::<C>::new(&scenario);
+    bench.drive();
+    let mut ticks = 0;
+    while !bench.board.torque().is_off() {
+        bench.tick();
+        ticks += 1;
+        assert!(ticks < 2000);
+    }
+    let fault = latched_fault(&mut bench);
+    println!("{fault:?} after {ticks} ticks");
+    assert_eq!(fault, Some(Fault::WindingTooHot));
+    // A new configuration does not cool it.
+    let response = bench
+        .board
+        .configure(FrameSource::Sensors, &encoded(&scenario));
+    assert!(matches!(response, Some(Response::Ready { .. })));
+    assert!(bench.board.permit_arming());
+    bench.board.enable(false);
+    bench.assert_stays_off(10);
+    bench.board.enable(true);
+    bench.assert_stays_off(90);
+    assert_eq!(latched_fault(&mut bench), Some(Fault::ArmingRefused));
 }
 
 /// An encoder that is zeroed 30° wrongly, a torque stage that is not ready.
