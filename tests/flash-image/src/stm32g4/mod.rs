@@ -1,19 +1,21 @@
 //! The STM32G474's peripherals that the image uses (RM0440). An access to any other address ends the test.
 
 mod dma;
+mod flash;
 mod rcc;
 mod spi;
 
 use self::dma::{Dma, Request};
+use self::flash::{Flash, SLOTS};
 use self::rcc::{Rcc, bus};
 use self::spi::Spi;
+use crate::Picoseconds;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Crystal, Dac, FlashSlots, Gpio, GpioReset, Outside, Pin, PinMode, Power, Timer, Usart,
     UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band, store_port,
 };
 use crate::unicorn::Processor;
-use crate::{MICROSECOND, Picoseconds};
 
 /// Interrupt numbers.
 const PVD: usize = 1;
@@ -38,18 +40,6 @@ const WITHOUT_BOOST_HZ: u64 = 150_000_000;
 
 /// Highest clock per wait state of the flash, in boost mode, Hz.
 const PER_WAIT_STATE_HZ: u64 = 34_000_000;
-
-/// Bits of the flash's control register.
-const LOCK: u32 = 1 << 31;
-const OPTION_LOCK: u32 = 1 << 30;
-const START: u32 = 1 << 16;
-const SECOND_BANK: u32 = 1 << 11;
-const PAGE_ERASE: u32 = 2;
-const PROGRAM: u32 = 1;
-
-/// First page of the slots in the second bank, and its length.
-const FIRST_PAGE: u32 = 126;
-const PAGE: usize = 2 << 10;
 
 /// After a reset all pins are analogue, except the debugger's.
 fn gpio_reset(port: usize) -> GpioReset {
@@ -79,25 +69,12 @@ pub struct Stm32g4<O> {
     power: [u32; 33],
     /// Supply voltage, mV.
     supply_mv: u32,
-    flash_control: [u32; 16],
-    /// Number of keys that have opened the flash's control register and the option bytes.
-    keys: [usize; 2],
-    slots: FlashSlots,
-    /// The first half of a double word that is written.
-    half: Option<(u32, u32)>,
-    /// Whether a word that cannot be corrected has been read, and its interrupt is pending.
-    is_uncorrectable: bool,
-    has_memory_nmi: bool,
+    flash: Flash,
     external_interrupts: [u32; 16],
     reset: Option<Reset>,
 }
 
 impl<O: Outside> Stm32g4<O> {
-    /// Returns the level of the brown-out reset.
-    fn brown_out_level(&self) -> usize {
-        (self.flash_control[8] >> 8 & 7) as usize
-    }
-
     /// Returns the state of the supply supervisor.
     fn supply_is_low(&self) -> bool {
         let thresholds = [2000, 2200, 2400, 2500, 2600, 2800, 2900, 0];
@@ -144,9 +121,7 @@ impl<O: Outside> Stm32g4<O> {
             0x4002_0000 => self.dma.read(offset),
             0x4002_0800 => self.dma.read_multiplexer(offset),
             0x4002_1000 => self.rcc.read(offset, now),
-            0x4002_2000 if offset == 0x10 => u32::from(self.slots.is_busy(now)) << 16,
-            0x4002_2000 if offset == 0x18 => u32::from(self.is_uncorrectable) << 31,
-            0x4002_2000 => self.flash_control[((offset / 4) & 15) as usize],
+            0x4002_2000 => self.flash.read(offset, now),
             0x5000_0800 => self.dac.read(offset),
             _ => self.ports[(address >> 10 & 7) as usize].read(offset),
         }
@@ -175,7 +150,10 @@ impl<O: Outside> Stm32g4<O> {
                 self.rcc.write(offset, value, now);
                 self.check_clock(before);
             }
-            0x4002_2000 => self.store_flash(offset, value, now),
+            0x4002_2000 => {
+                let power = self.flash.write(offset, value, now);
+                self.note_power(power);
+            }
             0x5000_0800 => self.dac.write(offset, value),
             _ => {
                 let port = (address >> 10 & 7) as usize;
@@ -193,7 +171,7 @@ impl<O: Outside> Stm32g4<O> {
             system_hz <= WITHOUT_BOOST_HZ || self.power[32] & BOOST_OFF == 0,
             "{system_hz} Hz without the regulator's boost mode"
         );
-        let wait_states = u64::from(self.flash_control[0] & 15);
+        let wait_states = self.flash.wait_states();
         assert!(
             core_hz <= (wait_states + 1) * PER_WAIT_STATE_HZ,
             "{core_hz} Hz with {wait_states} wait states"
@@ -203,35 +181,6 @@ impl<O: Outside> Stm32g4<O> {
             "the bus clock has to be halved for the change to {system_hz} Hz"
         );
     }
-
-    /// Handles the keys that unlock the option bytes, which hold the brown-out level.
-    fn store_flash(&mut self, offset: u32, value: u32, now: Picoseconds) {
-        match (offset, value, self.keys) {
-            (0x08, 0x4567_0123, _) => self.keys[0] = 1,
-            (0x08, 0xcdef_89ab, [1, _]) => self.flash_control[5] &= !LOCK,
-            (0x0c, 0x0819_2a3b, _) if self.flash_control[5] & LOCK == 0 => self.keys[1] = 1,
-            (0x0c, 0x4c5d_6e7f, [_, 1]) => self.flash_control[5] &= !OPTION_LOCK,
-            (0x20, ..) if self.flash_control[5] & OPTION_LOCK == 0 => {
-                self.flash_control[8] = value;
-            }
-            (0x00, ..) => self.flash_control[0] = value,
-            (0x14, ..) if self.flash_control[5] & LOCK == 0 => {
-                assert!(!self.slots.is_busy(now), "the flash is busy");
-                self.flash_control[5] = value & !START;
-                if value & LOCK != 0 {
-                    self.keys[0] = 0;
-                }
-                if value & START != 0 && value & PAGE_ERASE != 0 {
-                    assert!(value & SECOND_BANK != 0, "the program's bank");
-                    let slot = ((value >> 3 & 0x7f) - FIRST_PAGE) as usize;
-                    let power = self.slots.erase(slot * PAGE, PAGE, now);
-                    self.note_power(power);
-                }
-            }
-            (0x18, ..) if value & 1 << 31 != 0 => self.is_uncorrectable = false,
-            _ => {}
-        }
-    }
 }
 
 impl<O> Stm32g4<O> {
@@ -240,39 +189,11 @@ impl<O> Stm32g4<O> {
             self.reset = Some(Reset::Power);
         }
     }
-
-    fn load_slot(&mut self, offset: u32, now: Picoseconds) -> u32 {
-        assert!(!self.slots.is_busy(now), "the bank is busy");
-        if self.slots.is_uncorrectable(offset) && !self.is_uncorrectable {
-            self.is_uncorrectable = true;
-            self.has_memory_nmi = true;
-        }
-        self.slots.word(offset)
-    }
-
-    /// Two stores of a word write a double word, which must be erased.
-    fn store_slot(&mut self, offset: u32, word: u32, size: u32, now: Picoseconds) {
-        assert!(!self.slots.is_busy(now), "the bank is busy");
-        assert_eq!(size, 4, "the width of a store");
-        assert_eq!(self.flash_control[5] & (LOCK | PROGRAM), PROGRAM);
-        let Some((first, low)) = self.half.take() else {
-            assert_eq!(offset % 8, 0);
-            self.half = Some((offset, word));
-            return;
-        };
-        assert_eq!(offset, first + 4);
-        let is_erased = [first, offset].map(|it| self.slots.word(it)) == [u32::MAX; 2];
-        assert!(is_erased, "a double word is written twice");
-        let unit = (u64::from(word) << 32 | u64::from(low)).to_le_bytes();
-        let until = now + 82 * MICROSECOND;
-        let power = self.slots.program(first as usize, &unit, until);
-        self.note_power(power);
-    }
 }
 
 impl<O: Outside> Chip for Stm32g4<O> {
     const FLASH: (u32, usize) = (0x0800_0000, 512 << 10);
-    const SLOTS: (u32, usize) = (0x0807_f000, 2 * PAGE);
+    const SLOTS: (u32, usize) = (0x0807_f000, SLOTS);
     const RAM: (u32, usize) = (0x2000_0000, 96 << 10);
     const ALIASED_RAM: usize = 0;
 
@@ -295,13 +216,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         // The regulator's range 1 without boost.
         self.power[0] = 0x200;
         self.power[32] = 0x100;
-        self.flash_control[0] = 0x600;
-        self.flash_control[5] = 0xc000_0000;
-        self.keys = [0; 2];
-        self.slots.reset();
-        self.half = None;
-        self.is_uncorrectable = false;
-        self.has_memory_nmi = false;
+        self.flash.reset();
         self.external_interrupts = [0; 16];
         self.reset = None;
     }
@@ -311,7 +226,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
             return self.load(word, 4, now) >> bit & 1;
         }
         let word = match address.checked_sub(Self::SLOTS.0) {
-            Some(offset) if offset < Self::SLOTS.1 as u32 => self.load_slot(offset, now),
+            Some(offset) if offset < Self::SLOTS.1 as u32 => self.flash.load(offset, now),
             _ => self.load(address & !3, size, now),
         };
         let value = word >> (8 * (address & 3));
@@ -326,7 +241,8 @@ impl<O: Outside> Chip for Stm32g4<O> {
         if let Some(offset) = address.checked_sub(Self::SLOTS.0)
             && offset < Self::SLOTS.1 as u32
         {
-            return self.store_slot(offset, value, size, now);
+            let power = self.flash.store(offset, value, size, now);
+            return self.note_power(power);
         }
         assert!(bit_band(address).is_none(), "store to {address:#010x}");
         assert!(address & 3 == 0 || size == 4, "store to {address:#010x}");
@@ -388,7 +304,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
     }
 
     fn take_nmi(&mut self) -> bool {
-        std::mem::take(&mut self.has_memory_nmi) || self.rcc.nmi
+        self.flash.take_nmi() || self.rcc.nmi
     }
 
     fn wants_reset(&self) -> bool {
@@ -410,8 +326,6 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
     const OSCILLATOR_HZ: [u64; 3] = [29_500, 32_000, 34_000];
 
     fn without_power(outside: O, oscillator_hz: u64) -> Self {
-        let mut flash_control = [0; 16];
-        flash_control[8] = 0xffef_f8aa;
         Self {
             outside,
             rcc: Rcc::new(),
@@ -425,12 +339,7 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
             dma: Dma::default(),
             power: [0; 33],
             supply_mv: 3300,
-            flash_control,
-            keys: [0; 2],
-            slots: FlashSlots::new(Self::SLOTS.1),
-            half: None,
-            is_uncorrectable: false,
-            has_memory_nmi: false,
+            flash: Flash::new(),
             external_interrupts: [0; 16],
             reset: None,
         }
@@ -462,7 +371,7 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
 
     fn set_supply(&mut self, millivolts: u32) {
         self.supply_mv = millivolts;
-        let threshold = [1700, 2000, 2200, 2500, 2800][self.brown_out_level().min(4)];
+        let threshold = [1700, 2000, 2200, 2500, 2800][self.flash.brown_out_level().min(4)];
         if millivolts < threshold {
             self.reset = Some(Reset::BrownOut);
         }
@@ -476,7 +385,7 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
     }
 
     fn slots_mut(&mut self) -> &mut FlashSlots {
-        &mut self.slots
+        &mut self.flash.slots
     }
 
     fn set_crystal(&mut self, failure: Crystal) {

@@ -150,10 +150,10 @@ fn a_request_to_stop_takes_the_torque_off<C: BoardChip>() {
     bench.assert_stays_off(100);
 }
 
-fn nothing_arms_without_the_hosts_permission<C: BoardChip>() {
-    let mut board = EmulatedBoard::<C>::booted();
-    let response = board.configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
-    assert!(matches!(response, Some(Response::Ready { .. })));
+/// Runs 300 ms on an arm at rest, with a host; the switch is closed after 100 ms. Checks that the torque stays
+/// off, and returns whether the controller was armed.
+fn was_armed_with_the_stages_off<C: BoardChip>(board: &mut EmulatedBoard<C>) -> bool {
+    let mut was_armed = false;
     for n in 0..300 {
         if n % 50 == 0 {
             board.send(&Request::Alive);
@@ -161,7 +161,21 @@ fn nothing_arms_without_the_hosts_permission<C: BoardChip>() {
         board.enable(n > 100);
         board.machine.run_for(MILLISECOND);
         assert!(board.torque().is_off());
+        while let Some(response) = board.response(0) {
+            if let Response::Tick { answer, .. } = response {
+                was_armed |= answer.supervisor_state() == Some(SupervisorState::Armed);
+            }
+        }
     }
+    was_armed
+}
+
+fn nothing_arms_without_the_hosts_permission<C: BoardChip>() {
+    let Bench::<C> { mut board, .. } =
+        Bench::<C>::without_configuration(&scenario(DEFAULT), EmulatedBoard::<C>::booted());
+    let response = board.configure(FrameSource::Sensors, &encoded(&scenario(DEFAULT)));
+    assert!(matches!(response, Some(Response::Ready { .. })));
+    assert!(!was_armed_with_the_stages_off(&mut board));
 }
 
 /// A drive that has stopped needs a new permission: closing the switch again is not enough.
@@ -180,21 +194,7 @@ fn a_dry_run_controls_with_the_stages_off<C: BoardChip>() {
     let response = board.configure(FrameSource::DryRun, &encoded(&scenario(DEFAULT)));
     assert!(matches!(response, Some(Response::Ready { .. })));
     assert!(board.permit_arming());
-    let mut was_armed = false;
-    for n in 0..300 {
-        if n % 50 == 0 {
-            board.send(&Request::Alive);
-        }
-        board.enable(n > 100);
-        board.machine.run_for(MILLISECOND);
-        assert!(board.torque().is_off());
-        while let Some(response) = board.response(0) {
-            if let Response::Tick { answer, .. } = response {
-                was_armed |= answer.supervisor_state() == Some(SupervisorState::Armed);
-            }
-        }
-    }
-    assert!(was_armed);
+    assert!(was_armed_with_the_stages_off(&mut board));
 }
 
 fn a_configuration_of_another_build_is_refused<C: BoardChip>() {

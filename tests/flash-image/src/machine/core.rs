@@ -1,0 +1,152 @@
+//! The state of a machine around its processor, which decides before each instruction whether it is executed.
+
+use std::sync::Arc;
+
+use super::trace::Trace;
+use super::{CYCLES_PER_INSTRUCTION, Chip};
+use crate::Picoseconds;
+use crate::system_control::{Exception, SystemControl};
+use crate::unicorn::{Processor, Register, Surroundings};
+
+/// Why [`Core::before_instruction`] stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stop {
+    Exception(Exception),
+    Limit,
+    Sleep,
+    Look,
+}
+
+/// The state of the machine except registers and memory.
+#[derive(Clone)]
+pub(super) struct Core<C> {
+    pub(super) chip: C,
+    pub(super) system: SystemControl,
+    pub(super) flash: Arc<[u8]>,
+    /// The program that the image copies to the RAM at address 0.
+    pub(super) program: Arc<[u8]>,
+    pub(super) now: Picoseconds,
+    pub(super) cycles: u64,
+    pub(super) instructions: u64,
+    pub(super) instruction_ps: Picoseconds,
+    pub(super) next_event: Picoseconds,
+    pub(super) limit: Picoseconds,
+    pub(super) instruction_limit: u64,
+    /// Remaining instructions of a conditional block, which is not interrupted because Unicorn does
+    /// not keep the block's state.
+    pub(super) conditional: u32,
+    pub(super) stop: Option<Stop>,
+    /// Addresses of the instructions of a traced handler, starting with its first.
+    pub(super) trace: Option<Trace>,
+    /// Whether the next exception may have changed.
+    pub(super) is_dirty: bool,
+    pub(super) candidate: bool,
+}
+
+impl<C: Chip> Core<C> {
+    pub(super) fn refresh(&mut self) {
+        self.system.set_lines(self.chip.interrupt_lines());
+        self.system.nmi_pending |= self.chip.take_nmi();
+        self.candidate = self.system.wakes();
+        let hz = self.chip.core_hz();
+        let cycles = crate::SECOND * CYCLES_PER_INSTRUCTION;
+        self.instruction_ps = cycles.checked_div(hz).unwrap_or(0);
+        self.next_event = self.chip.next_event();
+        self.is_dirty = false;
+    }
+
+    pub(super) fn advance(&mut self, memory: &Processor) {
+        self.chip.advance(self.now, memory);
+        self.refresh();
+    }
+
+    fn exception(&self, processor: &Processor) -> Option<Exception> {
+        self.system.next(
+            processor.get(Register::PRIMASK) & 1 != 0,
+            processor.get(Register::BASEPRI) as u8,
+            processor.get(Register::FAULTMASK) & 1 != 0,
+        )
+    }
+
+    fn opcode(&self, address: u32) -> u16 {
+        let at = address as usize;
+        let bytes = if at < C::ALIASED_RAM {
+            self.program.get(at..at + 2)
+        } else {
+            let at = address.wrapping_sub(C::FLASH.0) as usize;
+            self.flash.get(at..at + 2)
+        };
+        bytes.map_or(0, |it| u16::from_le_bytes([it[0], it[1]]))
+    }
+}
+
+impl<C: Chip> Surroundings for Core<C> {
+    fn before_instruction(&mut self, address: u32, processor: &Processor) -> bool {
+        if self.is_dirty {
+            self.refresh();
+        }
+        assert!(
+            address as usize >= C::ALIASED_RAM || self.chip.ram_is_at_zero(),
+            "{address:#010x} is executed before the RAM is mapped to it"
+        );
+        assert!(
+            address < C::FLASH.0 || address >= C::RAM.0 || !self.chip.flash_is_stalled(self.now),
+            "{address:#010x} is executed while the flash is busy"
+        );
+        let mut stop = None;
+        if self.conditional == 0 {
+            if self.candidate {
+                stop = self.exception(processor).map(Stop::Exception);
+            }
+            if self.now >= self.limit || self.instructions >= self.instruction_limit {
+                stop = Some(Stop::Limit);
+            } else if self.instruction_ps == 0
+                || self.system.reset_requested
+                || self.chip.wants_reset()
+            {
+                stop = Some(Stop::Look);
+            }
+        }
+        let opcode = self.opcode(address);
+        if stop.is_none() && opcode == 0xbf30 {
+            stop = Some(Stop::Sleep);
+        }
+        if stop.is_some() {
+            self.stop = stop;
+            return false;
+        }
+        if opcode & 0xff00 == 0xbf00 && opcode & 0xf != 0 {
+            self.conditional = 4 - (opcode & 0xf).trailing_zeros();
+        } else {
+            self.conditional = self.conditional.saturating_sub(1);
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.step(address, processor);
+        }
+        self.instructions += 1;
+        self.cycles += CYCLES_PER_INSTRUCTION;
+        self.now += self.instruction_ps;
+        if self.now >= self.next_event {
+            self.advance(processor);
+        }
+        true
+    }
+
+    fn read(&mut self, address: u32, size: u32, _: &Processor) -> u32 {
+        self.is_dirty = true;
+        if (0xe000_0000..0xe004_0000).contains(&address) {
+            self.system.read(address, self.cycles)
+        } else {
+            self.chip.read(address, size, self.now)
+        }
+    }
+
+    fn write(&mut self, address: u32, size: u32, value: u32, _: &Processor) {
+        self.is_dirty = true;
+        if (0xe000_0000..0xe004_0000).contains(&address) {
+            self.system.write(address, size, value, self.cycles);
+        } else {
+            self.chip.write(address, size, value, self.now);
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! The flash's registers and the pages that keep configurations (RM0440, chapter FLASH).
+
+use crate::stm32::{FlashSlots, Power};
+use crate::{MICROSECOND, Picoseconds};
+
+/// Bits of the control register.
+const LOCK: u32 = 1 << 31;
+const OPTION_LOCK: u32 = 1 << 30;
+const START: u32 = 1 << 16;
+const SECOND_BANK: u32 = 1 << 11;
+const PAGE_ERASE: u32 = 2;
+const PROGRAM: u32 = 1;
+
+/// First page of the slots in the second bank, and its length.
+const FIRST_PAGE: u32 = 126;
+const PAGE: usize = 2 << 10;
+
+/// Length of the slots.
+pub(super) const SLOTS: usize = 2 * PAGE;
+
+/// Registers and slots.
+#[derive(Clone)]
+pub(super) struct Flash {
+    registers: [u32; 16],
+    /// Number of keys that have opened the control register and the option bytes.
+    keys: [usize; 2],
+    pub slots: FlashSlots,
+    /// The first half of a double word that is written.
+    half: Option<(u32, u32)>,
+    /// Whether a word that cannot be corrected has been read, and its interrupt is pending.
+    is_uncorrectable: bool,
+    has_nmi: bool,
+}
+
+impl Flash {
+    /// Creates an erased flash with the option bytes of a new chip.
+    pub fn new() -> Self {
+        let mut registers = [0; 16];
+        registers[8] = 0xffef_f8aa;
+        Self {
+            registers,
+            keys: [0; 2],
+            slots: FlashSlots::new(SLOTS),
+            half: None,
+            is_uncorrectable: false,
+            has_nmi: false,
+        }
+    }
+
+    /// Resets the registers; option bytes and contents stay.
+    pub fn reset(&mut self) {
+        self.registers[0] = 0x600;
+        self.registers[5] = 0xc000_0000;
+        self.keys = [0; 2];
+        self.slots.reset();
+        self.half = None;
+        self.is_uncorrectable = false;
+        self.has_nmi = false;
+    }
+
+    /// Returns the wait states of a read.
+    pub fn wait_states(&self) -> u64 {
+        u64::from(self.registers[0] & 15)
+    }
+
+    /// Returns the level of the brown-out reset.
+    pub fn brown_out_level(&self) -> usize {
+        (self.registers[8] >> 8 & 7) as usize
+    }
+
+    /// Takes a pending non-maskable interrupt.
+    pub fn take_nmi(&mut self) -> bool {
+        std::mem::take(&mut self.has_nmi)
+    }
+
+    /// Returns the value of a register.
+    pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
+        match offset {
+            0x10 => u32::from(self.slots.is_busy(now)) << 16,
+            0x18 => u32::from(self.is_uncorrectable) << 31,
+            _ => self.registers[((offset / 4) & 15) as usize],
+        }
+    }
+
+    /// Stores to a register. Handles the keys that unlock the option bytes, which hold the brown-out level.
+    pub fn write(&mut self, offset: u32, value: u32, now: Picoseconds) -> Power {
+        match (offset, value, self.keys) {
+            (0x08, 0x4567_0123, _) => self.keys[0] = 1,
+            (0x08, 0xcdef_89ab, [1, _]) => self.registers[5] &= !LOCK,
+            (0x0c, 0x0819_2a3b, _) if self.registers[5] & LOCK == 0 => self.keys[1] = 1,
+            (0x0c, 0x4c5d_6e7f, [_, 1]) => self.registers[5] &= !OPTION_LOCK,
+            (0x20, ..) if self.registers[5] & OPTION_LOCK == 0 => self.registers[8] = value,
+            (0x00, ..) => self.registers[0] = value,
+            (0x14, ..) if self.registers[5] & LOCK == 0 => return self.control(value, now),
+            (0x18, ..) if value & 1 << 31 != 0 => self.is_uncorrectable = false,
+            _ => {}
+        }
+        Power::On
+    }
+
+    fn control(&mut self, value: u32, now: Picoseconds) -> Power {
+        assert!(!self.slots.is_busy(now), "the flash is busy");
+        self.registers[5] = value & !START;
+        if value & LOCK != 0 {
+            self.keys[0] = 0;
+        }
+        if value & START == 0 || value & PAGE_ERASE == 0 {
+            return Power::On;
+        }
+        assert!(value & SECOND_BANK != 0, "the program's bank");
+        let slot = ((value >> 3 & 0x7f) - FIRST_PAGE) as usize;
+        self.slots.erase(slot * PAGE, PAGE, now)
+    }
+
+    /// Returns a word of the slots.
+    pub fn load(&mut self, offset: u32, now: Picoseconds) -> u32 {
+        assert!(!self.slots.is_busy(now), "the bank is busy");
+        if self.slots.is_uncorrectable(offset) && !self.is_uncorrectable {
+            self.is_uncorrectable = true;
+            self.has_nmi = true;
+        }
+        self.slots.word(offset)
+    }
+
+    /// Stores a word to the slots: two of them write a double word, which must be erased.
+    pub fn store(&mut self, offset: u32, word: u32, size: u32, now: Picoseconds) -> Power {
+        assert!(!self.slots.is_busy(now), "the bank is busy");
+        assert_eq!(size, 4, "the width of a store");
+        assert_eq!(self.registers[5] & (LOCK | PROGRAM), PROGRAM);
+        let Some((first, low)) = self.half.take() else {
+            assert_eq!(offset % 8, 0);
+            self.half = Some((offset, word));
+            return Power::On;
+        };
+        assert_eq!(offset, first + 4);
+        let is_erased = [first, offset].map(|it| self.slots.word(it)) == [u32::MAX; 2];
+        assert!(is_erased, "a double word is written twice");
+        let unit = (u64::from(word) << 32 | u64::from(low)).to_le_bytes();
+        let until = now + 82 * MICROSECOND;
+        self.slots.program(first as usize, &unit, until)
+    }
+}
