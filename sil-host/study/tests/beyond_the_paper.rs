@@ -351,6 +351,6 @@ fn margins_grow_with_the_tick_and_with_the_counts() {
     let slow = held(&["run.tick_hz=500"]);
     let coarse = held(&["converters.encoder.bits=12"]);
     assert!(usual > 0.99 * 0.1647, "{usual}");
-    assert!(slow < usual - 2e-4 && slow > 0.155, "{slow} {usual}");
+    assert!(slow < usual - 3e-4 && slow > 0.155, "{slow} {usual}");
     assert!(coarse < usual - 1e-3 && coarse > 0.155, "{coarse}");
 }
