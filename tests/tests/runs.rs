@@ -103,9 +103,6 @@ fn without_control_the_arm_keeps_bouncing_from_x0_a() {
     assert!(number(&report, "contact_fraction") < 0.01);
 }
 
-/// The probe with which the controller measures how much the contact gives, N.
-const PROBE_N: f64 = 0.1;
-
 #[test]
 fn the_papers_own_gains_work_with_ideal_converters() {
     let bench = Bench::new("paper");
@@ -116,7 +113,7 @@ fn the_papers_own_gains_work_with_ideal_converters() {
         "{report}"
     );
     assert!(
-        (number(&report, "min_normal_force_n") - 10.0).abs() < PROBE_N + 0.1,
+        (number(&report, "min_normal_force_n") - 10.0).abs() < 0.1,
         "{report}"
     );
 }
