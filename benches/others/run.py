@@ -28,7 +28,7 @@ PLANTS = {
     "MuJoCo, Coulomb friction added": (
         "mujoco_arm",
         {"mujoco": "mujoco"},
-        "MuJoCo's normal contact, 1e5 N/m and 76 N s/m for 40 g; mu f_n of the step before (0.1 ms) as an external force",
+        "MuJoCo's normal contact, 1e5 N/m and 76 N s/m for 40 g, in steps of 0.1 ms; mu f_n of the same step as an external force",
     ),
     "MuJoCo, its own friction": (
         "mujoco_arm",
@@ -38,7 +38,7 @@ PLANTS = {
     "Drake": (
         "drake_arm",
         {"drake": "pydrake"},
-        "point contact of 1e5 N/m with Hunt-Crossley damping, regularised friction, solved implicitly in steps of 0.1 ms",
+        "point contact of 1e5 N/m with Hunt-Crossley damping, regularised friction, continuous, with error control",
     ),
 }
 
