@@ -246,6 +246,20 @@ fn timing_gives_the_same_report_for_every_host() {
     }
 }
 
+/// Whatever an emulator made there would stay if its bridge were killed.
+#[test]
+fn the_emulator_makes_no_temporary_files() {
+    let bench = Bench::new("no-temporary-files");
+    let image = image().to_string_lossy();
+    let qemu = ["run", "--host", "qemu", "--elf", &image];
+    let output = bench
+        .command(&[&qemu[..], &SHORT, &QUIET].concat())
+        .env("TMPDIR", "/nowhere")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+}
+
 #[test]
 fn the_error_about_a_missing_image_names_the_build_command() {
     let bench = Bench::new("no-image");

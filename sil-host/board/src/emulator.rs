@@ -6,18 +6,16 @@
 //! therefore the same in every run. The counts are instructions, not cycles: QEMU models no
 //! pipeline, no flash wait states and no bus.
 
-use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::io::{self, PipeReader, PipeWriter, Read, Write};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use command_fds::{CommandFdExt, FdMapping};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::Signal;
-use nix::sys::stat::Mode;
-use nix::unistd::mkfifo;
 use painleve_firmware::BUILD;
 use painleve_plant::Configuration;
 use painleve_shared::frame::SensorFrame;
@@ -30,6 +28,11 @@ use crate::timing::Unit;
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
+
+/// QEMU's descriptor of the pipe from which the image reads requests, `/dev/fd/100` to the image.
+const REQUESTS: i32 = 100;
+/// QEMU's descriptor of the pipe to which the image writes responses.
+const RESPONSES: i32 = 101;
 
 /// Folder of the images, below the workspace's target folder.
 const IMAGES: &str = "thumbv7em-none-eabihf/firmware";
@@ -80,8 +83,11 @@ pub fn check(image: &Path) -> Result<(), BoardError> {
 /// QEMU ends when this value is dropped or the thread that created it ends.
 pub struct Emulator {
     process: Guarded,
-    requests: File,
-    responses: File,
+    requests: PipeWriter,
+    responses: PipeReader,
+    /// QEMU's ends. Held here too, a pipe of an ended QEMU stays whole, and the error is its exit
+    /// status instead of a broken pipe.
+    _ends: (PipeReader, PipeWriter),
     silence_limit: Duration,
     /// One instruction takes 2^shift ns of virtual time.
     shift: u32,
@@ -100,19 +106,12 @@ impl Emulator {
         silence_limit: Duration,
     ) -> Result<Self, BoardError> {
         check(image)?;
-        // QEMU runs in its own folder.
-        let image = image.canonicalize()?;
         let table = with_log
-            .then(|| log::LogTable::of_image(&image))
+            .then(|| log::LogTable::of_image(image))
             .transpose()?;
-        let folder = tempfile::Builder::new().prefix("painleve-").tempdir()?;
-        let pipe = |name| -> io::Result<File> {
-            let path = folder.path().join(name);
-            mkfifo(&path, Mode::S_IRUSR | Mode::S_IWUSR)?;
-            // Opened for reading and writing, so that the call does not wait for the other side.
-            OpenOptions::new().read(true).write(true).open(path)
-        };
-        let (requests, responses) = (pipe("requests")?, pipe("responses")?);
+        // Pipes without names leave nothing behind, whenever a process is killed.
+        let (request_end, requests) = io::pipe()?;
+        let (responses, response_end) = io::pipe()?;
         let shift = shift_for(configuration.tick_hz);
         let mut command = Command::new(PROGRAM);
         command
@@ -121,19 +120,31 @@ impl Emulator {
             .args(["-icount", &format!("shift={shift},sleep=off")])
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-kernel")
-            .arg(&image)
-            .current_dir(folder.path())
+            .arg(image)
             .stdin(Stdio::null())
             .stdout(if with_log {
                 Stdio::piped()
             } else {
                 Stdio::null()
             });
+        command
+            .fd_mappings(vec![
+                FdMapping {
+                    parent_fd: request_end.try_clone()?.into(),
+                    child_fd: REQUESTS,
+                },
+                FdMapping {
+                    parent_fd: response_end.try_clone()?.into(),
+                    child_fd: RESPONSES,
+                },
+            ])
+            .map_err(io::Error::other)?;
         let child = end_with_parent(&mut command, Signal::SIGKILL).spawn()?;
         let mut emulator = Self {
             process: Guarded::new(child),
             requests,
             responses,
+            _ends: (request_end, response_end),
             silence_limit,
             shift,
         };
@@ -150,7 +161,6 @@ impl Emulator {
             Response::OtherBuild { build } => Err(BoardError::other_build(build)),
             other => Err(BoardError::OutOfTurn(other)),
         }
-        // The folder is removed here: both sides have opened their pipes.
     }
 
     /// Sends bytes as they are, as a disturbed link delivers them; nothing is received.

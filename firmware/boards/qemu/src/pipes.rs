@@ -5,8 +5,8 @@
 //! flash target. QEMU models neither its clock tree nor its converters and watchdogs: the arm's
 //! frames come through the link.
 //!
-//! The link is semihosting on two pipes in QEMU's working folder. The virtual
-//! clock stands still during a semihosting call, so that a run under `-icount` is
+//! The link is semihosting on two pipes that QEMU inherits, with the descriptors 100 and 101. The
+//! virtual clock stands still during a semihosting call, so that a run under `-icount` is
 //! deterministic to the instruction, however long the host takes.
 
 use defmt_semihosting as _;
@@ -46,8 +46,8 @@ impl Board for Qemu {
             drive: Timers::start(device.TIM2, device.TIM5),
             bytes: NoBytes,
             port: Pipes {
-                requests: File::open(c"requests").map_err(|_| StartFault::Link)?,
-                responses: File::create(c"responses").map_err(|_| StartFault::Link)?,
+                requests: File::open(c"/dev/fd/100").map_err(|_| StartFault::Link)?,
+                responses: File::create(c"/dev/fd/101").map_err(|_| StartFault::Link)?,
             },
             memory: NoMemory,
         })
