@@ -1,4 +1,4 @@
-//! The page of a run in headless Chromium, if the machine has Node and Chromium.
+//! The page of a run, and the labels of pictures, in headless Chromium, if the machine has Node and Chromium.
 
 #![allow(
     clippy::unwrap_used,
@@ -94,4 +94,40 @@ fn the_page_of_a_long_run_is_small() {
     bench.report(&options);
     let bytes = std::fs::metadata(bench.path("out/run.html")).unwrap().len();
     assert!(bytes < 2_000_000, "{bytes}");
+}
+
+#[test]
+fn no_label_of_a_picture_overlaps_another_or_is_cut_off_or_too_small() {
+    let bench = Bench::new("pictures");
+    let images = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/images");
+    let entries = std::fs::read_dir(images).unwrap();
+    let mut pictures: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    pictures.retain(|path| path.extension().is_some_and(|extension| extension == "svg"));
+    // Those of the book do not show every panel, nor a study of one cell.
+    for scenario in ["pid-elbow-up", "open-loop-bounce"] {
+        bench.report(&["run", scenario, "--json", "--no-record"]);
+        let path = bench.path(&format!("{scenario}.svg"));
+        std::fs::rename(bench.path("out/run.svg"), &path).unwrap();
+        pictures.push(path);
+    }
+    for study in [
+        &["regions", "--mu", "0.6"][..],
+        &["bifurcation", "--mu", "0.6", "--v-belt=-0.4"],
+        &[
+            "poincare",
+            "--v-belt=-0.4",
+            "--transient-s",
+            "10",
+            "--record-s",
+            "10",
+        ],
+        &["closed-loop-bifurcation", "--v-belt=-0.4"],
+    ] {
+        let file = format!("{}.svg", study[0]);
+        let command = [&["study"], study, &["--json", "--svg", &file]].concat();
+        bench.report(&command);
+        pictures.push(bench.path(&file));
+    }
+    let pictures: Vec<_> = pictures.iter().map(|path| path.to_str().unwrap()).collect();
+    run_script("pictures.mjs", &pictures);
 }

@@ -8,8 +8,8 @@
 //!
 //! Writes `benches/work_precision/results.csv` and `docs/images/work-precision.svg`. Without the
 //! Python environment, or with `PAINLEVE_KEEP_PEERS=1`, the other programs' rows of an earlier run are
-//! kept. The error is the largest
-//! deviation of either link angle at any tick from the plant's own solution with a tolerance of
+//! kept; with `-- --redraw` at the end of the command only the figure is drawn again. The error is
+//! the largest deviation of either link angle at any tick from the plant's own solution with a tolerance of
 //! 1e-13; SciPy's methods, which share no code with it, converge to the same solution.
 
 use std::fmt::Write as _;
@@ -286,14 +286,23 @@ fn others(ticks: Ticks, root: &Path, results: &Path, reference: &[State]) -> Out
         String::from_utf8(done.stdout)?
     } else {
         println!("no target/peers: the other programs' rows are kept");
-        let kept = std::fs::read_to_string(results)?;
-        let theirs = kept.lines().filter(|line| !line.starts_with('#'));
-        let prefix = format!("{},", ticks.count);
-        let theirs = theirs.filter_map(|line| line.strip_prefix(&prefix));
-        let theirs = theirs.filter(|line| !line.starts_with("\"painleve"));
-        theirs.collect::<Vec<_>>().join("\n")
+        let mut rows = kept(ticks, results)?;
+        rows.retain(|row| !is_ours(&row.program));
+        return Ok(rows);
     };
     text.lines().map(|line| row(ticks, line)).collect()
+}
+
+/// Reads the rows of an earlier run.
+fn kept(ticks: Ticks, results: &Path) -> Outcome<Vec<Row>> {
+    let text = std::fs::read_to_string(results)?;
+    let prefix = format!("{},", ticks.count);
+    let lines = text.lines().filter_map(|line| line.strip_prefix(&prefix));
+    lines.map(|line| row(ticks, line)).collect()
+}
+
+fn is_ours(program: &str) -> bool {
+    program.starts_with("painleve")
 }
 
 /// Reads a line "program,setting,cost,error" whose program may contain commas.
@@ -315,7 +324,6 @@ fn svg(rows: &[Row]) -> String {
     let colours: [Colour; 10] = [
         BLUE_INK, SKY, GREEN, PURPLE, ORANGE, VERMILLION, BLACK_INK, GREY, BLUE_INK, GREEN,
     ];
-    let is_ours = |name: &str| name.starts_with("painleve");
     let mut programs: Vec<&str> = rows.iter().map(|row| row.program.as_str()).collect();
     programs.sort_by_key(|name| (!is_ours(name), *name));
     programs.dedup();
@@ -349,7 +357,9 @@ fn svg(rows: &[Row]) -> String {
         });
         Panel {
             title: title.into(),
-            note: "error, log₁₀ rad".into(),
+            note: "error (rad)".into(),
+            y: Some(-15.5..-1.0),
+            y_labels: Some(powers([-15, -12, -9, -6, -3])),
             marks: curves.collect(),
             height: 560,
             ..Panel::default()
@@ -359,11 +369,30 @@ fn svg(rows: &[Row]) -> String {
         title: "Error against cost: one second of sliding".into(),
         subtitle: "largest deviation of a link angle from the rigid arm's solution; one thread; from loose to tight settings along each curve"
             .into(),
-        x_title: "CPU time per simulated second, log₁₀ s".into(),
+        x_title: "CPU time per simulated second (s)".into(),
+        x_labels: Some(powers([-5, -4, -3, -2, -1, 0])),
         panels: PANELS.map(|(count, title)| panel(count, title)).into(),
         ..Chart::default()
     }
     .svg()
+}
+
+/// Returns powers of ten as labels of a logarithmic axis.
+fn powers<const N: usize>(exponents: [i32; N]) -> Vec<(f64, String)> {
+    let raised = |digit: char| match digit.to_digit(10) {
+        Some(digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize).unwrap_or(' '),
+        None => '⁻',
+    };
+    let label = |exponent: i32| match exponent {
+        0 => "1".to_owned(),
+        _ => format!(
+            "10{}",
+            exponent.to_string().chars().map(raised).collect::<String>()
+        ),
+    };
+    exponents
+        .map(|exponent| (f64::from(exponent), label(exponent)))
+        .into()
 }
 
 /// Panels of the figure: ticks in a second, and title.
@@ -375,7 +404,14 @@ const PANELS: [(usize, &str); 2] = [
 fn run() -> Outcome<()> {
     let root = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let results = root.join("benches/work_precision/results.csv");
+    let figure = root.join("docs/images/work-precision.svg");
     let mut rows = Vec::new();
+    if std::env::args().any(|argument| argument == "--redraw") {
+        for (count, _) in PANELS {
+            rows.extend(kept(Ticks { count }, &results)?);
+        }
+        return Ok(std::fs::write(figure, svg(&rows))?);
+    }
     for (count, _) in PANELS {
         let ticks = Ticks { count };
         let reference = solved(ticks, attractor()?, 1e-13)?;
@@ -393,7 +429,7 @@ fn run() -> Outcome<()> {
         )?;
     }
     std::fs::write(results, &text)?;
-    std::fs::write(root.join("docs/images/work-precision.svg"), svg(&rows))?;
+    std::fs::write(figure, svg(&rows))?;
     print!("{text}");
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::mark::{LegendEntry, Symbol};
 use crate::canvas::{Anchor, Canvas, Fill, Stroke};
-use crate::style::{HEADING, LABEL, Look, NOTE, text_width, wrapped};
+use crate::style::{GREY, HEADING, LABEL, Look, NOTE, text_width, wrapped};
 
 /// Height of a row of text, drawn units.
 pub(super) const ROW: i32 = 44;
@@ -124,9 +124,18 @@ fn draw_symbol(canvas: &mut Canvas, entry: &LegendEntry<'_>, (left, middle): (i3
         }
         Symbol::Dot => canvas.circles(&[(left + SYMBOL - 12, middle)], 9, entry.colour),
         Symbol::Area { opacity } => {
-            let corners = [(left + 14, middle - 13), (right, middle + 13)];
+            let (left, top, bottom) = (left + 14, middle - 13, middle + 13);
             let colour = entry.colour;
-            canvas.rectangles(&[corners], Fill { colour, opacity });
+            canvas.rectangles(&[[(left, top), (right, bottom)]], Fill { colour, opacity });
+            // The outline shows colours that hardly differ from the ground.
+            let outline = [
+                (left, top),
+                (right, top),
+                (right, bottom),
+                (left, bottom),
+                (left, top),
+            ];
+            canvas.line(&outline, Stroke::solid(GREY, 1));
         }
     }
 }

@@ -14,6 +14,9 @@ use crate::style::{Colour, GREY, GRID, LABEL, ticks, without_straight_ons};
 const LABEL_GAP: i32 = 12;
 /// Half of the width, and the height, of a mark where a curve leaves its panel.
 const OFF_SCALE: (i32, i32) = (9, 15);
+/// Up to this many dots of one kind are at least this large, drawn units: a few small ones would
+/// hardly be seen on a narrow screen.
+const FEW_DOTS: (usize, i32) = (40, 14);
 
 /// A panel with its position in the figure and its scales.
 pub(super) struct Placed<'a> {
@@ -282,6 +285,10 @@ impl Frame<'_, '_> {
         // Most points of a diagram coincide.
         pixels.sort_unstable();
         pixels.dedup();
+        let size = match FEW_DOTS {
+            (few, least) if pixels.len() <= few => size.max(least),
+            _ => size,
+        };
         if size >= 8 {
             canvas.circles(&pixels, size / 2, colour);
             return;

@@ -71,15 +71,21 @@ fn nan_interrupts_lines_and_coincident_dots_are_merged() {
     ];
     let svg = chart(vec![Mark::line("", BLUE_INK, points)]).svg();
     assert_eq!(count(&svg, "stroke=\"#0072B2\" "), 2);
-    let dots = Mark::Dots {
-        name: String::new(),
-        colour: GREEN,
-        size: 4,
-        points: vec![(0.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.5, f64::NAN)],
+    let dots = |points| {
+        let dots = Mark::Dots {
+            name: String::new(),
+            colour: GREEN,
+            size: 4,
+            points,
+        };
+        chart(vec![dots]).svg()
     };
-    let svg = chart(vec![dots]).svg();
-    let (_, dots) = svg.split_once("<path fill=\"#009E73\"").unwrap();
-    assert_eq!(count(dots.split_once("/>").unwrap().0, "M"), 2);
+    let few = dots(vec![(0.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.5, f64::NAN)]);
+    assert_eq!(count(&few, "r=\"7\" fill=\"#009E73\""), 2);
+    // Many keep their size and are one shape.
+    let many = dots((0..100).map(|n| (f64::from(n / 2), 1.0)).collect());
+    let (_, many) = many.split_once("<path fill=\"#009E73\"").unwrap();
+    assert_eq!(count(many.split_once("/>").unwrap().0, "h4v4"), 50);
 }
 
 #[test]

@@ -222,7 +222,7 @@ impl Panels<'_> {
             (middle_s, low, high)
         });
         let band = Mark::Band {
-            name: "± deviation".into(),
+            name: "± 1 standard deviation".into(),
             colour: PURPLE,
             points: band.collect(),
         };

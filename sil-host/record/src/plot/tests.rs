@@ -109,7 +109,7 @@ fn panels_are_titled_with_their_units() {
         "u₁",
         "u₂",
         "Friction coefficient μ",
-        "± deviation",
+        "± 1 standard deviation",
         "Contact mode",
         "slide +",
         "flight",

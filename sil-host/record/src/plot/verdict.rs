@@ -8,12 +8,16 @@ use crate::events::{EventKind, RunEvent};
 
 /// Less than this is not worth a remark, m.
 const NOTICEABLE_M: f64 = 1e-3;
+/// A tip that has been on the belt for this long at the end of a run has come to stay, s.
+const SETTLED_S: f64 = 0.5;
 
 /// The outcome of a run as far as it has been seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Verdict {
     lift_offs: u64,
     first_lift_off_s: Option<f64>,
+    last_landing_s: Option<f64>,
+    time_s: f64,
     impacts: u64,
     fault: Option<Fault>,
     tip_m: f64,
@@ -25,6 +29,7 @@ impl Verdict {
     /// Updates the end of the run; `requested_m` is NaN if it is not known.
     pub(super) fn tick(&mut self, sample: &Sample, requested_m: f64) {
         let known = |value: f64| value.is_finite().then_some(value);
+        self.time_s = sample.plant.time_s;
         self.tip_m = sample.plant.tip_t_m;
         self.reference_m = known(sample.reference_tip_t_m);
         self.requested_m = known(requested_m);
@@ -38,7 +43,12 @@ impl Verdict {
             }) => {
                 self.lift_offs += 1;
                 self.first_lift_off_s.get_or_insert(event.time_s);
+                self.last_landing_s = None;
             }
+            EventKind::Plant(Event::ModeChange {
+                from: ContactMode::Flight,
+                ..
+            }) => self.last_landing_s = Some(event.time_s),
             EventKind::Plant(Event::ImpactWithoutCollision { .. }) => {
                 self.first_lift_off_s.get_or_insert(event.time_s);
             }
@@ -58,6 +68,11 @@ impl Verdict {
             0 => {}
             1 => words.push_str(", 1 impact"),
             count => words.push_str(&format!(", {count} impacts")),
+        }
+        if let Some(landing_s) = self.last_landing_s
+            && self.time_s - landing_s > SETTLED_S
+        {
+            words.push_str(&format!(", on the belt from {landing_s:.3} s"));
         }
         if let Some(reference_m) = self.reference_m {
             let error_mm = 1e3 * (self.tip_m - reference_m);

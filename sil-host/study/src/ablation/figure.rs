@@ -27,11 +27,14 @@ impl Figure for Ablation {
         let mut marks = vec![Mark::line("", GREY, vec![(0.0, 0.0), (0.0, count as f64)])];
         for (index, (row, change)) in rows.iter().enumerate() {
             let top = (count - index) as f64;
-            let points = format!("{:+.1}", 100.0 * change.difference).replace('-', "−");
+            let points = match format!("{:+.1}", 100.0 * change.difference) {
+                zero if zero.ends_with("0.0") && zero.len() == 4 => "no change".into(),
+                points => points.replace('-', "−"),
+            };
             marks.push(Mark::Label {
                 at: (x.start + 0.01 * (x.end - x.start), top - 0.3),
                 centred: false,
-                text: format!("{}: {points} %", row.name()),
+                text: format!("{}: {points}", row.part()),
             });
             let line = |name: &str, colour, width, from: f64, to: f64| Mark::Line {
                 name: name.into(),
@@ -63,7 +66,7 @@ impl Figure for Ablation {
             x_title: "Change of success (percentage points)".into(),
             x: Some(x),
             panels: vec![Panel {
-                title: "Without".into(),
+                title: "Part that is switched off".into(),
                 y: Some(0.0..count as f64),
                 y_ticks: 0,
                 height: ROW * count as i32,

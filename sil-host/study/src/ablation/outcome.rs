@@ -98,8 +98,15 @@ impl Ablated {
     }
 
     pub(super) fn name(&self) -> String {
-        let part = |part: &Part| format!("without {}", outcome::name(part));
-        self.without.as_ref().map_or("everything".into(), part)
+        match &self.without {
+            Some(_) => format!("without {}", self.part()),
+            None => "everything".into(),
+        }
+    }
+
+    /// Returns the part that is switched off; empty if none is.
+    pub(super) fn part(&self) -> String {
+        self.without.as_ref().map_or(String::new(), outcome::name)
     }
 }
 

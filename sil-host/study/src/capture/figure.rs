@@ -12,13 +12,23 @@ impl Figure for Captures {
     fn svg(&self) -> String {
         let solved = self.rows.iter().filter(|row| row.solved);
         let times: Vec<f64> = solved.map(|row| row.capture_s).collect();
-        let note = "last bar: that long or longer".to_string();
+        let note = "the last bar includes all longer times".to_string();
         Chart {
             title: "Capture of the bouncing arm".into(),
-            subtitle: format!("captured within {LIMIT_S} s and held: {}", self.success),
+            subtitle: format!(
+                "captured within {LIMIT_S} s and kept on the belt: {}",
+                self.success
+            ),
             x_title: "Time from enabling to the last landing (s)".into(),
             x: Some(0.0..0.6),
-            panels: vec![histogram("Runs", note, BLUE_INK, 0.6, LIMIT_S, &times)],
+            panels: vec![histogram(
+                "Number of runs",
+                note,
+                BLUE_INK,
+                0.6,
+                LIMIT_S,
+                &times,
+            )],
             ..Chart::default()
         }
         .svg()

@@ -26,9 +26,10 @@ impl Figure for ClosedLoopDiagram {
             .map(|sections| panel(sections, &self.rows, decades));
         Chart {
             title: "Belt speed with the controller in the loop (Fig. 12)".into(),
-            subtitle: "largest θ̇₁ in rad/s on a logarithmic axis; the firmware's controller in \
-                       this process, with the converters of the bench"
-                .into(),
+            subtitle:
+                "largest θ̇₁ in rad/s on a logarithmic axis, with the firmware's controller and \
+                       simulated converters"
+                    .into(),
             x_title: "Belt speed v_belt (m/s)".into(),
             panels: panels.collect(),
             ..Chart::default()
@@ -50,7 +51,7 @@ fn panel(sections: &[BeltSpeedSection], rows: &[Row], decades: f64) -> Panel {
         let rows = rows.iter().filter(|row| section.is_of(row));
         let points = rows.map(|row| (row.v_belt_m_s, place(row.max_theta1_dot_rad_s)));
         let name = format!(
-            "μ = {}, x₀,{}: bounces at {} of {}",
+            "μ = {}, x0,{}: bounces at {} of {} speeds",
             section.mu,
             section.initial,
             section.bouncing_m_s.len(),

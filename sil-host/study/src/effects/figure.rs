@@ -30,10 +30,10 @@ impl Figure for EffectsOutcome {
         Chart {
             title: "Tolerance of the closed loop to each effect".into(),
             subtitle: format!(
-                "{} random closed loops at each level, seed {}; grey: the levels tried",
+                "{} random closed loops at each level, seed {}; grey lines: the levels tried",
                 self.runs, self.seed
             ),
-            x_title: "Doublings of the level of a typical rig, which is given with each name"
+            x_title: "Level relative to the typical one given with each name, log₂ (1 is double)"
                 .into(),
             x: Some(LEAST - 0.2..MOST),
             panels,
@@ -47,7 +47,7 @@ impl Figure for EffectsOutcome {
 fn panel(all: &[Series], is_first: bool) -> Panel {
     let shown: Vec<&Series> = all.iter().filter(|series| series.key != "–").collect();
     let count = shown.len().max(1);
-    let line = |index: usize| (count - index) as f64 - 0.72;
+    let line = |index: usize| (count - index) as f64 - 0.75;
     let place = |series: &Series, level: f64| {
         let severity = series.effect().severity(level);
         libm::log2(severity).clamp(LEAST, MOST)
@@ -91,7 +91,7 @@ fn panel(all: &[Series], is_first: bool) -> Panel {
         });
         marks.push(Mark::Dots {
             name: if is_first {
-                format!("below {:.0} %", 100.0 * rate)
+                format!("success below {:.0} %", 100.0 * rate)
             } else {
                 String::new()
             },
@@ -114,7 +114,7 @@ fn panel(all: &[Series], is_first: bool) -> Panel {
             )
         }),
         note: none,
-        y: Some(0.0..count as f64),
+        y: Some(0.0..count as f64 + 0.05),
         y_ticks: 0,
         height: LINE * count as i32,
         marks,

@@ -24,8 +24,8 @@ impl Figure for LiftOffs {
             let within = times.iter().filter(|time_ms| **time_ms <= limit_ms).count();
             let flights = long.count();
             let note = format!(
-                "{within} of {flights} flights longer than {limit_ms} ms detected within that limit, \
-                 {} later, {} not; last bar: that long or longer",
+                "of {flights} flights longer than {limit_ms} ms, {within} are detected within \
+                 {limit_ms} ms, {} later, {} never; the last bar includes all longer delays",
                 times.len() - within,
                 flights - times.len(),
             );
@@ -33,12 +33,22 @@ impl Figure for LiftOffs {
         };
         Chart {
             title: "Delay in detecting a lift-off".into(),
-            subtitle: "tips led over the edge p = 0 with the governor switched off".into(),
+            subtitle:
+                "the governor is switched off, so that the reference leads the tip beyond p = 0"
+                    .into(),
             x_title: "Time from lift-off to its detection (ms)".into(),
             x: Some(0.0..FARTHEST_MS),
             panels: vec![
-                panel("With the force cell (runs)", Evidence::ForceCell, BLUE_INK),
-                panel("From the encoders (runs)", Evidence::Encoders, ORANGE),
+                panel(
+                    "Flights detected with the force cell",
+                    Evidence::ForceCell,
+                    BLUE_INK,
+                ),
+                panel(
+                    "Flights detected with the encoders",
+                    Evidence::Encoders,
+                    ORANGE,
+                ),
             ],
             ..Chart::default()
         }

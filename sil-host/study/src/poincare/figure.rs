@@ -18,10 +18,10 @@ const RED: Colour = Colour(0xC6, 0x1A, 0x1A);
 /// The kinds of motion in the order of the legend.
 const MOTIONS: [(&str, Colour); 8] = [
     ("period 1", BLACK_INK),
-    ("2", BLUE_INK),
-    ("3", GREEN),
-    ("4", PURPLE),
-    ("longer", SKY),
+    ("period 2", BLUE_INK),
+    ("period 3", GREEN),
+    ("period 4", PURPLE),
+    ("longer period", SKY),
     ("chaotic", RED),
     ("undecided", ORANGE),
     ("quiet", QUIET),

@@ -67,9 +67,9 @@ impl Map {
         }
         let down = InitialState::default();
         [
-            ("x₀,a", 32.0, 18.27),
-            ("x₀,d", down.theta1_deg, down.theta2_deg),
-            ("x₀,u", down.theta2_deg, down.theta1_deg),
+            ("x0,a", 32.0, 18.27),
+            ("x0,d", down.theta1_deg, down.theta2_deg),
+            ("x0,u", down.theta2_deg, down.theta1_deg),
         ]
         .into_iter()
         .filter(|(_, _, theta2)| theta2 * self.theta2.sign() > 0.0)
