@@ -297,7 +297,7 @@ impl<L: Law> Stages<L> {
             state.supervision.latch(Fault::EncoderJump);
         }
         let model = state.estimates.model();
-        let contact = self.estimators.observe_contact(
+        let (mut contact, slow) = self.estimators.observe_contact(
             &mut state.estimates,
             &model,
             readings,
@@ -310,15 +310,37 @@ impl<L: Law> Stages<L> {
             contact.touches,
             self.demand.is_on(),
         );
+        let references = &mut state.references;
+        let landing = state.demand.landing_posture();
+        let beginning = self
+            .references
+            .begin(references, &model, &contact, &phase, landing);
+        // Slow estimates and the search for the edges take turns, so that no tick is long. Each branch
+        // excludes the other's work, as the bound on a tick's cycles can see.
+        let (estimates, last) = (&mut state.estimates, &state.command);
+        let tip_t_m = model.tip_m.x;
+        if readings.frame.tick & 1 == 0 {
+            let is_busy = self
+                .estimators
+                .evaluate_response(estimates, &mut contact, &slow, last);
+            if !is_busy {
+                let (arm, least) = (&estimates.arm, beginning.least_p_ratio(&contact));
+                self.references
+                    .search(references, arm, tip_t_m, contact.friction, least);
+            }
+        } else {
+            self.estimators
+                .balance_torques(estimates, &model, &contact, &slow, last);
+            if beginning.needs_edges(&contact) {
+                let (arm, least) = (&estimates.arm, beginning.least_p_ratio(&contact));
+                self.references
+                    .search(references, arm, tip_t_m, contact.friction, least);
+            } else {
+                self.estimators.calibrate(estimates, &slow);
+            }
+        }
+        let target = self.references.tick(references, &beginning, &model, &phase);
         let arm = &state.estimates.arm;
-        let target = self.references.tick(
-            &mut state.references,
-            arm,
-            &model,
-            &contact,
-            &phase,
-            state.demand.landing_posture(),
-        );
         if phase.drives() {
             let input = DemandInput {
                 arm,

@@ -30,7 +30,7 @@ use self::friction::{FrictionEstimate, FrictionEstimator, FrictionSettings, Fric
 use self::joints::{EncoderJump, JointEstimator, JointEstimatorSettings, JointState};
 use self::model::Model;
 use self::response::{
-    ContactResponse, ForceReading, ResponseEstimator, ResponseSettings, ResponseState,
+    ContactResponse, ForceReading, Place, ResponseEstimator, ResponseSettings, ResponseState,
 };
 use crate::last_command::LastCommand;
 
@@ -65,9 +65,23 @@ pub struct ContactEstimate {
     pub p_per_kg: f32,
     /// What the contact's response to torque allows.
     pub response: ContactResponse,
-    /// Whether there is time for the search for the edges, because disturbance and calibration are not
-    /// updated at this tick.
-    pub has_spare_time: bool,
+}
+
+/// What one tick adds to the slow estimates.
+#[derive(Clone, Copy, Debug)]
+pub struct SlowReadings {
+    /// Measured height of the tip above the belt, m.
+    gap_m: f32,
+    /// p/Q22.
+    p_ratio: f32,
+    /// Time since the previous readings, s.
+    elapsed_s: f32,
+    /// Whether the gap shows the links' length: the tip certainly touches, and has moved.
+    shows_length: bool,
+    /// Whether force and torque show what the model does not explain.
+    is_informative: bool,
+    /// Whether a block of the response's readings is complete.
+    completes_block: bool,
 }
 
 /// One frame's readings.
@@ -210,9 +224,8 @@ impl Estimators {
         )
     }
 
-    /// Updates contact, friction, belt, calibration and disturbance with the readings, given the
-    /// arm's model at the estimated state and the torque until now; `drives` states whether torque
-    /// was applied.
+    /// Updates contact, friction and belt with the readings, given the arm's model at the estimated state and
+    /// the torque until now; `drives` states whether torque was applied.
     #[inline]
     pub fn observe_contact(
         &self,
@@ -221,7 +234,7 @@ impl Estimators {
         readings: &Readings<'_>,
         last: &LastCommand,
         drives: bool,
-    ) -> ContactEstimate {
+    ) -> (ContactEstimate, SlowReadings) {
         let Readings {
             frame,
             elapsed_ticks,
@@ -250,8 +263,6 @@ impl Estimators {
             }
         };
         let certain = state.contact.is_certain();
-        let is_light = frame.tick & 1 == 0;
-        let mut has_spare_time = is_light;
         let tip_velocity_m_s = model.tip_velocity_m_s.x;
         if contact {
             if !touched && let Some(slip) = self.belt.slip(&state.belt, tip_velocity_m_s) {
@@ -263,11 +274,6 @@ impl Estimators {
                 let dragged = slip * lag_m_s > DRAGGED_M_S;
                 self.friction.update(&mut state.friction, &force_n, dragged);
             }
-            // An unchanged reading would gain weight merely with time.
-            if certain && !is_light && state.joints.has_moved() {
-                self.calibrator
-                    .update(&mut state.calibration, &mut state.arm, gap_m);
-            }
         } else if touched {
             self.explain_throw(&mut state.friction, model);
         }
@@ -277,43 +283,29 @@ impl Estimators {
         self.belt.update(&mut state.belt, tip_velocity_m_s, sliding);
         let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
         let p_ratio = p_per_kg / model.q22_per_kg;
-        let informative = certain && force_in_range && drives;
+        let is_informative = certain && force_in_range && drives;
         let slides = contact && p_per_kg > 0.0 && !friction.sticks;
-        if informative && slides && !last.is_constrained() && self.response.is_enabled() {
+        let mut completes_block = false;
+        if is_informative && slides && !last.is_constrained() && self.response.is_enabled() {
             let (_, slope) = model.free_normal_acceleration();
             let reading = ForceReading {
                 normal_force_n: force_n.y,
                 withheld_n: last.rounding_nm.vector().dot(&slope) / p_per_kg,
-                p_ratio,
-                waits_at_edge: last.at_edge && last.reference_velocity_m_s.abs() < WAITING_M_S,
-                has_spare_time,
             };
-            if self.response.update(&mut state.response, &reading) {
-                has_spare_time = false;
-            }
+            completes_block = self.response.update(&mut state.response, &reading);
         } else {
             state.response.pause();
         }
-        let response = self.response.response(&state.response, p_per_kg, p_ratio);
-        let elapsed_s = elapsed_ticks as f32 * self.tick_s;
-        if informative && is_light {
-            state.disturbance.skip(&last.torque_nm, &force_n, elapsed_s);
-        } else if informative {
-            self.disturbance.update(
-                &mut state.disturbance,
-                model,
-                &Balance {
-                    torque_nm: last.torque_nm,
-                    force_n,
-                    p_ratio: contact.then_some(p_ratio),
-                    loop_share: response.loop_share,
-                    elapsed_s,
-                },
-            );
-        } else {
-            state.disturbance.pause();
-        }
-        ContactEstimate {
+        let slow = SlowReadings {
+            gap_m,
+            p_ratio,
+            elapsed_s: elapsed_ticks as f32 * self.tick_s,
+            // An unchanged reading would gain weight merely with time.
+            shows_length: contact && certain && state.joints.has_moved(),
+            is_informative,
+            completes_block,
+        };
+        let contact = ContactEstimate {
             touches: contact,
             lands: contact && !touched,
             in_flight: state.contact.is_in_flight(),
@@ -321,8 +313,74 @@ impl Estimators {
             force_n,
             friction,
             p_per_kg,
-            response,
-            has_spare_time,
+            response: self.response.response(&state.response, p_per_kg, p_ratio),
+        };
+        (contact, slow)
+    }
+
+    /// Updates the response of the contact if a block of readings is complete; returns whether it was. The
+    /// disturbance leaves this tick out.
+    #[inline]
+    pub fn evaluate_response(
+        &self,
+        state: &mut EstimatesState,
+        contact: &mut ContactEstimate,
+        slow: &SlowReadings,
+        last: &LastCommand,
+    ) -> bool {
+        if slow.is_informative {
+            let (torque_nm, force_n) = (&last.torque_nm, &contact.force_n);
+            state.disturbance.skip(torque_nm, force_n, slow.elapsed_s);
+        } else {
+            state.disturbance.pause();
+        }
+        if slow.completes_block {
+            let p_ratio = slow.p_ratio;
+            let place = Place {
+                p_ratio,
+                waits_at_edge: last.at_edge && last.reference_velocity_m_s.abs() < WAITING_M_S,
+            };
+            self.response.evaluate(&mut state.response, &place);
+            contact.response = self
+                .response
+                .response(&state.response, contact.p_per_kg, p_ratio);
+        }
+        slow.completes_block
+    }
+
+    /// Updates the calibration.
+    #[inline]
+    pub fn calibrate(&self, state: &mut EstimatesState, slow: &SlowReadings) {
+        if slow.shows_length {
+            self.calibrator
+                .update(&mut state.calibration, &mut state.arm, slow.gap_m);
+        }
+    }
+
+    /// Updates the disturbance.
+    #[inline]
+    pub fn balance_torques(
+        &self,
+        state: &mut EstimatesState,
+        model: &Model,
+        contact: &ContactEstimate,
+        slow: &SlowReadings,
+        last: &LastCommand,
+    ) {
+        if slow.is_informative {
+            self.disturbance.update(
+                &mut state.disturbance,
+                model,
+                &Balance {
+                    torque_nm: last.torque_nm,
+                    force_n: contact.force_n,
+                    p_ratio: contact.touches.then_some(slow.p_ratio),
+                    loop_share: contact.response.loop_share,
+                    elapsed_s: slow.elapsed_s,
+                },
+            );
+        } else {
+            state.disturbance.pause();
         }
     }
 

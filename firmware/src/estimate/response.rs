@@ -69,12 +69,15 @@ pub struct ForceReading {
     pub normal_force_n: f32,
     /// Normal force that the torque withheld by rounding would cause on a rigid contact, N.
     pub withheld_n: f32,
+}
+
+/// Where the tip is when a block is evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
     /// p/Q22.
     pub p_ratio: f32,
     /// Whether the reference waits at an edge for a smaller least p/Q22.
     pub waits_at_edge: bool,
-    /// Whether there is time to update averages and bounds at this tick.
-    pub has_spare_time: bool,
 }
 
 /// What the response allows.
@@ -227,8 +230,8 @@ impl ResponseEstimator {
         }
     }
 
-    /// Updates the estimate with one tick of a tip that slides in contact, and returns whether it has
-    /// used the spare time.
+    /// Adds one tick of a tip that slides in contact to the present block, and returns whether the block is
+    /// complete: [`evaluate`](Self::evaluate) is then due, twice, when there is time.
     #[inline]
     pub fn update(&self, state: &mut ResponseState, reading: &ForceReading) -> bool {
         let excitation_n = reading.withheld_n - state.withheld_n + state.probe_n;
@@ -257,17 +260,19 @@ impl ResponseEstimator {
             sums.measured += change * change;
             return false;
         }
-        if !reading.has_spare_time {
-            return false;
-        }
+        true
+    }
+
+    /// Updates the averages or the bounds with a complete block.
+    #[inline]
+    pub fn evaluate(&self, state: &mut ResponseState, place: &Place) {
         state.block_ticks += 1;
         if state.block_ticks < END_TICKS {
             self.average(state);
         } else {
             self.bound(state);
-            self.move_limit(state, reading);
+            self.move_limit(state, place);
         }
-        true
     }
 
     /// Adds a block to the averages.
@@ -306,9 +311,9 @@ impl ResponseEstimator {
     }
 
     /// Lets the tip closer to the edge while the contact there is rigid, and less close while it gives.
-    fn move_limit(&self, state: &mut ResponseState, reading: &ForceReading) {
+    fn move_limit(&self, state: &mut ResponseState, place: &Place) {
         let settings = &self.settings;
-        if reading.p_ratio > self.near_p_ratio {
+        if place.p_ratio > self.near_p_ratio {
             return;
         }
         state.near_s += self.period_s;
@@ -318,7 +323,7 @@ impl ResponseEstimator {
         let least = &mut state.least_p_ratio;
         if state.upper < settings.gives {
             *least += RETREAT * self.approach;
-        } else if state.lower > settings.rigid && reading.waits_at_edge {
+        } else if state.lower > settings.rigid && place.waits_at_edge {
             *least -= self.approach;
         }
         *least = least.limited(0.0, settings.minimum_p_ratio);
@@ -379,12 +384,15 @@ mod tests {
             let reading = ForceReading {
                 normal_force_n: contact(commanded) + 0.03 * noise(3 * tick),
                 withheld_n: withheld,
-                // The tip stands where it may.
-                p_ratio: state.least_p_ratio,
-                waits_at_edge: true,
-                has_spare_time: tick % 2 == 0,
             };
-            estimator.update(&mut state, &reading);
+            if estimator.update(&mut state, &reading) && tick % 2 == 0 {
+                // The tip stands where it may.
+                let place = Place {
+                    p_ratio: state.least_p_ratio,
+                    waits_at_edge: true,
+                };
+                estimator.evaluate(&mut state, &place);
+            }
             let next = 0.05 * noise(3 * tick + 1);
             commanded = 10.0 + next - withheld + state.probe_n;
             withheld = next;

@@ -12,6 +12,7 @@ use painleve_shared::{Arm, Posture};
 use self::governor::{EdgeGovernor, GovernorSettings, GovernorState, LeastPRatio};
 use self::reference::{Program, ReferenceGenerator, ReferenceState, TipReference};
 use crate::estimate::ContactEstimate;
+use crate::estimate::friction::FrictionEstimate;
 use crate::estimate::model::Model;
 use crate::supervise::supervisor::Phase;
 
@@ -32,6 +33,32 @@ pub struct Target {
     pub at_edge: bool,
     /// Whether the tip must be returned to the belt before it can follow.
     pub recovering: bool,
+}
+
+/// How a tick of the [`References`] begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Beginning {
+    /// Whether the tip must be returned to the belt before it can follow.
+    recovering: bool,
+    /// Whether the reference starts at the tip.
+    starts: bool,
+    /// Least p as a fraction of Q22 at which the tip may land; 0 if it is not being returned to the belt.
+    landing_p_ratio: f32,
+}
+
+impl Beginning {
+    /// Returns the least p/Q22 that the search for the edges requires.
+    pub fn least_p_ratio(&self, contact: &ContactEstimate) -> LeastPRatio {
+        LeastPRatio {
+            landing: self.landing_p_ratio,
+            contact: contact.response.least_p_ratio,
+        }
+    }
+
+    /// Returns whether the edges are needed soon, because a tip in the air is being returned to the belt.
+    pub fn needs_edges(&self, contact: &ContactEstimate) -> bool {
+        self.landing_p_ratio > 0.0 && !contact.touches
+    }
 }
 
 /// Follows the program within the edges.
@@ -84,18 +111,16 @@ impl References {
         self.generator.is_done(&state.generator)
     }
 
-    /// Returns the target of one tick. `landing` is the posture in which a thrown tip is being
-    /// returned to the belt.
+    /// Begins a tick. `landing` is the posture in which a thrown tip is being returned to the belt.
     #[inline]
-    pub fn tick(
+    pub fn begin(
         &self,
         state: &mut ReferencesState,
-        arm: &Arm<f32>,
         model: &Model,
         contact: &ContactEstimate,
         phase: &Phase,
         landing: Option<Posture>,
-    ) -> Target {
+    ) -> Beginning {
         // The descent continues, and presses the tip gently, until contact is certain. The law's
         // whole force while in doubt would be evidence that comes and goes with the law.
         let descends = contact.in_flight || landing.is_some();
@@ -115,24 +140,47 @@ impl References {
             // position has changed with the links' length.
             state.generator.start_from(tip_t_m);
         }
-        let landing_p_ratio = if recovering || landing.is_some() {
-            self.landing_p_ratio
-        } else {
-            0.0
-        };
-        if contact.has_spare_time || (landing_p_ratio > 0.0 && !contact.touches) {
-            self.governor.search(
-                &mut state.governor,
-                arm,
-                state.posture,
-                tip_t_m,
-                &contact.friction,
-                LeastPRatio {
-                    landing: landing_p_ratio,
-                    contact: contact.response.least_p_ratio,
-                },
-            );
+        Beginning {
+            recovering,
+            starts,
+            landing_p_ratio: if recovering || landing.is_some() {
+                self.landing_p_ratio
+            } else {
+                0.0
+            },
         }
+    }
+
+    /// Continues the search for the edges of the admissible stretch around a tip at `tip_t_m`.
+    // Out of line: two kinds of tick contain it. Its arguments are few, because references to the stages'
+    // results would keep these in memory.
+    #[inline(never)]
+    pub fn search(
+        &self,
+        state: &mut ReferencesState,
+        arm: &Arm<f32>,
+        tip_t_m: f32,
+        friction: FrictionEstimate,
+        least: LeastPRatio,
+    ) {
+        let posture = state.posture;
+        self.governor
+            .search(&mut state.governor, arm, posture, tip_t_m, &friction, least);
+    }
+
+    /// Returns the target of a tick that has begun.
+    #[inline]
+    pub fn tick(
+        &self,
+        state: &mut ReferencesState,
+        beginning: &Beginning,
+        model: &Model,
+        phase: &Phase,
+    ) -> Target {
+        let Beginning {
+            recovering, starts, ..
+        } = *beginning;
+        let tip_t_m = model.tip_m.x;
         let wanted = match phase.state {
             SupervisorState::Armed => state.generator.start(),
             // The reference waits for a tip that is being returned to the belt.
