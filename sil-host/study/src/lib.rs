@@ -10,6 +10,7 @@
 //! - [`robustness`]: random arms, belts and converters; [`ablation`]: the contribution of each part of the controller
 //! - [`effects`]: success against the level of each effect of a real rig, on rigid and compliant contact
 //! - [`stiffness`]: the compliant contact as it gets stiffer, beside the rigid one
+//! - [`ringing`]: where the friction observer makes a compliant contact ring, beside the stability limit
 //! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
 //! - [`contact_probe`], [`distribution`], [`proportion`], [`paired_difference`]: contact, distributions and success rates
 //! - [`case`], [`trial`]: closed loops to study, and their execution in this process;
@@ -57,6 +58,7 @@ mod places;
 pub mod poincare;
 pub mod proportion;
 pub mod regions;
+pub mod ringing;
 pub mod robustness;
 pub mod settled;
 pub mod sliding_range;

@@ -67,6 +67,11 @@ impl<P: Plant> Trial<P> {
         self.simulation.plant().snapshot().tip_t_m
     }
 
+    /// Returns the normal force on the tip, N.
+    pub fn normal_force_n(&self) -> f64 {
+        self.simulation.plant().snapshot().normal_force_n
+    }
+
     /// Returns the last answer of the controller.
     pub fn answer(&self) -> &ActuatorFrame {
         &self.answer
