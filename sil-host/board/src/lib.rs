@@ -127,7 +127,7 @@ pub enum BoardError {
     #[error("the emulated board has stopped ({0}): run with --log to see the log of its image")]
     Ended(ExitStatus),
     /// The board has been silent for too long.
-    #[error("the board has not answered for {0:.1?}: its image hangs or is missing")]
+    #[error("the board has not answered for {:.1} s: its image hangs or is missing", .0.as_secs_f64())]
     Silent(Duration),
     /// The received bytes are not a message.
     #[error(

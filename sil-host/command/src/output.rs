@@ -34,10 +34,10 @@ pub struct OutputArguments {
     /// Do not write a record.
     #[arg(long, conflicts_with = "record")]
     no_record: bool,
-    /// Figure of the run.
+    /// Figure of the run, an SVG file.
     #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = figure_path)]
     plot: PathBuf,
-    /// Page of the run for the browser: it moves, and needs no network.
+    /// Page that plays the run in the browser, without a network.
     #[arg(long, value_name = "PATH", default_value = "out/run.html")]
     html: PathBuf,
     /// Do not write a page.
@@ -46,7 +46,7 @@ pub struct OutputArguments {
     /// Write neither figure nor page.
     #[arg(long, conflicts_with_all = ["plot", "html"])]
     no_plot: bool,
-    /// Table of every tick.
+    /// Table of every tick, a CSV file.
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
     /// Print the events of the run on standard error: changes of mode and state, lift-offs, impacts,

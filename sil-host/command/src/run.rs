@@ -52,13 +52,13 @@ impl std::str::FromStr for Replay {
 /// The scenario and its pacing.
 #[derive(Clone, Debug, Args)]
 pub struct ScenarioArguments {
-    /// Built-in scenario or TOML file; `run -` reads standard input.
+    /// Built-in scenario or TOML file; `-` reads standard input.
     #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
     name: String,
-    /// The same, as an option.
+    /// Built-in scenario or TOML file, as an option instead of an argument.
     #[arg(long = "scenario", value_name = "SCENARIO", conflicts_with = "name")]
     option: Option<String>,
-    /// Run INDEX of `study robustness --seed SEED` instead of a scenario.
+    /// Repeat run INDEX of `study robustness --seed SEED` instead of a scenario.
     #[arg(
         long,
         value_name = "SEED:INDEX",
@@ -66,7 +66,7 @@ pub struct ScenarioArguments {
         allow_hyphen_values = true
     )]
     replay: Option<Replay>,
-    /// Arms of that study, if not the paper's.
+    /// With --replay: the study's option --arms.
     #[arg(long, value_enum, default_value = "paper", requires = "replay")]
     arms: Arms,
     /// Override one key, for example belt.friction=0.4; may be repeated.
@@ -169,12 +169,12 @@ pub struct RunArguments {
     /// Exit with code 6 if one of these events happened; the report is still complete.
     #[arg(long, value_enum, value_name = "EVENTS", value_delimiter = ',')]
     fail_on: Vec<FailOn>,
-    /// Serve the run to a page in the browser and to Foxglove on this machine, which watch and steer
-    /// it, in one process and without files; until Ctrl-C.
+    /// Watch and steer the run from a page in the browser or from Foxglove, on this machine. It runs
+    /// in one process, writes no files, and continues until Ctrl-C.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     #[arg(conflicts_with_all = ["bus", "port", "fail_on"])]
     live: Option<u16>,
-    /// Let pages of another origin connect to --live as Foxglove does, for example
+    /// With --live: let pages of this origin connect as Foxglove does, for example
     /// http://localhost:8080; may be repeated.
     #[arg(long, value_name = "ORIGIN", requires = "live")]
     live_origin: Vec<String>,

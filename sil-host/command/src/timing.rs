@@ -32,8 +32,8 @@ pub struct TimingArguments {
     /// Override one key in all of them, for example run.tick_hz=10000; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Count instructions of the image under QEMU, cycles of a board, or wake-up latencies of this
-    /// PC.
+    /// Where the controller runs: qemu counts instructions, serial the cycles of a board, native the
+    /// wake-up latencies of this PC.
     #[arg(long, value_enum, default_value = "qemu")]
     host: Host,
     /// Serial port of the board, for example /dev/ttyUSB0.
@@ -47,7 +47,7 @@ pub struct TimingArguments {
     #[arg(long, conflicts_with_all = ["names", "overrides", "host", "port", "svg", "cyclictest"])]
     bound: bool,
     /// With --host native: run cyclictest (Debian's package rt-tests) beside each scenario, at the same rate
-    /// and priority. Its row shows what the machine itself grants.
+    /// and priority. Its row shows the latency of the machine itself.
     #[arg(long)]
     cyclictest: bool,
     /// Print JSON on stdout instead of the table.

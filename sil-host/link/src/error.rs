@@ -40,7 +40,7 @@ pub enum LinkError {
     },
 
     /// No plant appeared in time.
-    #[error("no plant on bus `{bus}` after {waited:.1?}: start `painleve plant --bus {bus}`")]
+    #[error("no plant on bus `{bus}` after {:.1} s: start `painleve plant --bus {bus}`", .waited.as_secs_f64())]
     PlantMissing {
         /// The bus.
         bus: BusName,
@@ -49,9 +49,7 @@ pub enum LinkError {
     },
 
     /// No controller appeared in time.
-    #[error(
-        "no controller on bus `{bus}` after {waited:.1?}: start `painleve controller --bus {bus}`"
-    )]
+    #[error("no controller on bus `{bus}` after {:.1} s: start `painleve controller --bus {bus}`", .waited.as_secs_f64())]
     ControllerMissing {
         /// The bus.
         bus: BusName,
@@ -77,7 +75,7 @@ pub enum LinkError {
     },
 
     /// The plant's process is alive but sends nothing.
-    #[error("the plant on bus `{bus}` has sent nothing for {silence:.1?}: it is stopped or stuck")]
+    #[error("the plant on bus `{bus}` has sent nothing for {:.1} s: it is stopped or stuck", .silence.as_secs_f64())]
     PlantSilent {
         /// The bus.
         bus: BusName,
@@ -86,9 +84,7 @@ pub enum LinkError {
     },
 
     /// The controller's process is alive but does not answer.
-    #[error(
-        "the controller on bus `{bus}` has not answered for {silence:.1?}: it is stopped or stuck"
-    )]
+    #[error("the controller on bus `{bus}` has not answered for {:.1} s: it is stopped or stuck", .silence.as_secs_f64())]
     ControllerSilent {
         /// The bus.
         bus: BusName,

@@ -92,11 +92,29 @@ impl TomlError {
     }
 }
 
+/// Returns a message of serde on one line, with words instead of Rust's names of types.
+fn in_words(message: &str) -> String {
+    let mut words = message.trim().replace('\n', " ");
+    for (names, meaning) in [
+        (&["f32", "f64"][..], "a number"),
+        (&["i32", "i64"], "a whole number"),
+        (
+            &["u8", "u16", "u32", "u64", "usize"],
+            "a whole number from 0",
+        ),
+    ] {
+        for name in names {
+            words = words.replace(&format!("expected {name}"), &format!("expected {meaning}"));
+        }
+    }
+    words
+}
+
 /// What is wrong with a key.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The key is unknown or its value has the wrong type.
-    #[error("{}", .0.message().replace('\n', " "))]
+    #[error("{}", in_words(.0.message()))]
     Value(toml::de::Error),
     /// The scenario cannot be written as a table.
     #[error(transparent)]
@@ -313,7 +331,10 @@ mod tests {
             ([0.21, 0.2], [0.12; 2])
         );
         let message = message(&["controller.belt.given_m_s=fast"]);
-        assert!(message.contains("given_m_s: invalid type"), "{message}");
+        assert!(
+            message.ends_with("given_m_s: invalid type: string \"fast\", expected a number"),
+            "{message}"
+        );
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub struct LiftOff {
     pub seed: u64,
     /// Number of runs with each kind of evidence.
     pub runs: usize,
-    /// Sliding time before the tip is led over the edge, s.
+    /// Sliding time before the reference leads the tip beyond the edge, s.
     pub slide_s: f64,
     /// Changes to every scenario.
     pub overrides: Vec<String>,

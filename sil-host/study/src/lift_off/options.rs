@@ -15,7 +15,7 @@ use crate::options::{self, RandomRuns};
 pub struct Options {
     #[command(flatten)]
     runs: RandomRuns,
-    /// Sliding time before the tip is led over the edge, s.
+    /// Sliding time before the reference leads the tip beyond the edge, s.
     #[arg(
         long,
         value_name = "SECONDS",
