@@ -9,7 +9,7 @@ use crate::last_command::LastCommand;
 use crate::refer::Target;
 use crate::supervise::supervisor::Supervision;
 
-/// A snapshot for logs and displays. The controller can only write it, through a [`TelemetrySink`].
+/// A snapshot for logs and displays. The controller can only write it, through a `TelemetrySink`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Telemetry {

@@ -1,6 +1,6 @@
 //! Starts the `painleve` program in end-to-end tests and inspects its results and leftovers.
 //!
-//! - [`line`]: a serial line that can be disturbed, with the image at its end
+//! - [`mod@line`]: a serial line that can be disturbed, with the image at its end
 //! - [`python`]: virtual environments
 //! - [`printed`]: figures in the documentation against measured ones
 

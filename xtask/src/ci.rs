@@ -1,6 +1,6 @@
-//! `cargo xtask ci`: formatting, lints and tests, in this order.
+//! `cargo xtask ci`: formatting, lints, links in doc comments and tests, in this order.
 
-use crate::command::{ChoreError, run_cargo};
+use crate::command::{ChoreError, cargo, run_cargo, run_with};
 use crate::test;
 
 /// Runs the steps of continuous integration.
@@ -17,5 +17,10 @@ pub fn run() -> Result<(), ChoreError> {
         "-D",
         "warnings",
     ])?;
+    run_with(
+        &cargo(),
+        &["doc", "--workspace", "--no-deps"],
+        &[("RUSTDOCFLAGS", "-D warnings")],
+    )?;
     test::run()
 }

@@ -1,5 +1,5 @@
 //! Code shared by the images of all boards. It names no chip: a board crate provides its own
-//! peripherals, and [`tasks!`] combines them with this code and a set of laws:
+//! peripherals, and `tasks!` combines them with this code and a set of laws:
 //!
 //! ```text
 //! #[cfg(target_os = "none")]

@@ -3,7 +3,7 @@
 use super::{Bounds, Range, Refused, SettingValue, Shape};
 use crate::range::OutOfRange;
 
-/// Declares a group of settings or a choice; see the [module](crate::settings).
+/// Declares a group of settings or a choice; see the [module](mod@crate::settings).
 ///
 /// A group lists `name: type = default, range, "unit";` with a doc comment on every setting; range and
 /// unit are optional where they do not apply. A choice lists `"name" => Variant`, which takes nothing, a

@@ -41,7 +41,7 @@ use crate::timing::Unit;
 pub struct TimedAnswer {
     /// The frame.
     pub frame: ActuatorFrame,
-    /// Cost of the controller's tick, in [`Board::unit`].
+    /// Cost of the controller's tick, in the board's unit.
     pub cost: u32,
 }
 

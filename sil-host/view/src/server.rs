@@ -1,7 +1,7 @@
 //! The live page on this machine: HTTP and WebSocket on one port of the loopback interface.
 //!
 //! Requests for another host (DNS rebinding) are refused, and so are connections from pages of another
-//! origin: the live page is open to itself only, and the [`foxglove`](crate::foxglove) service to the
+//! origin: the live page is open to itself only, and the [`foxglove`](mod@super::foxglove) service to the
 //! Foxglove app and the origins that the user names. Each viewer has a thread of its own, which sends
 //! about 60 times a second what the run has published to the [`Hub`].
 

@@ -5,7 +5,7 @@
 //! - [`stm32f4`], [`stm32g4`]: the microcontrollers' peripherals, [`stm32`] what they have in common; the
 //!   sensors on their buses are in [`painleve_parts`]
 //! - [`board`]: the board's wiring, the host's end of its serial line, the arm's torques
-//! - [`bench`]: the board with the simulated arm on its sensors and stages
+//! - [`mod@bench`]: the board with the simulated arm on its sensors and stages
 //!
 //! Time is counted in instructions: each takes [`machine::CYCLES_PER_INSTRUCTION`] of the clock
 //! that the image has configured. It does not measure the time on silicon.

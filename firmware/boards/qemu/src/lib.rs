@@ -1,7 +1,7 @@
 //! QEMU's `netduinoplus2`, a board with an STM32F405, the chip of the flash target.
 //!
-//! - [`pipes`]: in lockstep with its host, deterministic to the instruction
-//! - [`serial`]: with an independent clock, over the flash target's serial port
+//! - `pipes`: in lockstep with its host, deterministic to the instruction
+//! - `serial`: with an independent clock, over the flash target's serial port
 
 #![no_std]
 #![cfg(target_os = "none")]

@@ -8,7 +8,7 @@ use crate::robustness::LiftOffRule;
 pub struct RigEffect {
     /// Name on the command line and in rows.
     pub name: &'static str,
-    /// The key that a level sets; [`LevelOverrides::Computed`] may set further keys with it.
+    /// The key that a level sets; computed levels may set further keys with it.
     pub key: &'static str,
     /// Unit of a level; empty for a ratio.
     pub unit: &'static str,

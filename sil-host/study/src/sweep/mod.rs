@@ -9,7 +9,7 @@
 //! - [`shard_file`]: a finished shard, either complete or absent
 //! - [`folder`]: the finished shards, and their merge
 //! - `parquet`: the merged rows as columns, with the feature of that name
-//! - [`array`]: lists of shards in the syntax of schedulers; [`slurm`]: a job script for Slurm
+//! - [`mod@array`]: lists of shards in the syntax of schedulers; [`slurm`]: a job script for Slurm
 //!
 //! The files are the only state, and no process waits for another.
 
