@@ -347,12 +347,21 @@ fn an_output_that_cannot_be_written_is_reported_before_anything_is_computed() {
 #[test]
 fn the_page_of_all_figures_is_self_contained() {
     let bench = Bench::new("figures");
-    let output = bench.run(&["figures", "--draft", "--out", "page"]);
-    assert!(output.status.success(), "{output:?}");
-    assert_eq!(
-        String::from_utf8_lossy(&output.stdout).trim(),
-        "page/index.html"
-    );
+    let result = bench.report(&["figures", "--draft", "--out", "page", "--json"]);
+    assert_eq!(result["page"], "page/index.html");
+    assert_eq!(result["draft"], true);
+    for file in result["files"].as_array().unwrap_or(&Vec::new()) {
+        let file = file.as_str().unwrap_or_default();
+        assert!(bench.path(file).exists(), "{file} was not written");
+    }
+    let sections = result["sections"].as_array().map_or(&[][..], Vec::as_slice);
+    assert!(sections.len() >= 11, "{result}");
+    for section in sections {
+        keys(section, &["name", "title", "commands", "comparisons"]);
+        for comparison in section["comparisons"].as_array().unwrap_or(&Vec::new()) {
+            keys(comparison, &["what", "paper", "here", "verdict"]);
+        }
+    }
     let html = std::fs::read_to_string(bench.path("page/index.html")).unwrap_or_default();
     let files = bench.files();
     for name in [

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
+use serde_json::json;
 
+use super::json::JsonOption;
 use super::output_error::{OutputError, output};
 use super::{Cli, CommandError};
 
@@ -20,6 +22,8 @@ pub struct CompletionsArguments {
 pub struct ManArguments {
     /// Folder for the pages, as in ~/.local/share/man/man1.
     folder: PathBuf,
+    #[command(flatten)]
+    json: JsonOption,
 }
 
 /// Prints a completion script.
@@ -44,5 +48,14 @@ pub fn write_manual(arguments: &ManArguments) -> Result<(), CommandError> {
         })
     };
     std::fs::create_dir_all(folder).map_err(refuse)?;
-    clap_mangen::generate_to(Cli::command(), folder).map_err(refuse)
+    clap_mangen::generate_to(Cli::command(), folder).map_err(refuse)?;
+    let first = folder.join("painleve.1");
+    let result = json!({ "folder": folder, "first": first });
+    arguments.json.say(
+        &result,
+        format_args!(
+            "{}: the manual's first page; the others are beside it",
+            first.display()
+        ),
+    )
 }

@@ -7,9 +7,10 @@ use clap::Args;
 use painleve_record::export::ticks_to_csv;
 use painleve_system::atomic_file;
 use painleve_system::terminal::warn;
+use serde_json::json;
 
-use super::CommandError;
 use super::output_error::{InputError, RecordFileError, output};
+use super::{CommandError, say};
 
 /// Options of `painleve export`.
 #[derive(Debug, Args)]
@@ -22,6 +23,9 @@ pub struct ExportArguments {
     /// Write Parquet, by default beside the record; requires the cargo feature parquet.
     #[arg(long, value_name = "PATH", num_args = 0..=1)]
     parquet: Option<Option<PathBuf>>,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Writes one row per control tick and one column per quantity.
@@ -31,12 +35,22 @@ pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
         path: record.clone(),
         source,
     })?;
+    let mut files = Vec::new();
     if let Some(path) = &arguments.csv {
-        write(&beside(record, path.as_deref(), "csv"), &table)?;
+        files.push(write(beside(record, path.as_deref(), "csv"), &table)?);
     }
     if let Some(path) = &arguments.parquet {
         let columns = parquet(&table)?;
-        write(&beside(record, path.as_deref(), "parquet"), &columns)?;
+        files.push(write(beside(record, path.as_deref(), "parquet"), &columns)?);
+    }
+    if arguments.json {
+        let lines = table.iter().filter(|byte| **byte == b'\n').count();
+        // The first line is the header; no value contains a line break.
+        let rows = lines.saturating_sub(1);
+        return say(json!({ "record": record, "rows": rows, "files": files }));
+    }
+    for file in files {
+        warn(format_args!("wrote {}", file.display()));
     }
     Ok(())
 }
@@ -53,10 +67,10 @@ fn beside(record: &Path, path: Option<&Path>, extension: impl AsRef<OsStr>) -> P
     path.map_or_else(|| record.with_extension(extension), Path::to_path_buf)
 }
 
-fn write(path: &Path, contents: &[u8]) -> Result<(), CommandError> {
-    atomic_file::write(path, contents).map_err(output)?;
-    warn(format_args!("wrote {}", path.display()));
-    Ok(())
+/// Writes a file and returns its path.
+fn write(path: PathBuf, contents: &[u8]) -> Result<PathBuf, CommandError> {
+    atomic_file::write(&path, contents).map_err(output)?;
+    Ok(path)
 }
 
 #[cfg(feature = "parquet")]

@@ -16,10 +16,12 @@ use painleve_study::catalogue::{AnyOutcome, STUDIES};
 use painleve_study::figures::page_maker::{Fineness, PageMaker};
 use painleve_study::figures::{self, Page, Section};
 use painleve_system::atomic_file::{self, AtomicFile};
+use serde_json::{Value, json};
 
+use super::CommandError;
+use super::json::JsonOption;
 use super::output_error::output;
 use super::study::outcome::{Threads, progress_bar};
-use super::{CommandError, say};
 
 /// Options of `painleve figures`.
 #[derive(Debug, Args)]
@@ -32,6 +34,8 @@ pub struct FiguresArguments {
     draft: bool,
     #[command(flatten)]
     threads: Threads,
+    #[command(flatten)]
+    json: JsonOption,
 }
 
 /// The simulations shown in the paper.
@@ -86,11 +90,31 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
         is_draft: arguments.draft,
         sections,
     };
-    for (path, contents) in files {
-        atomic_file::write(path, &contents).map_err(output)?;
+    for (path, contents) in &files {
+        atomic_file::write(path, contents).map_err(output)?;
     }
     atomic_file::write(&page_path, page.html().as_bytes()).map_err(output)?;
-    say(page_path.display())
+    arguments
+        .json
+        .say(&result(&page_path, &page, &files), page_path.display())
+}
+
+/// Returns what the command prints with `--json`.
+fn result(page_path: &Path, page: &Page, files: &[(PathBuf, Vec<u8>)]) -> Value {
+    let section = |section: &Section| {
+        json!({
+            "name": section.name,
+            "title": section.title,
+            "commands": section.commands,
+            "comparisons": section.comparisons,
+        })
+    };
+    json!({
+        "page": page_path,
+        "draft": page.is_draft,
+        "files": files.iter().map(|(path, _)| path).collect::<Vec<_>>(),
+        "sections": page.sections.iter().map(section).collect::<Vec<_>>(),
+    })
 }
 
 /// Returns the data files of a section's outcome, to be written beside the page.

@@ -10,6 +10,7 @@ mod export;
 mod fail_on;
 mod figures;
 mod join;
+mod json;
 mod live;
 mod output;
 mod output_error;

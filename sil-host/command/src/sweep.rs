@@ -12,7 +12,10 @@ use painleve_study::sweep::slurm::Job;
 use painleve_study::sweep::{SweepError, array, folder, shard_file};
 use painleve_system::atomic_file;
 use painleve_system::terminal::warn;
+use serde::Serialize;
+use serde_json::json;
 
+use super::json::JsonOption;
 use super::output_error::output;
 use super::study::campaign::understand;
 use super::study::outcome::Threads;
@@ -34,7 +37,7 @@ enum SweepCommand {
     /// Show which shards are finished.
     Status(StatusArguments),
     /// Print the missing shards in array syntax, for example 3,7,9-12.
-    Missing(SweepFolder),
+    Missing(MissingArguments),
     /// Merge all shards; fails if one is missing or duplicated.
     Merge(MergeArguments),
     /// Write a script that submits the missing shards to a scheduler.
@@ -57,6 +60,16 @@ struct PlanArguments {
     #[arg(long, value_name = "N")]
     shards: NonZeroUsize,
     #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
+    place: SweepFolder,
+}
+
+#[derive(Debug, Args)]
+struct MissingArguments {
+    #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
     place: SweepFolder,
 }
 
@@ -71,15 +84,17 @@ struct ShardArguments {
     all: bool,
     #[command(flatten)]
     threads: Threads,
+    /// Print one JSON object on stdout at the end instead of a line per shard.
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     place: SweepFolder,
 }
 
 #[derive(Debug, Args)]
 struct StatusArguments {
-    /// Print one JSON object on stdout instead of the table.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonOption,
     #[command(flatten)]
     place: SweepFolder,
 }
@@ -93,6 +108,8 @@ struct MergeArguments {
     #[cfg(feature = "parquet")]
     #[arg(long, value_name = "PATH")]
     parquet: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
     #[command(flatten)]
     place: SweepFolder,
 }
@@ -121,6 +138,8 @@ struct SlurmArguments {
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
     #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
     place: SweepFolder,
 }
 
@@ -130,7 +149,7 @@ pub fn run(arguments: &SweepArguments) -> Result<(), CommandError> {
         SweepCommand::Plan(arguments) => plan(arguments),
         SweepCommand::Run(arguments) => compute(arguments),
         SweepCommand::Status(arguments) => status(arguments),
-        SweepCommand::Missing(place) => missing(&place.folder),
+        SweepCommand::Missing(arguments) => missing(arguments),
         SweepCommand::Merge(arguments) => merge(arguments),
         SweepCommand::Submit(SubmitArguments {
             scheduler: Scheduler::Slurm(arguments),
@@ -148,14 +167,25 @@ fn plan(arguments: &PlanArguments) -> Result<(), CommandError> {
     let manifest = Manifest::new(campaign, &understood, arguments.shards.get())?;
     let folder = &arguments.place.folder;
     let is_new = manifest.write(folder)?;
-    say(format!(
-        "{}{}: campaign {}, {} rows in {} shards",
-        Manifest::path(folder).display(),
-        if is_new { "" } else { " (there already)" },
-        manifest.campaign_hash(),
-        manifest.rows,
-        manifest.shards,
-    ))
+    let path = Manifest::path(folder);
+    let result = json!({
+        "manifest": path,
+        "is_new": is_new,
+        "campaign_hash": manifest.campaign_hash(),
+        "rows": manifest.rows,
+        "shards": manifest.shards,
+    });
+    arguments.json.say(
+        &result,
+        format_args!(
+            "{}{}: campaign {}, {} rows in {} shards",
+            path.display(),
+            if is_new { "" } else { " (there already)" },
+            manifest.campaign_hash(),
+            manifest.rows,
+            manifest.shards,
+        ),
+    )
 }
 
 /// Returns the manifest and the study that it describes.
@@ -178,10 +208,43 @@ fn compute(arguments: &ShardArguments) -> Result<(), CommandError> {
         let variable = |name: &str| std::env::var(name).ok();
         vec![share::shard(arguments.shard, manifest.shards, variable).map_err(SweepError::from)?]
     };
+    let mut finished = Vec::new();
     for shard in shards {
-        compute_shard(arguments, &manifest, &understood, shard)?;
+        let result = compute_shard(arguments, &manifest, &understood, shard)?;
+        if !arguments.json {
+            say(result.line(manifest.shards))?;
+        }
+        finished.push(result);
+    }
+    if arguments.json {
+        say(json!({ "shards": manifest.shards, "finished": finished }))?;
     }
     Ok(())
+}
+
+/// A shard after `sweep run`.
+#[derive(Debug, Serialize)]
+struct FinishedShard {
+    /// Number of the shard.
+    shard: usize,
+    /// Number of its rows.
+    rows: usize,
+    /// Its file.
+    file: PathBuf,
+    /// False if it was already finished.
+    computed: bool,
+}
+
+impl FinishedShard {
+    /// Returns the shard as a line of text.
+    fn line(&self, shards: usize) -> String {
+        let name = format!("shard {}/{shards}", self.shard);
+        if self.computed {
+            format!("{name}: {} rows in {}", self.rows, self.file.display())
+        } else {
+            format!("{name}: already finished")
+        }
+    }
 }
 
 fn compute_shard(
@@ -189,13 +252,20 @@ fn compute_shard(
     manifest: &Manifest,
     understood: &Understood,
     shard: usize,
-) -> Result<(), CommandError> {
+) -> Result<FinishedShard, CommandError> {
     let folder = &arguments.place.folder;
     let path = shard_file::path(folder, shard);
     let name = format!("shard {shard}/{}", manifest.shards);
+    let share = Share::new(understood.table.as_ref(), shard, manifest.shards);
+    let finished = |computed| FinishedShard {
+        shard,
+        rows: share.rows().len(),
+        file: path.clone(),
+        computed,
+    };
     if path.exists() {
         match shard_file::read(&path, manifest) {
-            Ok(found) if found.shard == shard => return say(format!("{name}: already finished")),
+            Ok(found) if found.shard == shard => return Ok(finished(false)),
             Ok(found) => warn(format_args!(
                 "{} holds shard {}: computed again",
                 path.display(),
@@ -207,23 +277,15 @@ fn compute_shard(
         // An unwritable path is reported before anything is computed.
         atomic_file::AtomicFile::create(&path).map_err(output)?;
     }
-    let share = Share::new(understood.table.as_ref(), shard, manifest.shards);
     let records = arguments.threads.compute(&name, &share)?;
     shard_file::write(folder, manifest, shard, share.rows(), &records)?;
-    say(format!(
-        "{name}: {} rows in {}",
-        share.rows().len(),
-        path.display()
-    ))
+    Ok(finished(true))
 }
 
 fn status(arguments: &StatusArguments) -> Result<(), CommandError> {
     let folder = &arguments.place.folder;
     let manifest = Manifest::load(folder)?;
     let status = folder::status(folder, &manifest)?;
-    if arguments.json {
-        return say(&serde_json::to_string(&status).map_err(output)?);
-    }
     let mut table = outcome::table(["sweep", &folder.display().to_string()]);
     table.add_row(["campaign", manifest.campaign_hash()]);
     table.add_row(["study", &manifest.campaign.study]);
@@ -245,12 +307,15 @@ fn status(arguments: &StatusArguments) -> Result<(), CommandError> {
             table.add_row([&file.display().to_string(), &reason]);
         }
     }
-    say(table)
+    arguments.json.say(&status, table)
 }
 
-fn missing(folder: &Path) -> Result<(), CommandError> {
+fn missing(arguments: &MissingArguments) -> Result<(), CommandError> {
+    let folder = &arguments.place.folder;
     let manifest = Manifest::load(folder)?;
-    say(array::syntax(&folder::missing(folder, &manifest)?))
+    let missing = array::syntax(&folder::missing(folder, &manifest)?);
+    let result = json!({ "shards": manifest.shards, "missing": missing });
+    arguments.json.say(&result, &missing)
 }
 
 fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
@@ -259,19 +324,26 @@ fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
     let text = folder::merge(folder, &manifest)?;
     let default = folder.join("merged.csv");
     let path = arguments.csv.as_ref().unwrap_or(&default);
+    atomic_file::write(path, &text).map_err(output)?;
+    #[cfg_attr(not(feature = "parquet"), expect(unused_mut))]
+    let mut files = vec![path];
     #[cfg(feature = "parquet")]
     if let Some(path) = &arguments.parquet {
         let columns = painleve_study::sweep::parquet::from_csv(&text).map_err(output)?;
         atomic_file::write(path, &columns).map_err(output)?;
+        files.push(path);
     }
-    atomic_file::write(path, &text).map_err(output)?;
     folder::tidy(folder);
-    say(format!(
-        "{}: {} rows of {} shards",
-        path.display(),
-        manifest.rows,
-        manifest.shards
-    ))
+    let result = json!({ "files": files, "rows": manifest.rows, "shards": manifest.shards });
+    arguments.json.say(
+        &result,
+        format_args!(
+            "{}: {} rows of {} shards",
+            path.display(),
+            manifest.rows,
+            manifest.shards
+        ),
+    )
 }
 
 fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
@@ -279,7 +351,10 @@ fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
     let manifest = Manifest::load(folder)?;
     let array = array::syntax(&folder::missing(folder, &manifest)?);
     if array.is_empty() {
-        return say("every shard is finished; merge them with `painleve sweep merge`");
+        return arguments.json.say(
+            &json!({ "missing": array, "script": null, "command": null }),
+            "every shard is finished; merge them with `painleve sweep merge`",
+        );
     }
     let job = Job {
         program: &std::env::current_exe()?,
@@ -293,8 +368,10 @@ fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
     let default = folder.join("sweep.sbatch");
     let path = arguments.out.as_ref().unwrap_or(&default);
     atomic_file::write(path, script.as_bytes()).map_err(output)?;
-    say(format!(
-        "{0}: shards {array}; submit with: sbatch {0}",
-        path.display()
-    ))
+    let command = format!("sbatch {}", path.display());
+    let result = json!({ "missing": array, "script": path, "command": command });
+    arguments.json.say(
+        &result,
+        format_args!("{}: shards {array}; submit with: {command}", path.display()),
+    )
 }

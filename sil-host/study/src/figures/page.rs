@@ -3,6 +3,7 @@
 use comfy_table::Table;
 use core::fmt::Write;
 use painleve_chart::markup;
+use serde::Serialize;
 
 /// The page.
 #[derive(Clone, Debug, Default)]
@@ -39,7 +40,7 @@ pub struct Section {
 }
 
 /// A number or statement of the paper, compared with the computed one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Subject of the comparison.
     pub what: String,
@@ -52,7 +53,8 @@ pub struct Comparison {
 }
 
 /// Verdict of a comparison with the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Equal to the digits of the paper.
     Agrees,
