@@ -96,7 +96,13 @@ impl<T: Real> Arm<T> {
     /// Height of the tip above the belt, z_n + H, m; negative inside the belt.
     #[inline]
     pub fn gap_m(&self, pose: &Pose<T>) -> T {
-        self.height_m - self.length_1_m * (pose.cosine.x + self.length_ratio * pose.cosine.y)
+        self.gap_of_cosines_m(pose.cosine.x, pose.cosine.y)
+    }
+
+    /// The same from cos θ1 and cos θ2.
+    #[inline]
+    pub fn gap_of_cosines_m(&self, cosine_1: T, cosine_2: T) -> T {
+        self.height_m - self.length_1_m * (cosine_1 + self.length_ratio * cosine_2)
     }
 
     /// Jacobian J with ż = J θ̇, m; its rows are the paper's j1 and j2.

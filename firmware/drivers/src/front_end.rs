@@ -9,11 +9,12 @@ use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::mounting::Mounting;
 use painleve_shared::winding::WindingSettings;
 
+use crate::checks::{Checks, TURNS, Verdict};
 use crate::encoders::{self, EncoderDriver};
 use crate::force_cell::{self, ForceCellDriver};
 use crate::gap::{GapCheck, Scales};
-use crate::heating::{Heating, HeatingModel};
-use crate::plausibility::{Implausible, Plausibility, SensorReadings};
+use crate::heating::HeatingModel;
+use crate::plausibility::{Implausible, SensorReadings};
 use crate::switches::Switches;
 
 /// Count of a sensor without a reading: out of every range, so that the controller counts it as a lapse.
@@ -57,9 +58,8 @@ pub struct FrontEndSettings {
 #[derive(Clone, Debug)]
 pub struct FrontEnd {
     settings: Option<FrontEndSettings>,
-    gap: Option<GapCheck>,
+    checks: Checks,
     switches: Switches,
-    plausibility: Plausibility,
     sequence: u32,
     may_arm: bool,
     /// Ticks for which RESET has been pressed, with ENABLE open.
@@ -67,8 +67,6 @@ pub struct FrontEnd {
     is_active: bool,
     /// Torques put out since the last frame.
     torques: [TorqueCounts; 2],
-    heating_model: Option<HeatingModel>,
-    heating: Heating,
     is_fit: bool,
 }
 
@@ -80,7 +78,7 @@ impl FrontEnd {
                 encoders: it.encoders,
                 force: it.force,
                 torque: it.torque,
-                tick_hz: it.tick_hz,
+                check_hz: it.tick_hz / f32::from(TURNS),
             };
             Some(GapCheck::new(it.arm?, scales))
         });
@@ -89,25 +87,22 @@ impl FrontEnd {
             .and_then(|it| HeatingModel::new(&it.winding, &it.torque, it.tick_hz));
         Self {
             settings,
-            gap,
+            checks: Checks::new(gap, heating_model),
             switches: Switches::default(),
-            plausibility: Plausibility::default(),
             sequence: 0,
             may_arm: false,
             pressed_ticks: 0,
             is_active: false,
             torques: [TorqueCounts(0); 2],
-            heating_model,
-            heating: Heating::default(),
             is_fit: false,
         }
     }
 
     /// Starts afresh with these settings; the windings are as hot as they were.
     pub fn restart(&mut self, settings: FrontEndSettings) {
-        let heating = self.heating;
-        *self = Self::new(Some(settings));
-        self.heating = heating;
+        let mut restarted = Self::new(Some(settings));
+        restarted.checks.keep_heat_of(&self.checks);
+        *self = restarted;
     }
 
     /// Permits or forbids the drive to arm.
@@ -141,12 +136,14 @@ impl FrontEnd {
         let readings = self.readings(encoders, force_cell);
         let mut inputs = self.switches.tick(levels.enable, levels.reset);
         self.note_button(levels);
-        let contradiction = self.contradicts(&readings);
-        if let Some(model) = &self.heating_model {
-            self.heating.tick(model, self.torques);
-        }
-        let is_hot = self.heating_model.is_some() && self.heating.is_hot();
-        let plausible = self.plausibility.tick(&readings, self.bits());
+        let bits = self.bits();
+        let Verdict {
+            contradiction,
+            is_hot,
+            plausible,
+        } = self
+            .checks
+            .tick(&readings, self.torques, self.is_active, bits);
         self.is_fit = readings.are_complete() && levels.stages_ready;
         if self.is_active {
             inputs.set(DigitalInputs::STAGE_NOT_READY, !levels.stages_ready);
@@ -241,17 +238,6 @@ impl FrontEnd {
                 normal.map(|it| balanced(it, tare_n, force_n)),
             ],
             magnets: magnets.map(|it| it.map(|it| it.is_healthy())),
-        }
-    }
-
-    /// Returns whether complete readings contradict each other.
-    fn contradicts(&mut self, readings: &SensorReadings) -> bool {
-        match (&mut self.gap, readings.joints, readings.forces) {
-            (Some(gap), [Some(joint_1), Some(joint_2)], [_, Some(normal)]) => {
-                let torques = self.is_active.then_some(self.torques);
-                gap.contradicts([joint_1, joint_2], normal, torques)
-            }
-            _ => false,
         }
     }
 }

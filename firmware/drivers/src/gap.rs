@@ -7,12 +7,13 @@
 //! cell or its line is dead and reads zero, or both encoders are frozen.
 //!
 //! Nor can a force stay the same to the count while the torques of a driven arm change: the force cell is stuck.
+//!
+//! A check takes three steps, for as many ticks.
 
-use painleve_shared::counts::{
-    EncoderCounts, EncoderScale, ForceCounts, LinearScale, TorqueCounts,
-};
-use painleve_shared::kinematics::Pose;
-use painleve_shared::{Arm, JointMotion};
+use painleve_shared::counts::{EncoderScale, ForceCounts, LinearScale, TorqueCounts};
+use painleve_shared::{Arm, JointMotion, Real};
+
+use crate::plausibility::SensorReadings;
 
 /// Largest error of the height of the tip, as a part of the height of the arm's base over the belt: errors of
 /// the links' lengths and of the encoders' zeros stay below.
@@ -48,8 +49,21 @@ pub struct Scales {
     pub force: LinearScale<f32>,
     /// Torque stages, N·m.
     pub torque: LinearScale<f32>,
-    /// Rate of the readings, Hz.
-    pub tick_hz: f32,
+    /// Rate of the checks, Hz.
+    pub check_hz: f32,
+}
+
+/// Readings under check.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    /// θ2, rad.
+    theta_2_rad: f32,
+    cosine_1: f32,
+    /// Height of the tip over the belt, m.
+    gap_m: f32,
+    normal_force: ForceCounts,
+    /// `None` while the drive is not active.
+    torques: Option<[TorqueCounts; 2]>,
 }
 
 /// Model and scalings of an arm on its belt.
@@ -60,13 +74,15 @@ pub struct GapCheck {
     /// One count of each encoder, rad.
     rad_per_count: [f32; 2],
     force: LinearScale<f32>,
-    /// Ticks for which a tip may rest near the belt without a force.
-    rest_limit_ticks: u32,
-    /// Ticks for which it has, and its height over the belt at the first of them, m.
-    rest_ticks: u32,
+    /// The readings under check; `None` if they are not complete.
+    sample: Option<Sample>,
+    /// Checks for which a tip may rest near the belt without a force.
+    rest_limit: u32,
+    /// Checks for which it has, and its height over the belt at the first of them, m.
+    rests: u32,
     rest_gap_m: f32,
-    /// Ticks for which a force may stay the same.
-    stuck_limit_ticks: u32,
+    /// Checks for which a force may stay the same.
+    stuck_limit: u32,
     /// Change of a torque, counts, from which a force has to change.
     stuck_torque: i32,
     unchanged: UnchangedForce,
@@ -76,8 +92,8 @@ pub struct GapCheck {
 #[derive(Clone, Copy, Debug, Default)]
 struct UnchangedForce {
     force: ForceCounts,
-    /// Ticks since it changed.
-    ticks: u32,
+    /// Checks since it changed.
+    checks: u32,
     /// Smallest and largest torques meanwhile.
     lowest: [TorqueCounts; 2],
     highest: [TorqueCounts; 2],
@@ -87,7 +103,7 @@ impl UnchangedForce {
     fn new(force: ForceCounts, torques: [TorqueCounts; 2]) -> Self {
         Self {
             force,
-            ticks: 0,
+            checks: 0,
             lowest: torques,
             highest: torques,
         }
@@ -109,31 +125,61 @@ impl GapCheck {
             encoders: scales.encoders,
             rad_per_count: scales.encoders.map(|scale| scale.rad_per_count()),
             force: scales.force,
-            rest_limit_ticks: (REST_LIMIT_S * scales.tick_hz) as u32,
-            rest_ticks: 0,
+            sample: None,
+            rest_limit: (REST_LIMIT_S * scales.check_hz) as u32,
+            rests: 0,
             rest_gap_m: 0.0,
-            stuck_limit_ticks: (STUCK_LIMIT_S * scales.tick_hz) as u32,
+            stuck_limit: (STUCK_LIMIT_S * scales.check_hz) as u32,
             stuck_torque: (STUCK_TORQUE * scales.torque.maximum_counts() as f32) as i32,
             unchanged: UnchangedForce::default(),
         }
     }
 
-    /// Returns whether the readings of this tick contradict each other, or those before, or the torques; `None`
-    /// while the drive is not active: a tip may rest without a force then, because somebody may hold the arm.
-    pub fn contradicts(
-        &mut self,
-        joints: [EncoderCounts; 2],
-        normal_force: ForceCounts,
-        torques: Option<[TorqueCounts; 2]>,
-    ) -> bool {
+    /// Begins a check of these readings. The torques are `None` while the drive is not active: a tip may rest
+    /// without a force then, because somebody may hold the arm.
+    pub fn begin(&mut self, readings: &SensorReadings, torques: Option<[TorqueCounts; 2]>) {
+        let ([Some(joint_1), Some(joint_2)], [_, Some(normal_force)]) =
+            (readings.joints, readings.forces)
+        else {
+            self.sample = None;
+            return;
+        };
         let [scale_1, scale_2] = &self.encoders;
         let [rad_1, rad_2] = self.rad_per_count;
-        let [joint_1, joint_2] = joints;
         let joints = JointMotion::new(
             scale_1.counts_from_zero(joint_1) as f32 * rad_1,
             scale_2.counts_from_zero(joint_2) as f32 * rad_2,
         );
-        let gap_m = self.arm.gap_m(&Pose::new(&joints.to_links()));
+        let theta_rad = joints.to_links();
+        let (_, cosine_1) = theta_rad.first().sine_cosine();
+        self.sample = Some(Sample {
+            theta_2_rad: theta_rad.second(),
+            cosine_1,
+            gap_m: 0.0,
+            normal_force,
+            torques,
+        });
+    }
+
+    /// Continues the check: computes the tip's height.
+    pub fn measure(&mut self) {
+        if let Some(sample) = &mut self.sample {
+            let (_, cosine_2) = sample.theta_2_rad.sine_cosine();
+            sample.gap_m = self.arm.gap_of_cosines_m(sample.cosine_1, cosine_2);
+        }
+    }
+
+    /// Ends the check: returns whether the readings contradict each other, or those before, or the torques.
+    pub fn contradicts(&mut self) -> bool {
+        let Some(Sample {
+            gap_m,
+            normal_force,
+            torques,
+            ..
+        }) = self.sample.take()
+        else {
+            return false;
+        };
         let tolerance_m = HEIGHT_TOLERANCE * self.arm.height_m();
         let force_n = self.force.value(normal_force.0);
         let touches = force_n > FORCE_TOLERANCE * self.force.range;
@@ -141,13 +187,13 @@ impl GapCheck {
             && force_n < NO_FORCE * self.force.range
             && gap_m < tolerance_m
             && (gap_m - self.rest_gap_m).abs() < REST_TOLERANCE * self.arm.height_m();
-        self.rest_ticks = if rests {
-            self.rest_ticks.saturating_add(1)
+        self.rests = if rests {
+            self.rests.saturating_add(1)
         } else {
             self.rest_gap_m = gap_m;
             0
         };
-        let is_dead = self.rest_ticks > self.rest_limit_ticks;
+        let is_dead = self.rests > self.rest_limit;
         let is_stuck = self.is_stuck(normal_force, torques.filter(|_| touches));
         gap_m < -tolerance_m || touches && gap_m > tolerance_m || is_dead || is_stuck
     }
@@ -161,9 +207,8 @@ impl GapCheck {
                     unchanged.lowest[joint] = unchanged.lowest[joint].min(torque);
                     unchanged.highest[joint] = unchanged.highest[joint].max(torque);
                 }
-                unchanged.ticks = unchanged.ticks.saturating_add(1);
-                unchanged.ticks > self.stuck_limit_ticks
-                    && unchanged.torque_change() > self.stuck_torque
+                unchanged.checks = unchanged.checks.saturating_add(1);
+                unchanged.checks > self.stuck_limit && unchanged.torque_change() > self.stuck_torque
             }
             _ => {
                 *unchanged = UnchangedForce::new(force, torques.unwrap_or_default());
@@ -177,6 +222,7 @@ impl GapCheck {
 mod tests {
     use super::*;
     use painleve_shared::ArmParameters;
+    use painleve_shared::counts::EncoderCounts;
 
     const FORCE: LinearScale<f32> = LinearScale {
         bits: 12,
@@ -193,7 +239,7 @@ mod tests {
             encoders: [EncoderScale::default(); 2],
             force: FORCE,
             torque: TORQUE,
-            tick_hz: 1000.0,
+            check_hz: 1000.0,
         };
         GapCheck::new(arm, scales)
     }
@@ -212,14 +258,31 @@ mod tests {
         Some([TorqueCounts(counts), TorqueCounts(7)])
     }
 
-    fn contradicts(degrees: [f64; 2], force_n: f32) -> bool {
-        check().contradicts(joints(degrees), counts(force_n), torques(0))
+    /// Returns the result of the three steps of a check.
+    fn result(
+        check: &mut GapCheck,
+        joints: [EncoderCounts; 2],
+        normal_force: ForceCounts,
+        torques: Option<[TorqueCounts; 2]>,
+    ) -> bool {
+        let readings = SensorReadings {
+            joints: joints.map(Some),
+            forces: [Some(normal_force); 2],
+            ..SensorReadings::default()
+        };
+        check.begin(&readings, torques);
+        check.measure();
+        check.contradicts()
     }
 
-    /// Returns the tick, of 1 kHz, at which a tip that rests on the belt for a second is found implausible.
+    fn contradicts(degrees: [f64; 2], force_n: f32) -> bool {
+        result(&mut check(), joints(degrees), counts(force_n), torques(0))
+    }
+
+    /// Returns the check, of a thousand a second, at which a tip that rests on the belt for a second is found implausible.
     fn found_at(force_n: f32, torques: Option<[TorqueCounts; 2]>) -> Option<u32> {
         let mut check = check();
-        (0..1000).find(|_| check.contradicts(joints(ON_BELT), counts(force_n), torques))
+        (0..1000).find(|_| result(&mut check, joints(ON_BELT), counts(force_n), torques))
     }
 
     /// Returns the same for a force, counts, and a torque, counts, of each tick.
@@ -227,7 +290,7 @@ mod tests {
         let mut check = check();
         (0..1000).find(|tick| {
             let force = ForceCounts(force(*tick));
-            check.contradicts(joints(ON_BELT), force, torques(torque(*tick)))
+            result(&mut check, joints(ON_BELT), force, torques(torque(*tick)))
         })
     }
 

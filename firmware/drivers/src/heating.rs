@@ -3,8 +3,11 @@
 //! A winding's rise over the ambient temperature, as a part of the allowed rise, follows
 //! τ dϑ/dt = (T/T_c)² − ϑ, with the torque T, the continuous torque T_c and the time constant τ: I²t.
 
+use painleve_shared::Real;
 use painleve_shared::counts::{LinearScale, TorqueCounts};
 use painleve_shared::winding::WindingSettings;
+
+use crate::checks::TURNS;
 
 /// Time between two steps of the estimate, s.
 const STEP_S: f32 = 0.1;
@@ -31,7 +34,10 @@ impl HeatingModel {
         torque: &LinearScale<f32>,
         tick_hz: f32,
     ) -> Option<Self> {
-        let ticks = ((STEP_S * tick_hz) as u32).max(1);
+        // The step ends at a turn.
+        let ticks = ((STEP_S * tick_hz) as u32)
+            .max(1)
+            .next_multiple_of(TURNS.into());
         let step_s = ticks as f32 / tick_hz;
         let continuous_nm = settings.continuous_torque_nm;
         let continuous_nm = continuous_nm.unwrap_or([0.5 * torque.range; 2]);
@@ -65,26 +71,24 @@ impl Heating {
     }
 
     /// Records the torques of one tick.
-    pub fn tick(&mut self, model: &HeatingModel, torques: [TorqueCounts; 2]) {
+    pub fn tick(&mut self, torques: [TorqueCounts; 2]) {
         for (sum, torque) in self.squares.iter_mut().zip(torques) {
             let counts = torque.0 as f32;
             *sum += counts * counts;
         }
-        self.ticks += 1;
-        if self.ticks >= model.ticks {
-            self.step(model);
-        }
+        self.ticks = self.ticks.saturating_add(1);
     }
 
-    // Out of line: one tick in a hundred.
-    #[cold]
-    #[inline(never)]
-    fn step(&mut self, model: &HeatingModel) {
+    /// Updates the temperatures if a step is over.
+    pub fn step(&mut self, model: &HeatingModel) {
+        if self.ticks < model.ticks {
+            return;
+        }
         let mut hottest = 0.0;
         for joint in 0..2 {
             let end = self.squares[joint] * model.rise_per_square[joint];
             self.rises[joint] += model.share[joint] * (end - self.rises[joint]);
-            hottest = self.rises[joint].max(hottest);
+            hottest = self.rises[joint].at_least(hottest);
         }
         self.is_hot = hottest >= if self.is_hot { COOLED } else { 1.0 };
         self.squares = [0.0; 2];
@@ -119,7 +123,8 @@ mod tests {
     fn time_s(heating: &mut Heating, torque_nm: [f32; 2]) -> Option<f64> {
         let before = heating.is_hot();
         let ticks = (1..=60_000).find(|_| {
-            heating.tick(&model(), torques(torque_nm));
+            heating.tick(torques(torque_nm));
+            heating.step(&model());
             heating.is_hot() != before
         })?;
         Some(f64::from(ticks) / f64::from(TICK_HZ))
@@ -162,11 +167,13 @@ mod tests {
         let model = HeatingModel::new(&settings, &SCALE, TICK_HZ).expect("switched on");
         let mut heating = Heating::default();
         for _ in 0..20_000 {
-            heating.tick(&model, torques([2.6, 0.0]));
+            heating.tick(torques([2.6, 0.0]));
+            heating.step(&model);
         }
         assert!(!heating.is_hot());
         for _ in 0..60_000 {
-            heating.tick(&model, torques([2.6, 0.0]));
+            heating.tick(torques([2.6, 0.0]));
+            heating.step(&model);
         }
         assert!(heating.is_hot());
         let off = WindingSettings {

@@ -5,6 +5,7 @@
 //! - [`encoders`]: two AS5048A magnetic encoders on one SPI bus
 //! - [`force_cell`]: an MCP3304 converter behind the force cell's bridge amplifiers
 //! - [`switches`]: ENABLE and RESET, debounced
+//! - [`checks`]: lets the checks below take turns
 //! - [`front_end`]: sensor frames from readings and switches, and the permission to arm
 //! - [`gap`]: checks encoders, force cell and torques against each other
 //! - [`heating`]: estimates the temperature of the torque stages' windings
@@ -20,6 +21,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod checks;
 pub mod encoders;
 pub mod exchange;
 pub mod force_cell;

@@ -6,8 +6,10 @@
 
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 
-/// Number of ticks checked before readings count as plausible.
-pub const TICKS: u16 = 50;
+use crate::checks::TURNS;
+
+/// Number of checks before readings count as plausible: 50 ticks.
+pub const CHECKS: u16 = 50 / TURNS as u16;
 
 /// Reason why the drive must not be armed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,14 +44,14 @@ impl SensorReadings {
     }
 }
 
-/// Checks readings at each tick.
+/// Checks readings every few ticks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Plausibility {
-    /// Ticks in a row with complete readings.
+    /// Checks in a row with complete readings.
     complete: u16,
-    /// Ticks in a row with both encoders at the same angle.
+    /// Checks in a row with both encoders at the same angle.
     same: u16,
-    /// Ticks in a row with an encoder at all zeros or all ones.
+    /// Checks in a row with an encoder at all zeros or all ones.
     dead: [u16; 2],
 }
 
@@ -58,15 +60,15 @@ impl Plausibility {
     ///
     /// # Errors
     /// [`Implausible`] gives the reason why the drive must not be armed on them.
-    pub fn tick(
+    pub fn check(
         &mut self,
         readings: &SensorReadings,
         (encoder_bits, force_bits): (u8, u8),
     ) -> Result<(), Implausible> {
         let ones = (1_u32 << (encoder_bits & 31)) - 1;
-        let count = |ticks: u16, condition: bool| {
+        let count = |checks: u16, condition: bool| {
             if condition {
-                ticks.saturating_add(1)
+                checks.saturating_add(1)
             } else {
                 0
             }
@@ -78,13 +80,13 @@ impl Plausibility {
         let [dead_1, dead_2] = self.dead;
         self.dead = [count(dead_1, is_dead(one)), count(dead_2, is_dead(two))];
         self.same = count(self.same, one.is_some() && one == two);
-        if self.dead.iter().any(|it| *it >= TICKS) {
+        if self.dead.iter().any(|it| *it >= CHECKS) {
             return Err(Implausible::DeadLine);
         }
-        if self.same >= TICKS {
+        if self.same >= CHECKS {
             return Err(Implausible::SameAngle);
         }
-        if self.complete < TICKS {
+        if self.complete < CHECKS {
             return Err(Implausible::NotYet);
         }
         match readings.magnets {
@@ -105,7 +107,7 @@ impl Plausibility {
 mod tests {
     use super::*;
 
-    fn after(ticks: u16, joints: [u32; 2], force: i32, magnet: bool) -> Result<(), Implausible> {
+    fn after(checks: u16, joints: [u32; 2], force: i32, magnet: bool) -> Result<(), Implausible> {
         let readings = SensorReadings {
             joints: joints.map(|it| Some(EncoderCounts(it))),
             forces: [Some(ForceCounts(force)); 2],
@@ -113,8 +115,8 @@ mod tests {
         };
         let mut plausibility = Plausibility::default();
         let mut verdict = Err(Implausible::NotYet);
-        for _ in 0..ticks {
-            verdict = plausibility.tick(&readings, (14, 13));
+        for _ in 0..checks {
+            verdict = plausibility.check(&readings, (14, 13));
         }
         verdict
     }
@@ -122,30 +124,33 @@ mod tests {
     #[test]
     fn an_arm_at_rest_is_plausible_after_a_while() {
         assert_eq!(
-            after(TICKS - 1, [100, 200], -5, true),
+            after(CHECKS - 1, [100, 200], -5, true),
             Err(Implausible::NotYet)
         );
-        assert_eq!(after(TICKS, [100, 200], -5, true), Ok(()));
+        assert_eq!(after(CHECKS, [100, 200], -5, true), Ok(()));
     }
 
     #[test]
     fn cut_lines_shorted_selects_and_missing_magnets_are_implausible() {
-        assert_eq!(after(TICKS, [0, 200], 0, true), Err(Implausible::DeadLine));
+        assert_eq!(after(CHECKS, [0, 200], 0, true), Err(Implausible::DeadLine));
         assert_eq!(
-            after(TICKS, [7, 16383], 0, true),
+            after(CHECKS, [7, 16383], 0, true),
             Err(Implausible::DeadLine)
         );
         assert_eq!(
-            after(TICKS, [200, 200], 0, true),
+            after(CHECKS, [200, 200], 0, true),
             Err(Implausible::SameAngle)
         );
-        assert_eq!(after(TICKS, [100, 200], 0, false), Err(Implausible::Magnet));
         assert_eq!(
-            after(TICKS, [100, 200], 4095, true),
+            after(CHECKS, [100, 200], 0, false),
+            Err(Implausible::Magnet)
+        );
+        assert_eq!(
+            after(CHECKS, [100, 200], 4095, true),
             Err(Implausible::ForceLimit)
         );
         assert_eq!(
-            after(TICKS, [100, 200], -4096, true),
+            after(CHECKS, [100, 200], -4096, true),
             Err(Implausible::ForceLimit)
         );
     }

@@ -66,15 +66,18 @@ impl Lapses<'_> {
         latches
     }
 
-    /// Records several lapses; only the first that has occurred too often may latch its fault.
-    #[inline]
-    fn note_all<const N: usize>(&mut self, lapses: [(Lapse, u32); N]) {
-        let mut first = None;
-        for (lapse, times) in lapses {
-            if self.monitor.note(lapse, times) && first.is_none() {
-                first = Some(lapse);
-            }
+    /// Records how many times one of a frame's lapses occurred, and keeps the `first` that has occurred too often.
+    // In line, because a loop over the lapses would take three times as long.
+    #[inline(always)]
+    fn note_among(&mut self, first: &mut Option<Lapse>, lapse: Lapse, times: u32) {
+        if self.monitor.note(lapse, times) && first.is_none() {
+            *first = Some(lapse);
         }
+    }
+
+    /// Latches the fault of a frame's first lapse that has occurred too often, and takes the torque off.
+    #[inline]
+    fn stop_at(&mut self, first: Option<Lapse>) {
         if let Some(lapse) = first
             && self.supervision.fault().is_none()
         {
@@ -132,24 +135,35 @@ fn irregular(
 ) -> Arrival {
     // More than half the counter's range ahead means behind.
     let stale = ahead == 0 || ahead > u32::MAX / 2;
-    let of_board = [
-        (DigitalInputs::ARMING_REFUSED, Lapse::ArmingRefused),
-        (DigitalInputs::STAGE_NOT_READY, Lapse::StageNotReady),
-        (DigitalInputs::GAP_AGAINST_FORCE, Lapse::GapAgainstForce),
-        (DigitalInputs::WINDING_HOT, Lapse::WindingHot),
-    ];
-    lapses.note_all(of_board.map(|(bit, lapse)| (lapse, u32::from(board_faults.contains(bit)))));
+    let first = &mut None;
+    let times = |bit| u32::from(board_faults.contains(bit));
+    lapses.note_among(
+        first,
+        Lapse::ArmingRefused,
+        times(DigitalInputs::ARMING_REFUSED),
+    );
+    lapses.note_among(
+        first,
+        Lapse::StageNotReady,
+        times(DigitalInputs::STAGE_NOT_READY),
+    );
+    lapses.note_among(
+        first,
+        Lapse::GapAgainstForce,
+        times(DigitalInputs::GAP_AGAINST_FORCE),
+    );
+    lapses.note_among(first, Lapse::WindingHot, times(DigitalInputs::WINDING_HOT));
     if stale {
-        lapses.note_all([(Lapse::StaleFrame, 1)]);
+        lapses.note_among(first, Lapse::StaleFrame, 1);
+        lapses.stop_at(*first);
         return Arrival::Stale;
     }
     state.last_sequence = Some(sequence);
-    lapses.note_all([
-        (Lapse::StaleFrame, 0),
-        (Lapse::LostFrame, ahead - 1),
-        (Lapse::EncoderOutOfRange, u32::from(!encoders)),
-        (Lapse::ForceOutOfRange, u32::from(!forces)),
-    ]);
+    lapses.note_among(first, Lapse::StaleFrame, 0);
+    lapses.note_among(first, Lapse::LostFrame, ahead - 1);
+    lapses.note_among(first, Lapse::EncoderOutOfRange, u32::from(!encoders));
+    lapses.note_among(first, Lapse::ForceOutOfRange, u32::from(!forces));
+    lapses.stop_at(*first);
     let ticks = ahead.saturating_add(state.unread_ticks);
     if encoders && forces {
         state.unread_ticks = 0;

@@ -83,11 +83,6 @@ impl Limits {
             ),
             declare("plausibility::", Limit::Times(2), "two joints"),
             declare(
-                "Lapses::note_all",
-                Limit::Times(8),
-                "eight kinds of lapse per frame",
-            ),
-            declare(
                 "div_rem",
                 Limit::Times(64),
                 "a division of 64 bits: at least one bit of the quotient per iteration",

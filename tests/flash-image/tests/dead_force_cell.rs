@@ -4,6 +4,7 @@
 
 use painleve_drivers::gap::{GapCheck, Scales};
 use painleve_drivers::heating::{Heating, HeatingModel};
+use painleve_drivers::plausibility::SensorReadings;
 use painleve_firmware::Controller;
 use painleve_flash_image::bench::{Bench, scenario};
 use painleve_flash_image::board::{BoardChip, F405, G474};
@@ -73,7 +74,7 @@ fn healthy_readings_of_every_scenario_are_plausible() {
             encoders: converters.encoders,
             force: converters.force,
             torque: converters.torque,
-            tick_hz,
+            check_hz: tick_hz,
         };
         let mut check = GapCheck::new(arm, scales);
         let model = HeatingModel::new(&converters.winding, &converters.torque, tick_hz).unwrap();
@@ -81,9 +82,16 @@ fn healthy_readings_of_every_scenario_are_plausible() {
         let mut torques = None;
         for tick in 0..(scenario.run.duration_s * f64::from(tick_hz)) as u32 {
             let frame = simulation.sample(&mut statistics).unwrap();
-            let contradicts = check.contradicts(frame.joints, frame.normal_force, torques);
-            assert!(!contradicts, "{name}, tick {tick}");
-            heating.tick(&model, torques.unwrap_or_default());
+            let readings = SensorReadings {
+                joints: frame.joints.map(Some),
+                forces: [Some(frame.tangential_force), Some(frame.normal_force)],
+                ..SensorReadings::default()
+            };
+            check.begin(&readings, torques);
+            check.measure();
+            assert!(!check.contradicts(), "{name}, tick {tick}");
+            heating.tick(torques.unwrap_or_default());
+            heating.step(&model);
             assert!(!heating.is_hot(), "{name}, tick {tick}");
             let answer = controller.tick(&frame);
             let state = answer.supervisor_state();

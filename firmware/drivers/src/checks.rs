@@ -1,0 +1,98 @@
+//! Checks of an arm that take seconds or many ticks to find something. They take turns, one part at a tick, so
+//! that no tick is long; a verdict stays until the next one.
+
+use painleve_shared::counts::TorqueCounts;
+
+use crate::gap::GapCheck;
+use crate::heating::{Heating, HeatingModel};
+use crate::plausibility::{Implausible, Plausibility, SensorReadings};
+
+/// Ticks from one turn of a check to its next.
+pub const TURNS: u8 = 5;
+
+/// What the checks have found at their last turns.
+#[derive(Clone, Copy, Debug)]
+pub struct Verdict {
+    /// Whether readings contradict each other, those before, or the torques.
+    pub contradiction: bool,
+    /// Whether a winding is too hot.
+    pub is_hot: bool,
+    /// Whether the drive may be armed on these readings.
+    pub plausible: Result<(), Implausible>,
+}
+
+/// The checks, with their state.
+#[derive(Clone, Debug)]
+pub struct Checks {
+    gap: Option<GapCheck>,
+    plausibility: Plausibility,
+    heating_model: Option<HeatingModel>,
+    heating: Heating,
+    turn: u8,
+    verdict: Verdict,
+}
+
+impl Checks {
+    /// Makes checks; without an arm's model or a model of its windings, the checks that need it find nothing.
+    pub fn new(gap: Option<GapCheck>, heating_model: Option<HeatingModel>) -> Self {
+        Self {
+            gap,
+            plausibility: Plausibility::default(),
+            heating_model,
+            heating: Heating::default(),
+            turn: 0,
+            verdict: Verdict {
+                contradiction: false,
+                is_hot: false,
+                plausible: Err(Implausible::NotYet),
+            },
+        }
+    }
+
+    /// Takes over the temperatures of the windings from `others`.
+    pub fn keep_heat_of(&mut self, others: &Self) {
+        self.heating = others.heating;
+        self.verdict.is_hot = self.heating_model.is_some() && self.heating.is_hot();
+    }
+
+    /// Records the torques put out since the last tick, and lets the check whose turn it is look at the readings.
+    /// `drives` states whether the drive is active, `bits` the resolutions of encoders and force cell.
+    pub fn tick(
+        &mut self,
+        readings: &SensorReadings,
+        torques: [TorqueCounts; 2],
+        drives: bool,
+        bits: (u8, u8),
+    ) -> Verdict {
+        self.heating.tick(torques);
+        self.turn = if self.turn + 1 < TURNS {
+            self.turn + 1
+        } else {
+            0
+        };
+        match self.turn {
+            0 => self.verdict.plausible = self.plausibility.check(readings, bits),
+            1 => {
+                if let Some(gap) = &mut self.gap {
+                    gap.begin(readings, drives.then_some(torques));
+                }
+            }
+            2 => {
+                if let Some(gap) = &mut self.gap {
+                    gap.measure();
+                }
+            }
+            3 => {
+                let gap = self.gap.as_mut();
+                self.verdict.contradiction = gap.is_some_and(GapCheck::contradicts);
+            }
+            _ => {
+                if let Some(model) = &self.heating_model {
+                    self.heating.step(model);
+                    self.verdict.is_hot = self.heating.is_hot();
+                }
+            }
+        }
+        self.verdict
+    }
+}
