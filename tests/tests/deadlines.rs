@@ -130,9 +130,9 @@ fn overruns_and_missing_frames_latch_a_fault_as_on_a_board() {
     let start_again = [ON | DigitalInputs::RESET, DigitalInputs::default(), ON];
     let armed = start_again.map(|inputs| arm.tick(inputs))[2];
     assert_eq!(armed.supervisor_state(), Some(SupervisorState::Armed));
-    let told = arm.answer(armed.tick);
-    assert_eq!(told.latched_fault(), Some(Fault::MissingFrame));
-    assert_eq!(told.torques, NO_TORQUE);
+    let answered = arm.answer(armed.tick);
+    assert_eq!(answered.latched_fault(), Some(Fault::MissingFrame));
+    assert_eq!(answered.torques, NO_TORQUE);
 
     arm.end.end().unwrap();
     let (output, _) = controller.end(Duration::from_secs(20));

@@ -218,17 +218,17 @@ fn silence_latches_a_fault_without_torque_until_rearming() {
 
     // The host falls silent. The board reports once, unasked, that it has stopped.
     let start = Instant::now();
-    let told = loop {
+    let answered = loop {
         let response = arm.board.listen(Duration::from_secs(1)).unwrap();
         if let Some(Response::Actuator { frame, .. }) = response {
             break frame;
         }
         assert!(start.elapsed() < Duration::from_secs(20), "not a word");
     };
-    assert_eq!(told.latched_fault(), Some(Fault::MissingFrame));
-    assert_eq!(told.torques, NO_TORQUE);
+    assert_eq!(answered.latched_fault(), Some(Fault::MissingFrame));
+    assert_eq!(answered.torques, NO_TORQUE);
     assert_eq!(
-        told.tick, last.tick,
+        answered.tick, last.tick,
         "the answer to the last frame is withdrawn"
     );
     assert!(arm.board.health().unwrap().lapses.missing_frames > 100);

@@ -21,7 +21,7 @@ fn with_own_mounts(bench: &Bench, line: &str) -> Option<Output> {
 }
 
 /// Checks for a single error line that contains `part`.
-fn assert_told(output: &Output, exit: i32, part: &str) {
+fn assert_reported(output: &Output, exit: i32, part: &str) {
     let text = errors(output);
     assert_eq!(code(output.status), exit, "{output:?}");
     assert_eq!(text.trim().lines().count(), 1, "{text}");
@@ -29,7 +29,7 @@ fn assert_told(output: &Output, exit: i32, part: &str) {
 }
 
 #[test]
-fn a_small_shared_memory_is_enough_or_is_told() {
+fn a_small_shared_memory_is_enough_or_is_reported() {
     let bench = Bench::new("small-shm");
     // Building the program, if it is not built yet, is not part of the time that is limited.
     program();
@@ -46,7 +46,7 @@ fn a_small_shared_memory_is_enough_or_is_told() {
             enough += 1;
         } else {
             assert_eq!(enough, 0, "{kib} KiB is less than enough: {output:?}");
-            assert_told(&output, 3, "/dev/shm");
+            assert_reported(&output, 3, "/dev/shm");
         }
     }
     assert!(enough > 0, "even 1 MiB is too little");
@@ -73,7 +73,7 @@ fn a_shared_memory_that_fills_up_between_two_starts_ends_them() {
         "3 3\n",
         "{output:?}"
     );
-    assert_told(&output, 0, "/dev/shm");
+    assert_reported(&output, 0, "/dev/shm");
     // The plant misses its controller, or needs memory for the connection to it.
     let plant = std::fs::read_to_string(bench.path("plant")).unwrap();
     assert!(plant.starts_with("error: "), "{plant}");
@@ -81,21 +81,21 @@ fn a_shared_memory_that_fills_up_between_two_starts_ends_them() {
 }
 
 #[test]
-fn read_only_folders_are_told() {
+fn read_only_folders_are_reported() {
     let bench = Bench::new("read-only");
     std::fs::create_dir(bench.path("disk")).unwrap();
     let mounted = "mount -t tmpfs -o ro tmpfs disk && cd disk";
     let Some(no_record) = with_own_mounts(&bench, &format!("{mounted} && $P run {SHORT}")) else {
         return;
     };
-    assert_told(&no_record, 4, "Read-only");
+    assert_reported(&no_record, 4, "Read-only");
     let line = format!(
         "{mounted} && XDG_RUNTIME_DIR= && mount -t tmpfs -o ro tmpfs /tmp && \
          if [ -d /run/user ]; then mount -t tmpfs -o ro tmpfs /run/user; fi && \
          $P controller --bus b"
     );
     if let Some(no_bus) = with_own_mounts(&bench, &line) {
-        assert_told(&no_bus, 3, "Read-only");
+        assert_reported(&no_bus, 3, "Read-only");
     }
 }
 
@@ -149,7 +149,7 @@ fn memory_refused_to_a_new_thread_ends_a_run_with_one_message() {
         .args(SHORT.split(' '))
         .current_dir(bench.path(""));
     match starved.output() {
-        Ok(output) => assert_told(&output, 3, "refuses"),
+        Ok(output) => assert_reported(&output, 3, "refuses"),
         Err(_) => eprintln!("strace is not installed: not tested"),
     }
 }

@@ -305,7 +305,7 @@ fn peer_failure(
     controller: &mut RunProcess,
     status: ExitStatus,
 ) -> Result<CommandError, CommandError> {
-    let told = plant.stdout.text();
+    let message = plant.stdout.text();
     if host != Host::Native
         && (controller.wait(BRIDGE_END)?).is_some_and(|status| !status.success())
     {
@@ -315,9 +315,9 @@ fn peer_failure(
             return Ok(ProcessError::Reported(cause.into()).into());
         }
     }
-    Ok(match told.trim() {
+    Ok(match message.trim() {
         "" => failure(status),
-        told => ProcessError::Reported(told.into()).into(),
+        message => ProcessError::Reported(message.into()).into(),
     })
 }
 

@@ -70,7 +70,10 @@ fn panel(all: &[Series], is_first: bool) -> Panel {
             dashed: false,
             points: ends.to_vec(),
         });
-        let unit = series.unit;
+        let unit = match (series.typical, series.unit) {
+            (1.0, "ticks") => "tick",
+            (_, unit) => unit,
+        };
         marks.push(Mark::Label {
             at: (LEAST, y + NAME),
             centred: false,
