@@ -81,7 +81,7 @@ enum Command {
     /// Report the cost of control ticks: instructions, cycles or wake-up latency, and the worst
     /// tick.
     Timing(timing::TimingArguments),
-    /// What earlier runs have left on this machine, and what the machine gives to runs.
+    /// Show what earlier runs have left on this machine, and what the machine offers to runs.
     Doctor(doctor::DoctorArguments),
     /// Write the ticks of a record as a table.
     Export(export::ExportArguments),

@@ -123,6 +123,7 @@ vertical-align:top;padding:5px 12px 5px 0;border-bottom:1px solid #e4e4e4}th{bor
 .none{color:#707070}svg{max-width:100%;height:auto}nav h2{border:0;margin:16px 0 0;padding:0}\
 .draft{border:2px solid #b04a00;padding:8px 12px;font-weight:bold}\
 .files{color:#707070;font-size:14px}a{color:#0072b2}\
+@media(max-width:500px){figure{margin:16px -24px!important}}\
 @media(prefers-color-scheme:dark){body{color:#e8e8e8;background:#161616}code{background:#2a2a2a}\
 th,td{border-color:#444}h2{border-color:#444}.yes{color:#3fc39a}.no{color:#ff9b5e}a{color:#62b5f0}\
 .none,.files{color:#a0a0a0}}";
