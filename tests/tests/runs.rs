@@ -7,7 +7,7 @@ use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
-use painleve_tests::{Bench, code, errors};
+use painleve_tests::{Bench, code, errors, skipped};
 use serde_json::Value;
 
 const QUIET: [&str; 2] = ["--no-record", "--no-plot"];
@@ -338,8 +338,58 @@ fn a_scenario_from_standard_input_runs_like_the_built_in_one() {
 }
 
 #[test]
-fn a_figure_that_is_not_svg_is_refused_with_the_way_to_convert_it() {
-    let output = Bench::new("png").run(&["run", "--plot", "run.png"]);
-    assert_eq!(code(output.status), 2);
-    assert!(errors(&output).contains("rsvg-convert"), "{output:?}");
+fn a_figure_with_another_extension_is_refused_and_so_is_one_that_cannot_be_converted() {
+    let bench = Bench::new("extension");
+    let refused = |plot: &str, path: &str, part: &str| {
+        let mut command = bench.command(&["run", "--plot", plot]);
+        let output = command.env("PATH", path).output().unwrap();
+        assert_eq!(code(output.status), 2, "{output:?}");
+        assert!(errors(&output).contains(part), "{output:?}");
+    };
+    refused("run.jpg", "", ".svg, .png or .pdf, not with .jpg");
+    refused("run.png", "/nowhere", "apt-get install librsvg2-bin");
+    assert!(bench.files().is_empty());
+}
+
+#[test]
+fn figures_are_png_or_pdf_files_by_their_extension() {
+    let version = std::process::Command::new("rsvg-convert")
+        .arg("--version")
+        .output();
+    if version.is_err() {
+        skipped("rsvg-convert not found; on Debian: apt-get install librsvg2-bin");
+        return;
+    }
+    let bench = Bench::new("pictures");
+    let short = [
+        "run",
+        "--set",
+        "run.duration_s=0.1",
+        "--no-record",
+        "--no-html",
+    ];
+    for (name, start) in [("run.png", &b"\x89PNG"[..]), ("run.pdf", b"%PDF-")] {
+        let draw = || {
+            bench.report(&[&short[..], &["--json", "--plot", name]].concat());
+            std::fs::read(bench.path(name)).unwrap()
+        };
+        let bytes = draw();
+        assert!(bytes.starts_with(start) && bytes.len() > 5000, "{name}");
+        assert!(bytes == draw(), "{name} differs between two equal runs");
+    }
+    let study = [
+        "study",
+        "admissible",
+        "--mu",
+        "0.6",
+        "--json",
+        "--svg",
+        "a.png",
+    ];
+    bench.report(&study);
+    assert!(
+        std::fs::read(bench.path("a.png"))
+            .unwrap()
+            .starts_with(b"\x89PNG")
+    );
 }

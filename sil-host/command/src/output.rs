@@ -18,6 +18,7 @@ use painleve_record::recorder::Sinks;
 use painleve_record::{McapLog, RecordError, RecordedTick, Recorder, RunPlot, Sink};
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
+use painleve_system::picture;
 use painleve_system::terminal::warn;
 
 use painleve_view::PageFile;
@@ -34,8 +35,8 @@ pub struct OutputArguments {
     /// Do not write a record.
     #[arg(long, conflicts_with = "record")]
     no_record: bool,
-    /// Figure of the run, an SVG file.
-    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = figure_path)]
+    /// Figure of the run: an SVG, PNG or PDF file, by its extension.
+    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = picture::path)]
     plot: PathBuf,
     /// Page that plays the run in the browser, without a network.
     #[arg(long, value_name = "PATH", default_value = "out/run.html")]
@@ -140,22 +141,6 @@ impl Sink for EventPrinter {
 
     fn finish(self: Box<Self>) -> Result<(), RecordError> {
         Ok(())
-    }
-}
-
-/// Reads the path of a figure, which is an SVG file.
-///
-/// # Errors
-/// One sentence if the path ends like another kind of picture.
-pub fn figure_path(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension() {
-        Some(extension) if !extension.eq_ignore_ascii_case("svg") => Err(format!(
-            "figures are SVG files, not .{}: let the name end with .svg, and convert the file with \
-             `rsvg-convert -o FILE.png FILE.svg` (or `-f pdf`)",
-            extension.display()
-        )),
-        _ => Ok(path),
     }
 }
 

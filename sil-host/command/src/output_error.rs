@@ -7,6 +7,7 @@ use painleve_commission::simulated::SimulatedError;
 use painleve_record::export::ExportError;
 use painleve_record::recorder::RecordError;
 use painleve_system::atomic_file::AtomicFileError;
+use painleve_system::picture::PictureError;
 
 use super::CommandError;
 
@@ -16,6 +17,9 @@ pub enum OutputError {
     /// A file.
     #[error(transparent)]
     File(#[from] AtomicFileError),
+    /// A figure.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// The record of a run.
     #[error(transparent)]
     Record(#[from] RecordError),

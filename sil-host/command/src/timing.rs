@@ -16,6 +16,7 @@ use painleve_plant::simulation::Simulation;
 use painleve_shared::message::FrameSource;
 use painleve_system::atomic_file::{self, AtomicFile};
 use painleve_system::interrupt::Interrupt;
+use painleve_system::picture;
 use painleve_system::realtime::{FIFO_PRIORITY, request_realtime};
 use painleve_system::terminal::{self, warn};
 
@@ -53,8 +54,8 @@ pub struct TimingArguments {
     /// Print JSON on stdout instead of the table.
     #[arg(long)]
     json: bool,
-    /// Write histograms as a figure, an SVG file.
-    #[arg(long, value_name = "PATH", value_parser = super::output::figure_path)]
+    /// Write histograms as a figure, an SVG, PNG or PDF file by its extension.
+    #[arg(long, value_name = "PATH", value_parser = picture::path)]
     svg: Option<PathBuf>,
 }
 
@@ -104,7 +105,8 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         }
     }
     if let Some(path) = &arguments.svg {
-        atomic_file::write(path, figure::svg(&reports).as_bytes()).map_err(output)?;
+        let picture = picture::encoded(path, figure::svg(&reports)).map_err(output)?;
+        atomic_file::write(path, &picture).map_err(output)?;
     }
     if arguments.json {
         let text = serde_json::to_string(&reports).map_err(output)?;

@@ -18,6 +18,7 @@ use painleve_plant::{ContactMode, Event};
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::status::SupervisorState;
 use painleve_system::atomic_file::{self, AtomicFile, AtomicFileError};
+use painleve_system::picture;
 
 use crate::events::{EventKind, RunEvent};
 use crate::recorder::{RecordError, RecordedTick, Sink};
@@ -207,10 +208,10 @@ impl Sink for PlotFile {
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), RecordError> {
-        let svg = self.plot.svg();
         let path = self.file.path().to_path_buf();
+        let content = picture::encoded(&path, self.plot.svg())?;
         self.file
-            .write_all(svg.as_bytes())
+            .write_all(&content)
             .map_err(|error| RecordError::write(&path, error))?;
         Ok(self.file.commit()?)
     }

@@ -15,6 +15,7 @@ use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::sample::Sample;
 use painleve_plant::{Configuration, Event};
 use painleve_system::atomic_file::AtomicFileError;
+use painleve_system::picture::PictureError;
 
 use crate::events::{ControllerEvents, EventKind, RunEvent};
 use crate::replica::Replica;
@@ -30,6 +31,9 @@ pub enum RecordError {
     /// The file cannot be created or renamed.
     #[error(transparent)]
     File(#[from] AtomicFileError),
+    /// The figure cannot be converted.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// Writing failed during the recording, for example because the disk is full.
     #[error(
         "cannot record to `{path}`: {source}; choose a path with enough space or run without recording"

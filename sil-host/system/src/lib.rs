@@ -6,6 +6,7 @@
 //! - [`lifetime`]: child processes that never outlive their parent
 //! - [`memory_full`]: the end of a process that finds shared memory full
 //! - [`interrupt`]: Ctrl-C and requests to end
+//! - [`picture`]: figures as SVG, PNG or PDF
 //! - [`terminal`]: standard output and error that may be closed or full
 
 pub mod atomic_file;
@@ -13,5 +14,6 @@ pub mod input_file;
 pub mod interrupt;
 pub mod lifetime;
 pub mod memory_full;
+pub mod picture;
 pub mod realtime;
 pub mod terminal;

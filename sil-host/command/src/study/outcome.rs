@@ -11,8 +11,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use painleve_study::Study;
 use painleve_study::catalogue::{AnyOutcome, AnyStudy};
 use painleve_system::atomic_file::{self, AtomicFile};
+use painleve_system::picture;
 
-use crate::output::figure_path;
 use crate::output_error::output;
 use crate::process_error::ProcessError;
 use crate::{CommandError, say};
@@ -29,8 +29,8 @@ pub struct OutcomeOptions {
     /// Write the rows as a CSV file.
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
-    /// Write the figure, an SVG file.
-    #[arg(long, value_name = "PATH", value_parser = figure_path)]
+    /// Write the figure, an SVG, PNG or PDF file by its extension.
+    #[arg(long, value_name = "PATH", value_parser = picture::path)]
     svg: Option<PathBuf>,
     #[command(flatten)]
     threads: Threads,
@@ -97,7 +97,8 @@ impl OutcomeOptions {
             atomic_file::write(path, &outcome.csv().map_err(output)?).map_err(output)?;
         }
         if let Some(path) = &self.svg {
-            atomic_file::write(path, outcome.svg().as_bytes()).map_err(output)?;
+            let picture = picture::encoded(path, outcome.svg()).map_err(output)?;
+            atomic_file::write(path, &picture).map_err(output)?;
         }
         if self.json {
             say(outcome.json().map_err(output)?)
