@@ -5,6 +5,7 @@
 
 mod machine;
 mod samples;
+mod viewers;
 
 use std::fs;
 use std::process::Command;
@@ -51,6 +52,7 @@ pub fn run(arguments: &BenchArguments) -> Result<(), ChoreError> {
     controller(&machine, &mut rows)?;
     link(&machine, &mut rows)?;
     programs(&machine, &mut rows)?;
+    viewers::rows(&machine, &mut rows)?;
     campaign(arguments.runs, &machine, &mut rows)?;
 
     let mut table = format!(
