@@ -1,5 +1,6 @@
 //! `cargo xtask setup`: installs the tools for building, emulating and testing the images.
 
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::build_fw::{TARGET, debian_can_build, target_is_installed};
@@ -26,6 +27,68 @@ pub fn run() -> Result<(), ChoreError> {
     install_unicorn()?;
     eprintln!("ready: `cargo xtask build-fw` builds the images");
     Ok(())
+}
+
+/// Programs and files that tests beyond Rust use, each with the Debian package that provides it.
+const TEST_TOOLS: [(&str, &str); 5] = [
+    ("c++", "g++"),
+    ("node", "nodejs"),
+    ("chromium", "chromium"),
+    ("rsvg-convert", "librsvg2-bin"),
+    ("python3", "python3-venv"),
+];
+
+/// Installs what the tests of pages, pictures, examples, FMU and Python package use, if missing. If it cannot be
+/// installed, those tests are skipped and say so.
+pub fn install_test_tools() {
+    let mut missing: Vec<&str> = TEST_TOOLS
+        .iter()
+        .filter(|(program, _)| !starts(program))
+        .map(|(_, package)| *package)
+        .collect();
+    if !has_virtual_environments() && !missing.contains(&"python3-venv") {
+        missing.push("python3-venv");
+    }
+    if !has_libclang() {
+        missing.push("libclang-dev");
+    }
+    if missing.is_empty() {
+        return;
+    }
+    if let Err(ChoreError(reason)) = install(&missing) {
+        eprintln!(
+            "{reason}\ntests that use {} are skipped",
+            missing.join(", ")
+        );
+    }
+}
+
+/// Returns whether `python3 -m venv` can create environments with pip.
+pub fn has_virtual_environments() -> bool {
+    let modules = ["-c", "import venv, ensurepip"];
+    Command::new("python3")
+        .args(modules)
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
+/// Returns whether the system has libclang, where bindgen looks for it.
+pub fn has_libclang() -> bool {
+    let library = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        names.any(|name| {
+            name.starts_with("libclang") && name.contains(".so") && !name.contains("cpp")
+        })
+    };
+    let versions = std::fs::read_dir("/usr/lib")
+        .into_iter()
+        .flatten()
+        .flatten();
+    let mut folders: Vec<PathBuf> = versions.map(|entry| entry.path().join("lib")).collect();
+    folders.extend(["/usr/lib", "/usr/lib64", "/usr/local/lib"].map(PathBuf::from));
+    std::env::var_os("LIBCLANG_PATH").is_some() || folders.iter().any(|folder| library(folder))
 }
 
 /// Installs the prebuilt Unicorn from PyPI into an environment under `target/`.
