@@ -14,6 +14,7 @@ use painleve_record::replica::Replica;
 use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
+use painleve_study::catalogue::{CatalogueEntry, STUDIES};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -363,10 +364,34 @@ impl PyController {
     }
 }
 
+/// Computes a study on all cores and returns the JSON object of `painleve study NAME --json` as text; `arguments` are
+/// that command's options.
+#[pyfunction]
+fn study(py: Python<'_>, name: &str, arguments: Vec<String>) -> PyResult<String> {
+    let unknown = || {
+        let names: Vec<&str> = STUDIES.iter().map(|entry| entry.name).collect();
+        PyValueError::new_err(format!("unknown study '{name}': {}", names.join(", ")))
+    };
+    let entry = CatalogueEntry::find(name).ok_or_else(unknown)?;
+    let command = entry.command().no_binary_name(true);
+    let options = command
+        .try_get_matches_from(arguments)
+        .and_then(|matches| (entry.read)(&matches))
+        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let study = options
+        .study()
+        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let outcome = py
+        .detach(|| study.compute(&|| ()))
+        .map_err(failed)?;
+    outcome.json().map_err(failed)
+}
+
 /// The compiled part of the package.
 #[pymodule]
 fn _painleve(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(run, module)?)?;
+    module.add_function(wrap_pyfunction!(study, module)?)?;
     module.add_class::<PyPlant>()?;
     module.add_class::<PySimulation>()?;
     module.add_class::<PyController>()

@@ -48,3 +48,23 @@ def test_the_environment():
     steps = [environment.step([0.5, 0.8])[3] for _ in range(10)]
     assert steps == [False] * 9 + [True]
     assert gymnasium is not None
+
+
+def test_a_study_gives_the_object_of_the_command():
+    admissible = painleve.study("admissible", mu=0.6)
+    assert abs(admissible["elbow_down"]["intervals_m"][0][1] - 0.164705) < 1e-6
+    heavier = painleve.study("admissible", mu=0.6, set={"arm.tip_mass_kg": 0.01})
+    assert heavier["elbow_down"] != admissible["elbow_down"]
+    section = painleve.study(
+        "bifurcation", mu=0.6, v_belt=[-0.5, -0.4], initial=["a", "d"], transient_s=1, record_s=1
+    )
+    assert len(section["rows"]) == 4
+
+
+def test_mistakes_in_a_study_are_named():
+    with pytest.raises(ValueError, match="unknown study 'admisible': .*admissible"):
+        painleve.study("admisible")
+    with pytest.raises(ValueError, match="--mu = -1"):
+        painleve.study("bifurcation", mu=-1)
+    with pytest.raises(ValueError, match="--nu"):
+        painleve.study("admissible", nu=0.6)
