@@ -5,7 +5,7 @@ use std::process::Command;
 
 use boon::{Compiler, Schemas};
 use painleve_tests::python::{python, workspace};
-use painleve_tests::{Bench, code, errors};
+use painleve_tests::{Bench, code, errors, image};
 
 /// Returns the page.
 fn page() -> String {
@@ -51,8 +51,23 @@ fn execute(bench: &Bench, page: &str, word: &str) -> usize {
 
 #[test]
 fn every_command_for_the_program_alone_succeeds_and_writes_its_files() {
+    image();
     let bench = Bench::new("first-ten-things");
     assert!(execute(&bench, &page(), "") >= 7);
+}
+
+#[test]
+fn a_boards_record_holds_the_same_numbers_as_the_simulated_one() {
+    image();
+    let bench = Bench::new("first-ten-things-board");
+    let tables = ["board", "simulated"].map(|name| {
+        let record = format!("out/{name}.mcap");
+        assert_eq!(execute(&bench, &page(), &record), 1);
+        bench.report(&["export", &record, "--csv", "--json"]);
+        std::fs::read(bench.path(&format!("out/{name}.csv"))).unwrap()
+    });
+    assert!(tables[0].len() > 1_000_000);
+    assert!(tables[0] == tables[1]);
 }
 
 #[test]
