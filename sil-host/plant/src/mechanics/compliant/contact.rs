@@ -69,7 +69,7 @@ settings! {
         /// Viscous friction σ₂ per newton of normal force.
         viscous_friction_s_m: f64 = 0.0, 0.0..=10.0, "s/m";
         /// Error tolerance of one integration step, absolute and relative: for angles (rad), rates
-        /// (rad/s) and y.
+        /// (rad/s) and the bristles' deflection y.
         local_error: f64 = 1e-6, 1e-12..=1e-3;
     }
 }
