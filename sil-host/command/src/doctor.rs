@@ -65,7 +65,7 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     } else {
         let mut table = terminal::table(["item", "state"]);
         table.add_rows(rows);
-        say(terminal::readable(table))?;
+        say(terminal::readable_table(table))?;
     }
     survey.map(|_| ()).map_err(LinkError::into)
 }

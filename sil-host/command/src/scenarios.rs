@@ -47,5 +47,5 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     for (name, description) in &scenarios {
         table.add_row([*name, description]);
     }
-    say(terminal::readable(table))
+    say(terminal::readable_table(table))
 }

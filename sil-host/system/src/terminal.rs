@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io::{self, Write};
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{ContentArrangement, Row, Table};
+use comfy_table::{Cell, ContentArrangement, Row, Table};
 
 /// Writes a line to standard output.
 ///
@@ -58,13 +58,47 @@ pub fn readable(text: impl Display) -> String {
     }
 }
 
+/// Returns a table for readers: in ASCII where the locale asks for it.
+pub fn readable_table(table: Table) -> String {
+    if is_ascii_only() {
+        to_ascii(&with_ascii_cells(table).to_string())
+    } else {
+        table.to_string()
+    }
+}
+
+/// Returns a table whose cells are in ASCII before their widths are chosen: some replacements are
+/// wider than their symbols.
+fn with_ascii_cells(mut table: Table) -> Table {
+    let ascii = |row: &Row| -> Vec<Cell> {
+        let cells = row.cell_iter();
+        cells
+            .map(|cell| Cell::new(to_ascii(&cell.content())))
+            .collect()
+    };
+    if let Some(header) = table.header().map(ascii) {
+        table.set_header(header);
+    }
+    for row in table.row_iter_mut() {
+        *row = Row::from(ascii(row));
+    }
+    table
+}
+
 /// Returns a text in ASCII: symbols by their usual replacement, other letters as `?`.
 pub fn to_ascii(text: &str) -> String {
     let replace = |letter| match letter {
         'μ' | 'µ' => "u",
         'θ' => "theta",
+        '₀' => "0",
         '₁' => "1",
         '₂' => "2",
+        'ₜ' => "t",
+        'ₙ' => "n",
+        'ᵣ' => "r",
+        // The dot of a time derivative.
+        '\u{307}' => "'",
+        '∞' => "inf",
         '°' => "deg",
         '²' => "^2",
         '³' => "^3",
@@ -94,10 +128,21 @@ pub fn to_ascii(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::to_ascii;
+    use super::{table, to_ascii, with_ascii_cells};
 
     #[test]
     fn tables_and_units_become_ascii() {
         assert_eq!(to_ascii("│ μ ┆ 3 m/s² ± 1 … │"), "| u | 3 m/s^2 +- 1 ... |");
+        assert_eq!(to_ascii("zₜ, θ̇₁"), "zt, theta'1");
+    }
+
+    #[test]
+    fn the_lines_of_a_table_in_ascii_are_equally_wide() {
+        let mut table = table(["μ", "θ₁ (°)"]);
+        table.add_row(["0.1 … 0.2", "≤ 3"]).add_row(["0", "1"]);
+        let text = to_ascii(&with_ascii_cells(table).to_string());
+        let widths: Vec<usize> = text.lines().map(str::len).collect();
+        assert!(widths.iter().all(|width| *width == widths[0]), "{text}");
+        assert!(text.contains("| 0.1 ... 0.2 | <= 3         |"), "{text}");
     }
 }

@@ -107,9 +107,9 @@ impl OutcomeOptions {
             table
                 .load_style(ASCII_MARKDOWN)
                 .set_content_arrangement(ContentArrangement::Disabled);
-            say(terminal::readable(table))
+            say(terminal::readable_table(table))
         } else {
-            say(terminal::readable(outcome.table()))
+            say(terminal::readable_table(outcome.table()))
         }
     }
 }
