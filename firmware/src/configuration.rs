@@ -7,6 +7,7 @@ use painleve_shared::counts::{EncoderScale, LinearScale};
 use painleve_shared::mounting::Mounting;
 use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::settings::Settings;
+use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 use painleve_shared::{Arm, ArmParameters, Real, check_setting, settings};
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,8 @@ settings! {
         torque: LinearScale<f32> = LinearScale { bits: 12, range: 5.0 };
         /// Directions and zeros of the parts of a real arm.
         mounting: Mounting = Mounting::default();
+        /// Motors and gears of the torque stages.
+        stages: StageSettings = StageSettings::default();
         /// Protection of the torque stages' windings.
         winding: WindingSettings = WindingSettings::default();
     }
@@ -46,7 +49,8 @@ settings! {
 settings! {
     /// Settings of the controller, group by group.
     pub struct ControllerSettings<L: Law = LawSettings> {
-        /// Largest torque on either joint; at most the torque stages' range.
+        /// Largest torque on either joint; at most the torque stages' range, and what motor and
+        /// gear can give at the joint.
         torque_limit_nm: f32 = 5.0, 0.0..=1e6, "N·m";
         /// Estimation of joint angles and rates from encoder counts.
         estimator: JointEstimatorSettings = JointEstimatorSettings::default();
@@ -149,7 +153,9 @@ impl<L: Law> Configuration<L> {
         let settings = &self.settings;
         let force_range_n = self.converters.force.range;
         let torque_range_nm = self.converters.torque.range;
-        check_setting!(settings.torque_limit_nm, 0.0, torque_range_nm)?;
+        let [stage_1_nm, stage_2_nm] = self.converters.stages.joint_range_nm(torque_range_nm);
+        let torque_limit_nm = torque_range_nm.at_most(stage_1_nm).at_most(stage_2_nm);
+        check_setting!(settings.torque_limit_nm, 0.0, torque_limit_nm)?;
         check_setting!(settings.estimator.bandwidth_rad_s, 1.0, 3.0 * self.tick_hz)?;
         check_setting!(settings.contact.contact_n, 1e-3, force_range_n)?;
         check_setting!(settings.contact.force_noise_n, 1e-4, force_range_n)?;

@@ -43,6 +43,7 @@ pub mod range;
 pub mod real;
 pub mod settings;
 mod square_root;
+pub mod stages;
 pub mod status;
 pub mod stored;
 pub mod winding;

@@ -9,7 +9,7 @@ settings! {
     pub struct WindingSettings {
         /// Whether a winding that has become too hot stops the drive (fault 17).
         enabled: bool = true;
-        /// Torque at each joint that its stage can give without end; half of the stages' range if absent.
+        /// Torque that each motor can give without end; half of its range (`converters.stages.motor_range_nm`) if absent.
         continuous_torque_nm: Option<[f32; 2]> = None, 1e-3..=1e6, "N·m";
         /// Time constant of each winding's temperature.
         time_constant_s: [f32; 2] = [20.0; 2], 1.0..=3600.0, "s";

@@ -7,6 +7,7 @@ use painleve_shared::counts::{
 };
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::mounting::Mounting;
+use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 
 use crate::checks::{Checks, TURNS, Verdict};
@@ -41,6 +42,8 @@ pub struct FrontEndSettings {
     pub force: LinearScale<f32>,
     /// Torque stages, N·m.
     pub torque: LinearScale<f32>,
+    /// Their motors and gears.
+    pub stages: StageSettings,
     /// Protection of their windings.
     pub winding: WindingSettings,
     /// Directions and zeros of the parts.
@@ -84,7 +87,7 @@ impl FrontEnd {
         });
         let heating_model = settings
             .as_ref()
-            .and_then(|it| HeatingModel::new(&it.winding, &it.torque, it.tick_hz));
+            .and_then(|it| HeatingModel::new(&it.winding, &it.stages, &it.torque, it.tick_hz));
         Self {
             settings,
             checks: Checks::new(gap, heating_model),

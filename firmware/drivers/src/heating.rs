@@ -5,6 +5,7 @@
 
 use painleve_shared::Real;
 use painleve_shared::counts::{LinearScale, TorqueCounts};
+use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 
 use crate::checks::TURNS;
@@ -27,10 +28,11 @@ pub struct HeatingModel {
 }
 
 impl HeatingModel {
-    /// Makes a model of windings behind stages of this scale, for `tick_hz` torques a second; `None` if the
-    /// protection is switched off.
+    /// Makes a model of the windings of these stages, for `tick_hz` joint torques a second of this scale; `None`
+    /// if the protection is switched off.
     pub fn new(
         settings: &WindingSettings,
+        stages: &StageSettings,
         torque: &LinearScale<f32>,
         tick_hz: f32,
     ) -> Option<Self> {
@@ -39,8 +41,13 @@ impl HeatingModel {
             .max(1)
             .next_multiple_of(TURNS.into());
         let step_s = ticks as f32 / tick_hz;
+        let range_nm = stages.motor_range_nm(torque.range);
         let continuous_nm = settings.continuous_torque_nm;
-        let continuous_nm = continuous_nm.unwrap_or([0.5 * torque.range; 2]);
+        let mut continuous_nm = continuous_nm.unwrap_or(range_nm.map(|it| 0.5 * it));
+        // At the joint, where the torques are counted.
+        for (torque_nm, gear) in continuous_nm.iter_mut().zip(stages.joint_per_motor()) {
+            *torque_nm *= gear;
+        }
         settings.enabled.then(|| Self {
             ticks,
             share: settings.time_constant_s.map(|it| step_s / it),
@@ -112,7 +119,8 @@ mod tests {
             time_constant_s: [10.0, 5.0],
             ..WindingSettings::default()
         };
-        HeatingModel::new(&settings, &SCALE, TICK_HZ).expect("switched on")
+        HeatingModel::new(&settings, &StageSettings::default(), &SCALE, TICK_HZ)
+            .expect("switched on")
     }
 
     fn torques(torque_nm: [f32; 2]) -> [TorqueCounts; 2] {
@@ -164,7 +172,8 @@ mod tests {
     #[test]
     fn half_the_range_is_the_default_and_only_a_setting_switches_it_off() {
         let settings = WindingSettings::default();
-        let model = HeatingModel::new(&settings, &SCALE, TICK_HZ).expect("switched on");
+        let stages = StageSettings::default();
+        let model = HeatingModel::new(&settings, &stages, &SCALE, TICK_HZ).expect("switched on");
         let mut heating = Heating::default();
         for _ in 0..20_000 {
             heating.tick(torques([2.6, 0.0]));
@@ -180,6 +189,27 @@ mod tests {
             enabled: false,
             ..settings
         };
-        assert!(HeatingModel::new(&off, &SCALE, TICK_HZ).is_none());
+        assert!(HeatingModel::new(&off, &stages, &SCALE, TICK_HZ).is_none());
+    }
+
+    /// A motor of 0.5 N·m, of which it can give half without end, on a gear of 10 with an efficiency of 0.8: 2 N·m
+    /// at the joint.
+    #[test]
+    fn a_winding_heats_by_the_torque_of_its_motor() {
+        let stages = StageSettings {
+            gear_ratio: [10.0, 1.0],
+            gear_efficiency: [0.8, 1.0],
+            motor_range_nm: Some([0.5, 5.0]),
+        };
+        let settings = WindingSettings::default();
+        let model = HeatingModel::new(&settings, &stages, &SCALE, TICK_HZ).expect("switched on");
+        for (torque_nm, expected) in [(1.98, false), (2.05, true)] {
+            let mut heating = Heating::default();
+            for _ in 0..200_000 {
+                heating.tick(torques([torque_nm, 0.0]));
+                heating.step(&model);
+            }
+            assert_eq!(heating.is_hot(), expected, "{torque_nm}");
+        }
     }
 }

@@ -10,6 +10,7 @@
 //! - [`gap`]: checks encoders, force cell and torques against each other
 //! - [`heating`]: estimates the temperature of the torque stages' windings
 //! - [`plausibility`]: checks that readings can come from an arm before the drive is armed
+//! - [`stages`]: codes of the torque stages' converter from joint torques, through motor and gear
 //! - [`slots`]: keeps a configuration in flash over a loss of power
 //!
 //! A reading that a single disturbed bit could have changed is not passed on: each value is read twice, and
@@ -30,6 +31,7 @@ pub mod gap;
 pub mod heating;
 pub mod plausibility;
 pub mod slots;
+pub mod stages;
 pub mod switches;
 
 /// Reason for a missing reading in this tick.

@@ -10,6 +10,7 @@ use embedded_hal::digital::OutputPin;
 use painleve_drivers::encoders::EncoderDriver;
 use painleve_drivers::force_cell::ForceCellDriver;
 use painleve_drivers::front_end::{FrontEnd, FrontEndSettings, InputLevels};
+use painleve_drivers::stages::StageScale;
 use painleve_firmware::Configuration;
 use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
@@ -28,12 +29,6 @@ const IDLE_HZ: f32 = 1000.0;
 
 /// Time for which RESET has to be pressed to permit arming without a host, s.
 const BUTTON_S: f32 = 1.0;
-
-/// Bits of the torque stages' digital-to-analog converter.
-pub const CONVERTER_BITS: u8 = 12;
-
-/// The converter's code for zero torque.
-pub const NO_TORQUE: u16 = 1 << (CONVERTER_BITS - 1);
 
 /// The registers and pins of a board that drives an arm.
 pub trait ArmPins {
@@ -72,10 +67,8 @@ pub struct ArmDrive<P: ArmPins> {
     encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 2>,
     force_cell: SensorBus<P::ForceSpi, P::Select, ForceCellDriver, 1>,
     front_end: FrontEnd,
-    /// Resolution of the controller's torques, bits.
-    torque_bits: u8,
-    /// Whether the torque stages turn their joints backwards.
-    stage_reversed: [bool; 2],
+    /// Scale of the torque stages; `None` until there is a configuration.
+    stages: Option<StageScale>,
     source: FrameSource,
     /// Newest frame from the host, if the host is the source of frames.
     from_host: Option<SensorFrame>,
@@ -94,8 +87,7 @@ impl<P: ArmPins> ArmDrive<P> {
             encoders,
             force_cell,
             front_end: FrontEnd::new(None),
-            torque_bits: CONVERTER_BITS,
-            stage_reversed: [false; 2],
+            stages: None,
             source: FrameSource::Lockstep,
             from_host: None,
         }
@@ -108,17 +100,6 @@ impl<P: ArmPins> ArmDrive<P> {
         let frame = self.front_end.frame(encoders, force_cell, levels);
         sensor_bus::start_both(&mut self.encoders, &mut self.force_cell);
         frame
-    }
-
-    /// Returns the converter's code for a torque: offset binary.
-    fn code(&self, torque: TorqueCounts, reversed: bool) -> u16 {
-        let counts = if self.torque_bits > CONVERTER_BITS {
-            torque.0 >> (self.torque_bits - CONVERTER_BITS)
-        } else {
-            torque.0 << (CONVERTER_BITS - self.torque_bits)
-        };
-        let counts = if reversed { -counts } else { counts };
-        (counts + i32::from(NO_TORQUE)).clamp(0, (1 << CONVERTER_BITS) - 1) as u16
     }
 }
 
@@ -154,14 +135,8 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
             [TorqueCounts(0); 2]
         };
         self.front_end.note_output(is_active, torques);
-        if is_on {
-            let [torque_1, torque_2] = torques;
-            let [reversed_1, reversed_2] = self.stage_reversed;
-            let codes = [
-                self.code(torque_1, reversed_1),
-                self.code(torque_2, reversed_2),
-            ];
-            self.pins.switch_stages_on(codes);
+        if let Some(stages) = self.stages.filter(|_| is_on) {
+            self.pins.switch_stages_on(stages.codes(torques));
         } else {
             self.pins.switch_stages_off();
         }
@@ -175,8 +150,11 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
 impl<P: ArmPins> BoardDrive for ArmDrive<P> {
     fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource) {
         let converters = &configuration.converters;
-        self.torque_bits = converters.torque.bits;
-        self.stage_reversed = converters.mounting.stage_reversed;
+        self.stages = Some(StageScale::new(
+            &converters.torque,
+            &converters.stages,
+            &converters.mounting,
+        ));
         self.source = source;
         self.from_host = None;
         // The switch has to be opened and closed again, and the sensors are checked anew.
@@ -186,6 +164,7 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
             encoders: converters.encoders,
             force: converters.force,
             torque: converters.torque,
+            stages: converters.stages,
             winding: converters.winding,
             mounting: converters.mounting,
             tick_hz: configuration.tick_hz,

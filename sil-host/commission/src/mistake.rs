@@ -176,7 +176,7 @@ pub enum Mistake {
     StagesSwapped,
     /// A torque stage has another scale.
     #[error(
-        "torque stage of {}: gives {ratio:.2} times the commanded torque; check converters.torque.range_nm and the gear",
+        "torque stage of {}: gives {ratio:.2} times the commanded torque, as if converters.stages.gear_ratio were {gear_ratio:.2}; check it, gear_efficiency and motor_range_nm",
         JOINT_NAMES[*.joint]
     )]
     StageScale {
@@ -184,6 +184,8 @@ pub enum Mistake {
         joint: usize,
         /// Torque at the joint divided by the commanded torque.
         ratio: f64,
+        /// Gear ratio that would explain it.
+        gear_ratio: f64,
     },
     /// The forces of a torque are not those of the model.
     #[error(

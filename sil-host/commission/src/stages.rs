@@ -66,7 +66,13 @@ pub(crate) fn measure<R: Rig>(
     for joint in 0..2 {
         let ratio = explained.ratio[joint].abs();
         if !RATIO.contains(&ratio) {
-            return Err(Mistake::StageScale { joint, ratio }.into());
+            let configured = session.expected.converters.stages.gear_ratio[joint];
+            return Err(Mistake::StageScale {
+                joint,
+                ratio,
+                gear_ratio: f64::from(configured) * ratio,
+            }
+            .into());
         }
         if (explained.ratio[joint] < 0.0) != mounting.stage_reversed[joint] {
             deviations.push(Deviation::StageDirection { joint });

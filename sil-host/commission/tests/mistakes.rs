@@ -65,6 +65,7 @@ fn named(mistake: BuiltInMistake) -> (bool, &'static [&'static str]) {
         StagesSwapped => (true, &["torque stages: exchanged"]),
         FirstStageHalved => (true, &["torque stage of joint 1: gives 0."]),
         ElbowStageDoubled => (true, &["torque stage of the elbow: gives "]),
+        FirstGearOfAnotherRatio => (true, &["torque stage of joint 1: gives 0.3"]),
         ElbowStageDead => (true, &["torque stage of the elbow: no effect"]),
         ForceCellUpsideDown => (
             false,

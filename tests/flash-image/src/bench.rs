@@ -43,6 +43,8 @@ pub struct Bench<C: BoardChip> {
     pub closes_switch: bool,
     /// How the parts are mounted on the arm.
     pub mounted: Mounting,
+    /// Torque at each joint by the converter's code, divided by that of a board without gears.
+    pub gear: [f64; 2],
     /// Turns of the encoders on their shafts, counts.
     pub encoder_offset: [u16; 2],
     /// Encoders that repeat their last angle.
@@ -124,6 +126,7 @@ impl<C: BoardChip> Bench<C> {
             waits: 0,
             closes_switch: true,
             mounted: Mounting::default(),
+            gear: [1.0; 2],
             encoder_offset: [0; 2],
             is_frozen: [false; 2],
             force_is_stuck_at: None,
@@ -203,12 +206,16 @@ impl<C: BoardChip> Bench<C> {
         }
         let torque = self.board.torque();
         let counts = if torque.enabled == Some(true) {
-            let [one, two] = torque.counts;
-            let [reversed_1, reversed_2] = self.mounted.stage_reversed;
-            [
-                if reversed_1 { -one } else { one },
-                if reversed_2 { -two } else { two },
-            ]
+            let most = (1 << 11) - 1;
+            [0, 1].map(|joint| {
+                let geared = f64::from(torque.counts[joint]) * self.gear[joint];
+                let counts = (geared.round() as i32).clamp(-most - 1, most);
+                if self.mounted.stage_reversed[joint] {
+                    -counts
+                } else {
+                    counts
+                }
+            })
         } else {
             [0; 2]
         };

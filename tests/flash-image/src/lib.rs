@@ -6,12 +6,14 @@
 //!   sensors on their buses are in [`painleve_parts`]
 //! - [`board`]: the board's wiring, the host's end of its serial line, the arm's torques
 //! - [`mod@bench`]: the board with the simulated arm on its sensors and stages
+//! - [`harm`]: what the arm does between a failure and the stop of the drive
 //!
 //! Time is counted in instructions: each takes [`machine::CYCLES_PER_INSTRUCTION`] of the clock
 //! that the image has configured. It does not measure the time on silicon.
 
 pub mod bench;
 pub mod board;
+pub mod harm;
 pub mod machine;
 pub mod stm32;
 pub mod stm32f4;

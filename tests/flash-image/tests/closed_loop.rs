@@ -8,6 +8,7 @@ use painleve_firmware::Controller;
 use painleve_flash_image::bench::{Bench, scenario};
 use painleve_flash_image::board::{BoardChip, F405, G474};
 use painleve_shared::frame::SensorFrame;
+use painleve_shared::stages::StageSettings;
 use painleve_shared::status::SupervisorState;
 
 #[test]
@@ -21,11 +22,27 @@ fn the_nucleo_with_its_own_sensors_gives_the_torques_of_a_pc() {
 }
 
 fn gives_the_torques_of_a_pc<C: BoardChip>() {
-    for name in ["hybrid-elbow-down", "edge"] {
-        let scenario = scenario(name);
+    let geared = StageSettings {
+        gear_ratio: [20.0, 12.5],
+        gear_efficiency: [0.8, 0.9],
+        motor_range_nm: Some([0.4, 0.5]),
+    };
+    for (name, stages) in [
+        ("hybrid-elbow-down", StageSettings::default()),
+        ("edge", StageSettings::default()),
+        ("hybrid-elbow-down", geared),
+    ] {
+        let mut scenario = scenario(name);
+        scenario.converters.stages = stages;
+        let range_nm = scenario.converters.torque.range_nm;
+        // Torque at the joint by the stages' output.
+        let gear = stages
+            .joint_range_nm(range_nm as f32)
+            .map(|it| f64::from(it) / range_nm);
         let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
         let mut switches = Switches::default();
         let mut bench = Bench::<C>::new(&scenario);
+        bench.gear = gear;
         let mut answer = |tick, closed, sampled| {
             controller.tick(&SensorFrame {
                 tick,
@@ -51,8 +68,10 @@ fn gives_the_torques_of_a_pc<C: BoardChip>() {
             );
             let torque = bench.board.torque();
             assert_eq!(torque.enabled, Some(drives), "{name}, tick {tick}");
-            let expected = answer.torques.map(|it| it.0);
-            assert_eq!(torque.counts, expected, "{name}, tick {tick}");
+            for ((answer, gear), counts) in answer.torques.iter().zip(gear).zip(torque.counts) {
+                let error = f64::from(counts) - f64::from(answer.0) / gear;
+                assert!(error.abs() < 0.501, "{name}, tick {tick}: {error}");
+            }
             driven += u32::from(drives);
         }
         assert!(driven > 800, "{name}: {driven} ticks");

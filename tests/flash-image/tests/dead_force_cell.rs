@@ -8,6 +8,7 @@ use painleve_drivers::plausibility::SensorReadings;
 use painleve_firmware::Controller;
 use painleve_flash_image::bench::{Bench, scenario};
 use painleve_flash_image::board::{BoardChip, F405, G474};
+use painleve_flash_image::harm::Harm;
 use painleve_plant::scenario::built_in;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
@@ -24,12 +25,7 @@ fn takes_the_torque_off<C: BoardChip>(is_zero: bool) {
     bench.drive();
     let present = bench.frame.normal_force.0;
     bench.force_is_stuck_at = Some(if is_zero { 0 } else { present });
-    let mut ticks = 0;
-    while !bench.board.torque().is_off() {
-        bench.tick();
-        ticks += 1;
-        assert!(ticks < LIMIT_TICKS);
-    }
+    let harm = Harm::until_off(&mut bench, LIMIT_TICKS);
     let mut fault = None;
     while let Some(response) = bench.board.response(2_000_000_000) {
         if let Response::Tick { answer, .. } = response {
@@ -39,7 +35,7 @@ fn takes_the_torque_off<C: BoardChip>(is_zero: bool) {
             }
         }
     }
-    println!("{fault:?} after {ticks} ticks");
+    println!("{fault:?} after {harm:?}");
     assert_eq!(fault, Some(Fault::GapAgainstForce));
     bench.assert_stays_off(100);
 }
@@ -77,7 +73,13 @@ fn healthy_readings_of_every_scenario_are_plausible() {
             check_hz: tick_hz,
         };
         let mut check = GapCheck::new(arm, scales);
-        let model = HeatingModel::new(&converters.winding, &converters.torque, tick_hz).unwrap();
+        let model = HeatingModel::new(
+            &converters.winding,
+            &converters.stages,
+            &converters.torque,
+            tick_hz,
+        )
+        .unwrap();
         let mut heating = Heating::default();
         let mut torques = None;
         for tick in 0..(scenario.run.duration_s * f64::from(tick_hz)) as u32 {

@@ -6,7 +6,7 @@
 
 #![allow(unsafe_code)] // registers, whatever the program was doing
 
-use painleve_image::arm_drive::NO_TORQUE;
+use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::watchdogs::{IndependentLimit, IndependentWatchdog, WindowWatchdog};
 use painleve_shared::black_box::ResetCause;
 use stm32f4xx_hal::pac;

@@ -5,7 +5,7 @@
 
 #![allow(unsafe_code)] // registers, whatever the program was doing
 
-use painleve_image::arm_drive::NO_TORQUE;
+use painleve_drivers::stages::NO_TORQUE;
 use painleve_stm32g4::pac;
 
 painleve_image::crash_handlers!(crate::G474);

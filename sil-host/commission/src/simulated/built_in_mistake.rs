@@ -36,6 +36,8 @@ pub enum BuiltInMistake {
     FirstStageHalved,
     /// The elbow's stage gives twice its torque.
     ElbowStageDoubled,
+    /// The gear of joint 1 has a third of its ratio.
+    FirstGearOfAnotherRatio,
     /// The elbow's stage has no supply.
     ElbowStageDead,
     /// The force cell is mounted upside down.
@@ -88,6 +90,7 @@ impl BuiltInMistake {
             Self::StagesSwapped => wiring.stages_swapped = true,
             Self::FirstStageHalved => wiring.stage_gain[0] = 0.5,
             Self::ElbowStageDoubled => wiring.stage_gain[1] = 2.0,
+            Self::FirstGearOfAnotherRatio => wiring.gear_ratio[0] = 1.0 / 3.0,
             Self::ElbowStageDead => wiring.stage_gain[1] = 0.0,
             Self::ForceCellUpsideDown => mounting.force_reversed.iter_mut().for_each(toggle),
             Self::TangentialForceMirrored => toggle(&mut mounting.force_reversed[0]),

@@ -29,6 +29,8 @@ pub struct Wiring {
     pub stages_swapped: bool,
     /// Torque of each stage divided by its command.
     pub stage_gain: [f64; 2],
+    /// Gear ratio of each joint divided by the scenario's.
+    pub gear_ratio: [f64; 2],
     /// Whether f_t and f_n are exchanged.
     pub forces_swapped: bool,
     /// Whether the force cell gives codes that no force gives.
@@ -51,6 +53,7 @@ impl Wiring {
             encoder_ratio: [1.0; 2],
             stages_swapped: false,
             stage_gain: [1.0; 2],
+            gear_ratio: [1.0; 2],
             forces_swapped: false,
             force_silent: false,
             force_stuck: false,
@@ -124,10 +127,11 @@ impl Wiring {
         mut torques: [TorqueCounts; 2],
     ) -> [TorqueCounts; 2] {
         for (joint, torque) in torques.iter_mut().enumerate() {
+            let scale_of_joint = self.stage_gain[joint] * self.gear_ratio[joint];
             let gain = if self.mounting.stage_reversed[joint] {
-                -self.stage_gain[joint]
+                -scale_of_joint
             } else {
-                self.stage_gain[joint]
+                scale_of_joint
             };
             let most = scale.maximum_counts();
             let counts = (f64::from(torque.0) * gain).round() as i32;

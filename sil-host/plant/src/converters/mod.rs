@@ -22,6 +22,7 @@ use painleve_firmware::configuration::Converters;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, LinearScale};
 use painleve_shared::mounting::Mounting;
 use painleve_shared::settings;
+use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 
 use encoder::EncoderSettings;
@@ -46,6 +47,8 @@ settings! {
         faults: ChannelFaults = ChannelFaults::default();
         /// Directions and zeros of the parts of a real arm; the simulated arm has none of them.
         mounting: Mounting = Mounting::default();
+        /// Motors and gears of a real arm's torque stages; the simulated stages act on the joints.
+        stages: StageSettings = StageSettings::default();
         /// Protection of a real arm's windings; the simulated stages stay cold.
         winding: WindingSettings = WindingSettings::default();
     }
@@ -65,6 +68,7 @@ impl ConverterSettings {
                 range: self.torque.range_nm as f32,
             },
             mounting: self.mounting,
+            stages: self.stages,
             winding: self.winding,
         }
     }

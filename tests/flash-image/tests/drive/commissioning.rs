@@ -104,6 +104,22 @@ fn an_arm_is_commissioned_and_its_corrected_scenario_describes_it() {
 }
 
 #[test]
+fn a_gear_of_another_ratio_is_named_and_nothing_is_written() {
+    let rig = EmulatedRig::new();
+    // The scenario says that there is no gear.
+    rig.act(|bench| bench.gear = [1.0, 3.0]);
+    let (output, text, folder) = commission(&rig, Bench::new("commission"), DEFAULT);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    for part in [
+        "torque stage of the elbow: gives ",
+        "as if converters.stages.gear_ratio were ",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(!folder.path("commissioned.toml").exists());
+}
+
+#[test]
 fn a_dead_force_line_is_named_and_nothing_is_written() {
     let rig = EmulatedRig::new();
     rig.act(|bench| bench.board.wiring().force.dead = Some(false));

@@ -13,6 +13,7 @@ use painleve_shared::mounting::Mounting;
 use painleve_shared::status::Fault;
 
 use super::{DEFAULT, assert_off_in_time, driven, latched_fault};
+use painleve_flash_image::harm::Harm;
 
 crate::on_each_board! {
     the_switch_takes_the_torque_off_and_a_bounce_does_not_put_it_on,
@@ -79,14 +80,9 @@ fn an_encoder_that_freezes_takes_the_torque_off<C: BoardChip>() {
     for encoder in 0..2 {
         let mut bench = driven::<C>();
         bench.is_frozen[encoder] = true;
-        let mut ticks = 0;
-        while !bench.board.torque().is_off() {
-            bench.tick();
-            ticks += 1;
-            assert!(ticks < 2000, "encoder {encoder}");
-        }
+        let harm = Harm::until_off(&mut bench, 2000);
         let fault = latched_fault(&mut bench);
-        println!("encoder {encoder}: {fault:?} after {ticks} ticks");
+        println!("encoder {encoder}: {fault:?} after {harm:?}");
         assert!(fault.is_some());
         bench.assert_stays_off(100);
     }
