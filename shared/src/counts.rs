@@ -72,6 +72,14 @@ fn round_to_i32<T: Real>(value: T) -> i32 {
     (value + T::literal(0.5).copysign(value)).truncate_to_i32()
 }
 
+/// Rounds half away from zero, exactly; saturates, and NaN gives 0.
+#[inline]
+fn round_to_i64(value: f64) -> i64 {
+    let whole = value as i64;
+    let rest = value - whole as f64;
+    whole.saturating_add(i64::from(rest >= 0.5) - i64::from(rest <= -0.5))
+}
+
 settings! {
     /// A joint encoder: resolution and mounting offset.
     #[derive(Copy, Eq)]
@@ -99,7 +107,8 @@ impl EncoderScale {
     /// One count, rad.
     #[inline]
     pub fn rad_per_count<T: Real>(&self) -> T {
-        T::literal(core::f64::consts::TAU / f64::from(self.modulus()))
+        // Exactly 2π/2^bits, without a division.
+        T::literal(core::f64::consts::TAU * f64::negative_power_of_two(self.bits & 31))
     }
 
     /// Returns whether an encoder of this resolution can give this reading.
@@ -110,10 +119,10 @@ impl EncoderScale {
 
     /// Returns the reading nearest to an angle in rad (any number of turns).
     pub fn reading(&self, angle_rad: f64) -> EncoderCounts {
-        let counts = libm::round(angle_rad / self.rad_per_count::<f64>()) as i64;
-        let modulus = i64::from(self.modulus());
-        let reading = (counts + i64::from(self.offset.0)).rem_euclid(modulus);
-        EncoderCounts(reading as u32)
+        let counts = round_to_i64(angle_rad / self.rad_per_count::<f64>());
+        let reading = counts.wrapping_add(self.offset.0.into());
+        // The remainder of a division by a power of two, also below zero.
+        EncoderCounts(reading as u32 & (self.modulus() - 1))
     }
 
     /// Returns the counts from angle zero to a reading, the short way round: −2^(bits−1) …
@@ -213,6 +222,32 @@ mod tests {
         assert_eq!(stage.counts(-5.0), (-2048, false));
         assert_eq!(stage.counts(f32::NAN), (0, false));
         assert!(!stage.contains(2048));
+    }
+
+    #[test]
+    fn integers_are_rounded_as_by_the_library() {
+        let numbers = [
+            0.0,
+            -0.0,
+            0.5,
+            -0.5,
+            1.5,
+            -2.5,
+            0.499_999_999_999_999_94,
+            -0.499_999_999_999_999_94,
+            1e-300,
+            4.503_599_627_370_495_5e15,
+            9e15,
+            1e18,
+            1e30,
+            -1e30,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NAN,
+        ];
+        for number in numbers {
+            assert_eq!(round_to_i64(number), libm::round(number) as i64, "{number}");
+        }
     }
 
     proptest! {

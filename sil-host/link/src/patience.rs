@@ -1,17 +1,17 @@
 //! How an end waits for its peer: it spins briefly, then yields, then naps.
 //!
 //! On two idle cores the answer of a lockstep peer arrives during the spin, after about a
-//! microsecond. On a busy machine a pure spin would waste whole scheduler slices on a peer that
-//! cannot run. The wait therefore soon yields the core, and naps if it lasts long (a real-time
-//! tick, an emulator, a debugger).
+//! microsecond. On a busy machine, and where the scheduler lets both ends share a core, a spin
+//! keeps the peer from running. The wait therefore soon yields the core, and naps if it lasts long
+//! (a real-time tick, an emulator, a debugger).
 
 use std::time::{Duration, Instant};
 
 /// Default limit of a peer's silence; a longer silence is an error.
 pub const DEFAULT_SILENCE_LIMIT: Duration = Duration::from_millis(1500);
 
-/// Polls without a pause; they take some tens of microseconds.
-const SPIN_POLLS: u32 = 1000;
+/// Polls without a pause; they take some microseconds.
+const SPIN_POLLS: u32 = 200;
 /// Time spent yielding before the first nap.
 const YIELD_TIME: Duration = Duration::from_micros(200);
 /// Length of a nap; the kernel adds its timer slack, 50 µs unless the process is real-time.

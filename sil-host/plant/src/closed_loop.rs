@@ -135,7 +135,14 @@ pub struct ClosedLoop<H, P = BuiltInPlant> {
 /// Hash of all sensor and actuator frames in order. Each field enters as little-endian bytes, so
 /// that the hash is the same on every host.
 #[derive(Clone, Default)]
-struct LogHash(Xxh3);
+struct LogHash {
+    hash: Xxh3,
+    /// Bytes that do not count yet: many small updates would cost twice as much.
+    pending: Vec<u8>,
+}
+
+/// Bytes of one update of a [`LogHash`].
+const HASHED_AT_ONCE: usize = 4096;
 
 impl LogHash {
     fn sensor(&mut self, frame: &SensorFrame) {
@@ -166,11 +173,17 @@ impl LogHash {
     }
 
     fn words<const N: usize>(&mut self, words: [u32; N]) {
-        self.0.update(words.map(u32::to_le_bytes).as_flattened());
+        let bytes = words.map(u32::to_le_bytes);
+        self.pending.extend_from_slice(bytes.as_flattened());
+        if self.pending.len() >= HASHED_AT_ONCE {
+            self.hash.update(&self.pending);
+            self.pending.clear();
+        }
     }
 
-    fn hex(&self) -> String {
-        format!("{:032x}", self.0.digest128())
+    fn hex(mut self) -> String {
+        self.hash.update(&self.pending);
+        format!("{:032x}", self.hash.digest128())
     }
 }
 

@@ -121,12 +121,16 @@ impl ForceCell {
         let (tangential, _) = self.scale.counts(output.x + self.tangential_noise.draw());
         let (normal, _) = self.scale.counts(output.y + self.normal_noise.draw());
         let reading = (ForceCounts(tangential), ForceCounts(normal));
-        self.delayed.push_back(reading);
-        // Before the first sample, the delay line holds the first reading.
-        let (tangential, normal) = if self.delayed.len() > usize::from(settings.delay_ticks) {
-            self.delayed.pop_front().unwrap_or(reading)
+        let (tangential, normal) = if settings.delay_ticks == 0 {
+            reading
         } else {
-            self.delayed.front().copied().unwrap_or(reading)
+            self.delayed.push_back(reading);
+            // Before the first sample, the delay line holds the first reading.
+            if self.delayed.len() > usize::from(settings.delay_ticks) {
+                self.delayed.pop_front().unwrap_or(reading)
+            } else {
+                self.delayed.front().copied().unwrap_or(reading)
+            }
         };
         let maximum = i64::from(self.scale.maximum_counts());
         let mut pass = |channel: usize, counts: ForceCounts| {
