@@ -1,11 +1,11 @@
-//! Links the board's images: memory map, linker arguments and log level, for the microcontroller
-//! only. An image in another crate finds the memory map as well.
+//! Links the images of a board: memory map, linker arguments and log level, for the microcontroller
+//! only. An image in another crate finds the board's memory map as well.
 
 use std::env;
 
 fn main() {
     println!("cargo:rerun-if-changed=memory.x");
-    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=../build.rs");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
