@@ -393,3 +393,26 @@ fn figures_are_png_or_pdf_files_by_their_extension() {
             .starts_with(b"\x89PNG")
     );
 }
+
+#[test]
+fn a_run_that_is_being_written_is_not_overwritten() {
+    let bench = Bench::new("being-written");
+    let first = bench.start(&["run", "--set", "run.duration_s=3600"]);
+    let start = std::time::Instant::now();
+    while !bench.files().iter().any(|file| file.contains(".run.mcap.")) {
+        assert!(start.elapsed().as_secs() < 20, "{:?}", bench.files());
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let output = bench.run(&["run", "--set", "run.duration_s=0.1"]);
+    assert_eq!(code(output.status), 4, "{output:?}");
+    assert!(
+        errors(&output).contains("run.mcap` is being written"),
+        "{output:?}"
+    );
+    let other = ["run", "--set", "run.duration_s=0.1", "--json", "--no-plot"];
+    bench.report(&[&other[..], &["--record", "out/other.mcap"]].concat());
+    painleve_tests::signal(first.id(), nix::sys::signal::Signal::SIGINT);
+    let (output, _) = first.end(std::time::Duration::from_secs(20));
+    assert_eq!(code(output.status), 130, "{output:?}");
+    bench.report(&["run", "--set", "run.duration_s=0.1", "--json"]);
+}

@@ -103,6 +103,7 @@ impl OutputArguments {
                     path: path.to_path_buf(),
                 });
             }
+            file.check_alone().map_err(output)?;
             sinks.push(match option {
                 "record" => {
                     Box::new(McapLog::to(file, scenario, Source::Simulation).map_err(output)?)

@@ -9,7 +9,7 @@
 //! replaced.
 
 use std::ffi::{OsStr, OsString};
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -40,6 +40,14 @@ pub enum AtomicFileError {
     /// The file exists already, but a new one was requested.
     #[error("`{path}` already exists")]
     Exists {
+        /// The requested path.
+        path: PathBuf,
+    },
+    /// Another process is writing the file.
+    #[error(
+        "`{path}` is being written by another process: wait for its end or choose another path"
+    )]
+    Busy {
         /// The requested path.
         path: PathBuf,
     },
@@ -100,6 +108,25 @@ impl AtomicFile {
             }),
             Err(source) => Err(AtomicFileError::Write { path, source }),
         }
+    }
+
+    /// Checks that no other process is writing a file of this name. Two that start at the same moment may both
+    /// find the other.
+    ///
+    /// # Errors
+    /// [`AtomicFileError::Busy`].
+    pub fn check_alone(&self) -> Result<(), AtomicFileError> {
+        let name = self.target.file_name().unwrap_or_default();
+        let is_written = |path: PathBuf| {
+            path.file_name() != self.temporary.path().file_name()
+                && File::open(path)
+                    .is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+        };
+        if temporaries(&self.folder, name).any(is_written) {
+            let path = self.path.clone();
+            return Err(AtomicFileError::Busy { path });
+        }
+        Ok(())
     }
 
     /// Returns the final path of the file, as given.
@@ -212,8 +239,8 @@ fn place(path: &Path) -> Option<(PathBuf, OsString)> {
 
 /// Creates a locked temporary file, after removing those of dead processes.
 fn temporary(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
-    let prefix = format!(".{}.", name.to_string_lossy());
-    remove_abandoned(folder, &prefix);
+    remove_abandoned(folder, name);
+    let prefix = prefix(name);
     loop {
         let temporary = tempfile::Builder::new()
             .prefix(&prefix)
@@ -233,15 +260,30 @@ fn temporary(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
 
 const SUFFIX: &str = ".part";
 
-fn remove_abandoned(folder: &Path, prefix: &str) {
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with(prefix)
-            && name.ends_with(SUFFIX)
-            && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
-        {
-            let _ = fs::remove_file(entry.path());
+/// Returns the start of the names of a file's temporary files.
+fn prefix(name: &OsStr) -> String {
+    format!(".{}.", name.to_string_lossy())
+}
+
+/// Returns the temporary files of a file, of all processes.
+fn temporaries(folder: &Path, name: &OsStr) -> impl Iterator<Item = PathBuf> {
+    let prefix = prefix(name);
+    let is_temporary = move |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let random = name
+            .strip_prefix(prefix.as_str())
+            .and_then(|rest| rest.strip_suffix(SUFFIX));
+        // Otherwise it belongs to a longer name.
+        random.is_some_and(|random| !random.contains('.'))
+    };
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.map(|entry| entry.path()).filter(is_temporary)
+}
+
+fn remove_abandoned(folder: &Path, name: &OsStr) {
+    for path in temporaries(folder, name) {
+        if File::open(&path).is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = fs::remove_file(path);
         }
     }
 }
@@ -343,6 +385,23 @@ mod tests {
         let mut left = names(folder.path());
         left.sort();
         assert_eq!(left, [".other.svg.killed.part", "run.svg"]);
+    }
+
+    #[test]
+    fn a_file_that_is_being_written_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let first = AtomicFile::create(&path).unwrap();
+        first.check_alone().unwrap();
+        // A longer name is another file.
+        let longer = AtomicFile::create(folder.path().join("a.csv.gz")).unwrap();
+        first.check_alone().unwrap();
+        longer.check_alone().unwrap();
+        let second = AtomicFile::create(&path).unwrap();
+        let message = second.check_alone().unwrap_err().to_string();
+        assert!(message.contains("a.csv` is being written"), "{message}");
+        first.commit().unwrap();
+        second.check_alone().unwrap();
     }
 
     #[test]
