@@ -258,9 +258,8 @@ impl Drive {
             return Ok(());
         };
         let before = self.last_sequence.replace(sensor.sequence);
-        let step = before.map_or(1, |before| sensor.sequence.wrapping_sub(before));
         self.report.ticks += 1;
-        self.report.lost_ticks += u64::from(step.saturating_sub(1));
+        self.report.lost_ticks += before.map_or(0, |before| lost_between(before, sensor.sequence));
         self.report.active_ticks += u64::from(state.drives());
         let sample = self.measured.sample(&sensor, answer);
         if let Some(recorder) = recorder {
@@ -268,5 +267,30 @@ impl Drive {
         }
         self.view.show(&sample);
         Ok(())
+    }
+}
+
+/// Returns the number of ticks lost between two sequence numbers. A board that was configured again counts
+/// anew: a step backwards loses none.
+fn lost_between(before: u32, now: u32) -> u64 {
+    let step = now.wrapping_sub(before);
+    if step > u32::MAX / 2 {
+        0
+    } else {
+        u64::from(step.saturating_sub(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lost_between;
+
+    #[test]
+    fn a_board_that_counts_anew_has_lost_no_ticks() {
+        assert_eq!(lost_between(7, 8), 0);
+        assert_eq!(lost_between(7, 10), 2);
+        assert_eq!(lost_between(u32::MAX, 1), 1);
+        assert_eq!(lost_between(7, 3), 0);
+        assert_eq!(lost_between(7, 7), 0);
     }
 }
