@@ -134,10 +134,10 @@ pub struct ClosedLoop<H, P = BuiltInPlant> {
 
 /// Hash of all sensor and actuator frames in order. Each field enters as little-endian bytes, so
 /// that the hash is the same on every host.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 struct LogHash {
     hash: Xxh3,
-    /// Bytes that do not count yet: many small updates would cost twice as much.
+    /// Bytes that do not count yet, at most [`HASHED_AT_ONCE`]: many small updates would cost twice as much.
     pending: Vec<u8>,
 }
 
@@ -145,6 +145,13 @@ struct LogHash {
 const HASHED_AT_ONCE: usize = 4096;
 
 impl LogHash {
+    fn new() -> Self {
+        Self {
+            hash: Xxh3::default(),
+            pending: Vec::with_capacity(HASHED_AT_ONCE),
+        }
+    }
+
     fn sensor(&mut self, frame: &SensorFrame) {
         let [joint_1, joint_2] = frame.joints.map(|joint| joint.0);
         self.words([
@@ -174,11 +181,12 @@ impl LogHash {
 
     fn words<const N: usize>(&mut self, words: [u32; N]) {
         let bytes = words.map(u32::to_le_bytes);
-        self.pending.extend_from_slice(bytes.as_flattened());
-        if self.pending.len() >= HASHED_AT_ONCE {
+        let bytes = bytes.as_flattened();
+        if self.pending.len() + bytes.len() > HASHED_AT_ONCE {
             self.hash.update(&self.pending);
             self.pending.clear();
         }
+        self.pending.extend_from_slice(bytes);
     }
 
     fn hex(mut self) -> String {
@@ -219,7 +227,7 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             simulation,
             host,
             statistics: Statistics::new(SETTLING_S),
-            log: LogHash::default(),
+            log: LogHash::new(),
             // The bounds are valid constants; three significant digits, as everywhere.
             round_trips_ns: Histogram::new_with_max(LONGEST_ROUND_TRIP_NS, 3)
                 .unwrap_or_else(|_| unreachable!("constant histogram bounds")),
