@@ -119,6 +119,7 @@ mod tests {
     fn friction(slip: Slip, sticks: bool) -> FrictionEstimate {
         FrictionEstimate {
             coefficient: 0.6,
+            next_coefficient: 0.6,
             deviation: 0.01,
             slip,
             slip_seen: true,

@@ -35,7 +35,9 @@ pub struct Model {
     inverse_determinant_per_m2: f32,
     /// M⁻¹ j2, 1/(kg·m): link acceleration per unit of normal force.
     normal_mobility: Vector2<f32>,
-    /// Q12 and Q22 of Q = J M⁻¹ Jᵀ, 1/kg.
+    /// Q11 of Q = J M⁻¹ Jᵀ, 1/kg.
+    pub q11_per_kg: f32,
+    /// Q12, 1/kg.
     pub q12_per_kg: f32,
     /// Q22, 1/kg.
     pub q22_per_kg: f32,
@@ -62,7 +64,8 @@ impl Model {
         let [length_1, length_2] = arm.link_length_m();
         let normal = Vector2::new(jacobian.m21, jacobian.m22);
         let normal_mobility = mobility * normal;
-        let tangential_mobility = mobility * Vector2::new(jacobian.m11, jacobian.m12);
+        let tangential = Vector2::new(jacobian.m11, jacobian.m12);
+        let tangential_mobility = mobility * tangential;
         let tip_m = arm.tip_m(&pose);
         Self {
             theta_rad,
@@ -80,6 +83,7 @@ impl Model {
             // det J = l1 l2 sin(θ2 − θ1).
             inverse_determinant_per_m2: 1.0 / (length_1 * length_2 * bounded),
             normal_mobility,
+            q11_per_kg: tangential_mobility.dot(&tangential),
             q12_per_kg: tangential_mobility.dot(&normal),
             q22_per_kg: normal_mobility.dot(&normal),
         }

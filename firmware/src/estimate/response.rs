@@ -88,6 +88,9 @@ pub struct ContactResponse {
     pub loop_share: f32,
     /// How much the contact gives, 0 … 1: 0 if it is rigid.
     pub give: f32,
+    /// How certainly the contact is not rigid, 0 … 1: 0 where the upper bound of the response is that of a
+    /// rigid contact, 1 where it is half of that or less.
+    pub lags: f32,
     /// Least p/Q22 at which the tip may be.
     pub least_p_ratio: f32,
     /// Probe to be added to the wanted normal force, N.
@@ -100,6 +103,7 @@ impl ContactResponse {
         Self {
             loop_share: p_ratio.at_least(0.0),
             give: 0.0,
+            lags: 0.0,
             least_p_ratio: 0.0,
             probe_n: 0.0,
         }
@@ -160,8 +164,9 @@ pub struct ResponseState {
     upper: f32,
     /// Fraction of the observers' full gain that the lower bound allows.
     gain: f32,
-    /// How much the contact gives, from the upper bound.
+    /// How much the contact gives, and how certainly it is not rigid, from the upper bound.
     give: f32,
+    lags: f32,
     /// Time since the tip touched, s.
     touched_s: f32,
     /// Time of observation near the edge, s.
@@ -203,6 +208,7 @@ impl ResponseEstimator {
             upper: 1.0,
             gain: 0.0,
             give: 0.0,
+            lags: 0.0,
             touched_s: 0.0,
             near_s: 0.0,
             least_p_ratio: self.settings.minimum_p_ratio,
@@ -225,6 +231,7 @@ impl ResponseEstimator {
             loop_share: (gain * p_ratio / (1.0 - p_ratio).at_least(LEAST_REST))
                 .limited(0.0, p_ratio.at_least(0.0)),
             give: state.give,
+            lags: state.lags,
             least_p_ratio: state.least_p_ratio,
             probe_n: state.probe_n,
         }
@@ -308,6 +315,7 @@ impl ResponseEstimator {
         state.upper = response + settings.deviations * deviation;
         state.gain = state.lower / settings.full_gain;
         state.give = (1.0 - state.upper / settings.gives).at_least(0.0);
+        state.lags = (2.0 - 2.0 * state.upper / settings.rigid).limited(0.0, 1.0);
     }
 
     /// Lets the tip closer to the edge while the contact there is rigid, and less close while it gives.

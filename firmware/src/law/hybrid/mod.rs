@@ -29,7 +29,7 @@ const FORCE_INTEGRAL_SHARE: f32 = 0.165;
 
 /// Rate limit of the friction feed-forward, as a fraction of f_n, 1/s: at a reversal of slip it
 /// passes through stick without a jerk.
-const FRICTION_SLEW_PER_S: f32 = 100.0;
+const FRICTION_SLEW_PER_S: f32 = 500.0;
 
 /// Fraction of the torque limit available for pressing the tip on the belt; the rest is for motion.
 const TORQUE_USED: f32 = 0.95;
@@ -90,6 +90,10 @@ pub struct HybridState {
     pressing: f32,
     /// Low-passed normal force, N.
     slow_force_n: f32,
+    /// Contact force (f_t, f_n) fed forward at the last tick, N.
+    fed_force_n: Vector2<f32>,
+    /// Low-passed acceleration along the belt by the rest of the contact force, m/s².
+    force_drift_m_s2: f32,
 }
 
 impl Default for HybridState {
@@ -103,6 +107,8 @@ impl Default for HybridState {
             fed_ratio: 0.0,
             pressing: 1.0,
             slow_force_n: 0.0,
+            fed_force_n: Vector2::zeros(),
+            force_drift_m_s2: 0.0,
         }
     }
 }
@@ -119,6 +125,7 @@ impl Law for HybridSettings {
             wanted_force_n: (self.force_time_constant_s > 0.0).then_some(force_n),
             filtered_friction_n: input.force_n.x.within(cone_n),
             slow_force_n: input.force_n.y,
+            fed_force_n: input.force_n,
             ..HybridState::default()
         };
     }
@@ -128,9 +135,10 @@ impl Law for HybridSettings {
         let normal_force = self.commanded_force_n(state, input);
         let friction_force =
             self.compensated_friction_n(state, input, normal_force, tangential_acceleration);
+        let force_drift = self.force_drift_m_s2(state, input);
         let acceleration = input
             .model
-            .link_acceleration_rad_s2(&Vector2::new(tangential_acceleration, 0.0));
+            .link_acceleration_rad_s2(&Vector2::new(tangential_acceleration - force_drift, 0.0));
         let wanted = Vector2::new(friction_force, normal_force);
         let motion_nm = input.model.inverse_dynamics_in_air_nm(&acceleration);
         let pressing_nm = input.model.torque_against_nm(&wanted);
@@ -143,9 +151,10 @@ impl Law for HybridSettings {
         } else {
             1.0
         };
+        state.fed_force_n = wanted * state.pressing;
         LawOutput {
             torque_nm: motion_nm + pressing_nm * state.pressing,
-            contact_force_n: wanted * state.pressing,
+            contact_force_n: state.fed_force_n,
         }
     }
 }
@@ -164,6 +173,28 @@ impl HybridSettings {
             + self.position_gain_per_s2 * error
             + self.velocity_gain_per_s * error_rate
             + state.position_integral_m_s2
+    }
+
+    /// Returns the acceleration of the tip along the belt by contact forces other than those fed forward,
+    /// m/s².
+    fn force_drift_m_s2(&self, state: &mut HybridState, input: &LawInput<'_>) -> f32 {
+        // On a rigid contact the friction observer is fast enough to do this.
+        if input.response.lags <= 0.0 {
+            state.force_drift_m_s2 = 0.0;
+            return 0.0;
+        }
+        // Where torque is short, the force is not the one that was fed forward.
+        if input.contact && !input.saturated && state.pressing >= 1.0 {
+            let rest_n = input.force_n - state.fed_force_n;
+            let model = input.model;
+            let drift = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
+            let rate = self.force_drift_rad_s * input.tick_s;
+            let drift = input.response.lags * drift;
+            state.force_drift_m_s2 += rate / (1.0 + rate) * (drift - state.force_drift_m_s2);
+        }
+        state
+            .force_drift_m_s2
+            .within(self.position_integral_limit_m_s2)
     }
 
     /// α_f, N.
@@ -221,7 +252,8 @@ impl HybridSettings {
                     friction.slip
                 };
                 let slip = friction.slip_seen.then_some(slip);
-                let ratio = slip.map_or(0.0, |slip| -friction.coefficient * slip.sign::<f32>());
+                let ratio =
+                    slip.map_or(0.0, |slip| -friction.next_coefficient * slip.sign::<f32>());
                 if slip != state.slip {
                     state.filtered_friction_n = 0.0;
                     if state.slip.is_none() {
@@ -283,7 +315,7 @@ mod tests {
             let input = LawInput {
                 arm: &arm, model: &model, posture,
                 friction: FrictionEstimate {
-                    coefficient: friction, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
+                    coefficient: friction, next_coefficient: friction, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
                 },
                 p_per_kg: model.p_per_kg(friction, Slip::Positive), response: ContactResponse::rigid(1.0),
                 force_n: Vector2::zeros(), contact: true, saturated: false,
@@ -300,5 +332,61 @@ mod tests {
             prop_assert!((normal - 10.0).abs() < 0.02, "f_n = {}", normal);
             prop_assert!((acceleration.x - (0.7 + 3000.0 * 0.001)).abs() < 0.05, "{}", acceleration);
         }
+    }
+
+    #[test]
+    fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let theta_rad = arm
+            .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
+            .unwrap();
+        let model = Model::new(
+            &arm,
+            theta_rad,
+            painleve_shared::LinkMotion::zeros(),
+            &GeneralisedTorque::zeros(),
+        );
+        let settings = HybridSettings::default();
+        let mut input = LawInput {
+            arm: &arm,
+            model: &model,
+            posture: Posture::ElbowDown,
+            friction: FrictionEstimate {
+                coefficient: 0.6,
+                next_coefficient: 0.6,
+                deviation: 0.0,
+                slip: Slip::Positive,
+                slip_seen: true,
+                sticks: false,
+            },
+            p_per_kg: model.p_per_kg(0.6, Slip::Positive),
+            response: ContactResponse {
+                lags: 1.0,
+                ..ContactResponse::rigid(1.0)
+            },
+            force_n: Vector2::new(-6.0, 10.0),
+            contact: true,
+            saturated: false,
+            reference: TipReference::at_rest(0.1),
+            torque_limit_nm: 50.0,
+            tick_s: 1e-3,
+        };
+        let mut state = HybridState::default();
+        settings.reset(&mut state, &input);
+        let rest_n = Vector2::new(-0.3, 0.5);
+        let expected = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
+        for _ in 0..200 {
+            input.force_n = state.fed_force_n + rest_n;
+            settings.force_drift_m_s2(&mut state, &input);
+        }
+        let learnt = settings.force_drift_m_s2(&mut state, &input);
+        assert!(
+            (learnt - expected).abs() < 1e-3 * expected.abs(),
+            "{learnt} {expected}"
+        );
+        // Nothing is learnt from a torque that was limited.
+        input.saturated = true;
+        input.force_n = Vector2::zeros();
+        assert_eq!(settings.force_drift_m_s2(&mut state, &input), learnt);
     }
 }

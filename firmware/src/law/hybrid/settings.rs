@@ -43,8 +43,11 @@ settings! {
         velocity_gain_per_s: f32 = 100.0, 0.0..=1e4, "1/s";
         /// Gain of ∫ (z_t* − z_t) dt, added to α_v; not in the paper.
         position_integral_gain_per_s3: f32 = 20_000.0, 0.0..=1e9, "1/s³";
-        /// Largest acceleration due to that integral.
+        /// Largest acceleration due to that integral, and largest one by contact forces that the law cancels.
         position_integral_limit_m_s2: f32 = 200.0, 0.0..=1e6, "m/s²";
+        /// Rate at which the law learns the acceleration of the tip along the belt by contact forces other
+        /// than those fed forward, which it cancels; 0 for never. Not in the paper.
+        force_drift_rad_s: f32 = 150.0, 0.0..=1e4, "rad/s";
         /// Time constant with which the wanted force approaches f_n* after landing; 0 for at once,
         /// as in the paper.
         force_time_constant_s: f32 = 0.02, 0.0..=10.0, "s";

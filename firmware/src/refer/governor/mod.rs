@@ -245,6 +245,7 @@ mod tests {
     fn known(coefficient: f32, slip: Slip) -> FrictionEstimate {
         FrictionEstimate {
             coefficient,
+            next_coefficient: coefficient,
             deviation: 0.0,
             slip,
             slip_seen: true,
