@@ -7,12 +7,14 @@ exactly the belt speeds at which the plant itself does (37 speeds, 300 s each).
 
 import csv
 import pathlib
+import re
 import sys
 import tempfile
 
 import fmpy
 from fmpy.validation import validate_fmu
 
+PAGE = pathlib.Path(__file__).parent.parent / "docs/interface.md"
 SECTION = pathlib.Path(__file__).parent.parent / "sil-host/plant/tests/data/open_loop_section_mu06.csv"
 
 
@@ -57,6 +59,10 @@ def main(fmu):
     bouncing = [speed for speed, _ in rows if bounces(model, speed)]
     assert bouncing == [speed for speed, expected in rows if expected], bouncing
     print(f"{len(bouncing)} of {len(rows)} belt speeds bounce, from {bouncing[0]} to {bouncing[-1]} m/s, as in the plant")
+
+    # The snippet of the documentation, which names the file that `cargo xtask fmu` writes.
+    [snippet] = re.findall(r"```python\n(import fmpy.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    exec(snippet, {})
 
 
 main(sys.argv[1])

@@ -112,7 +112,10 @@ fn pandas_reads_and_plots_a_run() {
     let page = page();
     let bench = Bench::new("first-ten-things-pandas");
     assert_eq!(execute(&bench, &page, "out/run.csv"), 1);
-    let snippet = blocks(&page, "python").concat();
+    let recording = std::fs::read_to_string(workspace().join("docs/recording.md")).unwrap();
+    let snippet = [blocks(&page, "python"), blocks(&recording, "python")].concat();
+    assert_eq!(snippet.len(), 2);
+    let snippet = snippet.concat();
     let check = "assert len(run) == 6000 and abs(run['plant.tip_t_m'].iloc[-1] - 0.148) < 1e-3";
     let output = Command::new(python)
         .args(["-c", &format!("{snippet}\n{check}\n")])

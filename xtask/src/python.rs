@@ -7,11 +7,12 @@ const MANIFEST: &str = "python/Cargo.toml";
 const FOLDER: &str = "target/python/package";
 const WHEELS: &str = "target/python/wheels";
 /// The test's own requirements.
-const TOOLS: [&str; 7] = [
+const TOOLS: [&str; 8] = [
     "maturin>=1.9,<2",
     "pytest",
     "gymnasium",
     "numpy",
+    "pandas",
     "matplotlib",
     "nbconvert",
     "ipykernel",

@@ -112,7 +112,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         let text = serde_json::to_string(&reports).map_err(output)?;
         say(text)
     } else {
-        say(terminal::readable(report::table(&reports)))
+        say(report::table(&reports))
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io::{self, Write};
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{Cell, ContentArrangement, Row, Table};
+use comfy_table::{Cell, ColumnConstraint, ContentArrangement, Row, Table, Width};
 
 /// Writes a line to standard output.
 ///
@@ -58,13 +58,57 @@ pub fn readable(text: impl Display) -> String {
     }
 }
 
-/// Returns a table for readers: in ASCII where the locale asks for it.
+/// Returns a table for readers: in ASCII where the locale asks for it, and with one line for each cell
+/// where the terminal is too narrow for the words of a row.
 pub fn readable_table(table: Table) -> String {
     if is_ascii_only() {
-        to_ascii(&with_ascii_cells(table).to_string())
+        to_ascii(&narrow(with_ascii_cells(table)).to_string())
     } else {
-        table.to_string()
+        narrow(table).to_string()
     }
+}
+
+/// Returns a table that breaks lines between words only. A table of too many columns for its width gets a
+/// line for each cell, named by the header, and an empty line between two rows; empty cells are left out.
+fn narrow(mut table: Table) -> Table {
+    let Some((header, width)) = table.header().zip(table.width()) else {
+        return table;
+    };
+    let names: Vec<String> = header.cell_iter().map(Cell::content).collect();
+    let rows: Vec<Vec<String>> = table
+        .row_iter()
+        .map(|row| row.cell_iter().map(Cell::content).collect())
+        .collect();
+    let longest_word = |column: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(column));
+        let words = cells
+            .chain(names.get(column))
+            .flat_map(|cell| cell.split_whitespace());
+        let letters = words.map(|word| word.chars().count()).max().unwrap_or(0);
+        u16::try_from(letters).unwrap_or(u16::MAX)
+    };
+    // With a space on either side.
+    let least: Vec<u16> = (0..names.len())
+        .map(|column| longest_word(column).saturating_add(2))
+        .collect();
+    let borders = least.len() + 1;
+    if least.iter().copied().map(usize::from).sum::<usize>() + borders <= usize::from(width) {
+        let bounds = least
+            .into_iter()
+            .map(|width| ColumnConstraint::LowerBoundary(Width::Fixed(width)));
+        table.set_constraints(bounds);
+        return table;
+    }
+    let mut lines = self::table(["quantity", "value"]);
+    lines.set_width(width);
+    for (index, row) in rows.iter().enumerate() {
+        if index > 0 {
+            lines.add_row(["", ""]);
+        }
+        let named = names.iter().zip(row).filter(|(_, cell)| !cell.is_empty());
+        lines.add_rows(named.map(|(name, cell)| [name, cell]));
+    }
+    lines
 }
 
 /// Returns a table whose cells are in ASCII before their widths are chosen: some replacements are
@@ -128,7 +172,7 @@ pub fn to_ascii(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{table, to_ascii, with_ascii_cells};
+    use super::{narrow, table, to_ascii, with_ascii_cells};
 
     #[test]
     fn tables_and_units_become_ascii() {
@@ -144,5 +188,30 @@ mod tests {
         let widths: Vec<usize> = text.lines().map(str::len).collect();
         assert!(widths.iter().all(|width| *width == widths[0]), "{text}");
         assert!(text.contains("| 0.1 ... 0.2 | <= 3         |"), "{text}");
+    }
+    #[test]
+    fn a_narrow_table_breaks_no_word() {
+        let rows = |width: u16| {
+            let mut table = table(["controller", "posture", "slides to (m)"]);
+            table
+                .set_width(width)
+                .add_row(["hybrid", "elbow-down", "0.1644"]);
+            table.add_row(["pid", "elbow-up", ""]);
+            narrow(table).to_string()
+        };
+        assert!(rows(36).contains("│ controller ┆"), "{}", rows(36));
+        let folded = rows(35);
+        assert!(
+            folded.lines().all(|line| line.chars().count() <= 35),
+            "{folded}"
+        );
+        for line in [
+            "│ controller    ┆ hybrid     │",
+            "│ slides to (m) ┆ 0.1644     │",
+            "│ posture       ┆ elbow-up   │",
+        ] {
+            assert!(folded.contains(line), "{folded}");
+        }
+        assert_eq!(folded.matches("slides to (m)").count(), 1, "{folded}");
     }
 }

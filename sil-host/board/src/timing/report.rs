@@ -97,7 +97,7 @@ impl TimingReport {
     }
 }
 
-/// Returns the reports as a table with one row each.
+/// Returns the reports as a table for readers, with one row each.
 pub fn table(reports: &[TimingReport]) -> String {
     let first = reports.first();
     let head = first.map_or(String::new(), |first| {
@@ -136,5 +136,5 @@ pub fn table(reports: &[TimingReport]) -> String {
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }
-    table.to_string()
+    terminal::readable_table(table)
 }
