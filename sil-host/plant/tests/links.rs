@@ -130,3 +130,30 @@ fn names_in_the_pages_occur_in_the_source() {
     }
     assert!(unknown.is_empty(), "not in the source: {unknown:#?}");
 }
+
+/// The book keeps the source of a formula for copying, where Markdown would read `'_P … }_\mathrm` as emphasis, and hide
+/// the text between two formulas.
+#[test]
+fn no_formula_begins_an_emphasis() {
+    let mut wrong = Vec::new();
+    for page in pages() {
+        let words: String = prose(&page).split('`').step_by(2).collect();
+        for formula in words.split('$').skip(1).step_by(2) {
+            let letters: Vec<char> = formula.chars().collect();
+            let opens = |three: &[char]| {
+                let [before, '_', after] = three else {
+                    return false;
+                };
+                !before.is_alphanumeric() && !after.is_whitespace()
+            };
+            if letters.windows(3).any(opens) {
+                wrong.push(format!("{}: {formula}", page.display()));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "write a space after these underscores:\n{}",
+        wrong.join("\n")
+    );
+}
