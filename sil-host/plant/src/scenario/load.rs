@@ -107,6 +107,20 @@ fn in_words(message: &str) -> String {
             words = words.replace(&format!("expected {name}"), &format!("expected {meaning}"));
         }
     }
+    words = words
+        .replace("missing field", "missing key")
+        .replace('`', "'");
+    // A type's name follows these to the end of the message.
+    for (kind, meaning) in [
+        ("struct ", "a table of keys"),
+        ("internally tagged enum ", "a table with the key 'kind'"),
+        ("enum ", "one of its kinds"),
+    ] {
+        let start = format!("expected {kind}");
+        if let Some((before, _)) = words.split_once(&start) {
+            words = format!("{before}expected {meaning}");
+        }
+    }
     words
 }
 
@@ -299,6 +313,23 @@ mod tests {
         assert_eq!(scenario.run.duration_s, 2.0);
         assert_eq!(scenario.belt.profile.speed_m_s(0.0), -0.4);
         assert_eq!(scenario.name, "hybrid-elbow-down");
+    }
+
+    #[test]
+    fn messages_name_no_types_of_the_program() {
+        for (wrong, expected) in [
+            ("converters.encoder=3", "expected a table of keys"),
+            (
+                "effects.friction=rising",
+                "expected a table with the key 'kind'",
+            ),
+            ("effects.friction=step", "missing key 'change'"),
+            ("contact=rigid", "expected a table of keys"),
+            ("run.tick_hz=fast", "expected a whole number from 0"),
+        ] {
+            let message = message(&[wrong]);
+            assert!(message.ends_with(expected), "{message}");
+        }
     }
 
     #[test]
