@@ -97,7 +97,7 @@ class ArmView {
     const gap = 1e3 * c.at("gap_m", time);
     g.textAlign = "right"; g.font = "600 13px system-ui, 'DejaVu Sans', sans-serif";
     g.fillStyle = flies ? this.colours.red : this.colours.faint;
-    g.fillText(flies ? `in the air: gap ${gap.toFixed(gap < 0.1 ? 4 : 2)} mm` : MODES[c.mode[c.index(time)]][0], width - 10, 20);
+    g.fillText(flies ? `gap ${gap.toFixed(gap < 0.1 ? 3 : 1)} mm` : MODES[c.mode[c.index(time)]][0], width - 10, 20);
   }
 }
 
