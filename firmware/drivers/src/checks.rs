@@ -24,6 +24,7 @@ pub struct Verdict {
 /// The checks, with their state.
 #[derive(Clone, Debug)]
 pub struct Checks {
+    bits: (u8, u8),
     gap: Option<GapCheck>,
     plausibility: Plausibility,
     heating_model: Option<HeatingModel>,
@@ -34,8 +35,10 @@ pub struct Checks {
 
 impl Checks {
     /// Makes checks; without an arm's model or a model of its windings, the checks that need it find nothing.
-    pub fn new(gap: Option<GapCheck>, heating_model: Option<HeatingModel>) -> Self {
+    /// `bits` are the resolutions of encoders and force cell.
+    pub fn new(gap: Option<GapCheck>, heating_model: Option<HeatingModel>, bits: (u8, u8)) -> Self {
         Self {
+            bits,
             gap,
             plausibility: Plausibility::default(),
             heating_model,
@@ -56,13 +59,12 @@ impl Checks {
     }
 
     /// Records the torques put out since the last tick, and lets the check whose turn it is look at the readings.
-    /// `drives` states whether the drive is active, `bits` the resolutions of encoders and force cell.
+    /// `drives` states whether the drive is active.
     pub fn tick(
         &mut self,
         readings: &SensorReadings,
         torques: [TorqueCounts; 2],
         drives: bool,
-        bits: (u8, u8),
     ) -> Verdict {
         self.heating.tick(torques);
         self.turn = if self.turn + 1 < TURNS {
@@ -71,7 +73,7 @@ impl Checks {
             0
         };
         match self.turn {
-            0 => self.verdict.plausible = self.plausibility.check(readings, bits),
+            0 => self.verdict.plausible = self.plausibility.check(readings, self.bits),
             1 => {
                 if let Some(gap) = &mut self.gap {
                     gap.begin(readings, drives.then_some(torques));

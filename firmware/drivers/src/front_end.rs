@@ -11,8 +11,8 @@ use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 
 use crate::checks::{Checks, TURNS, Verdict};
-use crate::encoders::{self, EncoderDriver};
-use crate::force_cell::{self, ForceCellDriver};
+use crate::encoders::EncoderDriver;
+use crate::force_cell::ForceCellDriver;
 use crate::gap::{GapCheck, Scales};
 use crate::heating::HeatingModel;
 use crate::plausibility::{Implausible, SensorReadings};
@@ -63,6 +63,8 @@ pub struct FrontEnd {
     settings: Option<FrontEndSettings>,
     checks: Checks,
     switches: Switches,
+    /// Readings since the last frame, in the arm's directions, forces as (f_t, f_n).
+    readings: SensorReadings,
     sequence: u32,
     may_arm: bool,
     /// Ticks for which RESET has been pressed, with ENABLE open.
@@ -88,10 +90,15 @@ impl FrontEnd {
         let heating_model = settings
             .as_ref()
             .and_then(|it| HeatingModel::new(&it.winding, &it.stages, &it.torque, it.tick_hz));
+        let bits = settings.as_ref().map_or((0, 0), |it| {
+            let [encoder, _] = it.encoders;
+            (encoder.bits, it.force.bits)
+        });
         Self {
             settings,
-            checks: Checks::new(gap, heating_model),
+            checks: Checks::new(gap, heating_model, bits),
             switches: Switches::default(),
+            readings: SensorReadings::default(),
             sequence: 0,
             may_arm: false,
             pressed_ticks: 0,
@@ -128,26 +135,69 @@ impl FrontEnd {
         self.torques = torques;
     }
 
-    /// Returns the frame of one tick. Sensors whose readings are not complete are `None`. ENABLE is high
-    /// only with the permission and, before the drive is armed, with plausible readings and ready stages.
-    pub fn frame(
-        &mut self,
-        encoders: Option<&EncoderDriver>,
-        force_cell: Option<&ForceCellDriver>,
-        levels: InputLevels,
-    ) -> SensorFrame {
-        let readings = self.readings(encoders, force_cell);
+    /// Takes the readings of a complete set of the encoders for the next frame.
+    pub fn take_encoders(&mut self, encoders: &EncoderDriver) {
+        let Some(settings) = &self.settings else {
+            return;
+        };
+        let [scale, _] = settings.encoders;
+        let mask = scale.modulus().wrapping_sub(1);
+        let turned = |counts: EncoderCounts, reversed: bool| {
+            let backwards = EncoderCounts(counts.0.wrapping_neg() & mask);
+            if reversed { backwards } else { counts }
+        };
+        let [reversed_1, reversed_2] = settings.mounting.encoder_reversed;
+        let [joint_1, joint_2] = encoders.readings(scale.bits);
+        self.readings.joints = [
+            joint_1.ok().map(|it| turned(it, reversed_1)),
+            joint_2.ok().map(|it| turned(it, reversed_2)),
+        ];
+        let magnets = encoders.diagnostics();
+        self.readings.magnets = magnets.map(|it| it.map(|it| it.is_healthy()));
+    }
+
+    /// Takes the readings of a complete set of the force cell for the next frame.
+    pub fn take_forces(&mut self, force_cell: &ForceCellDriver) {
+        let Some(settings) = &self.settings else {
+            return;
+        };
+        let most = settings.force.maximum_counts();
+        let balanced = |counts: ForceCounts, tare: ForceCounts, reversed: bool| {
+            let net = counts.0.wrapping_sub(tare.0);
+            ForceCounts(if reversed { net.wrapping_neg() } else { net }.clamp(-most - 1, most))
+        };
+        let mounting = &settings.mounting;
+        let [reversed_t, reversed_n] = mounting.force_reversed;
+        let [tare_t, tare_n] = mounting.force_tare;
+        let (tangential, normal) = force_cell.readings(settings.force.bits, mounting);
+        self.readings.forces = [
+            tangential.ok().map(|it| balanced(it, tare_t, reversed_t)),
+            normal.ok().map(|it| balanced(it, tare_n, reversed_n)),
+        ];
+    }
+
+    /// Returns the frame of one tick, from the readings taken since the last one. ENABLE is high only with the
+    /// permission and, before the drive is armed, with plausible readings and ready stages.
+    pub fn frame(&mut self, levels: InputLevels) -> SensorFrame {
         let mut inputs = self.switches.tick(levels.enable, levels.reset);
         self.note_button(levels);
-        let bits = self.bits();
+        let readings = &mut self.readings;
         let Verdict {
             contradiction,
             is_hot,
             plausible,
-        } = self
-            .checks
-            .tick(&readings, self.torques, self.is_active, bits);
+        } = self.checks.tick(readings, self.torques, self.is_active);
         self.is_fit = readings.are_complete() && levels.stages_ready;
+        let SensorReadings { joints, forces, .. } = readings;
+        let [joint_1, joint_2] = joints;
+        let [tangential, normal] = forces;
+        // A sensor whose next set of readings is not complete in time gives none.
+        let joints = [
+            joint_1.take().unwrap_or(NO_ENCODER),
+            joint_2.take().unwrap_or(NO_ENCODER),
+        ];
+        let tangential_force = tangential.take().unwrap_or(NO_FORCE);
+        let normal_force = normal.take().unwrap_or(NO_FORCE);
         if self.is_active {
             inputs.set(DigitalInputs::STAGE_NOT_READY, !levels.stages_ready);
             inputs.set(DigitalInputs::GAP_AGAINST_FORCE, contradiction);
@@ -164,14 +214,12 @@ impl FrontEnd {
             inputs.remove(DigitalInputs::ENABLE);
         }
         self.sequence = self.sequence.wrapping_add(1);
-        let SensorReadings { joints, forces, .. } = readings;
-        let [tangential, normal] = forces;
         SensorFrame {
             tick: self.sequence,
             sequence: self.sequence,
-            joints: joints.map(|it| it.unwrap_or(NO_ENCODER)),
-            normal_force: normal.unwrap_or(NO_FORCE),
-            tangential_force: tangential.unwrap_or(NO_FORCE),
+            joints,
+            normal_force,
+            tangential_force,
             inputs,
         }
     }
@@ -188,59 +236,5 @@ impl FrontEnd {
         let settings = self.settings.as_ref();
         let limit = settings.and_then(|it| it.button_ticks);
         self.may_arm |= limit.is_some_and(|limit| self.pressed_ticks >= limit);
-    }
-
-    /// Returns the resolutions of encoders and force cell, bits.
-    fn bits(&self) -> (u8, u8) {
-        let settings = self.settings.as_ref();
-        settings.map_or((encoders::BITS, force_cell::BITS), |it| {
-            let [encoder, _] = it.encoders;
-            (encoder.bits, it.force.bits)
-        })
-    }
-
-    /// Returns the readings in the arm's directions, forces as (f_t, f_n).
-    fn readings(
-        &self,
-        encoders: Option<&EncoderDriver>,
-        force_cell: Option<&ForceCellDriver>,
-    ) -> SensorReadings {
-        let Some(settings) = &self.settings else {
-            return SensorReadings::default();
-        };
-        let (encoder_bits, force_bits) = self.bits();
-        let [encoder_1, encoder_2] = settings.mounting.encoder_reversed;
-        let [force_t, force_n] = settings.mounting.force_reversed;
-        let [tare_t, tare_n] = settings.mounting.force_tare;
-        let (joint_1, joint_2) = encoders.map_or((None, None), |it| {
-            let [joint_1, joint_2] = it.readings(encoder_bits);
-            (joint_1.ok(), joint_2.ok())
-        });
-        let (tangential, normal) = force_cell.map_or((None, None), |it| {
-            let (tangential, normal) = it.readings(force_bits, &settings.mounting);
-            (tangential.ok(), normal.ok())
-        });
-        let turned = |counts: EncoderCounts, reversed: bool| {
-            let mask = (1_u32 << (encoder_bits & 31)).wrapping_sub(1);
-            let backwards = EncoderCounts(counts.0.wrapping_neg() & mask);
-            if reversed { backwards } else { counts }
-        };
-        let most = settings.force.maximum_counts();
-        let balanced = |counts: ForceCounts, tare: ForceCounts, reversed: bool| {
-            let net = counts.0.wrapping_sub(tare.0);
-            ForceCounts(if reversed { net.wrapping_neg() } else { net }.clamp(-most - 1, most))
-        };
-        let magnets = encoders.map_or([None; 2], EncoderDriver::diagnostics);
-        SensorReadings {
-            joints: [
-                joint_1.map(|it| turned(it, encoder_1)),
-                joint_2.map(|it| turned(it, encoder_2)),
-            ],
-            forces: [
-                tangential.map(|it| balanced(it, tare_t, force_t)),
-                normal.map(|it| balanced(it, tare_n, force_n)),
-            ],
-            magnets: magnets.map(|it| it.map(|it| it.is_healthy())),
-        }
     }
 }

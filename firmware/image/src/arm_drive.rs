@@ -96,8 +96,7 @@ impl<P: ArmPins> ArmDrive<P> {
     /// Returns the readings that were started at the last tick, and starts the next.
     fn read_sensors(&mut self) -> SensorFrame {
         let levels = self.pins.levels();
-        let (encoders, force_cell) = (self.encoders.complete(), self.force_cell.complete());
-        let frame = self.front_end.frame(encoders, force_cell, levels);
+        let frame = self.front_end.frame(levels);
         sensor_bus::start_both(&mut self.encoders, &mut self.force_cell);
         frame
     }
@@ -195,9 +194,11 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
     #[inline(always)]
     fn serve_sensor_bus(&mut self, bus: usize) {
         if bus == 0 {
-            self.encoders.serve();
-        } else {
-            self.force_cell.serve();
+            if let Some(encoders) = self.encoders.serve() {
+                self.front_end.take_encoders(encoders);
+            }
+        } else if let Some(force_cell) = self.force_cell.serve() {
+            self.front_end.take_forces(force_cell);
         }
     }
 

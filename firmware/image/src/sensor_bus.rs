@@ -61,7 +61,6 @@ pub struct SensorBus<W, S, D, const N: usize> {
     selected: usize,
     has_failed: bool,
     is_busy: bool,
-    is_complete: bool,
 }
 
 impl<W, S, D, const N: usize> SensorBus<W, S, D, N>
@@ -94,13 +93,7 @@ where
             selected: 0,
             has_failed: false,
             is_busy: false,
-            is_complete: false,
         }
-    }
-
-    /// Returns the driver if its readings are complete.
-    pub fn complete(&self) -> Option<&D> {
-        self.is_complete.then_some(&self.dialogue)
     }
 
     /// Selects the first part of a new set of readings, unless the last one is still under way. Returns
@@ -109,7 +102,6 @@ where
         let starts = !self.is_busy;
         if starts {
             self.is_busy = true;
-            self.is_complete = false;
             let exchange = self.dialogue.begin();
             self.select(exchange);
         }
@@ -128,18 +120,17 @@ where
         self.send();
     }
 
-    /// Serves the interrupt: takes a received word, sends the next.
-    pub fn serve(&mut self) {
-        let Some(received) = self.words.receive() else {
-            return;
-        };
+    /// Serves the interrupt: takes a received word, sends the next. Returns the driver when its set of readings
+    /// is complete.
+    pub fn serve(&mut self) -> Option<&D> {
+        let received = self.words.receive()?;
         self.has_failed |= received.is_err();
         let word = received.unwrap_or_default();
         self.received = self.received << self.word_bits | u32::from(word);
         self.words_left = self.words_left.saturating_sub(1);
         if self.words_left > 0 {
             self.send();
-            return;
+            return None;
         }
         self.close();
         let answer = (!self.has_failed).then_some(self.received);
@@ -148,10 +139,11 @@ where
                 self.select(exchange);
                 set_up(self.waits.setup);
                 self.send();
+                None
             }
             None => {
                 self.is_busy = false;
-                self.is_complete = true;
+                Some(&self.dialogue)
             }
         }
     }

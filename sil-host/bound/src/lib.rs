@@ -3,7 +3,7 @@
 //! The image is decoded ([`instruction`]) into a control-flow graph for each function ([`graph`]).
 //! The cycle model bounds the cost of every block ([`cycles`], [`cost`]), loops have declared
 //! limits ([`loops`]), and a linear programme finds the most expensive path ([`worst`]). [`report`]
-//! prints it with source lines.
+//! prints it with source lines. [`profile`] shows where executed ticks spend their instructions.
 //!
 //! The bound holds for every configuration and every frame, because it depends on neither.
 
@@ -13,6 +13,7 @@ pub mod graph;
 pub mod image;
 pub mod instruction;
 pub mod loops;
+pub mod profile;
 pub mod report;
 pub mod trace;
 pub mod worst;

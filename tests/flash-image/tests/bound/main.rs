@@ -7,6 +7,7 @@
 
 use painleve_bound::image::Image;
 use painleve_bound::loops::Limit;
+use painleve_bound::profile::Profile;
 use painleve_bound::report::{Bound, CONTROL_INTERRUPT};
 use painleve_bound::trace::{Executed, Tracer, rounds};
 use painleve_flash_image::bench::{BoardBench, encoded, scenario};
@@ -32,6 +33,8 @@ struct BoundCheck<'a> {
     tracer: Tracer<'a>,
     worst: Executed,
     most_instructions: Executed,
+    /// Addresses of the instructions of that interrupt.
+    longest: Vec<u32>,
     ticks: u64,
 }
 
@@ -42,6 +45,7 @@ impl<'a> BoundCheck<'a> {
             tracer: Tracer::new(image).unwrap(),
             worst: Executed::default(),
             most_instructions: Executed::default(),
+            longest: Vec::new(),
             ticks: 0,
         }
     }
@@ -63,6 +67,7 @@ impl<'a> BoundCheck<'a> {
             }
             if cost.instructions > self.most_instructions.instructions {
                 self.most_instructions = cost.clone();
+                self.longest = addresses;
             }
             if cost.cycles > worst.cycles {
                 worst = cost;
@@ -81,6 +86,7 @@ fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
     let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
     let mut watch = BoundCheck::new(&image, &bound);
     run(&mut watch);
+    println!("{}", Profile::of(&image, &watch.longest).unwrap());
     println!(
         "{} interrupts, worst {} instructions, {} cycles by the model; bound {} cycles, which is {:.2} times as much",
         watch.ticks,
