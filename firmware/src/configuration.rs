@@ -123,12 +123,12 @@ impl<L: Law> Configuration<L> {
         1.0 / self.tick_hz
     }
 
-    /// Returns the distance by which a count of the coarser encoder moves the tip along the belt,
-    /// m.
+    /// Returns the distance by which a count of the coarser encoder and the play of the gears move the
+    /// tip along the belt, m.
     pub fn tip_count_m(&self) -> f32 {
         let [one, two] = self.converters.encoders;
         let count_rad = one.rad_per_count::<f32>().at_least(two.rad_per_count());
-        self.arm.height_m * count_rad
+        self.arm.height_m * (count_rad + self.settings.estimator.gear_play_rad)
     }
 
     /// Checks every number, including those of the law, and builds the arm's model.

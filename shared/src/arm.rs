@@ -36,6 +36,9 @@ settings! {
         /// Joint angle at which each spring is relaxed; −α0 of the paper for joint 2.
         spring_rest_rad: [T; 2] = [T::zero(), T::literal(-13.72 * PI / 180.0)],
             -PI..=PI, "rad";
+        /// Coulomb friction of each joint. The equations of motion do not contain it: it depends on how the
+        /// joint has moved before.
+        coulomb_friction_nm: [T; 2] = [T::zero(); 2], 0.0..=10.0, "N·m";
         /// Inertia of each joint's rotor, reflected to the joint.
         rotor_inertia_kg_m2: [T; 2] = [T::zero(); 2], 0.0..=1e4, "kg·m²";
         /// Distance H of the first joint from the belt; less than the arm's length, and more than
@@ -63,6 +66,7 @@ impl<T: Real> ArmParameters<T> {
             damping_nms_rad: pair(self.damping_nms_rad),
             stiffness_nm_rad: pair(self.stiffness_nm_rad),
             spring_rest_rad: pair(self.spring_rest_rad),
+            coulomb_friction_nm: pair(self.coulomb_friction_nm),
             rotor_inertia_kg_m2: pair(self.rotor_inertia_kg_m2),
             height_m: cast(self.height_m),
             belt_tilt_rad: cast(self.belt_tilt_rad),
@@ -257,6 +261,7 @@ mod tests {
             damping_nms_rad: [0.01, 0.004],
             stiffness_nm_rad: [0.4, 0.9],
             spring_rest_rad: [0.2, -0.5],
+            coulomb_friction_nm: [0.02, 0.01],
             rotor_inertia_kg_m2: [3e-4, 2e-4],
             belt_tilt_rad: 0.1,
             ..Default::default()

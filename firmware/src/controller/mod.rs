@@ -24,6 +24,7 @@ use self::arrival::{Arrival, ArrivalState, Lapses, arrive};
 use crate::configuration::{Configuration, Converters};
 use crate::demand::{DemandInput, DemandState, TorqueDemand};
 use crate::estimate::joints::EncoderJump;
+use crate::estimate::transmission::{Transmission, TransmissionState};
 use crate::estimate::{EstimateSettings, EstimatesState, Estimators, Readings};
 use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
@@ -95,6 +96,7 @@ struct Stages<L> {
     references: References,
     demand: TorqueDemand<L>,
     torques: TorqueOutput,
+    transmission: Transmission,
 }
 
 /// State of the stages between ticks.
@@ -107,6 +109,7 @@ struct State<L: Law> {
     references: ReferencesState,
     demand: DemandState<L>,
     command: LastCommand,
+    transmission: TransmissionState,
 }
 
 impl<L: Law> Controller<L> {
@@ -126,6 +129,7 @@ impl<L: Law> Controller<L> {
             references: stages.references.start(&arm),
             demand: stages.demand.start(),
             command: LastCommand::default(),
+            transmission: TransmissionState::default(),
         };
         Ok(Self {
             stages,
@@ -278,6 +282,7 @@ impl<L: Law> Stages<L> {
                 converters.torque,
                 settings.torque_limit_nm,
             ),
+            transmission: Transmission::new(&settings.estimator, arm.coulomb_friction_nm),
         }
     }
 
@@ -296,7 +301,10 @@ impl<L: Law> Stages<L> {
         if let Err(EncoderJump) = joints {
             state.supervision.latch(Fault::EncoderJump);
         }
-        let model = state.estimates.model();
+        let model =
+            state
+                .estimates
+                .model(&self.transmission, &mut state.transmission, &state.command);
         let (mut contact, slow) = self.estimators.observe_contact(
             &mut state.estimates,
             &model,

@@ -20,6 +20,15 @@ settings! {
         bandwidth_rad_s: f32 = 400.0, 1.0..=3e5, "rad/s";
         /// Largest joint rate; a faster reading latches the fault `EncoderJump`.
         rate_limit_rad_s: f32 = 100.0, 1.0..=1e4, "rad/s";
+        /// Travel of a joint over which its Coulomb friction reverses.
+        friction_travel_rad: f32 = 1e-3, 1e-6..=1.0, "rad";
+        /// Fraction of the arm's Coulomb friction that is compensated.
+        friction_compensation: f32 = 0.85, 0.0..=1.0;
+        /// Twist of each gear for each N·m of commanded torque, if the encoders are on the motors; 0 if they
+        /// are on the links.
+        gear_compliance_rad_nm: [f32; 2] = [0.0; 2], 0.0..=0.1, "rad/(N·m)";
+        /// Largest play of the gears. The governor keeps its distance from the edges accordingly.
+        gear_play_rad: f32 = 0.0, 0.0..=0.1, "rad";
     }
 }
 
@@ -44,6 +53,7 @@ struct TrackingLoop {
 pub struct JointEstimator {
     scales: [EncoderScale; 2],
     rad_per_count: [f32; 2],
+    counts_per_rad: Vector2<f32>,
     /// Innovation in counts that an acceleration of 1 rad/s² causes if it is not fed forward.
     lag_counts_s2: Vector2<f32>,
     jump_counts: [i32; 2],
@@ -72,6 +82,7 @@ impl JointEstimator {
         Self {
             scales,
             rad_per_count,
+            counts_per_rad: rad_per_count.map(f32::recip).into(),
             lag_counts_s2: Vector2::from(rad_per_count.map(|lsb| tick_s / rate_gain_per_s / lsb)),
             // One count beyond the limit allows for the rounding of two readings.
             jump_counts: rad_per_count
@@ -169,8 +180,7 @@ impl JointEstimator {
     /// Returns the measured minus the expected joint angles q' at the last tick, counts.
     pub fn innovation_counts(&self, state: &JointState) -> Vector2<f32> {
         let [one, two] = &state.joints;
-        let [lsb_1, lsb_2] = self.rad_per_count;
-        Vector2::new(one.innovation_rad / lsb_1, two.innovation_rad / lsb_2)
+        Vector2::new(one.innovation_rad, two.innovation_rad).component_mul(&self.counts_per_rad)
     }
 
     /// Returns the steady innovation, counts, that an acceleration of q' (rad/s²) causes if it is
@@ -194,6 +204,12 @@ impl JointEstimator {
 }
 
 impl JointState {
+    /// Returns the joint angles q', rad.
+    pub fn angles_rad(&self) -> JointMotion<f32> {
+        let [one, two] = &self.joints;
+        JointMotion::new(one.angle_rad, two.angle_rad)
+    }
+
     /// Returns the link angles θ = (θ1, θ2), rad; zero before the first readings.
     pub fn theta_rad(&self) -> LinkMotion<f32> {
         let [one, two] = &self.joints;

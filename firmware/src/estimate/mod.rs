@@ -6,6 +6,7 @@
 //! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
 //! - [`calibration`]: length of the links
 //! - [`response`]: how much the contact gives
+//! - [`transmission`]: friction and gears of the joints
 //! - [`disturbance`]: torques that the model does not explain
 
 pub mod belt;
@@ -16,6 +17,7 @@ pub mod friction;
 pub mod joints;
 pub mod model;
 pub mod response;
+pub mod transmission;
 
 use nalgebra::Vector2;
 use painleve_shared::Arm;
@@ -32,6 +34,7 @@ use self::model::Model;
 use self::response::{
     ContactResponse, ForceReading, Place, ResponseEstimator, ResponseSettings, ResponseState,
 };
+use self::transmission::{Transmission, TransmissionState};
 use crate::last_command::LastCommand;
 
 /// Largest friction above the estimate that may explain a throw.
@@ -149,14 +152,28 @@ pub struct EstimatesState {
 }
 
 impl EstimatesState {
-    /// The arm's model at the estimated angles and rates.
+    /// Returns the arm's model at the estimated angles and rates, corrected for the joints' friction and gears
+    /// after the command until now.
     #[inline]
-    pub fn model(&self) -> Model {
+    pub fn model(
+        &self,
+        transmission: &Transmission,
+        state: &mut TransmissionState,
+        last: &LastCommand,
+    ) -> Model {
+        // Friction of the joints enters as an unknown torque does.
+        let mut theta_rad = self.joints.theta_rad();
+        let mut disturbance_nm = self.disturbance.torque_nm;
+        if !transmission.is_ideal() {
+            let links = transmission.tick(state, &self.joints.angles_rad(), &last.torque_nm);
+            theta_rad = links.theta_rad;
+            disturbance_nm = disturbance_nm - links.friction_nm;
+        }
         Model::new(
             &self.arm,
-            self.joints.theta_rad(),
+            theta_rad,
             self.joints.theta_dot_rad_s(),
-            &self.disturbance.torque_nm,
+            &disturbance_nm,
         )
     }
 }

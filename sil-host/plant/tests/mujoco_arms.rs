@@ -26,6 +26,7 @@ fn every_arm_agrees_with_mujoco() {
             damping_nms_rad: pair("damping"),
             stiffness_nm_rad: pair("stiffness"),
             spring_rest_rad: pair("rest"),
+            coulomb_friction_nm: [0.0; 2],
             rotor_inertia_kg_m2: pair("rotor"),
             // The compared quantities do not depend on the height of the belt.
             height_m: length_1.max(length_2),

@@ -18,7 +18,7 @@ impl BuiltInPlant {
         let (contact, effects) = (&scenario.contact, &scenario.effects);
         Ok(match contact.kind {
             ContactKind::Rigid => {
-                effects.none()?;
+                effects.none(&parameters.arm)?;
                 Self::Rigid(ArmOnBelt::new(&parameters, start)?)
             }
             ContactKind::Compliant => Self::Compliant(CompliantArmOnBelt::new(

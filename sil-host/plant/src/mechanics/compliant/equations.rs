@@ -31,6 +31,8 @@ pub struct CompliantMotion<'a> {
     pub contact: &'a CompliantContact,
     /// The effects.
     pub effects: &'a Effects,
+    /// Coulomb friction of the joints that the controller knows, N·m.
+    pub joint_friction_nm: [f64; 2],
     /// Joint torques.
     pub torque: TorqueSegment,
 }
@@ -146,7 +148,8 @@ impl<const N: usize> Equations<N> for CompliantMotion<'_> {
                 }
                 let bristles = x[9 + joint];
                 derivative[9 + joint] = friction.bristle_rate_per_s(rate, bristles);
-                joint_nm[joint] += friction.torque_nm(rate, bristles);
+                joint_nm[joint] +=
+                    friction.torque_nm(rate, bristles) - self.joint_friction_nm[joint] * bristles;
             }
         }
         let tip_force_n = touch.force_n + self.effects.push.force_n(t_s);

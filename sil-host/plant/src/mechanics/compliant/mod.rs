@@ -46,6 +46,8 @@ pub struct CompliantArmOnBelt {
     friction: f64,
     contact: CompliantContact,
     effects: Effects,
+    /// Coulomb friction of the joints that the controller knows, N·m.
+    joint_friction_nm: [f64; 2],
     local_error: f64,
     torque: TorqueSegment,
     time_s: f64,
@@ -95,11 +97,14 @@ impl CompliantArmOnBelt {
             friction: parameters.friction,
             contact: CompliantContact::new(contact),
             effects: effects.clone(),
+            joint_friction_nm: parameters.arm.coulomb_friction_nm,
             local_error: contact.local_error,
             torque: TorqueSegment::constant(JointTorque::zeros()),
             time_s: 0.0,
             state: SVector::zeros(),
-            has_drives: effects.gear.elastic || effects.joints.is_on(),
+            has_drives: effects.gear.elastic
+                || effects.joints.is_on()
+                || parameters.arm.coulomb_friction_nm != [0.0; 2],
             mode: ContactMode::Flight,
             step_size_s: 1e-4,
             budget: StepBudget::default(),
@@ -167,6 +172,7 @@ impl CompliantArmOnBelt {
             friction: self.friction,
             contact: &self.contact,
             effects: &self.effects,
+            joint_friction_nm: self.joint_friction_nm,
             torque: self.torque,
         }
     }

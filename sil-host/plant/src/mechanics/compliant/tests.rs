@@ -137,6 +137,22 @@ fn a_stiff_gear_without_joint_friction_hardly_changes_the_motion() {
 }
 
 #[test]
+fn friction_of_the_arm_and_unknown_friction_have_the_same_effect() {
+    let end = |set: &[&str]| {
+        let set: Vec<String> = set.iter().map(ToString::to_string).collect();
+        let scenario = crate::scenario::Scenario::load("hybrid-elbow-down", &set).unwrap();
+        let mut plant = crate::mechanics::BuiltInPlant::new(&scenario).unwrap();
+        plant.command_torque(torque_nm(0), 0.0);
+        Plant::advance(&mut plant, 0.05, &mut ()).unwrap();
+        plant.snapshot().theta_rad
+    };
+    let compliant = "contact.kind=compliant";
+    let arm = end(&[compliant, "arm.coulomb_friction_nm=[0.1, 0.1]"]);
+    assert_eq!(arm, end(&[compliant, "effects.joints.coulomb_nm=0.1"]));
+    assert_ne!(arm, end(&[compliant]));
+}
+
+#[test]
 fn a_push_changes_the_tips_velocity_by_its_impulse() {
     let push = Push {
         impulse_ns: [0.0, 0.02],
@@ -209,6 +225,10 @@ fn the_rigid_plant_refuses_every_effect_by_its_key() {
         ),
         ("effects.surface", "effects.surface.waviness_m=1e-4"),
         ("effects.joints", "effects.joints.coulomb_nm=0.1"),
+        (
+            "arm.coulomb_friction_nm",
+            "arm.coulomb_friction_nm=[0.0, 0.1]",
+        ),
         ("effects.gear", "effects.gear.elastic=true"),
         ("effects.push", "effects.push.impulse_ns=[0.0, 0.1]"),
         ("effects.payload", "effects.payload.mass_kg=0.1"),

@@ -9,12 +9,13 @@ const BRISTLE_RAD: f64 = 1e-3;
 const STRIBECK_RAD_S: f64 = 0.05;
 
 settings! {
-    /// Friction of both joints, in addition to the arm's viscous damping.
+    /// Friction of both joints, in addition to the arm's viscous damping and Coulomb friction, and unknown to
+    /// the controller.
     #[derive(Copy)]
     pub struct JointFriction {
         /// Coulomb friction.
         coulomb_nm: f64 = 0.0, 0.0..=10.0, "N·m";
-        /// Ratio of static to Coulomb friction.
+        /// Ratio of static to Coulomb friction, also of the arm's.
         static_ratio: f64 = 1.0, 1.0..=5.0;
         /// Viscous friction.
         viscous_nms_rad: f64 = 0.0, 0.0..=10.0, "N·m·s/rad";

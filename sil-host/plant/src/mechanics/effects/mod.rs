@@ -19,7 +19,7 @@ pub mod payload;
 pub mod push;
 pub mod surface;
 
-use painleve_shared::{OutOfRange, range, settings};
+use painleve_shared::{ArmParameters, OutOfRange, range, settings};
 
 use friction::FrictionChange;
 use gear::GearSettings;
@@ -47,12 +47,17 @@ settings! {
 }
 
 impl Effects {
-    /// Checks that all effects are off, for a plant that does not support them.
+    /// Checks that all effects are off, and that the joints have no friction, for a plant that does
+    /// not support them.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first effect that is on.
-    pub fn none(&self) -> Result<(), OutOfRange> {
+    pub fn none(&self, arm: &ArmParameters<f64>) -> Result<(), OutOfRange> {
         let off = |key, is_on: bool| range::check(key, f64::from(u8::from(is_on)), 0.0, 0.0);
+        off(
+            "arm.coulomb_friction_nm with contact.kind = rigid",
+            arm.coulomb_friction_nm != [0.0; 2],
+        )?;
         off(
             "effects.friction with contact.kind = rigid",
             self.friction != FrictionChange::None,

@@ -11,6 +11,9 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
 
     "joint-friction": "effects.joints.coulomb_nm", "N·m", [0.02, 0.05, 0.1, 0.2, 0.4], typical 0.05;
 
+    "joint-friction-known": "arm.coulomb_friction_nm", "N·m, known", [0.02, 0.05, 0.1, 0.2, 0.4], typical 0.05,
+        overrides: Computed(|level, _| set!["arm.coulomb_friction_nm=[{level:?}, {level:?}]"]);
+
     "joint-damping": "effects.joints.viscous_nms_rad", "N·m·s/rad",
         [0.005, 0.01, 0.02, 0.05], typical 0.01;
 
