@@ -107,6 +107,8 @@ impl Recovery {
 
     /// Computes the torques for one tick in the air, with the admissible stretch `edges_m`; until it
     /// is known the tip is held above the belt.
+    // Out of line: its code in the controller's would take registers from every tick.
+    #[inline(never)]
     pub fn tick(
         &self,
         state: &mut RecoveryState,

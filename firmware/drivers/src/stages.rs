@@ -48,8 +48,8 @@ impl StageScale {
 fn code(torque: TorqueCounts, codes_per_count: f32) -> u16 {
     // Half a code more, so that cutting off the fraction rounds.
     let code = torque.0 as f32 * codes_per_count + (f32::from(NO_TORQUE) + 0.5);
-    // The conversion saturates at 0; a torque that is not finite cannot occur.
-    (code as u16).min((1 << CONVERTER_BITS) - 1)
+    // The conversion to 32 bits is one instruction. It saturates at 0; a torque that is not finite cannot occur.
+    (code as u32).min((1 << CONVERTER_BITS) - 1) as u16
 }
 
 #[cfg(test)]

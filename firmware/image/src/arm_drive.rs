@@ -96,8 +96,10 @@ impl<P: ArmPins> ArmDrive<P> {
     /// Returns the readings that were started at the last tick, and starts the next.
     fn read_sensors(&mut self) -> SensorFrame {
         let levels = self.pins.levels();
+        // The parts' set-up times pass while the frame is assembled.
+        let selected = sensor_bus::select_both(&mut self.encoders, &mut self.force_cell);
         let frame = self.front_end.frame(levels);
-        sensor_bus::start_both(&mut self.encoders, &mut self.force_cell);
+        sensor_bus::send_both(&mut self.encoders, &mut self.force_cell, &selected);
         frame
     }
 }

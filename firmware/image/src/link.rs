@@ -198,7 +198,7 @@ fn configure<D: BoardDrive, L: Law + DeserializeOwned>(
     let configuration = decoded.as_ref()?;
     control.lock(|control| {
         control.dropped_responses = 0;
-        control.tick_hz = configuration.tick_hz as u32;
+        control.expect_host(source, configuration.tick_hz as u32);
         control.task.configure(configuration, source).ok()?;
         let drive = control.task.drive_mut();
         drive.start(configuration, source);

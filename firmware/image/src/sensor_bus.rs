@@ -116,7 +116,7 @@ where
         self.words.discard();
         self.is_busy = false;
         self.select_first();
-        set_up(self.waits.setup);
+        set_up(DWT::cycle_count(), self.waits.setup);
         self.send();
     }
 
@@ -137,7 +137,7 @@ where
         match self.dialogue.proceed(answer) {
             Some(exchange) => {
                 self.select(exchange);
-                set_up(self.waits.setup);
+                set_up(DWT::cycle_count(), self.waits.setup);
                 self.send();
                 None
             }
@@ -188,11 +188,39 @@ where
     }
 }
 
-/// Starts new sets of readings on two buses, except where the last one is still under way. The parts' set-up times
-/// pass together.
-pub fn start_both<W1, S1, D1, const N1: usize, W2, S2, D2, const N2: usize>(
+/// New sets of readings on two buses whose first parts are selected.
+#[must_use]
+pub struct Selected {
+    one: bool,
+    other: bool,
+    at_cycle: u32,
+}
+
+/// Selects the first parts of new sets of readings on two buses, except where the last one is still under way.
+pub fn select_both<W1, S1, D1, const N1: usize, W2, S2, D2, const N2: usize>(
     one: &mut SensorBus<W1, S1, D1, N1>,
     other: &mut SensorBus<W2, S2, D2, N2>,
+) -> Selected
+where
+    W1: SpiWords,
+    S1: OutputPin,
+    D1: Dialogue,
+    W2: SpiWords,
+    S2: OutputPin,
+    D2: Dialogue,
+{
+    Selected {
+        one: one.select_first(),
+        other: other.select_first(),
+        at_cycle: DWT::cycle_count(),
+    }
+}
+
+/// Starts the selected sets of readings, once the parts' set-up times have passed since they were selected.
+pub fn send_both<W1, S1, D1, const N1: usize, W2, S2, D2, const N2: usize>(
+    one: &mut SensorBus<W1, S1, D1, N1>,
+    other: &mut SensorBus<W2, S2, D2, N2>,
+    selected: &Selected,
 ) where
     W1: SpiWords,
     S1: OutputPin,
@@ -201,26 +229,30 @@ pub fn start_both<W1, S1, D1, const N1: usize, W2, S2, D2, const N2: usize>(
     S2: OutputPin,
     D2: Dialogue,
 {
-    let (one_starts, other_starts) = (one.select_first(), other.select_first());
-    set_up(one.waits.setup.max(other.waits.setup));
-    if one_starts {
+    set_up(selected.at_cycle, one.waits.setup.max(other.waits.setup));
+    if selected.one {
         one.send();
     }
-    if other_starts {
+    if selected.other {
         other.send();
     }
 }
 
-/// Waits for a part's set-up time.
+/// Waits until a part's set-up time has passed since it was selected.
 #[inline]
-fn set_up(cycles: u32) {
-    wait(cycles);
+fn set_up(selected_at_cycle: u32, cycles: u32) {
+    wait_since(selected_at_cycle, cycles);
 }
 
-/// Waits for at least this many processor cycles by the cycle counter, which must run.
+/// Waits for at least this many processor cycles.
 #[inline]
 fn wait(cycles: u32) {
-    let start = DWT::cycle_count();
+    wait_since(DWT::cycle_count(), cycles);
+}
+
+/// Waits until at least this many processor cycles have passed since `start` by the cycle counter, which must run.
+#[inline]
+fn wait_since(start: u32, cycles: u32) {
     // Bounded even if the counter stands still.
     for _ in 0..cycles {
         if DWT::cycle_count().wrapping_sub(start) >= cycles {

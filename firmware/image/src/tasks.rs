@@ -16,7 +16,6 @@ use painleve_firmware::drive::{Answered, ControlTask, TaskCounts};
 use painleve_firmware::law::Law;
 use painleve_shared::black_box::{Crash, FaultRecord};
 use painleve_shared::message::{FrameSource, Response};
-use painleve_shared::status::Fault;
 use rtic::Mutex;
 
 use crate::black_box;
@@ -37,6 +36,7 @@ pub const SENSORS_SILENCE_MS: u32 = 200;
 pub const FRAMES_SILENCE_MS: u32 = 5000;
 
 /// State that the tasks share.
+#[repr(C)]
 pub struct Control<D, L: Law> {
     /// The control task.
     pub task: ControlTask<D, L>,
@@ -44,10 +44,11 @@ pub struct Control<D, L: Law> {
     pub dropped_responses: u32,
     /// Control rate, Hz; 0 until there is a configuration.
     pub tick_hz: u32,
-    /// Ticks since the host's last message.
+    /// Ticks since the host's last message, and their limit.
     pub silent_ticks: u32,
-    /// The fault latched at the last tick.
-    fault: Option<Fault>,
+    silence_limit_ticks: u32,
+    /// Number of the fault latched at the last tick; 0 for none.
+    fault: u8,
     /// A newly latched fault, for the black box.
     pub(crate) fault_to_record: Option<FaultRecord>,
 }
@@ -60,24 +61,36 @@ impl<D: BoardDrive, L: Law> Control<D, L> {
             dropped_responses: 0,
             tick_hz: 0,
             silent_ticks: 0,
-            fault: None,
+            silence_limit_ticks: u32::MAX,
+            fault: 0,
             fault_to_record: None,
         }
+    }
+
+    /// Sets the limit of the host's silence for frames from `source` at the control rate `tick_hz`.
+    pub fn expect_host(&mut self, source: FrameSource, tick_hz: u32) {
+        let limit_ms = match source {
+            FrameSource::Sensors | FrameSource::DryRun | FrameSource::Commissioning => {
+                SENSORS_SILENCE_MS
+            }
+            FrameSource::Lockstep | FrameSource::Realtime => FRAMES_SILENCE_MS,
+            FrameSource::StandAlone => return self.expect_no_host(tick_hz),
+        };
+        self.tick_hz = tick_hz;
+        // 32 bits hold 5 s at 100 kHz.
+        self.silence_limit_ticks = limit_ms.saturating_mul(tick_hz) / 1000;
+    }
+
+    /// Lets the host be silent without limit.
+    pub fn expect_no_host(&mut self, tick_hz: u32) {
+        self.tick_hz = tick_hz;
+        self.silence_limit_ticks = u32::MAX;
     }
 
     /// Returns whether the host has been silent for too long, whatever the frames' source.
     fn note_silence(&mut self) -> bool {
         self.silent_ticks = self.silent_ticks.saturating_add(1);
-        let limit_ms = match self.task.source() {
-            FrameSource::Sensors | FrameSource::DryRun | FrameSource::Commissioning => {
-                SENSORS_SILENCE_MS
-            }
-            FrameSource::Lockstep | FrameSource::Realtime => FRAMES_SILENCE_MS,
-            FrameSource::StandAlone => return false,
-        };
-        // 32 bits hold 5 s at 100 kHz; dividing 64 would be a loop without a declared limit.
-        let limit = limit_ms.saturating_mul(self.tick_hz) / 1000;
-        self.tick_hz > 0 && self.silent_ticks > limit
+        self.silent_ticks > self.silence_limit_ticks
     }
 }
 
@@ -103,7 +116,7 @@ pub fn control<D: BoardDrive, L: Law>(
 ) -> bool {
     if control.note_silence() {
         control.task.stop_instead_of_tick();
-        control.tick_hz = 0;
+        control.expect_no_host(0);
         return false;
     }
     let Some(Answered {
@@ -114,28 +127,31 @@ pub fn control<D: BoardDrive, L: Law>(
     else {
         return false;
     };
-    let response = match sensor {
-        Some(sensor) if control.task.source().is_on_board() => Response::Tick {
+    // Each kind is built in its place in the queue.
+    let sent = match sensor {
+        Some(sensor) if control.task.source().is_on_board() => answers.enqueue(Response::Tick {
             sensor,
             answer: frame,
             elapsed,
-        },
-        _ => Response::Actuator { frame, elapsed },
+        }),
+        _ => answers.enqueue(Response::Actuator { frame, elapsed }),
     };
-    if answers.enqueue(response).is_err() {
+    if sent.is_err() {
         control.dropped_responses = control.dropped_responses.wrapping_add(1);
     }
-    let change = Change::of(&frame);
-    if let (Some(sensor), Some(_)) = (sensor, change.fault)
-        && change.fault != control.fault
-    {
-        let answer = frame;
-        control.fault_to_record = Some(FaultRecord { sensor, answer });
+    if frame.fault != control.fault {
+        control.fault = frame.fault;
+        if let (Some(sensor), Some(_)) = (sensor, frame.latched_fault()) {
+            let answer = frame;
+            control.fault_to_record = Some(FaultRecord { sensor, answer });
+        }
     }
-    control.fault = change.fault;
     // An event for which the queue has no room is not logged.
-    if change != *reported && events.enqueue(change).is_ok() {
-        *reported = change;
+    if !reported.is_of(&frame) {
+        let change = Change::of(&frame);
+        if events.enqueue(change).is_ok() {
+            *reported = change;
+        }
     }
     true
 }

@@ -23,6 +23,12 @@ impl Change {
         fault: None,
     };
 
+    /// Returns whether an answer is in this state, by the numbers that cross the link.
+    pub fn is_of(&self, answer: &ActuatorFrame) -> bool {
+        let fault = self.fault.map_or(0, |fault| fault as u8);
+        answer.state == self.state as u8 && answer.fault == fault
+    }
+
     /// Returns the state in the newest answer.
     pub fn of(answer: &ActuatorFrame) -> Self {
         Self {

@@ -80,30 +80,34 @@ use crate::torque_output::{NotFinite, TorqueOutput};
 /// assert_eq!(answer.torques.map(|torque| torque.0), [0, 0]);
 /// # Ok::<(), painleve_shared::range::OutOfRange>(())
 /// ```
+// In this order: a Cortex-M4F loads floats only from the first kilobyte after a pointer. What a tick needs less of
+// comes last.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Controller<L: Law = LawSettings> {
-    stages: Stages<L>,
-    state: State<L>,
     last_answer: ActuatorFrame,
+    state: State<L>,
+    stages: Stages<L>,
+    monitor: LapseMonitor,
 }
 
 /// The stages of a tick: settings only.
 #[derive(Clone, Debug)]
+#[repr(C)]
 struct Stages<L> {
-    converters: Converters,
     estimators: Estimators,
-    supervisor: Supervisor,
-    references: References,
-    demand: TorqueDemand<L>,
     torques: TorqueOutput,
     transmission: Transmission,
+    supervisor: Supervisor,
+    demand: TorqueDemand<L>,
+    references: References,
+    converters: Converters,
 }
 
 /// State of the stages between ticks.
 #[derive(Clone, Debug)]
 struct State<L: Law> {
     arrivals: ArrivalState,
-    monitor: LapseMonitor,
     estimates: EstimatesState,
     supervision: Supervision,
     references: ReferencesState,
@@ -123,7 +127,6 @@ impl<L: Law> Controller<L> {
         let stages = Stages::new(configuration);
         let state = State {
             arrivals: ArrivalState::default(),
-            monitor: LapseMonitor::new(settings.lapses),
             estimates: stages.estimators.start(arm),
             supervision: Supervision::default(),
             references: stages.references.start(&arm),
@@ -132,13 +135,16 @@ impl<L: Law> Controller<L> {
             transmission: TransmissionState::default(),
         };
         Ok(Self {
-            stages,
-            state,
             last_answer: ActuatorFrame::default(),
+            state,
+            stages,
+            monitor: LapseMonitor::new(settings.lapses),
         })
     }
 
     /// Answers one sensor frame.
+    // Out of line, because the compiler then finds fewer values that have to wait on the stack.
+    #[inline(never)]
     pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
         self.tick_into(frame, TelemetrySink::nowhere())
     }
@@ -158,13 +164,12 @@ impl<L: Law> Controller<L> {
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
         let State {
-            monitor,
             supervision,
             command,
             ..
         } = &mut self.state;
         let mut lapses = Lapses {
-            monitor,
+            monitor: &mut self.monitor,
             supervision,
             command,
         };
@@ -176,20 +181,19 @@ impl<L: Law> Controller<L> {
 
     /// Returns how often each kind of lapse has occurred.
     pub fn lapse_counts(&self) -> &LapseMonitor {
-        &self.state.monitor
+        &self.monitor
     }
 
     #[inline]
     fn tick_into(&mut self, frame: &SensorFrame, telemetry: TelemetrySink<'_>) -> ActuatorFrame {
         let State {
             arrivals,
-            monitor,
             supervision,
             command,
             ..
         } = &mut self.state;
         let lapses = Lapses {
-            monitor,
+            monitor: &mut self.monitor,
             supervision,
             command,
         };
@@ -249,7 +253,6 @@ impl<L: Law> Stages<L> {
             settings,
         } = configuration;
         Self {
-            converters: *converters,
             estimators: Estimators::new(&EstimateSettings {
                 tick_hz: *tick_hz,
                 encoders: converters.encoders,
@@ -283,6 +286,7 @@ impl<L: Law> Stages<L> {
                 settings.torque_limit_nm,
             ),
             transmission: Transmission::new(&settings.estimator, arm.coulomb_friction_nm),
+            converters: *converters,
         }
     }
 

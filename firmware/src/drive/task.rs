@@ -76,11 +76,13 @@ pub struct TaskCounts {
 /// assert_eq!(task.drive().answer, answered.frame);
 /// # Ok::<(), painleve_shared::range::OutOfRange>(())
 /// ```
+// In this order, so that the controller is at the beginning: see its fields.
 #[derive(Debug)]
+#[repr(C)]
 pub struct ControlTask<D, L: Law = LawSettings> {
-    drive: D,
     /// `None` until the task is configured.
     controller: Option<Controller<L>>,
+    drive: D,
     /// Replaces the controller's ticks with [`FrameSource::Commissioning`].
     open_loop: Option<OpenLoop>,
     source: FrameSource,
@@ -91,8 +93,8 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
     /// Makes a task without a configuration, which does nothing.
     pub const fn new(drive: D) -> Self {
         Self {
-            drive,
             controller: None,
+            drive,
             open_loop: None,
             source: FrameSource::Lockstep,
             counts: TaskCounts {

@@ -153,6 +153,8 @@ macro_rules! law_set {
                 }
             }
 
+            // Out of line: few ticks reset a law, and its code there would take registers from every tick.
+            #[inline(never)]
             fn reset(&self, state: &mut $states, input: &$crate::law::LawInput<'_>) {
                 match self {
                     Self::Off => $crate::law::Law::reset(&$crate::law::off::Off {}, &mut (), input),

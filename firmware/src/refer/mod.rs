@@ -62,12 +62,14 @@ impl Beginning {
 }
 
 /// Follows the program within the edges.
+// In this order: see the fields of the controller.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct References {
-    generator: ReferenceGenerator,
     governor: EdgeGovernor,
     /// Least p as a fraction of Q22 at which a recovered tip may land.
     landing_p_ratio: f32,
+    generator: ReferenceGenerator,
 }
 
 /// State of the [`References`] between ticks.
@@ -91,9 +93,9 @@ impl References {
         landing_p_ratio: f32,
     ) -> Self {
         Self {
-            generator: ReferenceGenerator::new(program, tick_hz),
             governor: EdgeGovernor::new(governor, 1.0 / tick_hz, tip_count_m),
             landing_p_ratio,
+            generator: ReferenceGenerator::new(program, tick_hz),
         }
     }
 

@@ -12,7 +12,9 @@
 //! folded instructions. Loads and stores overlap with their neighbours only where TRM section 3.3.2 says that they do
 //! ([`Overlap`](crate::instruction::Overlap)). The model does assume that data lies in RAM other than
 //! the program's, which no other bus master uses at the same time, unless the address is a constant
-//! in flash, in the program or in a peripheral; and that addresses are aligned.
+//! in flash, in the program or in a peripheral; and that addresses are aligned. The interrupts compute no address of a
+//! peripheral but those of the pins that select the sensors; their ports are on the bus AHB1, which runs at the core's clock
+//! and does not wait (RM0090, sections 2.1 and 8.1).
 
 /// Wait states of the flash: RM0090, table 10, 168 MHz at 2.7 … 3.6 V.
 pub const FLASH_WAIT_STATES: u32 = 5;
@@ -90,7 +92,8 @@ pub fn data_wait(address: u32) -> u32 {
 /// section 3.9.1: 12, plus the read of the vector from flash and the wait for the first instruction. To
 /// return: 12, plus the wait for an instruction from flash. A handler that uses the floating-point unit
 /// saves s0 … s15 and FPSCR, 17 stores and one cycle to begin (TRM, section 7.2.2 and table 7-1, VSTM),
-/// and loads them again, 17.
+/// and loads them again, 17. To align the stack pointer, the core leaves a word of the stack out (CCR.STKALIGN), which
+/// transfers nothing.
 pub fn around(handler: u32, uses_float: bool) -> u32 {
     let entry = 12 + FLASH_READ + fetch_wait(handler);
     let exit = 12 + FLASH_READ;

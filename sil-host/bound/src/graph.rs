@@ -117,8 +117,8 @@ fn table(
             .rev()
             .fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
         let target = start + 2 * half_words;
-        // Padding and literals may follow the table. No entry leads into them.
-        if target < end {
+        // Padding and literals may follow the table. No entry leads into them, or into another function.
+        if target < end || image.name(target) != image.name(at) {
             break;
         }
         targets.push(target);
@@ -235,6 +235,23 @@ mod tests {
         let branch = Decoder::new().unwrap().at(&image, 0x100, false).unwrap();
         let targets = table(&image, &BTreeMap::from([(0x100, branch)]), 0x100).unwrap();
         assert_eq!(targets, [0x110, 0x112, 0x114, 0x116]);
+    }
+
+    /// A literal behind the table that would be an entry leads into another function.
+    #[test]
+    fn a_table_leads_into_its_own_function_only() {
+        let mut code = vec![0xdf, 0xe8, 0x15, 0xf0]; // tbh [pc, r5, lsl #1]
+        code.extend([4, 0, 5, 0]);
+        code.extend([0x40, 0x00, 0x40, 0x00]);
+        code.extend([0x70, 0x47].repeat(2)); // bx lr
+        let mut image = Image::of_code(0x100, &code, "switch");
+        image.begin_function(0x110, "next");
+        image.mark(0x100, true);
+        image.mark(0x104, false);
+        image.mark(0x10c, true);
+        let branch = Decoder::new().unwrap().at(&image, 0x100, false).unwrap();
+        let targets = table(&image, &BTreeMap::from([(0x100, branch)]), 0x100).unwrap();
+        assert_eq!(targets, [0x10c, 0x10e]);
     }
 
     /// The base of the table is a register, because a literal lies between branch and table.

@@ -92,6 +92,12 @@ impl Image {
         }
     }
 
+    /// Adds a function that begins at an address.
+    #[cfg(test)]
+    pub(crate) fn begin_function(&mut self, address: u32, name: &str) {
+        self.functions.insert(address, name.to_owned());
+    }
+
     /// Marks the start of code or of data at an address.
     #[cfg(test)]
     pub(crate) fn mark(&mut self, address: u32, is_code: bool) {

@@ -86,7 +86,7 @@ pub struct PathStretch {
     pub file: String,
     /// Source lines named by the compiler.
     pub lines: BTreeSet<u32>,
-    /// Cycles, including called functions.
+    /// Cycles.
     pub cycles: u32,
 }
 
@@ -129,7 +129,7 @@ impl Bound {
             sensor_cycles += bus.exchanges * bus.words * once;
             longest_sensor_cycles = longest_sensor_cycles.max(once);
         }
-        let path = stretches(&image, &worst.path);
+        let path = stretches(&image, &analysis.path_with_calls(&worst));
         Ok(Self {
             cycles,
             sensor_cycles,

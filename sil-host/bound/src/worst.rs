@@ -48,6 +48,8 @@ pub struct Visit {
     pub times: f64,
     /// Cycles of all executions, including called functions and the entries to the block.
     pub cycles: f64,
+    /// Function that it calls.
+    pub call: Option<u32>,
 }
 
 /// A loop of the machine code.
@@ -104,6 +106,28 @@ impl<'a> Analysis<'a> {
     /// Returns the analysed functions.
     pub fn functions(&self) -> impl Iterator<Item = &Worst> {
         self.known.values().flatten()
+    }
+
+    /// Returns the worst path of an analysed function with those of the functions that it calls, in order.
+    pub fn path_with_calls(&self, worst: &Worst) -> Vec<Visit> {
+        let mut all = Vec::new();
+        for visit in &worst.path {
+            let called = visit
+                .call
+                .and_then(|callee| self.known.get(&callee)?.as_ref());
+            let inside = called.map_or(0.0, |it| f64::from(it.cycles));
+            all.push(Visit {
+                cycles: visit.cycles - visit.times * inside,
+                ..*visit
+            });
+            let path = called.map(|it| self.path_with_calls(it));
+            all.extend(path.into_iter().flatten().map(|within| Visit {
+                times: visit.times * within.times,
+                cycles: visit.times * within.cycles,
+                ..within
+            }));
+        }
+        all
     }
 
     /// Returns the worst case of the function at `entry`; `None` if it never returns.
@@ -298,6 +322,7 @@ impl<'a> Analysis<'a> {
                 block: to,
                 times: 0.0,
                 cycles: 0.0,
+                call: graph.blocks[&to].call,
             });
             visit.times += times;
             visit.cycles += times * cycles;

@@ -37,7 +37,7 @@ use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
 use painleve_stm32f4::spi::SpiPort;
 use painleve_stm32f4::timer;
-use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PinState};
+use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PB0, PC0, PC1, PC2, PinState};
 pub use stm32f4xx_hal::pac;
 use stm32f4xx_hal::pac::{SPI1, SPI2};
 use stm32f4xx_hal::prelude::*;
@@ -104,7 +104,7 @@ impl Board for F405 {
         let b = device.GPIOB.split(&mut rcc);
         let c = device.GPIOC.split(&mut rcc);
 
-        let enable = b.pb0.into_push_pull_output_in_state(PinState::Low).erase();
+        let enable = b.pb0.into_push_pull_output_in_state(PinState::Low);
         let _ = (a.pa4.into_analog(), a.pa5.into_analog());
         pac::DAC::enable(&mut rcc);
         start_converter(&device.DAC);
@@ -170,9 +170,9 @@ impl Board for F405 {
             watchdogs: Watchdogs::new(watchdog, Window(device.WWDG), slow_bus_hz),
             converter: device.DAC,
             enable,
-            enable_switch: c.pc0.into_pull_down_input().erase(),
-            reset_button: c.pc1.into_pull_down_input().erase(),
-            stages_ready: c.pc2.into_pull_down_input().erase(),
+            enable_switch: c.pc0.into_pull_down_input(),
+            reset_button: c.pc1.into_pull_down_input(),
+            stages_ready: c.pc2.into_pull_down_input(),
         };
         let drive = ArmDrive::new(pins, encoders, force_cell);
         let memory = FlashMemory::new(ConfigurationFlash::new(flash::Registers(device.FLASH)));
@@ -240,10 +240,10 @@ pub struct F405Pins {
     core_hz: u32,
     watchdogs: Watchdogs<Independent, Window>,
     converter: pac::DAC,
-    enable: ErasedPin<Output>,
-    enable_switch: ErasedPin<Input>,
-    reset_button: ErasedPin<Input>,
-    stages_ready: ErasedPin<Input>,
+    enable: PB0<Output>,
+    enable_switch: PC0<Input>,
+    reset_button: PC1<Input>,
+    stages_ready: PC2<Input>,
 }
 
 impl ArmPins for F405Pins {
