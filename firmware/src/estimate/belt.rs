@@ -120,6 +120,7 @@ mod tests {
         FrictionEstimate {
             coefficient: 0.6,
             next_coefficient: 0.6,
+            catch_up: 0.0,
             deviation: 0.01,
             slip,
             slip_seen: true,

@@ -47,6 +47,12 @@ const CHANGING_GAIN: f32 = 0.1;
 const CHANGING: f32 = 0.1;
 /// Gain above which the filter has just restarted, so that an innovation says nothing about the rate.
 const RESTART_GAIN: f32 = 0.5;
+/// Largest square of a change of the innovation that counts as noise, as a multiple of the noise's. A sudden
+/// change of μ is not noise: counted as such, it would hide the next one.
+const NOISE_JUMP: f32 = 16.0;
+/// Ticks for which the torque misses a sudden change of μ: on average half a tick until a reading shows it,
+/// and one until the torque that it causes acts.
+const MISSED_TICKS: f32 = 1.5;
 /// Ticks from a reading to the middle of the tick in which the torque that it causes acts.
 const LEAD_TICKS: f32 = 2.0;
 
@@ -74,6 +80,9 @@ pub struct FrictionEstimate {
     pub coefficient: f32,
     /// μ̂ at the time at which the next torque acts.
     pub next_coefficient: f32,
+    /// Excess of μ that, fed forward in this tick, gives the tip the impulse that it has missed since a change
+    /// of μ.
+    pub catch_up: f32,
     /// Standard deviation of μ̂.
     pub deviation: f32,
     /// Direction of slip, from the sign of the friction force.
@@ -100,6 +109,8 @@ pub struct FrictionEstimator {
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionState {
     coefficient: f32,
+    /// Excess of μ to be fed forward in this tick.
+    catch_up: f32,
     /// Change of μ̂ in one tick.
     rate_per_tick: f32,
     /// 1 when a change of μ is found; falls towards 0 while none is.
@@ -137,6 +148,7 @@ impl FrictionEstimator {
     pub fn start(&self) -> FrictionState {
         FrictionState {
             coefficient: self.settings.first_guess,
+            catch_up: 0.0,
             rate_per_tick: 0.0,
             changing: 0.0,
             variance: self.first_variance(),
@@ -160,6 +172,7 @@ impl FrictionEstimator {
         let first_variance = self.first_variance();
         let drift = self.settings.drift_per_sqrt_s;
         state.variance = (state.variance + drift * drift * self.tick_s).at_most(first_variance);
+        state.catch_up = 0.0;
         self.observe_slip(state, force_n);
         if force_n.y < self.settings.observable_n {
             state.stick_ticks = 0;
@@ -190,10 +203,11 @@ impl FrictionEstimator {
         let weight = self.mean_weight;
         let change = innovation - state.innovation;
         state.innovation = innovation;
-        state.noise_variance += 0.25 * weight * (0.5 * change * change - state.noise_variance);
-        let ratio_variance = state
-            .noise_variance
-            .limited(0.01 * ratio_variance, ratio_variance);
+        let least_variance = 0.01 * ratio_variance;
+        let most = NOISE_JUMP * state.noise_variance.at_least(least_variance);
+        let square = (0.5 * change * change).at_most(most);
+        state.noise_variance += 0.25 * weight * (square - state.noise_variance);
+        let ratio_variance = state.noise_variance.limited(least_variance, ratio_variance);
         state.mean_innovation += weight * (innovation - state.mean_innovation);
         let square = state.mean_innovation * state.mean_innovation;
         if square > SIGNIFICANT_SQUARE * (state.variance + ratio_variance) * weight {
@@ -206,7 +220,11 @@ impl FrictionEstimator {
         let gain = state.variance / (state.variance + ratio_variance);
         state.coefficient = (state.coefficient + gain * innovation).at_least(0.0);
         state.variance *= 1.0 - gain;
-        if state.changing > CHANGING && gain < RESTART_GAIN {
+        let changes = state.changing > CHANGING;
+        if changes {
+            state.catch_up = MISSED_TICKS * gain * innovation;
+        }
+        if changes && gain < RESTART_GAIN {
             // The gains of a filter of a random rate.
             state.rate_per_tick += 0.5 * gain * gain * innovation;
         } else {
@@ -224,6 +242,7 @@ impl FrictionEstimator {
     /// Restarts the filter after a sudden change of μ.
     fn restart(&self, state: &mut FrictionState) {
         state.stick_ticks = 0;
+        state.changing = 1.0;
         state.variance = self.first_variance();
         state.rate_per_tick = 0.0;
     }
@@ -274,6 +293,7 @@ impl FrictionState {
         FrictionEstimate {
             coefficient: self.coefficient,
             next_coefficient: (self.coefficient + LEAD_TICKS * self.rate_per_tick).at_least(0.0),
+            catch_up: self.catch_up,
             deviation: self.variance.square_root(),
             slip: self.slip,
             slip_seen: self.slip_seen,
@@ -437,6 +457,38 @@ mod tests {
         tested.update(&Vector2::new(-6.8, 10.0));
         let found = tested.estimate();
         assert!((found.coefficient - 0.68).abs() < 0.002, "{found:?}");
+    }
+
+    #[test]
+    fn the_impulse_that_a_sudden_change_has_cost_is_given_back_in_one_tick() {
+        let mut tested = Tested::new(0.6);
+        let ratio = |ratio: f32| Vector2::new(-10.0 * ratio, 10.0);
+        (0..2000).for_each(|_| tested.update(&ratio(0.6)));
+        assert_eq!(tested.estimate().catch_up, 0.0);
+        for (before, after) in [(0.6, 0.8), (0.8, 0.6)] {
+            tested.update(&ratio(after));
+            let missed = MISSED_TICKS * (after - before);
+            let found = tested.estimate().catch_up;
+            assert!((found - missed).abs() < 0.02 * missed.abs(), "{found}");
+            tested.update(&ratio(after));
+            assert!(tested.estimate().catch_up.abs() < 0.01);
+            (0..20).for_each(|_| tested.update(&ratio(after)));
+        }
+    }
+
+    #[test]
+    fn a_change_of_friction_does_not_hide_the_next_one() {
+        let mut tested = Tested::new(0.6);
+        (0..2000).for_each(|_| tested.update(&Vector2::new(-6.0, 10.0)));
+        for step in 0..20_u8 {
+            let friction = if step % 2 == 0 { 0.68 } else { 0.6 };
+            (0..50).for_each(|_| tested.update(&Vector2::new(-10.0 * friction, 10.0)));
+            if step % 2 == 1 {
+                tested.update(&Vector2::new(-6.8, 10.0));
+                let found = tested.estimate();
+                assert!((found.coefficient - 0.68).abs() < 0.005, "{found:?}");
+            }
+        }
     }
 
     #[test]

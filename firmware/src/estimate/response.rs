@@ -59,6 +59,8 @@ const LEAST_REST: f32 = 0.05;
 const SETTLING_S: f32 = 0.05;
 /// Multiple of `minimum_p_ratio` below which the contact is observed.
 const NEAR: f32 = 3.0;
+/// Time for which a contact that was certainly not rigid counts as one that gives, s.
+const LAGGED_S: f32 = 5.0;
 /// Retreat from the edge as a multiple of the approach.
 const RETREAT: f32 = 4.0;
 
@@ -91,6 +93,9 @@ pub struct ContactResponse {
     /// How certainly the contact is not rigid, 0 … 1: 0 where the upper bound of the response is that of a
     /// rigid contact, 1 where it is half of that or less.
     pub lags: f32,
+    /// Whether the contact was certainly not rigid at some time in the last seconds: farther from the edge,
+    /// where p is greater, a contact that gives looks rigid.
+    pub has_lagged: bool,
     /// Least p/Q22 at which the tip may be.
     pub least_p_ratio: f32,
     /// Probe to be added to the wanted normal force, N.
@@ -104,6 +109,7 @@ impl ContactResponse {
             loop_share: p_ratio.at_least(0.0),
             give: 0.0,
             lags: 0.0,
+            has_lagged: false,
             least_p_ratio: 0.0,
             probe_n: 0.0,
         }
@@ -167,6 +173,8 @@ pub struct ResponseState {
     /// How much the contact gives, and how certainly it is not rigid, from the upper bound.
     give: f32,
     lags: f32,
+    /// Remaining time for which the contact counts as one that has lagged, s.
+    lagged_s: f32,
     /// Time since the tip touched, s.
     touched_s: f32,
     /// Time of observation near the edge, s.
@@ -209,6 +217,7 @@ impl ResponseEstimator {
             gain: 0.0,
             give: 0.0,
             lags: 0.0,
+            lagged_s: 0.0,
             touched_s: 0.0,
             near_s: 0.0,
             least_p_ratio: self.settings.minimum_p_ratio,
@@ -232,6 +241,7 @@ impl ResponseEstimator {
                 .limited(0.0, p_ratio.at_least(0.0)),
             give: state.give,
             lags: state.lags,
+            has_lagged: state.lagged_s > 0.0,
             least_p_ratio: state.least_p_ratio,
             probe_n: state.probe_n,
         }
@@ -316,6 +326,11 @@ impl ResponseEstimator {
         state.gain = state.lower / settings.full_gain;
         state.give = (1.0 - state.upper / settings.gives).at_least(0.0);
         state.lags = (2.0 - 2.0 * state.upper / settings.rigid).limited(0.0, 1.0);
+        state.lagged_s = if state.lags > 0.0 {
+            LAGGED_S
+        } else {
+            state.lagged_s - self.period_s
+        };
     }
 
     /// Lets the tip closer to the edge while the contact there is rigid, and less close while it gives.

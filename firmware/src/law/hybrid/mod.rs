@@ -29,7 +29,7 @@ const FORCE_INTEGRAL_SHARE: f32 = 0.165;
 
 /// Rate limit of the friction feed-forward, as a fraction of f_n, 1/s: at a reversal of slip it
 /// passes through stick without a jerk.
-const FRICTION_SLEW_PER_S: f32 = 500.0;
+const FRICTION_SLEW_PER_S: f32 = 1000.0;
 
 /// Fraction of the torque limit available for pressing the tip on the belt; the rest is for motion.
 const TORQUE_USED: f32 = 0.95;
@@ -252,8 +252,13 @@ impl HybridSettings {
                     friction.slip
                 };
                 let slip = friction.slip_seen.then_some(slip);
-                let ratio =
-                    slip.map_or(0.0, |slip| -friction.next_coefficient * slip.sign::<f32>());
+                let catch_up = if input.response.has_lagged {
+                    friction.catch_up
+                } else {
+                    0.0
+                };
+                let coefficient = (friction.next_coefficient + catch_up).at_least(0.0);
+                let ratio = slip.map_or(0.0, |slip| -coefficient * slip.sign::<f32>());
                 if slip != state.slip {
                     state.filtered_friction_n = 0.0;
                     if state.slip.is_none() {
@@ -315,7 +320,7 @@ mod tests {
             let input = LawInput {
                 arm: &arm, model: &model, posture,
                 friction: FrictionEstimate {
-                    coefficient: friction, next_coefficient: friction, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
+                    coefficient: friction, next_coefficient: friction, catch_up: 0.0, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
                 },
                 p_per_kg: model.p_per_kg(friction, Slip::Positive), response: ContactResponse::rigid(1.0),
                 force_n: Vector2::zeros(), contact: true, saturated: false,
@@ -354,6 +359,7 @@ mod tests {
             friction: FrictionEstimate {
                 coefficient: 0.6,
                 next_coefficient: 0.6,
+                catch_up: 0.0,
                 deviation: 0.0,
                 slip: Slip::Positive,
                 slip_seen: true,

@@ -246,6 +246,7 @@ mod tests {
         FrictionEstimate {
             coefficient,
             next_coefficient: coefficient,
+            catch_up: 0.0,
             deviation: 0.0,
             slip,
             slip_seen: true,
