@@ -204,7 +204,7 @@ impl FrictionEstimator {
         let change = innovation - state.innovation;
         state.innovation = innovation;
         let least_variance = 0.01 * ratio_variance;
-        let most = NOISE_JUMP * state.noise_variance.at_least(least_variance);
+        let most = NOISE_JUMP * (state.noise_variance + least_variance);
         let square = (0.5 * change * change).at_most(most);
         state.noise_variance += 0.25 * weight * (square - state.noise_variance);
         let ratio_variance = state.noise_variance.limited(least_variance, ratio_variance);
@@ -220,13 +220,15 @@ impl FrictionEstimator {
         let gain = state.variance / (state.variance + ratio_variance);
         state.coefficient = (state.coefficient + gain * innovation).at_least(0.0);
         state.variance *= 1.0 - gain;
-        let changes = state.changing > CHANGING;
-        if changes {
-            state.catch_up = MISSED_TICKS * gain * innovation;
-        }
-        if changes && gain < RESTART_GAIN {
+        if state.changing > CHANGING {
+            let change = gain * innovation;
+            state.catch_up = MISSED_TICKS * change;
             // The gains of a filter of a random rate.
-            state.rate_per_tick += 0.5 * gain * gain * innovation;
+            state.rate_per_tick = if gain < RESTART_GAIN {
+                state.rate_per_tick + 0.5 * gain * change
+            } else {
+                0.0
+            };
         } else {
             state.rate_per_tick = 0.0;
         }
@@ -292,7 +294,7 @@ impl FrictionState {
     pub fn estimate(&self) -> FrictionEstimate {
         FrictionEstimate {
             coefficient: self.coefficient,
-            next_coefficient: (self.coefficient + LEAD_TICKS * self.rate_per_tick).at_least(0.0),
+            next_coefficient: self.coefficient + LEAD_TICKS * self.rate_per_tick,
             catch_up: self.catch_up,
             deviation: self.variance.square_root(),
             slip: self.slip,
