@@ -227,12 +227,11 @@ impl FrontEnd {
     /// Permits arming once the button has been pressed for long enough: a deliberate act of an operator who has
     /// opened ENABLE.
     fn note_button(&mut self, levels: InputLevels) {
-        let is_pressed = levels.reset && !levels.enable;
-        self.pressed_ticks = if is_pressed {
-            self.pressed_ticks.saturating_add(1)
-        } else {
-            0
-        };
+        if levels.enable || !levels.reset {
+            self.pressed_ticks = 0;
+            return;
+        }
+        self.pressed_ticks = self.pressed_ticks.saturating_add(1);
         let settings = self.settings.as_ref();
         let limit = settings.and_then(|it| it.button_ticks);
         self.may_arm |= limit.is_some_and(|limit| self.pressed_ticks >= limit);

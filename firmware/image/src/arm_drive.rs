@@ -70,6 +70,8 @@ pub struct ArmDrive<P: ArmPins> {
     /// Scale of the torque stages; `None` until there is a configuration.
     stages: Option<StageScale>,
     source: FrameSource,
+    /// Whether frames from this source drive the arm.
+    is_driven: bool,
     /// Newest frame from the host, if the host is the source of frames.
     from_host: Option<SensorFrame>,
 }
@@ -89,6 +91,7 @@ impl<P: ArmPins> ArmDrive<P> {
             front_end: FrontEnd::new(None),
             stages: None,
             source: FrameSource::Lockstep,
+            is_driven: false,
             from_host: None,
         }
     }
@@ -125,11 +128,7 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
         let is_active = answer
             .supervisor_state()
             .is_some_and(SupervisorState::drives);
-        let is_driven = matches!(
-            self.source,
-            FrameSource::Sensors | FrameSource::Commissioning | FrameSource::StandAlone
-        );
-        let is_on = is_active && is_driven && self.front_end.is_fit();
+        let is_on = is_active && self.is_driven && self.front_end.is_fit();
         let torques = if is_on {
             answer.torques
         } else {
@@ -157,6 +156,10 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
             &converters.mounting,
         ));
         self.source = source;
+        self.is_driven = matches!(
+            source,
+            FrameSource::Sensors | FrameSource::Commissioning | FrameSource::StandAlone
+        );
         self.from_host = None;
         // The switch has to be opened and closed again, and the sensors are checked anew.
         let is_mounted = source != FrameSource::Commissioning;

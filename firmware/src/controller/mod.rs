@@ -143,10 +143,10 @@ impl<L: Law> Controller<L> {
     }
 
     /// Answers one sensor frame.
-    // Out of line, because the compiler then finds fewer values that have to wait on the stack.
-    #[inline(never)]
+    #[inline]
     pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
-        self.tick_into(frame, TelemetrySink::nowhere())
+        self.tick_in_place(frame);
+        self.last_answer
     }
 
     /// Answers one sensor frame and writes the internal state to the telemetry.
@@ -155,7 +155,14 @@ impl<L: Law> Controller<L> {
         frame: &SensorFrame,
         telemetry: &mut Telemetry,
     ) -> ActuatorFrame {
-        self.tick_into(frame, TelemetrySink::to(telemetry))
+        self.tick_into(frame, TelemetrySink::to(telemetry));
+        self.last_answer
+    }
+
+    // Out of line, because the compiler then finds fewer values that have to wait on the stack.
+    #[inline(never)]
+    fn tick_in_place(&mut self, frame: &SensorFrame) {
+        self.tick_into(frame, TelemetrySink::nowhere());
     }
 
     /// Records how many times a lapse occurred around this tick, 0 for none. If it has now occurred
@@ -185,7 +192,7 @@ impl<L: Law> Controller<L> {
     }
 
     #[inline]
-    fn tick_into(&mut self, frame: &SensorFrame, telemetry: TelemetrySink<'_>) -> ActuatorFrame {
+    fn tick_into(&mut self, frame: &SensorFrame, telemetry: TelemetrySink<'_>) {
         let State {
             arrivals,
             supervision,
@@ -222,7 +229,6 @@ impl<L: Law> Controller<L> {
         }
         self.last_answer.tick = frame.tick;
         self.last_answer.sequence = self.last_answer.sequence.wrapping_add(1);
-        self.last_answer
     }
 
     /// Takes the torque off without a tick.
