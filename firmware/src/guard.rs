@@ -31,6 +31,7 @@ pub struct HalfPlane {
 /// Returns the torque (N·m) within ±`limit_nm` nearest to `wanted_nm` in the half-plane, and
 /// whether the half-plane changed it. If box and half-plane do not meet, returns the corner of the
 /// box that comes closest to satisfying it.
+#[inline]
 pub fn nearest_torque_nm(
     wanted_nm: &JointTorque<f32>,
     plane: &HalfPlane,

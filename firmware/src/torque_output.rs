@@ -58,6 +58,7 @@ impl TorqueOutput {
 
     /// Returns the torque (N·m) closest to the wanted one that keeps a sliding tip pressed on the
     /// belt, and whether it differs from the wanted one.
+    #[inline]
     fn pressed(
         &self,
         wanted_nm: &JointTorque<f32>,
@@ -81,6 +82,7 @@ impl TorqueOutput {
     }
 
     /// Limits the wanted torques and converts them to counts.
+    #[inline]
     fn limit(
         &self,
         command: &mut LastCommand,

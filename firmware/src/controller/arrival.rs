@@ -88,6 +88,7 @@ impl Lapses<'_> {
 }
 
 /// Checks a frame before its readings are used.
+#[inline]
 pub(super) fn arrive(
     converters: &Converters,
     state: &mut ArrivalState,

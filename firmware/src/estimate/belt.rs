@@ -64,6 +64,7 @@ impl BeltEstimator {
 
     /// Updates the bounds with one tick: the tip's velocity (m/s) and, in contact, the friction
     /// estimate.
+    #[inline]
     pub fn update(
         &self,
         state: &mut BeltState,

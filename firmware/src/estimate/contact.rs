@@ -123,6 +123,7 @@ impl ContactDetector {
 
     /// Updates the decision with one tick's normal force from the force cell, N. Returns whether
     /// the tip touches.
+    #[inline]
     pub fn update_from_force(&self, state: &mut ContactState, normal_force_n: f32) -> bool {
         let above = normal_force_n - 0.5 * self.settings.contact_n;
         state.weigh((self.slope_per_n * above).within(FORCE_LIMIT))

@@ -83,6 +83,7 @@ impl DisturbanceEstimator {
     }
 
     /// Updates the estimate with one tick of an arm whose `model` includes the present d.
+    #[inline]
     pub fn update(&self, state: &mut DisturbanceState, model: &Model, balance: &Balance) {
         let skipped = state.skipped.take();
         let before = state.rate_rad_s.replace(model.theta_dot_rad_s);

@@ -168,6 +168,7 @@ impl FrictionEstimator {
     }
 
     /// Updates the estimate with one reading (f_t, f_n), N, of a tip in contact.
+    #[inline]
     pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>, dragged: bool) {
         let first_variance = self.first_variance();
         let drift = self.settings.drift_per_sqrt_s;

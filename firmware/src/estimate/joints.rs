@@ -103,6 +103,7 @@ impl JointEstimator {
     /// # Errors
     /// [`EncoderJump`] if a joint seems to have moved faster than it can; the loops restart from
     /// these readings.
+    #[inline]
     pub fn update(
         &self,
         state: &mut JointState,

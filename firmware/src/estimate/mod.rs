@@ -402,6 +402,7 @@ impl Estimators {
     }
 
     /// Returns the measured height of the tip above the belt, m.
+    #[inline]
     fn gap_m(&self, joints: &JointState, model: &Model) -> f32 {
         let residual = joints.innovation_rad() * self.joints.residual_share();
         let jacobian = &model.jacobian;

@@ -46,6 +46,7 @@ pub struct Model {
 impl Model {
     /// Evaluates the terms at link angles θ (rad) and rates θ̇ (rad/s), with an additional
     /// generalised torque d (N·m) on the arm.
+    #[inline]
     pub fn new(
         arm: &Arm<f32>,
         theta_rad: LinkMotion<f32>,
@@ -143,17 +144,20 @@ impl Model {
 
     /// Returns the link acceleration θ̈ (rad/s²) of an arm without contact under joint torques,
     /// N·m: M⁻¹ (u − w − c).
+    #[inline]
     pub fn free_acceleration_rad_s2(&self, torque_nm: &JointTorque<f32>) -> LinkMotion<f32> {
         self.acceleration_by(torque_nm.to_links() - self.bias_nm)
     }
 
     /// Returns the link acceleration θ̈ (rad/s²) due to a contact force (f_t, f_n), N: M⁻¹ Jᵀ f.
+    #[inline]
     pub fn contact_acceleration_rad_s2(&self, force_n: &Vector2<f32>) -> LinkMotion<f32> {
         self.acceleration_by(self.force_torque_nm(force_n))
     }
 
     /// Returns the free normal acceleration as a function of the joint torques, b = b₀ + n · (u1,
     /// u2): b₀ in m/s² and n in 1/(kg·m).
+    #[inline]
     pub fn free_normal_acceleration(&self) -> (f32, Vector2<f32>) {
         let row = &self.normal_mobility;
         let offset = self.centripetal_m_s2.y - row.dot(self.bias_nm.vector());

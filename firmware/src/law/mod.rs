@@ -162,6 +162,7 @@ macro_rules! law_set {
                 }
             }
 
+            #[inline]
             fn tick(
                 &self,
                 state: &mut $states,

@@ -198,6 +198,7 @@ impl ReferenceGenerator {
 
     /// Returns the reference of this tick, then advances time by one tick. A segment without duration
     /// ends at once; of several in a row, `MOST_ENDS` end per tick.
+    #[inline]
     pub fn next_tick(&self, state: &mut ReferenceState) -> TipReference {
         for _ in 0..MOST_ENDS {
             let Some(segment) = self.program.segments.get(state.segment) else {

@@ -94,6 +94,7 @@ impl Supervisor {
     }
 
     /// Advances one tick; `has_law` states whether there is a law to arm.
+    #[inline]
     pub fn tick(
         &self,
         supervision: &mut Supervision,

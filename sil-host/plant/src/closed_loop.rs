@@ -228,9 +228,10 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             host,
             statistics: Statistics::new(SETTLING_S),
             log: LogHash::new(),
-            // The bounds are valid constants; three significant digits, as everywhere.
-            round_trips_ns: Histogram::new_with_max(LONGEST_ROUND_TRIP_NS, 3)
-                .unwrap_or_else(|_| unreachable!("constant histogram bounds")),
+            // Three significant digits, as everywhere. It grows with the longest round trip, because to clear the
+            // memory of all possible ones would take some per cent of a short run.
+            round_trips_ns: Histogram::new(3)
+                .unwrap_or_else(|_| unreachable!("constant histogram precision")),
             last_answer: ActuatorFrame::default(),
             saturated_ticks: 0,
             stale_ticks: 0,
@@ -263,8 +264,11 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             None
         } else {
             let Answer { frame, round_trip } = self.host.exchange(&sensor)?;
-            let nanoseconds = u64::try_from(round_trip.as_nanos()).unwrap_or(LONGEST_ROUND_TRIP_NS);
-            self.round_trips_ns.saturating_record(nanoseconds);
+            let nanoseconds = u64::try_from(round_trip.as_nanos()).unwrap_or(u64::MAX);
+            let nanoseconds = nanoseconds.min(LONGEST_ROUND_TRIP_NS);
+            self.round_trips_ns
+                .record(nanoseconds)
+                .unwrap_or_else(|_| unreachable!("the histogram grows up to its upper bound"));
             frame
         };
         match &frame {

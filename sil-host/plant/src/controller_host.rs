@@ -58,6 +58,7 @@ impl InProcess {
 }
 
 impl ControllerHost for InProcess {
+    #[inline]
     fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
         Ok(Answer {
             frame: Some(self.controller.tick(frame)),

@@ -55,6 +55,7 @@ impl Statistics {
 
 /// Returns the smaller force; NaN if either is. A rounding error at the instant of a lift-off
 /// counts as zero, but a larger pull is reported.
+#[inline]
 fn smaller(least_n: f64, force_n: f64) -> f64 {
     const ROUNDING_N: f64 = 1e-6;
     let force_n = if (-ROUNDING_N..=0.0).contains(&force_n) {
@@ -69,6 +70,7 @@ fn smaller(least_n: f64, force_n: f64) -> f64 {
 }
 
 impl Probe for Statistics {
+    #[inline]
     fn step(&mut self, step: &impl Step) {
         let duration = step.end_s() - step.start_s();
         self.total_s += duration;

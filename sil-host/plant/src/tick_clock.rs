@@ -41,16 +41,19 @@ impl TickClock {
     }
 
     /// Returns the time that is `ticks` tick periods after this tick, limited to the next tick, s.
+    #[inline]
     pub fn after_s(&self, ticks: f64) -> f64 {
         self.at_s((self.late + ticks).min(1.0 + self.next_late))
     }
 
     /// Returns the time that is `ticks` tick periods before the next tick, limited to this tick, s.
+    #[inline]
     pub fn before_next_s(&self, ticks: f64) -> f64 {
         self.at_s((1.0 + self.next_late - ticks).max(self.late))
     }
 
     /// Advances to the next tick.
+    #[inline]
     pub fn advance(&mut self) {
         self.tick += 1;
         self.late = self.next_late;
@@ -58,10 +61,12 @@ impl TickClock {
     }
 
     // Computed from whole numbers, so that errors do not accumulate.
+    #[inline]
     fn at_s(&self, ticks: f64) -> f64 {
         (self.tick as f64 + ticks) / self.tick_hz
     }
 
+    #[inline]
     fn draw(&mut self) -> f64 {
         if self.jitter == 0.0 {
             return 0.0;

@@ -130,6 +130,7 @@ impl Law for HybridSettings {
         };
     }
 
+    #[inline]
     fn tick(&self, state: &mut HybridState, input: &LawInput<'_>) -> LawOutput {
         let tangential_acceleration = self.commanded_acceleration_m_s2(state, input);
         let normal_force = self.commanded_force_n(state, input);

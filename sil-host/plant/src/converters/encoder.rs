@@ -43,6 +43,7 @@ impl EncoderSettings {
     }
 
     /// Returns the error of the encoder of joint 0 or 1 at a joint angle, rad.
+    #[inline]
     fn error_rad(&self, joint: usize, angle_rad: f64) -> f64 {
         let amplitude_rad = self.eccentricity_rad[joint];
         if amplitude_rad == 0.0 {
@@ -96,11 +97,13 @@ impl Encoders {
     }
 
     /// Returns how long before a tick the encoders capture for it, in ticks, 0 … 1.
+    #[inline]
     pub fn capture_before_tick(&self) -> f64 {
         self.fraction
     }
 
     /// Captures the link angles, rad; called once per tick.
+    #[inline]
     pub fn capture(&mut self, theta_rad: &LinkMotion<f64>) {
         let joints = theta_rad.to_joints().to_array();
         let mut readings = [EncoderCounts(0); 2];
@@ -115,14 +118,15 @@ impl Encoders {
 
     /// Returns the readings carried by this tick's frame.
     /// `time_s` is the time of the tick; called once per tick.
+    #[inline]
     pub fn readings(&mut self, time_s: f64) -> [EncoderCounts; 2] {
         let behind = self.whole_ticks + 1;
         let index = (self.next + MAXIMUM_LATENCY_TICKS - behind) % MAXIMUM_LATENCY_TICKS;
         let mut readings = self.captured[index];
         for (joint, reading) in readings.iter_mut().enumerate() {
             let passed = self.channels[joint].pass(time_s, i64::from(reading.0));
-            let turn = i64::from(self.scales[joint].modulus());
-            reading.0 = passed.rem_euclid(turn) as u32;
+            // A turn is a power of two.
+            reading.0 = (passed & i64::from(self.scales[joint].modulus() - 1)) as u32;
         }
         readings
     }

@@ -96,6 +96,7 @@ settings! {
 
 impl ChannelFault {
     /// Returns start and end, s; `None` without a fault.
+    #[inline]
     fn period_s(&self) -> Option<(f64, f64)> {
         match *self {
             Self::None => None,
@@ -174,6 +175,7 @@ impl FaultyChannel {
     }
 
     /// Passes the value of a tick, counts; called once per tick. The result may be out of the channel's range.
+    #[inline]
     pub fn pass(&mut self, time_s: f64, counts: i64) -> i64 {
         let Some((from_s, until_s)) = self.fault.period_s() else {
             return counts;

@@ -102,6 +102,7 @@ impl ForceCell {
 
     /// Samples the contact force (f_t, f_n) in N at time `time_s`, once per tick, and returns the
     /// readings (f_t, f_n) of this tick's frame.
+    #[inline]
     pub fn read(&mut self, force_n: &Vector2<f64>, time_s: f64) -> (ForceCounts, ForceCounts) {
         let settings = &self.settings;
         let [gain_t, gain_n] = settings.gain_error.map(|error| 1.0 + error);

@@ -57,6 +57,7 @@ impl LossyLink {
     }
 
     /// Draws the losses of the next tick; called once per tick.
+    #[inline]
     pub fn draw(&mut self) -> Lost {
         let LinkSettings {
             frame_loss,

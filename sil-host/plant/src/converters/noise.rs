@@ -38,6 +38,7 @@ impl Noise {
     }
 
     /// Returns the next value.
+    #[inline]
     pub fn draw(&mut self) -> f64 {
         if self.deviation == 0.0 {
             return 0.0;

@@ -33,6 +33,7 @@ settings! {
 
 impl TorqueErrorSettings {
     /// Returns the torque at the joints for a command (N·m) at joint angles (rad) and a time (s).
+    #[inline]
     pub fn applied_nm(
         &self,
         command_nm: JointTorque<f64>,

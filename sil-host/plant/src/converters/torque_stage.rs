@@ -50,7 +50,8 @@ pub struct TorqueStages {
     commands: [JointTorque<f64>; MAXIMUM_DELAY_TICKS],
     next: usize,
     watchdog: CommandWatchdog,
-    error: TorqueErrorSettings,
+    /// `None` without errors.
+    error: Option<TorqueErrorSettings>,
     channels: [FaultyChannel; 2],
     /// Last commands that arrived, counts.
     last_counts: [i64; 2],
@@ -90,7 +91,7 @@ impl TorqueStages {
         let channel = |fault, index| FaultyChannel::new(fault, full_scale, tick_s, seed, index);
         Self {
             scale,
-            error: settings.error,
+            error: Some(settings.error).filter(|error| *error != TorqueErrorSettings::default()),
             channels: [channel(&faults.torque_1, 4), channel(&faults.torque_2, 5)],
             last_counts: [0; 2],
             lag_s: settings.lag_s,
@@ -107,17 +108,20 @@ impl TorqueStages {
     }
 
     /// Returns the time constant of the stages, s.
+    #[inline]
     pub fn lag_s(&self) -> f64 {
         self.lag_s
     }
 
     /// Returns how long after a tick the torque changes, in ticks, 0 … 1.
+    #[inline]
     pub fn change_after_tick(&self) -> f64 {
         self.fraction
     }
 
     /// Accepts this tick's command, or repeats the last one if there is none; called once per tick.
     /// Counts beyond the range saturate. `time_s` is the time of the tick.
+    #[inline]
     pub fn command(&mut self, counts: Option<[TorqueCounts; 2]>, time_s: f64) {
         if let Some(counts) = counts {
             self.last_counts = counts.map(|count| i64::from(count.0));
@@ -138,11 +142,13 @@ impl TorqueStages {
     }
 
     /// Returns whether the watchdog has removed the torque.
+    #[inline]
     pub fn has_tripped(&self) -> bool {
         self.watchdog.tripped
     }
 
     /// Returns the torque commanded for the change within this tick, N·m.
+    #[inline]
     pub fn commanded_nm(&self) -> JointTorque<f64> {
         let behind = self.whole_ticks + 1;
         self.commands[(self.next + MAXIMUM_DELAY_TICKS - behind) % MAXIMUM_DELAY_TICKS]
@@ -150,9 +156,12 @@ impl TorqueStages {
 
     /// Returns the torque to which the joints' torque changes within this tick, N·m, with the errors at these joint
     /// angles (rad) and this time (s).
+    #[inline]
     pub fn target_nm(&self, joints_rad: &JointMotion<f64>, time_s: f64) -> JointTorque<f64> {
-        self.error
-            .applied_nm(self.commanded_nm(), joints_rad, time_s)
+        let commanded_nm = self.commanded_nm();
+        self.error.map_or(commanded_nm, |error| {
+            error.applied_nm(commanded_nm, joints_rad, time_s)
+        })
     }
 }
 

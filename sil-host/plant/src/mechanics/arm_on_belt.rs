@@ -147,6 +147,7 @@ impl ArmOnBelt {
     }
 
     /// Returns the contact force (f_t, f_n) on the tip now, N, without impulses.
+    #[inline]
     pub fn contact_force_n(&self) -> Vector2<f64> {
         self.evaluation().force_n
     }
@@ -162,6 +163,7 @@ impl ArmOnBelt {
 
     /// Commands joint torques `target_nm` from now on, through a first-order lag with time constant
     /// `lag_s` (0 for none).
+    #[inline]
     pub fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64) {
         let next = self.torque.followed_by(self.time_s, target_nm, lag_s);
         if next.at(self.time_s) != self.torque.at(self.time_s) {
@@ -178,6 +180,7 @@ impl ArmOnBelt {
     ///
     /// # Errors
     /// [`MotionError`] if no mode is possible.
+    #[inline]
     pub fn settle(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
         if self.unsettled
             && self.mode.is_contact()
@@ -190,6 +193,7 @@ impl ArmOnBelt {
     }
 
     /// Evaluates the equations at the present state, unless they are known.
+    #[inline]
     fn evaluate(&mut self) -> &Evaluation {
         let motion = Motion {
             arm: &self.arm,
@@ -203,6 +207,7 @@ impl ArmOnBelt {
         })
     }
 
+    #[inline]
     fn evaluation(&self) -> Evaluation {
         self.evaluation
             .unwrap_or_else(|| self.motion().evaluate(self.mode, self.time_s, &self.state))
@@ -405,6 +410,7 @@ impl Plant for ArmOnBelt {
         motion.snapshot_of(self.mode, self.time_s, &self.state, &here)
     }
 
+    #[inline]
     fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64) {
         Self::command_torque(self, target_nm, lag_s);
     }
@@ -421,6 +427,7 @@ impl Plant for ArmOnBelt {
         theta(&self.state)
     }
 
+    #[inline]
     fn contact_force_n(&self) -> Vector2<f64> {
         Self::contact_force_n(self)
     }

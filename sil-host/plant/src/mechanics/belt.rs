@@ -68,6 +68,7 @@ impl Default for BeltProfile {
 
 impl BeltProfile {
     /// Returns the speed at time `t_s`, m/s.
+    #[inline]
     pub fn speed_m_s(&self, t_s: f64) -> f64 {
         match *self {
             Self::Constant { speed_m_s } => speed_m_s,
@@ -105,6 +106,7 @@ impl BeltProfile {
 
     /// Returns the acceleration at time `t_s`, m/s²; at a corner, the
     /// acceleration just after it.
+    #[inline]
     pub fn acceleration_m_s2(&self, t_s: f64) -> f64 {
         match *self {
             Self::Constant { .. } | Self::Step { .. } => 0.0,
@@ -171,6 +173,7 @@ impl BeltProfile {
 
     /// Returns the next time after `t_s` at which speed or acceleration jumps,
     /// s; infinite if there is none.
+    #[inline]
     pub fn next_corner_s(&self, t_s: f64) -> f64 {
         let corners = match *self {
             Self::Constant { .. } | Self::Sine { .. } => [f64::INFINITY; 2],

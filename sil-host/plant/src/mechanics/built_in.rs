@@ -35,6 +35,7 @@ impl Plant for BuiltInPlant {
         }
     }
 
+    #[inline]
     fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64) {
         match self {
             Self::Rigid(plant) => plant.command_torque(target_nm, lag_s),
@@ -49,6 +50,7 @@ impl Plant for BuiltInPlant {
         }
     }
 
+    #[inline]
     fn time_s(&self) -> f64 {
         match self {
             Self::Rigid(plant) => plant.time_s(),
@@ -56,6 +58,7 @@ impl Plant for BuiltInPlant {
         }
     }
 
+    #[inline]
     fn link_angles_rad(&self) -> LinkMotion<f64> {
         match self {
             Self::Rigid(plant) => plant.link_angles_rad(),
@@ -63,6 +66,7 @@ impl Plant for BuiltInPlant {
         }
     }
 
+    #[inline]
     fn contact_force_n(&self) -> Vector2<f64> {
         match self {
             Self::Rigid(plant) => plant.contact_force_n(),

@@ -35,6 +35,7 @@ pub trait ArmProbe {
 
 /// A probe for any plant also observes this one.
 impl<P: Probe> ArmProbe for P {
+    #[inline]
     fn step(&mut self, step: &ArmStep<'_>) {
         Probe::step(self, step);
     }
@@ -45,23 +46,28 @@ impl<P: Probe> ArmProbe for P {
 }
 
 impl Step for ArmStep<'_> {
+    #[inline]
     fn start_s(&self) -> f64 {
         self.start_s
     }
 
+    #[inline]
     fn end_s(&self) -> f64 {
         self.end_s
     }
 
+    #[inline]
     fn mode(&self) -> ContactMode {
         self.mode
     }
 
+    #[inline]
     fn start(&self) -> Snapshot {
         self.motion
             .snapshot_of(self.mode, self.start_s, self.start, self.at_start)
     }
 
+    #[inline]
     fn end(&self) -> Snapshot {
         self.motion
             .snapshot_of(self.mode, self.end_s, self.end, self.at_end)

@@ -29,6 +29,7 @@ impl TorqueSegment {
 
     /// Returns the segment that follows when `target_nm` is commanded at `t_s` to a stage with time
     /// constant `lag_s`.
+    #[inline]
     pub fn followed_by(&self, t_s: f64, target_nm: JointTorque<f64>, lag_s: f64) -> Self {
         Self {
             start_s: t_s,
@@ -39,11 +40,13 @@ impl TorqueSegment {
     }
 
     /// Returns whether the torque is constant until the next command.
+    #[inline]
     pub fn is_constant(&self) -> bool {
         self.lag_s == 0.0 || self.start_nm == self.target_nm
     }
 
     /// Returns the time constant of the stage, s.
+    #[inline]
     pub fn lag_s(&self) -> f64 {
         self.lag_s
     }

@@ -138,6 +138,7 @@ pub fn event_functions(
 }
 
 /// Returns whether the tip slides at a state and continues in the same direction.
+#[inline]
 pub fn slides_on(mode: ContactMode, here: &Evaluation) -> bool {
     mode.slip().is_some_and(|slip| {
         slip.sign::<f64>() * here.slip[0] > REST_SLIP_M_S
@@ -148,6 +149,7 @@ pub fn slides_on(mode: ContactMode, here: &Evaluation) -> bool {
 
 /// Returns whether a mode lasts through a step of `h` seconds, judged by its two ends; `false`
 /// requests a search.
+#[inline]
 pub fn goes_on(
     motion: &Motion<'_>,
     mode: ContactMode,
