@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use crate::cycles::{
     ADDRESS_STALL, FLASH_DATA_WAIT, FLASH_LINE_BYTES, FLASH_READ, FLOAT_DIVIDE_REST,
-    InstructionKind, PIPELINE_REFILL, data_wait, fetch_wait, is_in_flash,
+    InstructionKind, PERIPHERAL_WAIT, PIPELINE_REFILL, data_wait, fetch_wait, is_in_flash,
 };
 use crate::graph::{Block, Graph};
-use crate::instruction::{Effect, Instruction, Overlap, PROGRAM_COUNTER};
+use crate::instruction::{Effect, Instruction, KEPT_BY_CALLS, Overlap, PROGRAM_COUNTER};
 
 /// Registers with known constant values.
 pub type Constants = BTreeMap<u16, u32>;
@@ -25,9 +25,7 @@ pub fn constants(graph: &Graph) -> BTreeMap<u32, Constants> {
             follow(&mut now, instruction);
         }
         if block.call.is_some() {
-            // The callee may change the registers that the calling convention allows; here all are
-            // assumed changed.
-            now.clear();
+            now.retain(|register, _| KEPT_BY_CALLS.contains(register));
         }
         for (to, _) in &block.successors {
             let changed = match at.get_mut(to) {
@@ -98,6 +96,19 @@ pub fn of_block(block: &Block, constants: &Constants) -> BlockCost {
         cycles: walk.cycles(),
         reading: walk.reading,
     }
+}
+
+/// Returns the addresses of the instructions of a block that access a peripheral at an address known to the model.
+pub fn peripheral_accesses(block: &Block, constants: &Constants) -> Vec<u32> {
+    let mut now = constants.clone();
+    let mut accesses = Vec::new();
+    for instruction in &block.instructions {
+        if wait(instruction, &now) == PERIPHERAL_WAIT {
+            accesses.push(instruction.address);
+        }
+        follow(&mut now, instruction);
+    }
+    accesses
 }
 
 /// The cost of consecutive instructions.

@@ -14,7 +14,7 @@
 //! the program's, which no other bus master uses at the same time, unless the address is a constant
 //! in flash, in the program or in a peripheral; and that addresses are aligned. The interrupts compute no address of a
 //! peripheral but those of the pins that select the sensors; their ports are on the bus AHB1, which runs at the core's clock
-//! and does not wait (RM0090, sections 2.1 and 8.1).
+//! and does not wait (RM0090, sections 2.1 and 8.1). A test compares this with the addresses that executed interrupts access.
 
 /// Wait states of the flash: RM0090, table 10, 168 MHz at 2.7 … 3.6 V.
 pub const FLASH_WAIT_STATES: u32 = 5;

@@ -110,6 +110,18 @@ pub const SECOND_ARGUMENT: u16 = ArmReg::ARM_REG_R1 as u16;
 /// Number of the program counter.
 pub const PROGRAM_COUNTER: u16 = ArmReg::ARM_REG_PC as u16;
 
+/// Registers that a function keeps, r4 to r11 (ARM's procedure call standard, AAPCS32, section 6.1.1).
+pub const KEPT_BY_CALLS: [u16; 8] = [
+    ArmReg::ARM_REG_R4 as u16,
+    ArmReg::ARM_REG_R5 as u16,
+    ArmReg::ARM_REG_R6 as u16,
+    ArmReg::ARM_REG_R7 as u16,
+    ArmReg::ARM_REG_R8 as u16,
+    ArmReg::ARM_REG_R9 as u16,
+    ArmReg::ARM_REG_R10 as u16,
+    ArmReg::ARM_REG_R11 as u16,
+];
+
 impl Decoder {
     /// Creates a decoder for the Cortex-M4F.
     ///

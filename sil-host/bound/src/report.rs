@@ -30,6 +30,9 @@ struct SensorBus {
     words: u32,
 }
 
+/// Handlers of the sensors' buses.
+pub const SENSOR_INTERRUPTS: [&str; 2] = [SENSOR_BUSES[0].handler, SENSOR_BUSES[1].handler];
+
 const SENSOR_BUSES: [SensorBus; 2] = [
     SensorBus {
         handler: "SPI1",
@@ -75,6 +78,10 @@ pub struct Bound {
     /// Loops of the interrupt and of the functions that it calls.
     #[serde(skip)]
     pub loops: Vec<Loop>,
+    /// Addresses of all instructions, including those of the sensors' interrupts, that are charged with the wait for a
+    /// peripheral.
+    #[serde(skip)]
+    pub peripheral_accesses: BTreeSet<u32>,
 }
 
 /// A part of the path within one source function.
@@ -119,13 +126,19 @@ impl Bound {
         let mut analysis = Analysis::new(&image, &limits)?.without(&not_called);
         let worst = worst_of(CONTROL_INTERRUPT, &mut analysis)?;
         let cycles = with_entry(&worst);
+        let accesses = |analysis: &Analysis<'_>| -> BTreeSet<u32> {
+            let functions = analysis.functions();
+            functions
+                .flat_map(|it| it.peripheral_accesses.iter().copied())
+                .collect()
+        };
+        let mut peripheral_accesses = accesses(&analysis);
         let (mut sensor_cycles, mut longest_sensor_cycles) = (0, 0);
         for bus in SENSOR_BUSES {
             let limits = Limits::of_sensor_bus(bus.timing, bus.clock_hz);
-            let once = with_entry(&worst_of(
-                bus.handler,
-                &mut Analysis::new(&image, &limits)?,
-            )?);
+            let mut analysis = Analysis::new(&image, &limits)?;
+            let once = with_entry(&worst_of(bus.handler, &mut analysis)?);
+            peripheral_accesses.append(&mut accesses(&analysis));
             sensor_cycles += bus.exchanges * bus.words * once;
             longest_sensor_cycles = longest_sensor_cycles.max(once);
         }
@@ -140,6 +153,7 @@ impl Bound {
             instructions: worst.instructions,
             path,
             not_called,
+            peripheral_accesses,
             loops: analysis
                 .functions()
                 .flat_map(|function| function.loops.iter().cloned())

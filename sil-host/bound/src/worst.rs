@@ -37,6 +37,8 @@ pub struct Worst {
     pub uses_float: bool,
     /// Loops of the function.
     pub loops: Vec<Loop>,
+    /// Addresses of the function's instructions that are charged with the wait for a peripheral.
+    pub peripheral_accesses: Vec<u32>,
 }
 
 /// A block of the worst path.
@@ -176,6 +178,7 @@ impl<'a> Analysis<'a> {
         let loops = self.loops(graph)?;
         let mut costs: BTreeMap<u32, u32> = BTreeMap::new();
         let mut ends_at = BTreeMap::new();
+        let mut peripheral_accesses = Vec::new();
         for (address, block) in &graph.blocks {
             let known = constants.get(address).cloned().unwrap_or_default();
             if let Some(callee) = block.call
@@ -193,6 +196,7 @@ impl<'a> Analysis<'a> {
                 cycles + cost::branch(callee) + cost::branch(*address)
             });
             let own = cost::of_block(block, &known);
+            peripheral_accesses.extend(cost::peripheral_accesses(block, &known));
             costs.insert(*address, own.cycles + call);
             ends_at.insert(*address, own);
         }
@@ -299,6 +303,7 @@ impl<'a> Analysis<'a> {
             instructions: 0,
             uses_float: false,
             loops,
+            peripheral_accesses,
         };
         let mut visits: BTreeMap<u32, Visit> = BTreeMap::new();
         let first = f64::from(costs[&graph.entry]);

@@ -140,7 +140,12 @@ impl<C: BoardChip> Bench<C> {
     /// Gives the parts the state of the simulated arm, as they are mounted.
     pub fn present(&mut self) {
         let frame = self.simulation.sample(&mut self.statistics);
-        self.frame = frame.unwrap_or_else(|error| panic!("{error}"));
+        self.show(frame.unwrap_or_else(|error| panic!("{error}")));
+    }
+
+    /// Gives the parts the readings of a frame, as they are mounted, or those of an arm that an operator holds.
+    pub fn show(&mut self, frame: SensorFrame) {
+        self.frame = frame;
         if let Some(held_rad) = self.held_rad {
             let angles = held_rad.to_joints().to_array();
             self.frame.joints = angles.map(|it| EncoderScale::default().reading(it));

@@ -134,6 +134,9 @@ impl<C: Chip> Surroundings for Core<C> {
 
     fn read(&mut self, address: u32, size: u32, _: &Processor) -> u32 {
         self.is_dirty = true;
+        if let Some(trace) = &mut self.trace {
+            trace.access(address);
+        }
         if (0xe000_0000..0xe004_0000).contains(&address) {
             self.system.read(address, self.cycles)
         } else {
@@ -143,6 +146,9 @@ impl<C: Chip> Surroundings for Core<C> {
 
     fn write(&mut self, address: u32, size: u32, value: u32, _: &Processor) {
         self.is_dirty = true;
+        if let Some(trace) = &mut self.trace {
+            trace.access(address);
+        }
         if (0xe000_0000..0xe004_0000).contains(&address) {
             self.system.write(address, size, value, self.cycles);
         } else {

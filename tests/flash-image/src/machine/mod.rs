@@ -9,6 +9,7 @@ mod program;
 mod snapshot;
 mod trace;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use self::core::Core;
@@ -192,6 +193,12 @@ impl<C: Chip> Machine<C> {
     pub fn take_traces(&mut self) -> Vec<Vec<u32>> {
         let trace = self.unicorn.surroundings_mut().trace.as_mut();
         trace.map_or_else(Vec::new, |trace| std::mem::take(&mut trace.done))
+    }
+
+    /// Returns the instructions of the traced handler that accessed peripherals, each with an address that it accessed.
+    pub fn peripheral_accesses(&self) -> BTreeSet<(u32, u32)> {
+        let trace = self.unicorn.surroundings().trace.as_ref();
+        trace.map_or_else(BTreeSet::new, |trace| trace.accesses.clone())
     }
 
     /// Returns the program counter.

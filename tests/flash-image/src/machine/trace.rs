@@ -1,5 +1,7 @@
 //! Records the executions of a handler.
 
+use std::collections::BTreeSet;
+
 use crate::unicorn::{Processor, Register};
 
 /// The executed instructions of one handler.
@@ -10,6 +12,8 @@ pub(super) struct Trace {
     stack: Option<u32>,
     now: Vec<u32>,
     pub(super) done: Vec<Vec<u32>>,
+    /// The instructions that accessed peripherals, and the addresses that they accessed.
+    pub(super) accesses: BTreeSet<(u32, u32)>,
 }
 
 impl Trace {
@@ -20,6 +24,14 @@ impl Trace {
             stack: None,
             now: Vec::new(),
             done: Vec::new(),
+            accesses: BTreeSet::new(),
+        }
+    }
+
+    /// Records that the present instruction accesses a peripheral.
+    pub(super) fn access(&mut self, address: u32) {
+        if let (Some(_), Some(instruction)) = (self.stack, self.now.last()) {
+            self.accesses.insert((*instruction, address));
         }
     }
 

@@ -8,14 +8,14 @@
 use painleve_bound::image::Image;
 use painleve_bound::loops::Limit;
 use painleve_bound::profile::Profile;
-use painleve_bound::report::{Bound, CONTROL_INTERRUPT};
+use painleve_bound::report::{Bound, CONTROL_INTERRUPT, SENSOR_INTERRUPTS};
 use painleve_bound::trace::{Executed, Tracer, rounds};
 use painleve_flash_image::bench::{BoardBench, encoded, scenario};
 use painleve_flash_image::board::{self, FlashedBoard};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
-use painleve_shared::frame::SensorFrame;
+use painleve_shared::frame::{DigitalInputs, SensorFrame};
 use painleve_shared::message::{FrameSource, Response};
 
 mod random;
@@ -143,6 +143,87 @@ fn ticks_with_sensors_stay_below_the_bound() {
         for _ in 0..50 {
             bench.tick();
             watch.look(&mut bench.board);
+        }
+    });
+}
+
+/// Ports of the pins, on a bus that runs at the core's clock (RM0090, sections 2.1 and 8.1).
+const PORTS: std::ops::Range<u32> = 0x4002_0000..0x4002_2400;
+
+/// The bound charges the wait for a peripheral where it knows the address. Executed interrupts access others only
+/// where that is not needed.
+#[test]
+fn peripherals_at_addresses_computed_at_run_time_are_those_of_pins() {
+    let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
+    let mut charged = 0;
+    let [encoders, force] = SENSOR_INTERRUPTS;
+    for handler in [CONTROL_INTERRUPT, encoders, force] {
+        let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));
+        let handler = bench.board.machine.symbol(handler).unwrap();
+        bench.board.machine.trace(handler);
+        bench.drive();
+        // The drive stops, too.
+        bench.board.enable(false);
+        (0..50).for_each(|_| bench.tick());
+        let accesses = bench.board.machine.peripheral_accesses();
+        assert!(!accesses.is_empty());
+        let (known, others): (Vec<_>, Vec<_>) = accesses
+            .into_iter()
+            .partition(|(instruction, _)| bound.peripheral_accesses.contains(instruction));
+        charged += known.len();
+        // The core's own registers are on no bus.
+        let others: Vec<_> = others
+            .iter()
+            .filter(|(_, address)| *address < 0xe000_0000 && !PORTS.contains(address))
+            .collect();
+        assert!(others.is_empty(), "not charged: {others:x?}");
+    }
+    assert!(charged > 0);
+}
+
+/// Hill climbing with the board's own sensors: starts in the state before the worst tick of a closed loop, and
+/// searches for readings and positions of the switch that make one of the next ticks more expensive.
+#[test]
+fn the_worst_readings_found_by_a_search_stay_below_the_bound() {
+    with_bound(|watch| {
+        let mut random = Random(4);
+        for name in ["hybrid-elbow-down", "pid-elbow-down", "capture"] {
+            let mut bench = BoardBench::new(&scenario(name));
+            let handler = bench.board.machine.symbol(CONTROL_INTERRUPT).unwrap();
+            bench.board.machine.trace(handler);
+            bench.drive();
+            watch.look(&mut bench.board);
+            let mut start = (bench.snapshot(), 0);
+            for _ in 0..50 {
+                let before = bench.snapshot();
+                bench.tick();
+                let cycles = watch.look(&mut bench.board).cycles;
+                if cycles > start.1 {
+                    start = (before, cycles);
+                }
+            }
+            bench.restore(&start.0);
+            // The readings of the next ticks; each attempt disturbs those of one.
+            let mut best = [bench.frame; 6];
+            let mut most = 0;
+            for _ in 0..tries(60) / 3 {
+                let mut tried = best;
+                let place = random.below(tried.len() as u64) as usize;
+                tried[place] = mutated(&tried[place], &mut random);
+                bench.restore(&start.0);
+                let mut cycles = 0;
+                for frame in tried {
+                    bench.show(frame);
+                    bench
+                        .board
+                        .enable(frame.inputs.contains(DigitalInputs::ENABLE));
+                    bench.wait_for_tick();
+                    cycles = cycles.max(watch.look(&mut bench.board).cycles);
+                }
+                if cycles >= most {
+                    (most, best) = (cycles, tried);
+                }
+            }
         }
     });
 }
