@@ -4,6 +4,19 @@ use crate::counts::ForceCounts;
 use crate::settings;
 
 settings! {
+    /// The sensors that are read on each channel: both encoders, f_t and f_n.
+    #[derive(Copy, Eq)]
+    pub enum SensorParts = First {
+        /// The first sensor of each channel; there may be no second one.
+        "first" => First,
+        /// The second sensor of each channel, in place of the first.
+        "second" => Second,
+        /// Both. The readings of the first sensors count as long as the second ones confirm them.
+        "both" => Both,
+    }
+}
+
+settings! {
     /// Directions and zeros of the parts as they are mounted. A board corrects its readings and torques by
     /// them, so that the controller always sees the arm of the model. The simulated arm has none of these.
     #[derive(Copy, Eq)]
@@ -21,5 +34,18 @@ settings! {
         force_lowest_code: u16 = 82, 41..=1024, "counts";
         /// Highest code that a working cell gives.
         force_highest_code: u16 = 4013, 3071..=4054, "counts";
+        /// The sensors that are read on each channel.
+        sensors: SensorParts = SensorParts::First;
+        /// Whether the second encoders of θ1 and of the elbow count backwards.
+        second_encoder_reversed: [bool; 2] = [false; 2];
+        /// Whether the second force cell, or second bridges on the same one, read f_t and f_n with the opposite
+        /// sign. Their tare is not needed: the difference of the channels is measured while the drive is off.
+        second_force_reversed: [bool; 2] = [false; 2];
+        /// Largest difference of two encoders of one joint by their noise, in counts of 14 bits. The default is
+        /// five standard deviations of the difference with the largest noise in the data sheet of the AS5048A,
+        /// 0.06° rms each.
+        second_encoder_tolerance: u16 = 19, 4..=400, "counts";
+        /// Largest difference of two readings of one force by their noise, in counts of 12 bits.
+        second_force_tolerance: u16 = 16, 4..=400, "counts";
     }
 }

@@ -1,9 +1,11 @@
-//! Two ams AS5048A magnetic encoders of 14 bits on one SPI bus in mode 1 (data sheet DS000298).
+//! Two ams AS5048A magnetic encoders of 14 bits on one SPI bus in mode 1, or four, two on each joint (data sheet
+//! DS000298).
 //!
 //! A frame has 16 bits; the answer to a command arrives with the next frame. Every word has even parity.
 //! Every answer has a flag that stays set after an error until the error register is read.
 
 use painleve_shared::counts::EncoderCounts;
+use painleve_shared::mounting::SensorParts;
 
 use crate::exchange::{Dialogue, Exchange, SelectTiming};
 use crate::{ReadError, rescale};
@@ -65,12 +67,14 @@ enum Step {
     Clear,
 }
 
-/// Two encoders on one bus.
+/// Encoders of both joints on one bus.
 #[derive(Clone, Debug)]
 pub struct EncoderDriver {
+    parts: SensorParts,
     tick: u8,
-    diagnostics: [Option<Diagnostics>; 2],
-    readings: [Result<u16, ReadError>; 2],
+    /// First encoders of both joints, then the second ones.
+    diagnostics: [Option<Diagnostics>; 4],
+    readings: [Result<u16, ReadError>; 4],
     /// The encoder in turn.
     encoder: usize,
     step: Step,
@@ -80,13 +84,14 @@ pub struct EncoderDriver {
 }
 
 impl EncoderDriver {
-    /// Makes the encoders of θ1 and of the elbow, with selects 0 and 1. The bus is in mode 1 and no faster
-    /// than [`FASTEST_HZ`].
+    /// Makes the first encoders of θ1 and of the elbow, with selects 0 and 1; the second ones have selects 2 and
+    /// 3. The bus is in mode 1 and no faster than [`FASTEST_HZ`].
     pub const fn new() -> Self {
         Self {
+            parts: SensorParts::First,
             tick: 0,
-            diagnostics: [None; 2],
-            readings: [Err(ReadError::Bus); 2],
+            diagnostics: [None; 4],
+            readings: [Err(ReadError::Bus); 4],
             encoder: 0,
             step: Step::Ask,
             first: 0,
@@ -95,16 +100,49 @@ impl EncoderDriver {
         }
     }
 
-    /// Returns both angles of the last set of readings as counts of `bits` bits.
+    /// Sets which encoders are read, from the next set of readings on.
+    pub fn read_parts(&mut self, parts: SensorParts) {
+        *self = Self {
+            parts,
+            ..Self::new()
+        };
+    }
+
+    /// Returns both angles of the last set of readings as counts of `bits` bits: those of the second encoders
+    /// if only they are read, else those of the first.
     pub fn readings(&self, bits: u8) -> [Result<EncoderCounts, ReadError>; 2] {
-        self.readings.map(|angle| {
+        self.in_use(&self.readings).map(|angle| {
             angle.map(|it| EncoderCounts(rescale(it.into(), BITS, bits).cast_unsigned()))
         })
     }
 
-    /// Returns the last diagnostics of the magnets; `None` before the first check.
+    /// Returns the angles of the first and of the second encoder of both joints, counts of [`BITS`] bits.
+    pub fn pairs(&self) -> [[Result<u16, ReadError>; 2]; 2] {
+        let [first_1, first_2, second_1, second_2] = self.readings;
+        [[first_1, second_1], [first_2, second_2]]
+    }
+
+    /// Returns the last diagnostics of the magnets of the encoders whose angles are [`readings`](Self::readings);
+    /// `None` before the first check.
     pub fn diagnostics(&self) -> [Option<Diagnostics>; 2] {
-        self.diagnostics
+        self.in_use(&self.diagnostics)
+    }
+
+    /// Returns the encoders of both joints whose readings are passed on.
+    fn in_use<T: Copy>(&self, [first_1, first_2, second_1, second_2]: &[T; 4]) -> [T; 2] {
+        match self.parts {
+            SensorParts::First | SensorParts::Both => [*first_1, *first_2],
+            SensorParts::Second => [*second_1, *second_2],
+        }
+    }
+
+    /// Returns the first and the last encoder that are read.
+    fn ends(&self) -> (usize, usize) {
+        match self.parts {
+            SensorParts::First => (0, 1),
+            SensorParts::Second => (2, 3),
+            SensorParts::Both => (0, 3),
+        }
     }
 
     /// Returns whether this encoder's magnet is checked in this set of readings.
@@ -142,7 +180,7 @@ impl EncoderDriver {
                 }
             }
             Step::Diagnostics => {
-                self.diagnostics[self.encoder & 1] = Some(Diagnostics(checked(answer)?));
+                self.diagnostics[self.encoder & 3] = Some(Diagnostics(checked(answer)?));
             }
         }
         let apart = self.second.wrapping_sub(self.first) & DATA;
@@ -153,15 +191,16 @@ impl EncoderDriver {
         }
     }
 
-    /// Stores a reading and turns to the other encoder.
+    /// Stores a reading and turns to the next encoder.
     fn finish(&mut self, reading: Result<u16, ReadError>) -> Option<Exchange> {
         // The mask spares a check of the index.
-        self.readings[self.encoder & 1] = reading;
+        self.readings[self.encoder & 3] = reading;
         self.is_retry = false;
-        if self.encoder == 1 {
+        let (_, last) = self.ends();
+        if self.encoder >= last {
             return None;
         }
-        self.encoder = 1;
+        self.encoder += 1;
         Some(self.send(Step::Ask, READ_ANGLE))
     }
 }
@@ -180,13 +219,13 @@ impl Dialogue for EncoderDriver {
         pause_ns: SETTLING_NS,
     };
     // Four with a magnet's check, or three; then four again after a disturbance.
-    const MOST_EXCHANGES: u32 = 4 + 3 + 2 * 4;
+    const MOST_EXCHANGES: [u32; 2] = [4 + 3 + 2 * 4, 4 + 3 * 3 + 4 * 4];
 
     fn begin(&mut self) -> Exchange {
         self.tick = (self.tick + 1) % DIAGNOSTICS_INTERVAL;
-        self.encoder = 0;
+        (self.encoder, _) = self.ends();
         self.is_retry = false;
-        self.readings = [Err(ReadError::Bus); 2];
+        self.readings = [Err(ReadError::Bus); 4];
         self.send(Step::Ask, READ_ANGLE)
     }
 

@@ -33,8 +33,8 @@ pub trait Dialogue {
     const BITS: u8;
     /// Times around each exchange.
     const TIMING: SelectTiming;
-    /// Largest number of exchanges of one set of readings.
-    const MOST_EXCHANGES: u32;
+    /// Largest number of exchanges of one set of readings, with one sensor on each channel and with two.
+    const MOST_EXCHANGES: [u32; 2];
 
     /// Starts a new set of readings; returns its first exchange.
     fn begin(&mut self) -> Exchange;

@@ -1,5 +1,5 @@
 //! A Microchip MCP3304 converter (13 bits, signed) behind the bridge amplifiers of a two-axis force cell,
-//! SPI mode 0 (data sheet DS21697).
+//! SPI mode 0 (data sheet DS21697), and a second one behind a second cell or second bridges on the first.
 //!
 //! Each axis is a differential pair, the amplifier's output against its ground, with a live zero: without a
 //! force, the output is at half the reference. A dead supply, an open or shorted wire and a dead converter
@@ -7,7 +7,7 @@
 //! shifter (74AHCT125), and its output needs a pin that tolerates 5 V.
 
 use painleve_shared::counts::ForceCounts;
-use painleve_shared::mounting::Mounting;
+use painleve_shared::mounting::{Mounting, SensorParts};
 
 use crate::exchange::{Dialogue, Exchange, SelectTiming};
 use crate::{ReadError, rescale};
@@ -37,33 +37,43 @@ const CONVERT: u32 = 0b0000_1000;
 /// The bit before the sign is always 0.
 const NULL_BIT: u32 = 1 << 13;
 
-/// A force cell.
+/// A force cell, or two.
 #[derive(Clone, Debug)]
 pub struct ForceCellDriver {
-    /// Normal and tangential force.
-    readings: [Result<i32, ReadError>; 2],
-    /// The pair of channels in turn.
-    pair: usize,
-    /// Conversions of this pair.
+    parts: SensorParts,
+    /// Normal and tangential force of the first converter, then of the second.
+    readings: [Result<i32, ReadError>; 4],
+    /// The conversion in turn: an index of the readings.
+    turn: usize,
+    /// Conversions of this force.
     conversions: [Result<i32, ReadError>; 2],
     count: usize,
 }
 
 impl ForceCellDriver {
-    /// Makes a force cell, in mode 0, no faster than [`FASTEST_HZ`], with select 0: f_n on channels 0 (+)
-    /// and 1 (−), f_t on 2 (+) and 3 (−).
+    /// Makes the first force cell, in mode 0, no faster than [`FASTEST_HZ`], with select 0: f_n on channels 0 (+)
+    /// and 1 (−), f_t on 2 (+) and 3 (−). The second has select 1.
     pub const fn new() -> Self {
         Self {
-            readings: [Err(ReadError::Bus); 2],
-            pair: 0,
+            parts: SensorParts::First,
+            readings: [Err(ReadError::Bus); 4],
+            turn: 0,
             conversions: [Err(ReadError::Bus); 2],
             count: 0,
         }
     }
 
-    /// Returns (f_t, f_n) of the last set of readings, from the live zero, as counts of `bits` bits. Each
-    /// force takes two conversions, and a third if these two disagree. A code outside the range that
-    /// `mounting` allows is no reading.
+    /// Sets which converters are read, from the next set of readings on.
+    pub fn read_parts(&mut self, parts: SensorParts) {
+        *self = Self {
+            parts,
+            ..Self::new()
+        };
+    }
+
+    /// Returns (f_t, f_n) of the last set of readings, from the live zero, as counts of `bits` bits: those of the
+    /// second converter if only that is read, else those of the first. Each force takes two conversions, and a
+    /// third if these two disagree. A code outside the range that `mounting` allows is no reading.
     pub fn readings(
         &self,
         bits: u8,
@@ -72,27 +82,44 @@ impl ForceCellDriver {
         Result<ForceCounts, ReadError>,
         Result<ForceCounts, ReadError>,
     ) {
-        let plausible = mounting.force_lowest_code.into()..=mounting.force_highest_code.into();
-        let [normal, tangential] = self.readings.map(|reading| {
-            let code = reading?;
-            let force = ForceCounts(rescale(code - LIVE_ZERO, BITS, bits));
-            plausible
-                .contains(&code)
-                .then_some(force)
-                .ok_or(ReadError::Implausible)
-        });
-        (tangential, normal)
+        let [first_n, first_t, second_n, second_t] = self.readings;
+        let (tangential, normal) = match self.parts {
+            SensorParts::First | SensorParts::Both => (first_t, first_n),
+            SensorParts::Second => (second_t, second_n),
+        };
+        let scaled = |reading| {
+            let force = from_live_zero(reading, mounting)?;
+            Ok(ForceCounts(rescale(force, BITS, bits)))
+        };
+        (scaled(tangential), scaled(normal))
+    }
+
+    /// Returns f_t and f_n, each by the first and by the second converter, from the live zero, in counts of
+    /// [`BITS`] bits.
+    pub fn pairs(&self, mounting: &Mounting) -> [[Result<i32, ReadError>; 2]; 2] {
+        let [first_n, first_t, second_n, second_t] = self.readings;
+        [[first_t, second_t], [first_n, second_n]]
+            .map(|pair| pair.map(|reading| from_live_zero(reading, mounting)))
+    }
+
+    /// Returns the first and the last conversion of a set of readings.
+    fn ends(&self) -> (usize, usize) {
+        match self.parts {
+            SensorParts::First => (0, 1),
+            SensorParts::Second => (2, 3),
+            SensorParts::Both => (0, 3),
+        }
     }
 
     fn convert(&self) -> Exchange {
         Exchange {
-            select: 0,
+            select: self.turn >> 1,
             // The upper two channel bits follow the start bit; the third begins the second byte.
-            data: (CONVERT | self.pair as u32) << 16,
+            data: (CONVERT | (self.turn as u32 & 1)) << 16,
         }
     }
 
-    /// Returns the pair's reading once its conversions suffice.
+    /// Returns the force's reading once its conversions suffice.
     fn reading(&mut self, conversion: Result<i32, ReadError>) -> Option<Result<i32, ReadError>> {
         if let Some(place) = self.conversions.get_mut(self.count) {
             *place = conversion;
@@ -120,6 +147,15 @@ fn median_of_agreeing(
     }
 }
 
+/// Returns a reading from the live zero, unless no force gives its code.
+fn from_live_zero(reading: Result<i32, ReadError>, mounting: &Mounting) -> Result<i32, ReadError> {
+    let code = reading?;
+    (mounting.force_lowest_code.into()..=mounting.force_highest_code.into())
+        .contains(&code)
+        .then_some(code - LIVE_ZERO)
+        .ok_or(ReadError::Implausible)
+}
+
 /// Returns the signed conversion in an answer.
 fn decoded(answer: Option<u32>) -> Result<i32, ReadError> {
     let answer = answer.ok_or(ReadError::Bus)?;
@@ -143,21 +179,23 @@ impl Dialogue for ForceCellDriver {
         hold_ns: 0,
         pause_ns: PAUSE_NS,
     };
-    const MOST_EXCHANGES: u32 = 6;
+    const MOST_EXCHANGES: [u32; 2] = [6, 12];
 
     fn begin(&mut self) -> Exchange {
-        *self = Self::new();
+        self.read_parts(self.parts);
+        (self.turn, _) = self.ends();
         self.convert()
     }
 
     fn proceed(&mut self, answer: Option<u32>) -> Option<Exchange> {
         if let Some(reading) = self.reading(decoded(answer)) {
             // The mask spares a check of the index.
-            self.readings[self.pair & 1] = reading;
-            if self.pair == 1 {
+            self.readings[self.turn & 3] = reading;
+            let (_, last) = self.ends();
+            if self.turn >= last {
                 return None;
             }
-            self.pair = 1;
+            self.turn += 1;
             self.count = 0;
         }
         Some(self.convert())

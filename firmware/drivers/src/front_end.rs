@@ -6,21 +6,30 @@ use painleve_shared::counts::{
     EncoderCounts, EncoderScale, ForceCounts, LinearScale, TorqueCounts,
 };
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
-use painleve_shared::mounting::Mounting;
+use painleve_shared::mounting::{Mounting, SensorParts};
 use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 
+use crate::ReadError;
 use crate::checks::{Checks, TURNS, Verdict};
 use crate::encoders::EncoderDriver;
 use crate::force_cell::ForceCellDriver;
 use crate::gap::{GapCheck, Scales};
 use crate::heating::HeatingModel;
 use crate::plausibility::{Implausible, SensorReadings};
+use crate::second_channel::{SecondChannel, Tolerance};
 use crate::switches::Switches;
 
 /// Count of a sensor without a reading: out of every range, so that the controller counts it as a lapse.
 const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
 const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
+
+/// Largest difference of two AS5048A over a turn by their nonlinearity, ±1.6° together (DS000298, ±0.8° each),
+/// from one end of it to the other, counts.
+const ENCODER_RANGE: u16 = 146;
+
+/// A sixteenth of the force cell's range by the gains of two cells, counts.
+const FORCE_RANGE: u16 = 128;
 
 /// Levels of the input pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -65,6 +74,9 @@ pub struct FrontEnd {
     switches: Switches,
     /// Readings since the last frame, in the arm's directions, forces as (f_t, f_n).
     readings: SensorReadings,
+    /// Second sensors of θ1, the elbow, f_t and f_n.
+    second_encoders: [SecondChannel; 2],
+    second_forces: [SecondChannel; 2],
     sequence: u32,
     may_arm: bool,
     /// Ticks for which RESET has been pressed, with ENABLE open.
@@ -99,6 +111,8 @@ impl FrontEnd {
             checks: Checks::new(gap, heating_model, bits),
             switches: Switches::default(),
             readings: SensorReadings::default(),
+            second_encoders: [SecondChannel::default(); 2],
+            second_forces: [SecondChannel::default(); 2],
             sequence: 0,
             may_arm: false,
             pressed_ticks: 0,
@@ -136,6 +150,8 @@ impl FrontEnd {
     }
 
     /// Takes the readings of a complete set of the encoders for the next frame.
+    // Out of line, so that the bound of the sensors' interrupts counts it once in a set of readings.
+    #[inline(never)]
     pub fn take_encoders(&mut self, encoders: &EncoderDriver) {
         let Some(settings) = &self.settings else {
             return;
@@ -146,17 +162,36 @@ impl FrontEnd {
             let backwards = EncoderCounts(counts.0.wrapping_neg() & mask);
             if reversed { backwards } else { counts }
         };
-        let [reversed_1, reversed_2] = settings.mounting.encoder_reversed;
+        let mounting = &settings.mounting;
+        let [reversed_1, reversed_2] = match mounting.sensors {
+            SensorParts::First | SensorParts::Both => mounting.encoder_reversed,
+            SensorParts::Second => mounting.second_encoder_reversed,
+        };
         let [joint_1, joint_2] = encoders.readings(scale.bits);
         self.readings.joints = [
             joint_1.ok().map(|it| turned(it, reversed_1)),
             joint_2.ok().map(|it| turned(it, reversed_2)),
         ];
+        if mounting.sensors == SensorParts::Both {
+            let tolerance = Tolerance {
+                noise: mounting.second_encoder_tolerance,
+                range: ENCODER_RANGE,
+            };
+            let reversed = [mounting.encoder_reversed, mounting.second_encoder_reversed];
+            let pairs = encoders
+                .pairs()
+                .map(|pair| pair.map(|it| it.map(i32::from)));
+            let channels = &mut self.second_encoders;
+            let joints = &mut self.readings.joints;
+            confirm(channels, joints, pairs, reversed, tolerance, self.is_active);
+        }
         let magnets = encoders.diagnostics();
         self.readings.magnets = magnets.map(|it| it.map(|it| it.is_healthy()));
     }
 
     /// Takes the readings of a complete set of the force cell for the next frame.
+    // Out of line for the same reason as `take_encoders`.
+    #[inline(never)]
     pub fn take_forces(&mut self, force_cell: &ForceCellDriver) {
         let Some(settings) = &self.settings else {
             return;
@@ -167,13 +202,27 @@ impl FrontEnd {
             ForceCounts(if reversed { net.wrapping_neg() } else { net }.clamp(-most - 1, most))
         };
         let mounting = &settings.mounting;
-        let [reversed_t, reversed_n] = mounting.force_reversed;
+        let [reversed_t, reversed_n] = match mounting.sensors {
+            SensorParts::First | SensorParts::Both => mounting.force_reversed,
+            SensorParts::Second => mounting.second_force_reversed,
+        };
         let [tare_t, tare_n] = mounting.force_tare;
         let (tangential, normal) = force_cell.readings(settings.force.bits, mounting);
         self.readings.forces = [
             tangential.ok().map(|it| balanced(it, tare_t, reversed_t)),
             normal.ok().map(|it| balanced(it, tare_n, reversed_n)),
         ];
+        if mounting.sensors == SensorParts::Both {
+            let tolerance = Tolerance {
+                noise: mounting.second_force_tolerance,
+                range: FORCE_RANGE,
+            };
+            let reversed = [mounting.force_reversed, mounting.second_force_reversed];
+            let pairs = force_cell.pairs(mounting);
+            let channels = &mut self.second_forces;
+            let forces = &mut self.readings.forces;
+            confirm(channels, forces, pairs, reversed, tolerance, self.is_active);
+        }
     }
 
     /// Returns the frame of one tick, from the readings taken since the last one. ENABLE is high only with the
@@ -235,5 +284,33 @@ impl FrontEnd {
         let settings = self.settings.as_ref();
         let limit = settings.and_then(|it| it.button_ticks);
         self.may_arm |= limit.is_some_and(|limit| self.pressed_ticks >= limit);
+    }
+}
+
+/// Removes the readings that the second sensor does not confirm. `reversed` are the directions of the first and of
+/// the second sensors.
+fn confirm<T>(
+    channels: &mut [SecondChannel; 2],
+    readings: &mut [Option<T>; 2],
+    pairs: [[Result<i32, ReadError>; 2]; 2],
+    [first_reversed, second_reversed]: [[bool; 2]; 2],
+    tolerance: Tolerance,
+    drives: bool,
+) {
+    let reversed = first_reversed.iter().zip(&second_reversed);
+    let readings = readings.iter_mut().zip(reversed);
+    for ((channel, pair), (reading, (first, second))) in
+        channels.iter_mut().zip(pairs).zip(readings)
+    {
+        let [one, other] = pair;
+        // Only the directions against each other matter.
+        let other = if first == second {
+            other
+        } else {
+            other.map(i32::wrapping_neg)
+        };
+        if !channel.confirms([one, other], tolerance, drives) {
+            *reading = None;
+        }
     }
 }

@@ -2,14 +2,15 @@
 //! `embedded-storage`: the same code on the board and on a PC.
 //!
 //! - [`exchange`]: carries out a driver's exchanges on a SPI bus
-//! - [`encoders`]: two AS5048A magnetic encoders on one SPI bus
-//! - [`force_cell`]: an MCP3304 converter behind the force cell's bridge amplifiers
+//! - [`encoders`]: two or four AS5048A magnetic encoders on one SPI bus
+//! - [`force_cell`]: one or two MCP3304 converters behind the force cell's bridge amplifiers
 //! - [`switches`]: ENABLE and RESET, debounced
 //! - [`checks`]: lets the checks below take turns
 //! - [`front_end`]: sensor frames from readings and switches, and the permission to arm
 //! - [`gap`]: checks encoders, force cell and torques against each other
 //! - [`heating`]: estimates the temperature of the torque stages' windings
 //! - [`plausibility`]: checks that readings can come from an arm before the drive is armed
+//! - [`second_channel`]: compares two sensors of one quantity
 //! - [`stages`]: codes of the torque stages' converter from joint torques, through motor and gear
 //! - [`slots`]: keeps a configuration in flash over a loss of power
 //!
@@ -30,6 +31,7 @@ pub mod front_end;
 pub mod gap;
 pub mod heating;
 pub mod plausibility;
+pub mod second_channel;
 pub mod slots;
 pub mod stages;
 pub mod switches;

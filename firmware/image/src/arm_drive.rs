@@ -64,8 +64,8 @@ pub trait ArmPins {
 /// The control task's part of a board.
 pub struct ArmDrive<P: ArmPins> {
     pins: P,
-    encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 2>,
-    force_cell: SensorBus<P::ForceSpi, P::Select, ForceCellDriver, 1>,
+    encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 4>,
+    force_cell: SensorBus<P::ForceSpi, P::Select, ForceCellDriver, 2>,
     front_end: FrontEnd,
     /// Scale of the torque stages; `None` until there is a configuration.
     stages: Option<StageScale>,
@@ -80,8 +80,8 @@ impl<P: ArmPins> ArmDrive<P> {
     /// Starts the control timer. The cycle counter must run.
     pub fn new(
         mut pins: P,
-        encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 2>,
-        force_cell: SensorBus<P::ForceSpi, P::Select, ForceCellDriver, 1>,
+        encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 4>,
+        force_cell: SensorBus<P::ForceSpi, P::Select, ForceCellDriver, 2>,
     ) -> Self {
         pins.start_timer(IDLE_HZ);
         Self {
@@ -176,6 +176,9 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
             button_ticks: (source == FrameSource::StandAlone)
                 .then_some((BUTTON_S * configuration.tick_hz) as u32),
         });
+        let parts = converters.mounting.sensors;
+        self.encoders.driver_mut().read_parts(parts);
+        self.force_cell.driver_mut().read_parts(parts);
         self.encoders.restart();
         self.force_cell.restart();
         self.pins.start_timer(configuration.tick_hz);

@@ -108,6 +108,11 @@ where
         starts
     }
 
+    /// Returns the driver, to change what it reads; [`restart`](Self::restart) is due then.
+    pub fn driver_mut(&mut self) -> &mut D {
+        &mut self.dialogue
+    }
+
     /// Gives up whatever is under way, and starts a new set of readings.
     pub fn restart(&mut self) {
         for select in &mut self.selects {

@@ -206,6 +206,8 @@ macro_rules! settings {
                 ),*],
             };
 
+            // A choice without settings has nothing to check.
+            #[allow(unused_variables)]
             #[inline(never)]
             fn check(
                 &self,

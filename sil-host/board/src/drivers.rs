@@ -37,10 +37,11 @@ type Modelled<D, P, const N: usize> = PolledDriver<D, ModelledBus<P>, SelectPin<
 /// The drivers, the chip models and the controller in this process.
 pub struct Drivers {
     controller: Controller,
-    encoders: Modelled<EncoderDriver, As5048a, 2>,
-    force_cell: Modelled<ForceCellDriver, Mcp3304, 1>,
-    encoder_parts: [SharedPart<As5048a>; 2],
-    force_part: SharedPart<Mcp3304>,
+    encoders: Modelled<EncoderDriver, As5048a, 4>,
+    force_cell: Modelled<ForceCellDriver, Mcp3304, 2>,
+    /// First encoders of both joints, then the second ones.
+    encoder_parts: [SharedPart<As5048a>; 4],
+    force_parts: [SharedPart<Mcp3304>; 2],
     /// Bridge amplifiers of f_n and f_t, whose failures can be simulated.
     pub bridges: [BridgeAmplifier; 2],
     encoder_bits: u8,
@@ -67,9 +68,10 @@ impl Drivers {
                 return Err(BoardError::Parts { key, wanted, has });
             }
         }
+        let mounting = configuration.converters.mounting;
         let clock = Clock::default();
         let mut encoder_bus = ModelledBus::new(&clock, ENCODER_BUS_HZ, true);
-        let encoder_parts = [1, 2].map(|seed| {
+        let encoder_parts = [1, 2, 4, 5].map(|seed| {
             let mut part = As5048a::default();
             part.bit_errors = BitErrors::new(bit_errors, seed);
             Rc::new(RefCell::new(part))
@@ -77,21 +79,27 @@ impl Drivers {
         let selects = encoder_parts
             .each_ref()
             .map(|part| encoder_bus.attach(part));
+        let mut encoders = EncoderDriver::new();
+        encoders.read_parts(mounting.sensors);
         let mut force_bus = ModelledBus::new(&clock, FORCE_BUS_HZ, false);
-        let mut force_part = Mcp3304::default();
-        force_part.bit_errors = BitErrors::new(bit_errors, 3);
-        let force_part = Rc::new(RefCell::new(force_part));
-        let select = force_bus.attach(&force_part);
+        let force_parts = [3, 6].map(|seed| {
+            let mut part = Mcp3304::default();
+            part.bit_errors = BitErrors::new(bit_errors, seed);
+            Rc::new(RefCell::new(part))
+        });
+        let force_selects = force_parts.each_ref().map(|part| force_bus.attach(part));
+        let mut force_cell = ForceCellDriver::new();
+        force_cell.read_parts(mounting.sensors);
         Ok(Self {
             controller: Controller::new(configuration).map_err(|_| BoardError::Refused)?,
-            encoders: PolledDriver::new(EncoderDriver::new(), encoder_bus, selects, clock.clone()),
-            force_cell: PolledDriver::new(ForceCellDriver::new(), force_bus, [select], clock),
+            encoders: PolledDriver::new(encoders, encoder_bus, selects, clock.clone()),
+            force_cell: PolledDriver::new(force_cell, force_bus, force_selects, clock),
             encoder_parts,
-            force_part,
+            force_parts,
             bridges: Default::default(),
             encoder_bits: encoder.bits,
             force_bits: force.bits,
-            mounting: configuration.converters.mounting,
+            mounting,
             ticks: 0,
         })
     }
@@ -100,20 +108,24 @@ impl Drivers {
     fn bit_errors(&self) -> u64 {
         let encoders = self.encoder_parts.iter();
         let encoders: u64 = encoders.map(|it| it.borrow().bit_errors.count).sum();
-        encoders + self.force_part.borrow().bit_errors.count
+        let converters = self.force_parts.iter();
+        let converters: u64 = converters.map(|it| it.borrow().bit_errors.count).sum();
+        encoders + converters
     }
 
     /// Loads the counts of the simulated converters into the chip models.
     fn present(&self, frame: &SensorFrame) {
         let up = encoders::BITS - self.encoder_bits;
-        for (part, joint) in self.encoder_parts.iter().zip(frame.joints) {
+        for (part, joint) in self.encoder_parts.iter().zip(frame.joints.iter().cycle()) {
             part.borrow_mut().angle = (joint.0 << up) as u16;
         }
         let up = force_cell::BITS - self.force_bits;
         let [normal, tangential] = self.bridges;
         let [n_plus, n_minus] = normal.channels(frame.normal_force.0 << up);
         let [t_plus, t_minus] = tangential.channels(frame.tangential_force.0 << up);
-        self.force_part.borrow_mut().channels = [n_plus, n_minus, t_plus, t_minus, 0, 0, 0, 0];
+        for part in &self.force_parts {
+            part.borrow_mut().channels = [n_plus, n_minus, t_plus, t_minus, 0, 0, 0, 0];
+        }
     }
 
     /// Returns the frame as the drivers read it.

@@ -47,6 +47,22 @@ fn every_built_in_scenario_gives_the_same_run_with_the_drivers() {
     assert_eq!(compared, built_in::names().count() - 1);
 }
 
+/// With both sensors of each channel, and with the second ones alone.
+#[test]
+fn second_sensors_change_no_run() {
+    let native = Scenario::load(built_in::DEFAULT, &[]).unwrap();
+    let native = run(
+        &native,
+        InProcess::new(&native.controller_configuration()).unwrap(),
+    );
+    for sensors in ["both", "second"] {
+        let overrides = [format!("converters.mounting.sensors={sensors}")];
+        let scenario = Scenario::load(built_in::DEFAULT, &overrides).unwrap();
+        let result = with_drivers(&scenario, 0.0).unwrap();
+        assert_eq!(result.log_hash, native.log_hash, "{sensors}");
+    }
+}
+
 /// A scenario with ideal converters, run with the board's converters. Its tip bounces: the force cell needs a
 /// range that the impacts do not exceed, because a board rejects the readings of a saturated cell.
 #[test]

@@ -24,10 +24,14 @@ struct SensorBus {
     timing: SelectTiming,
     /// Its clock (`firmware/boards/f405/src/lib.rs`), Hz.
     clock_hz: f64,
-    /// Exchanges in a tick, with every reading disturbed and repeated as often as its driver allows.
-    exchanges: u32,
+    /// Exchanges in a tick, with every reading disturbed and repeated as often as its driver allows: with one sensor
+    /// on each channel, and with two.
+    exchanges: [u32; 2],
     /// Interrupts of an exchange, one for each word.
     words: u32,
+    /// The function that takes the readings of a complete set, once in a tick: a set is started at a tick, and only
+    /// its last word's interrupt calls this.
+    takes: &'static str,
 }
 
 /// Handlers of the sensors' buses.
@@ -40,6 +44,7 @@ const SENSOR_BUSES: [SensorBus; 2] = [
         clock_hz: 5_250_000.0,
         exchanges: EncoderDriver::MOST_EXCHANGES,
         words: 1,
+        takes: "::take_encoders",
     },
     SensorBus {
         handler: "SPI2",
@@ -47,6 +52,7 @@ const SENSOR_BUSES: [SensorBus; 2] = [
         clock_hz: 1_312_500.0,
         exchanges: ForceCellDriver::MOST_EXCHANGES,
         words: 3,
+        takes: "::take_forces",
     },
 ];
 
@@ -60,12 +66,16 @@ pub struct Bound {
     pub cycles: u32,
     /// Cycles per tick of the interrupts that read the sensors for the next tick.
     pub sensor_cycles: u32,
+    /// The same with two sensors on each channel.
+    pub sensor_cycles_of_both: u32,
     /// Cycles of the longest of these interrupts, which may delay the control interrupt.
     pub longest_sensor_cycles: u32,
     /// The same bound at the core's clock, µs.
     pub microseconds: f64,
     /// Highest control rate at which the interrupt ends before the next one, Hz.
     pub proves_hz: u32,
+    /// The same with two sensors on each channel, Hz.
+    pub proves_hz_with_both: u32,
     /// Cycles of the entry to the control interrupt and of the exit from it.
     pub around_cycles: u32,
     /// Instructions on the worst path.
@@ -114,14 +124,17 @@ impl Bound {
             let worst = analysis.of(entry)?;
             worst.ok_or(BoundError::NeverReturns { address: entry })
         };
+        let out_of_line = |function: &str| {
+            let address = image.only_function(function);
+            address.ok_or_else(|| BoundError::Image {
+                path: path.to_owned(),
+                source: ImageError::NotOneFunction(function.to_owned()),
+            })
+        };
         let limits = Limits::of_control();
         let mut not_called = BTreeSet::new();
         for (function, _) in NOT_CALLED {
-            let address = image.only_function(function);
-            not_called.insert(address.ok_or_else(|| BoundError::Image {
-                path: path.to_owned(),
-                source: ImageError::NotOneFunction(function.to_owned()),
-            })?);
+            not_called.insert(out_of_line(function)?);
         }
         let mut analysis = Analysis::new(&image, &limits)?.without(&not_called);
         let worst = worst_of(CONTROL_INTERRUPT, &mut analysis)?;
@@ -133,22 +146,30 @@ impl Bound {
                 .collect()
         };
         let mut peripheral_accesses = accesses(&analysis);
-        let (mut sensor_cycles, mut longest_sensor_cycles) = (0, 0);
+        let (mut sensor_cycles, mut longest_sensor_cycles) = ([0; 2], 0);
         for bus in SENSOR_BUSES {
             let limits = Limits::of_sensor_bus(bus.timing, bus.clock_hz);
-            let mut analysis = Analysis::new(&image, &limits)?;
-            let once = with_entry(&worst_of(bus.handler, &mut analysis)?);
-            peripheral_accesses.append(&mut accesses(&analysis));
-            sensor_cycles += bus.exchanges * bus.words * once;
-            longest_sensor_cycles = longest_sensor_cycles.max(once);
+            let takes = BTreeSet::from([out_of_line(bus.takes)?]);
+            let mut of_last_word = Analysis::new(&image, &limits)?;
+            let mut of_word = Analysis::new(&image, &limits)?.without(&takes);
+            let last = with_entry(&worst_of(bus.handler, &mut of_last_word)?);
+            let other = with_entry(&worst_of(bus.handler, &mut of_word)?);
+            peripheral_accesses.append(&mut accesses(&of_last_word));
+            for (sum, exchanges) in sensor_cycles.iter_mut().zip(bus.exchanges) {
+                *sum += (exchanges * bus.words - 1) * other + last;
+            }
+            longest_sensor_cycles = longest_sensor_cycles.max(last);
         }
+        let [sensor_cycles, sensor_cycles_of_both] = sensor_cycles;
         let path = stretches(&image, &analysis.path_with_calls(&worst));
         Ok(Self {
             cycles,
             sensor_cycles,
+            sensor_cycles_of_both,
             longest_sensor_cycles,
             microseconds: f64::from(cycles) / CORE_HZ * 1e6,
             proves_hz: (CORE_HZ / f64::from(cycles + sensor_cycles)) as u32,
+            proves_hz_with_both: (CORE_HZ / f64::from(cycles + sensor_cycles_of_both)) as u32,
             around_cycles: cycles - worst.cycles,
             instructions: worst.instructions,
             path,
@@ -182,6 +203,7 @@ impl Bound {
             "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz.\n\
              Interrupts that read the sensors for the next tick: {} cycles, {:.1} µs in a tick, {:.1} µs each at most.\n\
              Together they prove control rates up to {} Hz.\n\
+             With two sensors on each channel: {} cycles, {:.1} µs in a tick, and up to {} Hz.\n\
              Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss. Tasks of lower \
              priority that mask the interrupts come on top.",
             self.cycles,
@@ -191,6 +213,9 @@ impl Bound {
             f64::from(self.sensor_cycles) / CORE_HZ * 1e6,
             f64::from(self.longest_sensor_cycles) / CORE_HZ * 1e6,
             self.proves_hz,
+            self.sensor_cycles_of_both,
+            f64::from(self.sensor_cycles_of_both) / CORE_HZ * 1e6,
+            self.proves_hz_with_both,
         );
         text
     }

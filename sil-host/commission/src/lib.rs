@@ -11,6 +11,8 @@
 //! 3. [`stages`]: small torques on the resting arm → polarity and scale of the stages, sign of f_t
 //! 4. [`slide`]: the tip slides by a millimetre in both directions → friction
 //!
+//! [`second_sensors`] repeats it with the second sensors of an arm that has two on each channel.
+//!
 //! The belt stands still throughout. A deviation that a setting can describe is corrected and reported; any
 //! other ends the procedure with one [`Mistake`].
 
@@ -18,6 +20,7 @@ pub mod encoders;
 mod mistake;
 mod readings;
 pub mod rest;
+pub mod second_sensors;
 pub mod simulated;
 pub mod slide;
 pub mod stages;

@@ -45,6 +45,24 @@ pub enum Deviation {
         /// 0 for f_t, 1 for f_n.
         axis: usize,
     },
+    /// A second encoder counts in the other direction.
+    #[error(
+        "second encoder of {}: counts in the other direction than the scenario says (converters.mounting.second_encoder_reversed)",
+        JOINT_NAMES[*.joint]
+    )]
+    SecondEncoderDirection {
+        /// Index of the joint.
+        joint: usize,
+    },
+    /// An axis of the second force cell has the other sign.
+    #[error(
+        "second force cell: {} has the other sign than the scenario says (converters.mounting.second_force_reversed)",
+        ["f_t", "f_n"][*.axis]
+    )]
+    SecondForceDirection {
+        /// 0 for f_t, 1 for f_n.
+        axis: usize,
+    },
     /// The belt is higher or lower.
     #[error("belt: it is {:.1} mm {} than the scenario says (arm.height_m)", 1e3 * .error_m.abs(), if *.error_m < 0.0 { "higher" } else { "lower" })]
     BeltHeight {

@@ -11,30 +11,40 @@ use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
 use painleve_parts::{As5048a, BitErrors, BridgeAmplifier, BridgeFailure, Mcp3304, SpiPart};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
-use painleve_shared::mounting::Mounting;
+use painleve_shared::mounting::{Mounting, SensorParts};
 
 type Tested<D, P, const N: usize> = PolledDriver<D, ModelledBus<P>, SelectPin<P>, Clock, N>;
-type TestedEncoders = Tested<EncoderDriver, As5048a, 2>;
-type TestedForceCell = Tested<ForceCellDriver, Mcp3304, 1>;
+type TestedEncoders = Tested<EncoderDriver, As5048a, 4>;
+type TestedForceCell = Tested<ForceCellDriver, Mcp3304, 2>;
 
-fn encoders() -> (TestedEncoders, [SharedPart<As5048a>; 2]) {
+fn encoders() -> (TestedEncoders, [SharedPart<As5048a>; 4]) {
+    encoders_read(SensorParts::First)
+}
+
+/// First encoders of both joints, then the second ones.
+fn encoders_read(read: SensorParts) -> (TestedEncoders, [SharedPart<As5048a>; 4]) {
     let clock = Clock::default();
     let mut bus = ModelledBus::new(&clock, encoders::FASTEST_HZ.into(), true);
-    let parts = [0, 1].map(|_| Rc::new(RefCell::new(As5048a::default())));
+    let parts = [(); 4].map(|()| Rc::new(RefCell::new(As5048a::default())));
     let selects = parts.each_ref().map(|part| bus.attach(part));
-    let driver = PolledDriver::new(EncoderDriver::new(), bus, selects, clock);
-    (driver, parts)
+    let mut driver = EncoderDriver::new();
+    driver.read_parts(read);
+    (PolledDriver::new(driver, bus, selects, clock), parts)
 }
 
 fn force_cell() -> (TestedForceCell, SharedPart<Mcp3304>) {
+    let (driver, [first, _]) = force_cells_read(SensorParts::First);
+    (driver, first)
+}
+
+fn force_cells_read(read: SensorParts) -> (TestedForceCell, [SharedPart<Mcp3304>; 2]) {
     let clock = Clock::default();
     let mut bus = ModelledBus::new(&clock, force_cell::FASTEST_HZ.into(), false);
-    let part = Rc::new(RefCell::new(Mcp3304::default()));
-    let select = bus.attach(&part);
-    (
-        PolledDriver::new(ForceCellDriver::new(), bus, [select], clock),
-        part,
-    )
+    let parts = [(); 2].map(|()| Rc::new(RefCell::new(Mcp3304::default())));
+    let selects = parts.each_ref().map(|part| bus.attach(part));
+    let mut driver = ForceCellDriver::new();
+    driver.read_parts(read);
+    (PolledDriver::new(driver, bus, selects, clock), parts)
 }
 
 /// An axis of the force cell without a failure.
@@ -105,6 +115,53 @@ fn a_force_beyond_the_range_gives_no_reading() {
         part.borrow_mut().channels = channels(BRIDGE.channels(force), BRIDGE.channels(0));
         assert_eq!(forces(&mut driver).1, Err(ReadError::Implausible));
     }
+}
+
+/// With both sensors of each channel, or the second ones alone, which are passed on as the first ones were.
+#[test]
+fn second_sensors_are_read() {
+    let (mut driver, parts) = encoders_read(SensorParts::Both);
+    let (mut force_driver, force_parts) = force_cells_read(SensorParts::Both);
+    for (part, angle) in parts.iter().zip([11, 22, 33, 44]) {
+        part.borrow_mut().angle = angle;
+    }
+    for (part, [normal, tangential]) in force_parts.iter().zip([[5, -6], [7, -8]]) {
+        part.borrow_mut().channels = channels(BRIDGE.channels(normal), BRIDGE.channels(tangential));
+    }
+    let encoders = driver.read();
+    assert_eq!(encoders.pairs(), [[Ok(11), Ok(33)], [Ok(22), Ok(44)]]);
+    assert_eq!(encoders.readings(encoders::BITS)[1], Ok(EncoderCounts(22)));
+    let pairs = force_driver.read().pairs(&Mounting::default());
+    assert_eq!(pairs, [[Ok(-6), Ok(-8)], [Ok(5), Ok(7)]]);
+    assert!(parts.iter().all(|it| it.borrow().violations().is_empty()));
+    assert!(
+        force_parts
+            .iter()
+            .all(|it| it.borrow().violations().is_empty())
+    );
+
+    let (mut driver, parts) = encoders_read(SensorParts::Second);
+    parts[0].borrow_mut().dead = Some(true);
+    parts[2].borrow_mut().angle = 33;
+    parts[3].borrow_mut().angle = 44;
+    for _ in 0..200 {
+        let encoders = driver.read();
+        let expected = [33, 44].map(|it| Ok(EncoderCounts(it)));
+        assert_eq!(encoders.readings(encoders::BITS), expected);
+    }
+    assert!(
+        driver
+            .read()
+            .diagnostics()
+            .iter()
+            .all(|it| it.unwrap().is_healthy())
+    );
+    let (mut force_driver, force_parts) = force_cells_read(SensorParts::Second);
+    force_parts[1].borrow_mut().channels = channels(BRIDGE.channels(7), BRIDGE.channels(-8));
+    assert_eq!(
+        forces(&mut force_driver),
+        (Ok(ForceCounts(-8)), Ok(ForceCounts(7)))
+    );
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The board with the simulated arm on its sensors and torque stages.
 
+use painleve_parts::BridgeAmplifier;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
@@ -15,6 +16,12 @@ use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 /// Ticks before the switch is closed.
 const BEFORE_ENABLE: u32 = 100;
+
+/// Angle by which the second encoders are turned on their shafts, counts.
+const SECOND_ENCODER_OFFSET: u16 = 9000;
+
+/// Readings of f_t and f_n of the second force cell without a load, counts.
+const SECOND_FORCE_TARE: [i32; 2] = [31, -44];
 
 /// Ticks between two alive messages of the host.
 const ALIVE_TICKS: u32 = 50;
@@ -49,8 +56,14 @@ pub struct Bench<C: BoardChip> {
     pub encoder_offset: [u16; 2],
     /// Encoders that repeat their last angle.
     pub is_frozen: [bool; 2],
-    /// Reading at which both axes of the force cell are stuck, counts.
-    pub force_is_stuck_at: Option<i32>,
+    /// Second encoders that repeat their last angle.
+    pub second_is_frozen: [bool; 2],
+    /// Readings of f_t and f_n beyond its tare at which the force cell is stuck, counts.
+    pub force_is_stuck_at: Option<[i32; 2]>,
+    /// The same of the second force cell.
+    pub second_force_is_stuck_at: Option<[i32; 2]>,
+    /// Whether the second sensors have the same zeros as the first ones.
+    pub second_is_aligned: bool,
     /// The arm is held until it is first driven.
     is_held: bool,
     /// Link angles at which an operator holds the arm, rad.
@@ -129,7 +142,10 @@ impl<C: BoardChip> Bench<C> {
             gear: [1.0; 2],
             encoder_offset: [0; 2],
             is_frozen: [false; 2],
+            second_is_frozen: [false; 2],
             force_is_stuck_at: None,
+            second_force_is_stuck_at: None,
+            second_is_aligned: false,
             is_held: true,
             held_rad: None,
         };
@@ -153,28 +169,53 @@ impl<C: BoardChip> Bench<C> {
             self.frame.tangential_force = ForceCounts(0);
         }
         let mounted = self.mounted;
+        let joints = self.frame.joints.map(|it| it.0 as u16);
+        let turned = |joint: usize, is_reversed: [bool; 2]| {
+            if is_reversed[joint] {
+                joints[joint].wrapping_neg()
+            } else {
+                joints[joint]
+            }
+        };
+        let (second_offset, second_tare) = if self.second_is_aligned {
+            (0, [0; 2])
+        } else {
+            (SECOND_ENCODER_OFFSET, SECOND_FORCE_TARE)
+        };
         let wiring = self.board.wiring();
         for joint in 0..2 {
-            let counts = self.frame.joints[joint].0 as u16;
-            let turned = if mounted.encoder_reversed[joint] {
-                counts.wrapping_neg()
-            } else {
-                counts
-            };
             if !self.is_frozen[joint] {
-                let angle = turned.wrapping_add(self.encoder_offset[joint]);
-                wiring.encoders[joint].angle = angle & 0x3fff;
+                let angle = turned(joint, mounted.encoder_reversed);
+                wiring.encoders[joint].angle =
+                    angle.wrapping_add(self.encoder_offset[joint]) & 0x3fff;
+            }
+            if !self.second_is_frozen[joint] {
+                let angle = turned(joint, mounted.second_encoder_reversed);
+                wiring.second_encoders[joint].angle = angle.wrapping_add(second_offset) & 0x3fff;
             }
         }
-        let stuck_at = self.force_is_stuck_at;
-        let signed = |counts: i32, axis: usize| {
-            let sign = if mounted.force_reversed[axis] { -1 } else { 1 };
-            stuck_at.unwrap_or(sign * counts + mounted.force_tare[axis].0)
+        let forces = [self.frame.tangential_force.0, self.frame.normal_force.0];
+        let signed = |axis: usize, is_reversed: [bool; 2]| {
+            forces[axis] * if is_reversed[axis] { -1 } else { 1 }
         };
-        let [normal, tangential] = wiring.bridges;
-        let [n_plus, n_minus] = normal.channels(signed(self.frame.normal_force.0, 1));
-        let [t_plus, t_minus] = tangential.channels(signed(self.frame.tangential_force.0, 0));
-        wiring.force.channels = [n_plus, n_minus, t_plus, t_minus, 0, 0, 0, 0];
+        let channels = |[tangential, normal]: [i32; 2], bridges: [BridgeAmplifier; 2]| {
+            let [of_normal, of_tangential] = bridges;
+            let [n_plus, n_minus] = of_normal.channels(normal);
+            let [t_plus, t_minus] = of_tangential.channels(tangential);
+            [n_plus, n_minus, t_plus, t_minus, 0, 0, 0, 0]
+        };
+        let first = [0, 1].map(|axis| {
+            let present = signed(axis, mounted.force_reversed);
+            let net = self.force_is_stuck_at.map_or(present, |it| it[axis]);
+            net + mounted.force_tare[axis].0
+        });
+        let second = [0, 1].map(|axis| {
+            let present = signed(axis, mounted.second_force_reversed);
+            let net = self.second_force_is_stuck_at.map_or(present, |it| it[axis]);
+            net + second_tare[axis]
+        });
+        wiring.force.channels = channels(first, wiring.bridges);
+        wiring.second_force.channels = channels(second, [BridgeAmplifier::default(); 2]);
     }
 
     /// An operator holds the arm in the air with its links at these angles from the plumb line, degrees.

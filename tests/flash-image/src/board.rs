@@ -22,8 +22,8 @@ pub const ENABLE: Pin = (2, 0);
 pub const RESET: Pin = (2, 1);
 /// Both torque stages are ready.
 pub const STAGES_READY: Pin = (2, 2);
-const ENCODER_SELECTS: [Pin; 2] = [(1, 6), (1, 7)];
-const FORCE_SELECT: Pin = (1, 12);
+/// Selects of the encoders, the second ones last, and of the force cells' converters.
+const SELECTS: [Pin; 6] = [(1, 6), (1, 7), (1, 10), (1, 11), (1, 12), (1, 1)];
 
 /// Duration of a byte on the serial line.
 const BYTE: Picoseconds = 10 * SECOND / 921_600;
@@ -37,7 +37,11 @@ pub struct BoardWiring {
     pub force: Mcp3304,
     /// Bridge amplifiers of f_n and f_t.
     pub bridges: [BridgeAmplifier; 2],
-    selected: [bool; 3],
+    /// Second encoders of θ1 and of the elbow.
+    pub second_encoders: [As5048a; 2],
+    /// Converter of the second force cell.
+    pub second_force: Mcp3304,
+    selected: [bool; 6],
     /// Level at which the image drives the torque stages' pin; `None` while the pin floats.
     pub stages: Option<bool>,
 }
@@ -46,14 +50,19 @@ impl BoardWiring {
     fn part(&mut self, index: usize) -> &mut dyn SpiPart {
         match index {
             0 | 1 => &mut self.encoders[index],
-            _ => &mut self.force,
+            2 | 3 => &mut self.second_encoders[index - 2],
+            4 => &mut self.force,
+            _ => &mut self.second_force,
         }
     }
 
     /// Returns the data-sheet limits that the image has violated.
     pub fn violations(&self) -> Vec<&'static str> {
-        let encoders = self.encoders.iter().flat_map(|it| it.violations());
-        encoders.chain(self.force.violations()).copied().collect()
+        let encoders = self.encoders.iter().chain(&self.second_encoders);
+        let encoders = encoders.flat_map(|it| it.violations());
+        let converters = [&self.force, &self.second_force];
+        let converters = converters.into_iter().flat_map(|it| it.violations());
+        encoders.chain(converters).copied().collect()
     }
 }
 
@@ -62,8 +71,7 @@ impl Outside for BoardWiring {
         if pin == STAGES {
             self.stages = level;
         }
-        let selects = [ENCODER_SELECTS[0], ENCODER_SELECTS[1], FORCE_SELECT];
-        if let Some(index) = selects.iter().position(|it| *it == pin) {
+        if let Some(index) = SELECTS.iter().position(|it| *it == pin) {
             // Pulled up on the board.
             let is_selected = level == Some(false);
             if is_selected != self.selected[index] {
@@ -78,7 +86,7 @@ impl Outside for BoardWiring {
     }
 
     fn transfer(&mut self, bus: usize, transfer: Transfer, now: Picoseconds) -> u16 {
-        let candidates = if bus == 0 { 0..2 } else { 2..3 };
+        let candidates = if bus == 0 { 0..4 } else { 4..6 };
         let mut answer = u16::MAX;
         for index in candidates {
             if self.selected[index] {

@@ -26,6 +26,20 @@ impl Harm {
     /// # Panics
     /// If it is still on after `limit` ticks.
     pub fn until_off<C: BoardChip>(bench: &mut Bench<C>, limit: u32) -> Self {
+        Self::until_off_counting(bench, limit, |_| false).0
+    }
+
+    /// Runs until the torque is off; returns also the number of ticks with the torque on after which `is_wrong`
+    /// is true: how long a failure that has become visible lasts.
+    ///
+    /// # Panics
+    /// If the torque is still on after `limit` ticks.
+    pub fn until_off_counting<C: BoardChip>(
+        bench: &mut Bench<C>,
+        limit: u32,
+        is_wrong: impl Fn(&Bench<C>) -> bool,
+    ) -> (Self, u32) {
+        let mut wrong_ticks = u32::from(is_wrong(bench));
         let start = bench.simulation.plant().snapshot();
         let mut harm = Self {
             ticks: 0,
@@ -44,7 +58,8 @@ impl Harm {
             let tip_m = (now.tip_t_m - start.tip_t_m).hypot(now.gap_m - start.gap_m);
             harm.tip_mm = harm.tip_mm.max(1e3 * tip_m);
             harm.normal_force_n = harm.normal_force_n.max(now.normal_force_n);
+            wrong_ticks += u32::from(!bench.board.torque().is_off() && is_wrong(bench));
         }
-        harm
+        (harm, wrong_ticks)
     }
 }

@@ -23,8 +23,8 @@ const LIMIT_TICKS: u32 = 400;
 fn takes_the_torque_off<C: BoardChip>(is_zero: bool) {
     let mut bench = Bench::<C>::new(&scenario("hybrid-elbow-down"));
     bench.drive();
-    let present = bench.frame.normal_force.0;
-    bench.force_is_stuck_at = Some(if is_zero { 0 } else { present });
+    let present = [bench.frame.tangential_force.0, bench.frame.normal_force.0];
+    bench.force_is_stuck_at = Some(if is_zero { [0; 2] } else { present });
     let harm = Harm::until_off(&mut bench, LIMIT_TICKS);
     let mut fault = None;
     while let Some(response) = bench.board.response(2_000_000_000) {

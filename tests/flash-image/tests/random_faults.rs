@@ -4,6 +4,7 @@ use painleve_flash_image::bench::{Bench, scenario};
 use painleve_flash_image::board::{BoardChip, F405, G474};
 use painleve_flash_image::stm32::Crystal;
 use painleve_parts::{BitErrors, BridgeFailure};
+use painleve_shared::mounting::SensorParts;
 
 /// Number of faults.
 const FAULTS: u32 = 1000;
@@ -34,10 +35,14 @@ enum InjectedFault {
     EncoderDies,
     ForceCellDies,
     ForceAxisDies,
+    ForceCellSticks,
+    SecondEncoderDies,
+    SecondForceCellDies,
 }
 
 impl InjectedFault {
-    const ALL: [Self; 12] = [
+    /// With one sensor on each channel.
+    const ALL: &[Self] = &[
         Self::BitErrors,
         Self::SerialNoise,
         Self::ResetPin,
@@ -52,6 +57,17 @@ impl InjectedFault {
         Self::ForceAxisDies,
     ];
 
+    /// Those that two sensors on each channel bring or show, and disturbances.
+    const OF_TWO_SENSORS: &[Self] = &[
+        Self::BitErrors,
+        Self::EncoderDies,
+        Self::ForceCellDies,
+        Self::ForceAxisDies,
+        Self::ForceCellSticks,
+        Self::SecondEncoderDies,
+        Self::SecondForceCellDies,
+    ];
+
     /// Returns whether the arm must continue.
     fn is_survived(self) -> bool {
         matches!(self, Self::BitErrors | Self::SerialNoise)
@@ -63,10 +79,12 @@ impl InjectedFault {
             Self::BitErrors => {
                 let seed = random.below(u64::MAX);
                 let wiring = board.wiring();
-                for encoder in &mut wiring.encoders {
+                let encoders = &mut wiring.encoders;
+                for encoder in encoders.iter_mut().chain(&mut wiring.second_encoders) {
                     encoder.bit_errors = BitErrors::new(1e-4, seed);
                 }
                 wiring.force.bit_errors = BitErrors::new(1e-4, seed);
+                wiring.second_force.bit_errors = BitErrors::new(1e-4, seed / 2);
             }
             Self::SerialNoise => {
                 let bytes: Vec<u8> = (0..random.below(60))
@@ -105,6 +123,24 @@ impl InjectedFault {
                 board.wiring().bridges[axis].failure = Some(failure);
                 bench.present();
             }
+            Self::ForceCellSticks => {
+                // At the reading without a force.
+                if random.below(2) == 0 {
+                    bench.force_is_stuck_at = Some([0; 2]);
+                } else {
+                    bench.second_force_is_stuck_at = Some([0; 2]);
+                }
+                bench.present();
+            }
+            Self::SecondEncoderDies => {
+                let encoder = random.below(2) as usize;
+                let level = random.below(2) == 0;
+                board.wiring().second_encoders[encoder].dead = Some(level);
+            }
+            Self::SecondForceCellDies => {
+                let level = random.below(2) == 0;
+                board.wiring().second_force.dead = Some(level);
+            }
         }
     }
 }
@@ -113,23 +149,38 @@ impl InjectedFault {
 /// for others.
 #[test]
 fn a_thousand_random_faults_take_the_torque_off_or_are_survived() {
-    take_the_torque_off_or_are_survived::<F405>(FAULTS);
+    take_the_torque_off_or_are_survived::<F405>(SensorParts::First, InjectedFault::ALL, FAULTS);
 }
 
 #[test]
 fn random_faults_on_the_nucleo_take_the_torque_off_or_are_survived() {
-    take_the_torque_off_or_are_survived::<G474>(FAULTS / 4);
+    take_the_torque_off_or_are_survived::<G474>(SensorParts::First, InjectedFault::ALL, FAULTS / 4);
 }
 
-fn take_the_torque_off_or_are_survived<C: BoardChip>(faults: u32) {
-    let mut bench = Bench::<C>::new(&scenario("hybrid-elbow-down"));
+#[test]
+fn random_faults_of_two_sensors_take_the_torque_off_or_are_survived() {
+    let faults = InjectedFault::OF_TWO_SENSORS;
+    take_the_torque_off_or_are_survived::<F405>(SensorParts::Both, faults, FAULTS / 4);
+    take_the_torque_off_or_are_survived::<G474>(SensorParts::Both, faults, FAULTS / 4);
+}
+
+fn take_the_torque_off_or_are_survived<C: BoardChip>(
+    sensors: SensorParts,
+    kinds: &[InjectedFault],
+    faults: u32,
+) {
+    let mut scenario = scenario("hybrid-elbow-down");
+    scenario.converters.mounting.sensors = sensors;
+    let mut bench = Bench::<C>::new(&scenario);
     bench.drive();
     let healthy = bench.snapshot();
     let mut random = Random(1);
     let mut exceptions = Vec::new();
     for number in 0..faults {
         bench.restore(&healthy);
-        let fault = InjectedFault::ALL[random.below(InjectedFault::ALL.len() as u64) as usize];
+        bench.force_is_stuck_at = None;
+        bench.second_force_is_stuck_at = None;
+        let fault = kinds[random.below(kinds.len() as u64) as usize];
         for _ in 0..random.below(5) {
             bench.tick();
         }

@@ -7,8 +7,9 @@
 //! | PA9, PA10  | USART1 to and from the host, 921,600 baud                |
 //! | PB3, PB4, PB5 | SPI1 clock, in, out: encoders                         |
 //! | PB6, PB7   | select encoder θ1, elbow (low)                           |
+//! | PB10, PB11 | select second encoder θ1, elbow (low)                    |
 //! | PB13, PB14, PB15 | SPI2 clock, in, out: force cell                    |
-//! | PB12       | select force cell (low)                                  |
+//! | PB12, PB1  | select force cell, second force cell (low)               |
 //! | PC0, PC1   | enable, reset (high; pulled down)                        |
 //! | PC2        | both torque stages are ready (high; pulled down)          |
 //!
@@ -134,9 +135,12 @@ impl Board for F405 {
         let core_hz = rcc.clocks.sysclk().raw();
         let spi = Spi::new(device.SPI1, pins, mode_1, ENCODER_BUS_HZ.Hz(), &mut rcc);
         let (spi, _) = spi.frame_size_16bit().release();
+        let high = PinState::High;
         let selects = [
-            b.pb6.into_push_pull_output_in_state(PinState::High).erase(),
-            b.pb7.into_push_pull_output_in_state(PinState::High).erase(),
+            b.pb6.into_push_pull_output_in_state(high).erase(),
+            b.pb7.into_push_pull_output_in_state(high).erase(),
+            b.pb10.into_push_pull_output_in_state(high).erase(),
+            b.pb11.into_push_pull_output_in_state(high).erase(),
         ];
         let timing = BusTiming {
             core_hz,
@@ -147,16 +151,16 @@ impl Board for F405 {
         let pins = (Some(b.pb13), Some(b.pb14), Some(b.pb15));
         let spi = Spi::new(device.SPI2, pins, mode_0, FORCE_BUS_HZ.Hz(), &mut rcc);
         let (spi, _) = spi.release();
-        let select = b
-            .pb12
-            .into_push_pull_output_in_state(PinState::High)
-            .erase();
+        let selects = [
+            b.pb12.into_push_pull_output_in_state(high).erase(),
+            b.pb1.into_push_pull_output_in_state(high).erase(),
+        ];
         let timing = BusTiming {
             core_hz,
             bus_hz: FORCE_BUS_HZ,
             word_bits: 8,
         };
-        let force_cell = SensorBus::new(SpiPort(spi), [select], ForceCellDriver::new(), timing);
+        let force_cell = SensorBus::new(SpiPort(spi), selects, ForceCellDriver::new(), timing);
 
         pac::TIM2::enable(&mut rcc);
         rcc.apb1enr().modify(|_, w| w.wwdgen().set_bit());

@@ -7,8 +7,9 @@
 //! | PA2, PA3   | USART2 to and from the host, through the board's debug probe, 921,600 baud |
 //! | PB3, PB4, PB5 | SPI1 clock, in, out: encoders                         |
 //! | PB6, PB7   | select encoder θ1, elbow (low)                           |
+//! | PB10, PB11 | select second encoder θ1, elbow (low)                    |
 //! | PB13, PB14, PB15 | SPI2 clock, in, out: force cell                    |
-//! | PB12       | select force cell (low)                                  |
+//! | PB12, PB1  | select force cell, second force cell (low)               |
 //! | PC0, PC1   | enable, reset (high; pulled down)                        |
 //! | PC2        | both torque stages are ready (high; pulled down)         |
 //!
@@ -112,12 +113,12 @@ impl Board for G474 {
         }
         let word = Word::HalfWord;
         let spi = SpiPort::new(device.SPI1, word, SampledAt::SecondEdge, ENCODER_DIVIDER);
-        let selects = [pins.output(Port::B, 6, true), pins.output(Port::B, 7, true)];
+        let selects = [6, 7, 10, 11].map(|number| pins.output(Port::B, number, true));
         let timing = timing(word, ENCODER_DIVIDER);
         let encoders = SensorBus::new(spi, selects, EncoderDriver::new(), timing);
         let word = Word::Byte;
         let spi = SpiPort::new(device.SPI2, word, SampledAt::FirstEdge, FORCE_DIVIDER);
-        let selects = [pins.output(Port::B, 12, true)];
+        let selects = [12, 1].map(|number| pins.output(Port::B, number, true));
         let timing = self::timing(word, FORCE_DIVIDER);
         let force_cell = SensorBus::new(spi, selects, ForceCellDriver::new(), timing);
 

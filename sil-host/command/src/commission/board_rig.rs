@@ -10,7 +10,7 @@ use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::FrameSource;
-use painleve_shared::mounting::Mounting;
+use painleve_shared::mounting::{Mounting, SensorParts};
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
@@ -83,6 +83,11 @@ impl BoardRig {
         *mounting = Mounting {
             force_lowest_code: mounting.force_lowest_code,
             force_highest_code: mounting.force_highest_code,
+            // One sensor of each channel at a time.
+            sensors: match mounting.sensors {
+                SensorParts::First | SensorParts::Both => SensorParts::First,
+                SensorParts::Second => SensorParts::Second,
+            },
             ..Mounting::default()
         };
         configuration.settings.torque_limit_nm = torque_limit_nm as f32;

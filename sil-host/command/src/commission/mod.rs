@@ -6,8 +6,9 @@ mod rehearsal;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use painleve_commission::second_sensors::{self, SecondSensors};
 use painleve_commission::simulated::{BuiltInMistake, SimulatedRig};
-use painleve_commission::{CommissionError, Commissioned, Expected, commission};
+use painleve_commission::{CommissionError, Commissioned, Deviation, Expected, commission};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_shared::range::OutOfRange;
 use painleve_system::atomic_file;
@@ -31,6 +32,9 @@ pub struct CommissionArguments {
     /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH", required_unless_present = "rehearse")]
     port: Option<PathBuf>,
+    /// Commission the second sensors of each channel: finds their directions, and lets the scenario use both.
+    #[arg(long)]
+    second_sensors: bool,
     /// Rehearse on a simulated arm, with a simulated operator.
     #[arg(long, conflicts_with = "port")]
     rehearse: bool,
@@ -69,7 +73,11 @@ fn mistakes() -> clap::builder::PossibleValuesParser {
 pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let tick_hz = scenario.run.tick_hz;
+    let as_written = scenario.clone();
     scenario.run.tick_hz = tick_hz.min(FASTEST_HZ);
+    if arguments.second_sensors {
+        scenario = second_sensors::in_place_of_first(&scenario);
+    }
     let range = |source: OutOfRange| {
         CommandError::Scenario(ScenarioError::Range {
             origin: arguments.scenario.clone(),
@@ -87,11 +95,17 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         CommissionError::Refused(mistake) => CommandError::Mounting(mistake),
         CommissionError::Range(source) => range(source),
     })?;
-    let mut corrected = commissioned.applied_to(&scenario).map_err(range)?;
-    corrected.run.tick_hz = tick_hz;
+    let (corrected, deviations) = if arguments.second_sensors {
+        let found = SecondSensors::new(&commissioned, &as_written);
+        (found.applied_to(&as_written), found.deviations)
+    } else {
+        let mut corrected = commissioned.applied_to(&scenario).map_err(range)?;
+        corrected.run.tick_hz = tick_hz;
+        (corrected, commissioned.deviations)
+    };
     let text = corrected.to_commented_toml();
     atomic_file::write(&arguments.output, text.as_bytes()).map_err(output)?;
-    report(arguments, &commissioned)
+    report(arguments, &deviations, commissioned.friction)
 }
 
 type Outcome = Result<Commissioned, CommissionError<CommandError>>;
@@ -131,23 +145,24 @@ fn torque_limit_nm(
 /// Prints what was found and where the corrected scenario is.
 fn report(
     arguments: &CommissionArguments,
-    commissioned: &Commissioned,
+    deviations: &[Deviation],
+    friction: Option<f64>,
 ) -> Result<(), CommandError> {
     if arguments.json {
-        let corrections = commissioned.deviations.iter().map(ToString::to_string);
+        let corrections = deviations.iter().map(ToString::to_string);
         return say(json!({
             "corrections": corrections.collect::<Vec<_>>(),
-            "friction": commissioned.friction,
+            "friction": friction,
             "output": arguments.output,
         }));
     }
-    for deviation in &commissioned.deviations {
+    for deviation in deviations {
         say(format_args!("corrected: {deviation}"))?;
     }
-    if commissioned.deviations.is_empty() {
+    if deviations.is_empty() {
         say("the scenario describes how the arm is mounted")?;
     }
-    match commissioned.friction {
+    match friction {
         Some(friction) => say(format_args!(
             "friction of the tip on the belt: {friction:.2}"
         ))?,

@@ -5,6 +5,7 @@
 
 mod chip;
 mod host;
+mod second_sensors;
 mod sensors;
 
 use painleve_flash_image::MILLISECOND;
