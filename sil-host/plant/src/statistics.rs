@@ -1,6 +1,6 @@
 //! Statistics of a run.
 
-use crate::plant::{ContactMode, Event, Probe, State, Step};
+use crate::plant::{ContactMode, Event, Probe, Snapshot, State, Step};
 
 /// Counts and extremes of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +43,15 @@ impl Statistics {
         }
     }
 
+    #[inline]
+    fn observe(&mut self, at: &Snapshot) {
+        self.max_tip_t_m = self.max_tip_t_m.max(at.tip_t_m);
+        self.peak_torque_nm = self.peak_torque_nm.max(at.torque_nm.amax());
+        if at.time_s >= self.settling_s {
+            self.min_normal_force_n = smaller(self.min_normal_force_n, at.normal_force_n);
+        }
+    }
+
     /// Returns the fraction of time in contact, 0 … 1.
     pub fn contact_fraction(&self) -> f64 {
         if self.total_s > 0.0 {
@@ -77,13 +86,8 @@ impl Probe for Statistics {
         if step.mode().is_contact() {
             self.contact_s += duration;
         }
-        for at in [step.start(), step.end()] {
-            self.max_tip_t_m = self.max_tip_t_m.max(at.tip_t_m);
-            self.peak_torque_nm = self.peak_torque_nm.max(at.torque_nm.amax());
-            if at.time_s >= self.settling_s {
-                self.min_normal_force_n = smaller(self.min_normal_force_n, at.normal_force_n);
-            }
-        }
+        self.observe(&step.start());
+        self.observe(&step.end());
     }
 
     fn event(&mut self, time_s: f64, event: Event, _: &State) {

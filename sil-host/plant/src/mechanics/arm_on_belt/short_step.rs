@@ -23,7 +23,8 @@ impl ArmOnBelt {
     /// Tries to reach `until_s` in one step of order 5. Returns the state with its terms and the equations there
     /// if the error is within the tolerance and no event is near, and the size up to which order 5
     /// is worth another attempt.
-    #[inline]
+    // Always: the result has 36 numbers, which a call would copy.
+    #[inline(always)]
     pub(super) fn short_step(
         &self,
         motion: &Motion<'_>,
