@@ -22,10 +22,14 @@ use crate::estimate::response::ResponseSettings;
 use crate::guard::GuardSettings;
 use crate::law::{Law, LawSettings};
 use crate::recover::RecoverySettings;
-use crate::refer::governor::GovernorSettings;
+use crate::refer::governor::{GovernorSettings, JointErrors};
 use crate::refer::reference::Program;
 use crate::supervise::lapses::LapseLimits;
 use crate::supervise::supervisor::SupervisorSettings;
+
+/// Largest factor by which tracking loops and law may be faster, for each Hz of the control rate: the settings
+/// are meant for 1 kHz.
+const SPEED_UP_S: f32 = 2e-3;
 
 settings! {
     /// Scalings of the converters, as configured in the controller.
@@ -123,12 +127,26 @@ impl<L: Law> Configuration<L> {
         1.0 / self.tick_hz
     }
 
-    /// Returns the distance by which a count of the coarser encoder and the play of the gears move the
-    /// tip along the belt, m.
-    pub fn tip_count_m(&self) -> f32 {
+    /// Returns what makes the joints' motion uncertain.
+    pub fn joint_errors(&self) -> JointErrors {
         let [one, two] = self.converters.encoders;
         let count_rad = one.rad_per_count::<f32>().at_least(two.rad_per_count());
-        self.arm.height_m * (count_rad + self.settings.estimator.gear_play_rad)
+        let [friction_1_nm, friction_2_nm] = self.arm.coulomb_friction_nm;
+        JointErrors {
+            count_m: self.arm.height_m * count_rad,
+            friction_nm: friction_1_nm.at_least(friction_2_nm),
+            play_rad: self.settings.estimator.gear_play_rad,
+        }
+    }
+
+    /// Returns the factor by which tracking loops and law are faster than their settings: 1 unless the joints
+    /// have known friction.
+    pub fn speed_up(&self) -> f32 {
+        if self.arm.coulomb_friction_nm == [0.0; 2] {
+            return 1.0;
+        }
+        let fastest = (SPEED_UP_S * self.tick_hz).at_least(1.0);
+        self.settings.estimator.friction_speed_up.at_most(fastest)
     }
 
     /// Checks every number, including those of the law, and builds the arm's model.
@@ -172,4 +190,20 @@ impl<L: Law> Configuration<L> {
 /// Adds the name of a group to the key of an error.
 fn within(group: &'static str, result: Result<(), OutOfRange>) -> Result<(), OutOfRange> {
     result.map_err(|error| error.inside(group))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_friction_of_the_joints_speeds_the_loops_up_where_the_rate_allows() {
+        let mut configuration: Configuration = Configuration::default();
+        assert_eq!(configuration.speed_up(), 1.0);
+        configuration.arm.coulomb_friction_nm = [0.0, 0.05];
+        for (tick_hz, speed_up) in [(250.0, 1.0), (750.0, 1.5), (1000.0, 2.0), (4000.0, 2.0)] {
+            configuration.tick_hz = tick_hz;
+            assert!((configuration.speed_up() - speed_up).abs() < 1e-6);
+        }
+    }
 }

@@ -258,9 +258,11 @@ impl<L: Law> Stages<L> {
             converters,
             settings,
         } = configuration;
+        let speed_up = configuration.speed_up();
         Self {
             estimators: Estimators::new(&EstimateSettings {
                 tick_hz: *tick_hz,
+                speed_up,
                 encoders: converters.encoders,
                 force: converters.force,
                 link_length_m: arm.link_length_m[0],
@@ -277,11 +279,11 @@ impl<L: Law> Stages<L> {
                 &settings.reference,
                 &settings.governor,
                 *tick_hz,
-                configuration.tip_count_m(),
+                &configuration.joint_errors(),
                 settings.recovery.minimum_p_ratio,
             ),
             demand: TorqueDemand::new(
-                settings.law.clone(),
+                settings.law.sped_up(speed_up),
                 &settings.recovery,
                 configuration.tick_s(),
                 settings.torque_limit_nm,

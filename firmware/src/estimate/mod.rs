@@ -101,6 +101,8 @@ pub struct Readings<'a> {
 pub struct EstimateSettings<'a> {
     /// Control rate, Hz.
     pub tick_hz: f32,
+    /// Factor by which the tracking loops are faster than their settings.
+    pub speed_up: f32,
     /// Scalings of the encoders of θ1 and of θ2 − θ1.
     pub encoders: [EncoderScale; 2],
     /// Scaling of the force cell.
@@ -185,7 +187,14 @@ impl Estimators {
         Self {
             force_scale: settings.force,
             tick_s,
-            joints: JointEstimator::new(settings.joints, settings.encoders, settings.tick_hz),
+            joints: JointEstimator::new(
+                &JointEstimatorSettings {
+                    bandwidth_rad_s: settings.speed_up * settings.joints.bandwidth_rad_s,
+                    ..*settings.joints
+                },
+                settings.encoders,
+                settings.tick_hz,
+            ),
             contact: ContactDetector::new(settings.contact),
             friction: FrictionEstimator::new(
                 settings.friction,

@@ -68,6 +68,14 @@ pub trait Law: Clone + Debug + Default + SettingValue {
         true
     }
 
+    /// Returns the law with motion loops that are faster by a factor, for joints with friction. A law without
+    /// such loops stays as it is.
+    #[must_use]
+    fn sped_up(&self, factor: f32) -> Self {
+        let _ = factor;
+        self.clone()
+    }
+
     /// Returns the state before the law's first tick. A law on a PC may allocate it here, once:
     /// the ticks must not.
     fn initial_state(&self) -> Self::State {
@@ -150,6 +158,13 @@ macro_rules! law_set {
                 match self {
                     Self::Off => $crate::law::Law::is_on(&$crate::law::off::Off {}),
                     $(Self::$law(law) => $crate::law::Law::is_on(law),)*
+                }
+            }
+
+            fn sped_up(&self, factor: f32) -> Self {
+                match self {
+                    Self::Off => Self::Off,
+                    $(Self::$law(law) => Self::$law($crate::law::Law::sped_up(law, factor)),)*
                 }
             }
 

@@ -9,7 +9,7 @@ pub mod reference;
 use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, Posture};
 
-use self::governor::{EdgeGovernor, GovernorSettings, GovernorState, LeastPRatio};
+use self::governor::{EdgeGovernor, GovernorSettings, GovernorState, JointErrors, LeastPRatio};
 use self::reference::{Program, ReferenceGenerator, ReferenceState, TipReference};
 use crate::estimate::ContactEstimate;
 use crate::estimate::friction::FrictionEstimate;
@@ -82,18 +82,17 @@ pub struct ReferencesState {
 }
 
 impl References {
-    /// Makes the references with these settings at this control rate. `tip_count_m` is the distance by
-    /// which one encoder count moves the tip; `landing_p_ratio` is the least p, as a fraction of Q22, at
+    /// Makes the references with these settings at this control rate. `landing_p_ratio` is the least p, as a fraction of Q22, at
     /// which a recovered tip may land.
     pub fn new(
         program: &Program,
         governor: &GovernorSettings,
         tick_hz: f32,
-        tip_count_m: f32,
+        joints: &JointErrors,
         landing_p_ratio: f32,
     ) -> Self {
         Self {
-            governor: EdgeGovernor::new(governor, 1.0 / tick_hz, tip_count_m),
+            governor: EdgeGovernor::new(governor, 1.0 / tick_hz, joints),
             landing_p_ratio,
             generator: ReferenceGenerator::new(program, tick_hz),
         }

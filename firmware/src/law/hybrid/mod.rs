@@ -116,6 +116,17 @@ impl Default for HybridState {
 impl Law for HybridSettings {
     type State = HybridState;
 
+    fn sped_up(&self, factor: f32) -> Self {
+        let square = factor * factor;
+        Self {
+            position_gain_per_s2: square * self.position_gain_per_s2,
+            velocity_gain_per_s: factor * self.velocity_gain_per_s,
+            position_integral_gain_per_s3: factor * square * self.position_integral_gain_per_s3,
+            force_drift_rad_s: factor * self.force_drift_rad_s,
+            ..*self
+        }
+    }
+
     /// Resets the integrals and starts from the present contact force.
     fn reset(&self, state: &mut HybridState, input: &LawInput<'_>) {
         let force_n = input.force_n.y.at_least(0.0);
@@ -338,6 +349,24 @@ mod tests {
             prop_assert!((normal - 10.0).abs() < 0.02, "f_n = {}", normal);
             prop_assert!((acceleration.x - (0.7 + 3000.0 * 0.001)).abs() < 0.05, "{}", acceleration);
         }
+    }
+
+    #[test]
+    fn a_law_twice_as_fast_has_poles_twice_as_far_out() {
+        let law = HybridSettings::default();
+        let faster = law.sped_up(2.0);
+        // x³ + K'_D x² + K'_P x + K_I at −s, and at −2 s.
+        let polynomial = |law: &HybridSettings, rate: f32| {
+            ((law.velocity_gain_per_s - rate) * rate - law.position_gain_per_s2) * rate
+                + law.position_integral_gain_per_s3
+        };
+        for rate in [8.0, 20.0, 55.0] {
+            assert_eq!(
+                polynomial(&faster, 2.0 * rate),
+                8.0 * polynomial(&law, rate)
+            );
+        }
+        assert_eq!(law.sped_up(1.0), law);
     }
 
     #[test]

@@ -47,7 +47,7 @@ settings! {
         position_integral_limit_m_s2: f32 = 200.0, 0.0..=1e6, "m/s²";
         /// Rate at which the law learns the acceleration of the tip along the belt by contact forces other
         /// than those fed forward, which it cancels; 0 for never. Not in the paper.
-        force_drift_rad_s: f32 = 150.0, 0.0..=1e4, "rad/s";
+        force_drift_rad_s: f32 = 300.0, 0.0..=1e4, "rad/s";
         /// Time constant with which the wanted force approaches f_n* after landing; 0 for at once,
         /// as in the paper.
         force_time_constant_s: f32 = 0.02, 0.0..=10.0, "s";

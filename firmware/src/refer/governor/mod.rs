@@ -43,15 +43,31 @@ pub struct LeastPRatio {
     pub contact: f32,
 }
 
+/// What makes the joints' motion uncertain.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointErrors {
+    /// Distance by which a count of the coarser encoder moves the tip along the belt, m.
+    pub count_m: f32,
+    /// Larger Coulomb friction of the joints, N·m.
+    pub friction_nm: f32,
+    /// Play of the gears, rad.
+    pub play_rad: f32,
+}
+
 /// The governor's settings for one arm and rate.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeGovernor {
-    settings: GovernorSettings,
+    enabled: bool,
+    friction_deviations: f32,
+    braking_m_s2: f32,
+    catch_up_m_s: f32,
     tick_s: f32,
     /// Least p as a fraction of Q22, at this control rate.
     least_p_ratio: f32,
     /// Distance kept from the point where p has that value, with these encoders, m.
     distance_m: f32,
+    /// Distance kept from the point where p is zero, because of the joints' friction and play, m.
+    clearance_m: f32,
 }
 
 /// The edges that an [`EdgeGovernor`] has found, and the reference it follows.
@@ -61,6 +77,8 @@ pub struct GovernorState {
     lower_m: f32,
     upper_m: f32,
     search: Option<Search>,
+    /// Edge for the least p/Q22 while the search goes on to the point where p is zero, m.
+    near_m: f32,
     /// Least ratio p/Q22 that the present search requires beyond the setting.
     asked_p_ratio: f32,
     /// Whether both edges have been found since that requirement was set.
@@ -81,6 +99,7 @@ impl GovernorState {
             lower_m: -USABLE_REACH * reach_m,
             upper_m: USABLE_REACH * reach_m,
             search: None,
+            near_m: 0.0,
             asked_p_ratio: 0.0,
             is_fresh: false,
             position_m: 0.0,
@@ -114,16 +133,21 @@ impl GovernorState {
 }
 
 impl EdgeGovernor {
-    /// Makes a governor that is called every `tick_s`, for encoders whose count moves the tip by
-    /// `count_m`.
-    pub fn new(settings: &GovernorSettings, tick_s: f32, count_m: f32) -> Self {
+    /// Makes a governor that is called every `tick_s`, for these joints.
+    pub fn new(settings: &GovernorSettings, tick_s: f32, joints: &JointErrors) -> Self {
         Self {
-            settings: *settings,
+            enabled: settings.enabled,
+            friction_deviations: settings.friction_deviations,
+            braking_m_s2: settings.braking_m_s2,
+            catch_up_m_s: settings.catch_up_m_s,
             tick_s,
             least_p_ratio: settings
                 .minimum_p_ratio
                 .at_least(settings.p_ratio_per_s2 * tick_s * tick_s),
-            distance_m: settings.distance_m + settings.distance_counts * count_m,
+            distance_m: settings.distance_m + settings.distance_counts * joints.count_m,
+            clearance_m: (settings.clearance_m_nm * joints.friction_nm
+                + settings.clearance_m_rad * joints.play_rad)
+                .at_most(settings.clearance_limit_m),
         }
     }
 
@@ -143,50 +167,67 @@ impl EdgeGovernor {
             state.search = None;
             state.is_fresh = false;
         }
-        let margin = self.settings.friction_deviations * friction.deviation;
+        let mut search = state.search.unwrap_or(Search::start(1.0, tip_t_m));
+        let margin = self.friction_deviations * friction.deviation;
         let admissibility = Admissibility {
             arm,
             posture,
             friction: friction.coefficient + margin,
             slip: friction.slip_seen.then_some(friction.slip),
-            minimum_p_ratio: self
-                .least_p_ratio
-                .at_least(least.landing)
-                .at_least(least.contact),
+            minimum_p_ratio: if search.is_beyond {
+                0.0
+            } else {
+                self.least_p_ratio
+                    .at_least(least.landing)
+                    .at_least(least.contact)
+            },
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
-        let mut search = state.search.unwrap_or(Search::start(1.0, tip_t_m));
         let points = if state.is_fresh { 1 } else { POINTS_IN_A_HURRY };
         for _ in 0..points {
             let point = search.point(step, reach);
             search = search.next(point, admissibility.at(point), reach);
-            if search.is_over() {
-                let edge = search.inside_m - search.direction * self.distance_m;
-                if search.direction > 0.0 {
-                    state.upper_m = edge;
-                    search = Search::start(-1.0, tip_t_m);
-                } else {
-                    // A stretch shorter than both margins shrinks to a point.
-                    state.lower_m = edge.at_most(state.upper_m);
-                    state.is_fresh = true;
-                    search = Search::start(1.0, tip_t_m);
-                }
-            }
+        }
+        if search.is_over() {
+            search = self.settle(state, search, tip_t_m);
         }
         state.search = Some(search);
     }
 
+    /// Takes over the edge that a search has found, with the distances kept from it; returns the next search.
+    fn settle(&self, state: &mut GovernorState, search: Search, tip_t_m: f32) -> Search {
+        let direction = search.direction;
+        let edge_m = if search.is_beyond {
+            let clear_m = search.inside_m - direction * self.clearance_m;
+            direction * (direction * clear_m).at_most(direction * state.near_m)
+        } else {
+            search.inside_m - direction * self.distance_m
+        };
+        if self.clearance_m > 0.0 && !search.is_beyond {
+            state.near_m = edge_m;
+            return search.beyond();
+        }
+        if direction > 0.0 {
+            state.upper_m = edge_m;
+        } else {
+            // A stretch shorter than both margins shrinks to a point.
+            state.lower_m = edge_m.at_most(state.upper_m);
+            state.is_fresh = true;
+        }
+        Search::start(-direction, tip_t_m)
+    }
+
     /// Returns the reference to follow instead of `wanted`, one tick after the last one.
     pub fn govern(&self, state: &mut GovernorState, wanted: &TipReference) -> TipReference {
-        let (settings, tick_s) = (&self.settings, self.tick_s);
-        if !settings.enabled {
+        let tick_s = self.tick_s;
+        if !self.enabled {
             return *wanted;
         }
         let (lower, upper) = (state.lower_m, state.upper_m);
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
-        let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / settings.braking_m_s2;
+        let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / self.braking_m_s2;
         let jumps = (wanted.position_m - state.position_m).abs() > JUMP_M;
         state.at_edge = outside(wanted.position_m);
         state.follows = !outside(stop_m)
@@ -203,20 +244,20 @@ impl EdgeGovernor {
         }
         // The highest speed from which the reference still stops within a distance.
         let stopping_speed = |distance: f32| {
-            (2.0 * settings.braking_m_s2 * distance)
+            (2.0 * self.braking_m_s2 * distance)
                 .square_root()
                 .at_most(APPROACH_PER_S * distance)
         };
         let target = wanted.position_m.limited(lower, upper);
         let away = target - state.position_m;
-        let approach = stopping_speed(away.abs()).at_most(settings.catch_up_m_s);
+        let approach = stopping_speed(away.abs()).at_most(self.catch_up_m_s);
         let moves_along = if state.at_edge { 0.0 } else { speed };
         let velocity = (moves_along + approach.copysign(away)).limited(
             -stopping_speed((state.position_m - lower).at_least(0.0)),
             stopping_speed((upper - state.position_m).at_least(0.0)),
         );
         // Beyond an edge that has moved inwards, the limit above only forbids going further out.
-        let step = 2.0 * settings.braking_m_s2 * tick_s;
+        let step = 2.0 * self.braking_m_s2 * tick_s;
         let change = (velocity - state.velocity_m_s).within(step);
         let velocity = state.velocity_m_s + change;
         let acceleration = change / tick_s;
@@ -262,7 +303,7 @@ mod tests {
             distance_counts: 0.0,
             ..Default::default()
         };
-        EdgeGovernor::new(&settings, TICK_S, 0.0)
+        EdgeGovernor::new(&settings, TICK_S, &JointErrors::default())
     }
 
     fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> GovernorState {
@@ -288,6 +329,44 @@ mod tests {
             assert!((upper - edge).abs() < 2e-5, "{posture:?}: {upper}");
             assert!(lower < -0.183, "{posture:?}: {lower}");
         }
+    }
+
+    #[test]
+    fn joints_with_friction_or_play_keep_their_distance_from_where_p_is_zero() {
+        let friction = known(0.6, Slip::Positive);
+        let edge_m = |joints: JointErrors, contact: f32| {
+            let settings = GovernorSettings::default();
+            let governor = EdgeGovernor::new(&settings, TICK_S, &joints);
+            let mut state = GovernorState::new(arm().reach_on_belt_m());
+            let least = LeastPRatio {
+                contact,
+                ..Default::default()
+            };
+            for _ in 0..300 {
+                let posture = Posture::ElbowDown;
+                governor.search(&mut state, &arm(), posture, -0.1, &friction, least);
+            }
+            state.edges_m().1
+        };
+        let ideal = JointErrors::default();
+        let rough = JointErrors {
+            friction_nm: 0.05,
+            play_rad: 1e-3,
+            ..ideal
+        };
+        // p is zero at 0.16471 m; 0.05 N·m and 1 mrad keep 6.8 mm.
+        for contact in [0.0, 0.05] {
+            let edge = edge_m(rough, contact);
+            assert!((edge - (0.164_71 - 0.0068)).abs() < 3e-5, "{edge}");
+        }
+        // The least p/Q22 applies as well, as without friction.
+        assert_eq!(edge_m(rough, 0.8), edge_m(ideal, 0.8));
+        let stiff = JointErrors {
+            friction_nm: 1.0,
+            ..ideal
+        };
+        let edge = edge_m(stiff, 0.0);
+        assert!((edge - (0.164_71 - 0.009)).abs() < 3e-5, "{edge}");
     }
 
     #[test]

@@ -58,6 +58,8 @@ pub(super) struct Search {
     pub(super) direction: f32,
     /// Last point on the tip's side of the edge, m.
     pub(super) inside_m: f32,
+    /// Whether it looks for the point where p is zero, after that with the least p/Q22.
+    pub(super) is_beyond: bool,
     stage: Stage,
 }
 
@@ -68,7 +70,17 @@ impl Search {
         Self {
             direction,
             inside_m: tip_t_m,
+            is_beyond: false,
             stage: Stage::Entering { refused: 0 },
+        }
+    }
+
+    /// Goes on from the point with the least p/Q22, which has been found, to that where p is zero.
+    pub(super) fn beyond(self) -> Self {
+        Self {
+            is_beyond: true,
+            stage: Stage::Marching,
+            ..self
         }
     }
 

@@ -20,6 +20,12 @@ settings! {
         /// Number of encoder counts, as seen at the tip, added to that distance: rounding moves the
         /// tip by as much.
         distance_counts: f32 = 3.0, 0.0..=1e3, "counts";
+        /// Distance kept from the point where p is zero, for each N·m of the joints' known friction.
+        clearance_m_nm: f32 = 0.085, 0.0..=10.0, "m/(N·m)";
+        /// Distance kept from that point in addition, for each rad of the gears' known play.
+        clearance_m_rad: f32 = 2.55, 0.0..=100.0, "m/rad";
+        /// Largest such distance.
+        clearance_limit_m: f32 = 9e-3, 0.0..=0.1, "m";
         /// Deceleration at which the reference stops before an edge.
         braking_m_s2: f32 = 1.0, 1e-3..=1e3, "m/s²";
         /// Largest speed of the approach to a reference that is away from the tip.
