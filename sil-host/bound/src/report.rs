@@ -200,7 +200,7 @@ impl Bound {
         let _ = writeln!(text, "{around:>7}  entry to and exit from the interrupt");
         let _ = write!(
             text,
-            "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz.\n\
+            "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz, with {} instructions on the worst path.\n\
              Interrupts that read the sensors for the next tick: {} cycles, {:.1} µs in a tick, {:.1} µs each at most.\n\
              Together they prove control rates up to {} Hz.\n\
              With two sensors on each channel: {} cycles, {:.1} µs in a tick, and up to {} Hz.\n\
@@ -209,6 +209,7 @@ impl Bound {
             self.cycles,
             self.microseconds,
             CORE_HZ / 1e6,
+            self.instructions,
             self.sensor_cycles,
             f64::from(self.sensor_cycles) / CORE_HZ * 1e6,
             f64::from(self.longest_sensor_cycles) / CORE_HZ * 1e6,

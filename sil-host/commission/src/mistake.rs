@@ -99,7 +99,9 @@ pub enum Mistake {
         joint: usize,
     },
     /// The encoders are exchanged.
-    #[error("encoders: exchanged with each other; swap their select lines (PB6, PB7)")]
+    #[error(
+        "encoders: exchanged with each other; swap their select lines (PB6 and PB7, or PB10 and PB11 of second encoders)"
+    )]
     EncodersSwapped,
     /// An encoder turns by another angle than its joint.
     #[error(
