@@ -9,6 +9,9 @@ use painleve_shared::{OutOfRange, Real, Slip, check_setting, settings};
 
 use crate::estimate::friction::FrictionEstimate;
 
+/// Error of the tip velocities that are bounds of the belt's speed, m/s.
+const BOUND_ERROR_M_S: f32 = 0.01;
+
 settings! {
     /// Settings of the belt-speed estimator.
     #[derive(Copy)]
@@ -99,6 +102,14 @@ impl BeltEstimator {
             .map_or(known, |speed| (speed, speed))
     }
 
+    /// Returns whether the bounds allow a belt as fast as a tip with this velocity (m/s), which is then in
+    /// stick.
+    pub fn may_stick(&self, state: &BeltState, tip_velocity_m_s: f32) -> bool {
+        let (slowest_m_s, fastest_m_s) = self.bounds_m_s(state);
+        tip_velocity_m_s > slowest_m_s - BOUND_ERROR_M_S
+            && tip_velocity_m_s < fastest_m_s + BOUND_ERROR_M_S
+    }
+
     /// Returns the direction of slip of a tip with this velocity (m/s); `None` where the bounds do
     /// not decide it.
     pub fn slip(&self, state: &BeltState, tip_velocity_m_s: f32) -> Option<Slip> {
@@ -140,6 +151,21 @@ mod tests {
         let (slowest, fastest) = belt.bounds_m_s(&state);
         assert!((slowest + 0.3).abs() < 1e-6 && (fastest - 0.102).abs() < 1e-3);
         assert_eq!(belt.slip(&state, -0.4), Some(Slip::Negative));
+    }
+
+    #[test]
+    fn a_tip_as_fast_as_one_that_slid_lately_does_not_stick() {
+        let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
+        let mut state = BeltState::default();
+        assert!(belt.may_stick(&state, 0.0));
+        belt.update(&mut state, 0.1, Some(&friction(Slip::Negative, false)));
+        assert!(!belt.may_stick(&state, 0.05) && belt.may_stick(&state, 0.095));
+        assert!(belt.may_stick(&state, 0.4));
+        // The belt may have slowed down meanwhile.
+        for _ in 0..50 {
+            belt.update(&mut state, 0.0, None);
+        }
+        assert!(belt.may_stick(&state, 0.05));
     }
 
     #[test]

@@ -6,7 +6,8 @@
 //!
 //! Readings without information about μ are skipped: in the air, at a small normal force, and in
 //! stick, where friction takes any value up to μ f_n in either direction. Stick is detected by a
-//! ratio well below the estimate; if the ratio stays there, μ has changed and the filter restarts.
+//! ratio well below the estimate while the belt drags the tip along; otherwise, or if the ratio stays
+//! there, μ has changed and the filter restarts.
 //! The estimated direction of slip reverses only on a friction force near the opposite side of the
 //! cone, because in stick the sign of the force carries no information.
 
@@ -167,7 +168,8 @@ impl FrictionEstimator {
         self.settings.first_deviation * self.settings.first_deviation
     }
 
-    /// Updates the estimate with one reading (f_t, f_n), N, of a tip in contact.
+    /// Updates the estimate with one reading (f_t, f_n), N, of a tip in contact; `dragged` states whether its
+    /// motion allows stick.
     #[inline]
     pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>, dragged: bool) {
         let first_variance = self.first_variance();
@@ -186,7 +188,7 @@ impl FrictionEstimator {
         let innovation = ratio - state.coefficient;
         let gate = STICK_DEVIATIONS * (state.variance + ratio_variance).square_root()
             + STICK_FRACTION * state.coefficient;
-        if innovation < -gate && (dragged || state.stick_ticks > 0) {
+        if innovation < -gate && dragged {
             state.sticking_s += self.tick_s;
             if state.sticking_s < self.settings.stick_limit_s {
                 state.stick_ticks = STICK_TICKS;
@@ -407,6 +409,19 @@ mod tests {
         let mut tested = Tested::new(0.6);
         slide(&mut tested, 0.6, Slip::Positive, 2000);
         slide(&mut tested, 0.4, Slip::Positive, 5);
+        assert!(!tested.estimate().sticks);
+        assert!((tested.estimate().coefficient - 0.4).abs() < 0.02);
+    }
+
+    #[test]
+    fn less_friction_is_learnt_as_soon_as_the_belt_no_longer_drags_the_tip() {
+        let mut tested = Tested::new(0.6);
+        slide(&mut tested, 0.6, Slip::Positive, 2000);
+        tested.2 = true;
+        slide(&mut tested, 0.4, Slip::Positive, 1);
+        assert!(tested.estimate().sticks);
+        tested.2 = false;
+        slide(&mut tested, 0.4, Slip::Positive, 3);
         assert!(!tested.estimate().sticks);
         assert!((tested.estimate().coefficient - 0.4).abs() < 0.02);
     }

@@ -297,7 +297,8 @@ impl Estimators {
             if force_in_range {
                 let slip = state.friction.slip().sign::<f32>();
                 let lag_m_s = last.reference_velocity_m_s - tip_velocity_m_s;
-                let dragged = slip * lag_m_s > DRAGGED_M_S;
+                let dragged = slip * lag_m_s > DRAGGED_M_S
+                    && self.belt.may_stick(&state.belt, tip_velocity_m_s);
                 self.friction.update(&mut state.friction, &force_n, dragged);
             }
         } else if touched {
