@@ -42,9 +42,9 @@ settings! {
         /// sign. Their tare is not needed: the difference of the channels is measured while the drive is off.
         second_force_reversed: [bool; 2] = [false; 2];
         /// Largest difference of two encoders of one joint by their noise, in counts of 14 bits. The default is
-        /// five standard deviations of the difference with the largest noise in the data sheet of the AS5048A,
-        /// 0.06° rms each.
-        second_encoder_tolerance: u16 = 19, 4..=400, "counts";
+        /// six standard deviations of the difference with the largest noise in the data sheet of the AS5048A,
+        /// 0.06° rms each: beyond it once in some 70 hours at 1 kHz.
+        second_encoder_tolerance: u16 = 23, 4..=400, "counts";
         /// Largest difference of two readings of one force by their noise, in counts of 12 bits.
         second_force_tolerance: u16 = 16, 4..=400, "counts";
     }

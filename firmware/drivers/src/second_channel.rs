@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     const TOLERANCE: Tolerance = Tolerance {
-        noise: 19,
+        noise: 23,
         range: 146,
     };
 
@@ -145,7 +145,7 @@ mod tests {
             // The readings before were themselves apart by their noise and by what had not been followed yet.
             let travel = speed.abs() * f64::from(tick);
             assert!(
-                travel < 2.0 * 19.0 + 2.0 * speed.abs() + 2.0,
+                travel < 2.0 * 23.0 + 2.0 * speed.abs() + 2.0,
                 "{speed} {travel}"
             );
         }
@@ -161,7 +161,7 @@ mod tests {
             tick += 1;
             let angle = tick / 10;
             is_confirmed = confirms(&mut channel, first + noise(tick), second + angle, true);
-            assert!(angle < 2 * 19 + 146);
+            assert!(angle < 2 * 23 + 146);
         }
     }
 
