@@ -16,16 +16,12 @@ pub struct BoardPackage {
     pub images: Vec<String>,
     /// The chip, as probe-rs names it; `None` for a board that cannot be flashed.
     pub chip: Option<String>,
-    /// Largest flash use of an image for code and constants, bytes.
-    pub flash_bytes: u64,
-    /// Largest static RAM use of an image, bytes.
-    pub ram_bytes: u64,
 }
 
 /// Returns all boards, sorted by folder name.
 ///
 /// # Errors
-/// If cargo cannot read the workspace, or a board's description is incomplete.
+/// If cargo cannot read the workspace.
 pub fn all() -> Result<Vec<BoardPackage>, ChoreError> {
     let packages = packages(&workspace().join("Cargo.toml"))?;
     let mut boards: Vec<_> = packages
@@ -33,7 +29,7 @@ pub fn all() -> Result<Vec<BoardPackage>, ChoreError> {
         .filter(|package| package["metadata"]["board"].is_object())
         .collect();
     boards.sort_by_key(|package| package["manifest_path"].as_str());
-    boards.into_iter().map(board).collect()
+    Ok(boards.into_iter().map(board).collect())
 }
 
 /// Returns the packages of the workspace with this manifest, as described by `cargo metadata`.
@@ -58,17 +54,10 @@ pub fn packages(manifest: &Path) -> Result<Vec<Value>, ChoreError> {
     }
 }
 
-fn board(package: &Value) -> Result<BoardPackage, ChoreError> {
-    let described = &package["metadata"]["board"];
-    let bytes = |key: &str| {
-        described[key].as_u64().ok_or_else(|| {
-            let path = &package["manifest_path"];
-            ChoreError(format!("{path}: [package.metadata.board] lacks {key}"))
-        })
-    };
+fn board(package: &Value) -> BoardPackage {
     let is_image = |target: &&Value| target["kind"] == serde_json::json!(["bin"]);
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-    Ok(BoardPackage {
+    BoardPackage {
         package: text(&package["name"]),
         images: package["targets"]
             .as_array()
@@ -77,8 +66,8 @@ fn board(package: &Value) -> Result<BoardPackage, ChoreError> {
             .filter(is_image)
             .map(|target| text(&target["name"]))
             .collect(),
-        chip: described["chip"].as_str().map(str::to_owned),
-        flash_bytes: bytes("flash_bytes")?,
-        ram_bytes: bytes("ram_bytes")?,
-    })
+        chip: package["metadata"]["board"]["chip"]
+            .as_str()
+            .map(str::to_owned),
+    }
 }

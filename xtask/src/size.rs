@@ -10,7 +10,7 @@ use crate::boards;
 use crate::build_fw;
 use crate::command::{ChoreError, run_cargo, say, workspace};
 
-/// Further limits, which the end-to-end tests check as well.
+/// All limits; the end-to-end tests check those of the ticks and of the stack as well.
 const BUDGET: &str = include_str!("../../tests/budget.json");
 
 /// The page that prints these figures.
@@ -36,19 +36,17 @@ pub fn run() -> Result<(), ChoreError> {
     build_fw::run()?;
     run_cargo(&["build", "--release", "--package", "painleve-command"])?;
     let mut over = Vec::new();
+    let budget = Budget::read()?;
     let boards = boards::all()?;
-    let images = boards
-        .iter()
-        .flat_map(|board| board.images.iter().map(move |name| (board, name)));
-    for (board, name) in images {
+    for name in boards.iter().flat_map(|board| &board.images) {
         let path = build_fw::image(name);
         let error = |reason: String| ChoreError(format!("{}: {reason}", path.display()));
         let bytes = std::fs::read(&path).map_err(|cause| error(cause.to_string()))?;
         let image = object::File::parse(&*bytes).map_err(|cause| error(cause.to_string()))?;
         say(name)?;
         for (what, size, limit) in [
-            ("flash", flash_bytes(&image), board.flash_bytes),
-            ("static RAM", ram_bytes(&image), board.ram_bytes),
+            ("flash", flash_bytes(&image), budget.image(name, "flash_bytes")?),
+            ("static RAM", ram_bytes(&image), budget.image(name, "ram_bytes")?),
         ] {
             over.extend(check(name, what, size, limit)?);
             for (_, chip) in PRINTED_IMAGES.iter().filter(|(image, _)| name == image) {
@@ -64,11 +62,7 @@ pub fn run() -> Result<(), ChoreError> {
         }
     }
     say("painleve-qemu, maximum over all built-in scenarios")?;
-    let budget: Value = serde_json::from_str(BUDGET)
-        .map_err(|cause| ChoreError(format!("tests/budget.json: {cause}")))?;
-    let stack_limit = budget["stack_bytes"]
-        .as_u64()
-        .ok_or_else(|| ChoreError("tests/budget.json has no limit for the stack".into()))?;
+    let stack_limit = budget.limit(&["stack_bytes"])?;
     let stack = stack_bytes()?;
     over.extend(check("painleve-qemu", "stack", stack, stack_limit)?);
     over.extend(misprinted("stack", "", stack, stack_limit));
@@ -76,6 +70,31 @@ pub fn run() -> Result<(), ChoreError> {
         Ok(())
     } else {
         Err(ChoreError(over.join("; ")))
+    }
+}
+
+/// The limits of `tests/budget.json`.
+struct Budget(Value);
+
+impl Budget {
+    fn read() -> Result<Self, ChoreError> {
+        serde_json::from_str(BUDGET)
+            .map(Self)
+            .map_err(|cause| ChoreError(format!("tests/budget.json: {cause}")))
+    }
+
+    /// Returns a limit of an image, in bytes.
+    fn image(&self, name: &str, what: &str) -> Result<u64, ChoreError> {
+        self.limit(&["images", name, what])
+    }
+
+    /// Returns the limit under these nested keys.
+    fn limit(&self, keys: &[&str]) -> Result<u64, ChoreError> {
+        let value = keys.iter().fold(&self.0, |value, key| &value[key]);
+        value.as_u64().ok_or_else(|| {
+            let keys = keys.join(".");
+            ChoreError(format!("tests/budget.json has no limit {keys}"))
+        })
     }
 }
 
