@@ -45,8 +45,16 @@ pub fn run() -> Result<(), ChoreError> {
         let image = object::File::parse(&*bytes).map_err(|cause| error(cause.to_string()))?;
         say(name)?;
         for (what, size, limit) in [
-            ("flash", flash_bytes(&image), budget.image(name, "flash_bytes")?),
-            ("static RAM", ram_bytes(&image), budget.image(name, "ram_bytes")?),
+            (
+                "flash",
+                flash_bytes(&image),
+                budget.image(name, "flash_bytes")?,
+            ),
+            (
+                "static RAM",
+                ram_bytes(&image),
+                budget.image(name, "ram_bytes")?,
+            ),
         ] {
             over.extend(check(name, what, size, limit)?);
             for (_, chip) in PRINTED_IMAGES.iter().filter(|(image, _)| name == image) {

@@ -16,6 +16,7 @@ use painleve_record::mcap_log::Source;
 use painleve_record::{McapLog, Recorder};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
+use painleve_shared::mounting::SensorParts;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 use serde::Serialize;
@@ -163,6 +164,7 @@ impl Drive {
             FrameSource::Sensors
         };
         let arm = ConnectedArm::open(&arguments.port, &configuration, source)?;
+        warn_of_single_sensors(scenario);
         for line in history::lines(&arm.black_box) {
             warn(line);
         }
@@ -267,6 +269,17 @@ impl Drive {
         }
         self.view.show(&sample);
         Ok(())
+    }
+}
+
+/// Tells the operator of an arm with one sensor on each channel what the board cannot detect within two ticks.
+fn warn_of_single_sensors(scenario: &Scenario) {
+    if scenario.converters.mounting.sensors != SensorParts::Both {
+        warn(
+            "one sensor on each channel: the board detects a frozen encoder or a stuck force cell only after up to a second, \
+             in which the arm moves on; two sensors on each channel take the torque off within two ticks of a wrong \
+             reading (converters.mounting.sensors = \"both\")",
+        );
     }
 }
 

@@ -12,6 +12,7 @@ use crate::{CommandError, say};
 pub fn run(arguments: &DriveArguments, scenario: &Scenario) -> Result<(), CommandError> {
     let mut board = StoringBoard::open(&arguments.port)?;
     let stored = if arguments.store {
+        super::warn_of_single_sensors(scenario);
         board.store(&scenario.controller_configuration())?
     } else if arguments.forget {
         board.forget()?
