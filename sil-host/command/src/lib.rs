@@ -206,6 +206,7 @@ impl CommandError {
                 | StudyError::OffTheBelt { .. }
                 | StudyError::NothingAdmissible
                 | StudyError::Range(_)
+                | StudyError::LevelsOfSeveralEffects
                 | StudyError::TooManyRows(_) => 2,
             },
             Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,

@@ -93,6 +93,9 @@ pub enum StudyError {
         /// The option.
         option: String,
     },
+    /// Levels without exactly one effect whose levels they are.
+    #[error("--level needs exactly one effect other than none in --effect")]
+    LevelsOfSeveralEffects,
     /// A position is out of reach.
     #[error("z_t = {tip_t_m} m is out of reach")]
     OutOfReach {

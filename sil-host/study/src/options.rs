@@ -227,6 +227,14 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     positive(text, 1e-3, 1e6, "seconds")
 }
 
+/// A level of an effect on the command line. The range of its key is checked by the scenario.
+pub fn level(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(level) if level.is_finite() && level >= 0.0 => Ok(level),
+        _ => Err("a level must be a number of at least 0".into()),
+    }
+}
+
 /// A number of runs on the command line.
 pub fn runs(text: &str) -> Result<usize, String> {
     match text.parse() {

@@ -40,6 +40,8 @@ pub struct EffectsStudy {
     pub contacts: Vec<Contact>,
     /// The names of the effects; no effect at all comes first.
     pub effects: Vec<&'static str>,
+    /// Levels of the effects after the first, in place of their own; empty for their own.
+    pub levels: Vec<f64>,
     /// Seed of all runs.
     pub seed: u64,
     /// Runs of each cell.
@@ -103,8 +105,9 @@ impl EffectsStudy {
         for controller in &self.controllers {
             for &contact in &self.contacts {
                 for effect in self.effects.iter().filter_map(|name| find(name)) {
-                    let levels = effect.levels.iter().filter(|_| effect.acts_on(contact));
-                    cells.extend(levels.map(|&level| EffectCell {
+                    let levels = self.levels_of(effect).into_iter();
+                    let levels = levels.filter(|_| effect.acts_on(contact));
+                    cells.extend(levels.map(|level| EffectCell {
                         controller,
                         contact,
                         effect,
@@ -114,6 +117,16 @@ impl EffectsStudy {
             }
         }
         cells
+    }
+
+    /// Returns the levels of an effect, from harmless to harmful.
+    fn levels_of(&self, effect: &RigEffect) -> Vec<f64> {
+        if self.levels.is_empty() || effect.name == EFFECTS[0].name {
+            return effect.levels.to_vec();
+        }
+        let mut levels = self.levels.clone();
+        levels.sort_by(|one, other| effect.severity(*one).total_cmp(&effect.severity(*other)));
+        levels
     }
 
     /// Builds the first run of every cell, so that an invalid override is reported before any run starts.

@@ -6,7 +6,7 @@ use clap::builder::PossibleValuesParser;
 use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
 use crate::StudyError;
 use crate::catalogue::{InShards, StudyOptions, in_shards};
-use crate::options::{ControllerOptions, RandomRuns};
+use crate::options::{ControllerOptions, RandomRuns, level};
 use crate::register_study;
 
 /// Success against the level of each effect of a real rig, on rigid and on compliant contact.
@@ -32,6 +32,16 @@ pub struct Options {
         value_parser = PossibleValuesParser::new(EFFECTS.iter().map(|effect| effect.name)),
     )]
     effect: Vec<String>,
+    /// Levels of the one chosen effect, in its unit, in place of its own levels.
+    #[arg(
+        long,
+        value_name = "LEVELS",
+        value_delimiter = ',',
+        value_parser = level,
+        allow_negative_numbers = true,
+        requires = "effect"
+    )]
+    level: Vec<f64>,
     #[command(flatten)]
     runs: RandomRuns,
 }
@@ -58,10 +68,14 @@ impl StudyOptions for Options {
                     .filter(|name| *name != none),
             );
         }
+        if !self.level.is_empty() && effects.len() != 2 {
+            return Err(StudyError::LevelsOfSeveralEffects);
+        }
         let study = EffectsStudy {
             controllers: self.controllers.controller.clone(),
             contacts: self.contact.clone(),
             effects,
+            levels: self.level.clone(),
             seed: self.runs.seed,
             runs: self.runs.runs,
             overrides: self.runs.overrides(),

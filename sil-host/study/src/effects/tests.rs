@@ -10,6 +10,7 @@ fn study(effects: &[&'static str], runs: usize) -> EffectsStudy {
         controllers: vec![ControllerChoice::Hybrid],
         contacts: vec![Contact::Rigid, Contact::Compliant],
         effects: effects.to_vec(),
+        levels: Vec::new(),
         seed: 1,
         runs,
         overrides: Vec::new(),
@@ -57,6 +58,29 @@ fn names_are_unique_and_levels_go_from_harmless_to_harmful() {
             .collect();
         assert!(severities.is_sorted(), "{}", effect.name);
     }
+}
+
+#[test]
+fn chosen_levels_take_the_place_of_an_effects_own() {
+    let study = EffectsStudy {
+        levels: vec![3e3, 2e4],
+        ..study(&["none", "softer-contact"], 1)
+    };
+    study.check().unwrap();
+    let cells = study.cells();
+    let levels: Vec<_> = cells
+        .iter()
+        .map(|place| (place.effect.name, place.level))
+        .collect();
+    assert_eq!(
+        levels,
+        [
+            ("none", 0.0),
+            ("none", 0.0),
+            ("softer-contact", 2e4),
+            ("softer-contact", 3e3)
+        ]
+    );
 }
 
 #[test]

@@ -33,6 +33,15 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
         [0.05, 0.1, 0.2, 0.5], typical 0.1,
         overrides: Computed(|level, _| gear(500.0, level, "link"));
 
+    "backlash-known": "effects.gear.backlash_deg", "° at 500 N·m/rad, encoder on the link, known",
+        [0.05, 0.1, 0.2, 0.5], typical 0.1,
+        overrides: Computed(|level, _| {
+            let play_rad = level.to_radians();
+            let mut overrides = gear(500.0, level, "link");
+            overrides.extend(set!["controller.estimator.gear_play_rad={play_rad:?}"]);
+            overrides
+        });
+
     "backlash-motor-side": "effects.gear.backlash_deg", "° at 5000 N·m/rad, encoder on the motor",
         [0.01, 0.02, 0.05, 0.1], typical 0.05,
         overrides: Computed(|level, _| gear(5000.0, level, "motor"));
