@@ -84,6 +84,28 @@ fn chosen_levels_take_the_place_of_an_effects_own() {
 }
 
 #[test]
+fn everything_together_has_the_targets_of_its_patches_of_friction() {
+    let study = study(&["everything", "friction-patches"], 20);
+    let patches = find("friction-patches").unwrap();
+    let journey = |name, level, run| {
+        let place = EffectCell {
+            controller: &study.controllers[0],
+            contact: Contact::Compliant,
+            effect: find(name).unwrap(),
+            level,
+        };
+        let scenario = study.scenario(place, run).unwrap();
+        (scenario.initial, scenario.controller.reference)
+    };
+    for run in 0..study.runs {
+        for share in [0.25, 2.0] {
+            let of_patches = journey(patches.name, share * patches.typical, run);
+            assert_eq!(journey("everything", share, run), of_patches);
+        }
+    }
+}
+
+#[test]
 fn rows_do_not_depend_on_threads_and_more_effect_is_worse() {
     let study = study(&["none", "force-noise"], 2);
     let on = |threads| {

@@ -42,6 +42,7 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
     "everything": "all of the keys above but contact, model and faults", "of the typical levels",
         [0.25, 0.5, 1.0, 2.0], typical 1.0,
         compliant_only: true,
+        largest_friction: Some(largest_friction_of_everything),
         overrides: Computed(everything);
 };
 
@@ -74,6 +75,16 @@ fn encoder_fault(kind: &str, duration_s: f64, drawn: &Drawn) -> Vec<String> {
 /// A fault of the torque of either joint; see [`fault`].
 fn torque_fault(kind: &str, duration_s: f64, drawn: &Drawn) -> Vec<String> {
     fault(drawn.joint("torque_1", "torque_2"), kind, duration_s, drawn)
+}
+
+/// Largest friction coefficient with the patches of [`everything`].
+fn largest_friction_of_everything(share: f64, friction: f64) -> f64 {
+    find("friction-patches").map_or(friction, |patches| {
+        let largest = patches.largest_friction;
+        largest.map_or(friction, |largest| {
+            largest(share * patches.typical, friction)
+        })
+    })
 }
 
 /// Effects of a rig together, each at this share of its typical level.
