@@ -65,8 +65,11 @@ impl TorqueOutput {
         model: &Model,
         contact: &ContactEstimate,
     ) -> (JointTorque<f32>, bool) {
-        let slides = contact.touches && contact.friction.slip_seen && contact.p_per_kg > 0.0;
-        if !(self.guard.enabled && slides) {
+        let friction = &contact.friction;
+        let slides = contact.touches && friction.slip_seen && contact.p_per_kg > 0.0;
+        // The guard assumes a rigid contact, and would cut the impulse that a contact that gives has missed.
+        let catches_up = friction.catch_up != 0.0;
+        if !(self.guard.enabled && slides) || catches_up {
             return (*wanted_nm, false);
         }
         let (offset, normal) = model.free_normal_acceleration();
@@ -110,6 +113,10 @@ impl TorqueOutput {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::friction::FrictionEstimate;
+    use crate::estimate::response::ContactResponse;
+    use nalgebra::Vector2;
+    use painleve_shared::{Arm, ArmParameters, GeneralisedTorque, LinkMotion, Posture, Slip};
 
     fn stages() -> TorqueOutput {
         let scale = LinearScale {
@@ -129,6 +136,45 @@ mod tests {
             assert_eq!(stages().limit(&mut command, &wanted), Err(NotFinite));
             assert_eq!(command, LastCommand::default());
         }
+    }
+
+    #[test]
+    fn the_guard_presses_a_tip_that_slides_unless_the_law_catches_up() {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let theta_rad = arm
+            .link_angles_on_belt_rad(0.0, Posture::ElbowDown)
+            .unwrap();
+        let model = Model::new(
+            &arm,
+            theta_rad,
+            LinkMotion::zeros(),
+            &GeneralisedTorque::zeros(),
+        );
+        let mut contact = ContactEstimate {
+            touches: true,
+            lands: false,
+            in_flight: false,
+            confidence: 1.0,
+            force_n: Vector2::new(-6.0, 10.0),
+            friction: FrictionEstimate {
+                coefficient: 0.6,
+                next_coefficient: 0.6,
+                catch_up: 0.0,
+                deviation: 0.0,
+                slip: Slip::Positive,
+                slip_seen: true,
+                sticks: false,
+            },
+            p_per_kg: model.p_per_kg(0.6, Slip::Positive),
+            response: ContactResponse::rigid(1.0),
+        };
+        // A torque that lifts the tip.
+        let lifting = model.torque_against_nm(&Vector2::new(0.0, -10.0));
+        let (pressed, guarded) = stages().pressed(&lifting, &model, &contact);
+        assert!(guarded && pressed != lifting);
+        contact.friction.catch_up = -0.3;
+        let result = stages().pressed(&lifting, &model, &contact);
+        assert_eq!(result, (lifting, false));
     }
 
     #[test]

@@ -305,7 +305,7 @@ impl Estimators {
             self.explain_throw(&mut state.friction, model);
         }
 
-        let friction = state.friction.estimate();
+        let mut friction = state.friction.estimate();
         let sliding = contact.then_some(&friction);
         self.belt.update(&mut state.belt, tip_velocity_m_s, sliding);
         let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
@@ -332,6 +332,11 @@ impl Estimators {
             is_informative,
             completes_block,
         };
+        let response = self.response.response(&state.response, p_per_kg, p_ratio);
+        if !response.has_lagged {
+            // A rigid contact would follow the excess at once.
+            friction.catch_up = 0.0;
+        }
         let contact = ContactEstimate {
             touches: contact,
             lands: contact && !touched,
@@ -340,7 +345,7 @@ impl Estimators {
             force_n,
             friction,
             p_per_kg,
-            response: self.response.response(&state.response, p_per_kg, p_ratio),
+            response,
         };
         (contact, slow)
     }

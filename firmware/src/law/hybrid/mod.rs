@@ -35,6 +35,8 @@ const FRICTION_SLEW_PER_S: f32 = 1000.0;
 const TORQUE_USED: f32 = 0.95;
 /// Least fraction of the wanted contact force.
 const LEAST_PRESSING: f32 = 0.1;
+/// Rate at which the pressing recovers on a contact that gives, 1/s.
+const RECOVERY_PER_S: f32 = 10.0;
 
 /// Returns the fraction of `pressing_nm` that keeps both joints within ±`limit_nm` together with
 /// `motion_nm`.
@@ -154,7 +156,7 @@ impl Law for HybridSettings {
         let wanted = Vector2::new(friction_force, normal_force);
         let motion_nm = input.model.inverse_dynamics_in_air_nm(&acceleration);
         let pressing_nm = input.model.torque_against_nm(&wanted);
-        state.pressing = if self.reduce_force_when_torque_limited {
+        let share = if self.reduce_force_when_torque_limited {
             affordable(
                 &motion_nm,
                 &pressing_nm,
@@ -162,6 +164,13 @@ impl Law for HybridSettings {
             )
         } else {
             1.0
+        };
+        state.pressing = if input.response.has_lagged {
+            // A pressing that followed the torque left by the motion would drive the ringing of the contact.
+            let step = RECOVERY_PER_S * input.tick_s * (share - state.pressing);
+            share.at_most(state.pressing + step)
+        } else {
+            share
         };
         state.fed_force_n = wanted * state.pressing;
         LawOutput {
@@ -195,8 +204,7 @@ impl HybridSettings {
             state.force_drift_m_s2 = 0.0;
             return 0.0;
         }
-        // Where torque is short, the force is not the one that was fed forward.
-        if input.contact && !input.saturated && state.pressing >= 1.0 {
+        if input.contact && !input.saturated {
             let rest_n = input.force_n - state.fed_force_n;
             let model = input.model;
             let drift = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
@@ -264,12 +272,7 @@ impl HybridSettings {
                     friction.slip
                 };
                 let slip = friction.slip_seen.then_some(slip);
-                let catch_up = if input.response.has_lagged {
-                    friction.catch_up
-                } else {
-                    0.0
-                };
-                let coefficient = (friction.next_coefficient + catch_up).at_least(0.0);
+                let coefficient = (friction.next_coefficient + friction.catch_up).at_least(0.0);
                 let ratio = slip.map_or(0.0, |slip| -coefficient * slip.sign::<f32>());
                 if slip != state.slip {
                     state.filtered_friction_n = 0.0;
@@ -283,7 +286,7 @@ impl HybridSettings {
                 let expected = state.fed_ratio * normal_force_n;
                 let weight = (input.tick_s / (time_constant_s + input.tick_s))
                     .at_most(OBSERVER_SHARE * input.response.loop_share);
-                let rest = input.force_n.x - expected;
+                let rest = input.force_n.x - state.pressing * expected;
                 state.filtered_friction_n += weight * (rest - state.filtered_friction_n);
                 expected + state.filtered_friction_n
             }
@@ -369,44 +372,56 @@ mod tests {
         assert_eq!(law.sped_up(1.0), law);
     }
 
-    #[test]
-    fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
-        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+    const FRICTION: f32 = 0.6;
+
+    fn at_rest(arm: &Arm<f32>) -> Model {
         let theta_rad = arm
             .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
             .unwrap();
-        let model = Model::new(
-            &arm,
+        Model::new(
+            arm,
             theta_rad,
             painleve_shared::LinkMotion::zeros(),
             &GeneralisedTorque::zeros(),
-        );
-        let settings = HybridSettings::default();
-        let mut input = LawInput {
-            arm: &arm,
-            model: &model,
+        )
+    }
+
+    /// Returns the input of a tip that slides at its reference on a contact that gives.
+    fn sliding<'a>(arm: &'a Arm<f32>, model: &'a Model) -> LawInput<'a> {
+        LawInput {
+            arm,
+            model,
             posture: Posture::ElbowDown,
             friction: FrictionEstimate {
-                coefficient: 0.6,
-                next_coefficient: 0.6,
+                coefficient: FRICTION,
+                next_coefficient: FRICTION,
                 catch_up: 0.0,
                 deviation: 0.0,
                 slip: Slip::Positive,
                 slip_seen: true,
                 sticks: false,
             },
-            p_per_kg: model.p_per_kg(0.6, Slip::Positive),
+            p_per_kg: model.p_per_kg(FRICTION, Slip::Positive),
             response: ContactResponse {
                 lags: 1.0,
+                has_lagged: true,
                 ..ContactResponse::rigid(1.0)
             },
-            force_n: Vector2::new(-6.0, 10.0),
+            force_n: Vector2::new(-FRICTION * 10.0, 10.0),
             contact: true,
             saturated: false,
-            reference: TipReference::at_rest(0.1),
+            reference: TipReference::at_rest(model.tip_m.x),
             torque_limit_nm: 50.0,
             tick_s: 1e-3,
-        };
+        }
+    }
+
+    #[test]
+    fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let model = at_rest(&arm);
+        let settings = HybridSettings::default();
+        let mut input = sliding(&arm, &model);
         let mut state = HybridState::default();
         settings.reset(&mut state, &input);
         let rest_n = Vector2::new(-0.3, 0.5);
@@ -424,5 +439,53 @@ mod tests {
         input.saturated = true;
         input.force_n = Vector2::zeros();
         assert_eq!(settings.force_drift_m_s2(&mut state, &input), learnt);
+    }
+
+    #[test]
+    fn a_reduced_force_is_no_error_of_the_friction() {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let model = at_rest(&arm);
+        let settings = HybridSettings::default();
+        let mut input = sliding(&arm, &model);
+        let mut state = HybridState::default();
+        settings.reset(&mut state, &input);
+        state.filtered_friction_n = 0.0;
+        input.torque_limit_nm = 1.0;
+        for _ in 0..100 {
+            settings.tick(&mut state, &input);
+            // The contact follows the reduced force exactly.
+            let normal_n = state.fed_force_n.y;
+            input.force_n = Vector2::new(-FRICTION * normal_n, normal_n);
+        }
+        assert!(state.pressing < 0.9, "{state:?}");
+        let fed = -state.fed_force_n.x / state.fed_force_n.y;
+        assert!((fed - FRICTION).abs() < 1e-4, "{state:?}");
+        assert!(state.force_drift_m_s2.abs() < 1e-2, "{state:?}");
+    }
+
+    #[test]
+    fn the_force_falls_at_once_but_recovers_slowly_on_a_contact_that_gives() {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let model = at_rest(&arm);
+        let settings = HybridSettings::default();
+        let mut input = sliding(&arm, &model);
+        let mut state = HybridState::default();
+        settings.reset(&mut state, &input);
+        settings.tick(&mut state, &input);
+        assert_eq!(state.pressing, 1.0);
+        input.torque_limit_nm = 1.0;
+        settings.tick(&mut state, &input);
+        let reduced = state.pressing;
+        assert!(reduced < 0.9, "{reduced}");
+        input.torque_limit_nm = 50.0;
+        for _ in 0..10 {
+            settings.tick(&mut state, &input);
+        }
+        let share = (state.pressing - reduced) / (1.0 - reduced);
+        assert!((share - 0.1).abs() < 0.01, "{share}");
+        // A rigid contact does not ring.
+        input.response.has_lagged = false;
+        settings.tick(&mut state, &input);
+        assert_eq!(state.pressing, 1.0);
     }
 }
