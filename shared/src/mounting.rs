@@ -6,8 +6,9 @@ use crate::settings;
 settings! {
     /// The sensors that are read on each channel: both encoders, f_t and f_n.
     #[derive(Copy, Eq)]
-    pub enum SensorParts = First {
-        /// The first sensor of each channel; there may be no second one.
+    pub enum SensorParts = Both {
+        /// The first sensor of each channel; there may be no second one. A sensor that repeats a plausible
+        /// reading is then found only by the motion that it hides.
         "first" => First,
         /// The second sensor of each channel, in place of the first.
         "second" => Second,
@@ -35,7 +36,7 @@ settings! {
         /// Highest code that a working cell gives.
         force_highest_code: u16 = 4013, 3071..=4054, "counts";
         /// The sensors that are read on each channel.
-        sensors: SensorParts = SensorParts::First;
+        sensors: SensorParts = SensorParts::Both;
         /// Whether the second encoders of θ1 and of the elbow count backwards.
         second_encoder_reversed: [bool; 2] = [false; 2];
         /// Whether the second force cell, or second bridges on the same one, read f_t and f_n with the opposite

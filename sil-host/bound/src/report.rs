@@ -201,22 +201,23 @@ impl Bound {
         let _ = write!(
             text,
             "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz, with {} instructions on the worst path.\n\
-             Interrupts that read the sensors for the next tick: {} cycles, {:.1} µs in a tick, {:.1} µs each at most.\n\
+             Interrupts that read the sensors for the next tick, two on each channel: {} cycles, {:.1} µs in a tick, \
+             {:.1} µs each at most.\n\
              Together they prove control rates up to {} Hz.\n\
-             With two sensors on each channel: {} cycles, {:.1} µs in a tick, and up to {} Hz.\n\
+             With one sensor on each channel: {} cycles, {:.1} µs in a tick, and up to {} Hz.\n\
              Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss. Tasks of lower \
              priority that mask the interrupts come on top.",
             self.cycles,
             self.microseconds,
             CORE_HZ / 1e6,
             self.instructions,
-            self.sensor_cycles,
-            f64::from(self.sensor_cycles) / CORE_HZ * 1e6,
-            f64::from(self.longest_sensor_cycles) / CORE_HZ * 1e6,
-            self.proves_hz,
             self.sensor_cycles_of_both,
             f64::from(self.sensor_cycles_of_both) / CORE_HZ * 1e6,
+            f64::from(self.longest_sensor_cycles) / CORE_HZ * 1e6,
             self.proves_hz_with_both,
+            self.sensor_cycles,
+            f64::from(self.sensor_cycles) / CORE_HZ * 1e6,
+            self.proves_hz,
         );
         text
     }

@@ -8,7 +8,7 @@ use painleve_shared::LinkMotion;
 use painleve_shared::counts::{EncoderScale, ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Request, Response};
-use painleve_shared::mounting::Mounting;
+use painleve_shared::mounting::{Mounting, SensorParts};
 
 use crate::board::{BoardChip, BoardSnapshot, EmulatedBoard, F405, G474};
 use crate::stm32::Pin;
@@ -83,6 +83,16 @@ pub struct BenchSnapshot<C = F405> {
 /// If there is no scenario of this name.
 pub fn scenario(name: &str) -> Scenario {
     Scenario::load(name, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Loads a built-in scenario for an arm with one sensor on each channel.
+///
+/// # Panics
+/// If there is no scenario of this name.
+pub fn with_one_sensor(name: &str) -> Scenario {
+    let mut scenario = scenario(name);
+    scenario.converters.mounting.sensors = SensorParts::First;
+    scenario
 }
 
 /// Encodes a scenario's configuration for the board.

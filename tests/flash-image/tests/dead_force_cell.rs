@@ -1,4 +1,5 @@
-//! A force cell that repeats a plausible reading while the arm is driven: no reading shows that it is stuck.
+//! The only force cell of an arm repeats a plausible reading while the arm is driven: no reading shows that it is
+//! stuck.
 
 #![allow(clippy::unwrap_used)]
 
@@ -6,7 +7,7 @@ use painleve_drivers::gap::{GapCheck, Scales};
 use painleve_drivers::heating::{Heating, HeatingModel};
 use painleve_drivers::plausibility::SensorReadings;
 use painleve_firmware::Controller;
-use painleve_flash_image::bench::{Bench, scenario};
+use painleve_flash_image::bench::{Bench, scenario, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, F405, G474};
 use painleve_flash_image::harm::Harm;
 use painleve_plant::scenario::built_in;
@@ -21,7 +22,7 @@ const LIMIT_TICKS: u32 = 400;
 
 /// The reading at which the force cell is stuck: that without a force, or the present one.
 fn takes_the_torque_off<C: BoardChip>(is_zero: bool) {
-    let mut bench = Bench::<C>::new(&scenario("hybrid-elbow-down"));
+    let mut bench = Bench::<C>::new(&with_one_sensor("hybrid-elbow-down"));
     bench.drive();
     let present = [bench.frame.tangential_force.0, bench.frame.normal_force.0];
     bench.force_is_stuck_at = Some(if is_zero { [0; 2] } else { present });

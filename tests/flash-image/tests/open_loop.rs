@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use painleve_flash_image::bench::{BoardBench, encoded, scenario};
+use painleve_flash_image::bench::{BoardBench, encoded, scenario, with_one_sensor};
 use painleve_flash_image::board::FlashedBoard;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::TorqueCounts;
@@ -13,8 +13,9 @@ use painleve_shared::status::Fault;
 /// 1 N·m of 5 N·m in 12 bits.
 const LIMIT_COUNTS: i32 = 410;
 
+/// Commissioning reads one sensor of each channel at a time.
 fn limited() -> Scenario {
-    let mut scenario = scenario("hybrid-elbow-down");
+    let mut scenario = with_one_sensor("hybrid-elbow-down");
     scenario.controller.torque_limit_nm = 1.0;
     scenario
 }

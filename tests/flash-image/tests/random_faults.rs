@@ -1,13 +1,16 @@
 //! Injects a thousand random faults at random instructions.
 
-use painleve_flash_image::bench::{Bench, scenario};
+use painleve_flash_image::bench::{Bench, scenario, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, F405, G474};
 use painleve_flash_image::stm32::Crystal;
 use painleve_parts::{BitErrors, BridgeFailure};
+use painleve_plant::scenario::Scenario;
 use painleve_shared::mounting::SensorParts;
 
 /// Number of faults.
 const FAULTS: u32 = 1000;
+
+const DEFAULT: &str = "hybrid-elbow-down";
 
 /// Marsaglia's xorshift.
 struct Random(u64);
@@ -41,8 +44,8 @@ enum InjectedFault {
 }
 
 impl InjectedFault {
-    /// With one sensor on each channel.
-    const ALL: &[Self] = &[
+    /// Those of an arm with one sensor on each channel.
+    const OF_ONE_SENSOR: &[Self] = &[
         Self::BitErrors,
         Self::SerialNoise,
         Self::ResetPin,
@@ -57,12 +60,8 @@ impl InjectedFault {
         Self::ForceAxisDies,
     ];
 
-    /// Those that two sensors on each channel bring or show, and disturbances.
-    const OF_TWO_SENSORS: &[Self] = &[
-        Self::BitErrors,
-        Self::EncoderDies,
-        Self::ForceCellDies,
-        Self::ForceAxisDies,
+    /// With two sensors on each channel: those of the second ones, and those that only two show.
+    const OF_SECOND_SENSORS: &[Self] = &[
         Self::ForceCellSticks,
         Self::SecondEncoderDies,
         Self::SecondForceCellDies,
@@ -77,14 +76,15 @@ impl InjectedFault {
         let board = &mut bench.board;
         match self {
             Self::BitErrors => {
-                let seed = random.below(u64::MAX);
+                // Every line has its own.
+                let mut errors = || BitErrors::new(1e-4, random.below(u64::MAX));
                 let wiring = board.wiring();
                 let encoders = &mut wiring.encoders;
                 for encoder in encoders.iter_mut().chain(&mut wiring.second_encoders) {
-                    encoder.bit_errors = BitErrors::new(1e-4, seed);
+                    encoder.bit_errors = errors();
                 }
-                wiring.force.bit_errors = BitErrors::new(1e-4, seed);
-                wiring.second_force.bit_errors = BitErrors::new(1e-4, seed / 2);
+                wiring.force.bit_errors = errors();
+                wiring.second_force.bit_errors = errors();
             }
             Self::SerialNoise => {
                 let bytes: Vec<u8> = (0..random.below(60))
@@ -149,29 +149,27 @@ impl InjectedFault {
 /// for others.
 #[test]
 fn a_thousand_random_faults_take_the_torque_off_or_are_survived() {
-    take_the_torque_off_or_are_survived::<F405>(SensorParts::First, InjectedFault::ALL, FAULTS);
+    take_the_torque_off_or_are_survived::<F405>(&scenario(DEFAULT), FAULTS);
 }
 
 #[test]
 fn random_faults_on_the_nucleo_take_the_torque_off_or_are_survived() {
-    take_the_torque_off_or_are_survived::<G474>(SensorParts::First, InjectedFault::ALL, FAULTS / 4);
+    take_the_torque_off_or_are_survived::<G474>(&scenario(DEFAULT), FAULTS / 4);
 }
 
 #[test]
-fn random_faults_of_two_sensors_take_the_torque_off_or_are_survived() {
-    let faults = InjectedFault::OF_TWO_SENSORS;
-    take_the_torque_off_or_are_survived::<F405>(SensorParts::Both, faults, FAULTS / 4);
-    take_the_torque_off_or_are_survived::<G474>(SensorParts::Both, faults, FAULTS / 4);
+fn random_faults_of_an_arm_with_one_sensor_take_the_torque_off_or_are_survived() {
+    take_the_torque_off_or_are_survived::<F405>(&with_one_sensor(DEFAULT), FAULTS / 4);
+    take_the_torque_off_or_are_survived::<G474>(&with_one_sensor(DEFAULT), FAULTS / 4);
 }
 
-fn take_the_torque_off_or_are_survived<C: BoardChip>(
-    sensors: SensorParts,
-    kinds: &[InjectedFault],
-    faults: u32,
-) {
-    let mut scenario = scenario("hybrid-elbow-down");
-    scenario.converters.mounting.sensors = sensors;
-    let mut bench = Bench::<C>::new(&scenario);
+fn take_the_torque_off_or_are_survived<C: BoardChip>(scenario: &Scenario, faults: u32) {
+    let second_sensors = match scenario.converters.mounting.sensors {
+        SensorParts::Both => InjectedFault::OF_SECOND_SENSORS,
+        SensorParts::First | SensorParts::Second => &[],
+    };
+    let kinds = [InjectedFault::OF_ONE_SENSOR, second_sensors].concat();
+    let mut bench = Bench::<C>::new(scenario);
     bench.drive();
     let healthy = bench.snapshot();
     let mut random = Random(1);

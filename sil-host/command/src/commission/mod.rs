@@ -10,6 +10,7 @@ use painleve_commission::second_sensors::{self, SecondSensors};
 use painleve_commission::simulated::{BuiltInMistake, SimulatedRig};
 use painleve_commission::{CommissionError, Commissioned, Deviation, Expected, commission};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
+use painleve_shared::mounting::SensorParts;
 use painleve_shared::range::OutOfRange;
 use painleve_system::atomic_file;
 use serde_json::json;
@@ -32,7 +33,7 @@ pub struct CommissionArguments {
     /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH", required_unless_present = "rehearse")]
     port: Option<PathBuf>,
-    /// Commission the second sensors of each channel: finds their directions, and lets the scenario use both.
+    /// Commission the second sensors of each channel, after the first ones: finds their directions.
     #[arg(long)]
     second_sensors: bool,
     /// Rehearse on a simulated arm, with a simulated operator.
@@ -105,7 +106,15 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     };
     let text = corrected.to_commented_toml();
     atomic_file::write(&arguments.output, text.as_bytes()).map_err(output)?;
-    report(arguments, &deviations, commissioned.friction)
+    report(arguments, &deviations, commissioned.friction)?;
+    let sensors = corrected.converters.mounting.sensors;
+    if sensors == SensorParts::Both && !arguments.second_sensors && !arguments.json {
+        let command = arguments.output.display();
+        say(format_args!(
+            "next, the second sensors: painleve commission {command} --second-sensors"
+        ))?;
+    }
+    Ok(())
 }
 
 type Outcome = Result<Commissioned, CommissionError<CommandError>>;

@@ -94,6 +94,7 @@ struct DriveReport {
 /// Connects to the board, configures it, and monitors it until the operator stops it.
 pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     let scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
+    check_rate(&scenario)?;
     if arguments.store || arguments.stored || arguments.forget {
         return stored::run(arguments, &scenario);
     }
@@ -270,6 +271,24 @@ impl Drive {
         self.view.show(&sample);
         Ok(())
     }
+}
+
+/// Highest control rate with two sensors on each channel, Hz: a set of readings takes some 160 µs.
+const FASTEST_WITH_TWO_SENSORS_HZ: u32 = 5000;
+
+/// Refuses a control rate at which the board cannot read the sensors at every tick.
+fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
+    let fastest_hz = match scenario.converters.mounting.sensors {
+        SensorParts::Both => FASTEST_WITH_TWO_SENSORS_HZ,
+        SensorParts::First | SensorParts::Second => return Ok(()),
+    };
+    let hz = f64::from(scenario.run.tick_hz);
+    painleve_shared::range::check("run.tick_hz", hz, 1.0, f64::from(fastest_hz)).map_err(|source| {
+        ScenarioError::Range {
+            origin: scenario.name.clone(),
+            source,
+        }
+    })
 }
 
 /// Tells the operator of an arm with one sensor on each channel what the board cannot detect within two ticks.

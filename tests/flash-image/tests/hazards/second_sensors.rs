@@ -1,6 +1,6 @@
 //! An arm with two sensors on each channel: what one of them shows wrongly, the other contradicts.
 
-use painleve_flash_image::bench::{Bench, encoded, scenario};
+use painleve_flash_image::bench::{Bench, encoded, scenario, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard};
 use painleve_flash_image::harm::Harm;
 use painleve_parts::BitErrors;
@@ -10,12 +10,13 @@ use painleve_shared::message::{FrameSource, Response};
 use painleve_shared::mounting::{Mounting, SensorParts};
 use painleve_shared::status::Fault;
 
-use super::{DEFAULT, assert_off_in_time, latched_fault};
+use super::{DEFAULT, assert_off_in_time, driven, latched_fault};
 
 crate::on_each_board! {
     a_frozen_encoder_is_contradicted_by_the_other,
     a_stuck_force_cell_is_contradicted_by_the_other,
     a_second_sensor_that_dies_takes_the_torque_off,
+    without_second_sensors_the_default_arm_is_never_driven,
     healthy_second_sensors_mounted_backwards_change_nothing,
     the_second_sensors_alone_drive_the_same_arm,
     an_unknown_direction_of_a_second_encoder_is_found_with_the_first_motion,
@@ -24,12 +25,6 @@ crate::on_each_board! {
 
 /// Most ticks with the torque on after the two sensors have come apart by more than their tolerance.
 const LIMIT_TICKS: u32 = 2;
-
-fn with_second_sensors() -> Scenario {
-    let mut scenario = scenario(DEFAULT);
-    scenario.converters.mounting.sensors = SensorParts::Both;
-    scenario
-}
 
 fn bench<C: BoardChip>(scenario: &Scenario, mounted: Mounting) -> Bench<C> {
     let mut bench = Bench::<C>::without_configuration(scenario, EmulatedBoard::<C>::booted());
@@ -42,12 +37,6 @@ fn bench<C: BoardChip>(scenario: &Scenario, mounted: Mounting) -> Bench<C> {
     let response = bench.board.configure(FrameSource::Sensors, &configuration);
     assert!(matches!(response, Some(Response::Ready { .. })));
     assert!(bench.board.permit_arming());
-    bench
-}
-
-fn driven<C: BoardChip>() -> Bench<C> {
-    let mut bench = Bench::<C>::new(&with_second_sensors());
-    bench.drive();
     bench
 }
 
@@ -117,6 +106,22 @@ fn a_second_sensor_that_dies_takes_the_torque_off<C: BoardChip>() {
     }
 }
 
+/// The pull-ups of the lines, or a level that a fault gives them.
+fn without_second_sensors_the_default_arm_is_never_driven<C: BoardChip>() {
+    for level in [false, true] {
+        let mut board = EmulatedBoard::<C>::booted();
+        for encoder in &mut board.wiring().second_encoders {
+            encoder.dead = Some(level);
+        }
+        board.wiring().second_force.dead = Some(level);
+        let mut bench = Bench::<C>::with_board(&scenario(DEFAULT), board);
+        for _ in 0..300 {
+            bench.tick();
+            assert!(bench.board.torque().is_off());
+        }
+    }
+}
+
 /// Returns the place of the tip after 300 ticks, m.
 fn tip_m<C: BoardChip>(scenario: &Scenario, mounted: Mounting) -> f64 {
     let mut bench = bench::<C>(scenario, mounted);
@@ -130,8 +135,8 @@ fn tip_m<C: BoardChip>(scenario: &Scenario, mounted: Mounting) -> f64 {
 }
 
 fn healthy_second_sensors_mounted_backwards_change_nothing<C: BoardChip>() {
-    let without = tip_m::<C>(&scenario(DEFAULT), Mounting::default());
-    let mut scenario = with_second_sensors();
+    let without = tip_m::<C>(&with_one_sensor(DEFAULT), Mounting::default());
+    let mut scenario = scenario(DEFAULT);
     assert_eq!(tip_m::<C>(&scenario, Mounting::default()), without);
     let mounting = &mut scenario.converters.mounting;
     mounting.second_encoder_reversed = [true, false];
@@ -142,8 +147,8 @@ fn healthy_second_sensors_mounted_backwards_change_nothing<C: BoardChip>() {
 
 /// For the commissioning of the second sensors.
 fn the_second_sensors_alone_drive_the_same_arm<C: BoardChip>() {
-    let without = tip_m::<C>(&scenario(DEFAULT), Mounting::default());
-    let mut scenario = with_second_sensors();
+    let without = tip_m::<C>(&with_one_sensor(DEFAULT), Mounting::default());
+    let mut scenario = scenario(DEFAULT);
     let mounting = &mut scenario.converters.mounting;
     mounting.sensors = SensorParts::Second;
     mounting.second_encoder_reversed = [false, true];
@@ -163,7 +168,7 @@ fn the_second_sensors_alone_drive_the_same_arm<C: BoardChip>() {
 
 fn an_unknown_direction_of_a_second_encoder_is_found_with_the_first_motion<C: BoardChip>() {
     for joint in 0..2 {
-        let scenario = with_second_sensors();
+        let scenario = scenario(DEFAULT);
         let mut mounted = Mounting::default();
         mounted.second_encoder_reversed[joint] = true;
         let mut bench = bench::<C>(&scenario, mounted);

@@ -2,7 +2,7 @@
 
 use painleve_drivers::force_cell::LIVE_ZERO;
 use painleve_flash_image::MILLISECOND;
-use painleve_flash_image::bench::{Bench, encoded, scenario};
+use painleve_flash_image::bench::{Bench, encoded, scenario, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard, STAGES_READY};
 use painleve_parts::BridgeFailure;
 use painleve_plant::plant::Plant as _;
@@ -75,10 +75,11 @@ fn a_force_cell_that_dies_takes_the_torque_off<C: BoardChip>() {
     }
 }
 
-/// The tip moves on the belt; the encoder repeats a plausible angle.
+/// The tip moves on the belt; the only encoder of a joint repeats a plausible angle.
 fn an_encoder_that_freezes_takes_the_torque_off<C: BoardChip>() {
     for encoder in 0..2 {
-        let mut bench = driven::<C>();
+        let mut bench = Bench::<C>::new(&with_one_sensor(DEFAULT));
+        bench.drive();
         bench.is_frozen[encoder] = true;
         let harm = Harm::until_off(&mut bench, 2000);
         let fault = latched_fault(&mut bench);
