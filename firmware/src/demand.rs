@@ -113,7 +113,9 @@ impl<L: Law> TorqueDemand<L> {
             tick_s: self.tick_s,
         };
         if starts {
-            self.law.reset(&mut state.law, &input);
+            // Few ticks reset, and out of line: the copy spares all others to store the input in memory.
+            let copy = input;
+            self.law.reset(&mut state.law, &copy);
         }
         self.law.tick(&mut state.law, &input)
     }

@@ -85,20 +85,26 @@ impl DisturbanceEstimator {
     /// Updates the estimate with one tick of an arm whose `model` includes the present d.
     #[inline]
     pub fn update(&self, state: &mut DisturbanceState, model: &Model, balance: &Balance) {
-        let skipped = state.skipped.take();
-        let before = state.rate_rad_s.replace(model.theta_dot_rad_s);
-        let Some(before) = before.filter(|_| self.settings.enabled) else {
-            return;
-        };
+        let rate_rad_s = model.theta_dot_rad_s;
         let (mut torque_nm, mut force_n) = (balance.torque_nm, balance.force_n);
         let mut elapsed_s = balance.elapsed_s;
-        if let Some(skipped) = skipped {
+        if let Some(skipped) = &state.skipped {
             // The means over both ticks.
             torque_nm = (torque_nm + skipped.torque_nm) * 0.5;
             force_n = (force_n + skipped.force_n) * 0.5;
             elapsed_s += skipped.elapsed_s;
+            state.skipped = None;
         }
-        let acceleration = (model.theta_dot_rad_s - before) / elapsed_s;
+        let Some(before) = &mut state.rate_rad_s else {
+            state.rate_rad_s = Some(rate_rad_s);
+            return;
+        };
+        let change = rate_rad_s - *before;
+        *before = rate_rad_s;
+        if !self.settings.enabled {
+            return;
+        }
+        let acceleration = change / elapsed_s;
         let needed_nm = model.inverse_dynamics_nm(&acceleration, &force_n);
         let residual_nm = (needed_nm - torque_nm).to_links();
         let limit = self.settings.limit_nm;

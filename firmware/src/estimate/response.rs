@@ -368,7 +368,7 @@ impl ResponseState {
 
     /// Draws the next probe, ±`amplitude_n` (N), from a shift register of 16 bits with the longest
     /// period.
-    #[inline(never)]
+    #[inline]
     fn draw_probe(&mut self, amplitude_n: f32) {
         let feedback = if self.random & 1 == 1 { 0xb400 } else { 0 };
         self.random = (self.random >> 1) ^ feedback;

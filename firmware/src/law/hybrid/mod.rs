@@ -40,6 +40,7 @@ const RECOVERY_PER_S: f32 = 10.0;
 
 /// Returns the fraction of `pressing_nm` that keeps both joints within ±`limit_nm` together with
 /// `motion_nm`.
+#[inline]
 fn affordable(motion_nm: &JointTorque<f32>, pressing_nm: &JointTorque<f32>, limit_nm: f32) -> f32 {
     if (*motion_nm + *pressing_nm).amax() <= limit_nm {
         1.0
