@@ -55,8 +55,8 @@ impl<T: Real> Pose<T> {
     /// Evaluates the pose of link angles in rad.
     #[inline]
     pub fn new(theta: &LinkMotion<T>) -> Self {
-        let (sine_1, cosine_1) = theta.first().sine_cosine();
-        let (sine_2, cosine_2) = theta.second().sine_cosine();
+        let [(sine_1, cosine_1), (sine_2, cosine_2)] =
+            T::sines_cosines(theta.first(), theta.second());
         Self {
             sine: Vector2::new(sine_1, sine_2),
             cosine: Vector2::new(cosine_1, cosine_2),

@@ -8,8 +8,6 @@
 //! in software: about 2,100 instructions against a few dozen. The arc cosine has the bits of `libm`, with the
 //! processor's square root.
 
-use core::cmp::Ordering;
-
 use nalgebra::RealField;
 
 use crate::arc_cosine::arc_cosine;
@@ -71,6 +69,12 @@ pub trait Real: RealField + Copy + SettingValue {
 
     /// Sine and cosine of an angle in rad.
     fn sine_cosine(self) -> (Self, Self);
+
+    /// Sines and cosines of two angles in rad: the same bits as one after the other, in less time on a Cortex-M4F.
+    #[inline]
+    fn sines_cosines(one: Self, other: Self) -> [(Self, Self); 2] {
+        [one.sine_cosine(), other.sine_cosine()]
+    }
 
     /// Arc cosine in rad; NaN outside -1 … 1.
     fn arc_cosine(self) -> Self;
@@ -161,6 +165,16 @@ impl Real for f32 {
     }
 
     #[inline]
+    fn sines_cosines(one: Self, other: Self) -> [(Self, Self); 2] {
+        // Without a branch between the two, the constants of the polynomials stay in registers.
+        if is_reducible(one) && is_reducible(other) {
+            [reduced_sine_cosine(one), reduced_sine_cosine(other)]
+        } else {
+            [one.sine_cosine(), other.sine_cosine()]
+        }
+    }
+
+    #[inline]
     fn arc_cosine(self) -> Self {
         arc_cosine(self)
     }
@@ -190,14 +204,27 @@ const ROUNDS_TO_INTEGER: f32 = 12_582_912.0;
 /// place of 1, for |angle| up to 8192 rad. Beyond that both results are NaN, on which the
 /// controller latches a fault: a joint never turns that far, and an exact reduction would cost
 /// thousands of instructions and 9 KiB of flash.
+#[inline]
 fn sine_cosine_f32(angle: f32) -> (f32, f32) {
+    if is_reducible(angle) {
+        reduced_sine_cosine(angle)
+    } else {
+        (f32::NAN, f32::NAN)
+    }
+}
+
+/// Returns whether the reduction handles an angle.
+#[inline]
+fn is_reducible(angle: f32) -> bool {
+    angle.abs() < REDUCTION_LIMIT_RAD
+}
+
+#[inline]
+fn reduced_sine_cosine(angle: f32) -> (f32, f32) {
     const HALF_PI_HIGH: f32 = 1.570_312_5;
     const HALF_PI_MIDDLE: f32 = 4.837_513e-4;
     const HALF_PI_LOW: f32 = 7.549_79e-8;
 
-    if angle.abs().partial_cmp(&REDUCTION_LIMIT_RAD) != Some(Ordering::Less) {
-        return (f32::NAN, f32::NAN);
-    }
     let turns = angle * core::f32::consts::FRAC_2_PI;
     // A number this large has no fraction bits, so the sum rounds to the nearest integer and holds
     // it in its last bits.
