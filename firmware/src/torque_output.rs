@@ -1,6 +1,6 @@
 //! Converts a law's torque to counts: guarded against lift-off, limited, rounded and checked.
 
-use painleve_shared::counts::{LinearScale, TorqueCounts};
+use painleve_shared::counts::{LinearConverter, LinearScale, TorqueCounts};
 use painleve_shared::{JointTorque, Real};
 
 use crate::estimate::ContactEstimate;
@@ -17,7 +17,7 @@ pub struct NotFinite;
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueOutput {
     guard: GuardSettings,
-    scale: LinearScale<f32>,
+    converter: LinearConverter<f32>,
     limit_nm: f32,
 }
 
@@ -26,7 +26,7 @@ impl TorqueOutput {
     pub fn new(guard: &GuardSettings, scale: LinearScale<f32>, limit_nm: f32) -> Self {
         Self {
             guard: *guard,
-            scale,
+            converter: scale.converter(),
             limit_nm,
         }
     }
@@ -98,10 +98,11 @@ impl TorqueOutput {
         // Carry the rounding remainder to the next tick: near the edge, where p is small, half a
         // count of constant torque would cause one newton of force.
         let owed = (*wanted_nm + command.rounding_nm).map(|torque| torque.within(self.limit_nm));
-        let (counts_1, over_1) = self.scale.counts(owed.first());
-        let (counts_2, over_2) = self.scale.counts(owed.second());
-        let given = JointTorque::new(self.scale.value(counts_1), self.scale.value(counts_2));
-        let half = 0.5 * self.scale.per_count();
+        let converter = &self.converter;
+        let (counts_1, over_1) = converter.counts(owed.first());
+        let (counts_2, over_2) = converter.counts(owed.second());
+        let given = JointTorque::new(converter.value(counts_1), converter.value(counts_2));
+        let half = 0.5 * converter.per_count;
         command.counts = [TorqueCounts(counts_1), TorqueCounts(counts_2)];
         command.torque_nm = given;
         command.saturated = over_1 || over_2 || wanted_nm.amax() > self.limit_nm;
@@ -179,7 +180,7 @@ mod tests {
 
     #[test]
     fn the_rounding_remainder_is_carried_to_later_ticks() {
-        let count = stages().scale.per_count();
+        let count = stages().converter.per_count;
         let wanted = JointTorque::new(0.3 * count, -0.3 * count);
         let mut command = LastCommand::default();
         let mut sum = JointTorque::zeros();

@@ -172,19 +172,57 @@ impl<T: Real> LinearScale<T> {
         (1_i32 << ((self.bits & 31).wrapping_sub(1) & 31)).wrapping_sub(1)
     }
 
+    /// Returns the converter of this scale.
+    #[inline]
+    pub fn converter(&self) -> LinearConverter<T> {
+        LinearConverter {
+            per_count: self.per_count(),
+            maximum_counts: self.maximum_counts(),
+        }
+    }
+
     /// Returns whether a converter of this resolution can give or take this reading.
     #[inline]
     pub fn contains(&self, counts: i32) -> bool {
-        let maximum = self.maximum_counts();
-        (-maximum - 1..=maximum).contains(&counts)
+        self.converter().contains(counts)
     }
 
     /// Returns the nearest reading, and whether it was clamped; NaN gives 0.
     #[inline]
     pub fn counts(&self, value: T) -> (i32, bool) {
-        let wanted = round_to_i32(value / self.per_count());
-        let maximum = self.maximum_counts();
-        let counts = wanted.clamp(-maximum - 1, maximum);
+        self.converter().counts(value)
+    }
+
+    /// Returns the value of a reading in the quantity's unit.
+    #[inline]
+    pub fn value(&self, counts: i32) -> T {
+        self.converter().value(counts)
+    }
+}
+
+/// What a conversion needs of a [`LinearScale`], computed once rather than at every tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearConverter<T> {
+    /// One count in the quantity's unit.
+    pub per_count: T,
+    /// The largest reading. The smallest is its complement, which is further from zero by one.
+    pub maximum_counts: i32,
+}
+
+impl<T: Real> LinearConverter<T> {
+    /// Returns whether the converter can give or take this reading.
+    #[inline]
+    pub fn contains(&self, counts: i32) -> bool {
+        let size = if counts < 0 { !counts } else { counts };
+        size <= self.maximum_counts
+    }
+
+    /// Returns the nearest reading, and whether it was clamped; NaN gives 0.
+    #[inline]
+    pub fn counts(&self, value: T) -> (i32, bool) {
+        let wanted = round_to_i32(value / self.per_count);
+        // Unlike `clamp`, this cannot panic.
+        let counts = wanted.max(!self.maximum_counts).min(self.maximum_counts);
         (counts, counts != wanted)
     }
 
@@ -192,7 +230,7 @@ impl<T: Real> LinearScale<T> {
     #[inline]
     pub fn value(&self, counts: i32) -> T {
         // Exact: a reading has at most 22 bits.
-        T::from_integer(counts) * self.per_count()
+        T::from_integer(counts) * self.per_count
     }
 }
 

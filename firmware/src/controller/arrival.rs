@@ -1,5 +1,6 @@
 //! Classifies an arriving sensor frame and records its lapses.
 
+use painleve_shared::counts::LinearConverter;
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 
 use crate::configuration::Converters;
@@ -87,10 +88,38 @@ impl Lapses<'_> {
     }
 }
 
+/// The ranges of the converters' readings.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ReadingRanges {
+    /// Counts per turn of each encoder.
+    encoder_moduli: [u32; 2],
+    force_cell: LinearConverter<f32>,
+}
+
+impl ReadingRanges {
+    pub fn of(converters: &Converters) -> Self {
+        Self {
+            encoder_moduli: converters.encoders.map(|scale| scale.modulus()),
+            force_cell: converters.force.converter(),
+        }
+    }
+
+    #[inline]
+    fn readability(&self, frame: &SensorFrame) -> Readability {
+        let [modulus_1, modulus_2] = self.encoder_moduli;
+        let [joint_1, joint_2] = frame.joints;
+        Readability {
+            encoders: joint_1.0 < modulus_1 && joint_2.0 < modulus_2,
+            forces: self.force_cell.contains(frame.normal_force.0)
+                && self.force_cell.contains(frame.tangential_force.0),
+        }
+    }
+}
+
 /// Checks a frame before its readings are used.
 #[inline]
 pub(super) fn arrive(
-    converters: &Converters,
+    ranges: &ReadingRanges,
     state: &mut ArrivalState,
     mut lapses: Lapses<'_>,
     frame: &SensorFrame,
@@ -99,15 +128,9 @@ pub(super) fn arrive(
         .last_sequence
         .unwrap_or(frame.sequence.wrapping_sub(1));
     let ahead = frame.sequence.wrapping_sub(last);
-    let mut joints = converters.encoders.iter().zip(frame.joints);
-    let forces = [frame.normal_force, frame.tangential_force];
-    let encoders = joints.all(|(scale, reading)| scale.contains(reading));
-    let forces = forces
-        .iter()
-        .all(|force| converters.force.contains(force.0));
+    let reading = ranges.readability(frame);
     let board_faults = frame.inputs.intersection(BOARD_FAULTS);
-    if ahead != 1 || !encoders || !forces || !board_faults.is_empty() {
-        let reading = Readability { encoders, forces };
+    if ahead != 1 || !reading.encoders || !reading.forces || !board_faults.is_empty() {
         return irregular(state, lapses, frame.sequence, ahead, reading, board_faults);
     }
     state.last_sequence = Some(frame.sequence);

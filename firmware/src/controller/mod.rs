@@ -20,8 +20,8 @@ use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFl
 use painleve_shared::range::OutOfRange;
 use painleve_shared::status::Fault;
 
-use self::arrival::{Arrival, ArrivalState, Lapses, arrive};
-use crate::configuration::{Configuration, Converters};
+use self::arrival::{Arrival, ArrivalState, Lapses, ReadingRanges, arrive};
+use crate::configuration::Configuration;
 use crate::demand::{DemandInput, DemandState, TorqueDemand};
 use crate::estimate::joints::EncoderJump;
 use crate::estimate::transmission::{Transmission, TransmissionState};
@@ -101,7 +101,7 @@ struct Stages<L> {
     supervisor: Supervisor,
     demand: TorqueDemand<L>,
     references: References,
-    converters: Converters,
+    ranges: ReadingRanges,
 }
 
 /// State of the stages between ticks.
@@ -204,7 +204,7 @@ impl<L: Law> Controller<L> {
             supervision,
             command,
         };
-        let arrival = arrive(&self.stages.converters, arrivals, lapses, frame);
+        let arrival = arrive(&self.stages.ranges, arrivals, lapses, frame);
         let supervision = &mut self.state.supervision;
         match arrival {
             Arrival::After(elapsed_ticks) => {
@@ -294,7 +294,7 @@ impl<L: Law> Stages<L> {
                 settings.torque_limit_nm,
             ),
             transmission: Transmission::new(&settings.estimator, arm.coulomb_friction_nm),
-            converters: *converters,
+            ranges: ReadingRanges::of(converters),
         }
     }
 

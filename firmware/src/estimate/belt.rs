@@ -53,7 +53,8 @@ impl Default for BeltState {
 #[derive(Clone, Copy, Debug)]
 pub struct BeltEstimator {
     settings: BeltSpeedSettings,
-    tick_s: f32,
+    /// Change of the belt's speed in one tick, m/s.
+    widening_m_s: f32,
 }
 
 impl BeltEstimator {
@@ -61,7 +62,7 @@ impl BeltEstimator {
     pub fn new(settings: &BeltSpeedSettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
-            tick_s,
+            widening_m_s: settings.acceleration_m_s2 * tick_s,
         }
     }
 
@@ -77,7 +78,7 @@ impl BeltEstimator {
         if self.settings.given_m_s.is_some() {
             return;
         }
-        let widening = self.settings.acceleration_m_s2 * self.tick_s;
+        let widening = self.widening_m_s;
         let limit = self.settings.fastest_m_s;
         state.slowest_m_s = (state.slowest_m_s - widening).at_least(-limit);
         state.fastest_m_s = (state.fastest_m_s + widening).at_most(limit);

@@ -100,6 +100,11 @@ pub struct FrictionEstimator {
     settings: FrictionSettings,
     force_variance_n2: f32,
     tick_s: f32,
+    /// Variance of μ at the start and whenever the filter restarts, and its growth in one tick.
+    first_variance: f32,
+    drift_variance: f32,
+    /// Square of a tangential force beyond the noise, N².
+    clear_force_n2: f32,
     /// Weight of one innovation in their average.
     mean_weight: f32,
     /// Part of [`CHANGING_S`] in one tick.
@@ -140,6 +145,9 @@ impl FrictionEstimator {
             settings: *settings,
             force_variance_n2: force_noise_n * force_noise_n,
             tick_s,
+            first_variance: settings.first_deviation * settings.first_deviation,
+            drift_variance: settings.drift_per_sqrt_s * settings.drift_per_sqrt_s * tick_s,
+            clear_force_n2: 9.0 * (force_noise_n * force_noise_n),
             mean_weight: tick_s / (MEAN_S + tick_s),
             changing_weight: tick_s / (CHANGING_S + tick_s),
         }
@@ -152,7 +160,7 @@ impl FrictionEstimator {
             catch_up: 0.0,
             rate_per_tick: 0.0,
             changing: 0.0,
-            variance: self.first_variance(),
+            variance: self.first_variance,
             slip: Slip::Positive,
             slip_seen: false,
             contrary_ticks: 0,
@@ -164,17 +172,12 @@ impl FrictionEstimator {
         }
     }
 
-    fn first_variance(&self) -> f32 {
-        self.settings.first_deviation * self.settings.first_deviation
-    }
-
     /// Updates the estimate with one reading (f_t, f_n), N, of a tip in contact; `dragged` states whether its
     /// motion allows stick.
     #[inline]
     pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>, dragged: bool) {
-        let first_variance = self.first_variance();
-        let drift = self.settings.drift_per_sqrt_s;
-        state.variance = (state.variance + drift * drift * self.tick_s).at_most(first_variance);
+        let first_variance = self.first_variance;
+        state.variance = (state.variance + self.drift_variance).at_most(first_variance);
         state.catch_up = 0.0;
         self.observe_slip(state, force_n);
         if force_n.y < self.settings.observable_n {
@@ -248,14 +251,14 @@ impl FrictionEstimator {
     fn restart(&self, state: &mut FrictionState) {
         state.stick_ticks = 0;
         state.changing = 1.0;
-        state.variance = self.first_variance();
+        state.variance = self.first_variance;
         state.rate_per_tick = 0.0;
     }
 
     fn observe_slip(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
         let slip = Slip::of(-force_n.x);
         // Below the noise level the sign carries no information.
-        let clear = force_n.x * force_n.x > 9.0 * self.force_variance_n2;
+        let clear = force_n.x * force_n.x > self.clear_force_n2;
         let cone_n = REVERSAL_FRACTION * state.coefficient * force_n.y;
         let contrary = clear && slip != state.slip && force_n.x.abs() >= cone_n;
         state.contrary_ticks = if contrary {
@@ -277,7 +280,7 @@ impl FrictionEstimator {
         if state.coefficient < critical {
             state.coefficient = critical;
         }
-        state.variance = self.first_variance();
+        state.variance = self.first_variance;
     }
 }
 

@@ -21,7 +21,7 @@ pub mod transmission;
 
 use nalgebra::Vector2;
 use painleve_shared::Arm;
-use painleve_shared::counts::{EncoderScale, LinearScale};
+use painleve_shared::counts::{EncoderScale, LinearConverter, LinearScale};
 use painleve_shared::frame::SensorFrame;
 
 use self::belt::{BeltEstimator, BeltSpeedSettings, BeltState};
@@ -128,7 +128,7 @@ pub struct EstimateSettings<'a> {
 /// All estimators of one arm.
 #[derive(Clone, Debug)]
 pub struct Estimators {
-    force_scale: LinearScale<f32>,
+    force_cell: LinearConverter<f32>,
     tick_s: f32,
     joints: JointEstimator,
     contact: ContactDetector,
@@ -185,7 +185,7 @@ impl Estimators {
     pub fn new(settings: &EstimateSettings<'_>) -> Self {
         let tick_s = 1.0 / settings.tick_hz;
         Self {
-            force_scale: settings.force,
+            force_cell: settings.force.converter(),
             tick_s,
             joints: JointEstimator::new(
                 &JointEstimatorSettings {
@@ -266,11 +266,11 @@ impl Estimators {
             elapsed_ticks,
         } = *readings;
         let force_n = Vector2::new(
-            self.force_scale.value(frame.tangential_force.0),
-            self.force_scale.value(frame.normal_force.0),
+            self.force_cell.value(frame.tangential_force.0),
+            self.force_cell.value(frame.normal_force.0),
         );
         // At the end of its range the force cell reads less than the actual force.
-        let range = self.force_scale.maximum_counts();
+        let range = self.force_cell.maximum_counts;
         let force_in_range = [frame.tangential_force, frame.normal_force]
             .iter()
             .all(|force| force.0.abs() < range);
