@@ -236,17 +236,20 @@ impl FrontEnd {
             is_hot,
             plausible,
         } = self.checks.tick(readings, self.torques, self.is_active);
-        self.is_fit = readings.are_complete() && levels.stages_ready;
-        let SensorReadings { joints, forces, .. } = readings;
-        let [joint_1, joint_2] = joints;
-        let [tangential, normal] = forces;
         // A sensor whose next set of readings is not complete in time gives none.
-        let joints = [
-            joint_1.take().unwrap_or(NO_ENCODER),
-            joint_2.take().unwrap_or(NO_ENCODER),
-        ];
-        let tangential_force = tangential.take().unwrap_or(NO_FORCE);
-        let normal_force = normal.take().unwrap_or(NO_FORCE);
+        let joints = core::mem::take(&mut readings.joints);
+        let forces = core::mem::take(&mut readings.forces);
+        let (is_complete, joints, [tangential_force, normal_force]) = match (joints, forces) {
+            ([Some(joint_1), Some(joint_2)], [Some(tangential), Some(normal)]) => {
+                (true, [joint_1, joint_2], [tangential, normal])
+            }
+            _ => (
+                false,
+                joints.map(|it| it.unwrap_or(NO_ENCODER)),
+                forces.map(|it| it.unwrap_or(NO_FORCE)),
+            ),
+        };
+        self.is_fit = is_complete && levels.stages_ready;
         if self.is_active {
             inputs.set(DigitalInputs::STAGE_NOT_READY, !levels.stages_ready);
             inputs.set(DigitalInputs::GAP_AGAINST_FORCE, contradiction);
