@@ -300,6 +300,20 @@ mod tests {
     }
 
     #[test]
+    fn the_rotors_of_elastic_gears_move_with_the_arm() {
+        let stiff = load(&["arm.rotor_inertia_kg_m2=[1e-5, 2e-5]"]).unwrap();
+        assert_eq!(stiff.moving_arm(), stiff.arm);
+        let elastic = load(&[
+            "arm.rotor_inertia_kg_m2=[1e-5, 2e-5]",
+            "contact.kind=compliant",
+            "effects.gear.elastic=true",
+            "effects.gear.rotor_inertia_kg_m2=1e-4",
+        ]);
+        let moving = elastic.unwrap().moving_arm().rotor_inertia_kg_m2;
+        assert!((moving[0] - 1.1e-4).abs() < 1e-12 && (moving[1] - 1.2e-4).abs() < 1e-12);
+    }
+
+    #[test]
     fn overrides_change_one_key_each() {
         let scenario = load(&[
             "belt.friction=0.4",

@@ -97,6 +97,19 @@ impl Scenario {
         }
     }
 
+    /// Returns the arm as it moves: with the rotors of its elastic gears, which follow the joints below the gears'
+    /// resonance. Their inertia is part of p, and with it of the edge.
+    pub fn moving_arm(&self) -> ArmParameters<f64> {
+        let mut arm = self.arm;
+        let gear = &self.effects.gear;
+        if gear.elastic {
+            for rotor_kg_m2 in &mut arm.rotor_inertia_kg_m2 {
+                *rotor_kg_m2 += gear.rotor_inertia_kg_m2;
+            }
+        }
+        arm
+    }
+
     /// Returns the controller's configuration, as it is sent to the host of the controller.
     pub fn controller_configuration(&self) -> Configuration {
         Configuration {

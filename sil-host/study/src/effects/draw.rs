@@ -62,7 +62,7 @@ impl EffectsStudy {
         let origin = format!("effect {} at level {level}", effect.name);
         let mut scenario = scenario.with_overrides(&origin, &overrides)?;
 
-        let arm = Arm::new(scenario.arm)?;
+        let arm = Arm::new(scenario.moving_arm())?;
         let friction = scenario.belt.friction;
         let journey = Journey {
             arm: &arm,

@@ -50,7 +50,7 @@ pub fn run<P: Plant>(
     judged: LiftOffRule,
 ) -> Result<Row, StudyError> {
     let end_s = scenario.run.duration_s;
-    let arm = Arm::new(scenario.arm)?;
+    let arm = Arm::new(scenario.moving_arm())?;
     let posture = Posture::of(&theta(&scenario.initial.state()));
     let v_belt_m_s = scenario.belt.profile.speed_m_s(0.0);
     let target_m = target_m(scenario);
@@ -171,7 +171,7 @@ fn stretch_around_m(
 }
 
 /// Returns the target of a scenario's last reference, m; NaN without a reference.
-fn target_m(scenario: &Scenario) -> f64 {
+pub(crate) fn target_m(scenario: &Scenario) -> f64 {
     let segments = scenario.controller.reference.segments.iter();
     let mut targets = segments.filter_map(|segment| match segment {
         Segment::MinimumJerk { target_m, .. }

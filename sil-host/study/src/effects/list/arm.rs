@@ -79,10 +79,17 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
         });
 };
 
+/// Inertia of the motors' rotors behind elastic gears, kg·m². The controller knows it, as it knows that of rotors
+/// behind stiff gears: it is in a motor's data sheet.
+const ROTOR_INERTIA_KG_M2: f64 = 1e-4;
+
 /// Stiffness (N·m/rad) and backlash (°) of the gears, and the side of the encoders.
 fn gear(stiffness_nm_rad: f64, backlash_deg: f64, side: &str) -> Vec<String> {
+    let rotor = ROTOR_INERTIA_KG_M2;
     set![
         "effects.gear.elastic=true",
+        "effects.gear.rotor_inertia_kg_m2={rotor:?}",
+        "arm_model.rotor_inertia_kg_m2=[{rotor:?}, {rotor:?}]",
         "effects.gear.stiffness_nm_rad={stiffness_nm_rad:?}",
         "effects.gear.backlash_deg={backlash_deg:?}",
         "effects.gear.encoder_side={side}"

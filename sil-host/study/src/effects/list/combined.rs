@@ -79,12 +79,9 @@ fn torque_fault(kind: &str, duration_s: f64, drawn: &Drawn) -> Vec<String> {
 
 /// Largest friction coefficient with the patches of [`everything`].
 fn largest_friction_of_everything(share: f64, friction: f64) -> f64 {
-    find("friction-patches").map_or(friction, |patches| {
-        let largest = patches.largest_friction;
-        largest.map_or(friction, |largest| {
-            largest(share * patches.typical, friction)
-        })
-    })
+    find("friction-patches")
+        .and_then(|patches| Some(patches.largest_friction?(share * patches.typical, friction)))
+        .unwrap_or(friction)
 }
 
 /// Effects of a rig together, each at this share of its typical level.
