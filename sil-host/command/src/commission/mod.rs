@@ -109,9 +109,13 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     report(arguments, &deviations, commissioned.friction)?;
     let sensors = corrected.converters.mounting.sensors;
     if sensors == SensorParts::Both && !arguments.second_sensors && !arguments.json {
-        let command = arguments.output.display();
+        let scenario = arguments.output.display();
+        let rig = match &arguments.port {
+            Some(port) => format!("--port {}", port.display()),
+            None => "--rehearse".to_owned(),
+        };
         say(format_args!(
-            "next, the second sensors: painleve commission {command} --second-sensors"
+            "next, the second sensors: painleve commission {scenario} {rig} --second-sensors"
         ))?;
     }
     Ok(())
