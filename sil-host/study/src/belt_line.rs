@@ -71,6 +71,11 @@ impl<'a> BeltLine<'a> {
         self.arm.p(&Pose::new(&self.theta_rad(tau)), friction, slip)
     }
 
+    /// Returns p/Q22 at τ.
+    pub fn p_ratio(&self, tau: f64, friction: f64, slip: Slip) -> f64 {
+        self.p(tau, friction, slip) / self.inverse_tip_inertia(tau).m22
+    }
+
     /// Returns the friction coefficient at which p is zero at τ; infinite if there is none.
     pub fn friction_of_zero_p(&self, tau: f64, slip: Slip) -> f64 {
         let q = self.inverse_tip_inertia(tau);

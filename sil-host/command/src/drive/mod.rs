@@ -17,6 +17,7 @@ use painleve_record::{McapLog, Recorder};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::mounting::SensorParts;
+use painleve_shared::range;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 use serde::Serialize;
@@ -274,16 +275,15 @@ impl Drive {
 }
 
 /// Highest control rate with two sensors on each channel, Hz: a set of readings takes some 160 µs.
-const FASTEST_WITH_TWO_SENSORS_HZ: u32 = 5000;
+const FASTEST_WITH_TWO_SENSORS_HZ: f64 = 5000.0;
 
 /// Refuses a control rate at which the board cannot read the sensors at every tick.
 fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
-    let fastest_hz = match scenario.converters.mounting.sensors {
-        SensorParts::Both => FASTEST_WITH_TWO_SENSORS_HZ,
-        SensorParts::First | SensorParts::Second => return Ok(()),
-    };
+    if scenario.converters.mounting.sensors != SensorParts::Both {
+        return Ok(());
+    }
     let hz = f64::from(scenario.run.tick_hz);
-    painleve_shared::range::check("run.tick_hz", hz, 1.0, f64::from(fastest_hz)).map_err(|source| {
+    range::check("run.tick_hz", hz, 1.0, FASTEST_WITH_TWO_SENSORS_HZ).map_err(|source| {
         ScenarioError::Range {
             origin: scenario.name.clone(),
             source,

@@ -108,7 +108,7 @@ fn everything_together_has_targets_away_from_the_edge_of_the_arm_that_moves() {
             let friction = everything.largest_friction.unwrap()(share, scenario.belt.friction);
             let line = BeltLine::new(&arm, posture);
             let tau = line.tau(judge::target_m(&scenario)).unwrap();
-            let p_ratio = line.p(tau, friction, slip) / line.p(tau, 0.0, slip);
+            let p_ratio = line.p_ratio(tau, friction, slip);
             assert!(p_ratio > 0.199, "{share}, run {run}: {p_ratio}");
         }
     }

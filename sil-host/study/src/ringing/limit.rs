@@ -1,9 +1,5 @@
 //! The stability limit of a contact that gives, with a friction observer around it.
 
-use painleve_shared::Slip;
-
-use crate::belt_line::BeltLine;
-
 /// A sliding contact and the arm behind it, at one place on the belt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactAtPlace {
@@ -18,11 +14,6 @@ pub struct ContactAtPlace {
 }
 
 impl ContactAtPlace {
-    /// p/Q22 at τ of a belt line.
-    pub fn p_ratio(line: &BeltLine<'_>, tau: f64, friction: f64, slip: Slip) -> f64 {
-        line.p(tau, friction, slip) / line.inverse_tip_inertia(tau).m22
-    }
-
     /// Returns the largest stable rate λ of the observer, 1/s; infinite if every rate is stable.
     ///
     /// It is the smaller root of the limit of Routh and Hurwitz, (λ + c p)(k p + c Q22 λ) = k Q22 λ.

@@ -142,7 +142,7 @@ impl Ringing {
         let p = |tau| line.p(tau, base.belt.friction, slip);
         let last = positive_stretches(p).pop();
         let (low, to) = last.ok_or(StudyError::NothingAdmissible)?;
-        let ratio = |tau| ContactAtPlace::p_ratio(&line, tau, base.belt.friction, slip);
+        let ratio = |tau| line.p_ratio(tau, base.belt.friction, slip);
         let step = (to - low) / PLACES as f64;
         let mut from = to;
         while from - step > low && ratio(from - step) > ratio(from) {
@@ -188,7 +188,7 @@ impl Study for Ringing {
         let arm = Arm::new(base.arm)?;
         let line = BeltLine::new(&arm, POSTURE);
         let way = self.way(&arm, &base)?;
-        let ratio = |tau| ContactAtPlace::p_ratio(&line, tau, base.belt.friction, slip(&base));
+        let ratio = |tau| line.p_ratio(tau, base.belt.friction, slip(&base));
         let rings = |tau| self.rings(damping_ns_m, rate_per_s, line.tip_t_m(tau));
         let contact = |tau| {
             let q22 = line.inverse_tip_inertia(tau).m22;

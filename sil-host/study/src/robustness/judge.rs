@@ -82,9 +82,8 @@ pub fn run<P: Plant>(
     let friction = scenario.belt.friction;
     let stretch = stretch_around_m(&arm, posture, friction, slip, start_m);
     let line = BeltLine::new(&arm, posture);
-    let p_ratio = line.tau(trial.tip_t_m()).map_or(f64::NAN, |tau| {
-        line.p(tau, friction, slip) / line.p(tau, 0.0, slip)
-    });
+    let tau = line.tau(trial.tip_t_m());
+    let p_ratio = tau.map_or(f64::NAN, |tau| line.p_ratio(tau, friction, slip));
     let to_edge_m = if target_m > start_m {
         stretch.end - trial.tip_t_m()
     } else {

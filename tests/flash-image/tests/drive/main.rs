@@ -65,17 +65,20 @@ fn an_arm_is_driven_after_the_order_and_the_switch_and_recorded() {
     }
 }
 
-#[test]
-fn a_dry_run_keeps_the_stages_off() {
-    let rig = EmulatedRig::new();
-    let mut program = StartedProgram::drive(
-        &rig.port,
-        &["--dry-run", "--no-record", "--duration", "0.5"],
-    );
+/// The output of half a second of a dry run with the switch closed.
+fn dry_run(rig: &EmulatedRig, settings: &[&str]) -> Output {
+    let dry = ["--dry-run", "--no-record", "--duration", "0.5"];
+    let mut program = StartedProgram::drive(&rig.port, &[&dry[..], settings].concat());
     program.order("arm");
     rig.wait_for_work();
     rig.close_switch();
-    let (output, _) = program.end();
+    program.end().0
+}
+
+#[test]
+fn a_dry_run_keeps_the_stages_off() {
+    let rig = EmulatedRig::new();
+    let output = dry_run(&rig, &[]);
     assert!(!errors(&output).contains("one sensor on each channel"));
     assert!(report(&output)["active_ticks"].as_u64() > Some(50));
     assert_eq!(rig.ticks_on(), 0);
@@ -83,23 +86,8 @@ fn a_dry_run_keeps_the_stages_off() {
 
 #[test]
 fn an_arm_with_one_sensor_on_each_channel_is_an_exception_that_is_announced() {
-    let rig = EmulatedRig::new();
     let one = "converters.mounting.sensors=first";
-    let mut program = StartedProgram::drive(
-        &rig.port,
-        &[
-            "--set",
-            one,
-            "--dry-run",
-            "--no-record",
-            "--duration",
-            "0.5",
-        ],
-    );
-    program.order("arm");
-    rig.wait_for_work();
-    rig.close_switch();
-    let (output, _) = program.end();
+    let output = dry_run(&EmulatedRig::new(), &["--set", one]);
     let warning = "one sensor on each channel: the board detects a frozen encoder";
     assert!(errors(&output).contains(warning));
     assert!(report(&output)["active_ticks"].as_u64() > Some(50));
