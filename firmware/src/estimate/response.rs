@@ -10,6 +10,10 @@
 //! is stable while λ < c p²/(Q22 − p), near the edge λ T < ρ p/Q22. ρ therefore limits the part of the
 //! force error that observers and integrals may remove in a tick. Until the response is that of a rigid
 //! contact, the tip is also kept away from the edge.
+//!
+//! A vibration below 100 Hz drowns the response in first differences of the force, but hardly appears in second
+//! differences. These show whether the contact certainly is not rigid; changes that neither probe nor rounding
+//! nor noise explain show how restless it is.
 
 use painleve_shared::{Real, settings};
 
@@ -57,6 +61,8 @@ const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
 const LEAST_REST: f32 = 0.05;
 /// Time in contact before the correlation starts, s.
 const SETTLING_S: f32 = 0.05;
+/// Rate at which a restless contact counts as calm again, N/s.
+const CALMING_N_S: f32 = 0.15;
 /// Multiple of `minimum_p_ratio` below which the contact is observed.
 const NEAR: f32 = 3.0;
 /// Time for which a contact that was certainly not rigid counts as one that gives, s.
@@ -100,6 +106,8 @@ pub struct ContactResponse {
     pub least_p_ratio: f32,
     /// Probe to be added to the wanted normal force, N.
     pub probe_n: f32,
+    /// Root mean square of the changes of force from tick to tick by causes unknown, N.
+    pub restless_n: f32,
 }
 
 impl ContactResponse {
@@ -112,6 +120,7 @@ impl ContactResponse {
             has_lagged: false,
             least_p_ratio: 0.0,
             probe_n: 0.0,
+            restless_n: 0.0,
         }
     }
 }
@@ -130,24 +139,61 @@ pub struct ResponseEstimator {
     approach: f32,
     /// Share for each unit of p that is always allowed, kg.
     least_share_kg: f32,
+    /// Square of the changes of force by noise, in a block, N².
+    noise_n2: f32,
+    /// Fall of the restlessness in a block, N.
+    calming_n: f32,
 }
 
-/// Sums or averages over blocks of ticks, N².
+/// Sums or averages over blocks of ticks, N², of first or of second differences of the force.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
-    /// Change of force times expected change, for each delay.
+    /// Measured times expected difference, for each delay.
     products: [f32; DELAYS],
-    /// Square of the expected change.
+    /// Square of the expected difference.
     expected: f32,
-    /// Square of the change of force.
+    /// Square of the measured difference.
     measured: f32,
+}
+
+impl Moments {
+    /// Adds a measured difference, N, and the ones expected at each delay.
+    #[inline]
+    fn add(&mut self, measured_n: f32, expected_n: [f32; DELAYS]) {
+        for (product, expected_n) in self.products.iter_mut().zip(expected_n) {
+            *product += measured_n * expected_n;
+        }
+        let [_, expected_n, _] = expected_n;
+        self.expected += expected_n * expected_n;
+        self.measured += measured_n * measured_n;
+    }
+
+    /// Moves the averages by `weight` towards the sums of a block.
+    fn approach(&mut self, sums: &Self, weight: f32) {
+        for (average, sum) in self.products.iter_mut().zip(sums.products) {
+            *average += weight * (sum - *average);
+        }
+        self.expected += weight * (sums.expected - self.expected);
+        self.measured += weight * (sums.measured - self.measured);
+    }
+
+    /// Returns ρ and its standard deviation, from averages whose last block had this weight.
+    fn response(&self, weight: f32) -> (f32, f32) {
+        let largest = |most: f32, product: &f32| product.at_least(most);
+        let most = self.products.iter().fold(0.0, largest);
+        let square = self.expected.at_least(1e-12);
+        let variance = weight / (2.0 - weight) * self.measured * square;
+        let deviation = (variance / f32::from(BLOCK_TICKS)).square_root() / square;
+        (most / square, deviation)
+    }
 }
 
 /// The estimator's state.
 #[derive(Clone, Copy, Debug)]
 pub struct ResponseState {
-    /// Last normal force, N.
+    /// Last normal force and its last change, N.
     force_n: f32,
+    change_n: f32,
     /// Last withheld force, N.
     withheld_n: f32,
     /// Last change of force that was commanded in addition to the law's, N.
@@ -156,22 +202,23 @@ pub struct ResponseState {
     probe_n: f32,
     random: u16,
     /// Expected changes of force, N, the latest first.
-    expected_n: [f32; DELAYS],
-    /// Sums over the present block.
-    block: Moments,
+    expected_n: [f32; DELAYS + 1],
+    /// Sums over the present block, of first and of second differences.
+    block: [Moments; 2],
     block_ticks: u8,
     /// Averages of the blocks.
-    averages: Moments,
+    averages: [Moments; 2],
     blocks: f32,
     /// Weight of the last block.
     block_weight: f32,
-    /// Bounds of ρ.
+    /// Bounds of ρ from first differences.
     lower: f32,
     upper: f32,
     /// Fraction of the observers' full gain that the lower bound allows.
     gain: f32,
-    /// How much the contact gives, and how certainly it is not rigid, from the upper bound.
+    /// How much the contact gives, from the upper bound.
     give: f32,
+    /// How certainly it is not rigid, from the upper bound of second differences.
     lags: f32,
     /// Remaining time for which the contact counts as one that has lagged, s.
     lagged_s: f32,
@@ -181,11 +228,13 @@ pub struct ResponseState {
     near_s: f32,
     /// Least p/Q22 at which the tip may be.
     least_p_ratio: f32,
+    /// How restless the contact was lately, N.
+    restless_n: f32,
 }
 
 impl ResponseEstimator {
-    /// Makes an estimator that is called every `tick_s`.
-    pub fn new(settings: &ResponseSettings, tick_s: f32) -> Self {
+    /// Makes an estimator that is called every `tick_s`, for readings with this standard deviation (N).
+    pub fn new(settings: &ResponseSettings, force_noise_n: f32, tick_s: f32) -> Self {
         let period_s = f32::from(PERIOD_TICKS) * tick_s;
         Self {
             settings: *settings,
@@ -195,6 +244,8 @@ impl ResponseEstimator {
             period_s,
             approach: period_s * settings.approach_per_s,
             least_share_kg: settings.least_damping_ns_m * tick_s,
+            noise_n2: 2.0 * f32::from(BLOCK_TICKS) * force_noise_n * force_noise_n,
+            calming_n: period_s * CALMING_N_S,
         }
     }
 
@@ -202,14 +253,15 @@ impl ResponseEstimator {
     pub fn start(&self) -> ResponseState {
         ResponseState {
             force_n: 0.0,
+            change_n: 0.0,
             withheld_n: 0.0,
             excitation_n: 0.0,
             probe_n: 0.0,
             random: 1,
-            expected_n: [0.0; DELAYS],
-            block: Moments::default(),
+            expected_n: [0.0; DELAYS + 1],
+            block: Default::default(),
             block_ticks: 0,
-            averages: Moments::default(),
+            averages: Default::default(),
             blocks: 0.0,
             block_weight: 1.0,
             lower: 0.0,
@@ -221,6 +273,7 @@ impl ResponseEstimator {
             touched_s: 0.0,
             near_s: 0.0,
             least_p_ratio: self.settings.minimum_p_ratio,
+            restless_n: 0.0,
         }
     }
 
@@ -244,6 +297,7 @@ impl ResponseEstimator {
             has_lagged: state.lagged_s > 0.0,
             least_p_ratio: state.least_p_ratio,
             probe_n: state.probe_n,
+            restless_n: state.restless_n,
         }
     }
 
@@ -255,10 +309,13 @@ impl ResponseEstimator {
         let expected_n = excitation_n - state.excitation_n;
         state.withheld_n = reading.withheld_n;
         state.excitation_n = excitation_n;
-        let [e0, e1, _] = state.expected_n;
-        state.expected_n = [expected_n, e0, e1];
-        let change = reading.normal_force_n - state.force_n;
+        let [e1, e2, e3, _] = state.expected_n;
+        let e0 = expected_n;
+        state.expected_n = [e0, e1, e2, e3];
+        let change_n = reading.normal_force_n - state.force_n;
+        let change_of_change_n = change_n - state.change_n;
         state.force_n = reading.normal_force_n;
+        state.change_n = change_n;
         state.touched_s += self.tick_s;
         state.probe_n = 0.0;
         if state.touched_s < SETTLING_S {
@@ -269,12 +326,9 @@ impl ResponseEstimator {
         }
         if state.block_ticks < BLOCK_TICKS {
             state.block_ticks += 1;
-            let sums = &mut state.block;
-            for (product, expected) in sums.products.iter_mut().zip(&state.expected_n) {
-                *product += change * expected;
-            }
-            sums.expected += e0 * e0;
-            sums.measured += change * change;
+            let [first, second] = &mut state.block;
+            first.add(change_n, [e0, e1, e2]);
+            second.add(change_of_change_n, [e0 - e1, e1 - e2, e2 - e3]);
             return false;
         }
         true
@@ -300,12 +354,9 @@ impl ResponseEstimator {
         // The plain mean of the first blocks, until it covers the averaging time.
         let weight = (1.0 / state.blocks).at_least(self.weight).at_most(1.0);
         state.block_weight = weight;
-        let averages = &mut state.averages;
-        for (average, sum) in averages.products.iter_mut().zip(sums.products) {
-            *average += weight * (sum - *average);
+        for (averages, sums) in state.averages.iter_mut().zip(&sums) {
+            averages.approach(sums, weight);
         }
-        averages.expected += weight * (sums.expected - averages.expected);
-        averages.measured += weight * (sums.measured - averages.measured);
     }
 
     /// Updates the bounds of ρ from the averages.
@@ -313,19 +364,19 @@ impl ResponseEstimator {
     fn bound(&self, state: &mut ResponseState) {
         state.block_ticks = 0;
         let weight = state.block_weight;
-        let averages = &state.averages;
-        let largest = |most: f32, product: &f32| product.at_least(most);
-        let most = averages.products.iter().fold(0.0, largest);
-        let square = averages.expected.at_least(1e-12);
-        let variance = weight / (2.0 - weight) * averages.measured * square;
-        let deviation = (variance / f32::from(BLOCK_TICKS)).square_root() / square;
-        let response = most / square;
         let settings = &self.settings;
+        let [first, second] = &state.averages;
+        let (response, deviation) = first.response(weight);
         state.lower = response - settings.deviations * deviation;
         state.upper = response + settings.deviations * deviation;
         state.gain = state.lower / settings.full_gain;
         state.give = (1.0 - state.upper / settings.gives).at_least(0.0);
-        state.lags = (2.0 - 2.0 * state.upper / settings.rigid).limited(0.0, 1.0);
+        let (response, deviation) = second.response(weight);
+        let upper = response + settings.deviations * deviation;
+        state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);
+        let unexplained_n2 = first.measured - first.expected - self.noise_n2;
+        let restless_n = (unexplained_n2.at_least(0.0) / f32::from(BLOCK_TICKS)).square_root();
+        state.restless_n = restless_n.at_least(state.restless_n - self.calming_n);
         state.lagged_s = if state.lags > 0.0 {
             LAGGED_S
         } else {
@@ -361,7 +412,7 @@ impl ResponseState {
             self.touched_s = 0.0;
             self.probe_n = 0.0;
             self.give = 0.0;
-            self.block = Moments::default();
+            self.block = Default::default();
             self.block_ticks = 0;
         }
     }
@@ -400,7 +451,7 @@ mod tests {
     /// Returns the response after `ticks` near the edge, for a contact that gives the force (N) in
     /// answer to the force commanded at the previous tick.
     fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
-        let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
+        let estimator = ResponseEstimator::new(&ResponseSettings::default(), 0.1, TICK_S);
         let mut state = estimator.start();
         let (mut withheld, mut commanded) = (0.0, 10.0);
         for tick in 0..ticks {
@@ -487,13 +538,37 @@ mod tests {
         );
     }
 
+    /// Returns the response of a contact whose force swings by 3 N at 50 Hz.
+    fn swinging(mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
+        let mut ticks = 0;
+        observed(1000, |commanded| {
+            ticks += 1;
+            contact(commanded) + 3.0 * libm::sinf(core::f32::consts::TAU * 0.05 * ticks as f32)
+        })
+    }
+
+    #[test]
+    fn a_force_that_swings_is_restless_and_one_that_answers_the_probe_is_calm() {
+        assert_eq!(observed(1000, |commanded| commanded).restless_n, 0.0);
+        // 3 N at 50 Hz change by 0.66 N a tick, root mean square, of which 0.14 N may be noise.
+        let swings = swinging(|commanded| commanded);
+        assert!((swings.restless_n - 0.65).abs() < 0.05, "{swings:?}");
+    }
+
+    #[test]
+    fn a_contact_certainly_lags_even_if_its_force_swings() {
+        let gives = swinging(compliant(1e5, 60.0));
+        assert!(gives.lags > 0.0, "{gives:?}");
+        assert_eq!(swinging(|commanded| commanded).lags, 0.0);
+    }
+
     #[test]
     fn all_is_allowed_if_it_is_off() {
         let settings = ResponseSettings {
             enabled: false,
             ..Default::default()
         };
-        let estimator = ResponseEstimator::new(&settings, TICK_S);
+        let estimator = ResponseEstimator::new(&settings, 0.1, TICK_S);
         let found = estimator.response(&estimator.start(), P_PER_KG, P_RATIO);
         assert_eq!(found, ContactResponse::rigid(P_RATIO));
     }
