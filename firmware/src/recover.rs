@@ -25,6 +25,12 @@ const DEEPEST_M: f32 = 0.03;
 /// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are
 /// shorter.
 const SEARCHING: f32 = 4.0;
+/// Part of the arm's reach that the path uses, so that the links are never quite straight.
+const USED_REACH: f32 = 0.9999;
+/// Rate at which the landing point moves inwards while the path is out of reach, 1/s.
+const INWARDS_PER_S: f32 = 0.5;
+/// Speed along the belt below which the tip is at rest, m/s.
+const AT_REST_M_S: f32 = 0.01;
 
 settings! {
     /// Settings of the recovery.
@@ -126,6 +132,11 @@ impl Recovery {
             touched_s: 0.0,
         });
         flight.touched_s = 0.0;
+        // Where the belt is higher than assumed, the tip rests on it on its way: it may land there, too.
+        let waits = !flight.lands && flight.height_m == settings.clearance_m;
+        if waits && model.tip_velocity_m_s.x.abs() < AT_REST_M_S {
+            flight.landing_m = model.tip_m.x;
+        }
         if let Some((lower, upper)) = edges_m {
             flight.landing_m = flight.landing_m.limited(lower, upper);
         }
@@ -147,9 +158,16 @@ impl Recovery {
             -down
         };
         flight.height_m = (flight.height_m + vertical_speed * tick_s).at_least(-DEEPEST_M);
-        let height_m = flight.height_m - arm.height_m();
+        let wanted_m = Vector2::new(flight.landing_m, flight.height_m - arm.height_m());
+        // A path below the belt ends at the arm's reach, most of all once the links have been found shorter. Further
+        // inwards it gets deeper and presses.
+        let distance_m = wanted_m.norm_squared().square_root();
+        let excess = (distance_m / (USED_REACH * arm.reach_m())).at_least(1.0);
+        if excess > 1.0 {
+            flight.landing_m *= 1.0 - (tick_s * INWARDS_PER_S).at_most(1.0);
+        }
         let path_rad = arm
-            .link_angles_rad(&Vector2::new(flight.landing_m, height_m), flight.posture)
+            .link_angles_rad(&(wanted_m / excess), flight.posture)
             .or(flight.path_rad)
             .unwrap_or(model.theta_rad);
         let path_rate_rad_s = (path_rad - flight.path_rad.unwrap_or(path_rad)) / tick_s;
@@ -196,6 +214,58 @@ mod tests {
         }
         (0..11).for_each(|_| state.touch(1e-3));
         assert_eq!(state.posture(), None);
+    }
+
+    /// Returns the acceleration (m/s²) with which the recovery presses the tip down after `ticks` in which the belt
+    /// holds it at `tip_t_m` and `gap_m`, and the landing point, m.
+    fn held(length_m: f32, landing_m: f32, tip_t_m: f32, gap_m: f32, ticks: u32) -> (f32, f32) {
+        let arm = Arm::<f32>::new(ArmParameters {
+            link_length_m: [length_m; 2],
+            ..Default::default()
+        })
+        .unwrap();
+        let posture = Posture::ElbowDown;
+        let tip_m = Vector2::new(tip_t_m, gap_m - arm.height_m());
+        let theta = arm.link_angles_rad(&tip_m, posture).unwrap();
+        let torque = GeneralisedTorque::zeros();
+        let model = Model::new(&arm, theta, LinkMotion::zeros(), &torque);
+        let recovery = Recovery::new(&RecoverySettings::default(), 1e-3);
+        let mut state = RecoveryState {
+            flight: Some(Flight {
+                landing_m,
+                height_m: gap_m,
+                lands: gap_m <= 0.0,
+                posture,
+                path_rad: None,
+                touched_s: 0.0,
+            }),
+        };
+        let edges = Some((-0.15, 0.15));
+        let torque = (0..ticks)
+            .map(|_| recovery.tick(&mut state, &arm, &model, edges).torque_nm)
+            .last()
+            .unwrap();
+        let acceleration = model.free_acceleration_rad_s2(&torque);
+        let down = -(model.jacobian * acceleration.vector()).y;
+        (down, state.flight.unwrap().landing_m)
+    }
+
+    #[test]
+    fn a_path_out_of_reach_presses_the_tip_down_nevertheless() {
+        // At 0.2035 m a depth of 3 mm is out of reach at -0.144 m.
+        let (down, landing) = held(0.2035, -0.144, -0.1405, 0.0, 400);
+        assert!(down > 3.0 && landing > -0.14, "{down} {landing}");
+        let (down, landing) = held(0.22, -0.144, -0.1405, 0.0, 400);
+        assert!(down > 3.0 && landing == -0.144, "{down} {landing}");
+    }
+
+    #[test]
+    fn a_tip_at_rest_on_a_belt_higher_than_assumed_lands_there() {
+        let (down, landing) = held(0.21, -0.04, -0.035, 0.003, 400);
+        assert!(
+            down > 3.0 && (landing + 0.035).abs() < 1e-6,
+            "{down} {landing}"
+        );
     }
 
     proptest! {
