@@ -130,9 +130,10 @@ impl Law for HybridSettings {
         }
     }
 
-    /// Resets the integrals and starts from the present contact force.
+    /// Resets the integrals and starts from the present contact force, at most f_n*: an arm that fell on the
+    /// belt may press with more than the torque can hold.
     fn reset(&self, state: &mut HybridState, input: &LawInput<'_>) {
-        let force_n = input.force_n.y.at_least(0.0);
+        let force_n = input.force_n.y.limited(0.0, self.normal_force_n);
         // Limit to the friction cone: a saturated force cell gives any ratio.
         let cone_n = input.friction.coefficient * force_n;
         *state = HybridState {
@@ -440,6 +441,20 @@ mod tests {
         input.saturated = true;
         input.force_n = Vector2::zeros();
         assert_eq!(settings.force_drift_m_s2(&mut state, &input), learnt);
+    }
+
+    #[test]
+    fn a_tip_that_presses_too_much_is_wanted_to_press_no_more_than_it_should() {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let model = at_rest(&arm);
+        let settings = HybridSettings::default();
+        let mut input = sliding(&arm, &model);
+        let mut state = HybridState::default();
+        for (force_n, wanted_n) in [(20.0, 10.0), (4.0, 4.0), (-0.2, 0.0)] {
+            input.force_n.y = force_n;
+            settings.reset(&mut state, &input);
+            assert_eq!(state.wanted_force_n, Some(wanted_n));
+        }
     }
 
     #[test]

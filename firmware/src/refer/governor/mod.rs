@@ -26,6 +26,10 @@ const STEPS_OVER_REACH: f32 = 64.0;
 /// Fraction of the reach in use: beyond it the arm is almost straight.
 const USABLE_REACH: f32 = 0.995;
 
+/// Least distance kept from the edge, times the square of the control period, m/s²: below 1 kHz the tip
+/// swings further before the controller reacts.
+const DISTANCE_PER_S2: f32 = 500.0;
+
 /// A reference farther than this from the last one, m, counts as a jump; the governor catches up
 /// with it.
 const JUMP_M: f32 = 2e-3;
@@ -149,7 +153,10 @@ impl EdgeGovernor {
             least_p_ratio: settings
                 .minimum_p_ratio
                 .at_least(settings.p_ratio_per_s2 * tick_s * tick_s),
-            distance_m: settings.distance_m + settings.distance_counts * joints.count_m,
+            distance_m: settings
+                .distance_m
+                .at_least(DISTANCE_PER_S2 * tick_s * tick_s)
+                + settings.distance_counts * joints.count_m,
             clearance_m: settings.clearance_m_nm * joints.friction_nm
                 + settings.clearance_m_rad * joints.play_rad,
             clearance_m_n: settings.clearance_m_n,
@@ -407,6 +414,15 @@ mod tests {
         let most = edge_m(10.0);
         assert!((most - (0.164_71 - 0.008)).abs() < 3e-5, "{most}");
         assert_eq!(edge_m(0.0), calm);
+    }
+
+    #[test]
+    fn the_distance_from_the_edge_grows_with_the_period_below_1_khz() {
+        let settings = GovernorSettings::default();
+        for (tick_hz, distance_m) in [(4000.0, 0.5e-3), (1000.0, 0.5e-3), (500.0, 2e-3)] {
+            let governor = EdgeGovernor::new(&settings, 1.0 / tick_hz, &JointErrors::default());
+            assert!((governor.distance_m - distance_m).abs() < 1e-6);
+        }
     }
 
     #[test]
