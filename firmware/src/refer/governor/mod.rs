@@ -26,9 +26,9 @@ const STEPS_OVER_REACH: f32 = 64.0;
 /// Fraction of the reach in use: beyond it the arm is almost straight.
 const USABLE_REACH: f32 = 0.995;
 
-/// Least distance kept from the edge, times the square of the control period, m/s²: below 1 kHz the tip
-/// swings further before the controller reacts.
-const DISTANCE_PER_S2: f32 = 500.0;
+/// Longest control period for which the distance kept from the edge suffices, s. With longer ones it grows with their
+/// square: the tip swings further before the controller reacts.
+const PERIOD_S: f32 = 1e-3;
 
 /// A reference farther than this from the last one, m, counts as a jump; the governor catches up
 /// with it.
@@ -144,6 +144,7 @@ impl GovernorState {
 impl EdgeGovernor {
     /// Makes a governor that is called every `tick_s`, for these joints.
     pub fn new(settings: &GovernorSettings, tick_s: f32, joints: &JointErrors) -> Self {
+        let periods = (tick_s / PERIOD_S).at_least(1.0);
         Self {
             enabled: settings.enabled,
             friction_deviations: settings.friction_deviations,
@@ -153,9 +154,7 @@ impl EdgeGovernor {
             least_p_ratio: settings
                 .minimum_p_ratio
                 .at_least(settings.p_ratio_per_s2 * tick_s * tick_s),
-            distance_m: settings
-                .distance_m
-                .at_least(DISTANCE_PER_S2 * tick_s * tick_s)
+            distance_m: settings.distance_m * (periods * periods)
                 + settings.distance_counts * joints.count_m,
             clearance_m: settings.clearance_m_nm * joints.friction_nm
                 + settings.clearance_m_rad * joints.play_rad,
