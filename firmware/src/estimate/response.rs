@@ -169,6 +169,7 @@ impl Moments {
     }
 
     /// Moves the averages by `weight` towards the sums of a block.
+    #[inline(never)]
     fn approach(&mut self, sums: &Self, weight: f32) {
         for (average, sum) in self.products.iter_mut().zip(sums.products) {
             *average += weight * (sum - *average);
@@ -178,6 +179,7 @@ impl Moments {
     }
 
     /// Returns ρ and its standard deviation, from averages whose last block had this weight.
+    #[inline(never)]
     fn response(&self, weight: f32) -> (f32, f32) {
         let largest = |most: f32, product: &f32| product.at_least(most);
         let most = self.products.iter().fold(0.0, largest);
