@@ -202,11 +202,7 @@ impl Estimators {
                 tick_s,
             ),
             belt: BeltEstimator::new(settings.belt, tick_s),
-            response: ResponseEstimator::new(
-                settings.response,
-                settings.contact.force_noise_n,
-                tick_s,
-            ),
+            response: ResponseEstimator::new(settings.response, tick_s),
             disturbance: DisturbanceEstimator::new(
                 settings.disturbance,
                 HEAVY_EVERY_TICKS * tick_s,

@@ -61,6 +61,9 @@ const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
 const LEAST_REST: f32 = 0.05;
 /// Time in contact before the correlation starts, s.
 const SETTLING_S: f32 = 0.05;
+/// Part of the square of the second differences that may be noise in the first ones: a third if it is white, and half as
+/// much again for its chance.
+const NOISE_SHARE: f32 = 0.5;
 /// Rate at which a restless contact counts as calm again, N/s.
 const CALMING_N_S: f32 = 0.15;
 /// Multiple of `minimum_p_ratio` below which the contact is observed.
@@ -139,8 +142,6 @@ pub struct ResponseEstimator {
     approach: f32,
     /// Share for each unit of p that is always allowed, kg.
     least_share_kg: f32,
-    /// Square of the changes of force by noise, in a block, N².
-    noise_n2: f32,
     /// Fall of the restlessness in a block, N.
     calming_n: f32,
 }
@@ -235,8 +236,8 @@ pub struct ResponseState {
 }
 
 impl ResponseEstimator {
-    /// Makes an estimator that is called every `tick_s`, for readings with this standard deviation (N).
-    pub fn new(settings: &ResponseSettings, force_noise_n: f32, tick_s: f32) -> Self {
+    /// Makes an estimator that is called every `tick_s`.
+    pub fn new(settings: &ResponseSettings, tick_s: f32) -> Self {
         let period_s = f32::from(PERIOD_TICKS) * tick_s;
         Self {
             settings: *settings,
@@ -246,7 +247,6 @@ impl ResponseEstimator {
             period_s,
             approach: period_s * settings.approach_per_s,
             least_share_kg: settings.least_damping_ns_m * tick_s,
-            noise_n2: 2.0 * f32::from(BLOCK_TICKS) * force_noise_n * force_noise_n,
             calming_n: period_s * CALMING_N_S,
         }
     }
@@ -376,8 +376,10 @@ impl ResponseEstimator {
         let (response, deviation) = second.response(weight);
         let upper = response + settings.deviations * deviation;
         state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);
-        let unexplained_n2 = first.measured - first.expected - self.noise_n2;
-        let restless_n = (unexplained_n2.at_least(0.0) / f32::from(BLOCK_TICKS)).square_root();
+        // White noise has second differences whose square is three times that of the first ones.
+        let unexplained = |of: &Moments| (of.measured - of.expected).at_least(0.0);
+        let slow_n2 = unexplained(first) - NOISE_SHARE * unexplained(second);
+        let restless_n = (slow_n2.at_least(0.0) / f32::from(BLOCK_TICKS)).square_root();
         state.restless_n = restless_n.at_least(state.restless_n - self.calming_n);
         state.lagged_s = if state.lags > 0.0 {
             LAGGED_S
@@ -453,7 +455,7 @@ mod tests {
     /// Returns the response after `ticks` near the edge, for a contact that gives the force (N) in
     /// answer to the force commanded at the previous tick.
     fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
-        let estimator = ResponseEstimator::new(&ResponseSettings::default(), 0.1, TICK_S);
+        let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
         let mut state = estimator.start();
         let (mut withheld, mut commanded) = (0.0, 10.0);
         for tick in 0..ticks {
@@ -570,7 +572,7 @@ mod tests {
             enabled: false,
             ..Default::default()
         };
-        let estimator = ResponseEstimator::new(&settings, 0.1, TICK_S);
+        let estimator = ResponseEstimator::new(&settings, TICK_S);
         let found = estimator.response(&estimator.start(), P_PER_KG, P_RATIO);
         assert_eq!(found, ContactResponse::rigid(P_RATIO));
     }
