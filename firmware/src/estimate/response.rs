@@ -61,9 +61,8 @@ const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
 const LEAST_REST: f32 = 0.05;
 /// Time in contact before the correlation starts, s.
 const SETTLING_S: f32 = 0.05;
-/// Part of the square of the second differences that may be noise in the first ones: a third if it is white, and half as
-/// much again for its chance.
-const NOISE_SHARE: f32 = 0.5;
+/// Changes of force from tick to tick that the loop itself makes of noise, root mean square, N.
+const CALM_N: f32 = 0.1;
 /// Rate at which a restless contact counts as calm again, N/s.
 const CALMING_N_S: f32 = 0.15;
 /// Multiple of `minimum_p_ratio` below which the contact is observed.
@@ -376,11 +375,14 @@ impl ResponseEstimator {
         let (response, deviation) = second.response(weight);
         let upper = response + settings.deviations * deviation;
         state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);
-        // White noise has second differences whose square is three times that of the first ones.
+        // Swings slower than a sixth of the control rate have smaller second differences than first ones, white noise
+        // has larger ones.
         let unexplained = |of: &Moments| (of.measured - of.expected).at_least(0.0);
-        let slow_n2 = unexplained(first) - NOISE_SHARE * unexplained(second);
-        let restless_n = (slow_n2.at_least(0.0) / f32::from(BLOCK_TICKS)).square_root();
-        state.restless_n = restless_n.at_least(state.restless_n - self.calming_n);
+        let slow_n2 = unexplained(first) - unexplained(second);
+        let restless_n = (slow_n2.at_least(0.0) / f32::from(BLOCK_TICKS)).square_root() - CALM_N;
+        state.restless_n = restless_n
+            .at_least(state.restless_n - self.calming_n)
+            .at_least(0.0);
         state.lagged_s = if state.lags > 0.0 {
             LAGGED_S
         } else {
@@ -556,7 +558,7 @@ mod tests {
         assert_eq!(observed(1000, |commanded| commanded).restless_n, 0.0);
         // 3 N at 50 Hz change by 0.66 N a tick, root mean square, of which 0.14 N may be noise.
         let swings = swinging(|commanded| commanded);
-        assert!((swings.restless_n - 0.65).abs() < 0.05, "{swings:?}");
+        assert!((swings.restless_n - 0.53).abs() < 0.05, "{swings:?}");
     }
 
     #[test]
