@@ -12,8 +12,8 @@
 //! contact, the tip is also kept away from the edge.
 //!
 //! A vibration below 100 Hz drowns the response in first differences of the force, but hardly appears in second
-//! differences. These show whether the contact certainly is not rigid; changes that neither probe nor rounding
-//! nor noise explain show how restless it is.
+//! differences. These show whether the contact certainly is not rigid. Changes that probe and rounding do not
+//! explain, and that are larger in first than in second differences, as noise is not, show how restless it is.
 
 use painleve_shared::{Real, settings};
 
@@ -108,7 +108,8 @@ pub struct ContactResponse {
     pub least_p_ratio: f32,
     /// Probe to be added to the wanted normal force, N.
     pub probe_n: f32,
-    /// Root mean square of the changes of force from tick to tick by causes unknown, N.
+    /// Root mean square of the slow changes of force from tick to tick by causes unknown, less 0.1 N that the loop makes of
+    /// noise, N.
     pub restless_n: f32,
 }
 

@@ -418,90 +418,90 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
+    /// Runs `test` with the default settings, the input of a tip that slides on a contact that gives, and a new state.
+    fn while_sliding(test: impl FnOnce(&HybridSettings, &mut LawInput<'_>, &mut HybridState)) {
         let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
         let model = at_rest(&arm);
-        let settings = HybridSettings::default();
-        let mut input = sliding(&arm, &model);
-        let mut state = HybridState::default();
-        settings.reset(&mut state, &input);
-        let rest_n = Vector2::new(-0.3, 0.5);
-        let expected = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
-        for _ in 0..200 {
-            input.force_n = state.fed_force_n + rest_n;
-            settings.force_drift_m_s2(&mut state, &input);
-        }
-        let learnt = settings.force_drift_m_s2(&mut state, &input);
-        assert!(
-            (learnt - expected).abs() < 1e-3 * expected.abs(),
-            "{learnt} {expected}"
+        test(
+            &HybridSettings::default(),
+            &mut sliding(&arm, &model),
+            &mut HybridState::default(),
         );
-        // Nothing is learnt from a torque that was limited.
-        input.saturated = true;
-        input.force_n = Vector2::zeros();
-        assert_eq!(settings.force_drift_m_s2(&mut state, &input), learnt);
+    }
+
+    #[test]
+    fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
+        while_sliding(|settings, input, state| {
+            settings.reset(state, input);
+            let rest_n = Vector2::new(-0.3, 0.5);
+            let model = input.model;
+            let expected = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
+            for _ in 0..200 {
+                input.force_n = state.fed_force_n + rest_n;
+                settings.force_drift_m_s2(state, input);
+            }
+            let learnt = settings.force_drift_m_s2(state, input);
+            assert!(
+                (learnt - expected).abs() < 1e-3 * expected.abs(),
+                "{learnt} {expected}"
+            );
+            // Nothing is learnt from a torque that was limited.
+            input.saturated = true;
+            input.force_n = Vector2::zeros();
+            assert_eq!(settings.force_drift_m_s2(state, input), learnt);
+        });
     }
 
     #[test]
     fn a_tip_that_presses_too_much_is_wanted_to_press_no_more_than_it_should() {
-        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let model = at_rest(&arm);
-        let settings = HybridSettings::default();
-        let mut input = sliding(&arm, &model);
-        let mut state = HybridState::default();
-        for (force_n, wanted_n) in [(20.0, 10.0), (4.0, 4.0), (-0.2, 0.0)] {
-            input.force_n.y = force_n;
-            settings.reset(&mut state, &input);
-            assert_eq!(state.wanted_force_n, Some(wanted_n));
-        }
+        while_sliding(|settings, input, state| {
+            for (force_n, wanted_n) in [(20.0, 10.0), (4.0, 4.0), (-0.2, 0.0)] {
+                input.force_n.y = force_n;
+                settings.reset(state, input);
+                assert_eq!(state.wanted_force_n, Some(wanted_n));
+            }
+        });
     }
 
     #[test]
     fn a_reduced_force_is_no_error_of_the_friction() {
-        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let model = at_rest(&arm);
-        let settings = HybridSettings::default();
-        let mut input = sliding(&arm, &model);
-        let mut state = HybridState::default();
-        settings.reset(&mut state, &input);
-        state.filtered_friction_n = 0.0;
-        input.torque_limit_nm = 1.0;
-        for _ in 0..100 {
-            settings.tick(&mut state, &input);
-            // The contact follows the reduced force exactly.
-            let normal_n = state.fed_force_n.y;
-            input.force_n = Vector2::new(-FRICTION * normal_n, normal_n);
-        }
-        assert!(state.pressing < 0.9, "{state:?}");
-        let fed = -state.fed_force_n.x / state.fed_force_n.y;
-        assert!((fed - FRICTION).abs() < 1e-4, "{state:?}");
-        assert!(state.force_drift_m_s2.abs() < 1e-2, "{state:?}");
+        while_sliding(|settings, input, state| {
+            settings.reset(state, input);
+            state.filtered_friction_n = 0.0;
+            input.torque_limit_nm = 1.0;
+            for _ in 0..100 {
+                settings.tick(state, input);
+                // The contact follows the reduced force exactly.
+                let normal_n = state.fed_force_n.y;
+                input.force_n = Vector2::new(-FRICTION * normal_n, normal_n);
+            }
+            assert!(state.pressing < 0.9, "{state:?}");
+            let fed = -state.fed_force_n.x / state.fed_force_n.y;
+            assert!((fed - FRICTION).abs() < 1e-4, "{state:?}");
+            assert!(state.force_drift_m_s2.abs() < 1e-2, "{state:?}");
+        });
     }
 
     #[test]
     fn the_force_falls_at_once_but_recovers_slowly_on_a_contact_that_gives() {
-        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let model = at_rest(&arm);
-        let settings = HybridSettings::default();
-        let mut input = sliding(&arm, &model);
-        let mut state = HybridState::default();
-        settings.reset(&mut state, &input);
-        settings.tick(&mut state, &input);
-        assert_eq!(state.pressing, 1.0);
-        input.torque_limit_nm = 1.0;
-        settings.tick(&mut state, &input);
-        let reduced = state.pressing;
-        assert!(reduced < 0.9, "{reduced}");
-        input.torque_limit_nm = 50.0;
-        for _ in 0..10 {
-            settings.tick(&mut state, &input);
-        }
-        let share = (state.pressing - reduced) / (1.0 - reduced);
-        assert!((share - 0.1).abs() < 0.01, "{share}");
-        // A rigid contact does not ring.
-        input.response.has_lagged = false;
-        settings.tick(&mut state, &input);
-        assert_eq!(state.pressing, 1.0);
+        while_sliding(|settings, input, state| {
+            settings.reset(state, input);
+            settings.tick(state, input);
+            assert_eq!(state.pressing, 1.0);
+            input.torque_limit_nm = 1.0;
+            settings.tick(state, input);
+            let reduced = state.pressing;
+            assert!(reduced < 0.9, "{reduced}");
+            input.torque_limit_nm = 50.0;
+            for _ in 0..10 {
+                settings.tick(state, input);
+            }
+            let share = (state.pressing - reduced) / (1.0 - reduced);
+            assert!((share - 0.1).abs() < 0.01, "{share}");
+            // A rigid contact does not ring.
+            input.response.has_lagged = false;
+            settings.tick(state, input);
+            assert_eq!(state.pressing, 1.0);
+        });
     }
 }

@@ -45,7 +45,7 @@ pub struct LeastPRatio {
     pub landing: f32,
     /// What the contact's response asks for. The edges follow it.
     pub contact: f32,
-    /// Changes of the contact force from tick to tick by causes unknown, N. The edges follow them, too.
+    /// Slow changes of the contact force from tick to tick by causes unknown, N. The edges follow them, too.
     pub restless_n: f32,
 }
 
@@ -351,22 +351,26 @@ mod tests {
         }
     }
 
+    /// Returns the upper edge, m, at which the searches settle with the friction 0.6. p is zero at 0.16471 m.
+    fn upper_edge_m(governor: &EdgeGovernor, state: &mut GovernorState, least: LeastPRatio) -> f32 {
+        let friction = known(0.6, Slip::Positive);
+        for _ in 0..300 {
+            let posture = Posture::ElbowDown;
+            governor.search(state, &arm(), posture, -0.1, &friction, least);
+        }
+        state.edges_m().1
+    }
+
     #[test]
     fn joints_with_friction_or_play_keep_their_distance_from_where_p_is_zero() {
-        let friction = known(0.6, Slip::Positive);
         let edge_m = |joints: JointErrors, contact: f32| {
-            let settings = GovernorSettings::default();
-            let governor = EdgeGovernor::new(&settings, TICK_S, &joints);
+            let governor = EdgeGovernor::new(&GovernorSettings::default(), TICK_S, &joints);
             let mut state = GovernorState::new(arm().reach_on_belt_m());
             let least = LeastPRatio {
                 contact,
                 ..Default::default()
             };
-            for _ in 0..300 {
-                let posture = Posture::ElbowDown;
-                governor.search(&mut state, &arm(), posture, -0.1, &friction, least);
-            }
-            state.edges_m().1
+            upper_edge_m(&governor, &mut state, least)
         };
         let ideal = JointErrors::default();
         let rough = JointErrors {
@@ -374,7 +378,7 @@ mod tests {
             play_rad: 1e-3,
             ..ideal
         };
-        // p is zero at 0.16471 m; 0.05 N·m and 1 mrad keep 6.8 mm.
+        // 0.05 N·m and 1 mrad keep 6.8 mm.
         for contact in [0.0, 0.05] {
             let edge = edge_m(rough, contact);
             assert!((edge - (0.164_71 - 0.0068)).abs() < 3e-5, "{edge}");
@@ -391,7 +395,6 @@ mod tests {
 
     #[test]
     fn a_restless_force_keeps_the_tip_away_from_the_edge_and_a_calm_one_lets_it_return() {
-        let friction = known(0.6, Slip::Positive);
         let settings = GovernorSettings::default();
         let governor = EdgeGovernor::new(&settings, TICK_S, &JointErrors::default());
         let mut state = GovernorState::new(arm().reach_on_belt_m());
@@ -400,14 +403,10 @@ mod tests {
                 restless_n,
                 ..Default::default()
             };
-            for _ in 0..300 {
-                let posture = Posture::ElbowDown;
-                governor.search(&mut state, &arm(), posture, -0.1, &friction, least);
-            }
-            state.edges_m().1
+            upper_edge_m(&governor, &mut state, least)
         };
         let calm = edge_m(0.0);
-        // p is zero at 0.16471 m; 0.1 N from tick to tick keep 4 mm.
+        // 0.1 N from tick to tick keep 4 mm.
         let restless = edge_m(0.1);
         assert!((restless - (0.164_71 - 0.004)).abs() < 3e-5, "{restless}");
         let most = edge_m(10.0);
