@@ -557,7 +557,7 @@ mod tests {
     #[test]
     fn a_force_that_swings_is_restless_and_one_that_answers_the_probe_is_calm() {
         assert_eq!(observed(1000, |commanded| commanded).restless_n, 0.0);
-        // 3 N at 50 Hz change by 0.66 N a tick, root mean square, of which 0.14 N may be noise.
+        // 3 N at 50 Hz change by 0.66 N a tick, root mean square, and these changes by 0.21 N; 0.1 N counts as calm.
         let swings = swinging(|commanded| commanded);
         assert!((swings.restless_n - 0.53).abs() < 0.05, "{swings:?}");
     }
