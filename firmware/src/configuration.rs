@@ -201,7 +201,7 @@ mod tests {
         let mut configuration: Configuration = Configuration::default();
         assert_eq!(configuration.speed_up(), 1.0);
         configuration.arm.coulomb_friction_nm = [0.0, 0.05];
-        for (tick_hz, speed_up) in [(250.0, 1.0), (750.0, 1.5), (1000.0, 2.0), (4000.0, 2.0)] {
+        for (tick_hz, speed_up) in [(250.0, 1.0), (750.0, 1.5), (1000.0, 1.6), (4000.0, 1.6)] {
             configuration.tick_hz = tick_hz;
             assert!((configuration.speed_up() - speed_up).abs() < 1e-6);
         }

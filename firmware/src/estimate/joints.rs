@@ -17,7 +17,7 @@ settings! {
     #[derive(Copy)]
     pub struct JointEstimatorSettings {
         /// Bandwidth ω of both tracking loops; at most three times the control rate.
-        bandwidth_rad_s: f32 = 400.0, 1.0..=3e5, "rad/s";
+        bandwidth_rad_s: f32 = 500.0, 1.0..=3e5, "rad/s";
         /// Largest joint rate; a faster reading latches the fault `EncoderJump`.
         rate_limit_rad_s: f32 = 100.0, 1.0..=1e4, "rad/s";
         /// Travel of a joint over which its Coulomb friction reverses.
@@ -26,7 +26,7 @@ settings! {
         friction_compensation: f32 = 0.85, 0.0..=1.0;
         /// Factor by which tracking loops and hybrid law are faster on an arm with Coulomb friction; no more than 2
         /// for each kHz of the control rate.
-        friction_speed_up: f32 = 2.0, 1.0..=5.0;
+        friction_speed_up: f32 = 1.6, 1.0..=5.0;
         /// Twist of each gear for each N·m of commanded torque, if the encoders are on the motors; 0 if they
         /// are on the links.
         gear_compliance_rad_nm: [f32; 2] = [0.0; 2], 0.0..=0.1, "rad/(N·m)";

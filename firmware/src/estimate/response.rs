@@ -24,7 +24,7 @@ settings! {
         /// Whether the response is estimated; if not, the contact is taken to be rigid.
         enabled: bool = true;
         /// Averaging time of the correlation.
-        averaging_s: f32 = 0.25, 1e-3..=1e3, "s";
+        averaging_s: f32 = 0.18, 1e-3..=1e3, "s";
         /// Number of standard deviations from the estimated response to its bounds.
         deviations: f32 = 3.0, 0.0..=10.0;
         /// Lower bound of the response that allows the observers their full gain.
@@ -39,7 +39,7 @@ settings! {
         /// Least contact damping c that is assumed.
         least_damping_ns_m: f32 = 15.0, 1e-3..=1e9, "N·s/m";
         /// Least p/Q22 where the contact is not known to be rigid.
-        minimum_p_ratio: f32 = 0.08, 0.0..=0.9;
+        minimum_p_ratio: f32 = 0.075, 0.0..=0.9;
         /// Time of observation near that p/Q22 before the tip may go closer to the edge.
         observation_s: f32 = 0.3, 0.0..=100.0, "s";
         /// Speed at which the least p/Q22 then falls while the contact is rigid. It rises four times as
@@ -106,6 +106,9 @@ pub struct ContactResponse {
     pub has_lagged: bool,
     /// Least p/Q22 at which the tip may be.
     pub least_p_ratio: f32,
+    /// How certainly the contact is soft, 0 … 1: 0 where the upper bound of the response is half of
+    /// [`gives`](ResponseSettings::gives), 1 where it is a quarter of that or less.
+    pub soft: f32,
     /// Probe to be added to the wanted normal force, N.
     pub probe_n: f32,
     /// Root mean square of the slow changes of force from tick to tick by causes unknown, less 0.1 N that the loop makes of
@@ -122,6 +125,7 @@ impl ContactResponse {
             lags: 0.0,
             has_lagged: false,
             least_p_ratio: 0.0,
+            soft: 0.0,
             probe_n: 0.0,
             restless_n: 0.0,
         }
@@ -221,8 +225,9 @@ pub struct ResponseState {
     gain: f32,
     /// How much the contact gives, from the upper bound.
     give: f32,
-    /// How certainly it is not rigid, from the upper bound of second differences.
+    /// How certainly it is not rigid, and soft, from the upper bound of second differences.
     lags: f32,
+    soft: f32,
     /// Remaining time for which the contact counts as one that has lagged, s.
     lagged_s: f32,
     /// Time since the tip touched, s.
@@ -271,6 +276,7 @@ impl ResponseEstimator {
             gain: 0.0,
             give: 0.0,
             lags: 0.0,
+            soft: 0.0,
             lagged_s: 0.0,
             touched_s: 0.0,
             near_s: 0.0,
@@ -298,6 +304,7 @@ impl ResponseEstimator {
             lags: state.lags,
             has_lagged: state.lagged_s > 0.0,
             least_p_ratio: state.least_p_ratio,
+            soft: state.soft,
             probe_n: state.probe_n,
             restless_n: state.restless_n,
         }
@@ -376,6 +383,7 @@ impl ResponseEstimator {
         let (response, deviation) = second.response(weight);
         let upper = response + settings.deviations * deviation;
         state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);
+        state.soft = (2.0 - 4.0 * upper / settings.gives).limited(0.0, 1.0);
         // Swings slower than a sixth of the control rate have smaller second differences than first ones, white noise
         // has larger ones.
         let unexplained = |of: &Moments| (of.measured - of.expected).at_least(0.0);
@@ -520,7 +528,8 @@ mod tests {
         assert!(soft.loop_share < firm.loop_share && firm.loop_share < P_RATIO);
         assert!(soft.loop_share < 0.5 * P_RATIO, "{soft:?}");
         let softest = observed(1500, compliant(1e4, 5.0));
-        assert!(softest.give > 0.0, "{softest:?}");
+        assert!(softest.give > 0.0 && softest.soft > 0.0, "{softest:?}");
+        assert_eq!(observed(1500, compliant(1e6, 240.0)).soft, 0.0);
         let minimum = ResponseSettings::default().minimum_p_ratio;
         for found in [firm, soft, softest] {
             assert_eq!(found.least_p_ratio, minimum, "{found:?}");

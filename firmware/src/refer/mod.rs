@@ -52,6 +52,7 @@ impl Beginning {
         LeastPRatio {
             landing: self.landing_p_ratio,
             contact: contact.response.least_p_ratio,
+            soft: contact.response.soft,
             restless_n: contact.response.restless_n,
         }
     }

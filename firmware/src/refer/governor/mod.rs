@@ -45,6 +45,9 @@ pub struct LeastPRatio {
     pub landing: f32,
     /// What the contact's response asks for. The edges follow it.
     pub contact: f32,
+    /// How certainly the contact is soft, 0 … 1. Its least p/Q22 then replaces the distance that the edges keep on a rigid
+    /// contact.
+    pub soft: f32,
     /// Slow changes of the contact force from tick to tick by causes unknown, N. The edges follow them, too.
     pub restless_n: f32,
 }
@@ -202,7 +205,7 @@ impl EdgeGovernor {
             search = search.next(point, admissibility.at(point), reach);
         }
         if search.is_over() {
-            search = self.settle(state, search, tip_t_m, least.restless_n);
+            search = self.settle(state, search, tip_t_m, least);
         }
         state.search = Some(search);
     }
@@ -213,16 +216,16 @@ impl EdgeGovernor {
         state: &mut GovernorState,
         search: Search,
         tip_t_m: f32,
-        restless_n: f32,
+        least: LeastPRatio,
     ) -> Search {
         let direction = search.direction;
-        let clearance_m =
-            (self.clearance_m + self.clearance_m_n * restless_n).at_most(self.clearance_limit_m);
+        let clearance_m = (self.clearance_m + self.clearance_m_n * least.restless_n)
+            .at_most(self.clearance_limit_m);
         let edge_m = if search.is_beyond {
             let clear_m = search.inside_m - direction * clearance_m;
             direction * (direction * clear_m).at_most(direction * state.near_m)
         } else {
-            search.inside_m - direction * self.distance_m
+            search.inside_m - direction * (1.0 - least.soft) * self.distance_m
         };
         if clearance_m > 0.0 && !search.is_beyond {
             state.near_m = edge_m;
@@ -395,15 +398,13 @@ mod tests {
 
     #[test]
     fn a_restless_force_keeps_the_tip_away_from_the_edge_and_a_calm_one_lets_it_return() {
-        let settings = GovernorSettings::default();
-        let governor = EdgeGovernor::new(&settings, TICK_S, &JointErrors::default());
         let mut state = GovernorState::new(arm().reach_on_belt_m());
         let mut edge_m = |restless_n: f32| {
             let least = LeastPRatio {
                 restless_n,
                 ..Default::default()
             };
-            upper_edge_m(&governor, &mut state, least)
+            upper_edge_m(&with_distances(), &mut state, least)
         };
         let calm = edge_m(0.0);
         // 0.1 N from tick to tick keep 4 mm.
@@ -412,6 +413,31 @@ mod tests {
         let most = edge_m(10.0);
         assert!((most - (0.164_71 - 0.008)).abs() < 3e-5, "{most}");
         assert_eq!(edge_m(0.0), calm);
+    }
+
+    #[test]
+    fn on_a_soft_contact_the_least_p_ratio_replaces_the_distance() {
+        let edge_m = |contact: f32, soft: f32| {
+            let least = LeastPRatio {
+                contact,
+                soft,
+                ..Default::default()
+            };
+            let mut state = GovernorState::new(arm().reach_on_belt_m());
+            upper_edge_m(&with_distances(), &mut state, least)
+        };
+        let soft = edge_m(0.02, 1.0);
+        assert!((soft - edge_m(0.02, 0.0) - 0.5e-3).abs() < 3e-5, "{soft}");
+        assert!(edge_m(0.075, 1.0) < soft);
+    }
+
+    /// A governor with the default settings on an arm without joint errors.
+    fn with_distances() -> EdgeGovernor {
+        EdgeGovernor::new(
+            &GovernorSettings::default(),
+            TICK_S,
+            &JointErrors::default(),
+        )
     }
 
     #[test]

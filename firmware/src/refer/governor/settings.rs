@@ -15,8 +15,8 @@ settings! {
         p_ratio_per_s2: f32 = 2e4, 0.0..=1e6, "1/s²";
         /// Number of standard deviations added to the friction estimate.
         friction_deviations: f32 = 1.5, 0.0..=10.0;
-        /// Distance kept from the point where p/Q22 has its least value; below 1 kHz it grows with the square of
-        /// the control period.
+        /// Distance kept from the point where p/Q22 has its least value, except on a soft contact; below 1 kHz it
+        /// grows with the square of the control period.
         distance_m: f32 = 0.5e-3, 0.0..=0.1, "m";
         /// Number of encoder counts, as seen at the tip, added to that distance: rounding moves the
         /// tip by as much.
