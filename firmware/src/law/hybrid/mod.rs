@@ -29,6 +29,9 @@ const FORCE_INTEGRAL_SHARE: f32 = 0.165;
 /// Part of the friction observer's rate that a contact that gives takes away.
 const CALMER_OBSERVER: f32 = 0.7;
 
+/// Slowing of the rate at which the law learns the acceleration by other contact forces, for each unit of p, kg.
+const SLOWER_KG: f32 = 1.0;
+
 /// Rate limit of the friction feed-forward, as a fraction of f_n, 1/s: at a reversal of slip it
 /// passes through stick without a jerk.
 const FRICTION_SLEW_PER_S: f32 = 1000.0;
@@ -212,9 +215,12 @@ impl HybridSettings {
             let rest_n = input.force_n - state.fed_force_n;
             let model = input.model;
             let drift = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
+            // Far from the edge noise of the force moves the tip little, and where the arm is almost straight it costs
+            // much torque.
             let rate = self.force_drift_rad_s * input.tick_s;
+            let weight = rate / (1.0 + rate + SLOWER_KG * input.p_per_kg.at_least(0.0));
             let drift = input.response.lags * drift;
-            state.force_drift_m_s2 += rate / (1.0 + rate) * (drift - state.force_drift_m_s2);
+            state.force_drift_m_s2 += weight * (drift - state.force_drift_m_s2);
         }
         state
             .force_drift_m_s2
