@@ -6,6 +6,7 @@ use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Plant, PlantError, Probe};
+use painleve_shared::LinkMotion;
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::range::OutOfRange;
 use painleve_shared::settings::Settings;
@@ -65,6 +66,11 @@ impl<P: Plant> Trial<P> {
     /// Returns the tip position along the belt, m.
     pub fn tip_t_m(&self) -> f64 {
         self.simulation.plant().snapshot().tip_t_m
+    }
+
+    /// Returns the link angles, rad.
+    pub fn theta_rad(&self) -> LinkMotion<f64> {
+        self.simulation.plant().snapshot().theta_rad
     }
 
     /// Returns the normal force on the tip, N.

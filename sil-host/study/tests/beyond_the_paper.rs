@@ -108,9 +108,14 @@ const EDGES: [(&str, f64, f64); 6] = [
 fn a_reference_beyond_the_edge_ends_at_the_edge_without_lift_off() {
     for (scenario, friction, edge_m) in EDGES {
         let friction = format!("belt.friction={friction}");
-        for reference in [minimum_jerk(edge_m + 0.02), ramp(edge_m + 0.02)] {
-            let (result, course) = run(scenario, &[NOISE, &friction, &reference]);
-            let what = format!("{scenario} {friction} {reference}");
+        let references = [minimum_jerk(edge_m + 0.02), ramp(edge_m + 0.02)];
+        let noises = ["run.seed=1", "run.seed=2", "run.seed=3"];
+        for (reference, seed) in references
+            .iter()
+            .flat_map(|reference| noises.map(|seed| (reference, seed)))
+        {
+            let (result, course) = run(scenario, &[NOISE, &friction, reference, seed]);
+            let what = format!("{scenario} {friction} {reference} {seed}");
             assert_eq!(result.statistics.lift_offs, 0, "{what}");
             assert!(course.at_edge, "{what}");
             let short_m = edge_m - result.final_tip_t_m;

@@ -84,7 +84,7 @@ pub struct Row {
     pub lift_offs: u64,
     /// Largest final distance from target or governed edge, m.
     pub error_m: f64,
-    /// p at the final tip position as a fraction of Q22.
+    /// p in the arm's final posture as a fraction of Q22.
     pub p_ratio: f64,
     /// Final tip position, m.
     pub tip_t_m: f64,

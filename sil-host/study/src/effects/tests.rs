@@ -132,6 +132,29 @@ fn rows_do_not_depend_on_threads_and_more_effect_is_worse() {
     );
 }
 
+/// On a belt of 1e4 N/m, into which 10 N press the tip by 1 mm, the arm's posture is not that on the undeformed belt.
+#[test]
+fn on_compliant_contact_the_tip_stands_near_the_edge() {
+    for (effect, level) in [("none", 0.0), ("softer-contact", 1e4)] {
+        let study = EffectsStudy {
+            contacts: vec![Contact::Compliant],
+            levels: vec![level],
+            ..study(&[effect], 40)
+        };
+        let found = rows(&study, || ()).unwrap();
+        let stopped = |row: &&Row| row.ending == Ending::AtEdge && row.tip_t_m.abs() < 0.179;
+        let at_edge: Vec<f64> = found
+            .iter()
+            .filter(stopped)
+            .map(|row| row.p_ratio)
+            .collect();
+        assert!(at_edge.len() >= 3, "{effect}: {at_edge:?}");
+        for p_ratio in at_edge {
+            assert!((0.06..0.1).contains(&p_ratio), "{effect}: {p_ratio}");
+        }
+    }
+}
+
 /// Rows made by hand, so that a change of the controller does not change the snapshots.
 #[test]
 fn the_table_interpolates_between_levels() {

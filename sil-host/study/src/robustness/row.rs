@@ -53,7 +53,7 @@ pub struct Row {
     pub tolerance_m: f64,
     /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.
     pub to_edge_m: f64,
-    /// p at the tip as a fraction of Q22.
+    /// p in the arm's final posture as a fraction of Q22.
     pub p_ratio: f64,
     /// Number of times that contact was mistaken for flight while the tip slid.
     pub false_alarms: u32,
