@@ -126,7 +126,8 @@ fn a_reference_beyond_the_edge_ends_at_the_edge_without_lift_off() {
                 course.rest_error_m
             );
             let force_error_n = course.force_error_n;
-            assert!(force_error_n < 1.5, "{what}: {force_error_n} N");
+            // Noise of the force cell, amplified by Q22/p: the largest of all samples.
+            assert!(force_error_n < 2.0, "{what}: {force_error_n} N");
         }
     }
 }
