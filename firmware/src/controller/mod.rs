@@ -283,7 +283,9 @@ impl<L: Law> Stages<L> {
                 settings.recovery.minimum_p_ratio,
             ),
             demand: TorqueDemand::new(
-                settings.law.sped_up(speed_up),
+                settings
+                    .law
+                    .sped_up(speed_up * settings.contact.law_speed()),
                 &settings.recovery,
                 configuration.tick_s(),
                 settings.torque_limit_nm,

@@ -68,8 +68,8 @@ pub trait Law: Clone + Debug + Default + SettingValue {
         true
     }
 
-    /// Returns the law with motion loops that are faster by a factor, for joints with friction. A law without
-    /// such loops stays as it is.
+    /// Returns the law with motion loops that are faster by a factor, for joints with friction, or slower, for contact
+    /// that is detected from the encoders. A law without such loops stays as it is.
     #[must_use]
     fn sped_up(&self, factor: f32) -> Self {
         let _ = factor;

@@ -41,13 +41,14 @@ mod tests {
             "controller.reference.0.minimum-jerk.target_m=0.125",
             "controller.law.hybrid.normal_force_n=12.5",
             "controller.law.hybrid.position_gain_per_s2=2000",
+            "controller.law.hybrid.velocity_gain_per_s=70",
         ];
         let overrides = overrides.map(str::to_owned);
         let scenario = Scenario::load("hybrid-elbow-down", &overrides).unwrap();
         let settings = settings(&scenario);
         let values = settings.as_array().unwrap().iter();
         let values: Vec<_> = values.map(|setting| setting["value"].as_f64()).collect();
-        let expected = [0.3, -0.25, 0.125, 12.5, 2000.0, 100.0].map(Some);
+        let expected = [0.3, -0.25, 0.125, 12.5, 2000.0, 70.0].map(Some);
         assert_eq!(values, expected);
     }
 
