@@ -109,10 +109,15 @@ fn a_reference_beyond_the_edge_ends_at_the_edge_without_lift_off() {
     for (scenario, friction, edge_m) in EDGES {
         let friction = format!("belt.friction={friction}");
         let references = [minimum_jerk(edge_m + 0.02), ramp(edge_m + 0.02)];
-        let noises = ["run.seed=1", "run.seed=2", "run.seed=3"];
-        for (reference, seed) in references
+        // With the largest error of the force (N): its noise is amplified by Q22/p, and differs from course to course.
+        let noises = [
+            ("run.seed=1", 1.5),
+            ("run.seed=2", 2.0),
+            ("run.seed=3", 2.0),
+        ];
+        for (reference, (seed, limit_n)) in references
             .iter()
-            .flat_map(|reference| noises.map(|seed| (reference, seed)))
+            .flat_map(|reference| noises.map(|noise| (reference, noise)))
         {
             let (result, course) = run(scenario, &[NOISE, &friction, reference, seed]);
             let what = format!("{scenario} {friction} {reference} {seed}");
@@ -126,8 +131,7 @@ fn a_reference_beyond_the_edge_ends_at_the_edge_without_lift_off() {
                 course.rest_error_m
             );
             let force_error_n = course.force_error_n;
-            // Noise of the force cell, amplified by Q22/p: the largest of all samples.
-            assert!(force_error_n < 2.0, "{what}: {force_error_n} N");
+            assert!(force_error_n < limit_n, "{what}: {force_error_n} N");
         }
     }
 }
