@@ -73,7 +73,7 @@ impl<'a> BeltLine<'a> {
 
     /// Returns p/Q22 at τ.
     pub fn p_ratio(&self, tau: f64, friction: f64, slip: Slip) -> f64 {
-        self.p(tau, friction, slip) / self.inverse_tip_inertia(tau).m22
+        p_ratio(self.arm, &self.theta_rad(tau), friction, slip)
     }
 
     /// Returns the friction coefficient at which p is zero at τ; infinite if there is none.
@@ -86,6 +86,12 @@ impl<'a> BeltLine<'a> {
             f64::INFINITY
         }
     }
+}
+
+/// Returns p/Q22 of an arm at these link angles (rad), with the tip anywhere.
+pub fn p_ratio(arm: &Arm<f64>, theta_rad: &LinkMotion<f64>, friction: f64, slip: Slip) -> f64 {
+    let pose = Pose::new(theta_rad);
+    arm.p(&pose, friction, slip) / arm.inverse_tip_inertia(&pose).m22
 }
 
 /// Returns the intervals of τ on which `value` is positive, in order, to rounding.

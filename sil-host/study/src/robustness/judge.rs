@@ -7,11 +7,11 @@ use painleve_plant::Plant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::frame::StatusFlags;
-use painleve_shared::{Arm, Pose, Posture, Slip};
+use painleve_shared::{Arm, Posture, Slip};
 
 use super::{Ending, FalseAlarms, Row};
 use crate::StudyError;
-use crate::belt_line::admissible_m;
+use crate::belt_line::{admissible_m, p_ratio};
 use crate::contact_probe::ContactProbe;
 use crate::trial::Trial;
 
@@ -81,9 +81,9 @@ pub fn run<P: Plant>(
     let slip = Slip::of(-v_belt_m_s);
     let friction = scenario.belt.friction;
     let stretch = stretch_around_m(&arm, posture, friction, slip, start_m);
-    // In the tip's own posture: 10 N press it 1 mm deep into a belt of 1e4 N/m, which near the edge is a tenth of p/Q22.
-    let pose = Pose::new(&trial.theta_rad());
-    let p_ratio = arm.p(&pose, friction, slip) / arm.inverse_tip_inertia(&pose).m22;
+    // Of the arm as it stands, not as it would on the undeformed belt: 10 N press the tip 1 mm into a belt of 1e4 N/m,
+    // which near the edge changes p/Q22 by a tenth.
+    let p_ratio = p_ratio(&arm, &trial.theta_rad(), friction, slip);
     let to_edge_m = if target_m > start_m {
         stretch.end - trial.tip_t_m()
     } else {
