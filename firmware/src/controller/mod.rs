@@ -14,17 +14,17 @@ mod arrival;
 #[cfg(test)]
 mod tests;
 
-use painleve_shared::Slip;
 use painleve_shared::counts::{Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
 use painleve_shared::status::Fault;
+use painleve_shared::{Arm, Slip};
 
 use self::arrival::{Arrival, ArrivalState, Lapses, ReadingRanges, arrive};
 use crate::configuration::Configuration;
 use crate::demand::{DemandInput, DemandState, TorqueDemand};
+use crate::estimate::joint_friction::{JointFriction, JointFrictionState};
 use crate::estimate::joints::EncoderJump;
-use crate::estimate::transmission::{Transmission, TransmissionState};
 use crate::estimate::{EstimateSettings, EstimatesState, Estimators, Readings};
 use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
@@ -97,7 +97,7 @@ pub struct Controller<L: Law = LawSettings> {
 struct Stages<L> {
     estimators: Estimators,
     torques: TorqueOutput,
-    transmission: Transmission,
+    joint_friction: JointFriction,
     supervisor: Supervisor,
     demand: TorqueDemand<L>,
     references: References,
@@ -113,7 +113,7 @@ struct State<L: Law> {
     references: ReferencesState,
     demand: DemandState<L>,
     command: LastCommand,
-    transmission: TransmissionState,
+    joint_friction: JointFrictionState,
 }
 
 impl<L: Law> Controller<L> {
@@ -124,7 +124,7 @@ impl<L: Law> Controller<L> {
     pub fn new(configuration: &Configuration<L>) -> Result<Self, OutOfRange> {
         let arm = configuration.validate()?;
         let settings = &configuration.settings;
-        let stages = Stages::new(configuration);
+        let stages = Stages::new(configuration, &arm);
         let state = State {
             arrivals: ArrivalState::default(),
             estimates: stages.estimators.start(arm),
@@ -132,7 +132,7 @@ impl<L: Law> Controller<L> {
             references: stages.references.start(&arm),
             demand: stages.demand.start(),
             command: LastCommand::default(),
-            transmission: TransmissionState::default(),
+            joint_friction: JointFrictionState::default(),
         };
         Ok(Self {
             last_answer: ActuatorFrame::default(),
@@ -251,21 +251,21 @@ impl<L: Law> Controller<L> {
 
 impl<L: Law> Stages<L> {
     /// Makes the stages, each with its own settings.
-    fn new(configuration: &Configuration<L>) -> Self {
+    fn new(configuration: &Configuration<L>, arm: &Arm<f32>) -> Self {
         let Configuration {
             tick_hz,
-            arm,
+            arm: parameters,
             converters,
             settings,
         } = configuration;
-        let speed_up = configuration.speed_up();
+        let speeds = configuration.loop_speeds(arm);
         Self {
             estimators: Estimators::new(&EstimateSettings {
                 tick_hz: *tick_hz,
-                speed_up,
+                tracking_speed: speeds.tracking,
                 encoders: converters.encoders,
                 force: converters.force,
-                link_length_m: arm.link_length_m[0],
+                link_length_m: parameters.link_length_m[0],
                 joints: &settings.estimator,
                 contact: &settings.contact,
                 friction: &settings.friction,
@@ -283,9 +283,7 @@ impl<L: Law> Stages<L> {
                 settings.recovery.minimum_p_ratio,
             ),
             demand: TorqueDemand::new(
-                settings
-                    .law
-                    .sped_up(speed_up * settings.contact.law_speed()),
+                settings.law.sped_up(speeds.law),
                 &settings.recovery,
                 configuration.tick_s(),
                 settings.torque_limit_nm,
@@ -295,7 +293,7 @@ impl<L: Law> Stages<L> {
                 converters.torque,
                 settings.torque_limit_nm,
             ),
-            transmission: Transmission::new(&settings.estimator, arm.coulomb_friction_nm),
+            joint_friction: JointFriction::new(&settings.estimator, parameters.coulomb_friction_nm),
             ranges: ReadingRanges::of(converters),
         }
     }
@@ -315,10 +313,9 @@ impl<L: Law> Stages<L> {
         if let Err(EncoderJump) = joints {
             state.supervision.latch(Fault::EncoderJump);
         }
-        let model =
-            state
-                .estimates
-                .model(&self.transmission, &mut state.transmission, &state.command);
+        let model = state
+            .estimates
+            .model(&self.joint_friction, &mut state.joint_friction);
         let (mut contact, slow) = self.estimators.observe_contact(
             &mut state.estimates,
             &model,

@@ -6,11 +6,12 @@
 //! a slow loop does not lag behind the commanded motion.
 //!
 //! Both poles are at z = exp(−ω T), with gains 1 − z² and (1 − z)²/T.
+//!
+//! An encoder on the motor side of an elastic gear leads the link by the gear's twist under the torque.
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
-use painleve_shared::{JointMotion, LinkMotion};
-use painleve_shared::{Real, settings};
+use painleve_shared::{JointMotion, JointTorque, LinkMotion, Real, settings};
 
 settings! {
     /// Settings of the tracking loops.
@@ -28,7 +29,8 @@ settings! {
         /// for each kHz of the control rate.
         friction_speed_up: f32 = 1.6, 1.0..=5.0;
         /// Twist of each gear for each N·m of commanded torque, if the encoders are on the motors; 0 if they
-        /// are on the links.
+        /// are on the links. Tracking loops and hybrid law are slower where the arm's natural frequency on
+        /// these gears is below ω.
         gear_compliance_rad_nm: [f32; 2] = [0.0; 2], 0.0..=0.1, "rad/(N·m)";
         /// Largest play of the gears, from which the governor keeps its distance from the edges.
         gear_play_rad: f32 = 0.0, 0.0..=0.1, "rad";
@@ -64,6 +66,9 @@ pub struct JointEstimator {
     tick_s: f32,
     angle_gain: f32,
     rate_gain_per_s: f32,
+    /// Whether the gears twist, and by how much.
+    twists: bool,
+    compliance_rad_nm: [f32; 2],
 }
 
 /// Angles and rates of both joints, for a [`JointEstimator`].
@@ -94,6 +99,8 @@ impl JointEstimator {
             tick_s,
             angle_gain: 1.0 - pole * pole,
             rate_gain_per_s,
+            twists: settings.gear_compliance_rad_nm != [0.0; 2],
+            compliance_rad_nm: settings.gear_compliance_rad_nm,
         }
     }
 
@@ -160,6 +167,29 @@ impl JointEstimator {
             acceleration_rad_s2.second(),
         );
         Ok(())
+    }
+
+    /// Takes the twist of the gears under the commanded torques (N·m) off the last readings, so that both loops
+    /// follow the links. Called after each [`update`](Self::update).
+    #[inline]
+    pub fn untwist(&self, state: &mut JointState, torque_nm: &JointTorque<f32>) {
+        if self.twists {
+            self.correct(state, torque_nm);
+        }
+    }
+
+    /// Kept out of line, because few arms need it.
+    #[cold]
+    #[inline(never)]
+    fn correct(&self, state: &mut JointState, torque_nm: &JointTorque<f32>) {
+        let torques_nm = [torque_nm.first(), torque_nm.second()];
+        let twists = self.compliance_rad_nm.into_iter().zip(torques_nm);
+        for (joint, (compliance_rad_nm, torque_nm)) in state.joints.iter_mut().zip(twists) {
+            let twist_rad = compliance_rad_nm * torque_nm;
+            joint.innovation_rad -= twist_rad;
+            joint.angle_rad -= self.angle_gain * twist_rad;
+            joint.rate_rad_s -= self.rate_gain_per_s * twist_rad;
+        }
     }
 
     /// Restarts both loops from these readings, at rest.
@@ -294,6 +324,34 @@ mod tests {
         let truth = 10.0 * 0.199;
         assert!((with - truth).abs() < 0.05, "{with}");
         assert!((without - truth).abs() > (with - truth).abs());
+    }
+
+    #[test]
+    fn behind_gears_that_twist_the_loops_follow_the_links() {
+        let settings = JointEstimatorSettings {
+            gear_compliance_rad_nm: [1e-3, 2e-3],
+            ..Default::default()
+        };
+        let estimator = JointEstimator::new(&settings, [SCALE; 2], 1000.0);
+        let mut state = JointState::default();
+        // The torque alternates, so that the motors move, and the links stay.
+        for tick in 0..400 {
+            let share = f64::from(tick % 20) / 10.0 - 1.0;
+            let torque = JointTorque::new(2.0 * share as f32, -3.0 * share as f32);
+            let readings = [
+                SCALE.reading(0.2 + 1e-3 * 2.0 * share),
+                SCALE.reading(0.1 - 2e-3 * 3.0 * share),
+            ];
+            let still = JointMotion::zeros();
+            estimator.update(&mut state, &readings, 1, &still).unwrap();
+            estimator.untwist(&mut state, &torque);
+            if tick > 100 {
+                let error = (state.theta_rad() - LinkMotion::new(0.2, 0.3)).amax();
+                assert!(error < 5e-4, "{tick}: {error}");
+                let rate = state.theta_dot_rad_s().amax();
+                assert!(rate < 0.1, "{tick}: {rate}");
+            }
+        }
     }
 
     #[test]

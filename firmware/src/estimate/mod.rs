@@ -6,7 +6,7 @@
 //! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
 //! - [`calibration`]: length of the links
 //! - [`response`]: how much the contact gives
-//! - [`transmission`]: friction and gears of the joints
+//! - [`joint_friction`]: Coulomb friction of the joints
 //! - [`disturbance`]: torques that the model does not explain
 
 pub mod belt;
@@ -14,10 +14,10 @@ pub mod calibration;
 pub mod contact;
 pub mod disturbance;
 pub mod friction;
+pub mod joint_friction;
 pub mod joints;
 pub mod model;
 pub mod response;
-pub mod transmission;
 
 use nalgebra::Vector2;
 use painleve_shared::Arm;
@@ -29,12 +29,12 @@ use self::calibration::{CalibrationSettings, CalibrationState, LengthCalibrator}
 use self::contact::{ContactDetector, ContactSettings, ContactState, EncoderReading, Evidence};
 use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceSettings, DisturbanceState};
 use self::friction::{FrictionEstimate, FrictionEstimator, FrictionSettings, FrictionState};
+use self::joint_friction::{JointFriction, JointFrictionState};
 use self::joints::{EncoderJump, JointEstimator, JointEstimatorSettings, JointState};
 use self::model::Model;
 use self::response::{
     ContactResponse, ForceReading, Place, ResponseEstimator, ResponseSettings, ResponseState,
 };
-use self::transmission::{Transmission, TransmissionState};
 use crate::last_command::LastCommand;
 
 /// Largest friction above the estimate that may explain a throw.
@@ -102,7 +102,7 @@ pub struct EstimateSettings<'a> {
     /// Control rate, Hz.
     pub tick_hz: f32,
     /// Factor by which the tracking loops are faster than their settings.
-    pub speed_up: f32,
+    pub tracking_speed: f32,
     /// Scalings of the encoders of θ1 and of θ2 − θ1.
     pub encoders: [EncoderScale; 2],
     /// Scaling of the force cell.
@@ -154,26 +154,17 @@ pub struct EstimatesState {
 }
 
 impl EstimatesState {
-    /// Returns the arm's model at the estimated angles and rates, corrected for the joints' friction and gears
-    /// after the command until now.
+    /// Returns the arm's model at the estimated angles and rates, with the joints' friction.
     #[inline]
-    pub fn model(
-        &self,
-        transmission: &Transmission,
-        state: &mut TransmissionState,
-        last: &LastCommand,
-    ) -> Model {
+    pub fn model(&self, friction: &JointFriction, state: &mut JointFrictionState) -> Model {
         // Friction of the joints enters as an unknown torque does.
-        let mut theta_rad = self.joints.theta_rad();
         let mut disturbance_nm = self.disturbance.torque_nm;
-        if !transmission.is_ideal() {
-            let links = transmission.tick(state, &self.joints.angles_rad(), &last.torque_nm);
-            theta_rad = links.theta_rad;
-            disturbance_nm = disturbance_nm - links.friction_nm;
+        if !friction.is_zero() {
+            disturbance_nm = disturbance_nm - friction.tick(state, &self.joints.angles_rad());
         }
         Model::new(
             &self.arm,
-            theta_rad,
+            self.joints.theta_rad(),
             self.joints.theta_dot_rad_s(),
             &disturbance_nm,
         )
@@ -189,7 +180,7 @@ impl Estimators {
             tick_s,
             joints: JointEstimator::new(
                 &JointEstimatorSettings {
-                    bandwidth_rad_s: settings.speed_up * settings.joints.bandwidth_rad_s,
+                    bandwidth_rad_s: settings.tracking_speed * settings.joints.bandwidth_rad_s,
                     ..*settings.joints
                 },
                 settings.encoders,
@@ -229,7 +220,7 @@ impl Estimators {
         }
     }
 
-    /// Updates the joint estimate with the encoders' readings and the expected effect of the last
+    /// Updates the joint estimate with the encoders' readings and the expected effects of the last
     /// command.
     ///
     /// # Errors
@@ -247,7 +238,9 @@ impl Estimators {
             &readings.frame.joints,
             readings.elapsed_ticks,
             &last.expected_acceleration_rad_s2,
-        )
+        )?;
+        self.joints.untwist(&mut state.joints, &last.torque_nm);
+        Ok(())
     }
 
     /// Updates contact, friction and belt with the readings, given the arm's model at the estimated state and

@@ -1,0 +1,97 @@
+//! Coulomb friction of the joints.
+//!
+//! It follows the travel Δ of a joint (Dahl's model): F ← F + (F_c Δ − |Δ| F)/travel. It keeps its value at
+//! rest, and changes by little where an angle alternates between two counts.
+
+use painleve_shared::{GeneralisedTorque, JointMotion, JointTorque, Real};
+
+use super::joints::JointEstimatorSettings;
+
+/// Model of both joints' Coulomb friction.
+#[derive(Clone, Copy, Debug)]
+pub struct JointFriction {
+    /// Compensated Coulomb friction, N·m.
+    coulomb_nm: [f32; 2],
+    /// Reciprocal of the travel over which friction reverses, 1/rad.
+    per_travel_per_rad: f32,
+}
+
+/// Friction of both joints between ticks; initially zero.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct JointFrictionState([Travel; 2]);
+
+/// Travel and friction of one joint.
+#[derive(Clone, Copy, Debug, Default)]
+struct Travel {
+    /// Angle at the last tick, rad; absent before the first.
+    angle_rad: Option<f32>,
+    /// Friction, positive against a positive rate, N·m.
+    torque_nm: f32,
+}
+
+impl JointFriction {
+    /// Makes the model for joints with this Coulomb friction, N·m.
+    pub fn new(settings: &JointEstimatorSettings, coulomb_friction_nm: [f32; 2]) -> Self {
+        Self {
+            coulomb_nm: coulomb_friction_nm.map(|nm| settings.friction_compensation * nm),
+            per_travel_per_rad: 1.0 / settings.friction_travel_rad,
+        }
+    }
+
+    /// Returns whether there is nothing to compensate.
+    #[inline]
+    pub fn is_zero(&self) -> bool {
+        self.coulomb_nm == [0.0; 2]
+    }
+
+    /// Returns the friction after one tick, positive against a positive rate, as a torque on the links, N·m, given
+    /// the joint angles q', rad.
+    pub fn tick(
+        &self,
+        state: &mut JointFrictionState,
+        angles_rad: &JointMotion<f32>,
+    ) -> GeneralisedTorque<f32> {
+        let angles = [angles_rad.first(), angles_rad.second()];
+        let joints = state.0.iter_mut().zip(self.coulomb_nm).zip(angles);
+        for ((joint, coulomb_nm), angle_rad) in joints {
+            let before_rad = joint.angle_rad.replace(angle_rad).unwrap_or(angle_rad);
+            let travel = ((angle_rad - before_rad) * self.per_travel_per_rad).within(1.0);
+            joint.torque_nm += travel * coulomb_nm - travel.abs() * joint.torque_nm;
+        }
+        let [one, two] = &state.0;
+        JointTorque::new(one.torque_nm, two.torque_nm).to_links()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coulomb_friction_follows_the_travel() {
+        let model = JointFriction::new(&JointEstimatorSettings::default(), [0.1, 0.0]);
+        let mut state = JointFrictionState::default();
+        let mut friction_nm = |angle_rad: f32| {
+            let friction_nm = model.tick(&mut state, &JointMotion::new(angle_rad, -0.3));
+            assert_eq!(friction_nm.second(), 0.0);
+            friction_nm.first()
+        };
+        assert_eq!(friction_nm(0.5), 0.0);
+        for tick in 1..100 {
+            friction_nm(0.5 + 2e-4 * tick as f32);
+        }
+        // It keeps its value at rest, and reverses within the travel.
+        let forward = friction_nm(0.5198);
+        assert!((forward - 0.085).abs() < 1e-4, "{forward}");
+        assert_eq!(friction_nm(0.5198), forward);
+        let reversed = friction_nm(0.5188);
+        assert!((reversed + 0.085).abs() < 1e-4, "{reversed}");
+    }
+
+    #[test]
+    fn joints_without_friction_need_no_compensation() {
+        let settings = JointEstimatorSettings::default();
+        assert!(JointFriction::new(&settings, [0.0; 2]).is_zero());
+        assert!(!JointFriction::new(&settings, [0.0, 0.1]).is_zero());
+    }
+}
