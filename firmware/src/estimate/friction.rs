@@ -33,7 +33,7 @@ const STICK_TICKS: u8 = 3;
 /// Averaging time of the innovations, s.
 const MEAN_S: f32 = 0.02;
 /// Square of the number of standard deviations at which that average is significant.
-const SIGNIFICANT_SQUARE: f32 = 8.0;
+const SIGNIFICANT_SQUARE: f32 = 14.0;
 
 /// Number of standard deviations above the estimate, and fixed amount added to them, beyond which a ratio
 /// shows that μ has risen: no stick looks like this.

@@ -71,6 +71,11 @@ const NEAR: f32 = 3.0;
 const LAGGED_S: f32 = 5.0;
 /// Retreat from the edge as a multiple of the approach.
 const RETREAT: f32 = 4.0;
+/// Rate at which a contact that is watched at the edge counts as soft, or no longer, 1/s.
+const SOFT_PER_S: f32 = 2.0;
+/// Longest control period for which the response of a soft contact is compared as it is, s: in a shorter one every
+/// force that follows the torque late shows less.
+const SOFT_PERIOD_S: f32 = 1e-3;
 
 /// Inputs of one tick in which the tip slides in contact.
 #[derive(Clone, Copy, Debug)]
@@ -106,8 +111,8 @@ pub struct ContactResponse {
     pub has_lagged: bool,
     /// Least p/Q22 at which the tip may be.
     pub least_p_ratio: f32,
-    /// How certainly the contact is soft, 0 … 1: 0 where the upper bound of the response is 0.4 times
-    /// [`gives`](ResponseSettings::gives), 1 where it is half of that or less.
+    /// How far the contact has shown at the edge that it is soft, 0 … 1: it rises to 1 while the upper bound of the
+    /// response in a millisecond is [`gives`](ResponseSettings::gives) or less, and falls where it is 1.5 times that.
     pub soft: f32,
     /// Probe to be added to the wanted normal force, N.
     pub probe_n: f32,
@@ -148,6 +153,10 @@ pub struct ResponseEstimator {
     least_share_kg: f32,
     /// Fall of the restlessness in a block, N.
     calming_n: f32,
+    /// Change of the softness in a block.
+    softer: f32,
+    /// Factor from the response in a tick to that in a millisecond.
+    ticks_per_ms: f32,
 }
 
 /// Sums or averages over blocks of ticks, N², of first or of second differences of the force.
@@ -225,8 +234,9 @@ pub struct ResponseState {
     gain: f32,
     /// How much the contact gives, from the upper bound.
     give: f32,
-    /// How certainly it is not rigid, and soft, from the upper bound of second differences.
+    /// How certainly it is not rigid, from the upper bound of second differences.
     lags: f32,
+    /// How far it has shown at the edge that it is soft, from the same.
     soft: f32,
     /// Remaining time for which the contact counts as one that has lagged, s.
     lagged_s: f32,
@@ -253,6 +263,8 @@ impl ResponseEstimator {
             approach: period_s * settings.approach_per_s,
             least_share_kg: settings.least_damping_ns_m * tick_s,
             calming_n: period_s * CALMING_N_S,
+            softer: period_s * SOFT_PER_S,
+            ticks_per_ms: (SOFT_PERIOD_S / tick_s).at_least(1.0),
         }
     }
 
@@ -350,8 +362,8 @@ impl ResponseEstimator {
         if state.block_ticks < END_TICKS {
             self.average(state);
         } else {
-            self.bound(state);
-            self.move_limit(state, place);
+            let softness = self.bound(state);
+            self.move_limit(state, place, softness);
         }
     }
 
@@ -368,9 +380,9 @@ impl ResponseEstimator {
         }
     }
 
-    /// Updates the bounds of ρ from the averages.
+    /// Updates the bounds of ρ from the averages. Returns how soft the contact is at present, 0 … 1.
     #[inline(never)]
-    fn bound(&self, state: &mut ResponseState) {
+    fn bound(&self, state: &mut ResponseState) -> f32 {
         state.block_ticks = 0;
         let weight = state.block_weight;
         let settings = &self.settings;
@@ -383,7 +395,6 @@ impl ResponseEstimator {
         let (response, deviation) = second.response(weight);
         let upper = response + settings.deviations * deviation;
         state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);
-        state.soft = (2.0 - 5.0 * upper / settings.gives).limited(0.0, 1.0);
         // Swings slower than a sixth of the control rate have smaller second differences than first ones, white noise
         // has larger ones.
         let unexplained = |of: &Moments| (of.measured - of.expected).at_least(0.0);
@@ -397,18 +408,26 @@ impl ResponseEstimator {
         } else {
             state.lagged_s - self.period_s
         };
+        (3.0 - 2.0 * self.ticks_per_ms * upper / settings.gives).limited(0.0, 1.0)
     }
 
-    /// Lets the tip closer to the edge while the contact there is rigid, and less close while it gives.
-    fn move_limit(&self, state: &mut ResponseState, place: &Place) {
+    /// Lets the tip closer to the edge while the contact there is rigid or soft, and less close while it gives.
+    fn move_limit(&self, state: &mut ResponseState, place: &Place, softness: f32) {
         let settings = &self.settings;
+        let harder = state.soft - self.softer;
         if place.p_ratio > self.near_p_ratio {
+            state.soft = harder.at_least(0.0);
             return;
         }
         state.near_s += self.period_s;
         if state.near_s < settings.observation_s {
             return;
         }
+        state.soft = if place.waits_at_edge {
+            softness.limited(harder, state.soft + self.softer)
+        } else {
+            softness.limited(harder, state.soft)
+        };
         let least = &mut state.least_p_ratio;
         if state.upper < settings.gives {
             *least += RETREAT * self.approach;
@@ -463,10 +482,20 @@ mod tests {
         (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
     }
 
-    /// Returns the response after `ticks` near the edge, for a contact that gives the force (N) in
+    /// Returns the response after `ticks` of waiting at the edge, for a contact that gives the force (N) in
     /// answer to the force commanded at the previous tick.
-    fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
-        let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
+    fn observed(ticks: u32, contact: impl FnMut(f32) -> f32) -> ContactResponse {
+        observed_every(TICK_S, ticks, |_| true, contact)
+    }
+
+    /// The same with another control period, at an edge where the tip waits at some ticks.
+    fn observed_every(
+        tick_s: f32,
+        ticks: u32,
+        waits_at_edge: impl Fn(u32) -> bool,
+        mut contact: impl FnMut(f32) -> f32,
+    ) -> ContactResponse {
+        let estimator = ResponseEstimator::new(&ResponseSettings::default(), tick_s);
         let mut state = estimator.start();
         let (mut withheld, mut commanded) = (0.0, 10.0);
         for tick in 0..ticks {
@@ -478,7 +507,7 @@ mod tests {
                 // The tip stands where it may.
                 let place = Place {
                     p_ratio: state.least_p_ratio,
-                    waits_at_edge: true,
+                    waits_at_edge: waits_at_edge(tick),
                 };
                 estimator.evaluate(&mut state, &place);
             }
@@ -533,6 +562,34 @@ mod tests {
         let minimum = ResponseSettings::default().minimum_p_ratio;
         for found in [firm, soft, softest] {
             assert_eq!(found.least_p_ratio, minimum, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn only_a_contact_that_is_watched_at_the_edge_counts_as_soft() {
+        let soft = |waits_at_edge: fn(u32) -> bool| {
+            observed_every(TICK_S, 3000, waits_at_edge, compliant(1e4, 5.0)).soft
+        };
+        assert_eq!(soft(|_| true), 1.0);
+        assert_eq!(soft(|_| false), 0.0);
+        assert_eq!(soft(|tick| tick < 2000), 1.0);
+    }
+
+    #[test]
+    fn a_slow_torque_stage_is_not_a_soft_contact_at_any_control_rate() {
+        for tick_s in [1e-3, 0.25e-3] {
+            let mut force = 10.0;
+            let share = 1.0 - libm::expf(-tick_s / 1e-3);
+            let found = observed_every(
+                tick_s,
+                8000,
+                |_| true,
+                |commanded| {
+                    force += share * (commanded - force);
+                    force
+                },
+            );
+            assert_eq!(found.soft, 0.0, "{tick_s}: {found:?}");
         }
     }
 

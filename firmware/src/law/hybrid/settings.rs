@@ -61,7 +61,7 @@ settings! {
         /// Damping of a contact that gives, as a fraction of the change of force.
         contact_damping: f32 = 4.0, 0.0..=10.0;
         /// Rate of change above which it damps.
-        contact_damping_rad_s: f32 = 250.0, 1.0..=1e4, "rad/s";
+        contact_damping_rad_s: f32 = 1000.0, 1.0..=1e4, "rad/s";
         /// Friction feed-forward.
         friction: FrictionFeedForward = FrictionFeedForward::Observed { time_constant_s: 0.015 };
     }

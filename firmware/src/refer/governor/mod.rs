@@ -45,8 +45,8 @@ pub struct LeastPRatio {
     pub landing: f32,
     /// What the contact's response asks for. The edges follow it.
     pub contact: f32,
-    /// How certainly the contact is soft, 0 … 1. Its least p/Q22 then replaces the distance that the edges keep on a rigid
-    /// contact.
+    /// How far the contact has shown that it is soft, 0 … 1. Its least p/Q22 then replaces the distance that the edges
+    /// keep on a rigid contact.
     pub soft: f32,
     /// Slow changes of the contact force from tick to tick by causes unknown, N. The edges follow them, too.
     pub restless_n: f32,
