@@ -10,6 +10,8 @@ use super::joints::JointEstimatorSettings;
 /// Model of both joints' Coulomb friction.
 #[derive(Clone, Copy, Debug)]
 pub struct JointFriction {
+    /// Whether there is nothing to compensate.
+    is_zero: bool,
     /// Compensated Coulomb friction, N·m.
     coulomb_nm: [f32; 2],
     /// Reciprocal of the travel over which friction reverses, 1/rad.
@@ -32,8 +34,10 @@ struct Travel {
 impl JointFriction {
     /// Makes the model for joints with this Coulomb friction, N·m.
     pub fn new(settings: &JointEstimatorSettings, coulomb_friction_nm: [f32; 2]) -> Self {
+        let coulomb_nm = coulomb_friction_nm.map(|nm| settings.friction_compensation * nm);
         Self {
-            coulomb_nm: coulomb_friction_nm.map(|nm| settings.friction_compensation * nm),
+            is_zero: coulomb_nm == [0.0; 2],
+            coulomb_nm,
             per_travel_per_rad: 1.0 / settings.friction_travel_rad,
         }
     }
@@ -41,7 +45,7 @@ impl JointFriction {
     /// Returns whether there is nothing to compensate.
     #[inline]
     pub fn is_zero(&self) -> bool {
-        self.coulomb_nm == [0.0; 2]
+        self.is_zero
     }
 
     /// Returns the friction after one tick, positive against a positive rate, as a torque on the links, N·m, given

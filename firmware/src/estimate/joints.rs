@@ -173,23 +173,18 @@ impl JointEstimator {
     /// follow the links. Called after each [`update`](Self::update).
     #[inline]
     pub fn untwist(&self, state: &mut JointState, torque_nm: &JointTorque<f32>) {
-        if self.twists {
-            self.correct(state, torque_nm);
+        if !self.twists {
+            return;
         }
-    }
-
-    /// Kept out of line, because few arms need it.
-    #[cold]
-    #[inline(never)]
-    fn correct(&self, state: &mut JointState, torque_nm: &JointTorque<f32>) {
-        let torques_nm = [torque_nm.first(), torque_nm.second()];
-        let twists = self.compliance_rad_nm.into_iter().zip(torques_nm);
-        for (joint, (compliance_rad_nm, torque_nm)) in state.joints.iter_mut().zip(twists) {
-            let twist_rad = compliance_rad_nm * torque_nm;
+        let take_off = |joint: &mut TrackingLoop, twist_rad: f32| {
             joint.innovation_rad -= twist_rad;
             joint.angle_rad -= self.angle_gain * twist_rad;
             joint.rate_rad_s -= self.rate_gain_per_s * twist_rad;
-        }
+        };
+        let [joint_1, joint_2] = &mut state.joints;
+        let [soft_1, soft_2] = self.compliance_rad_nm;
+        take_off(joint_1, soft_1 * torque_nm.first());
+        take_off(joint_2, soft_2 * torque_nm.second());
     }
 
     /// Restarts both loops from these readings, at rest.

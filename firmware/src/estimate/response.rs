@@ -155,8 +155,8 @@ pub struct ResponseEstimator {
     calming_n: f32,
     /// Change of the softness in a block.
     softer: f32,
-    /// Factor from the response in a tick to that in a millisecond.
-    ticks_per_ms: f32,
+    /// Fall of the softness for each unit of the response in a tick.
+    softness_slope: f32,
 }
 
 /// Sums or averages over blocks of ticks, N², of first or of second differences of the force.
@@ -236,7 +236,8 @@ pub struct ResponseState {
     give: f32,
     /// How certainly it is not rigid, from the upper bound of second differences.
     lags: f32,
-    /// How far it has shown at the edge that it is soft, from the same.
+    /// How soft it is at present, from the same, and how far it has shown that at the edge, 0 … 1.
+    softness: f32,
     soft: f32,
     /// Remaining time for which the contact counts as one that has lagged, s.
     lagged_s: f32,
@@ -264,7 +265,7 @@ impl ResponseEstimator {
             least_share_kg: settings.least_damping_ns_m * tick_s,
             calming_n: period_s * CALMING_N_S,
             softer: period_s * SOFT_PER_S,
-            ticks_per_ms: (SOFT_PERIOD_S / tick_s).at_least(1.0),
+            softness_slope: 2.0 / settings.gives * (SOFT_PERIOD_S / tick_s).at_least(1.0),
         }
     }
 
@@ -288,6 +289,7 @@ impl ResponseEstimator {
             gain: 0.0,
             give: 0.0,
             lags: 0.0,
+            softness: 0.0,
             soft: 0.0,
             lagged_s: 0.0,
             touched_s: 0.0,
@@ -361,9 +363,10 @@ impl ResponseEstimator {
         state.block_ticks += 1;
         if state.block_ticks < END_TICKS {
             self.average(state);
+            // With the bounds of the block before, because their update takes long enough.
+            self.move_limit(state, place);
         } else {
-            let softness = self.bound(state);
-            self.move_limit(state, place, softness);
+            self.bound(state);
         }
     }
 
@@ -380,9 +383,9 @@ impl ResponseEstimator {
         }
     }
 
-    /// Updates the bounds of ρ from the averages. Returns how soft the contact is at present, 0 … 1.
+    /// Updates the bounds of ρ from the averages.
     #[inline(never)]
-    fn bound(&self, state: &mut ResponseState) -> f32 {
+    fn bound(&self, state: &mut ResponseState) {
         state.block_ticks = 0;
         let weight = state.block_weight;
         let settings = &self.settings;
@@ -408,11 +411,12 @@ impl ResponseEstimator {
         } else {
             state.lagged_s - self.period_s
         };
-        (3.0 - 2.0 * self.ticks_per_ms * upper / settings.gives).limited(0.0, 1.0)
+        state.softness = (3.0 - self.softness_slope * upper).limited(0.0, 1.0);
     }
 
     /// Lets the tip closer to the edge while the contact there is rigid or soft, and less close while it gives.
-    fn move_limit(&self, state: &mut ResponseState, place: &Place, softness: f32) {
+    fn move_limit(&self, state: &mut ResponseState, place: &Place) {
+        let softness = state.softness;
         let settings = &self.settings;
         let harder = state.soft - self.softer;
         if place.p_ratio > self.near_p_ratio {

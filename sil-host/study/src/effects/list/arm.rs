@@ -29,6 +29,17 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
         [10_000.0, 5000.0, 2000.0, 1000.0, 500.0], typical 2000.0,
         overrides: Computed(|level, _| gear(level, 0.0, "motor"));
 
+    "gear-stiffness-motor-side-known": "effects.gear.stiffness_nm_rad", "N·m/rad, encoder on the motor, known",
+        [5000.0, 2000.0, 1000.0, 500.0, 200.0], typical 2000.0,
+        overrides: Computed(|level, _| {
+            let compliance_rad_nm = 1.0 / level;
+            let mut overrides = gear(level, 0.0, "motor");
+            overrides.extend(set![
+                "controller.estimator.gear_compliance_rad_nm=[{compliance_rad_nm:?}, {compliance_rad_nm:?}]"
+            ]);
+            overrides
+        });
+
     "backlash": "effects.gear.backlash_deg", "° at 500 N·m/rad, encoder on the link",
         [0.05, 0.1, 0.2, 0.5], typical 0.1,
         overrides: Computed(|level, _| gear(500.0, level, "link"));
