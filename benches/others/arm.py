@@ -22,9 +22,9 @@ def on_belt(tip_t_m, elbow_down):
     return (direction + half, direction - half) if elbow_down else (direction - half, direction + half)
 
 
-def inverse_tip_inertia(tip_t_m, elbow_down):
-    """Q21 and Q22 of Q = J M^-1 J^T, 1/kg."""
-    one, two = on_belt(tip_t_m, elbow_down)
+def inverse_tip_inertia(links_rad):
+    """Q21 and Q22 of Q = J M^-1 J^T, 1/kg, at these link angles."""
+    one, two = links_rad
     length, mass = LENGTH_M, MASS_KG
     m11 = INERTIA_KG_M2 + mass * (length / 2) ** 2 + mass * length**2
     m12 = mass * length**2 / 2 * math.cos(two - one)
@@ -41,9 +41,9 @@ def inverse_tip_inertia(tip_t_m, elbow_down):
     return product(normal, along), product(normal, normal)
 
 
-def p_ratio(tip_t_m, friction, slip, elbow_down):
-    """p over Q22, with p = Q22 - mu s Q21."""
-    q21, q22 = inverse_tip_inertia(tip_t_m, elbow_down)
+def p_ratio(links_rad, friction, slip):
+    """p over Q22 at these link angles, with p = Q22 - mu s Q21."""
+    q21, q22 = inverse_tip_inertia(links_rad)
     return 1 - friction * slip * q21 / q22
 
 
@@ -52,7 +52,7 @@ def stretches(friction, slip, elbow_down, least):
     found, start = [], None
     places = [0.97 * REACH_M * (2 * i / POINTS - 1) for i in range(POINTS + 1)]
     for place in places:
-        if p_ratio(place, friction, slip, elbow_down) >= least:
+        if p_ratio(on_belt(place, elbow_down), friction, slip) >= least:
             start = place if start is None else start
             end = place
         elif start is not None:

@@ -144,6 +144,11 @@ class Bench:
     def tip_t_m(self):
         return self.plant.tip_t_m()
 
+    def links_rad(self):
+        """The angles of both links from the downward vertical."""
+        theta1, elbow = self.plant.joints_rad()
+        return theta1, theta1 + elbow
+
     def touches(self):
         return self.plant.touches()
 
@@ -176,7 +181,8 @@ def judge(library, run, bench):
     tip_m = bench.tip_t_m()
     low_m, high_m = run["edges_m"]
     to_edge_m = high_m - tip_m if run["target_m"] > run["start_m"] else tip_m - low_m
-    p_ratio = arm.p_ratio(tip_m, run["friction"], run["slip"], run["elbow_down"])
+    # In the arm's own posture: its tip is a little deep in a belt that gives.
+    p_ratio = arm.p_ratio(bench.links_rad(), run["friction"], run["slip"])
     if answer.fault:
         return f"fault {answer.fault}", ticks
     if captured is None or captured + CAPTURE_S > CAPTURE_LIMIT_S:

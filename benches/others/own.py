@@ -49,6 +49,9 @@ class Plant:
     def tip_t_m(self):
         return self.snapshot.tip_t_m
 
+    def links_rad(self):
+        return tuple(self.snapshot.theta_rad)
+
     def touches(self):
         return self.snapshot.contact_mode != 0
 
