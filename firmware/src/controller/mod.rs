@@ -343,17 +343,17 @@ impl<L: Law> Stages<L> {
                 .estimators
                 .evaluate_response(estimates, &mut contact, &slow, last);
             if !is_busy {
-                let (arm, least) = (&estimates.arm, beginning.least_p_ratio(&contact));
+                let (arm, margins) = (&estimates.arm, beginning.margins(&contact));
                 self.references
-                    .search(references, arm, tip_t_m, contact.friction, least);
+                    .search(references, arm, tip_t_m, contact.friction, margins);
             }
         } else {
             self.estimators
                 .balance_torques(estimates, &model, &contact, &slow, last);
             if beginning.needs_edges(&contact) {
-                let (arm, least) = (&estimates.arm, beginning.least_p_ratio(&contact));
+                let (arm, margins) = (&estimates.arm, beginning.margins(&contact));
                 self.references
-                    .search(references, arm, tip_t_m, contact.friction, least);
+                    .search(references, arm, tip_t_m, contact.friction, margins);
             } else {
                 self.estimators.calibrate(estimates, &slow);
             }

@@ -9,7 +9,7 @@ pub mod reference;
 use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, Posture};
 
-use self::governor::{EdgeGovernor, GovernorSettings, GovernorState, JointErrors, LeastPRatio};
+use self::governor::{EdgeGovernor, EdgeMargins, GovernorSettings, GovernorState, JointErrors};
 use self::reference::{Program, ReferenceGenerator, ReferenceState, TipReference};
 use crate::estimate::ContactEstimate;
 use crate::estimate::friction::FrictionEstimate;
@@ -47,11 +47,11 @@ pub struct Beginning {
 }
 
 impl Beginning {
-    /// Returns the least p/Q22 that the search for the edges requires.
-    pub fn least_p_ratio(&self, contact: &ContactEstimate) -> LeastPRatio {
-        LeastPRatio {
-            landing: self.landing_p_ratio,
-            contact: contact.response.least_p_ratio,
+    /// Returns the margins that the search for the edges keeps in addition to the settings.
+    pub fn margins(&self, contact: &ContactEstimate) -> EdgeMargins {
+        EdgeMargins {
+            landing_p_ratio: self.landing_p_ratio,
+            contact_p_ratio: contact.response.least_p_ratio,
             soft: contact.response.soft,
             restless_n: contact.response.restless_n,
         }
@@ -164,11 +164,17 @@ impl References {
         arm: &Arm<f32>,
         tip_t_m: f32,
         friction: FrictionEstimate,
-        least: LeastPRatio,
+        margins: EdgeMargins,
     ) {
         let posture = state.posture;
-        self.governor
-            .search(&mut state.governor, arm, posture, tip_t_m, &friction, least);
+        self.governor.search(
+            &mut state.governor,
+            arm,
+            posture,
+            tip_t_m,
+            &friction,
+            margins,
+        );
     }
 
     /// Returns the target of a tick that has begun.

@@ -38,13 +38,13 @@ const CAUGHT_M: f32 = 2e-5;
 /// Rate at which the remaining distance to a target decays, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
 
-/// Least p/Q22 required in addition to the setting.
+/// What decides how far the edges stay from the point where p is zero, in addition to the settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LeastPRatio {
-    /// Where a thrown tip may land. A change of it makes the edges unknown.
-    pub landing: f32,
-    /// What the contact's response asks for. The edges follow it.
-    pub contact: f32,
+pub struct EdgeMargins {
+    /// Least p/Q22 where a thrown tip may land. A change of it makes the edges unknown.
+    pub landing_p_ratio: f32,
+    /// Least p/Q22 for which the contact's response asks. The edges follow it.
+    pub contact_p_ratio: f32,
     /// How far the contact has shown that it is soft, 0 … 1. Its least p/Q22 then replaces the distance that the edges
     /// keep on a rigid contact.
     pub soft: f32,
@@ -166,8 +166,7 @@ impl EdgeGovernor {
         }
     }
 
-    /// Continues the search for the edges around a tip at `tip_t_m`, where p is at least
-    /// `minimum_p_ratio` of Q22 or the setting, whichever is greater.
+    /// Continues the search for the edges around a tip at `tip_t_m` (m), with the settings' margins and these.
     pub fn search(
         &self,
         state: &mut GovernorState,
@@ -175,10 +174,10 @@ impl EdgeGovernor {
         posture: Posture,
         tip_t_m: f32,
         friction: &FrictionEstimate,
-        least: LeastPRatio,
+        margins: EdgeMargins,
     ) {
-        if least.landing != state.asked_p_ratio {
-            state.asked_p_ratio = least.landing;
+        if margins.landing_p_ratio != state.asked_p_ratio {
+            state.asked_p_ratio = margins.landing_p_ratio;
             state.search = None;
             state.is_fresh = false;
         }
@@ -193,8 +192,8 @@ impl EdgeGovernor {
                 0.0
             } else {
                 self.least_p_ratio
-                    .at_least(least.landing)
-                    .at_least(least.contact)
+                    .at_least(margins.landing_p_ratio)
+                    .at_least(margins.contact_p_ratio)
             },
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
@@ -205,7 +204,7 @@ impl EdgeGovernor {
             search = search.next(point, admissibility.at(point), reach);
         }
         if search.is_over() {
-            search = self.settle(state, search, tip_t_m, least);
+            search = self.settle(state, search, tip_t_m, margins);
         }
         state.search = Some(search);
     }
@@ -216,16 +215,16 @@ impl EdgeGovernor {
         state: &mut GovernorState,
         search: Search,
         tip_t_m: f32,
-        least: LeastPRatio,
+        margins: EdgeMargins,
     ) -> Search {
         let direction = search.direction;
-        let clearance_m = (self.clearance_m + self.clearance_m_n * least.restless_n)
+        let clearance_m = (self.clearance_m + self.clearance_m_n * margins.restless_n)
             .at_most(self.clearance_limit_m);
         let edge_m = if search.is_beyond {
             let clear_m = search.inside_m - direction * clearance_m;
             direction * (direction * clear_m).at_most(direction * state.near_m)
         } else {
-            search.inside_m - direction * (1.0 - least.soft) * self.distance_m
+            search.inside_m - direction * (1.0 - margins.soft) * self.distance_m
         };
         if clearance_m > 0.0 && !search.is_beyond {
             state.near_m = edge_m;
@@ -338,7 +337,7 @@ mod tests {
                 posture,
                 tip_t_m,
                 friction,
-                LeastPRatio::default(),
+                EdgeMargins::default(),
             );
         }
         state
@@ -355,11 +354,15 @@ mod tests {
     }
 
     /// Returns the upper edge, m, at which the searches settle with the friction 0.6. p is zero at 0.16471 m.
-    fn upper_edge_m(governor: &EdgeGovernor, state: &mut GovernorState, least: LeastPRatio) -> f32 {
+    fn upper_edge_m(
+        governor: &EdgeGovernor,
+        state: &mut GovernorState,
+        margins: EdgeMargins,
+    ) -> f32 {
         let friction = known(0.6, Slip::Positive);
         for _ in 0..300 {
             let posture = Posture::ElbowDown;
-            governor.search(state, &arm(), posture, -0.1, &friction, least);
+            governor.search(state, &arm(), posture, -0.1, &friction, margins);
         }
         state.edges_m().1
     }
@@ -369,11 +372,11 @@ mod tests {
         let edge_m = |joints: JointErrors, contact: f32| {
             let governor = EdgeGovernor::new(&GovernorSettings::default(), TICK_S, &joints);
             let mut state = GovernorState::new(arm().reach_on_belt_m());
-            let least = LeastPRatio {
-                contact,
+            let margins = EdgeMargins {
+                contact_p_ratio: contact,
                 ..Default::default()
             };
-            upper_edge_m(&governor, &mut state, least)
+            upper_edge_m(&governor, &mut state, margins)
         };
         let ideal = JointErrors::default();
         let rough = JointErrors {
@@ -400,11 +403,11 @@ mod tests {
     fn a_restless_force_keeps_the_tip_away_from_the_edge_and_a_calm_one_lets_it_return() {
         let mut state = GovernorState::new(arm().reach_on_belt_m());
         let mut edge_m = |restless_n: f32| {
-            let least = LeastPRatio {
+            let margins = EdgeMargins {
                 restless_n,
                 ..Default::default()
             };
-            upper_edge_m(&with_distances(), &mut state, least)
+            upper_edge_m(&with_distances(), &mut state, margins)
         };
         let calm = edge_m(0.0);
         // 0.1 N from tick to tick keep 4 mm.
@@ -418,13 +421,13 @@ mod tests {
     #[test]
     fn on_a_soft_contact_the_least_p_ratio_replaces_the_distance() {
         let edge_m = |contact: f32, soft: f32| {
-            let least = LeastPRatio {
-                contact,
+            let margins = EdgeMargins {
+                contact_p_ratio: contact,
                 soft,
                 ..Default::default()
             };
             let mut state = GovernorState::new(arm().reach_on_belt_m());
-            upper_edge_m(&with_distances(), &mut state, least)
+            upper_edge_m(&with_distances(), &mut state, margins)
         };
         let soft = edge_m(0.02, 1.0);
         assert!((soft - edge_m(0.02, 0.0) - 0.5e-3).abs() < 3e-5, "{soft}");
