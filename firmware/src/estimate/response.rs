@@ -65,6 +65,9 @@ const SETTLING_S: f32 = 0.05;
 const CALM_N: f32 = 0.2;
 /// Rate at which a restless contact counts as calm again, N/s.
 const CALMING_N_S: f32 = 0.15;
+/// Most that a restless contact counts, N. The landing of a tip shakes a contact by newtons, after which it would count as
+/// restless for tens of seconds.
+const MOST_RESTLESS_N: f32 = 0.2;
 /// Multiple of `minimum_p_ratio` below which the contact is observed.
 const NEAR: f32 = 3.0;
 /// Time for which a contact that was certainly not rigid counts as one that gives, s.
@@ -117,7 +120,7 @@ pub struct ContactResponse {
     /// Probe to be added to the wanted normal force, N.
     pub probe_n: f32,
     /// Root mean square of the slow changes of force from tick to tick by causes unknown, less 0.2 N that the loop makes of
-    /// noise, N.
+    /// noise; at most 0.2 N.
     pub restless_n: f32,
 }
 
@@ -405,7 +408,7 @@ impl ResponseEstimator {
         let restless_n = (slow_n2.at_least(0.0) / f32::from(BLOCK_TICKS)).square_root() - CALM_N;
         state.restless_n = restless_n
             .at_least(state.restless_n - self.calming_n)
-            .at_least(0.0);
+            .limited(0.0, MOST_RESTLESS_N);
         state.lagged_s = if state.lags > 0.0 {
             LAGGED_S
         } else {
@@ -615,28 +618,43 @@ mod tests {
         );
     }
 
-    /// Returns the response of a contact whose force swings by 3 N at 50 Hz.
-    fn swinging(mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
-        let mut ticks = 0;
-        observed(1000, |commanded| {
-            ticks += 1;
-            contact(commanded) + 3.0 * libm::sinf(core::f32::consts::TAU * 0.05 * ticks as f32)
+    /// Returns the response after `ticks` of a contact whose force swings by `amplitude_n` at 50 Hz during the first second.
+    fn swinging(
+        ticks: u32,
+        amplitude_n: f32,
+        mut contact: impl FnMut(f32) -> f32,
+    ) -> ContactResponse {
+        let mut tick = 0;
+        observed(ticks, |commanded| {
+            tick += 1;
+            let amplitude_n = if tick <= 1000 { amplitude_n } else { 0.0 };
+            let phase = core::f32::consts::TAU * 0.05 * tick as f32;
+            contact(commanded) + amplitude_n * libm::sinf(phase)
         })
     }
 
     #[test]
     fn a_force_that_swings_is_restless_and_one_that_answers_the_probe_is_calm() {
         assert_eq!(observed(1000, |commanded| commanded).restless_n, 0.0);
-        // 3 N at 50 Hz change by 0.66 N a tick, root mean square, and these changes by 0.21 N; 0.2 N counts as calm.
-        let swings = swinging(|commanded| commanded);
-        assert!((swings.restless_n - 0.43).abs() < 0.05, "{swings:?}");
+        // 1.5 N at 50 Hz change by 0.33 N a tick, root mean square, and these changes by 0.1 N; 0.2 N counts as calm.
+        let swings = swinging(1000, 1.5, |commanded| commanded);
+        assert!((swings.restless_n - 0.115).abs() < 0.03, "{swings:?}");
+    }
+
+    #[test]
+    fn a_contact_is_calm_again_soon_after_violent_swings() {
+        let restless_n = |ticks| swinging(ticks, 50.0, |commanded| commanded).restless_n;
+        assert_eq!(restless_n(1000), MOST_RESTLESS_N);
+        assert!(restless_n(2500) > 0.0);
+        // The averages forget 50 N within ten averaging times.
+        assert_eq!(restless_n(4500), 0.0);
     }
 
     #[test]
     fn a_contact_certainly_lags_even_if_its_force_swings() {
-        let gives = swinging(compliant(1e5, 60.0));
+        let gives = swinging(1000, 3.0, compliant(1e5, 60.0));
         assert!(gives.lags > 0.0, "{gives:?}");
-        assert_eq!(swinging(|commanded| commanded).lags, 0.0);
+        assert_eq!(swinging(1000, 3.0, |commanded| commanded).lags, 0.0);
     }
 
     #[test]

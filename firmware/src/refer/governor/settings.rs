@@ -25,8 +25,8 @@ settings! {
         clearance_m_nm: f32 = 0.085, 0.0..=10.0, "m/(N·m)";
         /// Distance kept from that point in addition, for each rad of the gears' known play.
         clearance_m_rad: f32 = 2.55, 0.0..=100.0, "m/rad";
-        /// Distance kept from that point in addition, for each N by which the force changes from tick to tick
-        /// by causes unknown: near the edge a vibration is amplified, and an unknown inertia moves the edge.
+        /// Distance kept from that point in addition, for each N (at most 0.2 N) by which the force changes from tick
+        /// to tick by causes unknown: near the edge a vibration is amplified, and an unknown inertia moves the edge.
         clearance_m_n: f32 = 0.04, 0.0..=10.0, "m/N";
         /// Largest such distance.
         clearance_limit_m: f32 = 8e-3, 0.0..=0.1, "m";
