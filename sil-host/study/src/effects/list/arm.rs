@@ -29,7 +29,7 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
         [10_000.0, 5000.0, 2000.0, 1000.0, 500.0], typical 2000.0,
         overrides: Computed(|level, _| gear(level, 0.0, "motor"));
 
-    "gear-stiffness-motor-side-known": "effects.gear.stiffness_nm_rad", "N·m/rad, encoder on the motor, known",
+    "gear-stiffness-motor-side-known": "effects.gear.stiffness_nm_rad", "N·m/rad, known",
         [5000.0, 2000.0, 1000.0, 500.0, 200.0], typical 2000.0,
         overrides: Computed(|level, _| {
             let compliance_rad_nm = 1.0 / level;
