@@ -17,6 +17,8 @@ pub struct Block {
     pub returns: bool,
     /// The function that the last instruction calls.
     pub call: Option<u32>,
+    /// Whether that call depends on a condition.
+    pub may_skip_call: bool,
 }
 
 /// A function's blocks by address.
@@ -63,7 +65,7 @@ impl Graph {
                         }
                         leaders.insert(next);
                     }
-                    Flow::Call(_) => {
+                    Flow::Call { .. } => {
                         leaders.insert(next);
                     }
                     Flow::Return { conditional: false } | Flow::Trap => break,
@@ -170,6 +172,7 @@ fn blocks(
             successors: Vec::new(),
             returns: false,
             call: None,
+            may_skip_call: false,
         };
         let mut at = *leader;
         while let Some(instruction) = instructions.get(&at) {
@@ -190,8 +193,12 @@ fn blocks(
                         block.successors.push((next, false));
                     }
                 }
-                Flow::Call(target) => {
+                Flow::Call {
+                    target,
+                    conditional,
+                } => {
                     block.call = Some(*target);
+                    block.may_skip_call = *conditional;
                     block.successors.push((next, true));
                 }
                 Flow::Return { conditional } => {

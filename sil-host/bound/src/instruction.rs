@@ -25,7 +25,12 @@ pub enum Flow {
         conditional: bool,
     },
     /// Calls a function, then continues with the next instruction.
-    Call(u32),
+    Call {
+        /// The function.
+        target: u32,
+        /// Whether the call depends on a condition.
+        conditional: bool,
+    },
     /// Returns to the caller; a conditional return may also continue.
     Return {
         /// Whether execution may also continue with the next instruction.
@@ -233,7 +238,10 @@ impl Decoder {
         use ArmInsn::*;
         let mut flow = Flow::Next;
         let kind = if is(ARM_INS_BL) {
-            flow = Flow::Call(immediate.ok_or_else(|| unknown(&text))? as u32);
+            flow = Flow::Call {
+                target: immediate.ok_or_else(|| unknown(&text))? as u32,
+                conditional,
+            };
             InstructionKind::Branch
         } else if any(&[ARM_INS_B, ARM_INS_CBZ, ARM_INS_CBNZ]) {
             let target = immediate.ok_or_else(|| unknown(&text))? as u32;

@@ -226,7 +226,8 @@ impl<'a> Analysis<'a> {
         incoming.entry(graph.entry).or_default().push(start);
         let mut ends = Vec::new();
         for (from, block) in &graph.blocks {
-            let never_returns = block.call.is_some_and(|callee| calls[&callee].is_none());
+            let never_returns =
+                !block.may_skip_call && block.call.is_some_and(|callee| calls[&callee].is_none());
             if block.returns {
                 let end = problem.add_var(0.0, (0.0, 1.0));
                 outgoing.entry(*from).or_default().push(end);

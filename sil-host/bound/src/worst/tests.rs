@@ -199,3 +199,20 @@ fn an_instruction_of_unknown_cost_is_refused() {
     let error = worst(&[0xbf30, 0x4770], &[]).unwrap_err();
     assert!(error.to_string().contains("wfi"), "{error}");
 }
+
+#[test]
+fn a_call_that_depends_on_a_condition_may_be_skipped() {
+    // cmp r0, #0; condition; bl callee; bx lr; callee: bx lr
+    let returns_without_callee = |condition| {
+        let code = [0x2800_u16, condition, 0xf000, 0xf801, 0x4770, 0x4770];
+        let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
+        let image = Image::of_code(AT_IN_RAM, &bytes, "kernel");
+        let limits = Limits(Vec::new());
+        let callee = BTreeSet::from([AT_IN_RAM + 10]);
+        let mut analysis = Analysis::new(&image, &limits).unwrap().without(&callee);
+        matches!(analysis.of(AT_IN_RAM), Ok(Some(_)))
+    };
+    let (it_ne, nop) = (0xbf18, 0xbf00);
+    assert!(returns_without_callee(it_ne));
+    assert!(!returns_without_callee(nop));
+}
