@@ -46,20 +46,51 @@ impl<T: Real> Arm<T> {
         pose: &Pose<T>,
     ) -> GeneralisedTorque<T> {
         let joints = theta.to_joints();
-        let joint_rates = theta_dot.to_joints();
+        let damping = self.damping_torque_nm(theta_dot);
         let gravity_1 =
             self.gravity_1_normal * pose.sine.x + self.gravity_1_tangential * pose.cosine.x;
         let gravity_2 =
             self.gravity_2_normal * pose.sine.y + self.gravity_2_tangential * pose.cosine.y;
         let spring_1 = self.stiffness_1 * (joints.first() - self.spring_rest_1);
         let spring_2 = self.stiffness_2 * (joints.second() - self.spring_rest_2);
+        GeneralisedTorque::new(
+            gravity_1 - spring_2 + damping.first() + spring_1,
+            gravity_2 + spring_2 + damping.second(),
+        )
+    }
+
+    /// Returns the change ∂w/∂θ of the torque w, N·m/rad, by gravity and springs.
+    #[inline]
+    pub fn passive_stiffness_nm_rad(&self, pose: &Pose<T>) -> Matrix2<T> {
+        let gravity_1 =
+            self.gravity_1_normal * pose.cosine.x - self.gravity_1_tangential * pose.sine.x;
+        let gravity_2 =
+            self.gravity_2_normal * pose.cosine.y - self.gravity_2_tangential * pose.sine.y;
+        let elbow = self.stiffness_2;
+        Matrix2::new(
+            gravity_1 + self.stiffness_1 + elbow,
+            -elbow,
+            -elbow,
+            gravity_2 + elbow,
+        )
+    }
+
+    /// Returns the part of w by the dashpots, N·m, at link rates `theta_dot` (rad/s).
+    #[inline]
+    pub fn damping_torque_nm(&self, theta_dot: &LinkMotion<T>) -> GeneralisedTorque<T> {
+        let joint_rates = theta_dot.to_joints();
         let (rate_1, elbow_rate) = (joint_rates.first(), joint_rates.second());
         // σ1 θ̇1 − σ2 (θ̇2 − θ̇1); the first term is zero for equal dashpots.
-        let damping_1 = self.damping_1_excess * rate_1 - self.damping_2 * (elbow_rate - rate_1);
         GeneralisedTorque::new(
-            gravity_1 - spring_2 + damping_1 + spring_1,
-            gravity_2 + spring_2 + self.damping_2 * elbow_rate,
+            self.damping_1_excess * rate_1 - self.damping_2 * (elbow_rate - rate_1),
+            self.damping_2 * elbow_rate,
         )
+    }
+
+    /// Centrifugal torque on link 2 for each rad²/s² of link 1, N·m·s²; link 2 acts on link 1 with the opposite sign.
+    #[inline]
+    pub fn centrifugal_nms2(&self, pose: &Pose<T>) -> T {
+        self.inertia_coupling * pose.sine_elbow()
     }
 
     /// Centrifugal torque c, N·m.
@@ -69,7 +100,7 @@ impl<T: Real> Arm<T> {
         theta_dot: &LinkMotion<T>,
         pose: &Pose<T>,
     ) -> GeneralisedTorque<T> {
-        let coupling = self.inertia_coupling * pose.sine_elbow();
+        let coupling = self.centrifugal_nms2(pose);
         let (rate_1, rate_2) = (theta_dot.first(), theta_dot.second());
         GeneralisedTorque::new(-coupling * rate_2 * rate_2, coupling * rate_1 * rate_1)
     }
@@ -120,6 +151,18 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_passive_stiffness_is_the_derivative_of_the_torque((theta, theta_dot) in state(), d1 in -1.0_f64..1.0, d2 in -1.0_f64..1.0) {
+            let arm = Arm::<f64>::new(ArmParameters { stiffness_nm_rad: [0.4, 1.3], belt_tilt_rad: 0.1, ..Default::default() }).unwrap();
+            let torque = |step: f64| {
+                let theta = theta + LinkMotion::new(d1, d2) * step;
+                *arm.passive_torque_nm(&theta, &theta_dot, &Pose::new(&theta)).vector()
+            };
+            let slope = (torque(1e-5) - torque(-1e-5)) / 2e-5;
+            let expected = arm.passive_stiffness_nm_rad(&Pose::new(&theta)) * nalgebra::Vector2::new(d1, d2);
+            prop_assert!((slope - expected).amax() < 1e-8);
+        }
+
         #[test]
         fn inverse_mass_matrix_is_the_inverse((theta, _) in state()) {
             let arm = Arm::<f64>::new(ArmParameters::default()).unwrap();
