@@ -2,6 +2,7 @@
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
+use nalgebra::Vector2;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::{JointMotion, JointTorque};
 
@@ -17,6 +18,8 @@ pub struct LastCommand {
     pub saturated: bool,
     /// Whether the contact guard changed the torques.
     pub guarded: bool,
+    /// Contact force (f_t, f_n) that they are meant to cause, N.
+    pub contact_force_n: Vector2<f32>,
     /// Expected acceleration of the joints until the next tick, rad/s².
     pub expected_acceleration_rad_s2: JointMotion<f32>,
     /// Part of that acceleration due to the contact force, rad/s².
@@ -38,6 +41,7 @@ impl LastCommand {
             torque_nm,
             saturated,
             guarded,
+            contact_force_n,
             expected_acceleration_rad_s2,
             contact_acceleration_rad_s2,
             reference_velocity_m_s,
@@ -49,6 +53,7 @@ impl LastCommand {
         (*saturated, *guarded, *at_edge) = (false, false, false);
         // Stored in line in two parts; as one, the compiler calls a loop that takes six times as long.
         compiler_fence(Ordering::SeqCst);
+        *contact_force_n = Vector2::zeros();
         *expected_acceleration_rad_s2 = JointMotion::zeros();
         *contact_acceleration_rad_s2 = JointMotion::zeros();
         *reference_velocity_m_s = 0.0;
@@ -73,6 +78,7 @@ mod tests {
             torque_nm: ones,
             saturated: true,
             guarded: true,
+            contact_force_n: Vector2::new(1.0, 1.0),
             expected_acceleration_rad_s2: JointMotion::new(1.0, 1.0),
             contact_acceleration_rad_s2: JointMotion::new(1.0, 1.0),
             reference_velocity_m_s: 1.0,

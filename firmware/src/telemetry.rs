@@ -68,6 +68,7 @@ pub struct Telemetry {
 pub(crate) struct TelemetryTick<'a> {
     pub(crate) model: &'a Model,
     pub(crate) contact: &'a ContactEstimate,
+    pub(crate) contact_confidence: f32,
     pub(crate) target: &'a Target,
     pub(crate) command: &'a LastCommand,
     pub(crate) recovering: bool,
@@ -96,6 +97,7 @@ impl<'a> TelemetrySink<'a> {
         let TelemetryTick {
             model,
             contact,
+            contact_confidence,
             target,
             command,
             recovering,
@@ -114,7 +116,7 @@ impl<'a> TelemetrySink<'a> {
             tangential_force_n: contact.force_n.x,
             torque_nm: command.torque_nm,
             contact: contact.touches,
-            contact_confidence: contact.confidence,
+            contact_confidence: *contact_confidence,
             friction: contact.friction.coefficient,
             friction_deviation: contact.friction.deviation,
             slip: contact.friction.slip,

@@ -46,13 +46,7 @@ impl TorqueOutput {
         let (wanted_nm, guarded) = self.pressed(&output.torque_nm, model, contact);
         self.limit(command, &wanted_nm)?;
         command.guarded = guarded;
-        command.contact_acceleration_rad_s2 = model
-            .contact_acceleration_rad_s2(&output.contact_force_n)
-            .to_joints();
-        command.expected_acceleration_rad_s2 = model
-            .free_acceleration_rad_s2(&command.torque_nm)
-            .to_joints()
-            + command.contact_acceleration_rad_s2;
+        command.contact_force_n = output.contact_force_n;
         Ok(())
     }
 
@@ -72,10 +66,9 @@ impl TorqueOutput {
         if !(self.guard.enabled && slides) || catches_up {
             return (*wanted_nm, false);
         }
-        let (offset, normal) = model.free_normal_acceleration();
         let plane = HalfPlane {
-            normal,
-            bound: -contact.p_per_kg * self.guard.minimum_force_n - offset,
+            normal: model.free_slope_per_kg_m,
+            bound: -contact.p_per_kg * self.guard.minimum_force_n - model.free_offset_m_s2,
         };
         match nearest_torque_nm(wanted_nm, &plane, self.limit_nm) {
             (nearest_nm, true) => (nearest_nm, true),
@@ -154,8 +147,8 @@ mod tests {
         let mut contact = ContactEstimate {
             touches: true,
             lands: false,
+            leaves: false,
             in_flight: false,
-            confidence: 1.0,
             force_n: Vector2::new(-6.0, 10.0),
             friction: FrictionEstimate {
                 coefficient: 0.6,
@@ -167,6 +160,7 @@ mod tests {
                 sticks: false,
             },
             p_per_kg: model.p_per_kg(0.6, Slip::Positive),
+            p_ratio: 0.5,
             response: ContactResponse::rigid(1.0),
         };
         // A torque that lifts the tip.

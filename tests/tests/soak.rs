@@ -126,7 +126,7 @@ impl Native {
             self.task.note(Lapse::Garbage, garbage.into());
             if let Ok(Request::Sensor(frame)) = request {
                 self.task.drive_mut().0 = Some(frame);
-                answer = self.task.tick().map(|answered| answered.frame);
+                answer = self.task.tick().map(|answered| *answered.frame);
             }
         }
         answer

@@ -58,14 +58,15 @@ impl Checks {
         self.verdict.is_hot = self.heating_model.is_some() && self.heating.is_hot();
     }
 
-    /// Records the torques put out since the last tick, and lets the check whose turn it is look at the readings.
-    /// `drives` states whether the drive is active.
-    pub fn tick(
-        &mut self,
-        readings: &SensorReadings,
-        torques: [TorqueCounts; 2],
-        drives: bool,
-    ) -> Verdict {
+    /// Returns what the checks have found so far.
+    #[inline]
+    pub fn verdict(&self) -> &Verdict {
+        &self.verdict
+    }
+
+    /// Records the torques put out at a tick, and lets the check whose turn it is look at its readings. `drives`
+    /// states whether the drive is active.
+    pub fn tick(&mut self, readings: &SensorReadings, torques: [TorqueCounts; 2], drives: bool) {
         self.heating.tick(torques);
         self.turn = if self.turn + 1 < TURNS {
             self.turn + 1
@@ -95,6 +96,5 @@ impl Checks {
                 }
             }
         }
-        self.verdict
     }
 }

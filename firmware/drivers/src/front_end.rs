@@ -72,8 +72,11 @@ pub struct FrontEnd {
     settings: Option<FrontEndSettings>,
     checks: Checks,
     switches: Switches,
-    /// Readings since the last frame, in the arm's directions, forces as (f_t, f_n).
+    /// The newest readings, in the arm's directions, forces as (f_t, f_n), and whether they have come since the last
+    /// frame.
     readings: SensorReadings,
+    has_new_joints: bool,
+    has_new_forces: bool,
     /// Second sensors of θ1, the elbow, f_t and f_n.
     second_encoders: [SecondChannel; 2],
     second_forces: [SecondChannel; 2],
@@ -111,6 +114,8 @@ impl FrontEnd {
             checks: Checks::new(gap, heating_model, bits),
             switches: Switches::default(),
             readings: SensorReadings::default(),
+            has_new_joints: false,
+            has_new_forces: false,
             second_encoders: [SecondChannel::default(); 2],
             second_forces: [SecondChannel::default(); 2],
             sequence: 0,
@@ -185,6 +190,7 @@ impl FrontEnd {
             let joints = &mut self.readings.joints;
             confirm(channels, joints, pairs, reversed, tolerance, self.is_active);
         }
+        self.has_new_joints = true;
         let magnets = encoders.diagnostics();
         self.readings.magnets = magnets.map(|it| it.map(|it| it.is_healthy()));
     }
@@ -212,6 +218,7 @@ impl FrontEnd {
             tangential.ok().map(|it| balanced(it, tare_t, reversed_t)),
             normal.ok().map(|it| balanced(it, tare_n, reversed_n)),
         ];
+        self.has_new_forces = true;
         if mounting.sensors == SensorParts::Both {
             let tolerance = Tolerance {
                 noise: mounting.second_force_tolerance,
@@ -235,10 +242,15 @@ impl FrontEnd {
             contradiction,
             is_hot,
             plausible,
-        } = self.checks.tick(readings, self.torques, self.is_active);
+        } = *self.checks.verdict();
         // A sensor whose next set of readings is not complete in time gives none.
-        let joints = core::mem::take(&mut readings.joints);
-        let forces = core::mem::take(&mut readings.forces);
+        if !core::mem::take(&mut self.has_new_joints) {
+            readings.joints = [None; 2];
+        }
+        if !core::mem::take(&mut self.has_new_forces) {
+            readings.forces = [None; 2];
+        }
+        let (joints, forces) = (readings.joints, readings.forces);
         let (is_complete, joints, [tangential_force, normal_force]) = match (joints, forces) {
             ([Some(joint_1), Some(joint_2)], [Some(tangential), Some(normal)]) => {
                 (true, [joint_1, joint_2], [tangential, normal])
@@ -274,6 +286,13 @@ impl FrontEnd {
             tangential_force,
             inputs,
         }
+    }
+
+    /// Checks readings and torques of the last frame, for those after it. Readings that have come since then are
+    /// checked in place of the frame's.
+    pub fn check(&mut self) {
+        self.checks
+            .tick(&self.readings, self.torques, self.is_active);
     }
 
     /// Permits arming once the button has been pressed for long enough: a deliberate act of an operator who has

@@ -142,6 +142,10 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
         }
     }
 
+    fn end_tick(&mut self) {
+        self.front_end.check();
+    }
+
     fn stopwatch(&self) -> u32 {
         DWT::cycle_count()
     }
@@ -204,9 +208,11 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
         if bus == 0 {
             if let Some(encoders) = self.encoders.serve() {
                 self.front_end.take_encoders(encoders);
+                self.encoders.prepare();
             }
         } else if let Some(force_cell) = self.force_cell.serve() {
             self.front_end.take_forces(force_cell);
+            self.force_cell.prepare();
         }
     }
 

@@ -102,8 +102,7 @@ where
         let starts = !self.is_busy;
         if starts {
             self.is_busy = true;
-            let exchange = self.dialogue.begin();
-            self.select(exchange);
+            self.select();
         }
         starts
     }
@@ -120,13 +119,21 @@ where
         }
         self.words.discard();
         self.is_busy = false;
+        self.prepare();
         self.select_first();
         set_up(DWT::cycle_count(), self.waits.setup);
         self.send();
     }
 
+    /// Prepares the next set of readings, so that it can start at once; those of the last set have been taken.
+    #[inline]
+    pub fn prepare(&mut self) {
+        let exchange = self.dialogue.begin();
+        self.load(exchange);
+    }
+
     /// Serves the interrupt: takes a received word, sends the next. Returns the driver when its set of readings
-    /// is complete.
+    /// is complete; [`prepare`](Self::prepare) is due after they have been taken.
     pub fn serve(&mut self) -> Option<&D> {
         let received = self.words.receive()?;
         self.has_failed |= received.is_err();
@@ -141,7 +148,8 @@ where
         let answer = (!self.has_failed).then_some(self.received);
         match self.dialogue.proceed(answer) {
             Some(exchange) => {
-                self.select(exchange);
+                self.load(exchange);
+                self.select();
                 set_up(DWT::cycle_count(), self.waits.setup);
                 self.send();
                 None
@@ -153,13 +161,18 @@ where
         }
     }
 
+    /// Takes over the data of an exchange.
     #[inline]
-    fn select(&mut self, exchange: Exchange) {
+    fn load(&mut self, exchange: Exchange) {
         self.selected = exchange.select;
         self.sending = exchange.data << (32 - u32::from(D::BITS));
         self.received = 0;
         self.has_failed = false;
         self.words_left = self.words_per_exchange;
+    }
+
+    #[inline]
+    fn select(&mut self) {
         if let Some(select) = self.selects.get_mut(self.selected) {
             let _ = select.set_low();
         }

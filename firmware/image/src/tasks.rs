@@ -1,13 +1,16 @@
 //! The image's tasks, in order of priority, highest first:
 //!
-//! - `control`, the timer's interrupt at the control rate: sample → tick → actuate; and the sensors'
+//! - `control`, the timer's interrupt at the control rate: sample → answer → actuate; and the sensors'
 //!   buses, whose interrupts read the sensors for the next tick. They do not interrupt each other.
-//! - `serial`, the serial port's interrupt: bytes from and to the host
+//! - `update`, after each control interrupt: prepares the next one, and reports the answer
+//! - `serial`, the serial port's interrupt: bytes from and to the host. It has the priority of `update`.
 //! - `link`: requests from the host, responses to it
 //! - `idle`: the log
 //!
-//! `control` never waits. It puts its answers for `link` and its events for `idle` in bounded
-//! queues and discards those that do not fit.
+//! Neither of the first two waits. `update` masks `control` while it works on what both share, and has the rest of
+//! the period: a tick that begins before it has ended is an overrun, and finishes it first. Answers are therefore
+//! the same whenever the tasks run. `update` puts answers for `link` and events for `idle` in bounded queues and
+//! discards those that do not fit.
 
 use core::panic::PanicInfo;
 
@@ -107,48 +110,68 @@ pub fn start<B: Board>(device: B::Device, core: cortex_m::Peripherals) -> Parts<
     }
 }
 
-/// Runs one control tick. Returns whether there is an answer for the link.
-pub fn control<D: BoardDrive, L: Law>(
+/// Samples, answers and actuates.
+#[inline]
+pub fn control<D: BoardDrive, L: Law>(control: &mut Control<D, L>) {
+    if control.note_silence() {
+        control.task.stop_instead_of_tick();
+        control.expect_no_host(0);
+        return;
+    }
+    control.task.answer();
+}
+
+/// Finishes a control tick. Returns whether there is an answer for the link.
+#[inline]
+pub fn update<D: BoardDrive, L: Law>(
     control: &mut Control<D, L>,
     answers: &mut Producer<'static, Response>,
     events: &mut Producer<'static, Change>,
     reported: &mut Change,
 ) -> bool {
-    if control.note_silence() {
-        control.task.stop_instead_of_tick();
-        control.expect_no_host(0);
-        return false;
-    }
+    let Control {
+        task,
+        dropped_responses,
+        fault,
+        fault_to_record,
+        ..
+    } = control;
+    let is_on_board = task.source().is_on_board();
     let Some(Answered {
         sensor,
         frame,
         elapsed,
-    }) = control.task.tick()
+    }) = task.update()
     else {
         return false;
     };
     // Each kind is built in its place in the queue.
     let sent = match sensor {
-        Some(sensor) if control.task.source().is_on_board() => answers.enqueue(Response::Tick {
-            sensor,
-            answer: frame,
+        Some(sensor) if is_on_board => answers.enqueue(Response::Tick {
+            sensor: *sensor,
+            answer: *frame,
             elapsed,
         }),
-        _ => answers.enqueue(Response::Actuator { frame, elapsed }),
+        _ => answers.enqueue(Response::Actuator {
+            frame: *frame,
+            elapsed,
+        }),
     };
     if sent.is_err() {
-        control.dropped_responses = control.dropped_responses.wrapping_add(1);
+        *dropped_responses = dropped_responses.wrapping_add(1);
     }
-    if frame.fault != control.fault {
-        control.fault = frame.fault;
+    if frame.fault != *fault {
+        *fault = frame.fault;
         if let (Some(sensor), Some(_)) = (sensor, frame.latched_fault()) {
-            let answer = frame;
-            control.fault_to_record = Some(FaultRecord { sensor, answer });
+            *fault_to_record = Some(FaultRecord {
+                sensor: *sensor,
+                answer: *frame,
+            });
         }
     }
     // An event for which the queue has no room is not logged.
-    if !reported.is_of(&frame) {
-        let change = Change::of(&frame);
+    if !reported.is_of(frame) {
+        let change = Change::of(frame);
         if events.enqueue(change).is_ok() {
             *reported = change;
         }
@@ -209,13 +232,13 @@ pub fn panicked<B: Board>(info: &PanicInfo<'_>) -> ! {
 }
 
 /// Declares the tasks of an image for one board and one set of laws. Board crates invoke it with
-/// their chip's `device` and three interrupts: the `control` timer's, the `serial` port's, and one
-/// that no peripheral in use raises, which runs the `link`; `sensors` adds those of the sensors' buses.
+/// their chip's `device` and four interrupts: the `control` timer's, the `serial` port's, and two
+/// that no peripheral in use raises, which run `update` and `link`; `sensors` adds those of the sensors' buses.
 #[macro_export]
 macro_rules! tasks {
     (
         board = $board:ty, laws = $laws:ty, device = $($device:ident)::+,
-        control = $control:ident, serial = $serial:ident, link = $link:ident
+        control = $control:ident, update = $update:ident, serial = $serial:ident, link = $link:ident
         $(, sensors = [$($task:ident($number:literal): $bus:ident),+])?
     ) => {
         #[::rtic::app(device = $($device)::+, peripherals = true)]
@@ -231,6 +254,7 @@ macro_rules! tasks {
             type Hardware = $board;
             type Laws = $laws;
 
+            const UPDATE: $($device)::+::Interrupt = $($device)::+::Interrupt::$update;
             const LINK: $($device)::+::Interrupt = $($device)::+::Interrupt::$link;
 
             #[shared]
@@ -274,13 +298,19 @@ macro_rules! tasks {
                 (Shared { control }, local)
             }
 
-            #[task(binds = $control, priority = 3, shared = [control],
-                   local = [answers_in, events_in, reported])]
+            #[task(binds = $control, priority = 3, shared = [control])]
             fn control(mut cx: control::Context) {
+                cx.shared.control.lock($crate::tasks::control);
+                rtic::pend(UPDATE);
+            }
+
+            #[task(binds = $update, priority = 2, shared = [control],
+                   local = [answers_in, events_in, reported])]
+            fn update(mut cx: update::Context) {
                 let local = cx.local;
                 let answered = cx.shared.control.lock(|control| {
                     let (answers, events) = (local.answers_in, local.events_in);
-                    $crate::tasks::control(control, answers, events, local.reported)
+                    $crate::tasks::update(control, answers, events, local.reported)
                 });
                 // Bytes may have arrived without the idle line that would have woken `link`.
                 if answered || !<<Hardware as Board>::Port as Port>::HALF_DUPLEX {

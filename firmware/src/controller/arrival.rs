@@ -4,7 +4,6 @@ use painleve_shared::counts::LinearConverter;
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 
 use crate::configuration::Converters;
-use crate::last_command::LastCommand;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::Supervision;
 
@@ -40,7 +39,6 @@ pub(super) struct ArrivalState {
 pub(super) struct Lapses<'a> {
     pub monitor: &'a mut LapseMonitor,
     pub supervision: &'a mut Supervision,
-    pub command: &'a mut LastCommand,
 }
 
 impl Lapses<'_> {
@@ -76,14 +74,14 @@ impl Lapses<'_> {
         }
     }
 
-    /// Latches the fault of a frame's first lapse that has occurred too often, and takes the torque off.
+    /// Latches the fault of a frame's first lapse that has occurred too often. The answer to the frame then takes the
+    /// torque off.
     #[inline]
     fn stop_at(&mut self, first: Option<Lapse>) {
         if let Some(lapse) = first
             && self.supervision.fault().is_none()
         {
             self.supervision.latch(lapse.fault());
-            self.command.clear();
         }
     }
 }

@@ -1,10 +1,14 @@
-//! One control tick, from sensor counts to torque counts, as a pipeline of stages:
+//! One control tick, from sensor counts to torque counts, as a pipeline of stages, and the update after it:
 //!
 //! ```text
-//! frame ─ arrive ─ estimate ─ supervise ─ refer ─ demand ─ torque output ─ answer
+//! frame ─ arrive ─ observe ─ supervise ─ refer ─ demand ─ torque output ─ answer
 //!                     ↑                             ↑            │
-//!                     └──────── last command ───────┴────────────┘
+//!                  prepare ←── learn, search ───────┴─── last command
 //! ```
+//!
+//! The answer needs only what the readings of its tick decide. All else is updated after it, and prepared for the
+//! readings of the next tick: the torque goes out earlier, and the update has the rest of the period (Åström and
+//! Wittenmark, Computer-Controlled Systems, 3rd edition, chapter 9).
 //!
 //! Each stage consists of constant settings and a state of its own; the stages' signatures show the
 //! data flow between them. At the end of a tick its results are written to the telemetry, which is
@@ -24,10 +28,11 @@ use self::arrival::{Arrival, ArrivalState, Lapses, ReadingRanges, arrive};
 use crate::configuration::Configuration;
 use crate::demand::{DemandInput, DemandState, TorqueDemand};
 use crate::estimate::joint_friction::{JointFriction, JointFrictionState};
-use crate::estimate::joints::EncoderJump;
-use crate::estimate::{EstimateSettings, EstimatesState, Estimators, Readings};
+use crate::estimate::joints::Restart;
+use crate::estimate::{EstimateSettings, EstimatesState, Estimators, Observed, Readings};
 use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
+use crate::refer::governor::EdgeMargins;
 use crate::refer::{References, ReferencesState};
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::{Supervision, Supervisor};
@@ -89,6 +94,30 @@ pub struct Controller<L: Law = LawSettings> {
     state: State<L>,
     stages: Stages<L>,
     monitor: LapseMonitor,
+    due: Due,
+}
+
+/// The update that is due after an answer.
+#[derive(Clone, Copy, Debug, Default)]
+enum Due {
+    /// None: there were no new readings.
+    #[default]
+    Nothing,
+    /// The preparation of the next tick: the readings were out of range, or the estimates have started from them.
+    Preparation,
+    /// All of it.
+    Everything,
+}
+
+/// What the update needs of the tick that has been answered, besides the state of the stages.
+#[derive(Clone, Copy, Debug, Default)]
+struct Answered {
+    tick: u32,
+    elapsed_ticks: u32,
+    /// Whether torque was applied before the tick.
+    drove: bool,
+    /// Least p, as a fraction of Q22, at which the tip may land; 0 if it is not being returned to the belt.
+    landing_p_ratio: f32,
 }
 
 /// The stages of a tick: settings only.
@@ -106,13 +135,17 @@ struct Stages<L> {
 
 /// State of the stages between ticks.
 #[derive(Clone, Debug)]
+#[repr(C)]
 struct State<L: Law> {
-    arrivals: ArrivalState,
     estimates: EstimatesState,
+    command: LastCommand,
+    /// The command before that.
+    before: LastCommand,
+    demand: DemandState<L>,
     supervision: Supervision,
     references: ReferencesState,
-    demand: DemandState<L>,
-    command: LastCommand,
+    answered: Answered,
+    arrivals: ArrivalState,
     joint_friction: JointFrictionState,
 }
 
@@ -132,6 +165,8 @@ impl<L: Law> Controller<L> {
             references: stages.references.start(&arm),
             demand: stages.demand.start(),
             command: LastCommand::default(),
+            before: LastCommand::default(),
+            answered: Answered::default(),
             joint_friction: JointFrictionState::default(),
         };
         Ok(Self {
@@ -139,30 +174,66 @@ impl<L: Law> Controller<L> {
             state,
             stages,
             monitor: LapseMonitor::new(settings.lapses),
+            due: Due::Nothing,
         })
     }
 
-    /// Answers one sensor frame.
+    /// Answers one sensor frame and updates the state for the next one.
     #[inline]
     pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
-        self.tick_in_place(frame);
+        self.answer(frame);
+        self.update();
         self.last_answer
     }
 
-    /// Answers one sensor frame and writes the internal state to the telemetry.
+    /// Answers one sensor frame, updates the state for the next one, and writes the internal state to the telemetry.
     pub fn tick_with_telemetry(
         &mut self,
         frame: &SensorFrame,
         telemetry: &mut Telemetry,
     ) -> ActuatorFrame {
-        self.tick_into(frame, TelemetrySink::to(telemetry));
+        self.answer_into(frame, TelemetrySink::to(telemetry));
+        self.update();
         self.last_answer
+    }
+
+    /// Answers one sensor frame: the first part of a tick, after which the torque can go out. The second part is
+    /// [`update`](Self::update).
+    #[inline]
+    pub fn answer(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
+        self.answer_in_place(frame);
+        &self.last_answer
+    }
+
+    /// Returns the last answer.
+    #[inline]
+    pub fn last_answer(&self) -> &ActuatorFrame {
+        &self.last_answer
     }
 
     // Out of line, because the compiler then finds fewer values that have to wait on the stack.
     #[inline(never)]
-    fn tick_in_place(&mut self, frame: &SensorFrame) {
-        self.tick_into(frame, TelemetrySink::nowhere());
+    fn answer_in_place(&mut self, frame: &SensorFrame) {
+        self.answer_into(frame, TelemetrySink::nowhere());
+    }
+
+    /// Updates the state with the readings that the last [`answer`](Self::answer) has used, and prepares the next
+    /// answer, which otherwise does this first.
+    #[inline(never)]
+    pub fn update(&mut self) {
+        match core::mem::take(&mut self.due) {
+            Due::Nothing => return,
+            Due::Preparation => {}
+            Due::Everything => self.stages.learn(&mut self.state),
+        }
+        self.stages.prepare(&mut self.state);
+    }
+
+    // Out of line: the bound on an answer's cycles leaves it out, because it proves that the update is in time.
+    #[cold]
+    #[inline(never)]
+    fn catch_up(&mut self) {
+        self.update();
     }
 
     /// Records how many times a lapse occurred around this tick, 0 for none. If it has now occurred
@@ -170,15 +241,9 @@ impl<L: Law> Controller<L> {
     /// output at once.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
-        let State {
-            supervision,
-            command,
-            ..
-        } = &mut self.state;
         let mut lapses = Lapses {
             monitor: &mut self.monitor,
-            supervision,
-            command,
+            supervision: &mut self.state.supervision,
         };
         lapses.note(lapse, times).then(|| {
             self.stop(TelemetrySink::nowhere());
@@ -192,17 +257,18 @@ impl<L: Law> Controller<L> {
     }
 
     #[inline]
-    fn tick_into(&mut self, frame: &SensorFrame, telemetry: TelemetrySink<'_>) {
+    fn answer_into(&mut self, frame: &SensorFrame, telemetry: TelemetrySink<'_>) {
+        if !matches!(self.due, Due::Nothing) {
+            self.catch_up();
+        }
         let State {
             arrivals,
             supervision,
-            command,
             ..
         } = &mut self.state;
         let lapses = Lapses {
             monitor: &mut self.monitor,
             supervision,
-            command,
         };
         let arrival = arrive(&self.stages.ranges, arrivals, lapses, frame);
         let supervision = &mut self.state.supervision;
@@ -212,19 +278,24 @@ impl<L: Law> Controller<L> {
                     frame,
                     elapsed_ticks,
                 };
-                self.stages
-                    .tick(&mut self.state, &readings, &mut self.last_answer, telemetry);
+                let (state, answer) = (&mut self.state, &mut self.last_answer);
+                self.due = match self.stages.answer(state, &readings, answer, telemetry) {
+                    Ok(()) => Due::Everything,
+                    Err(_) => Due::Preparation,
+                };
             }
             // Without new readings, the last torque stays for a limited number of ticks.
             Arrival::Stale if supervision.drives() => {}
-            Arrival::OutOfRange
-                if supervision.drives() && frame.inputs.contains(DigitalInputs::ENABLE) => {}
             Arrival::Stale => self.stop(telemetry),
             Arrival::OutOfRange => {
-                if supervision.drives() {
-                    supervision.disable();
+                let enabled = frame.inputs.contains(DigitalInputs::ENABLE);
+                if !(supervision.drives() && enabled) {
+                    if supervision.drives() {
+                        supervision.disable();
+                    }
+                    self.stop(telemetry);
                 }
-                self.stop(telemetry);
+                self.due = Due::Preparation;
             }
         }
         self.last_answer.tick = frame.tick;
@@ -298,31 +369,30 @@ impl<L: Law> Stages<L> {
         }
     }
 
-    /// Runs one tick, from readings to the answer.
+    /// Answers readings.
+    ///
+    /// # Errors
+    /// [`Restart`] if the estimates have started from these readings, which then show nothing else.
     #[inline]
-    fn tick(
+    fn answer(
         &self,
         state: &mut State<L>,
         readings: &Readings<'_>,
         answer: &mut ActuatorFrame,
         telemetry: TelemetrySink<'_>,
-    ) {
-        let joints = self
-            .estimators
-            .follow_joints(&mut state.estimates, readings, &state.command);
-        if let Err(EncoderJump) = joints {
-            state.supervision.latch(Fault::EncoderJump);
-        }
-        let model = state
-            .estimates
-            .model(&self.joint_friction, &mut state.joint_friction);
-        let (mut contact, slow) = self.estimators.observe_contact(
+    ) -> Result<(), Restart> {
+        let followed = self.estimators.observe(
             &mut state.estimates,
-            &model,
             readings,
             &state.command,
-            state.supervision.drives(),
+            &self.joint_friction,
+            &mut state.joint_friction,
         );
+        if followed == Err(Restart::EncoderJump) {
+            state.supervision.latch(Fault::EncoderJump);
+        }
+        let (model, contact) = (&state.estimates.model, &state.estimates.contact);
+        state.answered.drove = state.supervision.drives();
         let phase = self.supervisor.tick(
             &mut state.supervision,
             readings.frame.inputs,
@@ -333,38 +403,16 @@ impl<L: Law> Stages<L> {
         let landing = state.demand.landing_posture();
         let beginning = self
             .references
-            .begin(references, &model, &contact, &phase, landing);
-        // Slow estimates and the search for the edges take turns, so that no tick is long. Each branch
-        // excludes the other's work, as the bound on a tick's cycles can see.
-        let (estimates, last) = (&mut state.estimates, &state.command);
-        let tip_t_m = model.tip_m.x;
-        if readings.frame.tick & 1 == 0 {
-            let is_busy = self
-                .estimators
-                .evaluate_response(estimates, &mut contact, &slow, last);
-            if !is_busy {
-                let (arm, margins) = (&estimates.arm, beginning.margins(&contact));
-                self.references
-                    .search(references, arm, tip_t_m, contact.friction, margins);
-            }
-        } else {
-            self.estimators
-                .balance_torques(estimates, &model, &contact, &slow, last);
-            if beginning.needs_edges(&contact) {
-                let (arm, margins) = (&estimates.arm, beginning.margins(&contact));
-                self.references
-                    .search(references, arm, tip_t_m, contact.friction, margins);
-            } else {
-                self.estimators.calibrate(estimates, &slow);
-            }
-        }
-        let target = self.references.tick(references, &beginning, &model, &phase);
-        let arm = &state.estimates.arm;
+            .begin(references, model, contact, &phase, landing);
+        state.answered.tick = readings.frame.tick;
+        state.answered.elapsed_ticks = readings.elapsed_ticks;
+        state.answered.landing_p_ratio = beginning.landing_p_ratio;
+        let target = self.references.tick(references, &beginning, model, &phase);
         if phase.drives() {
             let input = DemandInput {
-                arm,
-                model: &model,
-                contact: &contact,
+                arm: &state.estimates.arm,
+                model,
+                contact,
                 phase: &phase,
                 target: &target,
                 last: &state.command,
@@ -372,19 +420,21 @@ impl<L: Law> Stages<L> {
             let output = self.demand.tick(&mut state.demand, &input);
             let torques = self
                 .torques
-                .tick(&mut state.command, &output, &model, &contact);
+                .tick(&mut state.command, &output, model, contact);
+            state.command.reference_velocity_m_s = target.reference.velocity_m_s;
+            state.command.at_edge = target.at_edge;
             if let Err(NotFinite) = torques {
                 state.supervision.latch(Fault::NotFinite);
+                state.release();
             }
-        }
-        state.command.reference_velocity_m_s = target.reference.velocity_m_s;
-        state.command.at_edge = target.at_edge;
-        if !state.supervision.drives() {
+        } else {
             state.release();
         }
+        let (model, contact) = (&state.estimates.model, &state.estimates.contact);
         let tick = TelemetryTick {
-            model: &model,
-            contact: &contact,
+            model,
+            contact,
+            contact_confidence: state.estimates.contact_confidence(),
             target: &target,
             command: &state.command,
             recovering: target.recovering && state.supervision.drives(),
@@ -395,6 +445,76 @@ impl<L: Law> Stages<L> {
         answer.flags = flags(&tick, self.references.is_done(&state.references));
         report(answer, &state.supervision);
         telemetry.record(&tick, readings.frame.tick, &state.supervision);
+        followed
+    }
+
+    /// Updates the slow estimates and the edges with the tick that has been answered.
+    ///
+    /// Slow estimates and the search for the edges take turns, so that no update is long. Contact and flight have
+    /// branches of their own: each excludes the other's work, as the bound on the update's cycles can see.
+    // Out of line, because the bound leaves it out of a tick that has started the estimates.
+    #[inline(never)]
+    fn learn(&self, state: &mut State<L>) {
+        let (estimates, last, answered) = (&mut state.estimates, &state.before, &state.answered);
+        let observed = Observed {
+            elapsed_ticks: answered.elapsed_ticks,
+            drove: answered.drove,
+            last,
+        };
+        let is_even = answered.tick & 1 == 0;
+        let estimators = &self.estimators;
+        if estimates.contact.touches {
+            let slow = estimators.learn_in_contact(estimates, &observed);
+            if is_even {
+                estimators.skip_balance(estimates, &slow, last);
+                if !estimators.evaluate_response(estimates, &slow, last) {
+                    self.search(state);
+                }
+            } else {
+                estimators.balance_torques(estimates, &slow, last);
+                estimators.calibrate(estimates, &slow);
+            }
+        } else {
+            let slow = estimators.learn_in_the_air(estimates, &observed);
+            if is_even {
+                estimators.skip_balance(estimates, &slow, last);
+                self.search(state);
+            } else {
+                estimators.balance_torques(estimates, &slow, last);
+                // A tip that is being returned to the belt needs the edges soon.
+                if answered.landing_p_ratio > 0.0 {
+                    self.search(state);
+                }
+            }
+        }
+    }
+
+    /// Continues the search for the edges.
+    #[inline]
+    fn search(&self, state: &mut State<L>) {
+        let contact = &state.estimates.contact;
+        self.references.search(
+            &mut state.references,
+            &state.estimates.arm,
+            state.estimates.model.tip_m.x,
+            contact.friction,
+            EdgeMargins::of(&contact.response, state.answered.landing_p_ratio),
+        );
+    }
+
+    /// Prepares the estimates for the next readings.
+    #[inline]
+    fn prepare(&self, state: &mut State<L>) {
+        let drives = state.supervision.drives();
+        self.estimators.prepare(
+            &mut state.estimates,
+            &mut state.command,
+            drives,
+            &state.joint_friction,
+        );
+        self.references
+            .prepare(&mut state.references, state.supervision.state());
+        state.before = state.command;
     }
 }
 

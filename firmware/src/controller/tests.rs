@@ -72,6 +72,22 @@ fn assert_fault(controller: &mut Controller, bad: &SensorFrame, fault: Fault) {
 }
 
 #[test]
+fn an_update_that_is_due_is_done_before_the_next_answer() {
+    let mut in_time = tracking();
+    let mut late = in_time.clone();
+    for tick in 20..40 {
+        let mut frame = frame(tick);
+        // Other readings in each tick, and some that are lost.
+        frame.normal_force.0 += 10 * (tick as i32 % 3);
+        if tick % 7 == 0 {
+            frame.joints[0] = EncoderCounts(u32::MAX);
+        }
+        let expected = in_time.tick(&frame);
+        assert_eq!(*late.answer(&frame), expected);
+    }
+}
+
+#[test]
 fn answers_echo_the_tick_and_count_frames() {
     let mut controller = Controller::new(&configuration()).unwrap();
     let first = controller.tick(&frame(7));
@@ -159,8 +175,10 @@ fn after_a_jump_the_encoders_detect_flight() {
         thrown.joints[0] = encoder.reading((-4.4 - f64::from(tick)).to_radians());
         thrown
     };
+    // The estimates start from the jump; two further readings show the gap.
     controller.tick(&thrown(20));
-    let answer = controller.tick(&thrown(21));
+    controller.tick(&thrown(21));
+    let answer = controller.tick(&thrown(22));
     assert_eq!(answer.latched_fault(), Some(Fault::EncoderJump));
     assert!(!touches(answer));
 }

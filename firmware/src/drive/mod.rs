@@ -15,7 +15,7 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 ///
 /// # Order of calls
 /// The calls of one tick are, in this order: [`begin_tick`](Self::begin_tick),
-/// [`sample`](Self::sample), [`actuate`](Self::actuate) if there is an answer,
+/// [`sample`](Self::sample), [`actuate`](Self::actuate) if there is an answer, [`end_tick`](Self::end_tick),
 /// [`next_tick_is_due`](Self::next_tick_is_due), and `actuate` again if an overrun, or a message
 /// received in between, has latched a fault. [`stopwatch`](Self::stopwatch) may be called at any
 /// time.
@@ -45,6 +45,9 @@ pub trait Drive {
     /// Outputs an answer's torques. If called again within a tick, the last call takes effect;
     /// repeating the same answer changes nothing.
     fn actuate(&mut self, answer: &ActuatorFrame);
+
+    /// Does what a tick needs not do before its torque is out. Nothing by default.
+    fn end_tick(&mut self) {}
 
     /// Returns whether the next tick should have begun already, without side effects.
     fn next_tick_is_due(&self) -> bool;

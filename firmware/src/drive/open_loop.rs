@@ -62,7 +62,7 @@ impl OpenLoop {
     // Out of line: it must not take the place of the law in the control interrupt.
     #[cold]
     #[inline(never)]
-    pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
+    pub fn tick(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
         let is_enabled = frame.inputs.contains(DigitalInputs::ENABLE) && self.fault.is_none();
         if is_enabled {
             let start = *self.armed_at.get_or_insert(frame.joints);
@@ -78,7 +78,13 @@ impl OpenLoop {
         }
         self.last.tick = frame.tick;
         self.last.sequence = self.last.sequence.wrapping_add(1);
-        self.report()
+        self.report();
+        &self.last
+    }
+
+    /// Returns the last answer.
+    pub fn last_answer(&self) -> &ActuatorFrame {
+        &self.last
     }
 
     /// Takes the torque off until the next configuration, and returns the answer that says so.
@@ -87,7 +93,8 @@ impl OpenLoop {
     pub fn latch(&mut self, fault: Fault) -> ActuatorFrame {
         self.fault = self.fault.or(Some(fault));
         self.release();
-        self.report()
+        self.report();
+        self.last
     }
 
     fn release(&mut self) {
@@ -105,7 +112,7 @@ impl OpenLoop {
         moved(scale_1, from_1, to_1) || moved(scale_2, from_2, to_2)
     }
 
-    fn report(&mut self) -> ActuatorFrame {
+    fn report(&mut self) {
         let state = match (self.fault, self.armed_at) {
             (Some(_), _) => SupervisorState::Fault,
             (None, Some(_)) => SupervisorState::Armed,
@@ -114,7 +121,6 @@ impl OpenLoop {
         self.last.torques = self.torques;
         self.last.state = state as u8;
         self.last.fault = self.fault.map_or(0, |fault| fault as u8);
-        self.last
     }
 }
 

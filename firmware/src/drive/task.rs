@@ -1,4 +1,4 @@
-//! The control task: one tick with sampling, actuation and monitoring.
+//! The control task: one tick with sampling, actuation, update and monitoring.
 
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
@@ -14,13 +14,26 @@ use crate::supervise::lapses::{Lapse, LapseMonitor};
 
 /// The answer to one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Answered {
-    /// The sensor frame; `None` for an answer without one, sent because a fault has taken the torque off.
-    pub sensor: Option<SensorFrame>,
+pub struct Answered<'a> {
+    /// The sensor frame; `None` for an answer without one, sent because a fault has taken the torque off, and for the
+    /// answer of a late tick.
+    pub sensor: Option<&'a SensorFrame>,
     /// The frame that takes effect.
-    pub frame: ActuatorFrame,
-    /// Duration of the controller's tick in counts of [`Drive::stopwatch`]; 0 without a sensor frame.
+    pub frame: &'a ActuatorFrame,
+    /// Duration of the controller's tick, answer and update, in counts of [`Drive::stopwatch`]; 0 without a sensor
+    /// frame.
     pub elapsed: u32,
+}
+
+/// What is due after an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Due {
+    /// Nothing: there was no answer.
+    Nothing,
+    /// The report of an answer: one without a sensor frame, or that of a late tick.
+    Report,
+    /// The controller's update.
+    Update,
 }
 
 /// Statistics since the controller was configured.
@@ -34,6 +47,9 @@ pub struct TaskCounts {
 
 /// Drives an arm tick by tick: samples, runs the controller, actuates, and records missing frames
 /// and overruns. It is the same on a PC, under an emulator and on a board.
+///
+/// A tick has two parts: [`answer`](Self::answer) ends with the torque, [`update`](Self::update) prepares the next
+/// tick. A board runs them in tasks of different priority.
 ///
 /// ```
 /// use painleve_firmware::drive::{ControlTask, Drive};
@@ -73,7 +89,8 @@ pub struct TaskCounts {
 /// let mut task: ControlTask<Desk> = ControlTask::new(Desk::default());
 /// task.configure(&Configuration::default(), FrameSource::Sensors)?;
 /// let answered = task.tick().expect("a frame is available");
-/// assert_eq!(task.drive().answer, answered.frame);
+/// let answer = *answered.frame;
+/// assert_eq!(task.drive().answer, answer);
 /// # Ok::<(), painleve_shared::range::OutOfRange>(())
 /// ```
 // In this order, so that the controller is at the beginning: see its fields.
@@ -86,6 +103,10 @@ pub struct ControlTask<D, L: Law = LawSettings> {
     /// Replaces the controller's ticks with [`FrameSource::Commissioning`].
     open_loop: Option<OpenLoop>,
     source: FrameSource,
+    /// The newest sensor frame, and the duration of its answer.
+    sensor: Option<SensorFrame>,
+    elapsed: u32,
+    due: Due,
     counts: TaskCounts,
 }
 
@@ -97,6 +118,9 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
             drive,
             open_loop: None,
             source: FrameSource::Lockstep,
+            sensor: None,
+            elapsed: 0,
+            due: Due::Nothing,
             counts: TaskCounts {
                 ticks: 0,
                 worst_elapsed: 0,
@@ -131,6 +155,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         self.drive.actuate(&ActuatorFrame::default());
         self.controller = None;
         self.open_loop = None;
+        self.due = Due::Nothing;
     }
 
     /// Commands torques; without effect unless the source is [`FrameSource::Commissioning`].
@@ -147,58 +172,96 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
     }
 
     /// Runs one tick; returns `None` if there is no answer to send.
-    pub fn tick(&mut self) -> Option<Answered> {
+    pub fn tick(&mut self) -> Option<Answered<'_>> {
+        self.answer();
+        self.update()
+    }
+
+    /// Samples, answers and actuates: the first part of a tick.
+    #[inline]
+    pub fn answer(&mut self) {
+        if self.due != Due::Nothing {
+            self.finish_late_tick();
+        }
         self.drive.begin_tick();
         let Some(controller) = &mut self.controller else {
             self.drive.actuate(&ActuatorFrame::default());
-            return None;
+            return;
         };
-        let frame = self.drive.sample();
-        let missing = frame.is_none() && self.source == FrameSource::Realtime;
+        self.sensor = self.drive.sample();
+        let missing = self.sensor.is_none() && self.source == FrameSource::Realtime;
         let stopped = controller.note(Lapse::MissingFrame, u32::from(missing));
-        let Some(frame) = frame else {
-            let frame = stopped?;
-            self.drive.actuate(&frame);
-            return Some(Answered {
-                sensor: None,
-                frame,
-                elapsed: 0,
-            });
+        let Some(frame) = &self.sensor else {
+            if let Some(stopped) = stopped {
+                self.drive.actuate(&stopped);
+                self.elapsed = 0;
+                self.due = Due::Report;
+            }
+            return;
         };
         let start = self.drive.stopwatch();
-        let mut answer = match &mut self.open_loop {
-            None => controller.tick(&frame),
-            Some(open_loop) => open_loop.tick(&frame),
+        let answer = match &mut self.open_loop {
+            None => controller.answer(frame),
+            Some(open_loop) => open_loop.tick(frame),
         };
-        let elapsed = self.drive.stopwatch().wrapping_sub(start);
-        self.drive.actuate(&answer);
-        self.counts.ticks = self.counts.ticks.wrapping_add(1);
-        self.counts.worst_elapsed = self.counts.worst_elapsed.max(elapsed);
-        if self.drive.next_tick_is_due() {
-            answer = self.note_overrun(answer);
-        } else {
-            controller.note(Lapse::Overrun, 0);
+        self.elapsed = self.drive.stopwatch().wrapping_sub(start);
+        self.drive.actuate(answer);
+        self.due = Due::Update;
+    }
+
+    /// Updates the controller after an answer, and records whether that was in time: the second part of a tick.
+    /// Returns `None` if there is no answer to send.
+    #[inline]
+    pub fn update(&mut self) -> Option<Answered<'_>> {
+        let due = core::mem::replace(&mut self.due, Due::Nothing);
+        if due == Due::Nothing {
+            return None;
         }
+        let controller = self.controller.as_mut()?;
+        if due == Due::Update {
+            let start = self.drive.stopwatch();
+            controller.update();
+            let duration = self.drive.stopwatch().wrapping_sub(start);
+            self.elapsed = self.elapsed.wrapping_add(duration);
+            self.drive.end_tick();
+            self.counts.ticks = self.counts.ticks.wrapping_add(1);
+            self.counts.worst_elapsed = self.counts.worst_elapsed.max(self.elapsed);
+            if self.drive.next_tick_is_due() {
+                self.note_overrun();
+            } else {
+                controller.note(Lapse::Overrun, 0);
+            }
+        }
+        let controller = self.controller.as_ref()?;
+        let frame = match &self.open_loop {
+            None => controller.last_answer(),
+            Some(open_loop) => open_loop.last_answer(),
+        };
         Some(Answered {
-            sensor: Some(frame),
-            frame: answer,
-            elapsed,
+            sensor: self.sensor.as_ref(),
+            frame,
+            elapsed: self.elapsed,
         })
     }
 
-    /// Records an overrun after this answer. If overruns have now occurred too often in a row, the torque is off
-    /// on return. Returns the answer that holds.
+    /// Finishes a tick whose update was still due when the next one began: an overrun. Its answer is reported late, unless
+    /// the next tick has one.
     // Out of line: the bound on a tick's cycles leaves it out, because it proves that no tick overruns.
     #[cold]
     #[inline(never)]
-    fn note_overrun(&mut self, answer: ActuatorFrame) -> ActuatorFrame {
-        let controller = self.controller.as_mut();
-        let stopped = controller.and_then(|it| it.note(Lapse::Overrun, 1));
-        stopped.map_or(answer, |stopped| {
-            let answer = stop(&mut self.open_loop, stopped);
-            self.drive.actuate(&answer);
-            answer
-        })
+    fn finish_late_tick(&mut self) {
+        if self.update().is_some() {
+            self.due = Due::Report;
+        }
+    }
+
+    /// Records an overrun after an answer. If overruns have now occurred too often in a row, the torque is off
+    /// on return.
+    // Out of line: the bound on a tick's cycles leaves it out, because it proves that no tick overruns.
+    #[cold]
+    #[inline(never)]
+    fn note_overrun(&mut self) {
+        self.note(Lapse::Overrun, 1);
     }
 
     /// Records how many times a lapse occurred between two ticks, 0 for none. If it has now occurred
@@ -323,7 +386,7 @@ mod tests {
         task.configure(&Configuration::default(), source).unwrap();
         let answered = (0..20).map(|tick| {
             task.drive.frame = Some(frame(tick));
-            task.tick().unwrap().frame
+            *task.tick().unwrap().frame
         });
         let last = answered.last().unwrap();
         assert_eq!(last.supervisor_state(), Some(SupervisorState::Tracking));
@@ -342,13 +405,13 @@ mod tests {
         let mut task = tracking(FrameSource::Realtime);
         task.drive.frame = Some(frame(20));
         let answered = task.tick().unwrap();
-        assert_eq!(answered.elapsed, 7);
-        let actuated = Call::Actuate(answered.frame);
+        assert_eq!(answered.elapsed, 14, "answer and update");
+        let actuated = Call::Actuate(*answered.frame);
         assert_eq!(
             task.drive.calls(),
             [Call::BeginTick, Call::Sample, actuated]
         );
-        assert_eq!((task.counts().ticks, task.counts().worst_elapsed), (21, 7));
+        assert_eq!((task.counts().ticks, task.counts().worst_elapsed), (21, 14));
     }
 
     #[test]
@@ -369,9 +432,9 @@ mod tests {
         }
         task.drive.calls();
         let stopped = task.tick().unwrap();
-        assert_off(&stopped.frame, Fault::MissingFrame);
-        assert_eq!(stopped.elapsed, 0);
-        let actuated = Call::Actuate(stopped.frame);
+        assert_off(stopped.frame, Fault::MissingFrame);
+        assert_eq!((stopped.sensor, stopped.elapsed), (None, 0));
+        let actuated = Call::Actuate(*stopped.frame);
         assert_eq!(
             task.drive.calls(),
             [Call::BeginTick, Call::Sample, actuated]
@@ -392,12 +455,40 @@ mod tests {
         assert_eq!(task.tick().unwrap().frame.latched_fault(), None);
         task.drive.calls();
         task.drive.frame = Some(frame(21));
-        let stopped = task.tick().unwrap().frame;
+        let stopped = *task.tick().unwrap().frame;
         assert_off(&stopped, Fault::Overrun);
         let calls = task.drive.calls();
         assert!(matches!(calls[2], Call::Actuate(answer) if answer.latched_fault().is_none()));
         assert_eq!(calls[3], Call::Actuate(stopped));
         assert_eq!(calls.len(), 4);
+    }
+
+    /// A board's timer interrupts an update that is late, and the next tick finishes it.
+    #[test]
+    fn the_answer_of_a_late_tick_is_reported_with_the_next_one() {
+        let mut task = tracking(FrameSource::Lockstep);
+        let overruns = |task: &ControlTask<Mock>| {
+            let counts = task.lapse_counts().unwrap();
+            counts.total(Lapse::Overrun)
+        };
+        task.drive.frame = Some(frame(20));
+        task.answer();
+        task.drive.is_due = true;
+        task.drive.frame = None;
+        task.answer();
+        assert_eq!(overruns(&task), 1);
+        task.drive.is_due = false;
+        let late = task.update().unwrap();
+        assert_eq!((late.sensor, late.frame.tick), (None, 20));
+        assert_eq!(task.update(), None, "it is reported once");
+        // Both parts of both ticks, in order: the same state as without the overrun.
+        let mut in_time = tracking(FrameSource::Lockstep);
+        in_time.drive.frame = Some(frame(20));
+        in_time.tick();
+        for task in [&mut task, &mut in_time] {
+            task.drive.frame = Some(frame(21));
+        }
+        assert_eq!(task.tick().unwrap().frame, in_time.tick().unwrap().frame);
     }
 
     #[test]

@@ -48,8 +48,9 @@ impl JointFriction {
         self.is_zero
     }
 
-    /// Returns the friction after one tick, positive against a positive rate, as a torque on the links, N·m, given
-    /// the joint angles q', rad.
+    /// Returns the change of the friction in one tick, as a torque on the links, N·m, given the joint angles q', rad.
+    // Out of line: few arms need it.
+    #[inline(never)]
     pub fn tick(
         &self,
         state: &mut JointFrictionState,
@@ -57,12 +58,23 @@ impl JointFriction {
     ) -> GeneralisedTorque<f32> {
         let angles = [angles_rad.first(), angles_rad.second()];
         let joints = state.0.iter_mut().zip(self.coulomb_nm).zip(angles);
-        for ((joint, coulomb_nm), angle_rad) in joints {
+        let mut changes_nm = [0.0; 2];
+        for (((joint, coulomb_nm), angle_rad), change_nm) in joints.zip(&mut changes_nm) {
             let before_rad = joint.angle_rad.replace(angle_rad).unwrap_or(angle_rad);
             let travel = ((angle_rad - before_rad) * self.per_travel_per_rad).within(1.0);
-            joint.torque_nm += travel * coulomb_nm - travel.abs() * joint.torque_nm;
+            *change_nm = travel * coulomb_nm - travel.abs() * joint.torque_nm;
+            joint.torque_nm += *change_nm;
         }
-        let [one, two] = &state.0;
+        let [one, two] = changes_nm;
+        JointTorque::new(one, two).to_links()
+    }
+}
+
+impl JointFrictionState {
+    /// Returns the friction, positive against a positive rate, as a torque on the links, N·m.
+    #[inline]
+    pub fn torque_nm(&self) -> GeneralisedTorque<f32> {
+        let [one, two] = &self.0;
         JointTorque::new(one.torque_nm, two.torque_nm).to_links()
     }
 }
@@ -76,7 +88,10 @@ mod tests {
         let model = JointFriction::new(&JointEstimatorSettings::default(), [0.1, 0.0]);
         let mut state = JointFrictionState::default();
         let mut friction_nm = |angle_rad: f32| {
-            let friction_nm = model.tick(&mut state, &JointMotion::new(angle_rad, -0.3));
+            let before_nm = state.torque_nm();
+            let change_nm = model.tick(&mut state, &JointMotion::new(angle_rad, -0.3));
+            let friction_nm = state.torque_nm();
+            assert!((friction_nm - before_nm - change_nm).amax() < 1e-7);
             assert_eq!(friction_nm.second(), 0.0);
             friction_nm.first()
         };

@@ -3,7 +3,8 @@
 //! Each joint has a tracking loop (second-order Luenberger observer). One count of a 14-bit encoder
 //! per millisecond is 0.38 rad/s, so differencing cannot detect a lift-off; the loop spreads a count
 //! over its time constant instead. The acceleration commanded by the control law is fed forward, so
-//! a slow loop does not lag behind the commanded motion.
+//! a slow loop does not lag behind the commanded motion. A loop predicts the next angle after a tick has been
+//! answered, so that the next tick only corrects it.
 //!
 //! Both poles are at z = exp(−ω T), with gains 1 − z² and (1 − z)²/T.
 //!
@@ -37,9 +38,17 @@ settings! {
     }
 }
 
-/// The readings differ by more than the joint can have moved.
+/// Largest number of ticks over which the joints are predicted: a fault is latched long before.
+const MOST_LOST_TICKS: u32 = 1000;
+
+/// Why the tracking loops have started from the readings of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EncoderJump;
+pub enum Restart {
+    /// They are the first.
+    FirstReadings,
+    /// They differ from the previous ones by more than the joint can have moved.
+    EncoderJump,
+}
 
 /// Tracking loop of one joint.
 #[derive(Clone, Copy, Debug, Default)]
@@ -51,6 +60,16 @@ struct TrackingLoop {
     rate_rad_s: f32,
     /// Measured less expected angle at the last tick, rad.
     innovation_rad: f32,
+}
+
+impl TrackingLoop {
+    /// Predicts over a time (s) with this acceleration (rad/s²).
+    #[inline(always)]
+    fn predict(&mut self, acceleration_rad_s2: f32, time_s: f32) {
+        let before = self.rate_rad_s;
+        self.rate_rad_s += acceleration_rad_s2 * time_s;
+        self.angle_rad += 0.5 * (before + self.rate_rad_s) * time_s;
+    }
 }
 
 /// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates, with its gains.
@@ -78,6 +97,9 @@ pub struct JointState {
     started: bool,
     joints: [TrackingLoop; 2],
     moved: bool,
+    /// Ticks predicted since the last readings, and the largest counts by which the joints can move in them.
+    predicted_ticks: u32,
+    most_counts: [i32; 2],
 }
 
 impl JointEstimator {
@@ -104,73 +126,101 @@ impl JointEstimator {
         }
     }
 
-    /// Updates the estimate with the readings of one tick.
+    /// Corrects the prediction with the readings of one tick.
     ///
-    /// `elapsed_ticks` is the time since the previous readings (1 unless frames were lost);
-    /// `acceleration_rad_s2` is the expected acceleration of q' in that time. The first readings set
-    /// the angles with zero rates.
+    /// `elapsed_ticks` is the time since the previous readings (1 unless readings were lost);
+    /// `acceleration_rad_s2` is the expected acceleration of q' in the ticks that have not been predicted. The first
+    /// readings set the angles with zero rates.
     ///
     /// # Errors
-    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the loops restart from
-    /// these readings.
+    /// [`Restart`] if the loops have started from these readings: they are the first, or a joint seems to have
+    /// moved faster than it can.
     #[inline]
-    pub fn update(
+    pub fn correct(
         &self,
         state: &mut JointState,
         readings: &[EncoderCounts; 2],
         elapsed_ticks: u32,
         acceleration_rad_s2: &JointMotion<f32>,
-    ) -> Result<(), EncoderJump> {
+    ) -> Result<(), Restart> {
         if !state.started {
             self.start(state, readings);
-            return Ok(());
+            return Err(Restart::FirstReadings);
         }
-        let [joint_1, joint_2] = &mut state.joints;
+        let [joint_1, joint_2] = &state.joints;
         let [scale_1, scale_2] = &self.scales;
         let [reading_1, reading_2] = *readings;
         let moved_1 = scale_1.difference(joint_1.reading, reading_1);
         let moved_2 = scale_2.difference(joint_2.reading, reading_2);
-        let ticks = elapsed_ticks.clamp(1, 1000) as i32;
-        if moved_1.abs() > self.jump_counts[0].saturating_mul(ticks)
-            || moved_2.abs() > self.jump_counts[1].saturating_mul(ticks)
-        {
+        if elapsed_ticks > state.predicted_ticks {
+            self.bridge(state, acceleration_rad_s2, elapsed_ticks);
+        }
+        let [most_1, most_2] = state.most_counts;
+        let jumps = moved_1.abs() > most_1 || moved_2.abs() > most_2;
+        state.predicted_ticks = 0;
+        state.most_counts = [0; 2];
+        if jumps {
             self.start(state, readings);
-            return Err(EncoderJump);
+            return Err(Restart::EncoderJump);
         }
         state.moved = moved_1 != 0 || moved_2 != 0;
-        let elapsed_s = ticks as f32 * self.tick_s;
-        let follow =
-            |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32, acceleration: f32| {
-                joint.reading = reading;
-                joint.counts = joint.counts.wrapping_add(moved);
-                let rate = joint.rate_rad_s + acceleration * elapsed_s;
-                let angle = joint.angle_rad + 0.5 * (joint.rate_rad_s + rate) * elapsed_s;
-                let innovation = joint.counts as f32 * lsb - angle;
-                joint.angle_rad = angle + self.angle_gain * innovation;
-                joint.rate_rad_s =
-                    (rate + self.rate_gain_per_s * innovation).within(self.rate_limit_rad_s);
-                joint.innovation_rad = innovation;
-            };
+        let [joint_1, joint_2] = &mut state.joints;
+        let follow = |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32| {
+            joint.reading = reading;
+            joint.counts = joint.counts.wrapping_add(moved);
+            let innovation = joint.counts as f32 * lsb - joint.angle_rad;
+            joint.angle_rad += self.angle_gain * innovation;
+            joint.rate_rad_s += self.rate_gain_per_s * innovation;
+            joint.innovation_rad = innovation;
+        };
         let [lsb_1, lsb_2] = self.rad_per_count;
-        follow(
-            joint_1,
-            reading_1,
-            moved_1,
-            lsb_1,
-            acceleration_rad_s2.first(),
-        );
-        follow(
-            joint_2,
-            reading_2,
-            moved_2,
-            lsb_2,
-            acceleration_rad_s2.second(),
-        );
+        follow(joint_1, reading_1, moved_1, lsb_1);
+        follow(joint_2, reading_2, moved_2, lsb_2);
         Ok(())
     }
 
+    /// Predicts angles and rates at the next tick, given the expected acceleration of q' (rad/s²) until then.
+    #[inline]
+    pub fn predict(&self, state: &mut JointState, acceleration_rad_s2: &JointMotion<f32>) {
+        let limit = self.rate_limit_rad_s;
+        for joint in &mut state.joints {
+            joint.rate_rad_s = joint.rate_rad_s.within(limit);
+        }
+        self.predict_over(state, acceleration_rad_s2, 1);
+    }
+
+    #[inline(always)]
+    fn predict_over(
+        &self,
+        state: &mut JointState,
+        acceleration_rad_s2: &JointMotion<f32>,
+        ticks: i32,
+    ) {
+        let time_s = ticks as f32 * self.tick_s;
+        state.predicted_ticks = state.predicted_ticks.saturating_add(ticks as u32);
+        for (most, jump) in state.most_counts.iter_mut().zip(self.jump_counts) {
+            *most = most.saturating_add(jump.saturating_mul(ticks));
+        }
+        let [joint_1, joint_2] = &mut state.joints;
+        joint_1.predict(acceleration_rad_s2.first(), time_s);
+        joint_2.predict(acceleration_rad_s2.second(), time_s);
+    }
+
+    /// Predicts the ticks of frames that have not arrived.
+    // Out of line, because few ticks need it.
+    #[inline(never)]
+    fn bridge(
+        &self,
+        state: &mut JointState,
+        acceleration_rad_s2: &JointMotion<f32>,
+        elapsed_ticks: u32,
+    ) {
+        let ticks = (elapsed_ticks - state.predicted_ticks).min(MOST_LOST_TICKS);
+        self.predict_over(state, acceleration_rad_s2, ticks as i32);
+    }
+
     /// Takes the twist of the gears under the commanded torques (N·m) off the last readings, so that both loops
-    /// follow the links. Called after each [`update`](Self::update).
+    /// follow the links. Called after each [`correct`](Self::correct).
     #[inline]
     pub fn untwist(&self, state: &mut JointState, torque_nm: &JointTorque<f32>) {
         if !self.twists {
@@ -282,14 +332,13 @@ mod tests {
         for tick in 0..ticks {
             let (one, two) = motion(f64::from(tick) * 1e-3);
             let readings = [SCALE.reading(one), SCALE.reading(two)];
-            estimator
-                .update(
-                    &mut state,
-                    &readings,
-                    1,
-                    &JointMotion::new(acceleration, 0.0),
-                )
-                .unwrap();
+            let expected = JointMotion::new(acceleration, 0.0);
+            if tick > 0 {
+                estimator.predict(&mut state, &expected);
+            }
+            let corrected = estimator.correct(&mut state, &readings, 1, &expected);
+            let first = Err(Restart::FirstReadings);
+            assert_eq!(corrected, if tick == 0 { first } else { Ok(()) });
         }
         state
     }
@@ -338,7 +387,7 @@ mod tests {
                 SCALE.reading(0.1 - 2e-3 * 3.0 * share),
             ];
             let still = JointMotion::zeros();
-            estimator.update(&mut state, &readings, 1, &still).unwrap();
+            let _ = estimator.correct(&mut state, &readings, 1, &still);
             estimator.untwist(&mut state, &torque);
             if tick > 100 {
                 let error = (state.theta_rad() - LinkMotion::new(0.2, 0.3)).amax();
@@ -346,6 +395,7 @@ mod tests {
                 let rate = state.theta_dot_rad_s().amax();
                 assert!(rate < 0.1, "{tick}: {rate}");
             }
+            estimator.predict(&mut state, &still);
         }
     }
 
@@ -353,13 +403,13 @@ mod tests {
     fn a_jump_is_reported_and_the_loops_restart_from_it() {
         let jumped = [SCALE.reading(0.5), SCALE.reading(0.1)];
         let mut state = track(|t| (0.2 + t, 0.1), 0.0, 10);
-        let jump = estimator().update(&mut state, &jumped, 1, &JointMotion::zeros());
-        assert_eq!(jump, Err(EncoderJump));
+        let jump = estimator().correct(&mut state, &jumped, 1, &JointMotion::zeros());
+        assert_eq!(jump, Err(Restart::EncoderJump));
         assert!((state.theta_rad() - LinkMotion::new(0.5, 0.6)).amax() < 6e-4);
         assert_eq!(state.theta_dot_rad_s(), LinkMotion::zeros());
         // Over a longer time the same difference is a plausible motion.
         let mut state = track(|_| (0.2, 0.1), 0.0, 10);
-        let moved = estimator().update(&mut state, &jumped, 10, &JointMotion::zeros());
+        let moved = estimator().correct(&mut state, &jumped, 10, &JointMotion::zeros());
         assert!(moved.is_ok());
     }
 }

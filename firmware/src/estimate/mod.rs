@@ -20,9 +20,9 @@ pub mod model;
 pub mod response;
 
 use nalgebra::Vector2;
-use painleve_shared::Arm;
 use painleve_shared::counts::{EncoderScale, LinearConverter, LinearScale};
 use painleve_shared::frame::SensorFrame;
+use painleve_shared::{Arm, Slip};
 
 use self::belt::{BeltEstimator, BeltSpeedSettings, BeltState};
 use self::calibration::{CalibrationSettings, CalibrationState, LengthCalibrator};
@@ -30,7 +30,7 @@ use self::contact::{ContactDetector, ContactSettings, ContactState, EncoderReadi
 use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceSettings, DisturbanceState};
 use self::friction::{FrictionEstimate, FrictionEstimator, FrictionSettings, FrictionState};
 use self::joint_friction::{JointFriction, JointFrictionState};
-use self::joints::{EncoderJump, JointEstimator, JointEstimatorSettings, JointState};
+use self::joints::{JointEstimator, JointEstimatorSettings, JointState, Restart};
 use self::model::Model;
 use self::response::{
     ContactResponse, ForceReading, Place, ResponseEstimator, ResponseSettings, ResponseState,
@@ -49,23 +49,26 @@ const DRAGGED_M_S: f32 = 0.02;
 /// Speed below which a reference that an edge holds back waits there, m/s.
 const WAITING_M_S: f32 = 0.01;
 
-/// The contact estimate after a tick's readings.
+/// The contact estimate at a tick: contact and force from its readings, the rest from those before, evaluated
+/// for the posture predicted for the tick.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactEstimate {
     /// Whether the tip touches.
     pub touches: bool,
     /// Whether the tip touches now but did not at the previous tick.
     pub lands: bool,
+    /// Whether the tip touched at the previous tick but does not now.
+    pub leaves: bool,
     /// Whether flight is certain.
     pub in_flight: bool,
-    /// Certainty of `touches`, 0 … 1.
-    pub confidence: f32,
     /// Measured contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
     /// Estimated friction.
     pub friction: FrictionEstimate,
     /// p with that friction, 1/kg.
     pub p_per_kg: f32,
+    /// p/Q22.
+    pub p_ratio: f32,
     /// What the contact's response to torque allows.
     pub response: ContactResponse,
 }
@@ -73,10 +76,6 @@ pub struct ContactEstimate {
 /// What one tick adds to the slow estimates.
 #[derive(Clone, Copy, Debug)]
 pub struct SlowReadings {
-    /// Measured height of the tip above the belt, m.
-    gap_m: f32,
-    /// p/Q22.
-    p_ratio: f32,
     /// Time since the previous readings, s.
     elapsed_s: f32,
     /// Whether the gap shows the links' length: the tip certainly touches, and has moved.
@@ -94,6 +93,17 @@ pub struct Readings<'a> {
     pub frame: &'a SensorFrame,
     /// Ticks since the previous readings: 1 unless frames were lost.
     pub elapsed_ticks: u32,
+}
+
+/// What the update after a tick needs of it besides the estimates.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed<'a> {
+    /// Ticks since the previous readings.
+    pub elapsed_ticks: u32,
+    /// Whether torque was applied before the tick.
+    pub drove: bool,
+    /// The command until the tick.
+    pub last: &'a LastCommand,
 }
 
 /// Settings of all estimators, and the scalings of their readings.
@@ -129,6 +139,8 @@ pub struct EstimateSettings<'a> {
 #[derive(Clone, Debug)]
 pub struct Estimators {
     force_cell: LinearConverter<f32>,
+    /// Largest reading of the force cell, N.
+    force_range_n: f32,
     tick_s: f32,
     joints: JointEstimator,
     contact: ContactDetector,
@@ -141,11 +153,16 @@ pub struct Estimators {
 
 /// State of the [`Estimators`] between ticks.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct EstimatesState {
+    /// The contact estimate of the last tick and, after the update, for the next one.
+    pub contact: ContactEstimate,
+    /// The arm's model at the estimated angles and rates, with the joints' friction.
+    pub model: Model,
     /// The arm with its calibrated length.
     pub arm: Arm<f32>,
     joints: JointState,
-    contact: ContactState,
+    decision: ContactState,
     friction: FrictionState,
     belt: BeltState,
     response: ResponseState,
@@ -154,20 +171,9 @@ pub struct EstimatesState {
 }
 
 impl EstimatesState {
-    /// Returns the arm's model at the estimated angles and rates, with the joints' friction.
-    #[inline]
-    pub fn model(&self, friction: &JointFriction, state: &mut JointFrictionState) -> Model {
-        // Friction of the joints enters as an unknown torque does.
-        let mut disturbance_nm = self.disturbance.torque_nm;
-        if !friction.is_zero() {
-            disturbance_nm = disturbance_nm - friction.tick(state, &self.joints.angles_rad());
-        }
-        Model::new(
-            &self.arm,
-            self.joints.theta_rad(),
-            self.joints.theta_dot_rad_s(),
-            &disturbance_nm,
-        )
+    /// Returns the certainty of the decision about contact, 0 … 1.
+    pub fn contact_confidence(&self) -> f32 {
+        self.decision.confidence()
     }
 }
 
@@ -175,8 +181,10 @@ impl Estimators {
     /// Makes the estimators with these settings.
     pub fn new(settings: &EstimateSettings<'_>) -> Self {
         let tick_s = 1.0 / settings.tick_hz;
+        let force_cell = settings.force.converter();
         Self {
-            force_cell: settings.force.converter(),
+            force_cell,
+            force_range_n: force_cell.value(force_cell.maximum_counts),
             tick_s,
             joints: JointEstimator::new(
                 &JointEstimatorSettings {
@@ -208,202 +216,311 @@ impl Estimators {
 
     /// Starts without readings of this arm.
     pub fn start(&self, arm: Arm<f32>) -> EstimatesState {
+        let (friction, response) = (self.friction.start(), self.response.start());
+        let contact = ContactEstimate {
+            touches: false,
+            lands: false,
+            leaves: false,
+            in_flight: false,
+            force_n: Vector2::zeros(),
+            friction: friction.estimate(),
+            p_per_kg: 0.0,
+            p_ratio: 0.0,
+            response: self.response.response(&response, 0.0, 0.0),
+        };
         EstimatesState {
+            contact,
+            model: Model::default(),
             arm,
             joints: JointState::default(),
-            contact: ContactState::default(),
-            friction: self.friction.start(),
+            decision: ContactState::default(),
+            friction,
             belt: BeltState::default(),
-            response: self.response.start(),
+            response,
             disturbance: DisturbanceState::default(),
             calibration: CalibrationState::default(),
         }
     }
 
-    /// Updates the joint estimate with the encoders' readings and the expected effects of the last
-    /// command.
+    /// Corrects the predicted state of the arm with the encoders' readings, and decides about contact.
     ///
     /// # Errors
-    /// [`EncoderJump`] if a joint seems to have moved faster than it can; the estimate restarts
-    /// from these readings.
+    /// [`Restart`] if the estimate of the joints has started from these readings, at rest.
     #[inline]
-    pub fn follow_joints(
+    pub fn observe(
         &self,
         state: &mut EstimatesState,
         readings: &Readings<'_>,
         last: &LastCommand,
-    ) -> Result<(), EncoderJump> {
-        self.joints.update(
-            &mut state.joints,
-            &readings.frame.joints,
-            readings.elapsed_ticks,
-            &last.expected_acceleration_rad_s2,
-        )?;
-        self.joints.untwist(&mut state.joints, &last.torque_nm);
-        Ok(())
-    }
-
-    /// Updates contact, friction and belt with the readings, given the arm's model at the estimated state and
-    /// the torque until now; `drives` states whether torque was applied.
-    #[inline]
-    pub fn observe_contact(
-        &self,
-        state: &mut EstimatesState,
-        model: &Model,
-        readings: &Readings<'_>,
-        last: &LastCommand,
-        drives: bool,
-    ) -> (ContactEstimate, SlowReadings) {
-        let Readings {
-            frame,
-            elapsed_ticks,
-        } = *readings;
+        friction: &JointFriction,
+        friction_state: &mut JointFrictionState,
+    ) -> Result<(), Restart> {
+        let frame = readings.frame;
+        let expected = &last.expected_acceleration_rad_s2;
+        let (joints, elapsed_ticks) = (&mut state.joints, readings.elapsed_ticks);
+        let followed = self
+            .joints
+            .correct(joints, &frame.joints, elapsed_ticks, expected);
+        match followed {
+            Ok(()) => {
+                self.joints.untwist(joints, &last.torque_nm);
+                let (theta_rad, theta_dot_rad_s) = (joints.theta_rad(), joints.theta_dot_rad_s());
+                state.model.move_to(&state.arm, theta_rad, theta_dot_rad_s);
+                if !friction.is_zero() {
+                    // It follows the travel between readings, which the prediction does not show.
+                    let change_nm = friction.tick(friction_state, &state.joints.angles_rad());
+                    state.model.add_friction_nm(&change_nm);
+                }
+            }
+            // Nothing has been predicted for these readings.
+            Err(Restart::FirstReadings) => self.evaluate(state, friction_state),
+            // The drive stops, and the model follows at the next tick.
+            Err(Restart::EncoderJump) => {}
+        }
         let force_n = Vector2::new(
             self.force_cell.value(frame.tangential_force.0),
             self.force_cell.value(frame.normal_force.0),
         );
-        // At the end of its range the force cell reads less than the actual force.
-        let range = self.force_cell.maximum_counts;
-        let force_in_range = [frame.tangential_force, frame.normal_force]
-            .iter()
-            .all(|force| force.0.abs() < range);
-
-        let gap_m = self.gap_m(&state.joints, model);
-        let touched = state.contact.touches();
-        let contact = match self.contact.evidence() {
+        let touched = state.decision.touches();
+        let touches = match self.contact.evidence() {
             Evidence::ForceCell => self
                 .contact
-                .update_from_force(&mut state.contact, force_n.y),
+                .update_from_force(&mut state.decision, force_n.y),
             Evidence::Encoders => {
-                let mut encoders = self.encoder_reading(state, model, gap_m, last);
+                let mut encoders = self.encoder_reading(state, last);
                 self.find_belt(state, &mut encoders);
                 self.contact
-                    .update_from_encoders(&mut state.contact, &encoders)
+                    .update_from_encoders(&mut state.decision, &encoders)
             }
         };
-        let certain = state.contact.is_certain();
-        let tip_velocity_m_s = model.tip_velocity_m_s.x;
-        if contact {
-            if !touched && let Some(slip) = self.belt.slip(&state.belt, tip_velocity_m_s) {
-                state.friction.expect_slip(slip);
-            }
-            if force_in_range {
-                let slip = state.friction.slip().sign::<f32>();
-                let lag_m_s = last.reference_velocity_m_s - tip_velocity_m_s;
-                let dragged = slip * lag_m_s > DRAGGED_M_S
-                    && self.belt.may_stick(&state.belt, tip_velocity_m_s);
-                self.friction.update(&mut state.friction, &force_n, dragged);
-            }
-        } else if touched {
-            self.explain_throw(&mut state.friction, model);
+        let contact = &mut state.contact;
+        contact.touches = touches;
+        contact.lands = touches && !touched;
+        contact.leaves = touched && !touches;
+        contact.in_flight = state.decision.is_in_flight();
+        contact.force_n = force_n;
+        if contact.lands {
+            self.expect_slip(state);
         }
+        self.correct_friction(state, last.reference_velocity_m_s);
+        followed
+    }
 
-        let mut friction = state.friction.estimate();
-        let sliding = contact.then_some(&friction);
-        self.belt.update(&mut state.belt, tip_velocity_m_s, sliding);
-        let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
-        let p_ratio = p_per_kg / model.q22_per_kg;
-        let is_informative = certain && force_in_range && drives;
-        let slides = contact && p_per_kg > 0.0 && !friction.sticks;
-        let mut completes_block = false;
-        if is_informative && slides && !last.is_constrained() && self.response.is_enabled() {
-            let (_, slope) = model.free_normal_acceleration();
+    /// Corrects friction, and p with it, of a tip that touches and follows a reference with this velocity.
+    #[inline(always)]
+    fn correct_friction(&self, state: &mut EstimatesState, reference_velocity_m_s: f32) {
+        let contact = &mut state.contact;
+        if !contact.touches {
+            return;
+        }
+        if self.is_in_range(&contact.force_n) {
+            let tip_velocity_m_s = state.model.tip_velocity_m_s.x;
+            let is_dragged = |slip: Slip| {
+                let lag_m_s = reference_velocity_m_s - tip_velocity_m_s;
+                slip.sign::<f32>() * lag_m_s > DRAGGED_M_S
+                    && self.belt.may_stick(&state.belt, tip_velocity_m_s)
+            };
+            self.friction
+                .correct(&mut state.friction, &contact.force_n, is_dragged);
+        }
+        let has_lagged = contact.response.has_lagged;
+        state
+            .friction
+            .correct_estimate(&mut contact.friction, has_lagged);
+        contact.p_per_kg = state
+            .model
+            .p_per_kg(contact.friction.coefficient, contact.friction.slip);
+    }
+
+    /// Returns whether the force cell is not at the end of its range, where it reads less than the actual force.
+    #[inline]
+    fn is_in_range(&self, force_n: &Vector2<f32>) -> bool {
+        let range_n = self.force_range_n;
+        force_n.x.abs() < range_n && force_n.y.abs() < range_n
+    }
+
+    /// Sets the direction in which a landing tip will slip, where the belt's speed decides it.
+    fn expect_slip(&self, state: &mut EstimatesState) {
+        let tip_velocity_m_s = state.model.tip_velocity_m_s.x;
+        if let Some(slip) = self.belt.slip(&state.belt, tip_velocity_m_s) {
+            // The correction of friction that follows evaluates p.
+            state.friction.expect_slip(slip);
+        }
+    }
+
+    /// Updates friction, belt and response of a contact with the force at the last tick.
+    #[inline]
+    pub fn learn_in_contact(
+        &self,
+        state: &mut EstimatesState,
+        observed: &Observed<'_>,
+    ) -> SlowReadings {
+        let (model, contact) = (&state.model, &state.contact);
+        let force_n = contact.force_n;
+        let mut slow = self.slow_readings(state, observed);
+        // An unchanged reading would gain weight merely with time.
+        slow.shows_length = state.decision.is_certain() && state.joints.has_moved();
+        if self.is_in_range(&force_n) {
+            self.friction.update(&mut state.friction, &force_n);
+        }
+        let friction = state.friction.estimate();
+        self.belt
+            .update(&mut state.belt, model.tip_velocity_m_s.x, Some(&friction));
+        let (last, p_per_kg) = (observed.last, contact.p_per_kg);
+        let slides = p_per_kg > 0.0 && !friction.sticks;
+        if slow.is_informative && slides && !last.is_constrained() && self.response.is_enabled() {
+            let slope = &model.free_slope_per_kg_m;
             let reading = ForceReading {
                 normal_force_n: force_n.y,
-                withheld_n: last.rounding_nm.vector().dot(&slope) / p_per_kg,
+                withheld_n: last.rounding_nm.vector().dot(slope) / p_per_kg,
             };
-            completes_block = self.response.update(&mut state.response, &reading);
+            slow.completes_block = self.response.update(&mut state.response, &reading);
         } else {
             state.response.pause();
         }
-        let slow = SlowReadings {
-            gap_m,
-            p_ratio,
-            elapsed_s: elapsed_ticks as f32 * self.tick_s,
-            // An unchanged reading would gain weight merely with time.
-            shows_length: contact && certain && state.joints.has_moved(),
-            is_informative,
-            completes_block,
-        };
-        let response = self.response.response(&state.response, p_per_kg, p_ratio);
-        if !response.has_lagged {
-            // A rigid contact would follow the excess at once.
-            friction.catch_up = 0.0;
-        }
-        let contact = ContactEstimate {
-            touches: contact,
-            lands: contact && !touched,
-            in_flight: state.contact.is_in_flight(),
-            confidence: state.contact.confidence(),
-            force_n,
-            friction,
-            p_per_kg,
-            response,
-        };
-        (contact, slow)
+        slow
     }
 
-    /// Updates the response of the contact if a block of readings is complete; returns whether it was. The
-    /// disturbance leaves this tick out.
+    /// Updates friction and belt at a tick without contact.
+    #[inline]
+    pub fn learn_in_the_air(
+        &self,
+        state: &mut EstimatesState,
+        observed: &Observed<'_>,
+    ) -> SlowReadings {
+        if state.contact.leaves {
+            self.explain_throw(&mut state.friction, &state.model);
+        }
+        let tip_velocity_m_s = state.model.tip_velocity_m_s.x;
+        self.belt.update(&mut state.belt, tip_velocity_m_s, None);
+        state.response.pause();
+        self.slow_readings(state, observed)
+    }
+
+    /// Returns what a tick adds to the slow estimates with and without contact.
+    #[inline]
+    fn slow_readings(&self, state: &EstimatesState, observed: &Observed<'_>) -> SlowReadings {
+        let in_range = self.is_in_range(&state.contact.force_n);
+        SlowReadings {
+            elapsed_s: observed.elapsed_ticks as f32 * self.tick_s,
+            is_informative: state.decision.is_certain() && in_range && observed.drove,
+            shows_length: false,
+            completes_block: false,
+        }
+    }
+
+    /// Predicts the arm's state at the next tick, given the command until then and whether it drives, and evaluates
+    /// model and contact there.
+    #[inline]
+    pub fn prepare(
+        &self,
+        state: &mut EstimatesState,
+        command: &mut LastCommand,
+        drives: bool,
+        friction: &JointFrictionState,
+    ) {
+        if drives {
+            let model = &state.model;
+            command.contact_acceleration_rad_s2 = model
+                .contact_acceleration_rad_s2(&command.contact_force_n)
+                .to_joints();
+            command.expected_acceleration_rad_s2 = model
+                .free_acceleration_rad_s2(&command.torque_nm)
+                .to_joints()
+                + command.contact_acceleration_rad_s2;
+        }
+        self.joints
+            .predict(&mut state.joints, &command.expected_acceleration_rad_s2);
+        self.evaluate(state, friction);
+    }
+
+    /// Evaluates model, friction, p and the response of the contact at the estimated angles and rates.
+    #[inline(never)]
+    fn evaluate(&self, state: &mut EstimatesState, friction: &JointFrictionState) {
+        // Friction of the joints enters as an unknown torque does.
+        let disturbance_nm = state.disturbance.torque_nm - friction.torque_nm();
+        state.model = Model::new(
+            &state.arm,
+            state.joints.theta_rad(),
+            state.joints.theta_dot_rad_s(),
+            &disturbance_nm,
+        );
+        let (model, contact) = (&state.model, &mut state.contact);
+        let mut friction = state.friction.estimate();
+        let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
+        let p_ratio = p_per_kg / model.q22_per_kg;
+        let response = self.response.response(&state.response, p_per_kg, p_ratio);
+        friction.catch_up = 0.0;
+        contact.friction = friction;
+        contact.p_per_kg = p_per_kg;
+        contact.p_ratio = p_ratio;
+        contact.response = response;
+    }
+
+    /// Evaluates the response of the contact if a block of readings is complete; returns whether it was.
     #[inline]
     pub fn evaluate_response(
         &self,
         state: &mut EstimatesState,
-        contact: &mut ContactEstimate,
         slow: &SlowReadings,
         last: &LastCommand,
     ) -> bool {
+        if slow.completes_block {
+            let place = Place {
+                p_ratio: state.contact.p_ratio,
+                waits_at_edge: last.at_edge && last.reference_velocity_m_s.abs() < WAITING_M_S,
+            };
+            self.response.evaluate(&mut state.response, &place);
+        }
+        slow.completes_block
+    }
+
+    /// Leaves this tick out of the update of the disturbance; its torque and force count at the next one.
+    #[inline]
+    pub fn skip_balance(
+        &self,
+        state: &mut EstimatesState,
+        slow: &SlowReadings,
+        last: &LastCommand,
+    ) {
         if slow.is_informative {
-            let (torque_nm, force_n) = (&last.torque_nm, &contact.force_n);
+            let (torque_nm, force_n) = (&last.torque_nm, &state.contact.force_n);
             state.disturbance.skip(torque_nm, force_n, slow.elapsed_s);
         } else {
             state.disturbance.pause();
         }
-        if slow.completes_block {
-            let p_ratio = slow.p_ratio;
-            let place = Place {
-                p_ratio,
-                waits_at_edge: last.at_edge && last.reference_velocity_m_s.abs() < WAITING_M_S,
-            };
-            self.response.evaluate(&mut state.response, &place);
-            contact.response = self
-                .response
-                .response(&state.response, contact.p_per_kg, p_ratio);
-        }
-        slow.completes_block
     }
 
     /// Updates the calibration.
     #[inline]
     pub fn calibrate(&self, state: &mut EstimatesState, slow: &SlowReadings) {
         if slow.shows_length {
+            let gap_m = self.gap_m(state);
             self.calibrator
-                .update(&mut state.calibration, &mut state.arm, slow.gap_m);
+                .update(&mut state.calibration, &mut state.arm, gap_m);
         }
     }
 
     /// Updates the disturbance.
-    #[inline]
+    // Out of line: contact and flight both contain it.
+    #[inline(never)]
     pub fn balance_torques(
         &self,
         state: &mut EstimatesState,
-        model: &Model,
-        contact: &ContactEstimate,
         slow: &SlowReadings,
         last: &LastCommand,
     ) {
         if slow.is_informative {
-            self.disturbance.update(
-                &mut state.disturbance,
-                model,
-                &Balance {
-                    torque_nm: last.torque_nm,
-                    force_n: contact.force_n,
-                    p_ratio: contact.touches.then_some(slow.p_ratio),
-                    loop_share: contact.response.loop_share,
-                    elapsed_s: slow.elapsed_s,
-                },
-            );
+            let contact = &state.contact;
+            let balance = Balance {
+                torque_nm: last.torque_nm,
+                force_n: contact.force_n,
+                p_ratio: contact.touches.then_some(contact.p_ratio),
+                loop_share: contact.response.loop_share,
+                elapsed_s: slow.elapsed_s,
+            };
+            self.disturbance
+                .update(&mut state.disturbance, &state.model, &balance);
         } else {
             state.disturbance.pause();
         }
@@ -411,27 +528,23 @@ impl Estimators {
 
     /// Returns the measured height of the tip above the belt, m.
     #[inline]
-    fn gap_m(&self, joints: &JointState, model: &Model) -> f32 {
-        let residual = joints.innovation_rad() * self.joints.residual_share();
+    fn gap_m(&self, state: &EstimatesState) -> f32 {
+        let residual = state.joints.innovation_rad() * self.joints.residual_share();
+        let model = &state.model;
         let jacobian = &model.jacobian;
         model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
     }
 
     /// Returns the contact evidence from the encoders.
-    fn encoder_reading(
-        &self,
-        state: &EstimatesState,
-        model: &Model,
-        gap_m: f32,
-        last: &LastCommand,
-    ) -> EncoderReading {
+    fn encoder_reading(&self, state: &EstimatesState, last: &LastCommand) -> EncoderReading {
+        let model = &state.model;
         let count = self.joints.count_rad();
         // Half a count of each encoder; the second encoder affects θ2 alone.
         let rounding_m = 0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
         // Steady innovation after the contact force has vanished.
         let release = -self.joints.lag_counts(&last.contact_acceleration_rad_s2);
         EncoderReading {
-            gap_m,
+            gap_m: self.gap_m(state),
             gap_error_m: self.contact.gap_uncertainty_m()
                 + state.calibration.gap_error_m(rounding_m),
             moved: state.joints.has_moved(),

@@ -1,5 +1,5 @@
-//! The arm's model at the estimated state, evaluated once at each tick and shared by law, contact
-//! guard and recovery.
+//! The arm's model, shared by law, contact guard and recovery. It is evaluated once for each tick, at the state
+//! that is predicted for it, before its readings arrive.
 
 use nalgebra::{Matrix2, Vector2};
 use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose, Real, Slip};
@@ -8,8 +8,8 @@ use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose, Rea
 /// the tip along the belt.
 const STRAIGHT_ARM_SINE: f32 = 0.05;
 
-/// Terms of the equations of motion at one state.
-#[derive(Clone, Copy, Debug)]
+/// Terms of the equations of motion at one state; all zero before the first evaluation.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Model {
     /// Link angles θ, rad.
     pub theta_rad: LinkMotion<f32>,
@@ -27,14 +27,20 @@ pub struct Model {
     mass: Matrix2<f32>,
     /// M⁻¹, 1/(kg·m²).
     mobility: Matrix2<f32>,
+    /// ∂w/∂θ, N·m/rad.
+    stiffness_nm_rad: Matrix2<f32>,
     /// w + c − d, N·m.
     bias_nm: GeneralisedTorque<f32>,
+    /// Centrifugal torque on link 2 for each rad²/s² of link 1, and on link 1 against that of link 2, N·m·s².
+    centrifugal_nms2: f32,
     /// Centripetal acceleration s of the tip, m/s².
     centripetal_m_s2: Vector2<f32>,
     /// 1 / det J, with the determinant bounded away from zero, 1/m².
     inverse_determinant_per_m2: f32,
-    /// M⁻¹ j2, 1/(kg·m): link acceleration per unit of normal force.
-    normal_mobility: Vector2<f32>,
+    /// Free normal acceleration b = b₀ + n · (u1, u2) as a function of the joint torques: b₀, m/s².
+    pub free_offset_m_s2: f32,
+    /// n, 1/(kg·m).
+    pub free_slope_per_kg_m: Vector2<f32>,
     /// Q11 of Q = J M⁻¹ Jᵀ, 1/kg.
     pub q11_per_kg: f32,
     /// Q12, 1/kg.
@@ -68,6 +74,10 @@ impl Model {
         let tangential = Vector2::new(jacobian.m11, jacobian.m12);
         let tangential_mobility = mobility * tangential;
         let tip_m = arm.tip_m(&pose);
+        let bias_nm = arm.passive_torque_nm(&theta_rad, &theta_dot_rad_s, &pose)
+            + arm.centrifugal_torque_nm(&theta_dot_rad_s, &pose)
+            - *disturbance_nm;
+        let centripetal_m_s2 = arm.centripetal_m_s2(&pose, &theta_dot_rad_s);
         Self {
             theta_rad,
             theta_dot_rad_s,
@@ -77,17 +87,76 @@ impl Model {
             jacobian,
             mass: arm.mass_matrix(&pose),
             mobility,
-            bias_nm: arm.passive_torque_nm(&theta_rad, &theta_dot_rad_s, &pose)
-                + arm.centrifugal_torque_nm(&theta_dot_rad_s, &pose)
-                - *disturbance_nm,
-            centripetal_m_s2: arm.centripetal_m_s2(&pose, &theta_dot_rad_s),
+            stiffness_nm_rad: arm.passive_stiffness_nm_rad(&pose),
+            bias_nm,
+            centrifugal_nms2: arm.centrifugal_nms2(&pose),
+            centripetal_m_s2,
             // det J = l1 l2 sin(θ2 − θ1).
             inverse_determinant_per_m2: 1.0 / (length_1 * length_2 * bounded),
-            normal_mobility,
+            free_offset_m_s2: centripetal_m_s2.y - normal_mobility.dot(bias_nm.vector()),
+            free_slope_per_kg_m: Vector2::new(
+                normal_mobility.x,
+                normal_mobility.y - normal_mobility.x,
+            ),
             q11_per_kg: tangential_mobility.dot(&tangential),
             q12_per_kg: tangential_mobility.dot(&normal),
             q22_per_kg: normal_mobility.dot(&normal),
         }
+    }
+
+    /// Moves the model to these link angles θ (rad) and rates θ̇ (rad/s) nearby, to first order: everything that the inverse
+    /// dynamics need. M⁻¹, Q and the free normal acceleration stay those of the predicted state, from which an encoder's
+    /// count is a fraction of a milliradian away.
+    #[inline]
+    pub fn move_to(
+        &mut self,
+        arm: &Arm<f32>,
+        theta_rad: LinkMotion<f32>,
+        theta_dot_rad_s: LinkMotion<f32>,
+    ) {
+        let turned = theta_rad - self.theta_rad;
+        // Each column of J turns with its link.
+        let j = &self.jacobian;
+        let across_1 = Vector2::new(-j.m21, j.m11) * turned.first();
+        let across_2 = Vector2::new(-j.m22, j.m12) * turned.second();
+        // The tip moves by J δθ: at right angles to the same changes.
+        let moved = across_1 + across_2;
+        self.tip_m += Vector2::new(moved.y, -moved.x);
+        self.gap_m -= moved.x;
+        self.jacobian += Matrix2::from_columns(&[across_1, across_2]);
+        self.tip_velocity_m_s = self.jacobian * theta_dot_rad_s.vector();
+
+        let squares = |rates: &LinkMotion<f32>| {
+            Vector2::new(
+                rates.first() * rates.first(),
+                rates.second() * rates.second(),
+            )
+        };
+        let now = squares(&theta_dot_rad_s);
+        let change = now - squares(&self.theta_dot_rad_s);
+        let j = &self.jacobian;
+        self.centripetal_m_s2 = Vector2::new(
+            -(now.x * j.m21 + now.y * j.m22),
+            now.x * j.m11 + now.y * j.m12,
+        );
+        self.bias_nm += arm.damping_torque_nm(&(theta_dot_rad_s - self.theta_dot_rad_s))
+            + GeneralisedTorque::new(
+                -self.centrifugal_nms2 * change.y,
+                self.centrifugal_nms2 * change.x,
+            );
+        // ∂M12/∂(θ2 − θ1) is the coefficient of the centrifugal torques with the opposite sign.
+        let coupling = self.mass.m12 - self.centrifugal_nms2 * (turned.second() - turned.first());
+        self.mass.m12 = coupling;
+        self.mass.m21 = coupling;
+        self.bias_nm += GeneralisedTorque::from_vector(self.stiffness_nm_rad * turned.vector());
+        self.theta_rad = theta_rad;
+        self.theta_dot_rad_s = theta_dot_rad_s;
+    }
+
+    /// Adds friction of the joints, positive against a positive rate, as a torque on the links, N·m.
+    #[inline]
+    pub fn add_friction_nm(&mut self, torque_nm: &GeneralisedTorque<f32>) {
+        self.bias_nm += *torque_nm;
     }
 
     /// Returns the link acceleration θ̈ = J⁻¹ (z̈ − s), rad/s², for a tip acceleration z̈ (m/s²).
@@ -155,15 +224,6 @@ impl Model {
         self.acceleration_by(self.force_torque_nm(force_n))
     }
 
-    /// Returns the free normal acceleration as a function of the joint torques, b = b₀ + n · (u1,
-    /// u2): b₀ in m/s² and n in 1/(kg·m).
-    #[inline]
-    pub fn free_normal_acceleration(&self) -> (f32, Vector2<f32>) {
-        let row = &self.normal_mobility;
-        let offset = self.centripetal_m_s2.y - row.dot(self.bias_nm.vector());
-        (offset, Vector2::new(row.x, row.y - row.x))
-    }
-
     /// p = Q22 − μ s Q12, 1/kg.
     pub fn p_per_kg(&self, friction: f32, slip: Slip) -> f32 {
         self.q22_per_kg - friction * slip.sign::<f32>() * self.q12_per_kg
@@ -210,11 +270,28 @@ mod tests {
         }
 
         #[test]
+        fn a_tip_moved_by_an_encoders_count_is_where_the_model_puts_it(
+            (arm, mut model) in model(), d1 in -1e-3_f32..1e-3, d2 in -1e-3_f32..1e-3,
+        ) {
+            let theta = model.theta_rad + LinkMotion::new(d1, d2);
+            let theta_dot = LinkMotion::new(1.0, -2.0);
+            let there = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
+            model.move_to(&arm, theta, theta_dot);
+            prop_assert!((model.tip_m - there.tip_m).amax() < 1e-6);
+            prop_assert!((model.gap_m - there.gap_m).abs() < 1e-6);
+            prop_assert!((model.jacobian - there.jacobian).amax() < 1e-6);
+            prop_assert!((model.tip_velocity_m_s - there.tip_velocity_m_s).amax() < 1e-6);
+            prop_assert!((model.mass - there.mass).amax() < 1e-7);
+            prop_assert!((model.bias_nm - there.bias_nm).amax() < 2e-5, "{:?} {:?}", model.bias_nm, there.bias_nm);
+            prop_assert!((model.centripetal_m_s2 - there.centripetal_m_s2).amax() < 1e-5);
+        }
+
+        #[test]
         fn the_free_normal_acceleration_is_affine_in_the_torques(
             (arm, model) in model(), u1 in -5.0_f32..5.0, u2 in -5.0_f32..5.0,
         ) {
             let torque = JointTorque::new(u1, u2);
-            let (offset, slope) = model.free_normal_acceleration();
+            let (offset, slope) = (model.free_offset_m_s2, model.free_slope_per_kg_m);
             let b = arm
                 .contact_terms(
                     &model.theta_rad, &model.theta_dot_rad_s, &Pose::new(&model.theta_rad),

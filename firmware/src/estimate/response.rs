@@ -217,7 +217,8 @@ pub struct ResponseState {
     withheld_n: f32,
     /// Last change of force that was commanded in addition to the law's, N.
     excitation_n: f32,
-    /// Present probe, N, and the random numbers from which it is drawn.
+    /// Probe in the torque that acts, and the one for the next torque, N, with the random numbers from which it is drawn.
+    acting_probe_n: f32,
     probe_n: f32,
     random: u16,
     /// Expected changes of force, N, the latest first.
@@ -279,6 +280,7 @@ impl ResponseEstimator {
             change_n: 0.0,
             withheld_n: 0.0,
             excitation_n: 0.0,
+            acting_probe_n: 0.0,
             probe_n: 0.0,
             random: 1,
             expected_n: [0.0; DELAYS + 1],
@@ -331,7 +333,7 @@ impl ResponseEstimator {
     /// complete: [`evaluate`](Self::evaluate) is then due, twice, when there is time.
     #[inline]
     pub fn update(&self, state: &mut ResponseState, reading: &ForceReading) -> bool {
-        let excitation_n = reading.withheld_n - state.withheld_n + state.probe_n;
+        let excitation_n = reading.withheld_n - state.withheld_n + state.acting_probe_n;
         let expected_n = excitation_n - state.excitation_n;
         state.withheld_n = reading.withheld_n;
         state.excitation_n = excitation_n;
@@ -343,6 +345,7 @@ impl ResponseEstimator {
         state.force_n = reading.normal_force_n;
         state.change_n = change_n;
         state.touched_s += self.tick_s;
+        state.acting_probe_n = state.probe_n;
         state.probe_n = 0.0;
         if state.touched_s < SETTLING_S {
             return false;
@@ -451,6 +454,7 @@ impl ResponseState {
     pub fn pause(&mut self) {
         if self.touched_s > 0.0 {
             self.touched_s = 0.0;
+            self.acting_probe_n = 0.0;
             self.probe_n = 0.0;
             self.give = 0.0;
             self.block = Default::default();
@@ -504,7 +508,8 @@ mod tests {
     ) -> ContactResponse {
         let estimator = ResponseEstimator::new(&ResponseSettings::default(), tick_s);
         let mut state = estimator.start();
-        let (mut withheld, mut commanded) = (0.0, 10.0);
+        // The probe of a tick is drawn after the tick before.
+        let (mut withheld, mut probe_n, mut commanded) = (0.0, 0.0, 10.0);
         for tick in 0..ticks {
             let reading = ForceReading {
                 normal_force_n: contact(commanded) + 0.03 * noise(3 * tick),
@@ -519,8 +524,8 @@ mod tests {
                 estimator.evaluate(&mut state, &place);
             }
             let next = 0.05 * noise(3 * tick + 1);
-            commanded = 10.0 + next - withheld + state.probe_n;
-            withheld = next;
+            commanded = 10.0 + next - withheld + probe_n;
+            (withheld, probe_n) = (next, state.probe_n);
         }
         estimator.response(&state, P_PER_KG, P_RATIO)
     }
@@ -560,7 +565,7 @@ mod tests {
     #[test]
     fn the_share_of_a_contact_that_gives_falls_with_its_damping_and_keeps_the_tip_from_the_edge() {
         let of = |damping| observed(1500, compliant(1e5, damping));
-        let (firm, soft) = (of(60.0), of(20.0));
+        let (firm, soft) = (of(90.0), of(20.0));
         assert!(soft.loop_share < firm.loop_share && firm.loop_share < P_RATIO);
         assert!(soft.loop_share < 0.5 * P_RATIO, "{soft:?}");
         let softest = observed(1500, compliant(1e4, 5.0));

@@ -20,11 +20,11 @@ pub struct LawInput<'a> {
     /// Measured contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
     /// Estimated friction.
-    pub friction: FrictionEstimate,
+    pub friction: &'a FrictionEstimate,
     /// p with the estimated friction, 1/kg.
     pub p_per_kg: f32,
     /// What the contact's response to torque allows.
-    pub response: ContactResponse,
+    pub response: &'a ContactResponse,
     /// Whether the tip touches the belt.
     pub contact: bool,
     /// Whether the torque of the previous tick was limited.

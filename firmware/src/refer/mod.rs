@@ -43,24 +43,7 @@ pub struct Beginning {
     /// Whether the reference starts at the tip.
     starts: bool,
     /// Least p as a fraction of Q22 at which the tip may land; 0 if it is not being returned to the belt.
-    landing_p_ratio: f32,
-}
-
-impl Beginning {
-    /// Returns the margins that the search for the edges keeps in addition to the settings.
-    pub fn margins(&self, contact: &ContactEstimate) -> EdgeMargins {
-        EdgeMargins {
-            landing_p_ratio: self.landing_p_ratio,
-            contact_p_ratio: contact.response.least_p_ratio,
-            soft: contact.response.soft,
-            restless_n: contact.response.restless_n,
-        }
-    }
-
-    /// Returns whether the edges are needed soon, because a tip in the air is being returned to the belt.
-    pub fn needs_edges(&self, contact: &ContactEstimate) -> bool {
-        self.landing_p_ratio > 0.0 && !contact.touches
-    }
+    pub landing_p_ratio: f32,
 }
 
 /// Follows the program within the edges.
@@ -177,6 +160,14 @@ impl References {
         );
     }
 
+    /// Prepares the program's reference for the next tick of a drive in this state.
+    #[inline]
+    pub fn prepare(&self, state: &mut ReferencesState, drive: SupervisorState) {
+        if matches!(drive, SupervisorState::Tracking | SupervisorState::LiftOff) {
+            self.generator.prepare(&mut state.generator);
+        }
+    }
+
     /// Returns the target of a tick that has begun.
     #[inline]
     pub fn tick(
@@ -193,10 +184,9 @@ impl References {
         let wanted = match phase.state {
             SupervisorState::Armed => state.generator.start(),
             // The reference waits for a tip that is being returned to the belt.
-            SupervisorState::LiftOff if recovering => self.generator.present(&state.generator),
-            SupervisorState::Tracking | SupervisorState::LiftOff => {
-                self.generator.next_tick(&mut state.generator)
-            }
+            SupervisorState::LiftOff if recovering => state.generator.present(),
+            SupervisorState::Tracking if phase.starts_tracking => state.generator.start(),
+            SupervisorState::Tracking | SupervisorState::LiftOff => state.generator.next_tick(),
             SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
         };
         if starts || phase.starts_tracking {

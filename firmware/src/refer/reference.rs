@@ -152,6 +152,8 @@ pub struct ReferenceState {
     start_m: f32,
     /// Ticks since the start of the segment.
     elapsed_ticks: u32,
+    /// Reference at that time, once [prepared](ReferenceGenerator::prepare).
+    next: TipReference,
 }
 
 impl ReferenceState {
@@ -159,6 +161,7 @@ impl ReferenceState {
     pub fn at(start_m: f32) -> Self {
         Self {
             start_m,
+            next: TipReference::at_rest(start_m),
             ..Self::default()
         }
     }
@@ -166,11 +169,23 @@ impl ReferenceState {
     /// Starts the present segment from `start_m` (m).
     pub fn start_from(&mut self, start_m: f32) {
         self.start_m = start_m;
+        self.next = self.start();
     }
 
     /// Returns the start of the present segment, at rest: the position to hold before following.
     pub fn start(&self) -> TipReference {
         TipReference::at_rest(self.start_m)
+    }
+
+    /// Returns the prepared reference at rest: the position to hold while time stands still.
+    pub fn present(&self) -> TipReference {
+        TipReference::at_rest(self.next.position_m)
+    }
+
+    /// Returns the prepared reference, and advances time by one tick.
+    pub fn next_tick(&mut self) -> TipReference {
+        self.elapsed_ticks = self.elapsed_ticks.saturating_add(1);
+        self.next
     }
 }
 
@@ -183,38 +198,29 @@ impl ReferenceGenerator {
         }
     }
 
-    /// Returns the present reference at rest: the position to hold while time stands still.
-    pub fn present(&self, state: &ReferenceState) -> TipReference {
-        let segment = self.program.segments.get(state.segment);
-        TipReference::at_rest(segment.map_or(state.start_m, |segment| {
-            at(segment, state.start_m, state.elapsed_ticks, self.tick_hz).position_m
-        }))
-    }
-
     /// Returns whether the last segment has ended.
     pub fn is_done(&self, state: &ReferenceState) -> bool {
         state.segment >= self.program.segments.len()
     }
 
-    /// Returns the reference of this tick, then advances time by one tick. A segment without duration
-    /// ends at once; of several in a row, `MOST_ENDS` end per tick.
+    /// Prepares the reference of the next tick. A segment without duration ends at once; of several in a row,
+    /// `MOST_ENDS` end per tick.
     #[inline]
-    pub fn next_tick(&self, state: &mut ReferenceState) -> TipReference {
+    pub fn prepare(&self, state: &mut ReferenceState) {
         for _ in 0..MOST_ENDS {
             let Some(segment) = self.program.segments.get(state.segment) else {
                 break;
             };
             let duration_ticks = segment.duration_s() * self.tick_hz;
             if (state.elapsed_ticks as f32) < duration_ticks - 0.5 {
-                let reference = at(segment, state.start_m, state.elapsed_ticks, self.tick_hz);
-                state.elapsed_ticks = state.elapsed_ticks.saturating_add(1);
-                return reference;
+                state.next = at(segment, state.start_m, state.elapsed_ticks, self.tick_hz);
+                return;
             }
             state.start_m = segment.target_m().unwrap_or(state.start_m);
             state.elapsed_ticks = 0;
             state.segment += 1;
         }
-        state.start()
+        state.next = state.start();
     }
 }
 
@@ -256,6 +262,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn next_tick(generator: &ReferenceGenerator, state: &mut ReferenceState) -> TipReference {
+        generator.prepare(state);
+        state.next_tick()
+    }
+
     fn program(segments: &[Segment]) -> Program {
         Program {
             segments: segments.iter().copied().collect(),
@@ -280,7 +291,7 @@ mod tests {
         );
         let mut state = ReferenceState::default();
         let positions: std::vec::Vec<f32> = (0..8)
-            .map(|_| generator.next_tick(&mut state).position_m)
+            .map(|_| next_tick(&generator, &mut state).position_m)
             .collect();
         let expected = [0.0, 0.0, 0.0, 0.025, 0.05, 0.075, -0.1, -0.1];
         for (ours, theirs) in positions.iter().zip(expected) {
@@ -299,7 +310,7 @@ mod tests {
         let generator = ReferenceGenerator::new(&program(&steps), 1000.0);
         let mut state = ReferenceState::default();
         let positions: [f32; 4] =
-            core::array::from_fn(|_| generator.next_tick(&mut state).position_m);
+            core::array::from_fn(|_| next_tick(&generator, &mut state).position_m);
         assert_eq!(positions, [0.03, 0.05, 0.05, 0.05]);
         assert!(generator.is_done(&state));
     }
@@ -325,10 +336,10 @@ mod tests {
             let segment = Segment::MinimumJerk { target_m: target, duration_s: duration };
             let generator = ReferenceGenerator::new(&program(&[segment]), 1000.0);
             let mut state = ReferenceState::at(start);
-            let mut before = generator.next_tick(&mut state);
+            let mut before = next_tick(&generator, &mut state);
             prop_assert_eq!(before.position_m, start);
             while !generator.is_done(&state) {
-                let now = generator.next_tick(&mut state);
+                let now = next_tick(&generator, &mut state);
                 let slope = (now.position_m - before.position_m) * 1000.0;
                 let mean = 0.5 * (now.velocity_m_s + before.velocity_m_s);
                 // The tolerance covers the trapezoid's error, jerk · T²/12, and rounding of the

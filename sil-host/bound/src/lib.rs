@@ -1,11 +1,12 @@
-//! An upper bound on the cycles of the image's control interrupt, derived from its machine code.
+//! Upper bounds on the cycles of the image's control interrupt and of the update after it, derived from its machine
+//! code.
 //!
 //! The image is decoded ([`instruction`]) into a control-flow graph for each function ([`graph`]).
 //! The cycle model bounds the cost of every block ([`cycles`], [`cost`]), loops have declared
 //! limits ([`loops`]), and a linear programme finds the most expensive path ([`worst`]). [`report`]
 //! prints it with source lines. [`profile`] shows where executed ticks spend their instructions.
 //!
-//! The bound holds for every configuration and every frame, because it depends on neither.
+//! The bounds hold for every configuration and every frame, because they depend on neither.
 
 pub mod cost;
 pub mod cycles;

@@ -25,9 +25,29 @@ pub const CLEARS: &str = "__aeabi_memclr";
 const CYCLES_PER_NS: f64 = 0.168;
 
 /// Functions that a tick does not call if the bound holds, with the reason. Each has to be out of line.
-pub const NOT_CALLED: [(&str, &str); 1] = [(
-    "::note_overrun",
-    "it handles a tick that ends after the next is due, at a higher control rate than is proved",
+pub const NOT_CALLED: [(&str, &str); 3] = [
+    (
+        "::note_overrun",
+        "it handles a tick that ends after the next is due, at a higher control rate than is proved",
+    ),
+    (
+        "::finish_late_tick",
+        "it finishes a tick that has not ended when the next begins, at a higher control rate than is proved",
+    ),
+    (
+        "::catch_up",
+        "it does what a control task has already done: the update between two answers",
+    ),
+];
+
+/// Function with which a control interrupt evaluates the model for the first readings. A tick that calls it [starts](STARTS).
+pub const EVALUATES: &str = "Estimators::evaluate";
+
+/// Functions that a tick does not call if its control interrupt [evaluates](EVALUATES) the model, with the reason. Each has
+/// to be out of line.
+pub const STARTS: [(&str, &str); 1] = [(
+    "::learn",
+    "the first readings show nothing about the torque before them",
 )];
 
 /// Limit of a loop, counted from its entry.

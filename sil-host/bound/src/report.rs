@@ -1,4 +1,4 @@
-//! The bound of the control interrupt and the path that attains it.
+//! The bounds of the control interrupt and of the update after it, and the paths that attain them.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -11,12 +11,15 @@ use serde::Serialize;
 
 use crate::cycles::around;
 use crate::image::Image;
-use crate::loops::{Limits, NOT_CALLED};
+use crate::loops::{EVALUATES, Limits, NOT_CALLED, STARTS};
 use crate::worst::{Analysis, Loop, Visit, Worst};
 use crate::{BoundError, ImageError};
 
 /// Handler of the control timer.
 pub const CONTROL_INTERRUPT: &str = "TIM2";
+
+/// Handler of the update after it.
+pub const UPDATE_INTERRUPT: &str = "TIM3";
 
 /// A sensor's bus.
 struct SensorBus {
@@ -59,39 +62,57 @@ const SENSOR_BUSES: [SensorBus; 2] = [
 /// The core's clock, Hz.
 pub const CORE_HZ: f64 = 168e6;
 
-/// A bound on the control interrupt.
+/// Bounds on the interrupts of a tick.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bound {
-    /// Cycles from the request of the interrupt to the return from it.
-    pub cycles: u32,
+    /// The control interrupt.
+    pub control: HandlerBound,
+    /// The update after it.
+    pub update: HandlerBound,
+    /// Cycles of both in a tick; less than their sum, because the update is short after the longest control interrupt,
+    /// which starts the estimates.
+    pub tick_cycles: u32,
     /// Cycles per tick of the interrupts that read the sensors for the next tick.
     pub sensor_cycles: u32,
     /// The same with two sensors on each channel.
     pub sensor_cycles_of_both: u32,
     /// Cycles of the longest of these interrupts, which may delay the control interrupt.
     pub longest_sensor_cycles: u32,
-    /// The same bound at the core's clock, µs.
-    pub microseconds: f64,
-    /// Highest control rate at which the interrupt ends before the next one, Hz.
+    /// Highest control rate at which all interrupts of a tick end before the next one, Hz.
     pub proves_hz: u32,
     /// The same with two sensors on each channel, Hz.
     pub proves_hz_with_both: u32,
-    /// Cycles of the entry to the control interrupt and of the exit from it.
-    pub around_cycles: u32,
-    /// Instructions on the worst path.
-    pub instructions: u32,
-    /// The path, in order of execution.
-    pub path: Vec<PathStretch>,
-    /// Functions that the bound leaves out ([`NOT_CALLED`]).
+    /// Functions that the bounds leave out ([`NOT_CALLED`]).
     #[serde(skip)]
     pub not_called: BTreeSet<u32>,
-    /// Loops of the interrupt and of the functions that it calls.
+    /// The function whose call in a control interrupt shows that the tick starts the estimates ([`EVALUATES`]).
+    #[serde(skip)]
+    pub evaluates: u32,
+    /// Functions that such a tick does not call ([`STARTS`]).
+    #[serde(skip)]
+    pub not_called_at_start: BTreeSet<u32>,
+    /// Loops of the interrupts and of the functions that they call.
     #[serde(skip)]
     pub loops: Vec<Loop>,
     /// Addresses of all instructions, including those of the sensors' interrupts, that are charged with the wait for a
     /// peripheral.
     #[serde(skip)]
     pub peripheral_accesses: BTreeSet<u32>,
+}
+
+/// A bound on one interrupt.
+#[derive(Clone, Debug, Serialize)]
+pub struct HandlerBound {
+    /// Cycles from the request of the interrupt to the return from it.
+    pub cycles: u32,
+    /// The same at the core's clock, µs.
+    pub microseconds: f64,
+    /// Cycles of the entry to the interrupt and of the exit from it.
+    pub around_cycles: u32,
+    /// Instructions on the worst path.
+    pub instructions: u32,
+    /// The path, in order of execution.
+    pub path: Vec<PathStretch>,
 }
 
 /// A part of the path within one source function.
@@ -108,7 +129,7 @@ pub struct PathStretch {
 }
 
 impl Bound {
-    /// Computes the bound of an image.
+    /// Computes the bounds of an image.
     ///
     /// # Errors
     /// [`BoundError`] naming the file or the code that cannot be bounded.
@@ -136,9 +157,43 @@ impl Bound {
         for (function, _) in NOT_CALLED {
             not_called.insert(out_of_line(function)?);
         }
-        let mut analysis = Analysis::new(&image, &limits)?.without(&not_called);
-        let worst = worst_of(CONTROL_INTERRUPT, &mut analysis)?;
-        let cycles = with_entry(&worst);
+        let of_handler = |handler: &str, analysis: &mut Analysis<'_>| {
+            let worst = worst_of(handler, analysis)?;
+            let cycles = with_entry(&worst);
+            Ok::<_, BoundError>(HandlerBound {
+                cycles,
+                microseconds: microseconds(cycles),
+                around_cycles: cycles - worst.cycles,
+                instructions: worst.instructions,
+                path: stretches(&image, handler, &analysis.path_with_calls(&worst)),
+            })
+        };
+        let without = |functions: &BTreeSet<u32>| {
+            let all = not_called.union(functions).copied().collect();
+            Ok::<_, BoundError>(Analysis::new(&image, &limits)?.without(&all))
+        };
+        let mut analysis = without(&BTreeSet::new())?;
+        let update = of_handler(UPDATE_INTERRUPT, &mut analysis)?;
+        // A tick either starts the estimates, or continues them.
+        let evaluates = out_of_line(EVALUATES)?;
+        let mut continuing = without(&BTreeSet::from([evaluates]))?;
+        let continues = of_handler(CONTROL_INTERRUPT, &mut continuing)?;
+        let mut not_called_at_start = BTreeSet::new();
+        for (function, _) in STARTS {
+            not_called_at_start.insert(out_of_line(function)?);
+        }
+        let mut starting = without(&not_called_at_start)?;
+        let starts = of_handler(CONTROL_INTERRUPT, &mut starting)?;
+        let update_at_start = of_handler(UPDATE_INTERRUPT, &mut starting)?;
+        let tick_cycles =
+            (continues.cycles + update.cycles).max(starts.cycles + update_at_start.cycles);
+        let control = if starts.cycles > continues.cycles {
+            starts
+        } else {
+            continues
+        };
+        // For loops and accesses: of all paths.
+        worst_of(CONTROL_INTERRUPT, &mut analysis)?;
         let accesses = |analysis: &Analysis<'_>| -> BTreeSet<u32> {
             let functions = analysis.functions();
             functions
@@ -161,19 +216,22 @@ impl Bound {
             longest_sensor_cycles = longest_sensor_cycles.max(last);
         }
         let [sensor_cycles, sensor_cycles_of_both] = sensor_cycles;
-        let path = stretches(&image, &analysis.path_with_calls(&worst));
+        let proves_hz = |sensor_cycles: u32| {
+            let all = tick_cycles + sensor_cycles;
+            (CORE_HZ / f64::from(all)) as u32
+        };
         Ok(Self {
-            cycles,
             sensor_cycles,
             sensor_cycles_of_both,
             longest_sensor_cycles,
-            microseconds: f64::from(cycles) / CORE_HZ * 1e6,
-            proves_hz: (CORE_HZ / f64::from(cycles + sensor_cycles)) as u32,
-            proves_hz_with_both: (CORE_HZ / f64::from(cycles + sensor_cycles_of_both)) as u32,
-            around_cycles: cycles - worst.cycles,
-            instructions: worst.instructions,
-            path,
+            proves_hz: proves_hz(sensor_cycles),
+            proves_hz_with_both: proves_hz(sensor_cycles_of_both),
+            control,
+            update,
+            tick_cycles,
             not_called,
+            evaluates,
+            not_called_at_start,
             peripheral_accesses,
             loops: analysis
                 .functions()
@@ -185,6 +243,47 @@ impl Bound {
     /// Returns the report as text.
     pub fn text(&self) -> String {
         let mut text = String::new();
+        // Writing to a string cannot fail.
+        for (name, handler) in [
+            ("control interrupt", &self.control),
+            ("update after it", &self.update),
+        ] {
+            handler.write_path(&mut text);
+            let _ = writeln!(
+                text,
+                "Bound of the {name}: {} cycles, {:.1} µs at {} MHz, with {} instructions on the worst path.\n",
+                handler.cycles,
+                handler.microseconds,
+                CORE_HZ / 1e6,
+                handler.instructions,
+            );
+        }
+        let both = self.tick_cycles;
+        let _ = write!(
+            text,
+            "Both in a tick: {both} cycles, {:.1} µs. After the longest control interrupt, which starts the estimates, the update \
+             is short.\n\
+             Interrupts that read the sensors for the next tick, two on each channel: {} cycles, {:.1} µs in a tick, \
+             {:.1} µs each at most.\n\
+             Together they prove control rates up to {} Hz.\n\
+             With one sensor on each channel: {} cycles, {:.1} µs in a tick, and up to {} Hz.\n\
+             Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss. Tasks of lower \
+             priority that mask the interrupts come on top.",
+            microseconds(both),
+            self.sensor_cycles_of_both,
+            microseconds(self.sensor_cycles_of_both),
+            microseconds(self.longest_sensor_cycles),
+            self.proves_hz_with_both,
+            self.sensor_cycles,
+            microseconds(self.sensor_cycles),
+            self.proves_hz,
+        );
+        text
+    }
+}
+
+impl HandlerBound {
+    fn write_path(&self, text: &mut String) {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{:>7}  function  file and lines", "cycles");
         for stretch in &self.path {
@@ -198,32 +297,14 @@ impl Bound {
         }
         let around = self.around_cycles;
         let _ = writeln!(text, "{around:>7}  entry to and exit from the interrupt");
-        let _ = write!(
-            text,
-            "Bound of the control interrupt: {} cycles, {:.1} µs at {} MHz, with {} instructions on the worst path.\n\
-             Interrupts that read the sensors for the next tick, two on each channel: {} cycles, {:.1} µs in a tick, \
-             {:.1} µs each at most.\n\
-             Together they prove control rates up to {} Hz.\n\
-             With one sensor on each channel: {} cycles, {:.1} µs in a tick, and up to {} Hz.\n\
-             Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss. Tasks of lower \
-             priority that mask the interrupts come on top.",
-            self.cycles,
-            self.microseconds,
-            CORE_HZ / 1e6,
-            self.instructions,
-            self.sensor_cycles_of_both,
-            f64::from(self.sensor_cycles_of_both) / CORE_HZ * 1e6,
-            f64::from(self.longest_sensor_cycles) / CORE_HZ * 1e6,
-            self.proves_hz_with_both,
-            self.sensor_cycles,
-            f64::from(self.sensor_cycles) / CORE_HZ * 1e6,
-            self.proves_hz,
-        );
-        text
     }
 }
 
-fn stretches(image: &Image, path: &[Visit]) -> Vec<PathStretch> {
+fn microseconds(cycles: u32) -> f64 {
+    f64::from(cycles) / CORE_HZ * 1e6
+}
+
+fn stretches(image: &Image, handler: &str, path: &[Visit]) -> Vec<PathStretch> {
     let mut all: Vec<PathStretch> = Vec::new();
     let mut rest = 0.0;
     for visit in path {
@@ -231,7 +312,7 @@ fn stretches(image: &Image, path: &[Visit]) -> Vec<PathStretch> {
         let ours = frames
             .iter()
             .find(|frame| frame.function.contains("painleve"));
-        let function = plain(ours.map_or(CONTROL_INTERRUPT, |frame| &frame.function));
+        let function = plain(ours.map_or(handler, |frame| &frame.function));
         let (file, line) = ours.map_or(("", 0), |frame| (frame.file.as_str(), frame.line));
         // Whole cycles that add up to the total.
         let exact = visit.cycles + rest;

@@ -43,8 +43,8 @@ pub struct TimingArguments {
     /// The controller's image; by default the workspace's own build.
     #[arg(long, value_name = "PATH")]
     elf: Option<PathBuf>,
-    /// Bound the cycles of the flash image's control interrupt from its machine code and show the
-    /// path that attains the bound, instead of running a scenario; --elf selects another image.
+    /// Bound the cycles of the flash image's control interrupt and of the update after it from its machine code and
+    /// show the paths that attain the bounds, instead of running a scenario; --elf selects another image.
     #[arg(long, conflicts_with_all = ["names", "overrides", "host", "port", "svg", "cyclictest"])]
     bound: bool,
     /// With --host native: run cyclictest (Debian's package rt-tests) beside each scenario, at the same rate

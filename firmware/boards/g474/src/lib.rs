@@ -64,7 +64,7 @@ macro_rules! image {
     ($laws:ty) => {
         ::painleve_image::tasks! {
             board = $crate::G474, laws = $laws, device = $crate::pac,
-            control = TIM2, serial = USART2, link = SPI3,
+            control = TIM2, update = TIM3, serial = USART2, link = SPI3,
             sensors = [encoders(0): SPI1, force_cell(1): SPI2]
         }
     };

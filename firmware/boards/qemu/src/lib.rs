@@ -19,7 +19,7 @@ macro_rules! image {
     ($laws:ty) => {
         ::painleve_image::tasks! {
             board = $crate::Qemu, laws = $laws, device = $crate::pac,
-            control = TIM2, serial = USART1, link = SPI3
+            control = TIM2, update = TIM3, serial = USART1, link = SPI3
         }
     };
 }
@@ -30,7 +30,7 @@ macro_rules! serial_image {
     ($laws:ty) => {
         ::painleve_image::tasks! {
             board = $crate::QemuSerial, laws = $laws, device = $crate::pac,
-            control = TIM2, serial = USART1, link = SPI3
+            control = TIM2, update = TIM3, serial = USART1, link = SPI3
         }
     };
 }

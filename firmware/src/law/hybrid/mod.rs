@@ -242,7 +242,7 @@ impl HybridSettings {
             let limit = self.force_integral_limit_n;
             state.force_integral_n = (state.force_integral_n + step).within(limit);
         }
-        let response = &input.response;
+        let response = input.response;
         let damping_n = if response.give > 0.0 {
             // Press less while the force rises: this damps a contact that gives.
             let rate = input.tick_s * self.contact_damping_rad_s;
@@ -271,7 +271,7 @@ impl HybridSettings {
                 state.filtered_friction_n
             }
             FrictionFeedForward::Observed { time_constant_s } => {
-                let friction = &input.friction;
+                let friction = input.friction;
                 // In stick the friction force follows the feed-forward. Feeding forward the friction
                 // of the wanted slip brings it to the edge of its cone, where the tip breaks away
                 // without a jerk.
@@ -346,10 +346,10 @@ mod tests {
             let reference = TipReference { position_m: tip + 0.001, velocity_m_s: speed, acceleration_m_s2: 0.7 };
             let input = LawInput {
                 arm: &arm, model: &model, posture,
-                friction: FrictionEstimate {
+                friction: &FrictionEstimate {
                     coefficient: friction, next_coefficient: friction, catch_up: 0.0, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
                 },
-                p_per_kg: model.p_per_kg(friction, Slip::Positive), response: ContactResponse::rigid(1.0),
+                p_per_kg: model.p_per_kg(friction, Slip::Positive), response: &ContactResponse::rigid(1.0),
                 force_n: Vector2::zeros(), contact: true, saturated: false,
                 reference, torque_limit_nm: 50.0, tick_s: 1e-3,
             };
@@ -398,27 +398,37 @@ mod tests {
         )
     }
 
+    const SLIDES: FrictionEstimate = FrictionEstimate {
+        coefficient: FRICTION,
+        next_coefficient: FRICTION,
+        catch_up: 0.0,
+        deviation: 0.0,
+        slip: Slip::Positive,
+        slip_seen: true,
+        sticks: false,
+    };
+
+    fn gives() -> ContactResponse {
+        ContactResponse {
+            lags: 1.0,
+            has_lagged: true,
+            ..ContactResponse::rigid(1.0)
+        }
+    }
+
     /// Returns the input of a tip that slides at its reference on a contact that gives.
-    fn sliding<'a>(arm: &'a Arm<f32>, model: &'a Model) -> LawInput<'a> {
+    fn sliding<'a>(
+        arm: &'a Arm<f32>,
+        model: &'a Model,
+        response: &'a ContactResponse,
+    ) -> LawInput<'a> {
         LawInput {
             arm,
             model,
             posture: Posture::ElbowDown,
-            friction: FrictionEstimate {
-                coefficient: FRICTION,
-                next_coefficient: FRICTION,
-                catch_up: 0.0,
-                deviation: 0.0,
-                slip: Slip::Positive,
-                slip_seen: true,
-                sticks: false,
-            },
+            friction: &SLIDES,
             p_per_kg: model.p_per_kg(FRICTION, Slip::Positive),
-            response: ContactResponse {
-                lags: 1.0,
-                has_lagged: true,
-                ..ContactResponse::rigid(1.0)
-            },
+            response,
             force_n: Vector2::new(-FRICTION * 10.0, 10.0),
             contact: true,
             saturated: false,
@@ -434,7 +444,7 @@ mod tests {
         let model = at_rest(&arm);
         test(
             &HybridSettings::default(),
-            &mut sliding(&arm, &model),
+            &mut sliding(&arm, &model, &gives()),
             &mut HybridState::default(),
         );
     }
@@ -509,8 +519,8 @@ mod tests {
             let share = (state.pressing - reduced) / (1.0 - reduced);
             assert!((share - 0.1).abs() < 0.01, "{share}");
             // A rigid contact does not ring.
-            input.response.has_lagged = false;
-            settings.tick(state, input);
+            let response = &ContactResponse::rigid(1.0);
+            settings.tick(state, &LawInput { response, ..*input });
             assert_eq!(state.pressing, 1.0);
         });
     }

@@ -17,6 +17,7 @@ use painleve_shared::{Arm, Posture, Real};
 use self::search::{Admissibility, Search};
 pub use self::settings::GovernorSettings;
 use crate::estimate::friction::FrictionEstimate;
+use crate::estimate::response::ContactResponse;
 use crate::refer::reference::TipReference;
 
 /// Points evaluated at each tick while the edges are unknown.
@@ -50,6 +51,20 @@ pub struct EdgeMargins {
     pub soft: f32,
     /// Slow changes of the contact force from tick to tick by causes unknown, N. The edges follow them, too.
     pub restless_n: f32,
+}
+
+impl EdgeMargins {
+    /// The margins for a contact with this response, and for a tip that may land where p/Q22 is `landing_p_ratio` or
+    /// more.
+    #[inline]
+    pub fn of(response: &ContactResponse, landing_p_ratio: f32) -> Self {
+        Self {
+            landing_p_ratio,
+            contact_p_ratio: response.least_p_ratio,
+            soft: response.soft,
+            restless_n: response.restless_n,
+        }
+    }
 }
 
 /// What makes the joints' motion uncertain.

@@ -36,7 +36,7 @@ pub(super) struct Core<C> {
     /// not keep the block's state.
     pub(super) conditional: u32,
     pub(super) stop: Option<Stop>,
-    /// Addresses of the instructions of a traced handler, starting with its first.
+    /// Addresses of the instructions of traced handlers.
     pub(super) trace: Option<Trace>,
     /// Whether the next exception may have changed.
     pub(super) is_dirty: bool,
@@ -121,7 +121,7 @@ impl<C: Chip> Surroundings for Core<C> {
             self.conditional = self.conditional.saturating_sub(1);
         }
         if let Some(trace) = &mut self.trace {
-            trace.step(address, processor);
+            trace.step(address, &self.system.active);
         }
         self.instructions += 1;
         self.cycles += CYCLES_PER_INSTRUCTION;

@@ -184,18 +184,19 @@ impl<C: Chip> Machine<C> {
         self.unicorn.surroundings().instructions
     }
 
-    /// Starts recording the addresses of the instructions of a handler.
-    pub fn trace(&mut self, handler: u32) {
-        self.unicorn.surroundings_mut().trace = Some(Trace::new(handler));
+    /// Starts recording the addresses of the instructions of these handlers.
+    pub fn trace(&mut self, handlers: &[u32]) {
+        self.unicorn.surroundings_mut().trace = Some(Trace::new(handlers));
     }
 
-    /// Returns the executions of the traced handler since the last call.
+    /// Returns the executions of traced handlers since the last call, in the order of their ends. Each begins with the
+    /// handler's address.
     pub fn take_traces(&mut self) -> Vec<Vec<u32>> {
         let trace = self.unicorn.surroundings_mut().trace.as_mut();
         trace.map_or_else(Vec::new, |trace| std::mem::take(&mut trace.done))
     }
 
-    /// Returns the instructions of the traced handler that accessed peripherals, each with an address that it accessed.
+    /// Returns the instructions of traced handlers that accessed peripherals, each with an address that it accessed.
     pub fn peripheral_accesses(&self) -> BTreeSet<(u32, u32)> {
         let trace = self.unicorn.surroundings().trace.as_ref();
         trace.map_or_else(BTreeSet::new, |trace| trace.accesses.clone())

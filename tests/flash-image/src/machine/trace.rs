@@ -1,28 +1,29 @@
-//! Records the executions of a handler.
+//! Records the executions of handlers.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use crate::unicorn::{Processor, Register};
+use crate::system_control::Exception;
 
-/// The executed instructions of one handler.
+/// The executed instructions of some handlers, without those of the interrupts that interrupt them.
 #[derive(Clone, Debug)]
 pub(super) struct Trace {
-    handler: u32,
-    /// The stack pointer before the handler's first instruction, while the handler runs.
-    stack: Option<u32>,
-    now: Vec<u32>,
+    handlers: BTreeSet<u32>,
+    /// Handlers that run, by their exceptions.
+    running: BTreeMap<Exception, Vec<u32>>,
+    /// The present instruction, if it is one of theirs.
+    instruction: Option<u32>,
     pub(super) done: Vec<Vec<u32>>,
     /// The instructions that accessed peripherals, and the addresses that they accessed.
     pub(super) accesses: BTreeSet<(u32, u32)>,
 }
 
 impl Trace {
-    /// Starts recording the handler at this address.
-    pub(super) fn new(handler: u32) -> Self {
+    /// Starts recording the handlers at these addresses.
+    pub(super) fn new(handlers: &[u32]) -> Self {
         Self {
-            handler: handler & !1,
-            stack: None,
-            now: Vec::new(),
+            handlers: handlers.iter().map(|it| it & !1).collect(),
+            running: BTreeMap::new(),
+            instruction: None,
             done: Vec::new(),
             accesses: BTreeSet::new(),
         }
@@ -30,24 +31,31 @@ impl Trace {
 
     /// Records that the present instruction accesses a peripheral.
     pub(super) fn access(&mut self, address: u32) {
-        if let (Some(_), Some(instruction)) = (self.stack, self.now.last()) {
-            self.accesses.insert((*instruction, address));
+        if let Some(instruction) = self.instruction {
+            self.accesses.insert((instruction, address));
         }
     }
 
-    /// Records an instruction that is about to be executed.
-    pub(super) fn step(&mut self, address: u32, processor: &Processor) {
-        let stack = processor.get(Register::SP);
-        if address == self.handler {
-            self.stack = Some(stack);
-        } else if self.stack.is_some_and(|before| stack >= before) {
-            // The handler has removed its frame: the interrupted program or a tail-chained handler
-            // follows.
-            self.stack = None;
-            self.done.push(std::mem::take(&mut self.now));
-        }
-        if self.stack.is_some() {
-            self.now.push(address);
-        }
+    /// Records an instruction that is about to be executed while these exceptions are active, the running one last.
+    pub(super) fn step(&mut self, address: u32, active: &[Exception]) {
+        let starts = self.handlers.contains(&address);
+        let top = active.last();
+        let done = &mut self.done;
+        self.running.retain(|exception, instructions| {
+            let runs = active.contains(exception) && !(starts && top == Some(exception));
+            if !runs {
+                done.push(std::mem::take(instructions));
+            }
+            runs
+        });
+        let instructions = match top {
+            Some(exception) if starts => Some(self.running.entry(*exception).or_default()),
+            Some(exception) => self.running.get_mut(exception),
+            None => None,
+        };
+        self.instruction = instructions.map(|it| {
+            it.push(address);
+            address
+        });
     }
 }

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
-//! No executed tick exceeds the bound on the control interrupt under the same cost model: in closed
-//! loops, with random frames and settings, and with those found by searches for the worst tick.
+//! No executed tick exceeds the bounds on the control interrupt and on the update after it under the same cost model:
+//! in closed loops, with random frames and settings, and with those found by searches for the worst tick.
 //!
 //! `PAINLEVE_TICKS` sets the number of random frames and of search steps; random settings use all
 //! processors.
@@ -8,7 +8,9 @@
 use painleve_bound::image::Image;
 use painleve_bound::loops::Limit;
 use painleve_bound::profile::Profile;
-use painleve_bound::report::{Bound, CONTROL_INTERRUPT, SENSOR_INTERRUPTS};
+use painleve_bound::report::{
+    Bound, CONTROL_INTERRUPT, HandlerBound, SENSOR_INTERRUPTS, UPDATE_INTERRUPT,
+};
 use painleve_bound::trace::{Executed, Tracer, rounds};
 use painleve_flash_image::bench::{BoardBench, encoded, scenario};
 use painleve_flash_image::board::{self, FlashedBoard};
@@ -27,57 +29,148 @@ fn tries(otherwise: u64) -> u64 {
     asked.and_then(|it| it.parse().ok()).unwrap_or(otherwise)
 }
 
-/// Compares executed interrupts with their bound.
+/// The longest executions of one handler.
+#[derive(Clone, Default)]
+struct Longest {
+    handler: u32,
+    worst: Executed,
+    most_instructions: Executed,
+    /// Addresses of the instructions of that execution.
+    addresses: Vec<u32>,
+    executions: u64,
+}
+
+impl Longest {
+    fn report(&self, name: &str, bound: &HandlerBound, image: &Image) {
+        println!("{}", Profile::of(image, &self.addresses).unwrap());
+        println!(
+            "{name}: {} interrupts, worst {} instructions, {} cycles by the model; bound {} cycles, which is {:.2} times as much",
+            self.executions,
+            self.most_instructions.instructions,
+            self.worst.cycles,
+            bound.cycles,
+            f64::from(bound.cycles) / f64::from(self.worst.cycles),
+        );
+        assert!(self.executions > 0);
+    }
+}
+
+/// Most cycles found.
+#[derive(Clone, Copy, Default)]
+struct Found {
+    control: u32,
+    /// Of a control interrupt and the update after it.
+    tick: u32,
+}
+
+/// What a search maximises, one after the other.
+const OBJECTIVES: [fn(Found) -> u32; 2] = [|found| found.control, |found| found.tick];
+
+/// Returns each scenario with each objective.
+fn searches<'a>(names: &'a [&'a str]) -> impl Iterator<Item = (&'a str, fn(Found) -> u32)> {
+    let with_objectives = |name: &&'a str| {
+        let name = *name;
+        OBJECTIVES.map(|of| (name, of))
+    };
+    names.iter().flat_map(with_objectives)
+}
+
+/// Compares executed interrupts with their bounds.
 struct BoundCheck<'a> {
     bound: &'a Bound,
     tracer: Tracer<'a>,
-    worst: Executed,
-    most_instructions: Executed,
-    /// Addresses of the instructions of that interrupt.
-    longest: Vec<u32>,
-    ticks: u64,
+    control: Longest,
+    /// Control interrupts that start the estimates.
+    starting: Longest,
+    update: Longest,
+    /// Most cycles and instructions of a control interrupt and the update after it.
+    worst_tick: Executed,
+    /// The last control interrupt.
+    last_control: Executed,
+    /// Whether it has started the estimates.
+    starts: bool,
 }
 
 impl<'a> BoundCheck<'a> {
     fn new(image: &'a Image, bound: &'a Bound) -> Self {
+        let longest = |handler: &str| Longest {
+            handler: image.function(handler).unwrap(),
+            ..Longest::default()
+        };
         Self {
             bound,
             tracer: Tracer::new(image).unwrap(),
-            worst: Executed::default(),
-            most_instructions: Executed::default(),
-            longest: Vec::new(),
-            ticks: 0,
+            control: longest(CONTROL_INTERRUPT),
+            starting: longest(CONTROL_INTERRUPT),
+            update: longest(UPDATE_INTERRUPT),
+            worst_tick: Executed::default(),
+            last_control: Executed::default(),
+            starts: false,
         }
     }
 
-    /// Returns the worst of the interrupts executed since the last call.
-    fn look(&mut self, board: &mut FlashedBoard) -> Executed {
-        let mut worst = Executed::default();
+    /// Returns the most cycles of the ticks executed since the last call.
+    fn look(&mut self, board: &mut FlashedBoard) -> Found {
+        let mut found = Found::default();
         for addresses in board.machine.take_traces() {
             let mut executed = addresses.iter();
             let left_out = executed.any(|it| self.bound.not_called.contains(it));
             assert!(!left_out, "a tick calls what the bound leaves out");
             let cost = self.tracer.cost(&addresses).unwrap();
-            assert!(cost.cycles <= self.bound.cycles, "{cost:?}");
             for one in &self.bound.loops {
                 if let Limit::Times(times) = one.limit {
                     let gone = rounds(one, &addresses);
                     assert!(gone <= times, "{gone} rounds of {one:?}");
                 }
             }
-            if cost.instructions > self.most_instructions.instructions {
-                self.most_instructions = cost.clone();
-                self.longest = addresses;
+            let is_control = addresses[0] == self.control.handler;
+            if is_control {
+                self.starts = addresses.contains(&self.bound.evaluates);
             }
-            if cost.cycles > worst.cycles {
-                worst = cost;
+            let mut executed = addresses.iter();
+            let at_start = &self.bound.not_called_at_start;
+            let left_out = self.starts && executed.any(|it| at_start.contains(it));
+            assert!(
+                !left_out,
+                "a tick that starts calls what the bound leaves out"
+            );
+            let (longest, bound) = if is_control {
+                self.last_control = cost.clone();
+                found.control = found.control.max(cost.cycles);
+                let longest = if self.starts {
+                    &mut self.starting
+                } else {
+                    &mut self.control
+                };
+                (longest, &self.bound.control)
+            } else {
+                let tick = Executed {
+                    cycles: self.last_control.cycles + cost.cycles,
+                    instructions: self.last_control.instructions + cost.instructions,
+                };
+                found.tick = found.tick.max(tick.cycles);
+                if tick.cycles > self.worst_tick.cycles {
+                    self.worst_tick = tick;
+                }
+                (&mut self.update, &self.bound.update)
+            };
+            assert_eq!(addresses[0], longest.handler);
+            assert!(
+                cost.cycles <= bound.cycles,
+                "{cost:?} of 0x{:x} is beyond {}",
+                longest.handler,
+                bound.cycles
+            );
+            longest.executions += 1;
+            if cost.cycles > longest.worst.cycles {
+                longest.worst = cost.clone();
             }
-            self.ticks += 1;
+            if cost.instructions > longest.most_instructions.instructions {
+                longest.most_instructions = cost;
+                longest.addresses = addresses;
+            }
         }
-        if worst.cycles > self.worst.cycles {
-            self.worst = worst.clone();
-        }
-        worst
+        found
     }
 }
 
@@ -86,21 +179,29 @@ fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
     let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
     let mut watch = BoundCheck::new(&image, &bound);
     run(&mut watch);
-    println!("{}", Profile::of(&image, &watch.longest).unwrap());
+    watch.update.report("update", &bound.update, &image);
+    watch.control.report("control", &bound.control, &image);
     println!(
-        "{} interrupts, worst {} instructions, {} cycles by the model; bound {} cycles, which is {:.2} times as much",
-        watch.ticks,
-        watch.most_instructions.instructions,
-        watch.worst.cycles,
-        bound.cycles,
-        f64::from(bound.cycles) / f64::from(watch.worst.cycles),
+        "both in a tick: {} instructions, {} cycles by the model; bound {} cycles",
+        watch.worst_tick.instructions, watch.worst_tick.cycles, bound.tick_cycles,
     );
-    assert!(watch.ticks > 0);
+    let started = &watch.starting;
+    println!(
+        "{} control interrupts have started the estimates, with at most {} instructions, {} cycles",
+        started.executions, started.most_instructions.instructions, started.worst.cycles,
+    );
+    assert!(watch.worst_tick.cycles <= bound.tick_cycles);
+}
+
+/// Starts recording the control interrupt and the update.
+fn trace_ticks(board: &mut FlashedBoard) {
+    let handler = |name| board.machine.symbol(name).unwrap();
+    let handlers = [CONTROL_INTERRUPT, UPDATE_INTERRUPT].map(handler);
+    board.machine.trace(&handlers);
 }
 
 fn traced(mut board: FlashedBoard) -> FlashedBoard {
-    let handler = board.machine.symbol(CONTROL_INTERRUPT).unwrap();
-    board.machine.trace(handler);
+    trace_ticks(&mut board);
     board
 }
 
@@ -137,8 +238,7 @@ fn scenarios_stay_below_the_bound() {
 fn ticks_with_sensors_stay_below_the_bound() {
     with_bound(|watch| {
         let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));
-        let handler = bench.board.machine.symbol(CONTROL_INTERRUPT).unwrap();
-        bench.board.machine.trace(handler);
+        trace_ticks(&mut bench.board);
         bench.drive();
         for _ in 0..50 {
             bench.tick();
@@ -157,10 +257,10 @@ fn peripherals_at_addresses_computed_at_run_time_are_those_of_pins() {
     let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
     let mut charged = 0;
     let [encoders, force] = SENSOR_INTERRUPTS;
-    for handler in [CONTROL_INTERRUPT, encoders, force] {
+    for handler in [CONTROL_INTERRUPT, UPDATE_INTERRUPT, encoders, force] {
         let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));
         let handler = bench.board.machine.symbol(handler).unwrap();
-        bench.board.machine.trace(handler);
+        bench.board.machine.trace(&[handler]);
         bench.drive();
         // The drive stops, too.
         bench.board.enable(false);
@@ -182,22 +282,23 @@ fn peripherals_at_addresses_computed_at_run_time_are_those_of_pins() {
 }
 
 /// Hill climbing with the board's own sensors: starts in the state before the worst tick of a closed loop, and
-/// searches for readings and positions of the switch that make one of the next ticks more expensive.
+/// searches for readings and positions of the switch that make one of the next ticks more expensive. The control
+/// interrupt is also within its budget of instructions.
 #[test]
 fn the_worst_readings_found_by_a_search_stay_below_the_bound() {
     with_bound(|watch| {
         let mut random = Random(4);
-        for name in ["hybrid-elbow-down", "pid-elbow-down", "capture"] {
+        let names = ["hybrid-elbow-down", "pid-elbow-down", "capture"];
+        for (name, cycles_of) in searches(&names) {
             let mut bench = BoardBench::new(&scenario(name));
-            let handler = bench.board.machine.symbol(CONTROL_INTERRUPT).unwrap();
-            bench.board.machine.trace(handler);
+            trace_ticks(&mut bench.board);
             bench.drive();
             watch.look(&mut bench.board);
             let mut start = (bench.snapshot(), 0);
             for _ in 0..50 {
                 let before = bench.snapshot();
                 bench.tick();
-                let cycles = watch.look(&mut bench.board).cycles;
+                let cycles = cycles_of(watch.look(&mut bench.board));
                 if cycles > start.1 {
                     start = (before, cycles);
                 }
@@ -218,13 +319,20 @@ fn the_worst_readings_found_by_a_search_stay_below_the_bound() {
                         .board
                         .enable(frame.inputs.contains(DigitalInputs::ENABLE));
                     bench.wait_for_tick();
-                    cycles = cycles.max(watch.look(&mut bench.board).cycles);
+                    cycles = cycles.max(cycles_of(watch.look(&mut bench.board)));
                 }
                 if cycles >= most {
                     (most, best) = (cycles, tried);
                 }
             }
         }
+        let [control, starting] =
+            [&watch.control, &watch.starting].map(|longest| longest.most_instructions.instructions);
+        let most = control.max(starting);
+        let budget: serde_json::Value =
+            serde_json::from_str(include_str!("../../../budget.json")).unwrap();
+        let limit = &budget["instructions_of_control_interrupt"];
+        assert!(u64::from(most) <= limit.as_u64().unwrap(), "{most}");
     });
 }
 
@@ -274,7 +382,7 @@ fn random_settings(watch: &mut BoundCheck<'_>, number: u64) -> String {
 }
 
 /// Executes ticks of a closed loop with random disturbances of the frames, and returns the most cycles.
-fn random_frames(watch: &mut BoundCheck<'_>, scenario: &Scenario, random: &mut Random) -> u32 {
+fn random_frames(watch: &mut BoundCheck<'_>, scenario: &Scenario, random: &mut Random) -> Found {
     let mut board = FlashedBoard::booted();
     let response = board.configure(FrameSource::Lockstep, &encoded(scenario));
     assert!(
@@ -286,7 +394,7 @@ fn random_frames(watch: &mut BoundCheck<'_>, scenario: &Scenario, random: &mut R
     let mut statistics = Statistics::new(0.05);
     let mut last = SensorFrame::default();
     let mut continues = true;
-    let mut most = 0;
+    let mut most = Found::default();
     for _ in 0..FRAMES_PER_SETTINGS {
         // An arm that jams under random torques leaves its last frame to be disturbed.
         let sampled = continues.then(|| simulation.sample(&mut statistics).ok());
@@ -300,7 +408,9 @@ fn random_frames(watch: &mut BoundCheck<'_>, scenario: &Scenario, random: &mut R
             frame = mutated(&frame, random);
         }
         let answer = board.exchange(&frame);
-        most = most.max(watch.look(&mut board).cycles);
+        let found = watch.look(&mut board);
+        most.control = most.control.max(found.control);
+        most.tick = most.tick.max(found.tick);
         continues &= simulation.advance(answer.as_ref(), &mut statistics).is_ok();
     }
     most
@@ -314,11 +424,11 @@ fn the_worst_settings_found_by_a_search_stay_below_the_bound() {
         let mut random = Random(3);
         let names = ["edge", "pid-elbow-down", "capture"];
         let attempts = tries(600).div_ceil(FRAMES_PER_SETTINGS * names.len() as u64);
-        for name in names {
+        for (name, cycles_of) in searches(&names) {
             let (mut worst, mut most) = (scenario(name), 0);
             for _ in 0..attempts {
                 let (tried, _) = with_random_settings(worst.clone(), &mut random);
-                let cycles = random_frames(watch, &tried, &mut random);
+                let cycles = cycles_of(random_frames(watch, &tried, &mut random));
                 if cycles >= most {
                     (worst, most) = (tried, cycles);
                 }
@@ -334,20 +444,26 @@ fn random_settings_stay_below_the_bound() {
     let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
     let settings = tries(800).div_ceil(FRAMES_PER_SETTINGS);
     let threads = std::thread::available_parallelism().map_or(1, |it| it.get() as u64);
-    // Ticks, most instructions, most cycles and the settings with these.
+    // What was found, and the settings with most cycles.
     let run = |thread: u64| {
         let image = Image::read(&board::image("painleve-f405")).unwrap();
         let mut watch = BoundCheck::new(&image, &bound);
         let mut worst = String::new();
         for number in (thread..settings).step_by(threads as usize) {
-            let before = watch.worst.cycles;
+            let before = watch.worst_tick.cycles;
             let name = random_settings(&mut watch, number);
-            if watch.worst.cycles > before {
+            if watch.worst_tick.cycles > before {
                 worst = name;
             }
         }
-        let most = watch.most_instructions.instructions;
-        (watch.ticks, most, watch.worst.cycles, worst)
+        let BoundCheck {
+            control,
+            starting,
+            update,
+            worst_tick,
+            ..
+        } = watch;
+        ([control, starting, update], worst_tick, worst)
     };
     let found: Vec<_> = std::thread::scope(|scope| {
         let run = &run;
@@ -357,15 +473,29 @@ fn random_settings_stay_below_the_bound() {
         let joined = spawned.into_iter().map(|it| it.join());
         joined.map(Result::unwrap).collect()
     });
-    let ticks: u64 = found.iter().map(|it| it.0).sum();
-    let instructions = found.iter().map(|it| it.1).max().unwrap();
-    let (_, _, cycles, worst) = found.iter().max_by_key(|it| it.2).unwrap();
+    let kinds = [
+        ("control", &bound.control),
+        ("control, starting the estimates", &bound.control),
+        ("update", &bound.update),
+    ];
+    for (handler, (name, bound)) in kinds.into_iter().enumerate() {
+        let of = || found.iter().map(|(handlers, ..)| &handlers[handler]);
+        let executions: u64 = of().map(|it| it.executions).sum();
+        let most = of().map(|it| it.most_instructions.instructions).max();
+        let cycles = of().map(|it| it.worst.cycles).max().unwrap();
+        println!(
+            "{name} of {settings} settings: {executions} interrupts, worst {} instructions, {cycles} cycles by the model; bound {} cycles, which is {:.2} times as much",
+            most.unwrap(),
+            bound.cycles,
+            f64::from(bound.cycles) / f64::from(cycles),
+        );
+        assert!(executions >= settings);
+    }
+    let (_, tick, worst) = found.iter().max_by_key(|(_, tick, _)| tick.cycles).unwrap();
     println!(
-        "{settings} settings, {ticks} interrupts, worst {instructions} instructions, {cycles} cycles by the model; bound {} cycles, which is {:.2} times as much\n{worst}",
-        bound.cycles,
-        f64::from(bound.cycles) / f64::from(*cycles),
+        "both in a tick: {} instructions, {} cycles by the model\n{worst}",
+        tick.instructions, tick.cycles
     );
-    assert!(ticks >= settings);
 }
 
 /// Hill climbing: starts in the state before the worst tick of a closed loop and searches for more
@@ -374,7 +504,8 @@ fn random_settings_stay_below_the_bound() {
 fn the_worst_frames_found_by_a_search_stay_below_the_bound() {
     with_bound(|watch| {
         let mut random = Random(2);
-        for name in ["edge", "pid-elbow-down", "capture"] {
+        let names = ["edge", "pid-elbow-down", "capture"];
+        for (name, cycles_of) in searches(&names) {
             let scenario = scenario(name);
             let mut simulation = Simulation::new(&scenario).unwrap();
             let mut statistics = Statistics::new(0.05);
@@ -387,7 +518,7 @@ fn the_worst_frames_found_by_a_search_stay_below_the_bound() {
                 simulation
                     .advance(answer.as_ref(), &mut statistics)
                     .unwrap();
-                let cycles = watch.look(&mut board).cycles;
+                let cycles = cycles_of(watch.look(&mut board));
                 if cycles > start.2 {
                     start = (before, frame, cycles);
                 }
@@ -407,7 +538,7 @@ fn the_worst_frames_found_by_a_search_stay_below_the_bound() {
                 let mut cycles = 0;
                 for frame in &tried {
                     board.exchange(frame);
-                    cycles = cycles.max(watch.look(&mut board).cycles);
+                    cycles = cycles.max(cycles_of(watch.look(&mut board)));
                 }
                 if cycles >= most {
                     (most, best) = (cycles, tried);
