@@ -75,8 +75,8 @@ pub struct Declared {
 pub struct Limits(pub Vec<Declared>);
 
 impl Limits {
-    /// Returns the declarations for the control interrupt.
-    pub fn of_control() -> Self {
+    /// Returns the declarations for the interrupts of a tick: control and update.
+    pub fn of_tick() -> Self {
         let declare = |function, limit, because| Declared {
             function,
             limit,
@@ -92,7 +92,7 @@ impl Limits {
                 "two points of the belt per tick",
             ),
             declare(
-                "ReferenceGenerator::next_tick",
+                "ReferenceGenerator::prepare",
                 Limit::Times(MOST_ENDS),
                 "three segments end per tick",
             ),
@@ -135,7 +135,7 @@ impl Limits {
             declare("::hold", wait(timing.hold_ns, half_period_ns)),
             declare("::pause", wait(timing.pause_ns, 0.0)),
         ];
-        all.extend(Self::of_control().0);
+        all.extend(Self::of_tick().0);
         Self(all)
     }
 

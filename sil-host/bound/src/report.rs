@@ -152,7 +152,7 @@ impl Bound {
                 source: ImageError::NotOneFunction(function.to_owned()),
             })
         };
-        let limits = Limits::of_control();
+        let limits = Limits::of_tick();
         let mut not_called = BTreeSet::new();
         for (function, _) in NOT_CALLED {
             not_called.insert(out_of_line(function)?);
