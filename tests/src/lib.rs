@@ -27,7 +27,7 @@ pub fn skipped(reason: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED: {reason}");
 }
 
-/// Returns the path of the release program, which is built if missing or out of date.
+/// Returns the path of the program, which is built if missing or out of date, with the checks of the profile `verify`.
 ///
 /// # Panics
 /// If it cannot be built.
@@ -37,7 +37,7 @@ pub fn program() -> &'static Path {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
         let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let built = Command::new(cargo)
-            .args(["build", "--release", "--package", "painleve-command"])
+            .args(["build", "--profile", "verify", "--package", "painleve-command"])
             .args(["--message-format", "json"])
             .current_dir(&workspace)
             .stderr(Stdio::inherit())
@@ -84,10 +84,8 @@ pub fn flash_image() -> &'static Path {
 fn built_image(name: &str) -> PathBuf {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let xtask = ["run", "--quiet", "--package", "painleve-xtask", "--"];
     let built = Command::new(cargo)
-        .args(xtask)
-        .arg("build-fw")
+        .args(["xtask", "build-fw"])
         .current_dir(&workspace)
         .status();
     assert!(
