@@ -3,6 +3,7 @@
 mod bench;
 mod boards;
 mod build_fw;
+mod campaign;
 mod chaos;
 mod ci;
 mod command;
@@ -30,10 +31,10 @@ struct Xtask {
 
 #[derive(Debug, Subcommand)]
 enum Chore {
-    /// Install the tools that the tests require and run every test.
-    Test,
-    /// Install the microcontroller's Rust target and QEMU.
-    Setup,
+    /// Run the tests of the default tier, or all; install the tools that they require, if missing.
+    Test(test::TestArguments),
+    /// Install the microcontroller's Rust target, QEMU and Unicorn, if missing.
+    Setup(setup::SetupArguments),
     /// Build the controller's images for the microcontroller.
     BuildFw,
     /// Print flash, RAM and stack use of the images, with their limits.
@@ -54,15 +55,15 @@ enum Chore {
     Soak(soak::SoakArguments),
     /// Measure the figures of docs/benchmarks.md on this machine, pinned, and write its table.
     Bench(bench::BenchArguments),
-    /// Run the steps of continuous integration: formatting, clippy, every test.
+    /// Run the steps of continuous integration: formatting, clippy, links, tests of the default tier.
     Ci,
 }
 
 fn main() -> ExitCode {
     let result = match Xtask::parse().chore {
-        Chore::Test => test::run(),
-        Chore::Setup => setup::run(),
-        Chore::BuildFw => build_fw::run(),
+        Chore::Test(arguments) => test::run(&arguments),
+        Chore::Setup(arguments) => setup::run(&arguments),
+        Chore::BuildFw => build_fw::run(build_fw::Images::All),
         Chore::Size => size::run(),
         Chore::Flash(arguments) => flash::run(&arguments),
         Chore::Examples => examples::run(),
