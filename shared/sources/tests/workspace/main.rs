@@ -1,0 +1,5 @@
+//! Checks of the sources of the whole workspace.
+
+#![allow(clippy::unwrap_used)]
+
+mod imports;
