@@ -14,7 +14,7 @@ use painleve_record::replica::Replica;
 use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
-use painleve_study::catalogue::{CatalogueEntry, STUDIES};
+use painleve_study::studies::{self, STUDIES};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -372,7 +372,7 @@ fn study(py: Python<'_>, name: &str, arguments: Vec<String>) -> PyResult<String>
         let names: Vec<&str> = STUDIES.iter().map(|entry| entry.name).collect();
         PyValueError::new_err(format!("unknown study '{name}': {}", names.join(", ")))
     };
-    let entry = CatalogueEntry::find(name).ok_or_else(unknown)?;
+    let entry = studies::find(name).ok_or_else(unknown)?;
     let command = entry.command().no_binary_name(true);
     let options = command
         .try_get_matches_from(arguments)

@@ -152,7 +152,7 @@ pub enum BoardError {
     /// The board has not stored its configuration.
     #[error("stored state {}: {}", .0.code(), .0.text())]
     NotStored(StoredState),
-    /// Image and program were built from different sources.
+    /// Messages or settings of image and program differ.
     #[error(
         "the image is of build {board:016x} and this program of build {host:016x}: build both from the same sources, see `cargo xtask build-fw`, and flash again"
     )]
@@ -160,6 +160,16 @@ pub enum BoardError {
         /// The image's build.
         board: u64,
         /// This program's build.
+        host: u64,
+    },
+    /// Image and program understand each other, but their controllers were built from different sources.
+    #[error(
+        "the image is of sources {board:016x} and this program of sources {host:016x}: its controller may behave differently; see `cargo xtask build-fw`"
+    )]
+    OtherSources {
+        /// Hash of the image's sources.
+        board: u64,
+        /// Hash of this program's sources.
         host: u64,
     },
     /// The board's parts cannot give the requested counts.
@@ -185,7 +195,17 @@ impl BoardError {
     fn other_build(board: u64) -> Self {
         Self::OtherBuild {
             board,
-            host: painleve_firmware::BUILD,
+            host: painleve_plant::law_choice::build(),
+        }
+    }
+
+    /// Compares the hash of the image's sources with this program's.
+    fn compare_sources(board: u64) -> Result<(), Self> {
+        let host = painleve_firmware::SOURCES;
+        if board == host {
+            Ok(())
+        } else {
+            Err(Self::OtherSources { board, host })
         }
     }
 }

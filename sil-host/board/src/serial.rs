@@ -16,8 +16,8 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{
     BaudRate, FlushArg, SetArg, cfmakeraw, cfsetspeed, tcflush, tcgetattr, tcsetattr,
 };
-use painleve_firmware::BUILD;
 use painleve_plant::Configuration;
+use painleve_plant::law_choice::build;
 use painleve_shared::black_box::BlackBox;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, PROTOCOL, Request, Response};
@@ -58,6 +58,8 @@ pub struct Serial {
     line: LineHealth,
     frame_patience: Duration,
     pub(crate) silence_limit: Duration,
+    /// Hash of the board's sources, once it is identified.
+    sources: u64,
     stopwatch_hz: u32,
 }
 
@@ -68,7 +70,7 @@ impl Serial {
     ///
     /// # Errors
     /// [`BoardError::Port`] if it cannot be opened, [`BoardError::Silent`] if no board
-    /// answers, [`BoardError::Refused`].
+    /// answers, [`BoardError::OtherProtocol`], [`BoardError::OtherBuild`], [`BoardError::Refused`].
     pub fn open(
         path: &Path,
         configuration: &Configuration,
@@ -77,6 +79,7 @@ impl Serial {
     ) -> Result<Self, BoardError> {
         let mut serial = Self::connect(path)?;
         serial.silence_limit = silence_limit;
+        serial.identify()?;
         serial.configure(configuration, source)?;
         Ok(serial)
     }
@@ -96,11 +99,12 @@ impl Serial {
             line: LineHealth::default(),
             frame_patience: LOCKSTEP_PATIENCE,
             silence_limit: SILENCE_LIMIT,
+            sources: 0,
             stopwatch_hz: 0,
         })
     }
 
-    /// Compares the board's protocol and build with this program's.
+    /// Compares the board's protocol and build with this program's, and asks for the board's sources.
     ///
     /// # Errors
     /// [`BoardError::OtherProtocol`] or [`BoardError::OtherBuild`] if they differ, and
@@ -114,11 +118,28 @@ impl Serial {
                     host: PROTOCOL,
                 })
             }
-            Response::Identity { build, .. } if build != BUILD => {
+            Response::Identity { build, .. } if build != self::build() => {
                 Err(BoardError::other_build(build))
             }
-            _ => Ok(()),
+            _ => self.ask_for_sources(),
         }
+    }
+
+    fn ask_for_sources(&mut self) -> Result<(), BoardError> {
+        let is_wanted = |response: &Response| matches!(response, Response::Sources(_));
+        match self.ask(&Request::Sources, PATIENCE, is_wanted)? {
+            Response::Sources(board) => self.sources = board,
+            other => return Err(BoardError::OutOfTurn(other)),
+        }
+        Ok(())
+    }
+
+    /// Returns whether the identified board was built from this program's sources.
+    ///
+    /// # Errors
+    /// [`BoardError::OtherSources`] if it was not.
+    pub fn compare_sources(&self) -> Result<(), BoardError> {
+        BoardError::compare_sources(self.sources)
     }
 
     /// Returns the board's record of its last reset, crash and fault.
@@ -155,7 +176,7 @@ impl Serial {
         };
         let configuration = super::encode(configuration)?;
         let request = Request::Configure {
-            build: BUILD,
+            build: build(),
             source,
             configuration: &configuration,
         };

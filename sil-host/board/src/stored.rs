@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use painleve_firmware::BUILD;
 use painleve_plant::Configuration;
+use painleve_plant::law_choice::build;
 use painleve_shared::message::{Request, Response};
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 
@@ -39,7 +39,7 @@ impl StoringBoard {
     ) -> Result<StoredConfiguration, BoardError> {
         let configuration = super::encode(configuration)?;
         self.change(&Request::Store {
-            build: BUILD,
+            build: build(),
             configuration: &configuration,
         })
     }

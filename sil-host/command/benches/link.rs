@@ -17,6 +17,7 @@ use nix::unistd::Pid;
 use painleve_link::lockstep::Lockstep;
 use painleve_link::{BusName, ControllerEnd, LinkError, Pacing, PlantEnd, Received, Session};
 use painleve_plant::closed_loop::ClosedLoop;
+use painleve_plant::law_choice::build;
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
@@ -112,7 +113,7 @@ fn add_lockstep_turn(round_trips: &mut RoundTrips, processors: &Processors) -> O
     let session = Session {
         tick_hz: scenario.run.tick_hz,
         pacing: Pacing::Lockstep,
-        configuration: postcard::to_stdvec(&scenario.controller_configuration())?,
+        configuration: postcard::to_stdvec(&(build(), scenario.controller_configuration()))?,
     };
     let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default())?;
     let mut controller = AnsweringProcess(

@@ -12,9 +12,10 @@ use painleve_plant::simulation::Simulation;
 use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
 use painleve_record::replica::Replica;
 use painleve_record::{RecordedTick, RunPlot};
-use painleve_study::catalogue::{AnyOutcome, STUDIES};
+use painleve_study::catalogue::AnyOutcome;
 use painleve_study::figures::page_maker::{Fineness, PageMaker};
 use painleve_study::figures::{self, Page, Section};
+use painleve_study::studies::STUDIES;
 use painleve_system::atomic_file::{self, AtomicFile};
 use serde_json::{Value, json};
 
@@ -47,6 +48,9 @@ const RUNS: [&str; 4] = [
 ];
 
 /// Computes all studies, then writes the page.
+///
+/// # Errors
+/// [`CommandError`] if a study fails, the page cannot be written, or the user interrupts.
 pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
     let folder = &arguments.out;
     let page_path = folder.join("index.html");
@@ -66,7 +70,7 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
     // ones.
     let mut files = Vec::new();
     let mut sections = Vec::new();
-    for study in STUDIES.iter() {
+    for study in &STUDIES {
         for (section, outcome) in arguments.threads.in_pool(|| (study.sections)(&page))?? {
             files.extend(data(folder, &section, &*outcome)?);
             sections.push(section);

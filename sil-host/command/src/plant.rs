@@ -9,6 +9,7 @@ use painleve_link::paced::Paced;
 use painleve_link::{BusName, Pacing, PlantEnd, Session};
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult};
 use painleve_plant::controller_host::ControllerHost;
+use painleve_plant::law_choice::build;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_record::report::{DurationPercentiles, RunReport};
@@ -53,6 +54,9 @@ pub struct PlantArguments {
 }
 
 /// Runs a scenario against the controller on the bus.
+///
+/// # Errors
+/// [`CommandError`] if the scenario is invalid, the run ends early, or a file cannot be written.
 pub fn run(arguments: &PlantArguments) -> Result<(), CommandError> {
     let interrupt = Interrupt::catch()?;
     match run_until(arguments, &interrupt) {
@@ -154,7 +158,7 @@ fn simulate(
 }
 
 fn session(scenario: &Scenario, pacing: Pacing) -> Result<Session, CommandError> {
-    let configuration = postcard::to_stdvec(&scenario.controller_configuration())
+    let configuration = postcard::to_stdvec(&(build(), scenario.controller_configuration()))
         .map_err(ProcessError::Unsendable)?;
     Ok(Session {
         tick_hz: scenario.run.tick_hz,

@@ -209,6 +209,9 @@ fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), 
 }
 
 /// Runs a scenario as two processes and reports.
+///
+/// # Errors
+/// [`CommandError`] if an option is invalid, a process of the run fails, or a condition of `--fail-on` is met.
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let mut arguments = arguments.clone();
     let _standard_input = arguments.scenario.copy_standard_input()?;
@@ -414,6 +417,9 @@ fn failure(status: ExitStatus) -> CommandError {
 }
 
 /// Prints a report as JSON or as a table.
+///
+/// # Errors
+/// [`CommandError::Output`] if the report cannot be written.
 pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
     let text = if json {
         serde_json::to_string(report).map_err(output)?

@@ -144,6 +144,10 @@ struct SlurmArguments {
 }
 
 /// Runs one step of a sweep.
+///
+/// # Errors
+/// [`CommandError`] if the sweep does not exist or is incomplete, a file cannot be written, or the user
+/// interrupts.
 pub fn run(arguments: &SweepArguments) -> Result<(), CommandError> {
     match &arguments.command {
         SweepCommand::Plan(arguments) => plan(arguments),

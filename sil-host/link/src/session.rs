@@ -44,8 +44,8 @@ pub struct Session {
     pub tick_hz: u32,
     /// Pacing of the plant.
     pub pacing: Pacing,
-    /// The controller's configuration, encoded with postcard, at most
-    /// [`CONFIGURATION_CAPACITY`] bytes; the link does not interpret it.
+    /// Hash of the build and the controller's configuration, encoded with postcard, at most
+    /// [`CONFIGURATION_CAPACITY`] bytes; the link does not interpret them.
     pub configuration: Vec<u8>,
 }
 

@@ -9,6 +9,7 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};
 
+use painleve_firmware::Configuration;
 use painleve_firmware::law::{Law, LawInput, LawOutput, LawSettings};
 use painleve_shared::OutOfRange;
 use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape, ShapeSource};
@@ -22,6 +23,7 @@ static LAWS: OnceLock<LawSet> = OnceLock::new();
 #[derive(Clone, Copy)]
 struct LawSet {
     shape: Shape,
+    build: u64,
     default: fn() -> LawChoice,
     read: fn(&mut dyn erased_serde::Deserializer<'_>) -> erased_serde::Result<LawChoice>,
 }
@@ -49,10 +51,16 @@ pub fn install<L: ScenarioLaws>() {
     let _ = LAWS.set(LawSet::of::<L>());
 }
 
+/// Returns [`Configuration::BUILD`] with the laws of this program, which a board's must equal.
+pub fn build() -> u64 {
+    LawSet::installed().build
+}
+
 impl LawSet {
     fn of<L: ScenarioLaws>() -> Self {
         Self {
             shape: L::SHAPE,
+            build: Configuration::<L>::BUILD,
             default: || LawChoice::new(L::default()),
             read: |source| erased_serde::deserialize::<L>(source).map(LawChoice::new),
         }

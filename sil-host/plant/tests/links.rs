@@ -1,5 +1,5 @@
-//! Checks that relative links in the README and in `docs/` lead to existing files and headings, and that
-//! the names of settings and tests in these pages occur in the source.
+//! Checks that relative links of the pages in the root and in `docs/` lead to existing files and headings, that paths in these
+//! pages exist, and that the names of settings and tests occur in the source.
 
 #![allow(clippy::unwrap_used)]
 
@@ -14,13 +14,15 @@ fn workspace() -> PathBuf {
         .unwrap()
 }
 
-/// Returns the README and all pages of the documentation.
+/// Returns the pages of the documentation and those beside the README.
 fn pages() -> Vec<PathBuf> {
-    let mut pages = vec![workspace().join("README.md")];
-    for entry in fs::read_dir(workspace().join("docs")).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_some_and(|extension| extension == "md") {
-            pages.push(path);
+    let mut pages = Vec::new();
+    for folder in [workspace(), workspace().join("docs")] {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "md") {
+                pages.push(path);
+            }
         }
     }
     pages
@@ -77,6 +79,44 @@ fn relative_links_lead_to_existing_files_and_headings() {
         }
     }
     assert!(broken.is_empty(), "broken links: {broken:#?}");
+}
+
+/// Collects the paths of all files and folders below a folder, without those that a build or a run makes.
+fn collect_paths(folder: &Path, paths: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if ["target", "out", ".git"].contains(&name.as_str()) {
+            continue;
+        }
+        if path.is_dir() {
+            collect_paths(&path, paths);
+        }
+        paths.push(path);
+    }
+}
+
+/// A path is a word with a slash in backticks, such as `firmware/src/lib.rs`, or the name of a Rust file. It may begin in
+/// any folder. Paths of the system, of the output and of what somebody is told to add are left out.
+#[test]
+fn paths_in_the_pages_exist() {
+    let mut paths = Vec::new();
+    collect_paths(&workspace(), &mut paths);
+    let mut missing = Vec::new();
+    for page in pages() {
+        for name in prose(&page).split('`').skip(1).step_by(2) {
+            let is_path = (name.contains('/') || name.ends_with(".rs"))
+                && !["/", "out/", "target/"]
+                    .iter()
+                    .any(|it| name.starts_with(it))
+                && !name.contains([' ', '<', ':'])
+                && !["NAME", "FAMILY"].iter().any(|it| name.contains(it));
+            if is_path && !paths.iter().any(|path| path.ends_with(name)) {
+                missing.push(format!("{}: {name}", page.display()));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "these paths do not exist: {missing:#?}");
 }
 
 /// Collects the text of all source files below a folder.

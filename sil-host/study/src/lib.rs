@@ -25,7 +25,7 @@
 //!
 //! Each study is a folder: `mod.rs` holds its settings and rows, `options.rs` parses the settings
 //! from the command line, `outcome.rs` collects the rows, `figure.rs` draws them, and `page.rs`
-//! compares them with the paper. The [`catalogue`] lists all studies.
+//! compares them with the paper. [`studies`] lists them all.
 //!
 //! A study is a list of independent rows ([`Study`]), which
 //! can be computed in any order, on any number of threads, or in shards.
@@ -63,6 +63,7 @@ pub mod robustness;
 pub mod settled;
 pub mod sliding_range;
 pub mod stiffness;
+pub mod studies;
 pub mod sweep;
 pub mod tabular;
 pub mod trial;

@@ -77,6 +77,14 @@ impl ConnectedArm {
         })
     }
 
+    /// Returns whether the board was built from this program's sources.
+    ///
+    /// # Errors
+    /// [`BoardError::OtherSources`] if it was not.
+    pub fn compare_sources(&self) -> Result<(), BoardError> {
+        self.serial.compare_sources()
+    }
+
     /// Asks the board to permit or forbid arming; the answer is [`ArmEvent::Permission`]. The drive
     /// arms only after its switch has also been opened and closed.
     ///

@@ -5,10 +5,12 @@
 
 pub mod built_in;
 pub mod describe;
+mod error;
 mod load;
 mod override_key;
 mod plant;
 mod reference_file;
+mod table;
 
 use painleve_firmware::configuration::ControllerSettings;
 use painleve_shared::{ArmParameters, OutOfRange, settings};
@@ -23,7 +25,7 @@ use crate::mechanics::{PlantParameters, SolverSettings};
 
 pub use crate::mechanics::InitialState;
 pub use crate::mechanics::belt::BeltSettings;
-pub use load::ScenarioError;
+pub use error::ScenarioError;
 
 settings! {
     /// The complete definition of a run. The default is the paper's hybrid law from x0,d with

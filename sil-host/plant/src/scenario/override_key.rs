@@ -2,11 +2,9 @@
 
 use toml::{Table, Value};
 
-use super::load::{KeyError, ScenarioError, from_table};
+use super::error::{KeyError, MOST_LEVELS, ScenarioError};
+use super::table::from_table;
 use super::{Scenario, describe};
-
-/// Upper limit of the levels of a key; no scenario key has as many.
-pub(super) const MOST_LEVELS: usize = 16;
 
 /// Returns the scenario with one key changed. The key must exist in the scenario or be optional,
 /// such as `controller.belt.given_m_s`.

@@ -7,7 +7,6 @@ use crate::StudyError;
 use crate::case::Reference;
 use crate::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
-use crate::register_study;
 
 use crate::options::{
     ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, seconds,
@@ -85,11 +84,8 @@ pub struct Options {
     overrides: Overrides,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "sliding-range";
-    const ORDER: u32 = 50;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = SlidingRange;
     type Outcome = SlidingRanges;
