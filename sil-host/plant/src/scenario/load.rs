@@ -46,23 +46,23 @@ pub enum ScenarioError {
         source: TomlError,
     },
     /// A key is unknown or has the wrong type.
-    #[error("{origin}: {key}: {source}")]
+    #[error("{}{key}: {source}", origin.as_ref().map_or(String::new(), |origin| format!("{origin}: ")))]
     Key {
-        /// File, scenario or option.
-        origin: String,
+        /// File or scenario; absent for an override.
+        origin: Option<String>,
         /// Path of the key.
         key: String,
         /// What is wrong, and what is allowed.
         source: KeyError,
     },
     /// An override is not of the form key=value.
-    #[error("--set '{text}' is not of the form key=value; example: --set belt.friction=0.4")]
+    #[error("'{text}' is not of the form key=value; example: belt.friction=0.4")]
     Override {
         /// The given text.
         text: String,
     },
     /// An override's key has more levels than any key of a scenario.
-    #[error("--set: a key has at most {MOST_LEVELS} levels (belt.friction has two)")]
+    #[error("a key has at most {MOST_LEVELS} levels (belt.friction has two)")]
     TooDeep,
     /// A value is out of range.
     #[error("{origin}: {source}")]
@@ -142,7 +142,7 @@ pub enum KeyError {
         known: Vec<String>,
     },
     /// A part of the key names a variant that is not the chosen one.
-    #[error("{key} is {chosen}, which has no '{part}'; choose it first with --set {key}={part}")]
+    #[error("{key} is {chosen}, which has no '{part}'; choose it first with {key}={part}")]
     NotChosen {
         /// The choice.
         key: String,
@@ -201,7 +201,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load_unplaced(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
-        from_table(&origin(name), read(name)?)?.with_overrides(&origin(name), overrides)
+        from_table(Some(&origin(name)), read(name)?)?.with_overrides(&origin(name), overrides)
     }
 
     /// Reads a scenario from TOML text and validates it as a whole, except for the start of the
@@ -211,7 +211,7 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user.
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         let origin = "scenario";
-        from_table(origin, parse(origin, text)?)?.with_overrides(origin, &[])
+        from_table(Some(origin), parse(origin, text)?)?.with_overrides(origin, &[])
     }
 
     /// Returns this scenario with overrides `key=value` applied in order and its numbers validated.
@@ -273,14 +273,18 @@ fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
     })
 }
 
-pub(super) fn from_table(origin: &str, mut table: Table) -> Result<Scenario, ScenarioError> {
+/// Reads a scenario from a table. `origin` is the file or scenario that messages name.
+pub(super) fn from_table(
+    origin: Option<&str>,
+    mut table: Table,
+) -> Result<Scenario, ScenarioError> {
     reference_file::expand(&mut table).map_err(|reason| ScenarioError::Key {
-        origin: origin.into(),
+        origin: origin.map(str::to_owned),
         key: "controller.reference".into(),
         source: KeyError::File(reason),
     })?;
     serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
-        origin: origin.into(),
+        origin: origin.map(str::to_owned),
         key: error.path().to_string(),
         source: KeyError::Value(error.into_inner()),
     })
@@ -396,11 +400,11 @@ mod tests {
             (&["arm_model.lenght_m=0.2"], &["arm_model.lenght_m"]),
             (
                 &["controller.law.pid.integral_gain=1"],
-                &["controller.law is hybrid", "--set controller.law=pid"],
+                &["controller.law is hybrid", "first with controller.law=pid"],
             ),
             (
                 &["controller.law=off", "controller.law.pid.integral_gain=1"],
-                &["controller.law is off", "--set controller.law=pid"],
+                &["controller.law is off", "first with controller.law=pid"],
             ),
             (
                 &["controller.law=pid", "controller.law.pid.integral_gain=1"],
