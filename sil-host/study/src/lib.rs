@@ -263,8 +263,8 @@ mod tests {
             done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             std::panic::resume_unwind(Box::new("interrupted"));
         };
-        let rows = std::panic::AssertUnwindSafe(|| rows(&First(30), interrupt));
-        let outcome = std::panic::catch_unwind(|| pool.unwrap().install(rows));
+        let study = || pool.unwrap().install(|| rows(&First(30), interrupt));
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(study));
         assert!(outcome.is_err());
         // Each of the two threads may have begun one.
         assert!(done.into_inner() <= 2);
