@@ -177,7 +177,8 @@ impl ArmOnBelt {
             return Err(format!("communicationStepSize = {step_s}: {limit}").into());
         }
         let tolerance_s = TIME_TOLERANCE * now_s.abs().max(1.0);
-        if !((point_s - now_s).abs() <= tolerance_s.min(step_s)) {
+        let is_at_point = (point_s - now_s).abs() <= tolerance_s.min(step_s);
+        if !is_at_point {
             let expected = format!("the plant is at {now_s} s");
             return Err(format!("currentCommunicationPoint = {point_s}: {expected}").into());
         }
