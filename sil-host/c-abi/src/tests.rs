@@ -37,10 +37,8 @@ fn crooked<T>(pointer: *mut T) -> *mut T {
 fn new_plant(text: &CStr) -> *mut PainlevePlant {
     let mut plant = null_mut();
     // SAFETY: a C string, and a variable of this function.
-    assert_eq!(
-        unsafe { painleve_plant_new(text.as_ptr(), &mut plant) },
-        Done
-    );
+    let status = unsafe { painleve_plant_new(text.as_ptr(), &mut plant) };
+    assert_eq!(status, Done);
     plant
 }
 
