@@ -30,12 +30,12 @@ struct LawSet {
 
 /// A set of laws that a scenario may name.
 pub trait ScenarioLaws:
-    Law<State: Send + 'static> + Serialize + DeserializeOwned + PartialEq + Send + Sync + 'static
+    Law<State: Send + Sync + 'static> + Serialize + DeserializeOwned + PartialEq + Send + Sync + 'static
 {
 }
 
 impl<L> ScenarioLaws for L where
-    L: Law<State: Send + 'static>
+    L: Law<State: Send + Sync + 'static>
         + Serialize
         + DeserializeOwned
         + PartialEq
@@ -173,13 +173,13 @@ impl Debug for LawChoiceState {
 }
 
 /// The state of a law as a trait object.
-trait AnyState: Debug + Send {
+trait AnyState: Debug + Send + Sync {
     fn inner(&self) -> &dyn Any;
     fn inner_mut(&mut self) -> &mut dyn Any;
     fn boxed(&self) -> Box<dyn AnyState>;
 }
 
-impl<S: Clone + Debug + Send + 'static> AnyState for S {
+impl<S: Clone + Debug + Send + Sync + 'static> AnyState for S {
     fn inner(&self) -> &dyn Any {
         self
     }

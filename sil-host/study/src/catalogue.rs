@@ -134,7 +134,7 @@ impl<O: StudyOptions> AnyOptions for O {
     }
 }
 
-/// Called after every row.
+/// Called after every row. A panic in it ends the study.
 pub type Progress<'a> = &'a (dyn Fn() + Sync);
 
 /// Any study.

@@ -44,23 +44,23 @@ pub enum ScenarioError {
         source: TomlError,
     },
     /// A key is unknown or has the wrong type.
-    #[error("{origin}: {key}: {source}")]
+    #[error("{}{key}: {source}", origin.as_ref().map_or(String::new(), |origin| format!("{origin}: ")))]
     Key {
-        /// File, scenario or option.
-        origin: String,
+        /// File or scenario; absent for an override.
+        origin: Option<String>,
         /// Path of the key.
         key: String,
         /// What is wrong, and what is allowed.
         source: KeyError,
     },
     /// An override is not of the form key=value.
-    #[error("--set '{text}' is not of the form key=value; example: --set belt.friction=0.4")]
+    #[error("'{text}' is not of the form key=value; example: belt.friction=0.4")]
     Override {
         /// The given text.
         text: String,
     },
     /// An override's key has more levels than any key of a scenario.
-    #[error("--set: a key has at most {MOST_LEVELS} levels (belt.friction has two)")]
+    #[error("a key has at most {MOST_LEVELS} levels (belt.friction has two)")]
     TooDeep,
     /// A value is out of range.
     #[error("{origin}: {source}")]
@@ -140,7 +140,7 @@ pub enum KeyError {
         known: Vec<String>,
     },
     /// A part of the key names a variant that is not the chosen one.
-    #[error("{key} is {chosen}, which has no '{part}'; choose it first with --set {key}={part}")]
+    #[error("{key} is {chosen}, which has no '{part}'; choose it first with {key}={part}")]
     NotChosen {
         /// The choice.
         key: String,

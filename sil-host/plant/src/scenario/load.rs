@@ -34,7 +34,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load_unplaced(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
-        from_table(&origin(name), read(name)?)?.with_overrides(&origin(name), overrides)
+        from_table(Some(&origin(name)), read(name)?)?.with_overrides(&origin(name), overrides)
     }
 
     /// Reads a scenario from TOML text and validates it as a whole, except for the start of the
@@ -44,7 +44,7 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user.
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         let origin = "scenario";
-        from_table(origin, parse(origin, text)?)?.with_overrides(origin, &[])
+        from_table(Some(origin), parse(origin, text)?)?.with_overrides(origin, &[])
     }
 
     /// Returns this scenario with overrides `key=value` applied in order and its numbers validated.
@@ -209,11 +209,11 @@ mod tests {
             (&["arm_model.lenght_m=0.2"], &["arm_model.lenght_m"]),
             (
                 &["controller.law.pid.integral_gain=1"],
-                &["controller.law is hybrid", "--set controller.law=pid"],
+                &["controller.law is hybrid", "first with controller.law=pid"],
             ),
             (
                 &["controller.law=off", "controller.law.pid.integral_gain=1"],
-                &["controller.law is off", "--set controller.law=pid"],
+                &["controller.law is off", "first with controller.law=pid"],
             ),
             (
                 &["controller.law=pid", "controller.law.pid.integral_gain=1"],

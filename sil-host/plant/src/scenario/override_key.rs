@@ -1,4 +1,4 @@
-//! Changes of single keys of a scenario: `--set key=value`.
+//! Changes of single keys of a scenario: `key=value`, from the command line, a viewer, Python or a simulator.
 
 use toml::{Table, Value};
 
@@ -27,7 +27,7 @@ pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, 
         .and_then(|mut table| table.remove("value"))
         .unwrap_or_else(|| Value::String(value.into()));
     let wrong_key = |source| ScenarioError::Key {
-        origin: "--set".into(),
+        origin: None,
         key: key.into(),
         source,
     };
@@ -87,7 +87,7 @@ pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, 
     let Value::Table(table) = root else {
         return Err(wrong());
     };
-    from_table("--set", table).map_err(|error| missing.flatten().map_or(error, wrong_key))
+    from_table(None, table).map_err(|error| missing.flatten().map_or(error, wrong_key))
 }
 
 /// Returns the name of the variant that a choice without a tag has.

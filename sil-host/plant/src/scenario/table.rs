@@ -14,14 +14,17 @@ pub(super) fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
 }
 
 /// Reads a scenario from a table; its numbers are not validated yet.
-pub(super) fn from_table(origin: &str, mut table: Table) -> Result<Scenario, ScenarioError> {
+pub(super) fn from_table(
+    origin: Option<&str>,
+    mut table: Table,
+) -> Result<Scenario, ScenarioError> {
     reference_file::expand(&mut table).map_err(|reason| ScenarioError::Key {
-        origin: origin.into(),
+        origin: origin.map(str::to_owned),
         key: "controller.reference".into(),
         source: KeyError::File(reason),
     })?;
     serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
-        origin: origin.into(),
+        origin: origin.map(str::to_owned),
         key: error.path().to_string(),
         source: KeyError::Value(error.into_inner()),
     })
