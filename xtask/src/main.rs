@@ -10,6 +10,7 @@ mod examples;
 mod flash;
 mod fmu;
 mod fuzz;
+mod measure;
 mod python;
 mod setup;
 mod size;
@@ -54,6 +55,8 @@ enum Chore {
     Soak(soak::SoakArguments),
     /// Measure the figures of docs/benchmarks.md on this machine, pinned, and write its table.
     Bench(bench::BenchArguments),
+    /// Measure the figures that the documentation prints, and write them to docs/measured/*.toml.
+    Measure(measure::MeasureArguments),
     /// Run the steps of continuous integration: formatting, clippy, every test.
     Ci,
 }
@@ -72,6 +75,7 @@ fn main() -> ExitCode {
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),
         Chore::Bench(arguments) => bench::run(&arguments),
+        Chore::Measure(arguments) => measure::run(&arguments),
         Chore::Ci => ci::run(),
     };
     match result {
