@@ -6,6 +6,7 @@
 //! where it stopped. The pages then take their figures from these files.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry::{Occupied, Vacant};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -114,10 +115,14 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
             } else {
                 command
             };
-            if !answers.contains_key(&command) {
-                answers.insert(command.clone(), here.answer(&command)?);
-            }
-            let result = here.result(&entry, &answers[&command])?;
+            let answer = match answers.entry(command) {
+                Occupied(known) => known.into_mut(),
+                Vacant(place) => {
+                    let answer = here.answer(place.key())?;
+                    place.insert(answer)
+                }
+            };
+            let result = here.result(&entry, answer)?;
             say(&format!("# {whole}\n{result}"))?;
             if !arguments.quick {
                 file.keep(place, result)?;
@@ -161,7 +166,9 @@ fn read_files() -> Result<Vec<Measured>, ChoreError> {
             continue;
         };
         let text = fs::read_to_string(&path).map_err(|cause| failed(&path, &cause))?;
-        let table = text.parse().map_err(|cause| failed(&path, &cause))?;
+        let table = text
+            .parse::<Table>()
+            .map_err(|cause| failed(&path, &cause))?;
         let name = name.to_owned();
         files.push(Measured { path, name, table });
     }
@@ -281,8 +288,8 @@ impl Here {
             })?;
             // TOML has no null: what a run does not have is left out.
             if !value.is_null() {
-                let value = toml::Value::try_from(value)
-                    .map_err(|cause| ChoreError(format!("{at}: {cause}")))?;
+                let value = converted(value)
+                    .ok_or_else(|| ChoreError(format!("'{at}' is neither number nor text")))?;
                 result.insert(key.clone(), value);
             }
         }
@@ -302,6 +309,14 @@ impl Here {
         }
         Ok(result)
     }
+}
+
+/// Returns a number or text of JSON for TOML.
+fn converted(value: &Value) -> Option<toml::Value> {
+    let whole = value.as_i64().map(toml::Value::Integer);
+    let text = || value.as_str().map(|text| toml::Value::String(text.into()));
+    let float = || value.as_f64().map(toml::Value::Float);
+    whole.or_else(float).or_else(text)
 }
 
 /// Returns the interval of Wilson at 95 %, in percent with three decimals.
