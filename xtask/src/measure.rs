@@ -74,7 +74,7 @@ struct Measured {
 /// If a name is unknown, a file is malformed, a command fails, or a result cannot be written.
 pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
     let mut files = read_files()?;
-    check_names(&arguments.names, &mut files)?;
+    check_names(&arguments.names, &files)?;
     let is_named = |name: &str| {
         let file = name.split('.').next();
         let names = &arguments.names;
@@ -176,7 +176,7 @@ fn read_files() -> Result<Vec<Measured>, ChoreError> {
     Ok(files)
 }
 
-fn check_names(names: &[String], files: &mut [Measured]) -> Result<(), ChoreError> {
+fn check_names(names: &[String], files: &[Measured]) -> Result<(), ChoreError> {
     let mut known: Vec<String> = BLOCKS.iter().map(|(name, _)| (*name).into()).collect();
     for file in files {
         for place in 0..file.entries()?.len() {
@@ -198,24 +198,24 @@ fn check_names(names: &[String], files: &mut [Measured]) -> Result<(), ChoreErro
 }
 
 impl Measured {
-    fn entries(&mut self) -> Result<&mut Vec<toml::Value>, ChoreError> {
-        let entries = self
-            .table
-            .get_mut("measured")
-            .and_then(toml::Value::as_array_mut);
+    fn entries(&self) -> Result<&Vec<toml::Value>, ChoreError> {
+        let entries = self.table.get("measured").and_then(toml::Value::as_array);
         entries.ok_or_else(|| ChoreError(format!("{} has no [[measured]]", self.path.display())))
     }
 
-    fn entry(&mut self, place: usize) -> Result<Table, ChoreError> {
+    fn entry(&self, place: usize) -> Result<Table, ChoreError> {
         let entry = self.entries()?[place].as_table().cloned();
         entry.ok_or_else(|| ChoreError(format!("{}: [[measured]] is a table", self.path.display())))
     }
 
     /// Writes the result of an entry. The file is renamed into place, so that it is never half written.
     fn keep(&mut self, place: usize, result: Table) -> Result<(), ChoreError> {
-        let mut entry = self.entry(place)?;
-        entry.insert("result".into(), result.into());
-        self.entries()?[place] = entry.into();
+        let entries = self
+            .table
+            .get_mut("measured")
+            .and_then(toml::Value::as_array_mut);
+        let entry = entries.and_then(|entries| entries.get_mut(place)?.as_table_mut());
+        entry.map(|entry| entry.insert("result".into(), result.into()));
         let partial = self.path.with_extension("partial");
         fs::write(&partial, format!("{HEAD}{}", self.table))
             .and_then(|()| fs::rename(&partial, &self.path))
@@ -377,7 +377,7 @@ mod tests {
 
     #[test]
     fn every_file_declares_entries_with_names_of_their_own() {
-        for mut file in read_files().unwrap_or_else(|error| panic!("{error}")) {
+        for file in read_files().unwrap_or_else(|error| panic!("{error}")) {
             let mut names = Vec::new();
             let count = file.entries().map_or(0, |entries| entries.len());
             for place in 0..count {
