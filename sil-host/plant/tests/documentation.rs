@@ -166,13 +166,21 @@ fn thousands(whole: i64) -> String {
     grouped.join(",")
 }
 
-/// Returns a value as a page prints it.
+/// Returns a value as a page prints it, a fraction with four significant digits unless told otherwise.
 fn printed(value: &Value, decimals: Option<usize>) -> String {
-    match (value, decimals) {
-        (Value::Integer(whole), None) => thousands(*whole),
-        (Value::String(text), _) => text.clone(),
-        (value, Some(decimals)) => format!("{:.decimals$}", number(value).unwrap()),
-        (value, None) => value.to_string(),
+    match value {
+        Value::Integer(whole) if decimals.is_none() => thousands(*whole),
+        Value::String(text) => text.clone(),
+        value => {
+            let value = number(value).unwrap();
+            let magnitude = if value == 0.0 {
+                0.0
+            } else {
+                value.abs().log10().floor()
+            };
+            let decimals = decimals.unwrap_or((3.0 - magnitude).max(0.0) as usize);
+            format!("{value:.decimals$}")
+        }
     }
 }
 
@@ -197,18 +205,18 @@ fn success(result: &Table) -> Option<String> {
 
 /// Returns the table of a file: a row for each entry, with its provenance.
 fn measured_table(entries: &[Entry]) -> String {
-    let keys = entries.first().unwrap().result.keys();
-    let more: Vec<&str> = keys
-        .map(String::as_str)
-        .filter(|key| !NO_COLUMN.contains(key))
-        .collect();
-    let names: String = more
-        .iter()
-        .map(|key| format!(" {} |", key.replace('_', " ")))
-        .collect();
-    let mut text =
-        format!("| | success (95 % interval) | runs |{names} seed | measured at commit |\n");
-    writeln!(text, "|---|---|---|{}---|---|", "---|".repeat(more.len())).unwrap();
+    let first = entries.first().unwrap();
+    let keys = first.result.keys().map(String::as_str);
+    let figures: Vec<&str> = keys.filter(|key| !NO_COLUMN.contains(key)).collect();
+    let is_campaign = success(&first.result).is_some();
+    let mut columns: Vec<String> = figures.iter().map(|key| key.replace('_', " ")).collect();
+    if is_campaign {
+        columns.splice(0..0, ["success (95 % interval)", "runs"].map(String::from));
+        columns.push("seed".into());
+    }
+    columns.push("measured at commit".into());
+    let mut text = format!("| | {} |\n|---|", columns.join(" | "));
+    writeln!(text, "{}", "---|".repeat(columns.len())).unwrap();
     for Entry {
         label,
         command,
@@ -216,21 +224,19 @@ fn measured_table(entries: &[Entry]) -> String {
         ..
     } in entries
     {
-        let success = success(result).unwrap();
         let cell = |key: &&str| {
-            format!(
-                " {} |",
-                result
-                    .get(*key)
-                    .map_or("–".into(), |value| printed(value, None))
-            )
+            result
+                .get(*key)
+                .map_or("–".into(), |value| printed(value, None))
         };
-        let cells: String = ["runs"].iter().chain(&more).map(cell).collect();
-        let seed = command
-            .split_once("--seed ")
-            .map_or("–", |(_, seed)| seed.split(' ').next().unwrap());
-        let commit = result["commit"].as_str().unwrap();
-        writeln!(text, "| {label} | {success} |{cells} {seed} | {commit} |").unwrap();
+        let mut cells: Vec<String> = figures.iter().map(cell).collect();
+        if is_campaign {
+            cells.splice(0..0, [success(result).unwrap(), cell(&"runs")]);
+            let seed = command.split_once("--seed ").unwrap().1;
+            cells.push(seed.split(' ').next().unwrap().into());
+        }
+        cells.push(result["commit"].as_str().unwrap().into());
+        writeln!(text, "| {label} | {} |", cells.join(" | ")).unwrap();
     }
     text
 }
