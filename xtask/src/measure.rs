@@ -188,13 +188,17 @@ fn check_names(names: &[String], files: &[Measured]) -> Result<(), ChoreError> {
         }
         known.push(file.name.clone());
     }
-    match names.iter().find(|name| !known.contains(name)) {
-        Some(name) => Err(ChoreError(format!(
-            "unknown name '{name}'; allowed: {}",
-            known.join(", ")
-        ))),
-        None => Ok(()),
-    }
+    let Some(name) = names.iter().find(|name| !known.contains(name)) else {
+        return Ok(());
+    };
+    let whole = known
+        .iter()
+        .map(String::as_str)
+        .filter(|name| !name.contains('.'));
+    let allowed = whole.collect::<Vec<_>>().join(", ");
+    Err(ChoreError(format!(
+        "unknown name '{name}'; allowed: {allowed}, or FILE.ENTRY as `--list` prints it"
+    )))
 }
 
 impl Measured {
