@@ -179,7 +179,7 @@ fn printed(value: &Value, decimals: Option<usize>) -> String {
                 value.abs().log10().floor()
             };
             let decimals = decimals.unwrap_or((3.0 - magnitude).max(0.0) as usize);
-            format!("{value:.decimals$}")
+            format!("{value:.decimals$}").replace('-', "−")
         }
     }
 }
