@@ -11,6 +11,7 @@ mod examples;
 mod flash;
 mod fmu;
 mod fuzz;
+mod measure;
 mod python;
 mod setup;
 mod size;
@@ -55,6 +56,8 @@ enum Chore {
     Soak(soak::SoakArguments),
     /// Measure the figures of docs/benchmarks.md on this machine, pinned, and write its table.
     Bench(bench::BenchArguments),
+    /// Measure the figures that the documentation prints, and write them to docs/measured/*.toml.
+    Measure(measure::MeasureArguments),
     /// Run the steps of continuous integration: formatting, clippy, links, tests of the default tier.
     Ci,
 }
@@ -73,6 +76,7 @@ fn main() -> ExitCode {
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),
         Chore::Bench(arguments) => bench::run(&arguments),
+        Chore::Measure(arguments) => measure::run(&arguments),
         Chore::Ci => ci::run(),
     };
     match result {
