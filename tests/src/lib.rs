@@ -37,7 +37,13 @@ pub fn program() -> &'static Path {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
         let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let built = Command::new(cargo)
-            .args(["build", "--profile", "verify", "--package", "painleve-command"])
+            .args([
+                "build",
+                "--profile",
+                "verify",
+                "--package",
+                "painleve-command",
+            ])
             .args(["--message-format", "json"])
             .current_dir(&workspace)
             .stderr(Stdio::inherit())
