@@ -8,6 +8,7 @@ use painleve_system::input_file;
 use toml::{Table, Value};
 
 use super::override_key::{MOST_LEVELS, with_override};
+use super::words::{TomlError, in_words, known_names};
 use super::{Scenario, built_in, reference_file};
 use crate::mechanics::BuiltInPlant;
 
@@ -16,8 +17,8 @@ use crate::mechanics::BuiltInPlant;
 pub enum ScenarioError {
     /// The name is neither a built-in scenario nor a file.
     #[error(
-        "no built-in scenario and no file is called '{name}'; built in are: {}",
-        built_in::names().collect::<Vec<_>>().join(", ")
+        "no built-in scenario and no file is called '{name}'; {}",
+        known_names(name, &built_in::names().collect::<Vec<_>>())
     )]
     Unknown {
         /// The requested name.
@@ -74,56 +75,6 @@ pub enum ScenarioError {
     },
 }
 
-/// What is wrong with a TOML text, and in which line.
-#[derive(Debug, thiserror::Error)]
-#[error("{}{}", .line.map_or(String::new(), |line| format!("line {line}: ")), source.message())]
-pub struct TomlError {
-    line: Option<usize>,
-    source: toml::de::Error,
-}
-
-impl TomlError {
-    /// Returns the error of a parser in a text.
-    pub fn new(source: toml::de::Error, text: &str) -> Self {
-        let line = source
-            .span()
-            .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
-        Self { line, source }
-    }
-}
-
-/// Returns a message of serde on one line, with words instead of Rust's names of types.
-fn in_words(message: &str) -> String {
-    let mut words = message.trim().replace('\n', " ");
-    for (names, meaning) in [
-        (&["f32", "f64"][..], "a number"),
-        (&["i32", "i64"], "a whole number"),
-        (
-            &["u8", "u16", "u32", "u64", "usize"],
-            "a whole number from 0",
-        ),
-    ] {
-        for name in names {
-            words = words.replace(&format!("expected {name}"), &format!("expected {meaning}"));
-        }
-    }
-    words = words
-        .replace("missing field", "missing key")
-        .replace('`', "'");
-    // A type's name follows these to the end of the message.
-    for (kind, meaning) in [
-        ("struct ", "a table of keys"),
-        ("internally tagged enum ", "a table with the key 'kind'"),
-        ("enum ", "one of its kinds"),
-    ] {
-        let start = format!("expected {kind}");
-        if let Some((before, _)) = words.split_once(&start) {
-            words = format!("{before}expected {meaning}");
-        }
-    }
-    words
-}
-
 /// What is wrong with a key.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
@@ -134,7 +85,7 @@ pub enum KeyError {
     #[error(transparent)]
     Table(#[from] toml::ser::Error),
     /// A part of the key is unknown.
-    #[error("unknown key '{part}'; {}known: {}", meant(part, known), known.join(", "))]
+    #[error("unknown key '{part}'; {}", known_names(part, known))]
     Unknown {
         /// The part.
         part: String,
@@ -165,18 +116,6 @@ pub enum KeyError {
     /// A part of the key lies inside a number, a text or a switch.
     #[error("'{0}' would be inside a single value")]
     InsideValue(String),
-}
-
-/// Smallest similarity of a key that may have been meant, from 0 to 1.
-const SIMILAR: f64 = 0.75;
-
-/// Returns a question about the known key that is most similar to an unknown one; empty if none is.
-fn meant(part: &str, known: &[String]) -> String {
-    let similarity = |key: &&String| strsim::normalized_damerau_levenshtein(part, key);
-    let similar = known.iter().filter(|key| similarity(key) >= SIMILAR);
-    similar
-        .max_by(|one, other| similarity(one).total_cmp(&similarity(other)))
-        .map_or(String::new(), |key| format!("did you mean '{key}'? "))
 }
 
 impl Scenario {
@@ -330,6 +269,13 @@ mod tests {
     }
 
     #[test]
+    fn targets_keep_their_decimals() {
+        let target = |name| Scenario::load(name, &[]).unwrap().target_m();
+        assert_eq!(target("hybrid-elbow-up"), Some(0.163));
+        assert_eq!(target("capture"), None);
+    }
+
+    #[test]
     fn messages_name_no_types_of_the_program() {
         for (wrong, expected) in [
             ("converters.encoder=3", "expected a table of keys"),
@@ -339,10 +285,25 @@ mod tests {
             ),
             ("effects.friction=step", "missing key 'change'"),
             ("contact=rigid", "expected a table of keys"),
-            ("run.tick_hz=fast", "expected a whole number from 0"),
+            (
+                "run.tick_hz=fast",
+                "expected a whole number from 0 to 4294967295, not \"fast\"",
+            ),
+            (
+                "run.seed=18446744073709551615",
+                "run.seed: expected a whole number from 0 to 9223372036854775807, not \"18446744073709551615\"",
+            ),
+            (
+                "controller.law.hybrid.friction=foo",
+                "friction: unknown name 'foo'; known: measured, filtered, observed, model",
+            ),
+            (
+                "controller.law.pid=3",
+                "controller.law.pid: expected a table",
+            ),
         ] {
             let message = message(&[wrong]);
-            assert!(message.ends_with(expected), "{message}");
+            assert!(message.contains(expected), "{message}");
         }
     }
 
@@ -377,7 +338,7 @@ mod tests {
         );
         let message = message(&["controller.belt.given_m_s=fast"]);
         assert!(
-            message.ends_with("given_m_s: invalid type: string \"fast\", expected a number"),
+            message.ends_with("given_m_s: expected a number, not \"fast\""),
             "{message}"
         );
     }
@@ -465,8 +426,9 @@ mod tests {
         assert!(message("[belt\n").contains("line 1"));
         assert!(message("[belt]\nspeed = 1\n").contains("speed"));
         assert!(message("[belt]\nfriction = \"high\"\n").contains("belt.friction"));
-        let missing = Scenario::load("no-such-scenario", &[]).unwrap_err();
-        assert!(missing.to_string().contains("hybrid-elbow-down"));
+        let missing = |name| Scenario::load(name, &[]).unwrap_err().to_string();
+        assert!(missing("no-such-scenario").contains("'; known: hybrid-elbow-down"));
+        assert!(missing("edgee").contains("did you mean 'edge'?"));
         assert!(Scenario::load(folder.path().to_str().unwrap(), &[]).is_err());
     }
 }
