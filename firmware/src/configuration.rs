@@ -67,7 +67,7 @@ settings! {
         belt: BeltSpeedSettings = BeltSpeedSettings::default();
         /// Estimation of unknown torques.
         disturbance: DisturbanceSettings = DisturbanceSettings::default();
-        /// Estimation of how much the contact gives.
+        /// Estimation of the contact's compliance.
         response: ResponseSettings = ResponseSettings::default();
         /// Calibration of the links' length.
         calibration: CalibrationSettings = CalibrationSettings::default();

@@ -63,7 +63,8 @@ impl Micrometres {
     /// Returns this position in m.
     #[inline]
     pub fn to_metres(self) -> f64 {
-        f64::from(self.0) * 1e-6
+        // Unlike the product with 1e-6, the quotient is the number nearest to the decimal.
+        f64::from(self.0) / 1e6
     }
 }
 

@@ -20,8 +20,8 @@ impl StoringBoard {
     /// Connects, and compares protocol and build.
     ///
     /// # Errors
-    /// [`BoardError::Port`], [`BoardError::Silent`], [`BoardError::OtherProtocol`] or
-    /// [`BoardError::OtherBuild`].
+    /// [`BoardError::Port`], [`BoardError::InUse`], [`BoardError::Silent`], [`BoardError::NoFrames`],
+    /// [`BoardError::OtherProtocol`] or [`BoardError::OtherBuild`].
     pub fn open(path: &Path) -> Result<Self, BoardError> {
         let mut serial = Serial::connect(path)?;
         serial.identify()?;

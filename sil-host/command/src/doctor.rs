@@ -117,20 +117,14 @@ fn image() -> String {
     }
 }
 
-/// Limits, and the smallest sufficient values.
-const LIMITS: [(&str, Resource, u64); 4] = [
+/// Limits, and the smallest sufficient values. Those of real time are judged by [`request_realtime`] alone: root needs none.
+const LIMITS: [(&str, Resource, u64); 2] = [
     ("open files (ulimit -n)", Resource::RLIMIT_NOFILE, 64),
     (
         "file size (ulimit -f), bytes",
         Resource::RLIMIT_FSIZE,
         1 << 30,
     ),
-    (
-        "locked memory (ulimit -l), bytes",
-        Resource::RLIMIT_MEMLOCK,
-        64 << 20,
-    ),
-    ("real-time priority (ulimit -r)", Resource::RLIMIT_RTPRIO, 1),
 ];
 
 fn limit(resource: Resource, least: u64) -> String {

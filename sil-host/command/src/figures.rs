@@ -22,7 +22,8 @@ use serde_json::{Value, json};
 use super::CommandError;
 use super::json::JsonOption;
 use super::output_error::output;
-use super::study::outcome::{Threads, progress_bar};
+use super::progress::{Progress, Shown};
+use super::study::outcome::Threads;
 
 /// Options of `painleve figures`.
 #[derive(Debug, Args)]
@@ -62,8 +63,8 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
             &Fineness::FULL
         },
         progress: &|title, rows| {
-            let bar = progress_bar(title, rows);
-            Box::new(move || bar.inc(1))
+            let progress = Progress::start(title, rows, Shown::with_json(arguments.json.json));
+            Box::new(move || progress.row_done())
         },
     };
     // Written only when all files are ready, so that Ctrl-C cannot leave old figures beside new
@@ -85,7 +86,7 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
         sections.push(section);
     }
     let page = Page {
-        title: "The paper's studies, computed again".into(),
+        title: "The paper's results, recomputed".into(),
         introduction: format!(
             "Every figure and number of Marchese, Coraggio, Hogan and di Bernardo, Control of Painlevé \
              Paradox in a Robotic System (arXiv:1907.04070), beside what painleve {} finds.",

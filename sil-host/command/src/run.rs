@@ -289,8 +289,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     }
     if let Some(missed) = report.missed_deadlines.filter(|missed| *missed > 0) {
         warn(format_args!(
-            "real time was missed: {missed} of {} ticks came a whole tick or more late; end other programs or \
-             permit SCHED_FIFO",
+            "real time was missed: {missed} of {} ticks came a whole tick or more late; end other programs \
+             or lower run.tick_hz",
             report.ticks
         ));
     }

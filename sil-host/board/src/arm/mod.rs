@@ -57,8 +57,8 @@ impl ConnectedArm {
     /// read its own sensors.
     ///
     /// # Errors
-    /// [`BoardError::Port`], [`BoardError::Silent`], [`BoardError::OtherProtocol`],
-    /// [`BoardError::OtherBuild`] or [`BoardError::Refused`].
+    /// [`BoardError::Port`], [`BoardError::InUse`], [`BoardError::Silent`], [`BoardError::NoFrames`],
+    /// [`BoardError::OtherProtocol`], [`BoardError::OtherBuild`] or [`BoardError::Refused`].
     pub fn open(
         path: &Path,
         configuration: &Configuration,
@@ -116,8 +116,8 @@ impl ConnectedArm {
     /// Returns `None` if no message arrives.
     ///
     /// # Errors
-    /// [`BoardError::Silent`] if the board has been silent for [`SILENCE_LIMIT`], and
-    /// [`BoardError::System`] if the port fails.
+    /// [`BoardError::Silent`] or [`BoardError::NoFrames`] if the board has been silent for
+    /// [`SILENCE_LIMIT`], [`BoardError::Unplugged`] and [`BoardError::System`] if the port fails.
     pub fn next_event(&mut self, limit: Duration) -> Result<Option<ArmEvent>, BoardError> {
         let start = Instant::now();
         loop {
@@ -128,7 +128,7 @@ impl ConnectedArm {
             let left = limit.saturating_sub(start.elapsed()).min(HEARTBEAT);
             let Some(response) = self.serial.listen(left)? else {
                 if self.heard.elapsed() > SILENCE_LIMIT {
-                    return Err(BoardError::Silent(self.heard.elapsed()));
+                    return Err(self.serial.silence(self.heard.elapsed()));
                 }
                 if start.elapsed() >= limit {
                     return Ok(None);
@@ -147,6 +147,7 @@ impl ConnectedArm {
                 },
                 Response::Permission(permitted) => ArmEvent::Permission(permitted),
                 Response::Health(health) => ArmEvent::Health(health),
+                _ if start.elapsed() >= limit => return Ok(None),
                 _ => continue,
             }));
         }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use painleve_shared::range::OutOfRange;
 
 use super::built_in;
+use super::words::{TomlError, in_words, known_names};
 
 /// Upper limit of the levels of a key; no scenario key has as many.
 pub(super) const MOST_LEVELS: usize = 16;
@@ -14,8 +15,8 @@ pub(super) const MOST_LEVELS: usize = 16;
 pub enum ScenarioError {
     /// The name is neither a built-in scenario nor a file.
     #[error(
-        "no built-in scenario and no file is called '{name}'; built in are: {}",
-        built_in::names().collect::<Vec<_>>().join(", ")
+        "no built-in scenario and no file is called '{name}'; {}",
+        known_names(name, &built_in::names().collect::<Vec<_>>())
     )]
     Unknown {
         /// The requested name.
@@ -72,56 +73,6 @@ pub enum ScenarioError {
     },
 }
 
-/// What is wrong with a TOML text, and in which line.
-#[derive(Debug, thiserror::Error)]
-#[error("{}{}", .line.map_or(String::new(), |line| format!("line {line}: ")), source.message())]
-pub struct TomlError {
-    line: Option<usize>,
-    source: toml::de::Error,
-}
-
-impl TomlError {
-    /// Returns the error of a parser in a text.
-    pub fn new(source: toml::de::Error, text: &str) -> Self {
-        let line = source
-            .span()
-            .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
-        Self { line, source }
-    }
-}
-
-/// Returns a message of serde on one line, with words instead of Rust's names of types.
-fn in_words(message: &str) -> String {
-    let mut words = message.trim().replace('\n', " ");
-    for (names, meaning) in [
-        (&["f32", "f64"][..], "a number"),
-        (&["i32", "i64"], "a whole number"),
-        (
-            &["u8", "u16", "u32", "u64", "usize"],
-            "a whole number from 0",
-        ),
-    ] {
-        for name in names {
-            words = words.replace(&format!("expected {name}"), &format!("expected {meaning}"));
-        }
-    }
-    words = words
-        .replace("missing field", "missing key")
-        .replace('`', "'");
-    // A type's name follows these to the end of the message.
-    for (kind, meaning) in [
-        ("struct ", "a table of keys"),
-        ("internally tagged enum ", "a table with the key 'kind'"),
-        ("enum ", "one of its kinds"),
-    ] {
-        let start = format!("expected {kind}");
-        if let Some((before, _)) = words.split_once(&start) {
-            words = format!("{before}expected {meaning}");
-        }
-    }
-    words
-}
-
 /// What is wrong with a key.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
@@ -132,7 +83,7 @@ pub enum KeyError {
     #[error(transparent)]
     Table(#[from] toml::ser::Error),
     /// A part of the key is unknown.
-    #[error("unknown key '{part}'; {}known: {}", meant(part, known), known.join(", "))]
+    #[error("unknown key '{part}'; {}", known_names(part, known))]
     Unknown {
         /// The part.
         part: String,
@@ -165,14 +116,3 @@ pub enum KeyError {
     InsideValue(String),
 }
 
-/// Smallest similarity of a key that may have been meant, from 0 to 1.
-const SIMILAR: f64 = 0.75;
-
-/// Returns a question about the known key that is most similar to an unknown one; empty if none is.
-fn meant(part: &str, known: &[String]) -> String {
-    let similarity = |key: &&String| strsim::normalized_damerau_levenshtein(part, key);
-    let similar = known.iter().filter(|key| similarity(key) >= SIMILAR);
-    similar
-        .max_by(|one, other| similarity(one).total_cmp(&similarity(other)))
-        .map_or(String::new(), |key| format!("did you mean '{key}'? "))
-}

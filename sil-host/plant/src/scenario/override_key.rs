@@ -56,9 +56,10 @@ pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, 
                     } else {
                         variants.iter().map(ToString::to_string).collect()
                     };
+                    let is_optional =
+                        variants.contains(&part) || describe::is_optional(&parts[..=index]);
                     let part = part.into();
                     let unknown = KeyError::Unknown { part, known };
-                    let is_optional = describe::is_optional(&parts[..=index]);
                     missing = Some((!is_optional).then_some(unknown));
                 }
                 let empty = || Value::Table(Table::new());

@@ -2,7 +2,8 @@
 
 use toml::{Table, Value};
 
-use super::error::{KeyError, ScenarioError, TomlError};
+use super::error::{KeyError, ScenarioError};
+use super::words::TomlError;
 use super::{Scenario, reference_file};
 
 /// Reads a table from TOML text; messages name its origin.
