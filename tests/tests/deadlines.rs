@@ -57,14 +57,10 @@ impl Pressing {
         let scenario = scenario.expect("valid overrides");
         let configuration = scenario.controller_configuration();
         let [encoder, _] = configuration.converters.encoders;
-        let session = Session {
-            tick_hz: scenario.run.tick_hz,
-            pacing: Pacing::Realtime,
-            configuration: postcard::to_stdvec(&configuration).unwrap(),
-        };
+        let session = Session::new(&scenario, Pacing::Realtime).unwrap();
         let bus: BusName = bus.parse().unwrap();
         Self {
-            end: PlantEnd::create(&bus, &session, &Interrupt::default()).unwrap(),
+            end: PlantEnd::create(&bus, None, &session, &Interrupt::default()).unwrap(),
             frame: SensorFrame {
                 joints: [
                     encoder.reading((-11.4_f64).to_radians()),

@@ -109,12 +109,8 @@ fn pin(process: Pid, processor: usize) -> Outcome<()> {
 fn add_lockstep_turn(round_trips: &mut RoundTrips, processors: &Processors) -> Outcome<()> {
     let scenario = Scenario::load(built_in::DEFAULT, &["run.duration_s=1000".into()])?;
     let bus = BusName::unique();
-    let session = Session {
-        tick_hz: scenario.run.tick_hz,
-        pacing: Pacing::Lockstep,
-        configuration: postcard::to_stdvec(&scenario.controller_configuration())?,
-    };
-    let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default())?;
+    let session = Session::new(&scenario, Pacing::Lockstep)?;
+    let mut plant = PlantEnd::create(&bus, None, &session, &Interrupt::default())?;
     let mut controller = AnsweringProcess(
         Command::new(env!("CARGO_BIN_EXE_painleve"))
             .args(["controller", "--wait-s", "5", "--bus", bus.as_str()])
@@ -144,7 +140,7 @@ impl PingPong {
             pacing: Pacing::Lockstep,
             configuration: Vec::new(),
         };
-        let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default())?;
+        let mut plant = PlantEnd::create(&bus, None, &session, &Interrupt::default())?;
         let echo = AnsweringProcess::start(&bus)?;
         echo.pin(processors)?;
         plant.wait_for_controller(Duration::from_secs(5))?;
@@ -197,8 +193,12 @@ impl Drop for AnsweringProcess {
 }
 
 fn answer_all(bus: &str) -> Outcome<()> {
-    let (mut controller, _) =
-        ControllerEnd::open(&bus.parse()?, Duration::from_secs(5), &Interrupt::default())?;
+    let (mut controller, _) = ControllerEnd::open(
+        &bus.parse()?,
+        None,
+        Duration::from_secs(5),
+        &Interrupt::default(),
+    )?;
     controller.set_silence_limit(PATIENCE);
     while let Received::Frame(frame) = controller.receive()? {
         controller.send(&ActuatorFrame {

@@ -15,7 +15,7 @@ use super::services::{
     Presence, Receiver, Sender, Services, Unavailable, receiver, sender, transport,
 };
 use super::session::{Announcement, Session, SessionMessage};
-use super::{BusName, LinkError};
+use super::{BusName, LinkError, Pair};
 use painleve_system::interrupt::Interrupt;
 
 /// Interval at which a waiting controller looks for a plant, long enough not to disturb the plant's
@@ -71,7 +71,8 @@ enum Attempt {
 }
 
 impl ControllerEnd {
-    /// Joins the plant on `bus`, waiting at most `timeout` for it, and reads its session.
+    /// Joins the plant on `bus`, waiting at most `timeout` for it, and reads its session. With a
+    /// `pair`, it joins only the plant of that pair; without one, only a plant that belongs to none.
     ///
     /// # Errors
     /// [`LinkError::PlantMissing`] after `timeout`,
@@ -81,15 +82,17 @@ impl ControllerEnd {
     /// [`LinkError::Held`], [`LinkError::Transport`].
     pub fn open(
         bus: &BusName,
+        pair: Option<Pair>,
         timeout: Duration,
         interrupt: &Interrupt,
     ) -> Result<(Self, Session), LinkError> {
-        Self::open_in(Place::of_user()?, bus, timeout, interrupt)
+        Self::open_in(Place::of_user()?, bus, pair, timeout, interrupt)
     }
 
     pub(super) fn open_in(
         place: Place,
         bus: &BusName,
+        pair: Option<Pair>,
         timeout: Duration,
         interrupt: &Interrupt,
     ) -> Result<(Self, Session), LinkError> {
@@ -101,7 +104,7 @@ impl ControllerEnd {
         };
         let mut silence = Silence::default();
         loop {
-            match join(&bus, interrupt)? {
+            match join(&bus, pair, interrupt)? {
                 Attempt::Joined(end, session) => return Ok((*end, session)),
                 Attempt::NoPlant => silence = Silence::default(),
                 Attempt::NotReady => {
@@ -280,16 +283,19 @@ impl ControllerEnd {
 }
 
 /// Tries to join the run of the plant on the bus.
-fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
+fn join(bus: &Bus, pair: Option<Pair>, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
     let Some(lock) = bus.look().filter(|lock| lock.is_held(Role::Plant)) else {
         return Ok(Attempt::NoPlant);
     };
     let in_use = || LinkError::ControllerInUse {
         bus: bus.name.clone(),
     };
-    let Some(run) = RunFiles::ready(&bus.folder(), &bus.place) else {
+    let Some(run) = RunFiles::ready(&bus.folder(), &bus.place, pair) else {
+        // A stranger's plant and controller do not concern a pair, whose plant may yet come.
+        return if pair.is_some() {
+            Ok(Attempt::NoPlant)
         // Another controller has joined, or the plant is not ready yet.
-        return if lock.is_held(Role::Controller) {
+        } else if lock.is_held(Role::Controller) {
             Err(in_use())
         } else {
             Ok(Attempt::NotReady)

@@ -16,7 +16,7 @@ use super::place::{Place, SHARED_MEMORY};
 use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{Presence, Receiver, Sender, Services, receiver, sender, transport};
 use super::session::{Session, SessionMessage};
-use super::{BusName, LinkError};
+use super::{BusName, LinkError, Pair};
 use painleve_system::interrupt::Interrupt;
 
 /// Time allowed for the controller of a killed plant to leave the bus. It is shorter than the
@@ -38,6 +38,7 @@ pub struct PlantEnd {
     run: RunFiles,
     guardian: Guardian,
     claim: Claim,
+    pair: Option<Pair>,
     begin: SessionMessage,
     silence_limit: Duration,
     /// Silence of the controller in real time.
@@ -84,7 +85,8 @@ impl PlantEnd {
     /// Creates the bus and announces `session` on it.
     ///
     /// First removes what killed processes left behind. The controller of a killed plant gets a
-    /// second to leave.
+    /// second to leave. With a `pair`, only its controller can join; without one, any controller
+    /// that belongs to no pair.
     ///
     /// # Errors
     /// [`LinkError::BusInUse`] if a plant is alive on the bus,
@@ -94,15 +96,17 @@ impl PlantEnd {
     /// [`LinkError::Transport`].
     pub fn create(
         bus: &BusName,
+        pair: Option<Pair>,
         session: &Session,
         interrupt: &Interrupt,
     ) -> Result<Self, LinkError> {
-        Self::create_in(Place::of_user()?, bus, session, interrupt)
+        Self::create_in(Place::of_user()?, bus, pair, session, interrupt)
     }
 
     pub(super) fn create_in(
         place: Place,
         bus: &BusName,
+        pair: Option<Pair>,
         session: &Session,
         interrupt: &Interrupt,
     ) -> Result<Self, LinkError> {
@@ -116,12 +120,13 @@ impl PlantEnd {
         let claim = take_over(&bus, interrupt)?;
         let guardian = Guardian::start(&claim)
             .map_err(|cause| transport(&bus.name, "start a thread", cause))?;
-        let (run, ports) = start_run(&bus, &guardian, &begin)?;
+        let (run, ports) = start_run(&bus, pair, &guardian, &begin)?;
         Ok(Self {
             ports,
             run,
             guardian,
             claim,
+            pair,
             begin,
             silence_limit: DEFAULT_SILENCE_LIMIT,
             silence: Silence::default(),
@@ -193,7 +198,7 @@ impl PlantEnd {
     fn restart(&mut self) -> Result<(), LinkError> {
         let bus = self.claim.bus();
         RunFiles::remove_half_made(&bus.folder(), &bus.place);
-        let (run, ports) = start_run(bus, &self.guardian, &self.begin)?;
+        let (run, ports) = start_run(bus, self.pair, &self.guardian, &self.begin)?;
         self.ports = ports;
         std::mem::replace(&mut self.run, run)
             .remove()
@@ -338,6 +343,7 @@ impl PlantEnd {
 /// Creates a run, announces its session and admits a controller.
 fn start_run(
     bus: &Bus,
+    pair: Option<Pair>,
     guardian: &Guardian,
     begin: &SessionMessage,
 ) -> Result<(RunFiles, Ports), LinkError> {
@@ -349,7 +355,7 @@ fn start_run(
     })?;
     run.reserve()
         .map_err(|cause| transport(&bus.name, "reserve its shared memory", cause))?;
-    run.set_ready().map_err(refuse)?;
+    run.set_ready(pair).map_err(refuse)?;
     Ok((run, ports))
 }
 
