@@ -5,10 +5,11 @@ use std::time::{Duration, Instant};
 
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
+use super::bell::Bell;
 use super::claim::{Bus, Claim, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::lock_file::{LockFile, Role};
-use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
+use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, LOOK_INTERVAL, Patience, Silence};
 use super::place::Place;
 use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{
@@ -57,6 +58,7 @@ struct Ports {
     _services: Services,
     presence: Presence,
     _left: CallMark,
+    bell: Bell,
     /// Held while the run's shared memory is in use.
     _in_use: LockFile,
 }
@@ -177,6 +179,7 @@ impl ControllerEnd {
 
     fn receive_before(&mut self, deadline: Option<Instant>) -> Result<Option<Received>, LinkError> {
         let mut known_gone = false;
+        let mut longest = LOOK_INTERVAL;
         loop {
             if let Some(frame) = self.take()? {
                 self.patience = Patience::new(self.silence_limit);
@@ -195,7 +198,13 @@ impl ControllerEnd {
                     bus: self.bus().clone(),
                 });
             }
-            match self.patience.pause() {
+            if let Some(deadline) = deadline {
+                longest = deadline.saturating_duration_since(Instant::now());
+                if longest.is_zero() {
+                    return Ok(None);
+                }
+            }
+            match self.patience.pause(&self.ports.bell, longest) {
                 AfterPause::Poll => {}
                 AfterPause::Look if self.interrupt.is_requested() => {
                     return Err(LinkError::Interrupted);
@@ -203,9 +212,6 @@ impl ControllerEnd {
                 // A frame sent just before the plant left still counts: poll once more.
                 AfterPause::Look => known_gone = !self.claim.peer_is_alive(),
                 AfterPause::GiveUp(silence) => return Err(self.silent_for(silence)),
-            }
-            if !known_gone && deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-                return Ok(None);
             }
         }
     }
@@ -220,7 +226,7 @@ impl ControllerEnd {
     pub fn send(&mut self, frame: &ActuatorFrame) -> Result<(), LinkError> {
         self.guardian
             .during(|| self.ports.actuator.send_copy(*frame))
-            .map(|_| ())
+            .map(|_| self.ports.bell.ring())
             .map_err(|cause| {
                 self.ports
                     .presence
@@ -261,7 +267,7 @@ impl ControllerEnd {
                 Some(Announcement::End) => return Ok(None),
                 None => {}
             }
-            match patience.pause() {
+            match patience.pause(&self.ports.bell, LOOK_INTERVAL) {
                 AfterPause::Poll => {}
                 AfterPause::Look if self.interrupt.is_requested() => {
                     return Err(LinkError::Interrupted);
@@ -339,6 +345,7 @@ impl Ports {
                 return Err(transport(&bus.name, action, cause));
             }
         };
+        let bell = Bell::hang(&bus.name, &in_use, Role::Controller)?;
         let presence = Presence::new(&bus.name, run)?;
         let services = match Services::open(&presence) {
             Ok(services) => services,
@@ -354,6 +361,7 @@ impl Ports {
             _services: services,
             presence,
             _left: left,
+            bell,
             _in_use: in_use,
         }))
     }

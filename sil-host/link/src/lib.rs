@@ -27,6 +27,7 @@
 //! [`SensorFrame`]: painleve_shared::frame::SensorFrame
 //! [`ActuatorFrame`]: painleve_shared::frame::ActuatorFrame
 
+mod bell;
 mod bus;
 mod bus_drive;
 mod claim;

@@ -8,10 +8,13 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use nix::sys::statvfs::statvfs;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
+use super::bell::Bell;
 use super::claim::{Bus, Claim, Taken, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::lock_file::{LockFile, Role};
-use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
+use super::patience::{
+    AfterPause, DEFAULT_SILENCE_LIMIT, LOOK_INTERVAL, Patience, Pauses, Silence,
+};
 use super::place::{Place, SHARED_MEMORY};
 use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{Presence, Receiver, Sender, Services, receiver, sender, transport};
@@ -56,6 +59,7 @@ struct Ports {
     _services: Services,
     presence: Presence,
     _left: CallMark,
+    bell: Bell,
     /// Held while the run's shared memory is in use.
     _in_use: LockFile,
 }
@@ -65,6 +69,7 @@ impl Ports {
         let in_use = run
             .hold(Role::Plant)
             .map_err(|cause| transport(&bus.name, "mark its shared memory as in use", cause))?;
+        let bell = Bell::hang(&bus.name, &in_use, Role::Plant)?;
         let presence = Presence::new(&bus.name, run)?;
         let services = Services::create(&presence)?;
         let (leaving, left) = guardian.marks();
@@ -76,6 +81,7 @@ impl Ports {
             _services: services,
             presence,
             _left: left,
+            bell,
             _in_use: in_use,
         })
     }
@@ -234,7 +240,7 @@ impl PlantEnd {
             if known_gone {
                 return Err(self.gone());
             }
-            match patience.pause() {
+            match patience.pause(&self.ports.bell, LOOK_INTERVAL) {
                 AfterPause::Poll => {}
                 AfterPause::Look if self.interrupt.is_requested() => {
                     return Err(LinkError::Interrupted);
@@ -254,6 +260,27 @@ impl PlantEnd {
     pub fn send(&mut self, frame: &SensorFrame) -> Result<(), LinkError> {
         self.deliver_session()?;
         self.send_to_controller(frame).map(|_| ())
+    }
+
+    /// Waits for the next answer until `deadline`; `None` if none has arrived by then.
+    ///
+    /// # Errors
+    /// As [`PlantEnd::try_receive`].
+    pub fn receive_before(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Option<ActuatorFrame>, LinkError> {
+        let mut pauses = Pauses::default();
+        loop {
+            if let Some(answer) = self.try_receive()? {
+                return Ok(Some(answer));
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            pauses.pause(&self.ports.bell, left);
+        }
     }
 
     /// Returns the next answer, if one has arrived. Call it until it returns `None` to get the
@@ -292,6 +319,7 @@ impl PlantEnd {
     fn deliver_session(&self) -> Result<(), LinkError> {
         self.guardian
             .during(|| self.ports.session.update_connections())
+            .map(|_| self.ports.bell.ring())
             .map_err(|cause| self.transport("announce the session", cause))
     }
 
@@ -299,6 +327,7 @@ impl PlantEnd {
     fn send_to_controller(&self, frame: &SensorFrame) -> Result<usize, LinkError> {
         self.guardian
             .during(|| self.ports.sensor.send_copy(*frame))
+            .inspect(|_| self.ports.bell.ring())
             .map_err(|cause| self.transport("send a sensor frame", cause))
     }
 
@@ -363,7 +392,7 @@ fn announce(ports: &Ports, message: SessionMessage) -> Result<(), LinkError> {
     ports
         .session
         .send_copy(message)
-        .map(|_| ())
+        .map(|_| ports.bell.ring())
         .map_err(|cause| ports.presence.transport("announce the session", cause))
 }
 
