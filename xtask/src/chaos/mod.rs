@@ -106,7 +106,13 @@ pub fn short() -> Result<(), ChoreError> {
 /// # Errors
 /// If a flaw is found.
 pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
-    run_cargo(&["build", "--release", "--package", "painleve-command"])?;
+    run_cargo(&[
+        "build",
+        "--profile",
+        "verify",
+        "--package",
+        "painleve-command",
+    ])?;
     if arguments.host != ChaosHost::Native {
         build_fw::run()?;
     }
@@ -114,7 +120,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     // A copy, because the program may be rebuilt during the trials.
     let programs = tempfile::tempdir().map_err(system)?;
     let program = programs.path().join("painleve");
-    std::fs::copy(workspace().join("target/release/painleve"), &program).map_err(system)?;
+    std::fs::copy(workspace().join("target/verify/painleve"), &program).map_err(system)?;
     // This process adopts orphans, as systemd or a container would.
     set_child_subreaper(true).map_err(|error| system(error.into()))?;
     tracer::restore_default_actions().map_err(|error| system(error.into()))?;
