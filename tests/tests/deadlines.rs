@@ -63,13 +63,12 @@ impl Pressing {
         let configuration = scenario.controller_configuration();
         let [encoder, _] = configuration.converters.encoders;
         let session = Session {
-            tick_hz: scenario.run.tick_hz,
-            pacing: Pacing::Realtime,
             configuration: postcard::to_stdvec(&(build, configuration)).unwrap(),
+            ..Session::new(&scenario, Pacing::Realtime).unwrap()
         };
         let bus: BusName = bus.parse().unwrap();
         Self {
-            end: PlantEnd::create(&bus, &session, &Interrupt::default()).unwrap(),
+            end: PlantEnd::create(&bus, None, &session, &Interrupt::default()).unwrap(),
             frame: SensorFrame {
                 joints: [
                     encoder.reading((-11.4_f64).to_radians()),
@@ -118,7 +117,7 @@ fn a_controller_refuses_the_plant_of_another_build() {
     assert_eq!(code(output.status), 3, "{output:?}");
     let message = errors(&output);
     assert!(
-        message.contains("use the same build for both ends"),
+        message.contains("use the same program for both ends"),
         "{message}"
     );
 }

@@ -3,9 +3,8 @@
 use std::time::Duration;
 
 use clap::Args;
-use painleve_link::{BusName, ControllerEnd, LinkError, Session};
+use painleve_link::{BusName, ControllerEnd, Pair, Session};
 use painleve_plant::Configuration;
-use painleve_plant::law_choice::build;
 use painleve_system::interrupt::Interrupt;
 
 use super::CommandError;
@@ -23,6 +22,9 @@ pub struct JoinArguments {
     wait_s: f64,
     #[command(flatten)]
     pub patience: PatienceArguments,
+    /// Join only the plant with the same mark: set by `painleve run`.
+    #[arg(long, hide = true)]
+    pair: Option<Pair>,
 }
 
 impl JoinArguments {
@@ -35,19 +37,14 @@ impl JoinArguments {
         interrupt: &Interrupt,
     ) -> Result<(ControllerEnd, Session, Configuration), CommandError> {
         let wait = Duration::from_secs_f64(self.wait_s);
-        let (mut end, session) = ControllerEnd::open(&self.bus, wait, interrupt)?;
+        let (mut end, session) = ControllerEnd::open(&self.bus, self.pair, wait, interrupt)?;
         end.set_silence_limit(self.patience.peer());
-        let unreadable = |source| ProcessError::Unreadable {
-            bus: self.bus.clone(),
-            source,
-        };
-        let (plant_build, bytes) =
-            postcard::take_from_bytes::<u64>(&session.configuration).map_err(unreadable)?;
-        if plant_build != build() {
-            let bus = self.bus.clone();
-            return Err(LinkError::Incompatible { bus }.into());
-        }
-        let configuration = postcard::from_bytes(bytes).map_err(unreadable)?;
+        let configuration = session
+            .controller()
+            .map_err(|source| ProcessError::Unreadable {
+                bus: self.bus.clone(),
+                source,
+            })?;
         Ok((end, session, configuration))
     }
 }

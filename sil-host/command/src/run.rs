@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use painleve_board::{emulator, serial};
-use painleve_link::{BusName, Pacing};
+use painleve_link::{BusName, Pacing, Pair};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_record::report::RunReport;
 use painleve_study::robustness::{self, Arms};
@@ -229,26 +229,27 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     }
     let interrupt = Interrupt::catch()?;
     let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
+    let pair = Pair::unique();
 
     let mut plant_arguments: Vec<OsString> = vec!["plant".into()];
     plant_arguments.extend(arguments.scenario.to_arguments());
     plant_arguments.extend(arguments.output.to_arguments());
     plant_arguments.extend(arguments.patience.to_arguments());
-    plant_arguments.extend(["--json".into(), "--started-by-run".into()]);
+    plant_arguments.push("--json".into());
     let host = arguments.host.to_possible_value();
     let host = host.as_ref().map_or("native", |host| host.get_name());
     plant_arguments.extend(["--host-name".into(), host.into()]);
     if arguments.host == Host::Serial {
         plant_arguments.push("--board-keeps-time".into());
     }
-    let mut plant = RunProcess::start(plant_arguments, &bus, Stdio::inherit())?;
+    let mut plant = RunProcess::start(plant_arguments, &bus, pair, Stdio::inherit())?;
     // The controller's messages are shown only if the plant has none; a log is shown at once.
     let stderr = if arguments.image.log {
         Stdio::inherit()
     } else {
         Stdio::piped()
     };
-    let mut controller = RunProcess::start(controller_arguments(arguments), &bus, stderr)?;
+    let mut controller = RunProcess::start(controller_arguments(arguments), &bus, pair, stderr)?;
 
     let status = watch(
         &mut plant,
