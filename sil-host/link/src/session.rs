@@ -56,7 +56,8 @@ pub struct Session {
 pub enum UnreadableConfiguration {
     /// Controller and plant have been built from different sources.
     #[error(
-        "the plant is build {plant:016x}, this controller build {:016x}: use the same program for both ends", build()
+        "the plant is build {plant:016x}, this controller build {:016x}: use the same program for both ends",
+        build()
     )]
     OtherBuild {
         /// Build of the plant.
@@ -229,7 +230,7 @@ mod tests {
             session.controller().unwrap(),
             scenario.controller_configuration()
         );
-        let other = BUILD.wrapping_add(1);
+        let other = build().wrapping_add(1);
         session.configuration =
             postcard::to_stdvec(&(other, scenario.controller_configuration())).unwrap();
         let error = session.controller().unwrap_err().to_string();

@@ -115,4 +115,3 @@ pub enum KeyError {
     #[error("'{0}' would be inside a single value")]
     InsideValue(String),
 }
-
