@@ -79,7 +79,8 @@ pub fn build(
     match toolchain()? {
         Toolchain::Installed => {
             let build = [&build[..], &["--target-dir", target]].concat();
-            run_with(&cargo(), &build, &[])
+            // Incremental compilation makes larger and slower images, beyond their budgets.
+            run_with(&cargo(), &build, &[("CARGO_INCREMENTAL", "0")])
         }
         Toolchain::Debian => {
             // A separate target folder, because objects of two compilers cannot be mixed.
