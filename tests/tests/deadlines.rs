@@ -116,10 +116,10 @@ fn a_controller_refuses_the_plant_of_another_build() {
     drop(plant);
     assert_eq!(code(output.status), 3, "{output:?}");
     let message = errors(&output);
-    assert!(
-        message.contains("use the same program for both ends"),
-        "{message}"
-    );
+    assert_eq!(message.trim().lines().count(), 1, "{message}");
+    for part in ["error: ", &bench.bus, "use the same program for both ends"] {
+        assert!(message.contains(part), "{message}");
+    }
 }
 
 #[test]
