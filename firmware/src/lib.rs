@@ -28,6 +28,7 @@ pub mod last_command;
 pub mod law;
 pub mod recover;
 pub mod refer;
+pub mod schedule;
 pub mod supervise;
 pub mod telemetry;
 pub mod torque_output;

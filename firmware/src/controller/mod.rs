@@ -34,6 +34,7 @@ use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
 use crate::refer::governor::EdgeMargins;
 use crate::refer::{References, ReferencesState};
+use crate::schedule::Turn;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::{Supervision, Supervisor};
 use crate::telemetry::{Telemetry, TelemetrySink, TelemetryTick};
@@ -112,7 +113,6 @@ enum Due {
 /// What the update needs of the tick that has been answered, besides the state of the stages.
 #[derive(Clone, Copy, Debug, Default)]
 struct Answered {
-    tick: u32,
     elapsed_ticks: u32,
     /// Whether torque was applied before the tick.
     drove: bool,
@@ -145,6 +145,7 @@ struct State<L: Law> {
     supervision: Supervision,
     references: ReferencesState,
     answered: Answered,
+    turn: Turn,
     arrivals: ArrivalState,
     joint_friction: JointFrictionState,
 }
@@ -167,6 +168,7 @@ impl<L: Law> Controller<L> {
             command: LastCommand::default(),
             before: LastCommand::default(),
             answered: Answered::default(),
+            turn: Turn::default(),
             joint_friction: JointFrictionState::default(),
         };
         Ok(Self {
@@ -404,7 +406,6 @@ impl<L: Law> Stages<L> {
         let beginning = self
             .references
             .begin(references, model, contact, &phase, landing);
-        state.answered.tick = readings.frame.tick;
         state.answered.elapsed_ticks = readings.elapsed_ticks;
         state.answered.landing_p_ratio = beginning.landing_p_ratio;
         let target = self.references.tick(references, &beginning, model, &phase);
@@ -448,43 +449,42 @@ impl<L: Law> Stages<L> {
         followed
     }
 
-    /// Updates the slow estimates and the edges with the tick that has been answered.
+    /// Updates the estimates with the tick that has been answered, and the slow ones and the edges in turn.
     ///
-    /// Slow estimates and the search for the edges take turns, so that no update is long. Contact and flight have
-    /// branches of their own: each excludes the other's work, as the bound on the update's cycles can see.
+    /// Contact and flight have branches of their own: each excludes the other's work, as the bound on the update's
+    /// cycles can see.
     // Out of line, because the bound leaves it out of a tick that has started the estimates.
     #[inline(never)]
     fn learn(&self, state: &mut State<L>) {
+        let turn = state.turn.take();
         let (estimates, last, answered) = (&mut state.estimates, &state.before, &state.answered);
         let observed = Observed {
             elapsed_ticks: answered.elapsed_ticks,
             drove: answered.drove,
             last,
         };
-        let is_even = answered.tick & 1 == 0;
         let estimators = &self.estimators;
         if estimates.contact.touches {
             let slow = estimators.learn_in_contact(estimates, &observed);
-            if is_even {
-                estimators.skip_balance(estimates, &slow, last);
-                if !estimators.evaluate_response(estimates, &slow, last) {
-                    self.search(state);
+            match turn {
+                Turn::Balance => {
+                    estimators.balance_torques(estimates);
+                    estimators.calibrate(estimates, &slow);
                 }
-            } else {
-                estimators.balance_torques(estimates, &slow, last);
-                estimators.calibrate(estimates, &slow);
+                Turn::Edges => {
+                    if !estimators.evaluate_response(estimates, &slow, last) {
+                        self.search(state);
+                    }
+                }
             }
         } else {
-            let slow = estimators.learn_in_the_air(estimates, &observed);
-            if is_even {
-                estimators.skip_balance(estimates, &slow, last);
+            estimators.learn_in_the_air(estimates, &observed);
+            if turn == Turn::Balance {
+                estimators.balance_torques(estimates);
+            }
+            // A tip that is being returned to the belt needs the edges soon.
+            if turn == Turn::Edges || answered.landing_p_ratio > 0.0 {
                 self.search(state);
-            } else {
-                estimators.balance_torques(estimates, &slow, last);
-                // A tip that is being returned to the belt needs the edges soon.
-                if answered.landing_p_ratio > 0.0 {
-                    self.search(state);
-                }
             }
         }
     }

@@ -87,6 +87,32 @@ fn an_update_that_is_due_is_done_before_the_next_answer() {
     }
 }
 
+/// Searches for edges and learning used to wait for ticks with odd or even numbers.
+#[test]
+fn what_is_learnt_does_not_depend_on_the_numbers_of_the_ticks() {
+    let after = |number: fn(u32) -> u32| {
+        let mut controller = Controller::new(&configuration()).unwrap();
+        let mut telemetry = Telemetry::default();
+        for sequence in 0..300 {
+            let frame = SensorFrame {
+                tick: number(sequence),
+                ..frame(sequence)
+            };
+            controller.tick_with_telemetry(&frame, &mut telemetry);
+        }
+        Telemetry {
+            tick: 0,
+            ..telemetry
+        }
+    };
+    let usual = after(|sequence| sequence);
+    let [lower_m, upper_m] = usual.edges_m;
+    assert!(lower_m < -0.17 && upper_m < 0.17, "{:?}", usual.edges_m);
+    for number in [|_| 0, |_| 1, |sequence| 3 * sequence + 1] {
+        assert_eq!(after(number), usual);
+    }
+}
+
 #[test]
 fn answers_echo_the_tick_and_count_frames() {
     let mut controller = Controller::new(&configuration()).unwrap();
