@@ -72,7 +72,7 @@ settings! {
         calibration: CalibrationSettings = CalibrationSettings::default();
         /// Arming, recovery and shutdown of the drive.
         supervisor: SupervisorSettings = SupervisorSettings::default();
-        /// Number of lapses tolerated in a row.
+        /// Number of lapses tolerated.
         lapses: LapseLimits = LapseLimits::default();
         /// The control law.
         law: L = L::default();

@@ -239,7 +239,7 @@ impl<L: Law> Controller<L> {
     }
 
     /// Records how many times a lapse occurred around this tick, 0 for none. If it has now occurred
-    /// too often in a row, latches the fault and returns the last answer with zero torque, to be
+    /// too often, latches the fault and returns the last answer with zero torque, to be
     /// output at once.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {

@@ -1,4 +1,5 @@
-//! Every other reading of a channel fails, on the way to a target beyond the edge.
+//! Every other reading of a channel fails, on the way to a target beyond the edge: the drive stops, and until then the
+//! tip stays on the belt.
 
 // Helpers of tests may panic as tests do.
 #![allow(clippy::unwrap_used)]
@@ -97,12 +98,12 @@ fn run(configuration: &Configuration, scenario: &Scenario, channel: Channel, par
         closed_loop.tick(&mut thrown).unwrap();
     }
     let fault = closed_loop.finish().0.fault;
-    let what = format!("{channel:?} {parity}: {fault:?}");
-    assert_eq!(thrown.0, None, "{what}");
+    assert_eq!(thrown.0, None, "{channel:?} {parity}: {fault:?}");
+    assert_ne!(fault, None, "{channel:?} {parity}");
 }
 
 #[test]
-fn a_tip_without_every_other_reading_is_held_or_the_drive_stops() {
+fn without_every_other_reading_the_drive_stops_before_the_tip_is_thrown() {
     let scenario = Scenario::load("edge", &[]).unwrap();
     let mut configuration = scenario.controller_configuration();
     for channel in CHANNELS {
