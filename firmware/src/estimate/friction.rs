@@ -64,6 +64,8 @@ settings! {
     /// Settings of the friction estimator.
     #[derive(Copy)]
     pub struct FrictionSettings {
+        /// Whether μ is estimated; if not, it is taken to be the first guess exactly.
+        enabled: bool = true;
         /// Initial estimate of μ.
         first_guess: f32 = 0.6, 0.0..=2.0;
         /// Standard deviation of the initial estimate, and of μ whenever the filter restarts.
@@ -161,12 +163,15 @@ impl FrictionEstimator {
     /// Makes an estimator that is called every `tick_s`; `force_noise_n` is the standard deviation
     /// of one reading of the force cell, N.
     pub fn new(settings: &FrictionSettings, force_noise_n: f32, tick_s: f32) -> Self {
+        // A friction that is known has no variance, at the start or later.
+        let unknown = if settings.enabled { 1.0 } else { 0.0 };
+        let square = |deviation: f32| unknown * (deviation * deviation);
         Self {
             settings: *settings,
             force_variance_n2: force_noise_n * force_noise_n,
             tick_s,
-            first_variance: settings.first_deviation * settings.first_deviation,
-            drift_variance: settings.drift_per_sqrt_s * settings.drift_per_sqrt_s * tick_s,
+            first_variance: square(settings.first_deviation),
+            drift_variance: square(settings.drift_per_sqrt_s) * tick_s,
             clear_force_n2: 9.0 * (force_noise_n * force_noise_n),
             mean_weight: tick_s / (MEAN_S + tick_s),
             changing_weight: tick_s / (CHANGING_S + tick_s),
@@ -233,6 +238,10 @@ impl FrictionEstimator {
                 state.stick_ticks = STICK_TICKS;
                 return;
             }
+        }
+        if !self.settings.enabled {
+            state.stick_ticks = state.stick_ticks.saturating_sub(1);
+            return;
         }
         if falls || beyond(above_n, RISE_DEVIATIONS_SQUARE, variance_n2 + quiet_n2) {
             self.restart(state);
@@ -340,6 +349,9 @@ impl FrictionEstimator {
     /// Raises the estimate after a throw, which shows that μ is at least `critical`, above which
     /// sliding has no solution.
     pub fn thrown(&self, state: &mut FrictionState, critical: f32) {
+        if !self.settings.enabled {
+            return;
+        }
         if state.coefficient < critical {
             state.coefficient = critical;
         }
@@ -591,6 +603,27 @@ mod tests {
         slide(&mut tested, 0.7, Slip::Positive, 5);
         let found = tested.estimate();
         assert!((found.coefficient - 0.7).abs() < 0.02, "{found:?}");
+    }
+
+    #[test]
+    fn a_friction_that_is_not_estimated_stays_the_first_guess() {
+        let settings = FrictionSettings {
+            enabled: false,
+            ..Default::default()
+        };
+        let estimator = FrictionEstimator::new(&settings, NOISE_N, 1e-3);
+        for (friction, drags) in [(0.3, false), (0.3, true), (0.8, false), (0.6, false)] {
+            let mut tested = Tested(estimator, estimator.start(), drags);
+            for slip in [Slip::Negative, Slip::Positive] {
+                slide(&mut tested, friction, slip, 2000);
+                tested.0.thrown(&mut tested.1, 0.9);
+                let found = tested.estimate();
+                assert_eq!((found.coefficient, found.deviation), (0.6, 0.0));
+                assert_eq!((found.next_coefficient, found.catch_up), (0.6, 0.0));
+                // The direction of slip still follows the force, near the other side of the cone.
+                assert!(found.slip == slip || friction < 0.5, "{found:?}");
+            }
+        }
     }
 
     #[test]

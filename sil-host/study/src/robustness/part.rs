@@ -14,7 +14,7 @@ pub enum Part {
     Recovery,
     /// Calibration of the link lengths.
     Calibration,
-    /// Friction estimate; without it the initial friction is taken as certain.
+    /// Friction estimate; without it the first guess is taken as exact.
     FrictionEstimate,
     /// Feedforward of the estimated friction; without it the last reading is used, as in the paper.
     FrictionFeedForward,
@@ -28,11 +28,23 @@ pub enum Part {
     ForceRamp,
     /// Estimate of unknown torques.
     Disturbance,
+    /// Estimate of how much the contact gives; without it the contact is taken to be rigid.
+    Response,
+    /// Probe: small changes of the wanted force that show how much the contact gives.
+    Probe,
+    /// Cancelling of the acceleration by contact forces that were not fed forward.
+    ForceDrift,
+    /// Damping of a contact that gives.
+    ContactDamping,
+    /// Distance from the edge that grows with the restlessness of the force.
+    RestlessDistance,
+    /// Faster loops on an arm with known friction of the joints.
+    FrictionSpeedUp,
 }
 
 impl Part {
     /// All parts.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 17] = [
         Self::Guard,
         Self::Governor,
         Self::Recovery,
@@ -44,6 +56,12 @@ impl Part {
         Self::ReduceForceWhenTorqueLimited,
         Self::ForceRamp,
         Self::Disturbance,
+        Self::Response,
+        Self::Probe,
+        Self::ForceDrift,
+        Self::ContactDamping,
+        Self::RestlessDistance,
+        Self::FrictionSpeedUp,
     ];
 
     /// Returns the overrides that switch the part off.
@@ -53,10 +71,7 @@ impl Part {
             Self::Governor => &["controller.governor.enabled=false"],
             Self::Recovery => &["controller.supervisor.on_lift_off=continue"],
             Self::Calibration => &["controller.calibration.enabled=false"],
-            Self::FrictionEstimate => &[
-                "controller.friction.first_deviation=0.001",
-                "controller.friction.drift_per_sqrt_s=0.0001",
-            ],
+            Self::FrictionEstimate => &["controller.friction.enabled=false"],
             Self::FrictionFeedForward => &["controller.law.hybrid.friction=measured"],
             Self::PositionIntegral => &["controller.law.hybrid.position_integral_gain_per_s3=0"],
             Self::ForceIntegral => &["controller.law.hybrid.force_integral_gain_per_s=0"],
@@ -65,6 +80,12 @@ impl Part {
             }
             Self::ForceRamp => &["controller.law.hybrid.force_time_constant_s=0"],
             Self::Disturbance => &["controller.disturbance.enabled=false"],
+            Self::Response => &["controller.response.enabled=false"],
+            Self::Probe => &["controller.response.probe_n=0"],
+            Self::ForceDrift => &["controller.law.hybrid.force_drift_rad_s=0"],
+            Self::ContactDamping => &["controller.law.hybrid.contact_damping=0"],
+            Self::RestlessDistance => &["controller.governor.clearance_m_n=0"],
+            Self::FrictionSpeedUp => &["controller.estimator.friction_speed_up=1"],
         }
     }
 }
