@@ -19,7 +19,6 @@ use crate::estimate::disturbance::DisturbanceSettings;
 use crate::estimate::friction::FrictionSettings;
 use crate::estimate::joints::JointEstimatorSettings;
 use crate::estimate::response::ResponseSettings;
-use crate::guard::GuardSettings;
 use crate::law::{Law, LawSettings};
 use crate::recover::RecoverySettings;
 use crate::refer::governor::{GovernorSettings, JointErrors};
@@ -76,8 +75,6 @@ settings! {
         lapses: LapseLimits = LapseLimits::default();
         /// The control law.
         law: L = L::default();
-        /// Contact guard, which keeps the tip pressed on the belt.
-        guard: GuardSettings = GuardSettings::default();
         /// Edge governor, which keeps the reference away from the paradox.
         governor: GovernorSettings = GovernorSettings::default();
         /// Recovery of a tip that has left the belt.

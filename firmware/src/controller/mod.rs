@@ -312,12 +312,9 @@ impl<L: Law> Controller<L> {
         let answer = &mut self.last_answer;
         answer.torques = [TorqueCounts(0); 2];
         report(answer, &self.state.supervision);
-        answer.flags.remove(
-            StatusFlags::SATURATED
-                | StatusFlags::GUARDED
-                | StatusFlags::AT_EDGE
-                | StatusFlags::RECOVERING,
-        );
+        answer
+            .flags
+            .remove(StatusFlags::SATURATED | StatusFlags::AT_EDGE | StatusFlags::RECOVERING);
         telemetry.stop(&self.state.supervision);
     }
 }
@@ -361,11 +358,7 @@ impl<L: Law> Stages<L> {
                 configuration.tick_s(),
                 settings.torque_limit_nm,
             ),
-            torques: TorqueOutput::new(
-                &settings.guard,
-                converters.torque,
-                settings.torque_limit_nm,
-            ),
+            torques: TorqueOutput::new(converters.torque, settings.torque_limit_nm),
             joint_friction: JointFriction::new(&settings.estimator, parameters.coulomb_friction_nm),
             ranges: ReadingRanges::of(converters),
         }
@@ -419,9 +412,7 @@ impl<L: Law> Stages<L> {
                 last: &state.command,
             };
             let output = self.demand.tick(&mut state.demand, &input);
-            let torques = self
-                .torques
-                .tick(&mut state.command, &output, model, contact);
+            let torques = self.torques.tick(&mut state.command, &output);
             state.command.reference_velocity_m_s = target.reference.velocity_m_s;
             state.command.at_edge = target.at_edge;
             if let Err(NotFinite) = torques {
@@ -546,7 +537,6 @@ fn flags(tick: &TelemetryTick<'_>, reference_done: bool) -> StatusFlags {
     flags.set(StatusFlags::CONTACT, contact.touches);
     flags.set(StatusFlags::SATURATED, command.saturated);
     flags.set(StatusFlags::REFERENCE_DONE, reference_done);
-    flags.set(StatusFlags::GUARDED, command.guarded);
     flags.set(StatusFlags::AT_EDGE, target.at_edge);
     flags.set(StatusFlags::RECOVERING, *recovering);
     flags.set(

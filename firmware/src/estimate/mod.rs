@@ -358,7 +358,7 @@ impl Estimators {
         let (last, p_per_kg) = (observed.last, contact.p_per_kg);
         let slides = p_per_kg > 0.0 && !friction.sticks;
         let mut completes_block = false;
-        if is_informative && slides && !last.is_constrained() && self.response.is_enabled() {
+        if is_informative && slides && !last.saturated && self.response.is_enabled() {
             let slope = &model.free_slope_per_kg_m;
             let reading = ForceReading {
                 normal_force_n: force_n.y,

@@ -6,8 +6,6 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
-    /// Guard: limits the torque to the side on which the tip stays pressed.
-    Guard,
     /// Governor: keeps the reference away from the paradox.
     Governor,
     /// Recovery: brings a tip that left the belt back; without it the law continues.
@@ -44,8 +42,7 @@ pub enum Part {
 
 impl Part {
     /// All parts.
-    pub const ALL: [Self; 17] = [
-        Self::Guard,
+    pub const ALL: [Self; 16] = [
         Self::Governor,
         Self::Recovery,
         Self::Calibration,
@@ -67,7 +64,6 @@ impl Part {
     /// Returns the overrides that switch the part off.
     pub fn without(self) -> &'static [&'static str] {
         match self {
-            Self::Guard => &["controller.guard.enabled=false"],
             Self::Governor => &["controller.governor.enabled=false"],
             Self::Recovery => &["controller.supervisor.on_lift_off=continue"],
             Self::Calibration => &["controller.calibration.enabled=false"],
