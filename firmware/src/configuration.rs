@@ -30,6 +30,10 @@ use crate::supervise::supervisor::SupervisorSettings;
 /// are meant for 1 kHz.
 const SPEED_UP_S: f32 = 2e-3;
 
+/// Coulomb friction of the joints from which tracking loops and law have their full speed-up, N·m; with less they have
+/// less of it in proportion. Measured with the speed-ups of docs/beyond-the-paper.md.
+const FULL_SPEED_UP_NM: f32 = 0.05;
+
 settings! {
     /// Scalings of the converters, as configured in the controller.
     #[derive(Copy)]
@@ -162,12 +166,9 @@ impl<L: Law> Configuration<L> {
     /// loops stay below the arm's natural frequency, because the torque moves the encoders.
     pub fn loop_speeds(&self, arm: &Arm<f32>) -> LoopSpeeds {
         let estimator = &self.settings.estimator;
-        let wanted = if self.arm.coulomb_friction_nm == [0.0; 2] {
-            1.0
-        } else {
-            let fastest = (SPEED_UP_S * self.tick_hz).at_least(1.0);
-            estimator.friction_speed_up.at_most(fastest)
-        };
+        let share = (self.joint_errors().friction_nm / FULL_SPEED_UP_NM).at_most(1.0);
+        let fastest = (SPEED_UP_S * self.tick_hz).at_least(1.0);
+        let wanted = (1.0 + share * (estimator.friction_speed_up - 1.0)).at_most(fastest);
         let natural_rad_s = natural_frequency_rad_s(arm, estimator.gear_compliance_rad_nm);
         let tracking = wanted.at_most(natural_rad_s / estimator.bandwidth_rad_s);
         LoopSpeeds {
@@ -241,6 +242,23 @@ mod tests {
             configuration.tick_hz = tick_hz;
             assert!((speeds(&configuration).tracking - speed_up).abs() < 1e-6);
         }
+    }
+
+    /// A billionth of a newton metre used to multiply K'_P by 2.56.
+    #[test]
+    fn a_little_more_friction_of_the_joints_makes_the_loops_a_little_faster() {
+        let mut configuration = Configuration::default();
+        let mut before = 1.0;
+        for step in 0..100_u8 {
+            configuration.arm.coulomb_friction_nm = [1e-9 + 1e-3 * f32::from(step), 0.0];
+            let LoopSpeeds { tracking, .. } = speeds(&configuration);
+            assert!(
+                (0.0..0.013).contains(&(tracking - before)),
+                "{step} {tracking}"
+            );
+            before = tracking;
+        }
+        assert_eq!(before, 1.6);
     }
 
     #[test]
