@@ -54,8 +54,8 @@ settings! {
         /// Whether the pressing force is reduced where the torque limits do not allow f_n*; not in
         /// the paper.
         reduce_force_when_torque_limited: bool = true;
-        /// Integral gain K'_I of the force.
-        force_integral_gain_per_s: f32 = 5.0, 0.0..=1e4, "1/s";
+        /// Integral gain K'_I of the force; 0 for none. The paper's is 650 1/s elbow down and 0 elbow up.
+        force_integral_gain_per_s: f32 = 0.0, 0.0..=1e4, "1/s";
         /// Largest correction by the force integral.
         force_integral_limit_n: f32 = 5.0, 0.0..=1e3, "N";
         /// Damping of a contact that gives, as a fraction of the change of force.

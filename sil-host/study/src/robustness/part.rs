@@ -18,8 +18,6 @@ pub enum Part {
     FrictionFeedForward,
     /// Integral of the position error.
     PositionIntegral,
-    /// Integral of the force error.
-    ForceIntegral,
     /// Reduction of the normal force where the torque is limited.
     ReduceForceWhenTorqueLimited,
     /// Gradual increase of the normal force after landing.
@@ -42,14 +40,13 @@ pub enum Part {
 
 impl Part {
     /// All parts.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 15] = [
         Self::Governor,
         Self::Recovery,
         Self::Calibration,
         Self::FrictionEstimate,
         Self::FrictionFeedForward,
         Self::PositionIntegral,
-        Self::ForceIntegral,
         Self::ReduceForceWhenTorqueLimited,
         Self::ForceRamp,
         Self::Disturbance,
@@ -70,7 +67,6 @@ impl Part {
             Self::FrictionEstimate => &["controller.friction.enabled=false"],
             Self::FrictionFeedForward => &["controller.law.hybrid.friction=measured"],
             Self::PositionIntegral => &["controller.law.hybrid.position_integral_gain_per_s3=0"],
-            Self::ForceIntegral => &["controller.law.hybrid.force_integral_gain_per_s=0"],
             Self::ReduceForceWhenTorqueLimited => {
                 &["controller.law.hybrid.reduce_force_when_torque_limited=false"]
             }

@@ -183,7 +183,6 @@ fn other_settings(part: Part) -> &'static [&'static str] {
             "controller.friction.first_deviation=1",
             "controller.friction.drift_per_sqrt_s=0.1",
         ],
-        Part::ForceIntegral => &["controller.law.hybrid.force_integral_limit_n=0"],
         Part::Disturbance => &[
             "controller.disturbance.bandwidth_rad_s=200",
             "controller.disturbance.limit_nm=0.01",
