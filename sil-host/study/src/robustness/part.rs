@@ -20,8 +20,6 @@ pub enum Part {
     PositionIntegral,
     /// Reduction of the normal force where the torque is limited.
     ReduceForceWhenTorqueLimited,
-    /// Gradual increase of the normal force after landing.
-    ForceRamp,
     /// Estimate of unknown torques.
     Disturbance,
     /// Estimate of how much the contact gives; without it the contact is taken to be rigid.
@@ -40,7 +38,7 @@ pub enum Part {
 
 impl Part {
     /// All parts.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 14] = [
         Self::Governor,
         Self::Recovery,
         Self::Calibration,
@@ -48,7 +46,6 @@ impl Part {
         Self::FrictionFeedForward,
         Self::PositionIntegral,
         Self::ReduceForceWhenTorqueLimited,
-        Self::ForceRamp,
         Self::Disturbance,
         Self::Response,
         Self::Probe,
@@ -70,7 +67,6 @@ impl Part {
             Self::ReduceForceWhenTorqueLimited => {
                 &["controller.law.hybrid.reduce_force_when_torque_limited=false"]
             }
-            Self::ForceRamp => &["controller.law.hybrid.force_time_constant_s=0"],
             Self::Disturbance => &["controller.disturbance.enabled=false"],
             Self::Response => &["controller.response.enabled=false"],
             Self::Probe => &["controller.response.probe_n=0"],

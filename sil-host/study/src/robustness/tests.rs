@@ -196,7 +196,6 @@ fn other_settings(part: Part) -> &'static [&'static str] {
         Part::FrictionFeedForward
         | Part::PositionIntegral
         | Part::ReduceForceWhenTorqueLimited
-        | Part::ForceRamp
         | Part::Probe
         | Part::ForceDrift
         | Part::RestlessDistance
@@ -208,7 +207,7 @@ fn other_settings(part: Part) -> &'static [&'static str] {
 /// joints with friction, little torque and a way to the edge.
 fn occasion(part: Part) -> &'static [&'static str] {
     match part {
-        Part::Recovery | Part::ForceRamp => &[],
+        Part::Recovery => &[],
         Part::RestlessDistance => &[
             "contact.kind=compliant",
             "contact.stiffness_n_m=1e4",
