@@ -33,6 +33,8 @@ pub fn run_chore() -> Result<(), ChoreError> {
         &format!("{FOLDER}/bin/maturin"),
         &[
             "build",
+            "--profile",
+            "verify",
             "--manifest-path",
             MANIFEST,
             "--target-dir",
@@ -55,17 +57,16 @@ pub fn run_chore() -> Result<(), ChoreError> {
     run(&python, &[&execute[..], &to].concat())
 }
 
-/// Compiles the package, which is a workspace of its own, against the present crates; needs no
-/// Python.
+/// Compiles the package; needs no Python.
 ///
 /// # Errors
 /// If it does not compile.
 pub fn check() -> Result<(), ChoreError> {
     run_cargo(&[
         "check",
-        "--manifest-path",
-        MANIFEST,
-        "--target-dir",
-        "target",
+        "--profile",
+        "verify",
+        "--package",
+        "painleve-python",
     ])
 }
