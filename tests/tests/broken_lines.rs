@@ -17,7 +17,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::unistd::Uid;
 use painleve_commission::simulated::SimulatedRig;
 use painleve_commission::{OperatorTask, Rig};
-use painleve_firmware::BUILD;
+use painleve_plant::law_choice::build;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
 use painleve_shared::black_box::BlackBox;
@@ -157,7 +157,7 @@ impl BoardEnd {
                 let response = match wire::decode(message) {
                     Ok(Request::Identify) => Response::Identity {
                         protocol: PROTOCOL,
-                        build: BUILD,
+                        build: build(),
                     },
                     Ok(Request::BlackBox) => Response::BlackBox(BlackBox::default()),
                     Ok(Request::Configure { .. }) => {

@@ -1,7 +1,7 @@
 //! `cargo xtask python`: builds the Python package, installs its wheel in a virtual environment, tests it,
 //! and executes its notebook.
 
-use crate::command::{ChoreError, run, run_cargo};
+use crate::command::{ChoreError, run};
 
 const MANIFEST: &str = "python/Cargo.toml";
 const FOLDER: &str = "target/python/package";
@@ -55,18 +55,4 @@ pub fn run_chore() -> Result<(), ChoreError> {
     let execute = ["-m", "nbconvert", "--to", "html", "--execute"];
     let to = ["--output-dir", NOTEBOOK_PAGE_FOLDER, NOTEBOOK];
     run(&python, &[&execute[..], &to].concat())
-}
-
-/// Compiles the package; needs no Python.
-///
-/// # Errors
-/// If it does not compile.
-pub fn check() -> Result<(), ChoreError> {
-    run_cargo(&[
-        "check",
-        "--profile",
-        "verify",
-        "--package",
-        "painleve-python",
-    ])
 }

@@ -230,7 +230,7 @@ mod tests {
             session.controller().unwrap(),
             scenario.controller_configuration()
         );
-        let other = BUILD.wrapping_add(1);
+        let other = build().wrapping_add(1);
         session.configuration =
             postcard::to_stdvec(&(other, scenario.controller_configuration())).unwrap();
         let error = session.controller().unwrap_err().to_string();

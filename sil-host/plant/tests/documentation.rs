@@ -12,7 +12,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use painleve_firmware::BUILD;
+use painleve_firmware::SOURCES;
 use painleve_plant::scenario::describe::settings_table;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::lapse::Lapse;
@@ -297,7 +297,7 @@ fn with_measured_figures(page: &str) -> String {
     for (head, result) in shown {
         let [source, commit] = ["source", "commit"].map(|key| result[key].as_str().unwrap());
         assert!(
-            source == format!("{BUILD:016x}") || states_commits && text.contains(commit),
+            source == format!("{SOURCES:016x}") || states_commits && text.contains(commit),
             "{head} was measured with other sources, at commit {commit}: measure it again with `cargo xtask measure`, or \
              write 'measured at commit {commit}' on its page"
         );
