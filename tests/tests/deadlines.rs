@@ -137,11 +137,11 @@ fn overruns_and_missing_frames_latch_a_fault_as_on_a_board() {
     );
     assert_ne!(answers[14].torques, NO_TORQUE);
 
-    // One tick that overruns is tolerated; two in a row are not.
+    // One tick that overruns is tolerated, and two in time make up for it; two in a row are too many.
     let overload = ON | DigitalInputs::OVERLOAD;
-    assert_eq!(arm.tick(overload).latched_fault(), None);
-    assert_eq!(arm.tick(ON).latched_fault(), None);
-    assert_eq!(arm.tick(overload).latched_fault(), None);
+    for inputs in [overload, ON, ON, overload] {
+        assert_eq!(arm.tick(inputs).latched_fault(), None);
+    }
     // The answer already sent is withdrawn.
     arm.tick(overload);
     let withdrawn = arm.answer(arm.frame.tick);
