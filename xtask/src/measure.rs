@@ -3,7 +3,8 @@
 //! Each file of `docs/measured/` declares its entries: a name, a label for tables, the command, and which fields of the
 //! command's JSON are kept. This chore executes the commands and writes each `result` into its file as soon as it is
 //! finished. An entry that the present sources have measured is skipped, so that an interrupted measurement goes on
-//! where it stopped. The pages then take their figures from these files.
+//! where it stopped. The pages then take their figures from these files. An entry that keeps nothing belongs to a command
+//! without JSON, and its result is copied by hand.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry::{Occupied, Vacant};
@@ -93,17 +94,22 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
             if !is_named(&whole) {
                 continue;
             }
+            let command = text(&entry, "command")?.to_owned();
             let source = entry.get("result").and_then(|result| result.get("source"));
             let is_finished = source.and_then(toml::Value::as_str) == Some(&here.source);
+            let is_by_hand = !entry.contains_key("keep");
             if arguments.list {
-                let state = if is_finished { "measured" } else { "missing" };
+                let state = match (is_by_hand, is_finished) {
+                    (true, _) => format!("copied by hand from `{command}`"),
+                    (_, true) => "measured".into(),
+                    _ => "missing".into(),
+                };
                 say(&format!("{whole}: {state}"))?;
                 continue;
             }
-            if is_finished && !arguments.again && !arguments.quick {
+            if is_by_hand || is_finished && !arguments.again && !arguments.quick {
                 continue;
             }
-            let command = text(&entry, "command")?.to_owned();
             let command = if arguments.quick {
                 with_fewer_runs(&command)
             } else {

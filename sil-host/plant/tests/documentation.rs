@@ -321,3 +321,167 @@ fn check_measured_figures() {
         fs::write(&page, expected).unwrap();
     }
 }
+
+/// What a measurement has as its result: `#` is a number, `#.#` one with a fraction, `#.####` one with four decimals or more.
+const MEASURED_KINDS: [&str; 21] = [
+    "# of #",
+    "#.# %",
+    "#.####",
+    "# N rms",
+    "# mN·m",
+    "# lift-offs",
+    "# impacts",
+    "# faults",
+    "# cycles",
+    "# instructions",
+    "# ns",
+    "# µs",
+    "# ticks/s",
+    "# frames/s",
+    "# × real",
+    "# simulated",
+    "# CPU",
+    "# KB",
+    "# MB",
+    "# minutes",
+    "# seconds",
+];
+
+/// Figures that look measured but are limits or definitions: page, words, reason.
+const NOT_MEASURED: [(&str, &str, &str); 8] = [
+    ("README.md", "to 0.0375 m", "the paper's target for its PID"),
+    (
+        "studies.md",
+        "0.0375 m elbow down",
+        "the paper's result for its PID",
+    ),
+    ("introduction.md", "0.3775 m", "the paper's arm"),
+    (
+        "plant.md",
+        "−0.175689 m",
+        "a solution of the model, which a test holds",
+    ),
+    (
+        "plant.md",
+        "0.441238 N",
+        "a solution of the model, which a test holds",
+    ),
+    ("benchmarks.md", "10 µs", "a step of the integrators"),
+    ("recording.md", "2 MB", "a limit, which a test holds"),
+    ("reliability.md", "500 MB", "a limit, which a test holds"),
+];
+
+/// Returns the prose of a page: neither code nor formulas, nor what is generated or measured.
+fn prose(page: &str) -> String {
+    let mut text = String::new();
+    let mut rest = page;
+    while let Some((before, after)) = rest.split_once("<!-- ") {
+        text += before;
+        let end = after
+            .find("<!-- end -->")
+            .into_iter()
+            .chain(after.find(END))
+            .min();
+        let block = &after[end.unwrap_or(0)..];
+        rest = block.split_once("-->").map_or("", |(_, after)| after);
+        text += " ";
+    }
+    text += rest;
+    for mark in ["```", "$$", "`", "$"] {
+        text = text.split(mark).step_by(2).collect::<Vec<_>>().join(" ␣ ");
+    }
+    text
+}
+
+/// Returns whether a word of a page is what a word of a kind stands for.
+fn matches(word: &str, kind: &str) -> bool {
+    let word = word.trim_matches(['(', ')', ',', '.', ';', ':', '*', '±', '−']);
+    let Some(fraction) = kind.strip_prefix('#') else {
+        return word == kind;
+    };
+    let is_digit = |c: char| c.is_ascii_digit();
+    let is_number =
+        word.contains(is_digit) && word.chars().all(|c| is_digit(c) || ".,–−".contains(c));
+    let decimals = word.split('.').next_back().unwrap_or_default().len();
+    is_number
+        && match fraction {
+            "" => true,
+            ".#" => word.contains('.'),
+            _ => word.contains('.') && decimals >= 4,
+        }
+}
+
+/// Returns the measured figures that the prose of a page contains.
+fn typed_figures(text: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let words: Vec<&str> = text.split_whitespace().collect();
+    for kind in MEASURED_KINDS {
+        let kind: Vec<&str> = kind.split(' ').collect();
+        for at in words.windows(kind.len()) {
+            if at.iter().zip(&kind).all(|(word, kind)| matches(word, kind)) {
+                found.push(at.join(" "));
+            }
+        }
+    }
+    let cells = text.lines().filter(|line| line.starts_with('|'));
+    for cell in cells.flat_map(|line| line.split('|')).map(str::trim) {
+        if matches(cell, "#") && cell.contains(['.', ',']) {
+            found.push(format!("| {cell} |"));
+        }
+    }
+    found
+}
+
+/// A measured figure stands in a block that takes it from `docs/measured`: typed by hand, it becomes false unnoticed.
+#[test]
+fn no_measured_figure_is_typed_by_hand() {
+    let mut found = Vec::new();
+    for path in pages() {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let mut text = prose(&fs::read_to_string(&path).unwrap());
+        for (_, words, reason) in NOT_MEASURED.iter().filter(|(page, ..)| *page == name) {
+            assert!(
+                text.contains(words),
+                "{name} no longer has '{words}' ({reason}): take it off the list"
+            );
+            text = text.replace(words, "");
+        }
+        found.extend(
+            typed_figures(&text)
+                .into_iter()
+                .map(|figure| format!("{name}: {figure}")),
+        );
+    }
+    assert!(
+        found.is_empty(),
+        "measured figures typed by hand; take them from docs/measured, or list them as limits: {found:#?}"
+    );
+}
+
+#[test]
+fn figures_of_every_measured_kind_are_recognised() {
+    for text in [
+        "60 of 60 runs",
+        "99.4 %",
+        "(98.8–99.5 %)",
+        "at 0.1526 m",
+        "2,304 instructions,",
+        "45 mN·m",
+        "0.03 N rms",
+        "| 9,480 |",
+    ] {
+        assert_eq!(typed_figures(text).len(), 1, "{text}");
+    }
+    for text in [
+        "95 % of them",
+        "within 0.5 s",
+        "2.0 m",
+        "| 20 mm |",
+        "| 3 |",
+    ] {
+        assert!(typed_figures(text).is_empty(), "{text}");
+    }
+    let page =
+        "<!-- measured: a.b.c -->2.5<!-- /measured --> % `7 of 8` $0.1234$\n```\n5 µs\n```\n";
+    assert!(typed_figures(&prose(page)).is_empty());
+}
