@@ -402,12 +402,12 @@ fn matches(word: &str, kind: &str) -> bool {
     let is_digit = |c: char| c.is_ascii_digit();
     let is_number =
         word.contains(is_digit) && word.chars().all(|c| is_digit(c) || ".,–−".contains(c));
-    let decimals = word.split('.').next_back().unwrap_or_default().len();
+    let decimals = |number: &str| number.split_once('.').map_or(0, |(_, digits)| digits.len());
     is_number
         && match fraction {
             "" => true,
             ".#" => word.contains('.'),
-            _ => word.contains('.') && decimals >= 4,
+            _ => word.split('–').any(|number| decimals(number) >= 4),
         }
 }
 
