@@ -33,7 +33,7 @@ settings! {
         rigid: f32 = 0.5, 1e-3..=1.0;
         /// Upper bound of the response below which the law damps the contact.
         gives: f32 = 0.2, 1e-3..=1.0;
-        /// Amplitude of the probe, a noise-like force that is added to the wanted normal force near the
+        /// Amplitude of the probe, a noise-like force that is added to the desired normal force near the
         /// edge until the contact is known to be rigid.
         probe_n: f32 = 0.1, 0.0..=10.0, "N";
         /// Least contact damping c that is assumed.
@@ -43,7 +43,7 @@ settings! {
         /// Time of observation near that p/Q22 before the tip may go closer to the edge.
         observation_s: f32 = 0.3, 0.0..=100.0, "s";
         /// Speed at which the least p/Q22 then falls while the contact is rigid. It rises four times as
-        /// fast while the contact gives.
+        /// fast while the contact is compliant.
         approach_per_s: f32 = 0.1, 0.0..=100.0, "1/s";
     }
 }
