@@ -30,8 +30,8 @@ settings! {
         force_reversed: [bool; 2] = [false; 2];
         /// Readings of f_t and f_n without a load, in counts from the live zero, before any change of sign.
         force_tare: [ForceCounts; 2] = [ForceCounts(0); 2], -(1 << 21)..=(1 << 21) - 1, "counts";
-        /// Lowest code of the force cell's converter (4096 counts are 5 V, the live zero is 2048) that a
-        /// working cell gives: below, a supply or a wire is dead.
+        /// Lowest code of the force cell's converter that a working cell gives: 4096 counts are 5 V, the live zero is
+        /// 2048.
         force_lowest_code: u16 = 82, 41..=1024, "counts";
         /// Highest code that a working cell gives.
         force_highest_code: u16 = 4013, 3071..=4054, "counts";
@@ -40,11 +40,10 @@ settings! {
         /// Whether the second encoders of θ1 and of the elbow count backwards.
         second_encoder_reversed: [bool; 2] = [false; 2];
         /// Whether the second force cell, or second bridges on the same one, read f_t and f_n with the opposite
-        /// sign. Their tare is not needed: the difference of the channels is measured while the drive is off.
+        /// sign. Their tare is not needed.
         second_force_reversed: [bool; 2] = [false; 2];
-        /// Largest difference of two encoders of one joint by their noise, in counts of 14 bits. The default is
-        /// six standard deviations of the difference with the largest noise in the data sheet of the AS5048A,
-        /// 0.06° rms each: beyond it once in some 70 hours at 1 kHz.
+        /// Largest difference of two encoders of one joint by their noise, in counts of 14 bits; by default six standard
+        /// deviations of the noisiest AS5048A.
         second_encoder_tolerance: u16 = 23, 4..=400, "counts";
         /// Largest difference of two readings of one force by their noise, in counts of 12 bits.
         second_force_tolerance: u16 = 16, 4..=400, "counts";

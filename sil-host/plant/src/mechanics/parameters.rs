@@ -64,9 +64,8 @@ settings! {
         absolute_tolerance: f64 = 1e-10, 1e-14..=1e-3;
         /// Largest step.
         maximum_step_s: f64 = 0.05, 1e-5..=1.0, "s";
-        /// A rebound slower than this ends a series of bounces. With the default, the last bounces
-        /// are lower than 1e-13 m, below the rounding error of the gap. Below the smallest allowed
-        /// speed, bounces end within that rounding error and never settle.
+        /// A rebound slower than this ends a series of bounces. With the default, the last bounces are lower than the
+        /// rounding error of the gap.
         chatter_speed_m_s: f64 = 1e-6, 1e-7..=1e-2, "m/s";
         /// What follows if both sliding and flight are solutions.
         indeterminate: Indeterminate = Indeterminate::Flight;
