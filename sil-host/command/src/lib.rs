@@ -4,6 +4,7 @@ mod bridge;
 mod commission;
 mod completions;
 mod controller;
+mod distinct_files;
 mod doctor;
 mod drive;
 mod export;
@@ -24,8 +25,8 @@ mod study;
 mod sweep;
 mod timing;
 
+use std::io::Write;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -146,14 +147,6 @@ pub enum CommandError {
     /// A file or option cannot be used.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Two files would replace each other.
-    #[error("--{} and --{} both name `{}`: choose different files", options[0], options[1], path.display())]
-    SameFile {
-        /// The options that name them.
-        options: [&'static str; 2],
-        /// The path.
-        path: PathBuf,
-    },
     /// The study failed.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -192,7 +185,6 @@ impl CommandError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Scenario(_)
-            | Self::SameFile { .. }
             | Self::Input(_)
             | Self::Cyclictest(CyclictestError::OtherHost)
             | Self::Bound(_) => 2,
@@ -239,10 +231,32 @@ impl From<std::io::Error> for CommandError {
 
 /// Writes a line to standard output.
 fn say(line: impl std::fmt::Display) -> Result<(), CommandError> {
-    terminal::say(line).map_err(|error| match error.kind() {
+    terminal::say(line).map_err(unsaid)
+}
+
+/// Returns the error of a write to standard output.
+fn unsaid(error: std::io::Error) -> CommandError {
+    match error.kind() {
         std::io::ErrorKind::BrokenPipe => CommandError::Unread,
         _ => output(OutputError::StandardOutput(error)),
-    })
+    }
+}
+
+/// Prints the help, the version or a usage error, and returns the exit code of the process.
+fn tell_usage(usage: &clap::Error) -> ExitCode {
+    let written = usage.print().and_then(|()| std::io::stdout().flush());
+    match written.map_err(unsaid) {
+        Err(error) if !usage.use_stderr() => exit_code_of(&error),
+        _ => u8::try_from(usage.exit_code()).unwrap_or(2).into(),
+    }
+}
+
+/// Prints an error, unless it has been printed or nobody wants it, and returns the exit code of the process.
+fn exit_code_of(error: &CommandError) -> ExitCode {
+    if !matches!(error, CommandError::Told { .. } | CommandError::Unread) {
+        warn(format_args!("error: {error}"));
+    }
+    ExitCode::from(error.exit_code())
 }
 
 /// Longest delay of Ctrl-C between two processes of a terminal.
@@ -282,7 +296,10 @@ pub fn main_with<L: ScenarioLaws>() -> ExitCode {
 
 /// Runs the command line and returns the exit code of the process.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(usage) => return tell_usage(&usage),
+    };
     panic::set_hook(Box::new(tell_panic));
     // Values that a panic may have left inconsistent are not used afterwards.
     let result = panic::catch_unwind(AssertUnwindSafe(|| {
@@ -299,12 +316,7 @@ pub fn main() -> ExitCode {
     }));
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            if !matches!(error, CommandError::Told { .. } | CommandError::Unread) {
-                warn(format_args!("error: {error}"));
-            }
-            ExitCode::from(error.exit_code())
-        }
+        Err(error) => exit_code_of(&error),
     }
 }
 

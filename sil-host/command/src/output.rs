@@ -1,8 +1,7 @@
 //! The output files of a run, written while it runs.
 
-use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -24,6 +23,7 @@ use painleve_system::terminal::warn;
 use painleve_view::PageFile;
 
 use super::CommandError;
+use super::distinct_files::{self, check_distinct};
 use super::output_error::output;
 
 /// The files that a run writes.
@@ -61,7 +61,7 @@ impl OutputArguments {
     pub fn to_arguments(&self) -> Vec<OsString> {
         let mut arguments = Vec::new();
         for (option, path) in self.files() {
-            arguments.extend([format!("--{option}").into(), path.into()]);
+            arguments.extend([option.into(), path.into()]);
         }
         for (option, given) in [
             ("--no-record", self.no_record),
@@ -75,15 +75,15 @@ impl OutputArguments {
     }
 
     /// Returns the files to write, each with its option.
-    fn files(&self) -> Vec<(&'static str, &Path)> {
+    pub fn files(&self) -> Vec<distinct_files::Output<'_>> {
         let wanted: [(_, Option<&PathBuf>); 4] = [
-            ("record", (!self.no_record).then_some(&self.record)),
-            ("plot", (!self.no_plot).then_some(&self.plot)),
+            ("--record", (!self.no_record).then_some(&self.record)),
+            ("--plot", (!self.no_plot).then_some(&self.plot)),
             (
-                "html",
+                "--html",
                 (!self.no_html && !self.no_plot).then_some(&self.html),
             ),
-            ("csv", self.csv.as_ref()),
+            ("--csv", self.csv.as_ref()),
         ];
         wanted
             .into_iter()
@@ -93,23 +93,17 @@ impl OutputArguments {
 
     /// Creates the files.
     fn sinks(&self, scenario: &Scenario) -> Result<Sinks, CommandError> {
-        let mut options = BTreeMap::new();
+        check_distinct(&self.files())?;
         let mut sinks: Sinks = Vec::new();
         for (option, path) in self.files() {
             let file = AtomicFile::create(path).map_err(output)?;
-            if let Some(first) = options.insert(file.target().to_path_buf(), option) {
-                return Err(CommandError::SameFile {
-                    options: [first, option],
-                    path: path.to_path_buf(),
-                });
-            }
             file.check_alone().map_err(output)?;
             sinks.push(match option {
-                "record" => {
+                "--record" => {
                     Box::new(McapLog::to(file, scenario, Source::Simulation).map_err(output)?)
                 }
-                "csv" => Box::new(CsvTable::to(file).map_err(output)?),
-                "html" => Box::new(PageFile::new(file, scenario)),
+                "--csv" => Box::new(CsvTable::to(file).map_err(output)?),
+                "--html" => Box::new(PageFile::new(file, scenario)),
                 _ => Box::new(PlotFile {
                     plot: RunPlot::new(scenario),
                     file,
@@ -140,8 +134,8 @@ impl Sink for EventPrinter {
         Ok(())
     }
 
-    fn finish(self: Box<Self>) -> Result<(), RecordError> {
-        Ok(())
+    fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
+        Ok(None)
     }
 }
 
@@ -151,7 +145,7 @@ const PROGRESS_TICKS: u64 = 256;
 /// The files of a run and its progress bar.
 pub struct Output {
     /// The files' paths, as they were given.
-    paths: Vec<PathBuf>,
+    paths: Vec<String>,
     /// `None` if the run writes no file.
     recorder: Option<Recorder>,
     progress: ProgressBar,
@@ -163,7 +157,7 @@ impl Output {
     /// Creates the files, so that an unwritable path is reported before anything runs.
     ///
     /// # Errors
-    /// [`CommandError::Output`] or [`CommandError::SameFile`].
+    /// [`CommandError::Output`], or [`CommandError::Input`] if two names mean one file.
     pub fn open(
         arguments: &OutputArguments,
         scenario: &Scenario,
@@ -176,7 +170,10 @@ impl Output {
             let configuration = scenario.controller_configuration();
             Some(Recorder::start(&configuration, sinks).map_err(output)?)
         };
-        let paths = arguments.files().into_iter().map(|(_, path)| path.into());
+        let paths = arguments
+            .files()
+            .into_iter()
+            .map(|(_, path)| path.display().to_string());
         Ok(Self {
             paths: paths.collect(),
             recorder,
@@ -198,7 +195,7 @@ impl Output {
     }
 
     /// Completes the files and returns their paths; without this nothing appears under their names.
-    pub fn finish(self) -> Result<Vec<PathBuf>, CommandError> {
+    pub fn finish(self) -> Result<Vec<String>, CommandError> {
         self.progress.finish_and_clear();
         if let Some(recorder) = self.recorder {
             recorder.finish().map_err(output)?;

@@ -14,6 +14,9 @@ use nix::libc::O_NONBLOCK;
 /// Largest size of a settings file, bytes. Real ones have a few thousand.
 pub const MOST_BYTES: u64 = 16 << 20;
 
+/// Largest size of a controller's image with its debug information, bytes. Real ones have ten million.
+pub const MOST_IMAGE_BYTES: u64 = 256 << 20;
+
 /// The files opened so far, by device and inode.
 static OPENED: Mutex<BTreeMap<(u64, u64), PathBuf>> = Mutex::new(BTreeMap::new());
 
