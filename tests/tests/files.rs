@@ -50,11 +50,7 @@ fn contents(bench: &Bench) -> Vec<(String, Vec<u8>)> {
 fn furnished(name: &str) -> Bench {
     let bench = Bench::new(name);
     fs::write(bench.path("belt.csv"), "time_s,speed_m_s\n0,-0.4\n1,-0.4\n").unwrap();
-    fs::write(
-        bench.path("friction.csv"),
-        "position_m,friction\n0,0.5\n1,0.5\n",
-    )
-    .unwrap();
+    fs::write(bench.path("friction.csv"), "time_s,change\n0,0\n1,0.1\n").unwrap();
     fs::write(
         bench.path("reference.csv"),
         "time_s,target_m\n0.1,0.01\n0.2,0.02\n",
@@ -281,7 +277,7 @@ fn links_that_lead_nowhere_are_named() {
 #[allow(clippy::unwrap_used)]
 fn damaged_records_are_refused_and_what_is_whole_is_recovered() {
     let bench = Bench::new("damaged");
-    let record = "run edge --set run.duration_s=0.6 --no-plot --record r.mcap --csv true.csv";
+    let record = "run edge --set run.duration_s=1.5 --no-plot --record r.mcap --csv true.csv";
     assert!(run(&bench, record).status.success());
     let (bytes, table) = (
         fs::read(bench.path("r.mcap")).unwrap(),

@@ -123,10 +123,15 @@ fn export(
         exported => {
             let mut exported = record_error(arguments, exported)?;
             match exported.damage.take() {
-                Some(damage) if !arguments.recover => record_error(
-                    arguments,
-                    Err(RecordFileError::Damaged { damage, exported }),
-                ),
+                Some(damage) if !arguments.recover => {
+                    let damaged = RecordFileError::Damaged {
+                        reason: damage.to_string(),
+                        whole_bytes: exported.whole_bytes,
+                        rows: exported.rows,
+                        end_s: exported.end_s,
+                    };
+                    record_error(arguments, Err(damaged))
+                }
                 damage => Ok(Exported { damage, ..exported }),
             }
         }

@@ -4,8 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use painleve_commission::simulated::SimulatedError;
-use painleve_record::export::{ExportError, Exported};
-use painleve_record::record_file::Damage;
+use painleve_record::export::ExportError;
 use painleve_record::recorder::RecordError;
 use painleve_system::atomic_file::AtomicFileError;
 use painleve_system::picture::PictureError;
@@ -58,14 +57,17 @@ pub enum RecordFileError {
     Content(#[from] ExportError),
     /// It is damaged, but not at its beginning.
     #[error(
-        "it is damaged after {} bytes: {damage}; --recover exports the {} ticks before, up to {} s",
-        exported.whole_bytes, exported.rows, exported.end_s
+        "it is damaged after {whole_bytes} bytes: {reason}; --recover exports the {rows} ticks before, up to {end_s} s"
     )]
     Damaged {
         /// What is wrong.
-        damage: Damage,
-        /// What is whole.
-        exported: Exported,
+        reason: String,
+        /// Bytes before the damage.
+        whole_bytes: u64,
+        /// Whole ticks.
+        rows: u64,
+        /// Time of the last of them, s.
+        end_s: f64,
     },
 }
 
