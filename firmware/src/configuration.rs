@@ -6,7 +6,8 @@
 use painleve_shared::counts::{EncoderScale, LinearScale};
 use painleve_shared::mounting::Mounting;
 use painleve_shared::range::{self, OutOfRange};
-use painleve_shared::settings::Settings;
+use painleve_shared::schema::SchemaHash;
+use painleve_shared::settings::{SettingValue, Settings};
 use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, Pose, Real, check_setting, settings};
@@ -66,7 +67,7 @@ settings! {
         belt: BeltSpeedSettings = BeltSpeedSettings::default();
         /// Estimation of unknown torques.
         disturbance: DisturbanceSettings = DisturbanceSettings::default();
-        /// Estimation of how much the contact gives.
+        /// Estimation of the contact's compliance.
         response: ResponseSettings = ResponseSettings::default();
         /// Calibration of the links' length.
         calibration: CalibrationSettings = CalibrationSettings::default();
@@ -142,6 +143,15 @@ impl<L: Law> Default for Configuration<L> {
 }
 
 impl<L: Law> Configuration<L> {
+    /// Identifies the build: hash of what the bytes of a configuration and of the messages mean. The host and the
+    /// board compare it before the board accepts a configuration, because the bytes carry no names.
+    pub const BUILD: u64 = SchemaHash::of_messages()
+        .value("tick_hz", &f32::SHAPE)
+        .value("arm", &ArmParameters::<f32>::SHAPE)
+        .value("converters", &Converters::SHAPE)
+        .value("settings", &ControllerSettings::<L>::SHAPE)
+        .finish();
+
     /// Returns the control period, s.
     pub fn tick_s(&self) -> f32 {
         1.0 / self.tick_hz
@@ -226,9 +236,21 @@ fn within(group: &'static str, result: Result<(), OutOfRange>) -> Result<(), Out
 mod tests {
     use super::*;
     use crate::estimate::contact::Evidence;
+    use crate::law::pid::PidSettings;
 
     fn speeds(configuration: &Configuration) -> LoopSpeeds {
         configuration.loop_speeds(&Arm::new(configuration.arm).unwrap())
+    }
+
+    #[test]
+    fn the_build_covers_every_part_of_the_configuration_and_the_laws() {
+        let Configuration {
+            tick_hz: _,
+            arm: _,
+            converters: _,
+            settings: _,
+        } = <Configuration>::default();
+        assert_ne!(<Configuration>::BUILD, Configuration::<PidSettings>::BUILD);
     }
 
     #[test]

@@ -32,10 +32,10 @@ pub mod supervise;
 pub mod telemetry;
 pub mod torque_output;
 
-/// Hash of the sources of controller and messages, which identifies a build. The host and the board
-/// compare it before the board accepts a configuration.
-pub const BUILD: u64 = match u64::from_str_radix(env!("PAINLEVE_BUILD"), 16) {
-    Ok(build) => build,
+/// Hash of the sources of the controller and of what it shares with the plant. It is displayed, and tells an image of
+/// these sources from one that may behave differently.
+pub const SOURCES: u64 = match u64::from_str_radix(env!("PAINLEVE_SOURCES"), 16) {
+    Ok(hash) => hash.rotate_left(1) ^ painleve_shared::SOURCES,
     Err(_) => panic!("the build script writes sixteen hexadecimal digits"),
 };
 

@@ -2,6 +2,7 @@
 //!
 //! Each is declared once, below, with its limit and the fault latched beyond the limit.
 
+use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::settings;
@@ -74,7 +75,7 @@ macro_rules! lapses {
         }
 
         /// Number of lapses of each kind. Counters wrap.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub struct LapseCounts {
             $($(

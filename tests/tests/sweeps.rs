@@ -282,7 +282,10 @@ fn mistakes_are_reported_and_nothing_is_written() {
     ] {
         refused(&["run", "--shard", shard], part);
     }
-    refused(&["plan", "campaign.toml", "--shards", "4"], "another sweep");
+    refused(
+        &["plan", "campaign.toml", "--shards", "4"],
+        "another sweep is planned here; choose another --folder, or delete the folder out/sweep",
+    );
     for (from, to, part) in [
         ("format = 1", "format = 2", "another version"),
         ("version = \"", "version = \"9", "another version"),

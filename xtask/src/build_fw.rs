@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::boards;
+use crate::boards::{self, BoardPackage};
 use crate::command::{ChoreError, cargo, run_with, workspace};
 
 /// The microcontroller's target.
@@ -23,12 +23,39 @@ enum Toolchain {
     Debian,
 }
 
-/// Builds every image.
+/// Which images.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Images {
+    /// Those of the default tier of tests: the first board that can be flashed, and the emulated one.
+    Default,
+    /// Those of every board.
+    All,
+}
+
+impl Images {
+    /// Returns the boards of these images, sorted by folder name.
+    ///
+    /// # Errors
+    /// If cargo cannot read the workspace.
+    pub fn boards(self) -> Result<Vec<BoardPackage>, ChoreError> {
+        let mut boards = boards::all()?;
+        let first = boards.iter().position(|board| board.chip.is_some());
+        let mut index = 0;
+        boards.retain(|board| {
+            let is_default = board.chip.is_none() || Some(index) == first;
+            index += 1;
+            self == Self::All || is_default
+        });
+        Ok(boards)
+    }
+}
+
+/// Builds images.
 ///
 /// # Errors
 /// If the target is not installed, or the build fails.
-pub fn run() -> Result<(), ChoreError> {
-    let boards = boards::all()?;
+pub fn run(images: Images) -> Result<(), ChoreError> {
+    let boards = images.boards()?;
     let mut selection = vec!["--profile", PROFILE, "--bins"];
     for board in &boards {
         selection.extend(["--package", &board.package]);
@@ -76,9 +103,14 @@ pub fn build(
     }
 }
 
+/// Returns the folder of the built images.
+pub fn folder() -> PathBuf {
+    workspace().join("target").join(TARGET).join(PROFILE)
+}
+
 /// Returns the path of a built image.
 pub fn image(name: &str) -> PathBuf {
-    workspace().join(format!("target/{TARGET}/{PROFILE}/{name}"))
+    folder().join(name)
 }
 
 /// Returns whether `rustc` has the target's core library.

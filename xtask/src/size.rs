@@ -6,9 +6,8 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::boards;
-use crate::build_fw;
-use crate::command::{ChoreError, run_cargo, say, workspace};
+use crate::build_fw::{self, Images};
+use crate::command::{ChoreError, PROFILE, program, run_cargo, say, workspace};
 
 /// All limits; the end-to-end tests check those of the ticks and of the stack as well.
 const BUDGET: &str = include_str!("../../tests/budget.json");
@@ -28,16 +27,30 @@ const TOLERANCE: f64 = 0.03;
 /// Number of largest symbols to print.
 const LARGEST: usize = 12;
 
-/// Builds the images, prints their sizes, and runs one to measure its stack.
+/// Builds the images and the program, and checks the images.
 ///
 /// # Errors
-/// If the build or the measurement fails, or an image exceeds a limit.
+/// If a build fails, or as [`check_images`].
 pub fn run() -> Result<(), ChoreError> {
-    build_fw::run()?;
-    run_cargo(&["build", "--release", "--package", "painleve-command"])?;
+    build_fw::run(Images::All)?;
+    run_cargo(&[
+        "build",
+        "--profile",
+        PROFILE,
+        "--package",
+        "painleve-command",
+    ])?;
+    check_images(Images::All)
+}
+
+/// Prints the sizes of images that are built, and runs one to measure its stack.
+///
+/// # Errors
+/// If the measurement fails, or an image exceeds a limit.
+pub fn check_images(images: Images) -> Result<(), ChoreError> {
     let mut over = Vec::new();
     let budget = Budget::read()?;
-    let boards = boards::all()?;
+    let boards = images.boards()?;
     for name in boards.iter().flat_map(|board| &board.images) {
         let path = build_fw::image(name);
         let error = |reason: String| ChoreError(format!("{}: {reason}", path.display()));
@@ -142,10 +155,9 @@ fn misprinted(what: &str, chip: &str, size: u64, limit: u64) -> Option<String> {
 /// Returns the largest stack use of any scenario, measured on the emulated board. It occurs while
 /// the configuration is decoded and in the first ticks.
 fn stack_bytes() -> Result<u64, ChoreError> {
-    let program = workspace().join("target/release/painleve");
     let arguments = ["timing", "--json", "--set", "run.duration_s=0.1"];
     let error = |what: &str| ChoreError(format!("`painleve {}` {what}", arguments.join(" ")));
-    let output = Command::new(&program)
+    let output = Command::new(program())
         .args(arguments)
         .current_dir(workspace())
         .stderr(Stdio::inherit())

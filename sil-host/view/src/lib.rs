@@ -5,6 +5,7 @@
 //! - [`page`]: the page of a recorded run as one file that needs no network
 //! - [`server`]: the viewers of a live run on this machine: the same page, and Foxglove
 //! - [`hub`], [`request`]: data on their way to the viewers, and their requests
+//! - [`parameters`]: the settings of a live run, by name
 //! - [`foxglove`]: Foxglove's WebSocket protocol
 //!
 //! `page/` contains the page itself; its scripts need no build step.
@@ -12,6 +13,8 @@
 pub mod foxglove;
 pub mod hub;
 pub mod page;
+pub mod parameters;
+mod receive;
 pub mod request;
 pub mod row;
 pub mod server;

@@ -18,6 +18,7 @@ use tungstenite::{Message, WebSocket};
 
 use crate::foxglove;
 use crate::hub::{Hub, PageQueue, locked};
+use crate::receive::receive;
 use crate::request::{Order, Orders};
 
 /// Time between two messages to a viewer.
@@ -207,22 +208,6 @@ fn web_socket(stream: TcpStream) -> io::Result<WebSocket<TcpStream>> {
         Role::Server,
         Some(limits),
     ))
-}
-
-/// Waits for a viewer's message until it is time to send to it.
-pub(crate) fn receive(
-    socket: &mut WebSocket<TcpStream>,
-) -> Result<Option<Message>, tungstenite::Error> {
-    match socket.read() {
-        Ok(Message::Close(_)) => Err(tungstenite::Error::ConnectionClosed),
-        Ok(message) => Ok(Some(message)),
-        Err(tungstenite::Error::Io(error))
-            if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
-        {
-            Ok(None)
-        }
-        Err(error) => Err(error),
-    }
 }
 
 /// Reads a request up to its empty line.

@@ -82,7 +82,7 @@ const BREAKING_AWAY_M_S2: f32 = 1.0;
 /// The hybrid law's state.
 #[derive(Clone, Copy, Debug)]
 pub struct HybridState {
-    /// Wanted normal force while it approaches f_n*, N; f_n* itself before the first reset.
+    /// Desired normal force while it approaches f_n*, N; f_n* itself before the first reset.
     wanted_force_n: Option<f32>,
     /// K'_I ∫ (f_n* − f_n) dt, N.
     force_integral_n: f32,

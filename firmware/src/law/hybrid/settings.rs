@@ -35,7 +35,7 @@ settings! {
     /// and 14-bit encoders.
     #[derive(Copy)]
     pub struct HybridSettings {
-        /// Wanted normal force f_n*.
+        /// Desired normal force f_n*.
         normal_force_n: f32 = 10.0, 0.0..=1e3, "N";
         /// Position gain K'_P.
         position_gain_per_s2: f32 = 9000.0, 0.0..=1e6, "1/s²";
@@ -58,7 +58,7 @@ settings! {
         force_integral_gain_per_s: f32 = 5.0, 0.0..=1e4, "1/s";
         /// Largest correction by the force integral.
         force_integral_limit_n: f32 = 5.0, 0.0..=1e3, "N";
-        /// Damping of a contact that gives, as a fraction of the change of force.
+        /// Damping of a compliant contact, as a fraction of the change of force.
         contact_damping: f32 = 4.0, 0.0..=10.0;
         /// Rate of change above which it damps.
         contact_damping_rad_s: f32 = 1000.0, 1.0..=1e4, "rad/s";

@@ -13,9 +13,9 @@ use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
-use painleve_view::foxglove::parameters::parameters;
 use painleve_view::hub::Hub;
 use painleve_view::page::{description, html};
+use painleve_view::parameters::parameters;
 use painleve_view::request::{Order, Outcome, ViewerRequest};
 use painleve_view::server::Server;
 use serde_json::json;
@@ -35,6 +35,9 @@ const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 
 /// Serves a run that goes on until it is interrupted, to its page and to Foxglove; pages of `origins`
 /// may connect as Foxglove does.
+///
+/// # Errors
+/// [`CommandError`] if the page cannot be served, or the run ends early.
 pub fn run(
     scenario: &Scenario,
     port: u16,

@@ -9,8 +9,9 @@ use painleve_shared::status::Fault;
 use super::*;
 use crate::{Outcome, rows};
 
-/// Nothing is tuned on the runs of this one.
-const HELD_OUT_SEED: u64 = 987_654_321;
+/// A fixed seed, which gates every change: its runs show that a change has broken the controller. They do not measure
+/// success on new seeds, as the campaigns in the documentation do.
+const REGRESSION_SEED: u64 = 987_654_321;
 
 fn campaign(runs: usize) -> Robustness {
     Robustness {
@@ -36,15 +37,16 @@ fn rows_do_not_depend_on_threads() {
     assert_eq!(outcome.worst.len(), failed);
 }
 
-/// Of a seed on which nothing has been tuned.
+/// If 99.45 % of all runs succeed, as in the campaign, fewer than 294 of 300 do with a probability of 0.0015 (binomial); if
+/// 97 %, with one of 0.80.
 #[test]
-fn most_runs_of_a_held_out_seed_succeed() {
+fn the_runs_of_the_regression_seed_succeed() {
     let study = Robustness {
-        seed: HELD_OUT_SEED,
+        seed: REGRESSION_SEED,
         ..campaign(300)
     };
     let outcome = RobustnessOutcome::new(Arms::Paper, study.seed, rows(&study, || ()).unwrap());
-    assert!(outcome.success.lower > 0.93, "{}", outcome.table());
+    assert!(outcome.success.successes >= 294, "{}", outcome.table());
 }
 
 #[test]
@@ -115,8 +117,7 @@ fn general_arms_are_in_their_ranges_and_all_different() {
     assert!(drawn.windows(2).all(|pair| pair[0].arm != pair[1].arm));
 }
 
-/// A seed that nothing was tuned on. With the campaign's 99.5 % fewer than 97 of 100 have a
-/// probability below 0.002.
+/// If 99.5 % of all runs succeed, as in the campaign, fewer than 97 of 100 do with a probability of 0.0017 (binomial).
 #[test]
 fn general_arms_succeed_too() {
     let study = Robustness {
@@ -133,7 +134,7 @@ fn general_arms_succeed_too() {
 #[test]
 fn a_stiff_damped_contact_is_found() {
     let study = Robustness {
-        seed: HELD_OUT_SEED,
+        seed: REGRESSION_SEED,
         overrides: [
             "contact.kind=compliant",
             "contact.stiffness_n_m=1e6",
