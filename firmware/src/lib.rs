@@ -9,8 +9,8 @@
 //! The modules follow the order of one tick: [`controller`] checks the frame; [`estimate`] converts
 //! counts to angles, rates, contact and friction; [`supervise`] decides which actions are allowed;
 //! [`refer`] gives the target position of the tip; [`demand`] computes torques, with the [`law`] or,
-//! to return a thrown tip to the belt, with [`recover`]; [`torque_output`] limits them and, by
-//! [`guard`], keeps the tip pressed. [`telemetry`] exposes the internal state. [`drive`] runs the
+//! to return a thrown tip to the belt, with [`recover`]; [`torque_output`] limits
+//! them. [`telemetry`] exposes the internal state. [`drive`] runs the
 //! ticks on the hardware.
 
 #![no_std]
@@ -23,11 +23,11 @@ pub mod controller;
 pub mod demand;
 pub mod drive;
 pub mod estimate;
-pub mod guard;
 pub mod last_command;
 pub mod law;
 pub mod recover;
 pub mod refer;
+pub mod schedule;
 pub mod supervise;
 pub mod telemetry;
 pub mod torque_output;

@@ -62,8 +62,6 @@ bitflags! {
         const SATURATED = 1 << 1;
         /// The last segment of the reference has ended.
         const REFERENCE_DONE = 1 << 2;
-        /// The contact guard changed the torque to keep the tip pressed on the belt.
-        const GUARDED = 1 << 3;
         /// The reference is beyond the edge of the admissible stretch and held at the edge.
         const AT_EDGE = 1 << 4;
         /// The tip is being returned to the belt.

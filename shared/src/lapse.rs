@@ -42,7 +42,7 @@ macro_rules! lapses {
                 }
             }
 
-            /// Returns the fault that is latched when too many occur in a row.
+            /// Returns the fault that is latched when too many occur.
             pub const fn fault(self) -> Fault {
                 match self {
                     $($(Self::$lapse => Fault::$fault),+),+
@@ -51,7 +51,8 @@ macro_rules! lapses {
         }
 
         settings! {
-            /// Number of lapses of each kind tolerated in a row; one more latches the fault.
+            /// Number of lapses of each kind tolerated in a row; one more latches the fault. Two good ticks make up
+            /// for one lapse.
             ///
             /// One overrun may be a rare branch; two in a row mean that the processor is too slow.
             /// At 1 kHz the arm moves at most 10 mm in 20 ms. A sensor whose answer was disturbed

@@ -17,6 +17,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::unistd::Uid;
 use painleve_commission::simulated::SimulatedRig;
 use painleve_commission::{OperatorTask, Rig};
+use painleve_firmware::SOURCES;
 use painleve_plant::law_choice::build;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
@@ -159,6 +160,7 @@ impl BoardEnd {
                         protocol: PROTOCOL,
                         build: build(),
                     },
+                    Ok(Request::Sources) => Response::Sources(SOURCES),
                     Ok(Request::BlackBox) => Response::BlackBox(BlackBox::default()),
                     Ok(Request::Configure { .. }) => {
                         is_running = true;

@@ -5,9 +5,6 @@ use std::sync::Barrier;
 use std::time::Duration;
 
 use nix::sys::signal::Signal;
-use painleve_link::{BusName, Pacing, PlantEnd, Session};
-use painleve_plant::scenario::Scenario;
-use painleve_system::interrupt::Interrupt;
 use painleve_tests::{Bench, child_of, code, errors, is_running, signal};
 use serde_json::Value;
 
@@ -120,22 +117,6 @@ fn a_second_plant_on_a_bus_is_refused() {
     assert_eq!(code(output.status), 3, "{output:?}");
     assert!(errors(&output).contains(&bench.bus), "{output:?}");
     assert!(is_running(plant), "the first plant must not suffer");
-}
-
-#[test]
-fn a_plant_of_another_build_is_refused() {
-    let bench = Bench::new("build");
-    let mut session = Session::new(&Scenario::default(), Pacing::Lockstep).unwrap();
-    // It begins with the build.
-    session.configuration[0] ^= 1;
-    let bus: BusName = bench.bus.parse().unwrap();
-    let _plant = PlantEnd::create(&bus, None, &session, &Interrupt::default()).unwrap();
-    assert_refused(
-        &bench,
-        &["controller", "--bus", &bench.bus],
-        3,
-        &[&bench.bus, "use the same program for both ends"],
-    );
 }
 
 /// Of runs that start on one bus at the same moment, one succeeds, and the others name the bus.

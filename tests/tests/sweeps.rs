@@ -65,7 +65,11 @@ fn campaigns_of_random_runs_are_merged_too() {
     for (study, options) in [
         (
             "robustness",
-            &[("runs", "7"), ("seed", "3"), ("without", "governor,guard")][..],
+            &[
+                ("runs", "7"),
+                ("seed", "3"),
+                ("without", "governor,disturbance"),
+            ][..],
         ),
         ("capture", &[("runs", "5"), ("set", "run.tick_hz=500")]),
         ("lift-off", &[("runs", "4"), ("slide-s", "0.3")]),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::boards::{self, BoardPackage};
+use crate::boards;
 use crate::command::{ChoreError, cargo, run_with, workspace};
 
 /// The microcontroller's target.
@@ -23,39 +23,12 @@ enum Toolchain {
     Debian,
 }
 
-/// Which images.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Images {
-    /// Those of the default tier of tests: the first board that can be flashed, and the emulated one.
-    Default,
-    /// Those of every board.
-    All,
-}
-
-impl Images {
-    /// Returns the boards of these images, sorted by folder name.
-    ///
-    /// # Errors
-    /// If cargo cannot read the workspace.
-    pub fn boards(self) -> Result<Vec<BoardPackage>, ChoreError> {
-        let mut boards = boards::all()?;
-        let first = boards.iter().position(|board| board.chip.is_some());
-        let mut index = 0;
-        boards.retain(|board| {
-            let is_default = board.chip.is_none() || Some(index) == first;
-            index += 1;
-            self == Self::All || is_default
-        });
-        Ok(boards)
-    }
-}
-
-/// Builds images.
+/// Builds every image.
 ///
 /// # Errors
 /// If the target is not installed, or the build fails.
-pub fn run(images: Images) -> Result<(), ChoreError> {
-    let boards = images.boards()?;
+pub fn run() -> Result<(), ChoreError> {
+    let boards = boards::all()?;
     let mut selection = vec!["--profile", PROFILE, "--bins"];
     for board in &boards {
         selection.extend(["--package", &board.package]);
@@ -79,7 +52,8 @@ pub fn build(
     match toolchain()? {
         Toolchain::Installed => {
             let build = [&build[..], &["--target-dir", target]].concat();
-            run_with(&cargo(), &build, &[])
+            // Incremental compilation makes larger and slower images, beyond their budgets.
+            run_with(&cargo(), &build, &[("CARGO_INCREMENTAL", "0")])
         }
         Toolchain::Debian => {
             // A separate target folder, because objects of two compilers cannot be mixed.

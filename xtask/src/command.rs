@@ -33,6 +33,20 @@ pub fn program() -> PathBuf {
     workspace().join("target").join(PROFILE).join("painleve")
 }
 
+/// Builds the program under test.
+///
+/// # Errors
+/// As [`run`].
+pub fn build_program() -> Result<(), ChoreError> {
+    run_cargo(&[
+        "build",
+        "--profile",
+        PROFILE,
+        "--package",
+        "painleve-command",
+    ])
+}
+
 /// Returns the workspace's folder.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -28,7 +28,7 @@ pub fn run(arguments: &FlashArguments) -> Result<(), ChoreError> {
                 .into(),
         ));
     }
-    build_fw::run(build_fw::Images::All)?;
+    build_fw::run()?;
     let image = build_fw::image(&arguments.image);
     run_with(
         "probe-rs",

@@ -66,7 +66,7 @@ fn main() -> ExitCode {
     let result = match Xtask::parse().chore {
         Chore::Test(arguments) => test::run(&arguments),
         Chore::Setup(arguments) => setup::run(&arguments),
-        Chore::BuildFw => build_fw::run(build_fw::Images::All),
+        Chore::BuildFw => build_fw::run(),
         Chore::Size => size::run(),
         Chore::Flash(arguments) => flash::run(&arguments),
         Chore::Examples => examples::run(),

@@ -15,7 +15,7 @@ use clap::Args;
 use serde_json::Value;
 use toml::Table;
 
-use crate::command::{ChoreError, cargo, run_cargo, run_with, say, workspace};
+use crate::command::{ChoreError, build_program, cargo, program, run_with, say, workspace};
 
 #[derive(Debug, Args)]
 pub struct MeasureArguments {
@@ -83,13 +83,7 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
                 .iter()
                 .any(|it| it == name || Some(it.as_str()) == file)
     };
-    run_cargo(&[
-        "build",
-        "--profile",
-        "verify",
-        "--package",
-        "painleve-command",
-    ])?;
+    build_program()?;
     let here = Here::new()?;
     let mut answers = HashMap::new();
     for file in &mut files {
@@ -272,8 +266,7 @@ impl Here {
     fn answer(&self, command: &str) -> Result<Value, ChoreError> {
         eprintln!("$ {command}");
         let arguments: Vec<&str> = command.split_whitespace().skip(1).collect();
-        let program = workspace().join("target/verify/painleve");
-        let printed = output(&program.to_string_lossy(), &arguments)?;
+        let printed = output(&program().to_string_lossy(), &arguments)?;
         serde_json::from_str(&printed).map_err(|cause| ChoreError(format!("`{command}`: {cause}")))
     }
 

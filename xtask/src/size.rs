@@ -6,8 +6,9 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::build_fw::{self, Images};
-use crate::command::{ChoreError, PROFILE, program, run_cargo, say, workspace};
+use crate::boards;
+use crate::build_fw;
+use crate::command::{ChoreError, build_program, program, say, workspace};
 
 /// All limits; the end-to-end tests check those of the ticks and of the stack as well.
 const BUDGET: &str = include_str!("../../tests/budget.json");
@@ -32,25 +33,19 @@ const LARGEST: usize = 12;
 /// # Errors
 /// If a build fails, or as [`check_images`].
 pub fn run() -> Result<(), ChoreError> {
-    build_fw::run(Images::All)?;
-    run_cargo(&[
-        "build",
-        "--profile",
-        PROFILE,
-        "--package",
-        "painleve-command",
-    ])?;
-    check_images(Images::All)
+    build_fw::run()?;
+    build_program()?;
+    check_images()
 }
 
 /// Prints the sizes of images that are built, and runs one to measure its stack.
 ///
 /// # Errors
 /// If the measurement fails, or an image exceeds a limit.
-pub fn check_images(images: Images) -> Result<(), ChoreError> {
+pub fn check_images() -> Result<(), ChoreError> {
     let mut over = Vec::new();
     let budget = Budget::read()?;
-    let boards = images.boards()?;
+    let boards = boards::all()?;
     for name in boards.iter().flat_map(|board| &board.images) {
         let path = build_fw::image(name);
         let error = |reason: String| ChoreError(format!("{}: {reason}", path.display()));

@@ -42,6 +42,7 @@ pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
             "painleve-tests",
             "--profile",
             PROFILE,
+            "--test",
             "soak",
             "--",
             "--nocapture",

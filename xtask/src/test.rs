@@ -1,6 +1,6 @@
 //! `cargo xtask test`: the tests, in two tiers.
 //!
-//! The default tier checks every promise once, on one chip. `--all` adds what takes long or requires further tools.
+//! The default tier checks every promise. `--all` adds what takes long or requires further tools.
 //! The last lines name the tier, what it left out, and why.
 
 use std::fs;
@@ -10,16 +10,18 @@ use std::time::Instant;
 
 use clap::Args;
 
-use crate::build_fw::{self, Images};
-use crate::command::{ChoreError, PROFILE, cargo, program, run_cargo, say, workspace};
+use crate::build_fw;
+use crate::command::{
+    ChoreError, PROFILE, build_program, cargo, program, run_cargo, say, workspace,
+};
 use crate::setup::{self, Tools};
 use crate::{campaign, chaos, examples, fmu, fuzz, python, size, soak};
 
 /// Options of `cargo xtask test`.
 #[derive(Debug, Default, Args)]
 pub struct TestArguments {
-    /// Also run what takes long or requires further tools: second chip, random faults, searches, campaigns, Python,
-    /// FMU, examples, browsers.
+    /// Also run what takes long or requires further tools: campaigns, examples, Python, FMU, malformed input, soak, chaos;
+    /// and install the browser.
     #[arg(long)]
     all: bool,
     /// List the slowest tests; requires cargo-nextest.
@@ -52,21 +54,15 @@ type Step = fn() -> Result<(), ChoreError>;
 /// If a step fails; later steps are not run.
 pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
     let start = Instant::now();
-    let (tools, images) = if arguments.all {
-        (Tools::All, Images::All)
+    let tools = if arguments.all {
+        Tools::All
     } else {
-        (Tools::Default, Images::Default)
+        Tools::Default
     };
     let missing = setup::install_missing(tools)?;
-    build_fw::run(images)?;
-    run_cargo(&[
-        "build",
-        "--profile",
-        PROFILE,
-        "--package",
-        "painleve-command",
-    ])?;
-    size::check_images(images)?;
+    build_fw::run()?;
+    build_program()?;
+    size::check_images()?;
     let mut left_out: Vec<String> = missing
         .iter()
         .map(|tool| format!("tests that use {tool}: it cannot be installed"))
@@ -80,7 +76,7 @@ pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
         chaos::short()?;
         let further: Vec<&str> = FURTHER_STEPS.iter().map(|(name, _)| *name).collect();
         left_out.push(format!(
-            "left to `cargo xtask test --all`: the second chip, tests marked #[ignore], {}",
+            "left to `cargo xtask test --all`: tests marked #[ignore], {}",
             further.join(", ")
         ));
     }

@@ -21,8 +21,8 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use nix::sys::prctl::set_child_subreaper;
 
-use crate::build_fw::{self, Images};
-use crate::command::{ChoreError, PROFILE, run_cargo};
+use crate::build_fw;
+use crate::command::{ChoreError, build_program};
 use fault::{FAULTS, InjectedFault};
 use host::{ChaosController, ChaosHost};
 use place::{ChaosFolder, unused_segments};
@@ -124,15 +124,9 @@ impl ChaosArguments {
 /// # Errors
 /// If a flaw is found.
 pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
-    run_cargo(&[
-        "build",
-        "--profile",
-        PROFILE,
-        "--package",
-        "painleve-command",
-    ])?;
+    build_program()?;
     if arguments.host != ChaosHost::Native {
-        build_fw::run(Images::All)?;
+        build_fw::run()?;
     }
     let system = |error: std::io::Error| ChoreError(format!("chaos: {error}"));
     // A copy, because the program may be rebuilt during the trials.
