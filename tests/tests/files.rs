@@ -67,7 +67,14 @@ fn furnished(name: &str) -> Bench {
         assert!(run(&bench, line).status.success(), "{line}");
     }
     symlink("r.mcap", bench.path("link")).unwrap();
-    fs::hard_link(bench.path("s.toml"), bench.path("hard.toml")).unwrap();
+    // Figures need their extension.
+    for (file, link) in [
+        ("s.toml", "hard.toml"),
+        ("s.toml", "s.svg"),
+        ("friction.csv", "friction.svg"),
+    ] {
+        fs::hard_link(bench.path(file), bench.path(link)).unwrap();
+    }
     bench
 }
 
@@ -76,7 +83,8 @@ fn no_output_replaces_an_input_or_another_output() {
     let bench = furnished("replace");
     let before = contents(&bench);
     let belt = "--set belt.profile={kind='file',path='belt.csv'}";
-    let friction = "--set effects.friction={kind='file',path='friction.csv'}";
+    let friction =
+        "--set contact.kind=compliant --set effects.friction={kind='file',path='friction.csv'}";
     for (line, parts) in [
         ("export r.mcap --csv r.mcap", ["--csv", "r.mcap"]),
         ("export r.mcap --csv link", ["--csv", "r.mcap"]),
@@ -127,8 +135,8 @@ fn no_output_replaces_an_input_or_another_output() {
             ["--csv", "s.toml"],
         ),
         (
-            &format!("{STUDY} {belt} --svg belt.csv"),
-            ["--svg", "belt.csv"],
+            &format!("{STUDY} {friction} --svg friction.svg"),
+            ["--svg", "friction.csv"],
         ),
         (
             "sweep merge --folder sw --csv sw/shard-0.csv",
@@ -139,8 +147,8 @@ fn no_output_replaces_an_input_or_another_output() {
             ["--csv", "sw/manifest.toml"],
         ),
         (
-            "timing s.toml --host native --svg s.toml",
-            ["--svg", "s.toml"],
+            "timing hard.toml --host native --svg s.svg",
+            ["--svg", "hard.toml"],
         ),
         (
             "commission s.toml --rehearse --output s.toml",

@@ -62,7 +62,7 @@ impl Fates {
 }
 
 /// Flips every `step`th bit of a run's record. A prime step visits all places of a byte.
-fn flip_bits(run: &Run, step: usize) -> Fates {
+fn flip_bits(run: &Run, step: usize) {
     let mut fates = Fates::default();
     let bits = (0..8 * run.record.len()).step_by(step);
     let count = bits.len();
@@ -70,15 +70,13 @@ fn flip_bits(run: &Run, step: usize) -> Fates {
     println!("{count} bits: {fates:?}");
     // Every bit is under some checksum.
     assert_eq!((fates.same, fates.recovered + fates.refused), (0, count));
-    fates
+    assert!(fates.recovered > 0 && fates.refused > 0);
 }
 
 #[test]
 fn no_bit_of_a_record_changes_its_table_unnoticed() {
-    let fates = flip_bits(&SMALL, 211);
-    assert!(fates.recovered > 0 && fates.refused > 0, "{fates:?}");
-    let fates = flip_bits(&LARGE, 10_007);
-    assert!(fates.recovered > fates.refused, "{fates:?}");
+    flip_bits(&SMALL, 211);
+    flip_bits(&LARGE, 10_007);
 }
 
 #[test]
