@@ -199,6 +199,9 @@ fn options_without_effect_are_refused() {
         ("run edge --port /dev/ttyUSB0", "--port"),
         ("run edge --bit-errors 0.01", "--bit-errors"),
         ("run edge --log", "--log"),
+        ("run edge --live 0 --elf x", "--elf"),
+        ("run edge --live 0 --json", "--json"),
+        ("run edge --live 0 --verbose", "--verbose"),
         ("run edge --live 0 --csv x.csv", "--csv"),
         ("run edge --live 0 --record x.mcap", "--record"),
         ("timing edge --host native --elf x", "--elf"),
@@ -381,6 +384,12 @@ fn names_that_are_not_text_are_used_as_they_are() {
         &[b"a\xff.mcap"],
     );
     assert_eq!(report["files"], json!([text]));
+    let line = format!("run edge {} --no-record --json", SHORT.join(" "));
+    let figure: &[&[u8]] = &[b"--plot", b"p\xff.svg", b"--html", b"p\xff.html"];
+    let files = json!(["p\u{fffd}.svg", "p\u{fffd}.html"]);
+    assert_eq!(run(&line, figure)["files"], files);
+    run("study admissible --json --svg", &[b"s\xff.svg"]);
+    assert!(bench.path("").join(name(b"s\xff.svg")).exists());
     let report = run("export --csv --json", &[b"--", b"a\xff.mcap"]);
     assert_eq!(report["record"], text);
     assert_eq!(report["files"], json!(["a\u{fffd}.csv"]));

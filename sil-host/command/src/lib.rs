@@ -28,12 +28,14 @@ mod timing;
 
 use std::io::Write;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use painleve_shared::status::Fault;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
@@ -47,6 +49,7 @@ use painleve_study::StudyError;
 use painleve_study::sweep::SweepError;
 use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_size_limit};
 use painleve_system::memory_full::exit_when_shared_memory_is_full;
+use painleve_system::picture;
 use painleve_system::terminal::{self, warn};
 
 use commission::BoardRigError;
@@ -287,6 +290,11 @@ fn seconds(text: &str) -> Result<f64, String> {
         Ok(seconds) if (0.0..=86_400.0).contains(&seconds) => Ok(seconds),
         _ => Err("expected a number of seconds from 0 to 86400".into()),
     }
+}
+
+/// Reads the path of a figure.
+fn figure_path() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(picture::path)
 }
 
 /// Runs the command line with user-defined laws; see [`main`].

@@ -17,7 +17,6 @@ use painleve_record::recorder::Sinks;
 use painleve_record::{McapLog, RecordError, RecordedTick, Recorder, RunPlot, Sink};
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
-use painleve_system::picture;
 use painleve_system::terminal::warn;
 
 use painleve_view::PageFile;
@@ -36,7 +35,7 @@ pub struct OutputArguments {
     #[arg(long, conflicts_with = "record")]
     no_record: bool,
     /// Figure of the run: an SVG, PNG or PDF file, by its extension.
-    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = picture::path)]
+    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = super::figure_path())]
     plot: PathBuf,
     /// Page that plays the run in the browser, without a network.
     #[arg(long, value_name = "PATH", default_value = "out/run.html")]

@@ -207,7 +207,8 @@ pub struct RunArguments {
     /// Watch and steer the run from a page in the browser or from Foxglove, on this machine. It runs
     /// in one process, writes no files, and continues until Ctrl-C.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
-    #[arg(conflicts_with_all = ["bus", "port", "fail_on", "record", "plot", "html", "csv", "timing"])]
+    #[arg(conflicts_with_all = ["bus", "port", "fail_on", "record", "plot", "html", "csv"])]
+    #[arg(conflicts_with_all = ["timing", "verbose", "quiet", "json"])]
     live: Option<u16>,
     /// With --live: let pages of this origin connect as Foxglove does, for example
     /// http://localhost:8080; may be repeated.
@@ -267,10 +268,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let arguments = &arguments;
     // Validate before any process starts, so that an error is reported once.
     let scenario = arguments.scenario.load()?;
+    arguments.check_options()?;
     if let Some(port) = arguments.live {
         return live(arguments, &scenario, port);
     }
-    arguments.check_options()?;
     if arguments.host == Host::Qemu {
         emulator::check(&arguments.image.path())?;
     }

@@ -55,7 +55,7 @@ pub struct TimingArguments {
     #[arg(long)]
     json: bool,
     /// Write histograms as a figure, an SVG, PNG or PDF file by its extension.
-    #[arg(long, value_name = "PATH", value_parser = picture::path)]
+    #[arg(long, value_name = "PATH", value_parser = super::figure_path())]
     svg: Option<PathBuf>,
 }
 

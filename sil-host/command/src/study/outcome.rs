@@ -30,7 +30,7 @@ pub struct OutcomeOptions {
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
     /// Write the figure, an SVG, PNG or PDF file by its extension.
-    #[arg(long, value_name = "PATH", value_parser = picture::path)]
+    #[arg(long, value_name = "PATH", value_parser = crate::figure_path())]
     svg: Option<PathBuf>,
     #[command(flatten)]
     threads: Threads,
