@@ -171,6 +171,15 @@ fn no_output_replaces_an_input_or_another_output() {
         }
         assert!(contents(&bench) == before, "{line}: {:?}", bench.files());
     }
+    for line in [
+        "run - --no-plot --record s.toml",
+        "drive edge --port /dev/null --record s.toml",
+    ] {
+        let output = shell(&bench, &format!("$P {line} <hard.toml"));
+        assert_eq!(code(output.status), 2, "{output:?}");
+        assert!(errors(&output).contains("`standard input`"), "{output:?}");
+    }
+    assert!(contents(&bench) == before);
     // With shards missing, a job script would replace one that is there.
     fs::remove_file(bench.path("sw/shard-1.csv")).unwrap_or_default();
     let output = run(

@@ -109,6 +109,7 @@ impl ScenarioArguments {
             .prefix("painleve-standard-input-")
             .suffix(".toml")
             .tempfile()?;
+        input_file::remember_standard_input()?;
         // As much as of a file, so that an endless input is refused as one.
         let input = std::io::stdin().lock().take(input_file::MOST_BYTES + 1);
         std::io::copy(&mut { input }, &mut file)?;

@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read};
+use std::os::fd::AsFd;
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -38,9 +39,23 @@ pub fn open(path: &Path) -> io::Result<File> {
     if !metadata.is_file() {
         return Err(refused("it is not a regular file".into()));
     }
-    let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
-    opened.insert((metadata.dev(), metadata.ino()), path.to_path_buf());
+    remember(&metadata, path);
     Ok(file)
+}
+
+/// Remembers the file behind standard input.
+///
+/// # Errors
+/// Those of the system.
+pub fn remember_standard_input() -> io::Result<()> {
+    let input = File::from(io::stdin().as_fd().try_clone_to_owned()?);
+    remember(&input.metadata()?, Path::new("standard input"));
+    Ok(())
+}
+
+fn remember(file: &Metadata, path: &Path) {
+    let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+    opened.insert((file.dev(), file.ino()), path.to_path_buf());
 }
 
 /// Returns the path under which this process has opened a file, if it has.

@@ -18,6 +18,7 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::mounting::SensorParts;
 use painleve_shared::range;
+use painleve_system::input_file;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 use serde::Serialize;
@@ -140,6 +141,8 @@ fn recorder(
     if arguments.no_record {
         return Ok(None);
     }
+    // Its lines are orders.
+    input_file::remember_standard_input()?;
     check_distinct(&[("--record", &arguments.record)])?;
     let log = McapLog::create(&arguments.record, scenario, Source::Arm).map_err(output)?;
     let configuration = scenario.controller_configuration();
