@@ -35,7 +35,7 @@ fn wrong_keys_and_values_are_named_and_nothing_is_written() {
         for (wrong, expected) in [
             (
                 "controller.disturbance.enabld=true",
-                &["controller.disturbance.enabld", "known: enabled"][..],
+                &["controller.disturbance.enabld", "did you mean 'enabled'"][..],
             ),
             (
                 "converters.link.frame_loss=2",

@@ -58,7 +58,7 @@ fn an_export_and_the_manual_print_their_files() {
     bench.report(&["run", "--set", "run.duration_s=0.05", "--no-plot", "--json"]);
     assert_eq!(
         bench.report(&["export", "out/run.mcap", "--csv", "--json"]),
-        json!({ "record": "out/run.mcap", "rows": 50, "files": ["out/run.csv"] })
+        json!({ "record": "out/run.mcap", "rows": 50, "files": ["out/run.csv"], "damage": null })
     );
     assert_eq!(
         bench.report(&["man", "manual", "--json"]),

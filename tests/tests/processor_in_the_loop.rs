@@ -99,8 +99,7 @@ fn equal_within_budget(name: &str, overrides: &[String], key: &str) -> String {
         ..Default::default()
     };
     assert_eq!(health, nothing_else, "{name}");
-    let most = budget[key][name].as_u64();
-    let most = most.unwrap_or_else(|| panic!("budget.json has no limit for {name}"));
+    let most = budget[key].as_u64().unwrap();
     assert!(
         u64::from(report.max) <= most,
         "{name}: more than the {most} instructions of budget.json: {:?}",

@@ -128,7 +128,7 @@ fn data_and_names_are_on_the_disk_before_a_file_is_reported() {
             .unwrap_or_else(|| panic!("no {call} of {path} in {trace}"))
     };
     let data = at("fsync(", "/new/deeper/.run.mcap.");
-    let named = at("rename", "/new/deeper/run.mcap\"");
+    let named = at("rename", "/new/deeper>, \"run.mcap\"");
     let name = at("fsync(", "/new/deeper>");
     let folders = [at("fsync(", "/new>"), at("fsync(", ">")];
     let reported = calls.iter().rposition(|line| line.contains("write(1<"));

@@ -21,7 +21,12 @@ pub struct FuzzArguments {
 
 /// Tests that are targets of their own, and tests within crates.
 const TARGETS: [&str; 2] = ["malformed_input", "state_machines"];
-const WITHIN: [&str; 3] = ["damaged_shards", "damaged_manifests", "any_bytes"];
+const WITHIN: [&str; 4] = [
+    "damaged_shards",
+    "damaged_manifests",
+    "damaged_records",
+    "any_bytes",
+];
 const FRAMES: &str = "random_frames";
 /// Compares both ends of a bus with a model. Its cases wait for each other, so there are fewer.
 const BUS: [&str; 4] = ["--package", "painleve-link", "--lib", "both_ends"];

@@ -21,6 +21,7 @@ use painleve_plant::law_choice::build;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire;
+use painleve_system::input_file;
 use painleve_system::lifetime::{Guarded, end_with_parent};
 
 use super::{BoardError, ConnectedBoard, TimedAnswer, log};
@@ -71,6 +72,8 @@ pub fn check(image: &Path) -> Result<(), BoardError> {
     if !image.is_file() {
         return Err(BoardError::ImageMissing(image.into()));
     }
+    // From now on it is known as an input. An image that cannot be read is reported where it is read.
+    let _ = input_file::open(image);
     let path = std::env::var_os("PATH").unwrap_or_default();
     if !std::env::split_paths(&path).any(|folder| folder.join(PROGRAM).is_file()) {
         return Err(BoardError::EmulatorMissing);

@@ -4,6 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use defmt_decoder::DecodeError;
+use painleve_system::input_file;
 use painleve_system::terminal::warn;
 
 use super::BoardError;
@@ -38,7 +39,7 @@ impl LogTable {
     }
 
     fn read(image: &Path) -> Result<Self, LogTableError> {
-        let bytes = std::fs::read(image)?;
+        let bytes = input_file::bytes(image, input_file::MOST_IMAGE_BYTES)?;
         defmt_decoder::Table::parse(&bytes)
             .map_err(|error| LogTableError::Damaged(error.into()))?
             .map(Self)

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
+use painleve_system::input_file;
 
 use crate::{BoundError, ImageError};
 
@@ -43,7 +44,7 @@ impl Image {
     }
 
     fn read_elf(path: &Path) -> Result<Self, ImageError> {
-        let bytes = std::fs::read(path)?;
+        let bytes = input_file::bytes(path, input_file::MOST_IMAGE_BYTES)?;
         let file = object::File::parse(&*bytes)?;
         let mut sections = Vec::new();
         for section in file.sections().filter(|section| {

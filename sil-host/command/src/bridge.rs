@@ -14,6 +14,7 @@ use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 
+use super::distinct_files;
 use super::join::JoinArguments;
 use super::output_error::output;
 use super::{CommandError, or_interrupted};
@@ -86,7 +87,7 @@ fn probability(text: &str) -> Result<f64, String> {
 pub struct ImageArguments {
     /// The controller's image; by default the workspace's own build.
     #[arg(long, value_name = "PATH")]
-    elf: Option<PathBuf>,
+    pub elf: Option<PathBuf>,
     /// Print the image's log.
     #[arg(long)]
     pub log: bool,
@@ -123,6 +124,7 @@ impl ImageArguments {
 pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
     match &arguments.target {
         BridgeTarget::Qemu { bus, image } => {
+            emulator::check(&image.path())?;
             carry(bus, image.timing.as_deref(), |configuration, _| {
                 Emulator::start(
                     &image.path(),
@@ -164,6 +166,9 @@ fn carry<B: ConnectedBoard>(
     timing: Option<&Path>,
     start: impl FnOnce(&Configuration, Pacing) -> Result<B, BoardError>,
 ) -> Result<(), CommandError> {
+    if let Some(path) = timing {
+        distinct_files::check(&[("--timing", path)])?;
+    }
     let interrupt = Interrupt::catch()?;
     or_interrupted(carry_until(bus, timing, start, &interrupt), &interrupt)
 }

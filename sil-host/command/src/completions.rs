@@ -1,13 +1,15 @@
 //! `painleve completions` and `painleve man`: shell completions and manual pages.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::{Args, CommandFactory};
+use clap::{Args, Command, CommandFactory};
 use clap_complete::Shell;
+use clap_mangen::Man;
+use painleve_system::atomic_file::{AtomicFile, commit_all, prepare};
 use serde_json::json;
 
 use super::json::JsonOption;
-use super::output_error::{OutputError, output};
+use super::output_error::output;
 use super::{Cli, CommandError};
 
 /// Options of `painleve completions`.
@@ -47,16 +49,16 @@ pub fn print(arguments: &CompletionsArguments) -> Result<(), CommandError> {
 /// [`CommandError::Output`] if a page cannot be written.
 pub fn write_manual(arguments: &ManArguments) -> Result<(), CommandError> {
     let folder = &arguments.folder;
-    let refuse = |source| {
-        output(OutputError::Folder {
-            folder: folder.clone(),
-            source,
-        })
-    };
-    std::fs::create_dir_all(folder).map_err(refuse)?;
-    clap_mangen::generate_to(Cli::command(), folder).map_err(refuse)?;
+    let mut command = Cli::command().disable_help_subcommand(true);
+    command.build();
+    let mut files = Vec::new();
+    prepare_pages(&command, folder, &mut files)?;
+    commit_all(files).map_err(output)?;
     let first = folder.join("painleve.1");
-    let result = json!({ "folder": folder, "first": first });
+    let result = json!({
+        "folder": folder.display().to_string(),
+        "first": first.display().to_string(),
+    });
     arguments.json.say(
         &result,
         format_args!(
@@ -64,4 +66,21 @@ pub fn write_manual(arguments: &ManArguments) -> Result<(), CommandError> {
             first.display()
         ),
     )
+}
+
+/// Prepares the page of a command and those of its subcommands.
+fn prepare_pages(
+    command: &Command,
+    folder: &Path,
+    files: &mut Vec<AtomicFile>,
+) -> Result<(), CommandError> {
+    let visible = command.get_subcommands().filter(|it| !it.is_hide_set());
+    for subcommand in visible {
+        prepare_pages(subcommand, folder, files)?;
+    }
+    let page = Man::new(command.clone());
+    let mut text = Vec::new();
+    page.render(&mut text).map_err(output)?;
+    files.push(prepare(folder.join(page.get_filename()), &text).map_err(output)?);
+    Ok(())
 }

@@ -1,16 +1,17 @@
 //! `painleve export`: the ticks of a record as a table.
 
-use std::ffi::OsStr;
+use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use painleve_record::export::ticks_to_csv;
-use painleve_system::atomic_file;
+use painleve_record::export::{ExportError, Exported, ticks_to_csv};
+use painleve_system::atomic_file::{AtomicFile, AtomicFileError, commit_all, prepare};
+use painleve_system::input_file;
 use painleve_system::terminal::warn;
 use serde_json::json;
 
 use super::output_error::{InputError, RecordFileError, output};
-use super::{CommandError, say};
+use super::{CommandError, distinct_files, say};
 
 /// Options of `painleve export`.
 #[derive(Debug, Args)]
@@ -23,6 +24,9 @@ pub struct ExportArguments {
     /// Write Parquet, by default beside the record; requires the cargo feature parquet.
     #[arg(long, value_name = "PATH", num_args = 0..=1)]
     parquet: Option<Option<PathBuf>>,
+    /// Export what is whole of a damaged or truncated record: the ticks before the damage.
+    #[arg(long)]
+    recover: bool,
     /// Print one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -34,54 +38,127 @@ pub struct ExportArguments {
 /// [`CommandError`] if the recording cannot be read, or the table cannot be written.
 pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
     let record = &arguments.record;
-    let table = read(record).map_err(|source| InputError::Record {
-        path: record.clone(),
-        source,
-    })?;
-    let mut files = Vec::new();
-    if let Some(path) = &arguments.csv {
-        files.push(write(beside(record, path.as_deref(), "csv"), &table)?);
+    let beside = |path: &Option<Option<PathBuf>>, extension: &str| {
+        let path = path.as_ref()?;
+        Some(
+            path.clone()
+                .unwrap_or_else(|| record.with_extension(extension)),
+        )
+    };
+    let csv = beside(&arguments.csv, "csv");
+    let parquet = beside(&arguments.parquet, "parquet");
+    if parquet.is_some() && !cfg!(feature = "parquet") {
+        return Err(InputError::NoParquet.into());
     }
-    if let Some(path) = &arguments.parquet {
-        let columns = parquet(&table)?;
-        files.push(write(beside(record, path.as_deref(), "parquet"), &columns)?);
+    let wanted = [("--csv", csv.as_deref()), ("--parquet", parquet.as_deref())];
+    let wanted: Vec<_> = wanted
+        .into_iter()
+        .filter_map(|(option, path)| Some((option, path?)))
+        .collect();
+    let bytes = record_error(
+        arguments,
+        input_file::open(record).and_then(|file| file.metadata()),
+    )?
+    .len();
+    distinct_files::check(&wanted)?;
+
+    let (mut files, mut exported) = (Vec::new(), None);
+    if let Some(path) = &csv {
+        let mut file = AtomicFile::create(path).map_err(output)?;
+        exported = Some(export(arguments, path, &mut file)?);
+        files.push(file);
+    }
+    if let Some(path) = &parquet {
+        let mut table = Vec::new();
+        exported = Some(export(arguments, path, &mut table)?);
+        files.push(prepare(path, &columns(&table)?).map_err(output)?);
+    }
+    commit_all(files).map_err(output)?;
+
+    let damage = exported.as_ref().and_then(|exported| {
+        let reason = exported.damage.as_ref()?.to_string();
+        Some((reason, exported))
+    });
+    if let Some((
+        reason,
+        Exported {
+            rows,
+            end_s,
+            whole_bytes,
+            ..
+        },
+    )) = &damage
+    {
+        warn(format_args!(
+            "{} is damaged after {whole_bytes} of {bytes} bytes: {reason}; exported the {rows} ticks before, up to \
+             {end_s} s",
+            record.display()
+        ));
     }
     if arguments.json {
-        let lines = table.iter().filter(|byte| **byte == b'\n').count();
-        // The first line is the header; no value contains a line break.
-        let rows = lines.saturating_sub(1);
-        return say(json!({ "record": record, "rows": rows, "files": files }));
+        return say(json!({
+            "record": record.display().to_string(),
+            "rows": exported.as_ref().map(|exported| exported.rows),
+            "files": wanted.iter().map(|(_, path)| path.display().to_string()).collect::<Vec<_>>(),
+            "damage": damage.map(|(reason, exported)| {
+                json!({ "reason": reason, "whole_bytes": exported.whole_bytes, "bytes": bytes })
+            }),
+        }));
     }
-    for file in files {
-        warn(format_args!("wrote {}", file.display()));
+    for (_, path) in wanted {
+        warn(format_args!("wrote {}", path.display()));
     }
     Ok(())
 }
 
-/// Returns the ticks of a record as CSV.
-fn read(record: &Path) -> Result<Vec<u8>, RecordFileError> {
-    let mut table = Vec::new();
-    ticks_to_csv(&std::fs::read(record)?, &mut table)?;
-    Ok(table)
+/// Writes the ticks of the record as CSV to what becomes the file at `path`.
+fn export(
+    arguments: &ExportArguments,
+    path: &Path,
+    table: impl Write,
+) -> Result<Exported, CommandError> {
+    let file = record_error(arguments, input_file::open(&arguments.record))?;
+    match ticks_to_csv(BufReader::with_capacity(1 << 20, file), table) {
+        Err(ExportError::Write(source)) => Err(output(AtomicFileError::Write {
+            path: path.to_path_buf(),
+            source: source.into(),
+        })),
+        exported => {
+            let mut exported = record_error(arguments, exported)?;
+            match exported.damage.take() {
+                Some(damage) if !arguments.recover => {
+                    let damaged = RecordFileError::Damaged {
+                        reason: damage.to_string(),
+                        whole_bytes: exported.whole_bytes,
+                        rows: exported.rows,
+                        end_s: exported.end_s,
+                    };
+                    record_error(arguments, Err(damaged))
+                }
+                damage => Ok(Exported { damage, ..exported }),
+            }
+        }
+    }
 }
 
-/// Returns the given path, or the record's with another extension.
-fn beside(record: &Path, path: Option<&Path>, extension: impl AsRef<OsStr>) -> PathBuf {
-    path.map_or_else(|| record.with_extension(extension), Path::to_path_buf)
-}
-
-/// Writes a file and returns its path.
-fn write(path: PathBuf, contents: &[u8]) -> Result<PathBuf, CommandError> {
-    atomic_file::write(&path, contents).map_err(output)?;
-    Ok(path)
+/// Adds the name of the record to an error.
+fn record_error<T, E: Into<RecordFileError>>(
+    arguments: &ExportArguments,
+    result: Result<T, E>,
+) -> Result<T, CommandError> {
+    result.map_err(|source| {
+        let path = arguments.record.clone();
+        let source = source.into();
+        InputError::Record { path, source }.into()
+    })
 }
 
 #[cfg(feature = "parquet")]
-fn parquet(table: &[u8]) -> Result<Vec<u8>, CommandError> {
+fn columns(table: &[u8]) -> Result<Vec<u8>, CommandError> {
     painleve_study::sweep::parquet::from_csv(table).map_err(output)
 }
 
 #[cfg(not(feature = "parquet"))]
-fn parquet(_: &[u8]) -> Result<Vec<u8>, CommandError> {
+fn columns(_: &[u8]) -> Result<Vec<u8>, CommandError> {
     Err(InputError::NoParquet.into())
 }

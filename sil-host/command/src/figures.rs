@@ -16,14 +16,14 @@ use painleve_study::catalogue::AnyOutcome;
 use painleve_study::figures::page_maker::{Fineness, PageMaker};
 use painleve_study::figures::{self, Page, Section};
 use painleve_study::studies::STUDIES;
-use painleve_system::atomic_file::{self, AtomicFile};
+use painleve_system::atomic_file::{commit_all, prepare};
 use serde_json::{Value, json};
 
-use super::CommandError;
 use super::json::JsonOption;
 use super::output_error::output;
 use super::progress::{Progress, Shown};
 use super::study::outcome::Threads;
+use super::{CommandError, distinct_files};
 
 /// Options of `painleve figures`.
 #[derive(Debug, Args)]
@@ -55,7 +55,7 @@ const RUNS: [&str; 4] = [
 pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
     let folder = &arguments.out;
     let page_path = folder.join("index.html");
-    AtomicFile::create(&page_path).map_err(output)?;
+    distinct_files::check(&[("--out", &page_path)])?;
     let page = PageMaker {
         fineness: if arguments.draft {
             &Fineness::DRAFT
@@ -95,10 +95,15 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
         is_draft: arguments.draft,
         sections,
     };
-    for (path, contents) in &files {
-        atomic_file::write(path, contents).map_err(output)?;
-    }
-    atomic_file::write(&page_path, page.html().as_bytes()).map_err(output)?;
+    let html = page.html();
+    let contents = files
+        .iter()
+        .map(|(path, contents)| (path, contents.as_slice()));
+    let contents = contents.chain([(&page_path, html.as_bytes())]);
+    let prepared: Result<_, _> = contents
+        .map(|(path, contents)| prepare(path, contents))
+        .collect();
+    prepared.and_then(commit_all).map_err(output)?;
     arguments
         .json
         .say(&result(&page_path, &page, &files), page_path.display())
@@ -115,9 +120,9 @@ fn result(page_path: &Path, page: &Page, files: &[(PathBuf, Vec<u8>)]) -> Value 
         })
     };
     json!({
-        "page": page_path,
+        "page": page_path.display().to_string(),
         "draft": page.is_draft,
-        "files": files.iter().map(|(path, _)| path).collect::<Vec<_>>(),
+        "files": files.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
         "sections": page.sections.iter().map(section).collect::<Vec<_>>(),
     })
 }

@@ -4,6 +4,7 @@ mod bridge;
 mod commission;
 mod completions;
 mod controller;
+mod distinct_files;
 mod doctor;
 mod drive;
 mod export;
@@ -25,6 +26,7 @@ mod study;
 mod sweep;
 mod timing;
 
+use std::io::Write;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -33,6 +35,7 @@ use std::time::Duration;
 
 use painleve_shared::status::Fault;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
@@ -46,6 +49,7 @@ use painleve_study::StudyError;
 use painleve_study::sweep::SweepError;
 use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_size_limit};
 use painleve_system::memory_full::exit_when_shared_memory_is_full;
+use painleve_system::picture;
 use painleve_system::terminal::{self, warn};
 
 use commission::BoardRigError;
@@ -147,14 +151,6 @@ pub enum CommandError {
     /// A file or option cannot be used.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Two files would replace each other.
-    #[error("--{} and --{} both name `{}`: choose different files", options[0], options[1], path.display())]
-    SameFile {
-        /// The options that name them.
-        options: [&'static str; 2],
-        /// The path.
-        path: PathBuf,
-    },
     /// The study failed.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -193,7 +189,6 @@ impl CommandError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Scenario(_)
-            | Self::SameFile { .. }
             | Self::Input(_)
             | Self::Cyclictest(CyclictestError::OtherHost)
             | Self::Bound(_) => 2,
@@ -240,10 +235,32 @@ impl From<std::io::Error> for CommandError {
 
 /// Writes a line to standard output.
 fn say(line: impl std::fmt::Display) -> Result<(), CommandError> {
-    terminal::say(line).map_err(|error| match error.kind() {
+    terminal::say(line).map_err(unsaid)
+}
+
+/// Returns the error of a write to standard output.
+fn unsaid(error: std::io::Error) -> CommandError {
+    match error.kind() {
         std::io::ErrorKind::BrokenPipe => CommandError::Unread,
         _ => output(OutputError::StandardOutput(error)),
-    })
+    }
+}
+
+/// Prints the help, the version or a usage error, and returns the exit code of the process.
+fn tell_usage(usage: &clap::Error) -> ExitCode {
+    let written = usage.print().and_then(|()| std::io::stdout().flush());
+    match written.map_err(unsaid) {
+        Err(error) if !usage.use_stderr() => exit_code_of(&error),
+        _ => u8::try_from(usage.exit_code()).unwrap_or(2).into(),
+    }
+}
+
+/// Prints an error, unless it has been printed or nobody wants it, and returns the exit code of the process.
+fn exit_code_of(error: &CommandError) -> ExitCode {
+    if !matches!(error, CommandError::Told { .. } | CommandError::Unread) {
+        warn(format_args!("error: {error}"));
+    }
+    ExitCode::from(error.exit_code())
 }
 
 /// Longest delay of Ctrl-C between two processes of a terminal.
@@ -275,6 +292,11 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Reads the path of a figure.
+fn figure_path() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(picture::path)
+}
+
 /// Runs the command line with user-defined laws; see [`main`].
 pub fn main_with<L: ScenarioLaws>() -> ExitCode {
     law_choice::install::<L>();
@@ -283,7 +305,10 @@ pub fn main_with<L: ScenarioLaws>() -> ExitCode {
 
 /// Runs the command line and returns the exit code of the process.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(usage) => return tell_usage(&usage),
+    };
     panic::set_hook(Box::new(tell_panic));
     // Values that a panic may have left inconsistent are not used afterwards.
     let result = panic::catch_unwind(AssertUnwindSafe(|| {
@@ -300,12 +325,7 @@ pub fn main() -> ExitCode {
     }));
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            if !matches!(error, CommandError::Told { .. } | CommandError::Unread) {
-                warn(format_args!("error: {error}"));
-            }
-            ExitCode::from(error.exit_code())
-        }
+        Err(error) => exit_code_of(&error),
     }
 }
 

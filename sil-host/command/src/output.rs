@@ -1,8 +1,7 @@
 //! The output files of a run, written while it runs.
 
-use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -18,12 +17,12 @@ use painleve_record::recorder::Sinks;
 use painleve_record::{McapLog, RecordError, RecordedTick, Recorder, RunPlot, Sink};
 use painleve_system::atomic_file::AtomicFile;
 use painleve_system::interrupt::Interrupt;
-use painleve_system::picture;
 use painleve_system::terminal::warn;
 
 use painleve_view::PageFile;
 
 use super::CommandError;
+use super::distinct_files::{self, check_distinct};
 use super::output_error::output;
 
 /// The files that a run writes.
@@ -36,7 +35,7 @@ pub struct OutputArguments {
     #[arg(long, conflicts_with = "record")]
     no_record: bool,
     /// Figure of the run: an SVG, PNG or PDF file, by its extension.
-    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = picture::path)]
+    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = super::figure_path())]
     plot: PathBuf,
     /// Page that plays the run in the browser, without a network.
     #[arg(long, value_name = "PATH", default_value = "out/run.html")]
@@ -61,7 +60,7 @@ impl OutputArguments {
     pub fn to_arguments(&self) -> Vec<OsString> {
         let mut arguments = Vec::new();
         for (option, path) in self.files() {
-            arguments.extend([format!("--{option}").into(), path.into()]);
+            arguments.extend([option.into(), path.into()]);
         }
         for (option, given) in [
             ("--no-record", self.no_record),
@@ -75,15 +74,15 @@ impl OutputArguments {
     }
 
     /// Returns the files to write, each with its option.
-    fn files(&self) -> Vec<(&'static str, &Path)> {
+    pub fn files(&self) -> Vec<distinct_files::Output<'_>> {
         let wanted: [(_, Option<&PathBuf>); 4] = [
-            ("record", (!self.no_record).then_some(&self.record)),
-            ("plot", (!self.no_plot).then_some(&self.plot)),
+            ("--record", (!self.no_record).then_some(&self.record)),
+            ("--plot", (!self.no_plot).then_some(&self.plot)),
             (
-                "html",
+                "--html",
                 (!self.no_html && !self.no_plot).then_some(&self.html),
             ),
-            ("csv", self.csv.as_ref()),
+            ("--csv", self.csv.as_ref()),
         ];
         wanted
             .into_iter()
@@ -93,23 +92,17 @@ impl OutputArguments {
 
     /// Creates the files.
     fn sinks(&self, scenario: &Scenario) -> Result<Sinks, CommandError> {
-        let mut options = BTreeMap::new();
+        check_distinct(&self.files())?;
         let mut sinks: Sinks = Vec::new();
         for (option, path) in self.files() {
             let file = AtomicFile::create(path).map_err(output)?;
-            if let Some(first) = options.insert(file.target().to_path_buf(), option) {
-                return Err(CommandError::SameFile {
-                    options: [first, option],
-                    path: path.to_path_buf(),
-                });
-            }
             file.check_alone().map_err(output)?;
             sinks.push(match option {
-                "record" => {
+                "--record" => {
                     Box::new(McapLog::to(file, scenario, Source::Simulation).map_err(output)?)
                 }
-                "csv" => Box::new(CsvTable::to(file).map_err(output)?),
-                "html" => Box::new(PageFile::new(file, scenario)),
+                "--csv" => Box::new(CsvTable::to(file).map_err(output)?),
+                "--html" => Box::new(PageFile::new(file, scenario)),
                 _ => Box::new(PlotFile {
                     plot: RunPlot::new(scenario),
                     file,
@@ -140,8 +133,8 @@ impl Sink for EventPrinter {
         Ok(())
     }
 
-    fn finish(self: Box<Self>) -> Result<(), RecordError> {
-        Ok(())
+    fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
+        Ok(None)
     }
 }
 
@@ -151,7 +144,7 @@ const PROGRESS_TICKS: u64 = 256;
 /// The files of a run and its progress bar.
 pub struct Output {
     /// The files' paths, as they were given.
-    paths: Vec<PathBuf>,
+    paths: Vec<String>,
     /// `None` if the run writes no file.
     recorder: Option<Recorder>,
     progress: ProgressBar,
@@ -163,7 +156,7 @@ impl Output {
     /// Creates the files, so that an unwritable path is reported before anything runs.
     ///
     /// # Errors
-    /// [`CommandError::Output`] or [`CommandError::SameFile`].
+    /// [`CommandError::Output`], or [`CommandError::Input`] if two names mean one file.
     pub fn open(
         arguments: &OutputArguments,
         scenario: &Scenario,
@@ -176,7 +169,10 @@ impl Output {
             let configuration = scenario.controller_configuration();
             Some(Recorder::start(&configuration, sinks).map_err(output)?)
         };
-        let paths = arguments.files().into_iter().map(|(_, path)| path.into());
+        let paths = arguments
+            .files()
+            .into_iter()
+            .map(|(_, path)| path.display().to_string());
         Ok(Self {
             paths: paths.collect(),
             recorder,
@@ -201,7 +197,7 @@ impl Output {
     ///
     /// # Errors
     /// [`CommandError::Output`] if a file cannot be completed.
-    pub fn finish(self) -> Result<Vec<PathBuf>, CommandError> {
+    pub fn finish(self) -> Result<Vec<String>, CommandError> {
         self.progress.finish_and_clear();
         if let Some(recorder) = self.recorder {
             recorder.finish().map_err(output)?;

@@ -1,7 +1,7 @@
 //! Outputs that cannot be written, and inputs that cannot be used.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use painleve_commission::simulated::SimulatedError;
 use painleve_record::export::ExportError;
@@ -36,14 +36,6 @@ pub enum OutputError {
     /// A part of a file.
     #[error(transparent)]
     Write(#[from] io::Error),
-    /// Files in a folder.
-    #[error("cannot write to {}: {source}", folder.display())]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// The reason.
-        source: io::Error,
-    },
     /// Standard output.
     #[error("cannot write to stdout: {0}")]
     StandardOutput(io::Error),
@@ -63,11 +55,56 @@ pub enum RecordFileError {
     /// Its content cannot be used.
     #[error(transparent)]
     Content(#[from] ExportError),
+    /// It is damaged, but not at its beginning.
+    #[error(
+        "it is damaged after {whole_bytes} bytes: {reason}; --recover exports the {rows} ticks before, up to {end_s} s"
+    )]
+    Damaged {
+        /// What is wrong.
+        reason: String,
+        /// Bytes before the damage.
+        whole_bytes: u64,
+        /// Whole ticks.
+        rows: u64,
+        /// Time of the last of them, s.
+        end_s: f64,
+    },
 }
 
 /// A file or option cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
+    /// Two outputs would replace each other.
+    #[error("{} and {} both name `{}`: choose different files", options[0], options[1], path.display())]
+    SameFile {
+        /// The options that name them.
+        options: [String; 2],
+        /// The path.
+        path: PathBuf,
+    },
+    /// An output would replace an input.
+    #[error(
+        "{option} would replace `{}`, which this command reads{}: choose another file",
+        input.display(), also(path, input)
+    )]
+    ReplacesInput {
+        /// The option of the output.
+        option: String,
+        /// Its path.
+        path: PathBuf,
+        /// The path of the input.
+        input: PathBuf,
+    },
+    /// An option is meant for other hosts.
+    #[error("{option} has no effect with --host {host}, only with {hosts}: leave it out")]
+    WithoutEffect {
+        /// The option.
+        option: &'static str,
+        /// The chosen host.
+        host: String,
+        /// The hosts with which it has an effect.
+        hosts: String,
+    },
     /// A record cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Record {
@@ -97,4 +134,13 @@ pub enum InputError {
         /// The reason.
         source: io::Error,
     },
+}
+
+/// Returns how an output's path leads to an input of another path.
+fn also(path: &Path, input: &Path) -> String {
+    if path == input {
+        String::new()
+    } else {
+        format!(", because `{}` is the same file", path.display())
+    }
 }

@@ -1,6 +1,7 @@
 //! `painleve run`: plant and controller as two processes, started, monitored and ended together.
 
 use std::ffi::OsString;
+use std::io::Read;
 use std::path::PathBuf;
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
@@ -11,11 +12,13 @@ use painleve_link::{BusName, Pacing, Pair};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_record::report::RunReport;
 use painleve_study::robustness::{self, Arms};
+use painleve_system::input_file;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::{self, warn};
 use tempfile::NamedTempFile;
 
 use super::bridge::{ImageArguments, SensorLineArguments};
+use super::distinct_files::check_distinct;
 use super::fail_on::{self, FailOn};
 use super::live;
 use super::output::OutputArguments;
@@ -106,7 +109,10 @@ impl ScenarioArguments {
             .prefix("painleve-standard-input-")
             .suffix(".toml")
             .tempfile()?;
-        std::io::copy(&mut std::io::stdin().lock(), &mut file)?;
+        input_file::remember_standard_input()?;
+        // As much as of a file, so that an endless input is refused as one.
+        let input = std::io::stdin().lock().take(input_file::MOST_BYTES + 1);
+        std::io::copy(&mut { input }, &mut file)?;
         self.option = Some(file.path().display().to_string());
         Ok(Some(file))
     }
@@ -144,6 +150,36 @@ pub enum Host {
     Serial,
 }
 
+impl Host {
+    /// Returns the name of the host on the command line.
+    pub fn name(self) -> String {
+        let value = self.to_possible_value();
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// Refuses options that have no effect with this host: each with whether it is given, and the hosts that it is
+    /// meant for.
+    ///
+    /// # Errors
+    /// [`InputError::WithoutEffect`].
+    pub fn check_options(
+        self,
+        options: &[(&'static str, bool, &[Self])],
+    ) -> Result<(), InputError> {
+        for &(option, is_given, hosts) in options {
+            if is_given && !hosts.contains(&self) {
+                let hosts: Vec<_> = hosts.iter().map(|host| host.name()).collect();
+                return Err(InputError::WithoutEffect {
+                    option,
+                    host: self.name(),
+                    hosts: hosts.join(", "),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Options of `painleve run`.
 #[derive(Clone, Debug, Args)]
 pub struct RunArguments {
@@ -172,7 +208,8 @@ pub struct RunArguments {
     /// Watch and steer the run from a page in the browser or from Foxglove, on this machine. It runs
     /// in one process, writes no files, and continues until Ctrl-C.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
-    #[arg(conflicts_with_all = ["bus", "port", "fail_on"])]
+    #[arg(conflicts_with_all = ["bus", "port", "fail_on", "record", "plot", "html", "csv"])]
+    #[arg(conflicts_with_all = ["timing", "verbose", "quiet", "json"])]
     live: Option<u16>,
     /// With --live: let pages of this origin connect as Foxglove does, for example
     /// http://localhost:8080; may be repeated.
@@ -208,6 +245,20 @@ fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), 
     live::run(scenario, port, &arguments.live_origin, &Interrupt::catch()?)
 }
 
+impl RunArguments {
+    fn check_options(&self) -> Result<(), InputError> {
+        use Host::{Drivers, Qemu, Serial};
+        let image = &self.image;
+        self.host.check_options(&[
+            ("--timing", image.timing.is_some(), &[Drivers, Qemu, Serial]),
+            ("--elf", image.elf.is_some(), &[Qemu]),
+            ("--log", image.log, &[Qemu]),
+            ("--port", self.port.is_some(), &[Serial]),
+            ("--bit-errors", self.lines.bit_errors != 0.0, &[Drivers]),
+        ])
+    }
+}
+
 /// Runs a scenario as two processes and reports.
 ///
 /// # Errors
@@ -218,12 +269,19 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let arguments = &arguments;
     // Validate before any process starts, so that an error is reported once.
     let scenario = arguments.scenario.load()?;
+    arguments.check_options()?;
     if let Some(port) = arguments.live {
         return live(arguments, &scenario, port);
     }
     if arguments.host == Host::Qemu {
         emulator::check(&arguments.image.path())?;
     }
+    let timing = arguments
+        .image
+        .timing
+        .as_deref()
+        .map(|path| ("--timing", path));
+    check_distinct(&[arguments.output.files(), Vec::from_iter(timing)].concat())?;
     if let (Host::Serial, Some(port)) = (arguments.host, &arguments.port) {
         serial::check(port)?;
     }
@@ -236,9 +294,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     plant_arguments.extend(arguments.output.to_arguments());
     plant_arguments.extend(arguments.patience.to_arguments());
     plant_arguments.push("--json".into());
-    let host = arguments.host.to_possible_value();
-    let host = host.as_ref().map_or("native", |host| host.get_name());
-    plant_arguments.extend(["--host-name".into(), host.into()]);
+    plant_arguments.extend(["--host-name".into(), arguments.host.name().into()]);
     if arguments.host == Host::Serial {
         plant_arguments.push("--board-keeps-time".into());
     }

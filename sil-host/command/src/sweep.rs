@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use painleve_study::outcome;
 use painleve_study::sweep::campaign::{Campaign, Understood};
+use painleve_study::sweep::folder::path_as_text;
 use painleve_study::sweep::manifest::Manifest;
 use painleve_study::sweep::share::{self, ShardOption, Share};
 use painleve_study::sweep::slurm::Job;
 use painleve_study::sweep::{SweepError, array, folder, shard_file};
-use painleve_system::atomic_file;
+use painleve_system::atomic_file::{self, commit_all, prepare};
 use painleve_system::terminal::warn;
 use serde::Serialize;
 use serde_json::json;
@@ -20,7 +21,7 @@ use super::output_error::output;
 use super::progress::Shown;
 use super::study::campaign::understand;
 use super::study::outcome::Threads;
-use super::{CommandError, say};
+use super::{CommandError, distinct_files, say};
 
 /// Options of `painleve sweep`.
 #[derive(Debug, Args)]
@@ -174,7 +175,7 @@ fn plan(arguments: &PlanArguments) -> Result<(), CommandError> {
     let is_new = manifest.write(folder)?;
     let path = Manifest::path(folder);
     let result = json!({
-        "manifest": path,
+        "manifest": path.display().to_string(),
         "is_new": is_new,
         "campaign_hash": manifest.campaign_hash(),
         "rows": manifest.rows,
@@ -235,6 +236,7 @@ struct FinishedShard {
     /// Number of its rows.
     rows: usize,
     /// Its file.
+    #[serde(serialize_with = "path_as_text")]
     file: PathBuf,
     /// False if it was already finished.
     computed: bool,
@@ -268,6 +270,7 @@ fn compute_shard(
         file: path.clone(),
         computed,
     };
+    distinct_files::check_distinct(&[("the shard", &path)])?;
     if path.exists() {
         match shard_file::read(&path, manifest) {
             Ok(found) if found.shard == shard => return Ok(finished(false)),
@@ -331,16 +334,29 @@ fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
     let text = folder::merge(folder, &manifest)?;
     let default = folder.join("merged.csv");
     let path = arguments.csv.as_ref().unwrap_or(&default);
-    atomic_file::write(path, &text).map_err(output)?;
     #[cfg_attr(not(feature = "parquet"), expect(unused_mut))]
-    let mut files = vec![path];
+    let mut outputs = vec![("--csv", path.as_path())];
+    #[cfg(feature = "parquet")]
+    outputs.extend(
+        arguments
+            .parquet
+            .iter()
+            .map(|path| ("--parquet", path.as_path())),
+    );
+    distinct_files::check(&outputs)?;
+    #[cfg_attr(not(feature = "parquet"), expect(unused_mut))]
+    let mut files = vec![prepare(path, &text).map_err(output)?];
     #[cfg(feature = "parquet")]
     if let Some(path) = &arguments.parquet {
         let columns = painleve_study::sweep::parquet::from_csv(&text).map_err(output)?;
-        atomic_file::write(path, &columns).map_err(output)?;
-        files.push(path);
+        files.push(prepare(path, &columns).map_err(output)?);
     }
+    commit_all(files).map_err(output)?;
     folder::tidy(folder);
+    let files: Vec<_> = outputs
+        .iter()
+        .map(|(_, path)| path.display().to_string())
+        .collect();
     let result = json!({ "files": files, "rows": manifest.rows, "shards": manifest.shards });
     arguments.json.say(
         &result,
@@ -374,9 +390,11 @@ fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
     let script = job.script().map_err(SweepError::from)?;
     let default = folder.join("sweep.sbatch");
     let path = arguments.out.as_ref().unwrap_or(&default);
+    distinct_files::check_distinct(&[("--out", path)])?;
     atomic_file::write(path, script.as_bytes()).map_err(output)?;
     let command = format!("sbatch {}", path.display());
-    let result = json!({ "missing": array, "script": path, "command": command });
+    let result =
+        json!({ "missing": array, "script": path.display().to_string(), "command": command });
     arguments.json.say(
         &result,
         format_args!("{}: shards {array}; submit with: {command}", path.display()),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
 use painleve_board::timing::{Cyclictest, CyclictestError, Metronome, TimingReport, Unit, report};
@@ -14,7 +14,7 @@ use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_shared::message::FrameSource;
-use painleve_system::atomic_file::{self, AtomicFile};
+use painleve_system::atomic_file;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::picture;
 use painleve_system::realtime::{FIFO_PRIORITY, request_realtime};
@@ -22,7 +22,7 @@ use painleve_system::terminal::{self, warn};
 
 use super::output_error::output;
 use super::run::Host;
-use super::{CommandError, say};
+use super::{CommandError, distinct_files, say};
 
 /// Options of `painleve timing`.
 #[derive(Debug, Args)]
@@ -55,8 +55,15 @@ pub struct TimingArguments {
     #[arg(long)]
     json: bool,
     /// Write histograms as a figure, an SVG, PNG or PDF file by its extension.
-    #[arg(long, value_name = "PATH", value_parser = picture::path)]
+    #[arg(long, value_name = "PATH", value_parser = super::figure_path())]
     svg: Option<PathBuf>,
+}
+
+impl TimingArguments {
+    /// Returns the path of the emulated image.
+    fn image(&self) -> PathBuf {
+        self.elf.clone().unwrap_or_else(emulator::default_image)
+    }
 }
 
 /// Runs every scenario and reports the cost of its ticks.
@@ -83,8 +90,16 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         .iter()
         .map(|name| Scenario::load(name, &arguments.overrides))
         .collect::<Result<Vec<_>, _>>()?;
+    use Host::{Qemu, Serial};
+    arguments.host.check_options(&[
+        ("--elf", arguments.elf.is_some(), &[Qemu]),
+        ("--port", arguments.port.is_some(), &[Serial]),
+    ])?;
+    if arguments.host == Qemu {
+        emulator::check(&arguments.image())?;
+    }
     if let Some(path) = &arguments.svg {
-        AtomicFile::create(path).map_err(output)?;
+        distinct_files::check(&[("--svg", path)])?;
     }
     let interrupt = Interrupt::catch()?;
     if arguments.cyclictest && arguments.host != Host::Native {
@@ -136,9 +151,7 @@ fn measure(
         }
         (Host::Native, _) => by_the_clock(scenario, interrupt),
         (Host::Qemu | Host::Serial, _) => {
-            let image = arguments.elf.clone();
-            let image = image.unwrap_or_else(emulator::default_image);
-            let board = Emulator::start(&image, &configuration, false, SILENCE_LIMIT)?;
+            let board = Emulator::start(&arguments.image(), &configuration, false, SILENCE_LIMIT)?;
             on_board(scenario, board, interrupt)
         }
     }
@@ -167,8 +180,7 @@ fn by_the_clock(scenario: &Scenario, interrupt: &Interrupt) -> Result<TimingRepo
     let (lateness_ns, missed_deadlines) = drive(scenario, metronome, interrupt)?.finish();
     let (name, unit) = (&scenario.name, Unit::Nanoseconds);
     let tick_hz = scenario.run.tick_hz;
-    let host = Host::Native.to_possible_value();
-    let host = host.as_ref().map_or("native", |host| host.get_name());
+    let host = &Host::Native.name();
     Ok(TimingReport {
         missed_deadlines,
         ..TimingReport::new(name, tick_hz, host, "wake-up", unit, &lateness_ns)

@@ -134,6 +134,7 @@ impl Bell {
         // Whatever ends the sleep, the caller looks for a message.
         let asleep = &self.line(self.role).asleep;
         let _ = futex::wait(asleep, Flags::empty(), 1, Some(&limit));
+        asleep.store(0, Ordering::Relaxed);
     }
 }
 

@@ -6,7 +6,7 @@ use painleve_firmware::drive::Drive;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::FrameSource;
 
-use crate::{ControllerEnd, LinkError, Pacing, Received, Session};
+use crate::{ControllerEnd, Expected, LinkError, Pacing, Received, Session};
 
 /// The controller's end of the link as a [`Drive`].
 ///
@@ -56,7 +56,10 @@ impl BusDrive {
             return self.end.receive().map(Some);
         };
         let next = due + period;
-        let received = self.end.receive_newest(next + period / 2)?;
+        let received = self.end.receive_newest(Expected {
+            due: next,
+            deadline: next + period / 2,
+        })?;
         if received.is_none() {
             self.due = Some(next);
         }

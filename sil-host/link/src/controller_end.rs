@@ -23,6 +23,19 @@ use painleve_system::interrupt::Interrupt;
 /// start.
 const PLANT_POLL: Duration = Duration::from_millis(10);
 
+/// Time before a frame is due at which its receiver wakes up, to spin. It covers the slack of Linux's
+/// timers (50 µs) and the start of an idle processor.
+const WAKE_UP: Duration = Duration::from_micros(120);
+
+/// When a frame is expected in real time.
+#[derive(Clone, Copy, Debug)]
+pub struct Expected {
+    /// When it is due.
+    pub due: Instant,
+    /// When to give it up.
+    pub deadline: Instant,
+}
+
 /// Message received from the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
@@ -163,22 +176,26 @@ impl ControllerEnd {
         }
     }
 
-    /// Waits as [`ControllerEnd::receive`] does, but only until `deadline`, and returns `None` if
-    /// nothing has arrived by then. If several frames have arrived, returns the newest; the
-    /// discarded ones show as a jump of its `sequence`.
+    /// Waits as [`ControllerEnd::receive`] does for a frame that is due, but only until its deadline,
+    /// and returns `None` if nothing has arrived by then. If several frames have arrived, returns the
+    /// newest; the discarded ones show as a jump of its `sequence`.
     ///
     /// # Errors
     /// As [`ControllerEnd::receive`]; the silence limit keeps counting across calls.
-    pub fn receive_newest(&mut self, deadline: Instant) -> Result<Option<Received>, LinkError> {
-        let mut newest = self.receive_before(Some(deadline))?;
+    pub fn receive_newest(&mut self, expected: Expected) -> Result<Option<Received>, LinkError> {
+        let mut newest = self.receive_before(Some(expected))?;
         while let (Some(Received::Frame(_)), Some(newer)) = (newest, self.take()?) {
             newest = Some(Received::Frame(newer));
         }
         Ok(newest)
     }
 
-    fn receive_before(&mut self, deadline: Option<Instant>) -> Result<Option<Received>, LinkError> {
+    fn receive_before(
+        &mut self,
+        expected: Option<Expected>,
+    ) -> Result<Option<Received>, LinkError> {
         let mut known_gone = false;
+        let mut is_early = false;
         let mut longest = LOOK_INTERVAL;
         loop {
             if let Some(frame) = self.take()? {
@@ -198,11 +215,23 @@ impl ControllerEnd {
                     bus: self.bus().clone(),
                 });
             }
-            if let Some(deadline) = deadline {
-                longest = deadline.saturating_duration_since(Instant::now());
+            if let Some(expected) = expected {
+                let now = Instant::now();
+                longest = expected.deadline.saturating_duration_since(now);
                 if longest.is_zero() {
                     return Ok(None);
                 }
+                let early = expected
+                    .due
+                    .saturating_duration_since(now)
+                    .saturating_sub(WAKE_UP);
+                if !early.is_zero() {
+                    longest = early;
+                    self.patience.stop_spinning();
+                } else if is_early {
+                    self.patience.spin_again();
+                }
+                is_early = !early.is_zero();
             }
             match self.patience.pause(&self.ports.bell, longest) {
                 AfterPause::Poll => {}

@@ -49,7 +49,7 @@ mod tests;
 
 pub use bus::{BusName, InvalidBusName, Pair};
 pub use bus_drive::BusDrive;
-pub use controller_end::{ControllerEnd, Received};
+pub use controller_end::{ControllerEnd, Expected, Received};
 pub use error::{FolderError, LinkError};
 pub use patience::DEFAULT_SILENCE_LIMIT;
 pub use plant_end::PlantEnd;

@@ -117,6 +117,16 @@ impl Patience {
         }
     }
 
+    /// Sleeps in the pauses that follow.
+    pub(super) fn stop_spinning(&mut self) {
+        self.pauses.polls = SPIN_POLLS;
+    }
+
+    /// Spins in the pauses that follow, as at the beginning of the wait.
+    pub(super) fn spin_again(&mut self) {
+        self.pauses = Pauses::default();
+    }
+
     /// Pauses once, at most `longest`, and returns the next step.
     #[inline]
     pub(super) fn pause(&mut self, bell: &Bell, longest: Duration) -> AfterPause {

@@ -84,8 +84,8 @@ impl Sink for CsvTable {
         self.write(row(tick))
     }
 
-    fn finish(self: Box<Self>) -> Result<(), RecordError> {
-        Ok(self.complete()?.commit()?)
+    fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
+        Ok(Some(self.complete()?))
     }
 
     fn finish_partial(self: Box<Self>, _reason: &str) -> Result<Option<PathBuf>, RecordError> {

@@ -1,28 +1,22 @@
 //! Columns of a recorded MCAP file as CSV text.
 
-use std::collections::BTreeMap;
-use std::io::Write;
+use std::borrow::Cow;
+use std::fmt;
+use std::io::{Read, Write};
 
-use mcap::McapError;
+use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
 use crate::csv_table::{decimal, header};
 use crate::fields::{TOPICS, Topic};
+use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 
 /// Why a record cannot be exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// The file is not an MCAP file, or is damaged.
+    /// No whole tick can be read.
     #[error("not a complete MCAP file: {0}")]
-    Mcap(#[from] McapError),
-    /// A message is not JSON.
-    #[error("a message of topic {topic} cannot be read: {source}")]
-    Message {
-        /// The topic.
-        topic: String,
-        /// The reason.
-        source: serde_json::Error,
-    },
+    Nothing(Damage),
     /// The file has no topic with one message per tick.
     #[error("no topic /plant, /sensor, /actuator or /estimates: this is not a record of painleve")]
     NoTicks,
@@ -31,71 +25,168 @@ pub enum ExportError {
     Write(#[from] csv::Error),
 }
 
-/// Writes the ticks of a record as CSV, with the columns of [`csv_table`](crate::csv_table).
+/// What was exported.
+#[derive(Debug)]
+pub struct Exported {
+    /// Number of ticks.
+    pub rows: u64,
+    /// Time of the last one, s.
+    pub end_s: f64,
+    /// What ended the record before its end, if it is damaged.
+    pub damage: Option<Damage>,
+    /// Bytes of the record before the damage.
+    pub whole_bytes: u64,
+}
+
+/// Writes the ticks of a record as CSV, with the columns of [`csv_table`](crate::csv_table). Of a damaged record the
+/// ticks before the damage are written, checked and whole: see [`Exported::damage`].
 ///
 /// # Errors
-/// [`ExportError`].
-pub fn ticks_to_csv(record: &[u8], output: impl Write) -> Result<(), ExportError> {
-    let mut writer = csv::Writer::from_writer(output);
-    writer.write_record(header())?;
-    let mut row = Row::default();
-    for message in mcap::MessageStream::new(record)? {
-        let message = message?;
-        let name = message.channel.topic.trim_start_matches('/');
-        let Some(topic) = TOPICS.iter().position(|topic| topic.name == name) else {
-            continue;
-        };
-        if row.time_ns != Some(message.log_time) {
-            row.write(&mut writer)?;
-            row.time_ns = Some(message.log_time);
-        }
-        row.topics[topic] =
-            serde_json::from_slice(&message.data).map_err(|source| ExportError::Message {
-                topic: message.channel.topic.clone(),
+/// [`ExportError`] if there is not even one, or the rows cannot be written.
+pub fn ticks_to_csv(record: impl Read, output: impl Write) -> Result<Exported, ExportError> {
+    let mut rows = Rows {
+        writer: csv::Writer::from_writer(output),
+        row: Row::default(),
+        written: 0,
+        end_ns: 0,
+        topics: None,
+    };
+    rows.writer.write_record(header())?;
+    let mut extent = Extent::default();
+    let damage = match messages(record, &mut extent, |message| rows.take_in(message)) {
+        Ok(()) => None,
+        Err(Stop::Damage(damage)) => Some(damage),
+        Err(Stop::Write(error)) => return Err(error.into()),
+    };
+    // The messages of one tick may be in two chunks.
+    if damage.is_none() || rows.topics == Some(rows.row.topics()) {
+        rows.end_row()?;
+    }
+    if rows.written == 0 {
+        return Err(damage.map_or(ExportError::NoTicks, ExportError::Nothing));
+    }
+    rows.writer.flush().map_err(csv::Error::from)?;
+    Ok(Exported {
+        rows: rows.written,
+        end_s: rows.end_ns as f64 / 1e9,
+        damage,
+        whole_bytes: extent.whole_bytes,
+    })
+}
+
+/// What ends the reading of a record.
+enum Stop {
+    Damage(Damage),
+    Write(csv::Error),
+}
+
+impl From<Damage> for Stop {
+    fn from(damage: Damage) -> Self {
+        Self::Damage(damage)
+    }
+}
+
+/// The rows of the table.
+struct Rows<W: Write> {
+    writer: csv::Writer<W>,
+    /// The row to which messages are added.
+    row: Row,
+    written: u64,
+    /// Time of the last row written.
+    end_ns: u64,
+    /// Topics of the last row written.
+    topics: Option<[bool; TOPICS.len()]>,
+}
+
+impl<W: Write> Rows<W> {
+    fn take_in(&mut self, message: RecordedMessage<'_>) -> Result<(), Stop> {
+        let topic = &TOPICS[message.topic];
+        let mut json = serde_json::Deserializer::from_slice(message.json);
+        let cells = Cells(topic)
+            .deserialize(&mut json)
+            .and_then(|cells| json.end().map(|()| cells))
+            .map_err(|source| Damage::Message {
+                topic: topic.name,
                 source,
             })?;
+        if self.row.time_ns != Some(message.time_ns) {
+            self.end_row().map_err(Stop::Write)?;
+            self.row.time_ns = Some(message.time_ns);
+        }
+        self.row.cells[message.topic] = Some(cells);
+        Ok(())
     }
-    if row.time_ns.is_none() {
-        return Err(ExportError::NoTicks);
+
+    /// Writes the row, if there is one, and begins an empty one.
+    fn end_row(&mut self) -> Result<(), csv::Error> {
+        let row = std::mem::take(&mut self.row);
+        let Some(time_ns) = row.time_ns else {
+            return Ok(());
+        };
+        self.topics = Some(row.topics());
+        self.end_ns = time_ns;
+        self.written += 1;
+        let cells = TOPICS.iter().zip(row.cells).flat_map(|(topic, cells)| {
+            cells.unwrap_or_else(|| vec![String::new(); topic.fields.len()])
+        });
+        let time = decimal(time_ns as f64 / 1e9);
+        self.writer.write_record(std::iter::once(time).chain(cells))
     }
-    row.write(&mut writer)?;
-    writer.flush().map_err(csv::Error::from)?;
-    Ok(())
 }
 
 /// The messages of one tick.
 #[derive(Default)]
 struct Row {
     time_ns: Option<u64>,
-    topics: [BTreeMap<String, Box<RawValue>>; TOPICS.len()],
+    /// The cells of each topic that has a message.
+    cells: [Option<Vec<String>>; TOPICS.len()],
 }
 
 impl Row {
-    /// Writes the row, if there is one, and empties it.
-    fn write(&mut self, writer: &mut csv::Writer<impl Write>) -> Result<(), csv::Error> {
-        let Some(time_ns) = self.time_ns.take() else {
-            return Ok(());
-        };
-        let topics = std::mem::take(&mut self.topics);
-        let cells = TOPICS
-            .iter()
-            .zip(&topics)
-            .flat_map(|(topic, values)| cells(topic, values));
-        let time = decimal(time_ns as f64 / 1e9);
-        writer.write_record(std::iter::once(time).chain(cells))
+    /// Returns which topics have a message.
+    fn topics(&self) -> [bool; TOPICS.len()] {
+        self.cells.each_ref().map(Option::is_some)
     }
 }
 
-/// Returns the cells of a topic: numbers as they are written in the file, strings without quotes.
-fn cells<'a>(
-    topic: &'a Topic,
-    values: &'a BTreeMap<String, Box<RawValue>>,
-) -> impl Iterator<Item = String> + 'a {
-    topic.fields.iter().map(|field| {
-        let text = values.get(field.name).map_or("", |value| value.get());
-        serde_json::from_str::<String>(text).unwrap_or_else(|_| match text {
-            "null" => String::new(),
-            number => number.to_owned(),
-        })
-    })
+/// Reads the cells of a topic from its message: numbers as they are written there, strings without quotes.
+struct Cells(&'static Topic);
+
+impl<'de> DeserializeSeed<'de> for Cells {
+    type Value = Vec<String>;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
+        deserializer.deserialize_map(self)
+    }
 }
+
+impl<'de> Visitor<'de> for Cells {
+    type Value = Vec<String>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+        let mut cells = vec![String::new(); self.0.fields.len()];
+        while let Some(key) = map.next_key::<Cow<'_, str>>()? {
+            match self.0.fields.iter().position(|field| field.name == key) {
+                Some(field) => cells[field] = cell(map.next_value::<&RawValue>()?),
+                None => {
+                    map.next_value::<IgnoredAny>()?;
+                }
+            }
+        }
+        Ok(cells)
+    }
+}
+
+fn cell(value: &RawValue) -> String {
+    match value.get() {
+        "null" => String::new(),
+        text => serde_json::from_str::<String>(text).unwrap_or_else(|_| text.to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

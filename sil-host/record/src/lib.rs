@@ -7,6 +7,7 @@
 //! - [`plot`]: the run over time as a figure
 //! - [`report`]: the results of the run as JSON and as a table
 //! - [`export`]: columns of a recorded MCAP file as CSV
+//! - [`record_file`]: the messages of a recorded MCAP file, checked
 
 pub mod csv_table;
 pub mod events;
@@ -15,6 +16,7 @@ pub mod fields;
 pub mod mcap_log;
 pub mod messages;
 pub mod plot;
+pub mod record_file;
 pub mod recorder;
 pub mod replica;
 pub mod report;

@@ -173,8 +173,8 @@ impl Sink for McapLog {
             .map_err(|error| RecordError::write(&self.path, reason(error)))
     }
 
-    fn finish(self: Box<Self>) -> Result<(), RecordError> {
-        Ok(self.complete()?.commit()?)
+    fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
+        Ok(Some(self.complete()?))
     }
 
     /// Writes the reason to a metadata record `ended early`.
@@ -201,4 +201,4 @@ fn reason(error: McapError) -> io::Error {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -205,13 +205,13 @@ impl Sink for PlotFile {
         Ok(())
     }
 
-    fn finish(mut self: Box<Self>) -> Result<(), RecordError> {
+    fn finish(mut self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
         let path = self.file.path().to_path_buf();
         let content = picture::encoded(&path, self.plot.svg())?;
         self.file
             .write_all(&content)
             .map_err(|error| RecordError::write(&path, error))?;
-        Ok(self.file.commit()?)
+        Ok(Some(self.file))
     }
 }
 

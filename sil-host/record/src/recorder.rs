@@ -14,7 +14,7 @@ use std::thread::{self, JoinHandle};
 use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::sample::Sample;
 use painleve_plant::{Configuration, Event};
-use painleve_system::atomic_file::AtomicFileError;
+use painleve_system::atomic_file::{AtomicFile, AtomicFileError, commit_all};
 use painleve_system::picture::PictureError;
 
 use crate::events::{ControllerEvents, EventKind, RunEvent};
@@ -87,11 +87,12 @@ pub trait Sink: Send {
         Ok(())
     }
 
-    /// Completes the file and gives it its name. Without this call no file is left.
+    /// Completes the file and returns it, if there is one. It receives its name when all sinks are complete; without
+    /// this call no file is left.
     ///
     /// # Errors
     /// [`RecordError`] if the file cannot be written.
-    fn finish(self: Box<Self>) -> Result<(), RecordError>;
+    fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError>;
 
     /// Keeps the file of a run that ended early under a name that marks it as partial, which is
     /// returned; `None` if a partial file has no use.
@@ -183,10 +184,14 @@ impl Recorder {
     /// Records the remaining samples and completes every file.
     ///
     /// # Errors
-    /// [`RecordError`] if anything could not be written; that file is not left then.
+    /// [`RecordError`] if anything could not be written; no file is left then.
     pub fn finish(mut self) -> Result<(), RecordError> {
         self.hand_over()?;
-        self.end()?.into_iter().try_for_each(Sink::finish)
+        let mut files = Vec::new();
+        for sink in self.end()? {
+            files.extend(sink.finish()?);
+        }
+        Ok(commit_all(files)?)
     }
 
     /// Keeps the recorded part of a run that ended early, and returns the files' names. Earlier

@@ -1,6 +1,5 @@
 //! The report of a run: one JSON object for programs, one table for readers.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use comfy_table::CellAlignment;
@@ -94,9 +93,9 @@ pub struct RunReport {
     /// Time at which the torque stages removed the torque for lack of commands, s; null if never.
     #[serde(default)]
     pub drive_watchdog_s: Option<f64>,
-    /// Files that the run wrote.
+    /// Files that the run wrote; bytes of their names that are not UTF-8 are replaced.
     #[serde(default)]
-    pub files: Vec<PathBuf>,
+    pub files: Vec<String>,
     /// Number of the fault latched at the end; null for none.
     pub fault: Option<u8>,
     /// Meaning of that fault.
@@ -230,7 +229,7 @@ impl RunReport {
         );
         for (index, file) in self.files.iter().enumerate() {
             let name = if index == 0 { "wrote" } else { "" };
-            row(name, file.display().to_string());
+            row(name, file.clone());
         }
         if let Some(tripped_s) = self.drive_watchdog_s {
             row(

@@ -5,16 +5,23 @@
 //! dropped before that, it is removed, and an older file stays unchanged.
 //!
 //! The temporary file is locked while its process lives. The next file of the same name removes the
-//! temporary files of killed processes. A symbolic link is kept; the file that it points to is
-//! replaced.
+//! temporary files of killed processes. A symbolic link of the user's own is kept; the file that it points to is
+//! replaced. Links of other users are refused.
 
 use std::ffi::{OsStr, OsString};
-use std::fs::{self, File, TryLockError};
+use std::fs::{File, TryLockError};
+use std::hash::{BuildHasher, RandomState};
 use std::io::{self, Seek, SeekFrom, Write};
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use nix::dir::Dir;
+use nix::errno::Errno;
+use nix::fcntl::{AtFlags, OFlag, openat, renameat};
+use nix::sys::stat::Mode;
+use nix::unistd::{UnlinkatFlags, linkat, unlinkat};
+
+use crate::output_place::{OutputPlace, PlaceError, sync};
 
 /// Failure to write an output file.
 #[derive(Debug, thiserror::Error)]
@@ -25,7 +32,29 @@ pub enum AtomicFileError {
         /// The requested path.
         path: PathBuf,
     },
-    /// A parent folder does not exist and cannot be created.
+    /// A symbolic link on the way leads nowhere.
+    #[error(
+        "cannot write `{path}`: `{link}` is a symbolic link that leads to no file; remove it or create what it \
+         names"
+    )]
+    Dangling {
+        /// The requested path.
+        path: PathBuf,
+        /// The link.
+        link: PathBuf,
+    },
+    /// Another user's symbolic link would choose the file that is replaced.
+    #[error(
+        "cannot write `{path}`: `{link}` is a symbolic link of another user, who may want a file of yours \
+         replaced; choose another path"
+    )]
+    ForeignLink {
+        /// The requested path.
+        path: PathBuf,
+        /// The link.
+        link: PathBuf,
+    },
+    /// A parent folder does not exist and cannot be created, or cannot be opened.
     #[error(
         "cannot create the folder `{folder}` for `{path}`: {source}; choose a path that can be written"
     )]
@@ -61,14 +90,30 @@ pub enum AtomicFileError {
     },
 }
 
+impl AtomicFileError {
+    fn of_place(path: PathBuf, error: PlaceError) -> Self {
+        match error {
+            PlaceError::NotAFile => Self::NotAFile { path },
+            PlaceError::Dangling(link) => Self::Dangling { path, link },
+            PlaceError::Foreign(link) => Self::ForeignLink { path, link },
+            PlaceError::Folder(folder, source) => Self::Folder {
+                path,
+                folder,
+                source,
+            },
+        }
+    }
+}
+
 /// A file that receives its name when it is complete.
 #[derive(Debug)]
 pub struct AtomicFile {
     /// The path as given, for messages.
     path: PathBuf,
-    folder: PathBuf,
-    target: PathBuf,
-    temporary: NamedTempFile,
+    place: OutputPlace,
+    /// The file under its temporary name.
+    file: File,
+    temporary: OsString,
     /// Whether an existing file must not be replaced.
     is_new: bool,
     /// Remaining bytes, for tests of a full disk.
@@ -80,27 +125,19 @@ impl AtomicFile {
     /// Opens a temporary file beside `path` and creates missing folders.
     ///
     /// # Errors
-    /// [`AtomicFileError`] if `path` is something other than a regular file, or its folder cannot
-    /// be created or written to.
+    /// [`AtomicFileError`] if `path` is something other than a regular file, leads through a symbolic link of
+    /// another user, or its folder cannot be created or written to.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self, AtomicFileError> {
         let path = path.into();
-        let Some((folder, name)) = place(&path) else {
-            return Err(AtomicFileError::NotAFile { path });
+        let place = match OutputPlace::find(&path) {
+            Ok(place) => place,
+            Err(error) => return Err(AtomicFileError::of_place(path, error)),
         };
-        if let Err(source) = create_folders(&folder) {
-            return Err(AtomicFileError::Folder {
+        match temporary(&place) {
+            Ok((file, temporary)) => Ok(Self {
                 path,
-                folder,
-                source,
-            });
-        }
-        let opened = temporary(&folder, &name)
-            .and_then(|temporary| Ok((fs::canonicalize(&folder)?.join(name), temporary)));
-        match opened {
-            Ok((target, temporary)) => Ok(Self {
-                target,
-                folder,
-                path,
+                place,
+                file,
                 temporary,
                 is_new: false,
                 #[cfg(any(test, feature = "full-disk"))]
@@ -116,13 +153,12 @@ impl AtomicFile {
     /// # Errors
     /// [`AtomicFileError::Busy`].
     pub fn check_alone(&self) -> Result<(), AtomicFileError> {
-        let name = self.target.file_name().unwrap_or_default();
-        let is_written = |path: PathBuf| {
-            path.file_name() != self.temporary.path().file_name()
-                && File::open(path)
+        let is_written = |name: OsString| {
+            name != self.temporary
+                && existing(&self.place, &name)
                     .is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
         };
-        if temporaries(&self.folder, name).any(is_written) {
+        if temporaries(&self.place).into_iter().any(is_written) {
             let path = self.path.clone();
             return Err(AtomicFileError::Busy { path });
         }
@@ -134,9 +170,16 @@ impl AtomicFile {
         &self.path
     }
 
-    /// Returns the final path of the file, with symbolic links resolved.
-    pub fn target(&self) -> &Path {
-        &self.target
+    /// Writes the data to the disk.
+    fn sync(&self) -> Result<(), AtomicFileError> {
+        self.file.sync_all().map_err(|source| self.error(source))
+    }
+
+    fn error(&self, source: impl Into<io::Error>) -> AtomicFileError {
+        AtomicFileError::Write {
+            path: self.path.clone(),
+            source: source.into(),
+        }
     }
 
     /// Writes the data to the disk and gives the file its name.
@@ -145,31 +188,34 @@ impl AtomicFile {
     /// [`AtomicFileError::Write`] if the disk is full or the name is not available; the file is
     /// then removed.
     pub fn commit(self) -> Result<(), AtomicFileError> {
-        let Self {
-            path,
-            folder,
-            target,
-            temporary,
-            is_new,
-            ..
-        } = self;
-        let write = |source| AtomicFileError::Write {
-            path: path.clone(),
-            source,
-        };
-        temporary.as_file().sync_all().map_err(write)?;
-        let named = if is_new {
-            temporary.persist_noclobber(target)
-        } else {
-            temporary.persist(target)
-        };
-        named.map_err(|error| match error.error.kind() {
-            io::ErrorKind::AlreadyExists if is_new => {
-                AtomicFileError::Exists { path: path.clone() }
+        self.sync()?;
+        let OutputPlace { folder, name, .. } = &self.place;
+        let temporary = self.temporary.as_os_str();
+        let named = if self.is_new {
+            // The temporary name is removed with `self`.
+            match linkat(
+                folder,
+                temporary,
+                folder,
+                name.as_os_str(),
+                AtFlags::empty(),
+            ) {
+                // A file system without hard links.
+                Err(Errno::EPERM | Errno::EOPNOTSUPP) if existing(&self.place, name).is_err() => {
+                    renameat(folder, temporary, folder, name.as_os_str())
+                }
+                linked => linked,
             }
-            _ => write(error.error),
+        } else {
+            renameat(folder, temporary, folder, name.as_os_str())
+        };
+        named.map_err(|error| match error {
+            Errno::EEXIST if self.is_new => AtomicFileError::Exists {
+                path: self.path.clone(),
+            },
+            _ => self.error(error),
         })?;
-        sync_folder(&folder).map_err(write)
+        sync(folder).map_err(|error| self.error(error))
     }
 
     /// Writes the data received up to now to the disk under a name that marks it as partial, for
@@ -179,19 +225,25 @@ impl AtomicFile {
     /// # Errors
     /// As [`AtomicFile::commit`].
     pub fn commit_partial(mut self) -> Result<PathBuf, AtomicFileError> {
-        let rename = |path: &Path| {
-            let extension = path.extension().unwrap_or_default().to_string_lossy();
-            path.with_extension(format!("partial.{extension}"))
-        };
-        self.target = rename(&self.target);
-        let path = rename(&self.path);
+        let place = &mut self.place;
+        let mut name = PathBuf::from(std::mem::take(&mut place.name));
+        let mut extension = OsString::from("partial");
+        if let Some(own) = name.extension() {
+            extension.push(".");
+            extension.push(own);
+        }
+        name.set_extension(extension);
+        let path = place.folder_path.join(&name);
+        place.name = name.into();
         self.commit()?;
         Ok(path)
     }
+}
 
-    // The plain file: `NamedTempFile` would put its temporary name into errors.
-    fn file(&self) -> &File {
-        self.temporary.as_file()
+impl Drop for AtomicFile {
+    fn drop(&mut self) {
+        // Fails if the file has received its name.
+        let _ = remove(&self.place, &self.temporary);
     }
 }
 
@@ -202,58 +254,45 @@ impl Write for AtomicFile {
             Some(room) => self.room = room,
             None => return Err(io::ErrorKind::StorageFull.into()),
         }
-        self.file().write(bytes)
+        self.file.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file().flush()
+        self.file.flush()
     }
 }
 
 impl Seek for AtomicFile {
     fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
-        self.file().seek(position)
+        self.file.seek(position)
     }
-}
-
-/// Returns the folder and the name of a future file, with symbolic links resolved. `None` if the
-/// path is something other than a regular file: renaming onto a folder would fail only at the end,
-/// and renaming onto a device would replace the device.
-fn place(path: &Path) -> Option<(PathBuf, OsString)> {
-    let followed = match fs::symlink_metadata(path) {
-        Ok(metadata) if metadata.is_symlink() => fs::canonicalize(path).ok()?,
-        _ => path.to_path_buf(),
-    };
-    if fs::metadata(&followed).is_ok_and(|metadata| !metadata.is_file()) {
-        return None;
-    }
-    let name = followed.file_name()?.to_os_string();
-    let folder = followed.parent()?;
-    let folder = if folder.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        folder
-    };
-    Some((folder.to_path_buf(), name))
 }
 
 /// Creates a locked temporary file, after removing those of dead processes.
-fn temporary(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
-    remove_abandoned(folder, name);
-    let prefix = prefix(name);
+fn temporary(place: &OutputPlace) -> io::Result<(File, OsString)> {
+    for name in temporaries(place) {
+        if existing(place, &name).is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = remove(place, &name);
+        }
+    }
+    let flags = OFlag::O_RDWR | OFlag::O_CREAT | OFlag::O_EXCL | OFlag::O_CLOEXEC;
+    let mode = Mode::from_bits_truncate(0o666);
+    let mut attempt = 0_u32;
     loop {
-        let temporary = tempfile::Builder::new()
-            .prefix(&prefix)
-            .suffix(SUFFIX)
-            // Temporary files are private by default; an output file must not be.
-            .permissions(fs::Permissions::from_mode(0o666))
-            .tempfile_in(folder)?;
+        attempt += 1;
+        // `RandomState` is random for each process, and for each call.
+        let random = RandomState::new().hash_one(attempt);
+        let mut name = prefix(&place.name);
+        name.push(format!("{random:016x}{SUFFIX}"));
+        let file = match openat(&place.folder, name.as_os_str(), flags, mode) {
+            Err(Errno::EEXIST) => continue,
+            file => File::from(file?),
+        };
         // On a file system without locks, abandoned files are not removed either.
-        let _ = temporary.as_file().try_lock();
+        let _ = file.try_lock();
         // Before it was locked, another process may have removed it as abandoned.
-        let own = temporary.as_file().metadata()?.ino();
-        if fs::symlink_metadata(temporary.path()).is_ok_and(|there| there.ino() == own) {
-            return Ok(temporary);
+        if existing(place, &name).is_ok() {
+            return Ok((file, name));
         }
     }
 }
@@ -261,54 +300,51 @@ fn temporary(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
 const SUFFIX: &str = ".part";
 
 /// Returns the start of the names of a file's temporary files.
-fn prefix(name: &OsStr) -> String {
-    format!(".{}.", name.to_string_lossy())
+fn prefix(name: &OsStr) -> OsString {
+    let mut prefix = OsString::from(".");
+    prefix.push(name);
+    prefix.push(".");
+    prefix
 }
 
-/// Returns the temporary files of a file, of all processes.
-fn temporaries(folder: &Path, name: &OsStr) -> impl Iterator<Item = PathBuf> {
-    let prefix = prefix(name);
-    let is_temporary = move |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let random = name
-            .strip_prefix(prefix.as_str())
-            .and_then(|rest| rest.strip_suffix(SUFFIX));
-        // Otherwise it belongs to a longer name.
-        random.is_some_and(|random| !random.contains('.'))
+/// Opens a file of the folder, but no link.
+fn existing(place: &OutputPlace, name: &OsStr) -> Result<File, Errno> {
+    let flags = OFlag::O_RDONLY | OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK | OFlag::O_CLOEXEC;
+    openat(&place.folder, name, flags, Mode::empty()).map(File::from)
+}
+
+fn remove(place: &OutputPlace, name: &OsStr) -> Result<(), Errno> {
+    unlinkat(&place.folder, name, UnlinkatFlags::NoRemoveDir)
+}
+
+/// Returns the names of a file's temporary files, of all processes.
+fn temporaries(place: &OutputPlace) -> Vec<OsString> {
+    let prefix = prefix(&place.name);
+    let is_temporary = |name: &[u8]| {
+        name.strip_prefix(prefix.as_bytes())
+            .and_then(|rest| rest.strip_suffix(SUFFIX.as_bytes()))
+            // Otherwise it belongs to a longer name.
+            .is_some_and(|random| !random.contains(&b'.'))
     };
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.map(|entry| entry.path()).filter(is_temporary)
+    let flags = OFlag::O_RDONLY | OFlag::O_DIRECTORY | OFlag::O_CLOEXEC;
+    let Ok(mut folder) = Dir::openat(&place.folder, ".", flags, Mode::empty()) else {
+        return Vec::new();
+    };
+    let names = folder.iter().flatten();
+    names
+        .map(|entry| OsStr::from_bytes(entry.file_name().to_bytes()).to_owned())
+        .filter(|name| is_temporary(name.as_bytes()))
+        .collect()
 }
 
-fn remove_abandoned(folder: &Path, name: &OsStr) {
-    for path in temporaries(folder, name) {
-        if File::open(&path).is_ok_and(|file| file.try_lock().is_ok()) {
-            let _ = fs::remove_file(path);
-        }
-    }
-}
-
-/// Creates a folder and the missing ones above it, and writes their names to the disk.
-fn create_folders(folder: &Path) -> io::Result<()> {
-    let missing: Vec<_> = folder.ancestors().take_while(|it| !it.exists()).collect();
-    fs::create_dir_all(folder)?;
-    for created in missing {
-        match created.parent() {
-            Some(above) if above.as_os_str().is_empty() => sync_folder(Path::new("."))?,
-            Some(above) => sync_folder(above)?,
-            None => {}
-        }
-    }
-    Ok(())
-}
-
-/// Writes the new directory entry to the disk.
-fn sync_folder(folder: &Path) -> io::Result<()> {
-    match File::open(folder).and_then(|folder| folder.sync_all()) {
-        // Some file systems do not support this.
-        Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
-        other => other,
-    }
+/// Gives several complete files their names, after the data of all is on the disk: a full disk leaves none of
+/// them.
+///
+/// # Errors
+/// As [`AtomicFile::commit`].
+pub fn commit_all(files: Vec<AtomicFile>) -> Result<(), AtomicFileError> {
+    files.iter().try_for_each(AtomicFile::sync)?;
+    files.into_iter().try_for_each(AtomicFile::commit)
 }
 
 /// Writes a whole new file; fails if the path exists. If several processes write at once, one
@@ -317,9 +353,9 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
 /// # Errors
 /// [`AtomicFileError::Exists`], and those of [`AtomicFile`].
 pub fn write_new(path: impl Into<PathBuf>, contents: &[u8]) -> Result<(), AtomicFileError> {
-    let mut file = AtomicFile::create(path)?;
+    let mut file = prepare(path, contents)?;
     file.is_new = true;
-    finish(file, contents)
+    file.commit()
 }
 
 /// Writes a whole file.
@@ -327,22 +363,27 @@ pub fn write_new(path: impl Into<PathBuf>, contents: &[u8]) -> Result<(), Atomic
 /// # Errors
 /// Those of [`AtomicFile`]; the file is then removed.
 pub fn write(path: impl Into<PathBuf>, contents: &[u8]) -> Result<(), AtomicFileError> {
-    finish(AtomicFile::create(path)?, contents)
+    prepare(path, contents)?.commit()
 }
 
-fn finish(mut file: AtomicFile, contents: &[u8]) -> Result<(), AtomicFileError> {
+/// Writes a whole file that receives its name later, with [`commit_all`].
+///
+/// # Errors
+/// Those of [`AtomicFile`]; the file is then removed.
+pub fn prepare(path: impl Into<PathBuf>, contents: &[u8]) -> Result<AtomicFile, AtomicFileError> {
+    let mut file = AtomicFile::create(path)?;
     match file.write_all(contents) {
-        Ok(()) => file.commit(),
-        Err(source) => Err(AtomicFileError::Write {
-            path: file.path,
-            source,
-        }),
+        Ok(()) => Ok(file),
+        Err(source) => Err(file.error(source)),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nix::unistd::geteuid;
+    use std::fs;
+    use std::os::unix::fs::{PermissionsExt, lchown, symlink};
 
     fn names(folder: &Path) -> Vec<String> {
         fs::read_dir(folder)
@@ -409,16 +450,121 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (file, link) = (folder.path().join("file"), folder.path().join("link"));
         fs::write(&file, "old").unwrap();
-        std::os::unix::fs::symlink(&file, &link).unwrap();
+        symlink(&file, &link).unwrap();
         write(&link, b"new").unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&file).unwrap(), b"new");
-        // A link that leads nowhere cannot be resolved.
-        fs::remove_file(&file).unwrap();
-        assert!(matches!(
-            AtomicFile::create(&link),
-            Err(AtomicFileError::NotAFile { .. })
-        ));
+        let partial = AtomicFile::create(&link).unwrap().commit_partial().unwrap();
+        assert_eq!(partial, folder.path().join("file.partial"));
+        // Links may also lead to a folder, up and down, and to further links.
+        let (deep, there) = (folder.path().join("deep/er"), folder.path().join("there"));
+        fs::create_dir_all(&deep).unwrap();
+        symlink("deep/../deep/er", &there).unwrap();
+        symlink("../../link", deep.join("back")).unwrap();
+        write(there.join("new"), b"").unwrap();
+        assert!(deep.join("new").exists());
+        write(there.join("back"), b"newer").unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"newer");
+    }
+
+    #[test]
+    fn links_that_lead_nowhere_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let (lost, turn) = (folder.path().join("lost"), folder.path().join("turn"));
+        symlink("nowhere/deep", &lost).unwrap();
+        symlink("turn", &turn).unwrap();
+        for path in [lost.clone(), lost.join("run.mcap")] {
+            let error = AtomicFile::create(path).unwrap_err();
+            assert!(
+                matches!(&error, AtomicFileError::Dangling { link, .. } if *link == lost),
+                "{error}"
+            );
+            assert!(error.to_string().contains("leads to no file"), "{error}");
+        }
+        let error = AtomicFile::create(&turn).unwrap_err().to_string();
+        assert!(error.contains("symbolic links"), "{error}");
+        assert_eq!(names(folder.path()).len(), 2);
+    }
+
+    /// A shared folder in which everybody may put links, as in `/tmp`.
+    #[test]
+    fn links_of_other_users_are_refused_where_they_choose_the_file() {
+        const STRANGER: u32 = 23_002;
+        if !geteuid().is_root() {
+            eprintln!("SKIPPED: only root can make a link of another user");
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let (home, shared) = (folder.path().join("home"), folder.path().join("shared"));
+        fs::create_dir(&home).unwrap();
+        fs::create_dir(&shared).unwrap();
+        let secret = home.join("secret");
+        fs::write(&secret, "mine").unwrap();
+        let link = |name: &str, target: &Path, owner: u32| {
+            let path = shared.join(name);
+            symlink(target, &path).unwrap();
+            lchown(&path, Some(owner), Some(owner)).unwrap();
+            path
+        };
+        let file = link("run.mcap", &secret, STRANGER);
+        let up = link("up", &home, STRANGER);
+        let own = link("own", &home, 0);
+        // A link of one's own to the link of another user.
+        let detour = home.join("detour");
+        symlink(&file, &detour).unwrap();
+        for mode in [0o755, 0o1777] {
+            fs::set_permissions(&shared, fs::Permissions::from_mode(mode)).unwrap();
+            for path in [&file, &detour] {
+                let error = AtomicFile::create(path).unwrap_err();
+                assert!(
+                    matches!(error, AtomicFileError::ForeignLink { .. }),
+                    "{error}"
+                );
+                assert!(error.to_string().contains("shared/run.mcap"), "{error}");
+            }
+            let by_folder = AtomicFile::create(up.join("secret"));
+            assert_eq!(by_folder.is_ok(), mode == 0o755, "{by_folder:?}");
+            AtomicFile::create(own.join("secret")).unwrap();
+        }
+        assert_eq!(fs::read(&secret).unwrap(), b"mine");
+        assert_eq!(names(&home).len(), 2);
+    }
+
+    /// Between the opening of a file and its commit, its folder is exchanged.
+    #[test]
+    fn a_file_stays_in_the_folder_that_was_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let (out, moved) = (folder.path().join("out"), folder.path().join("moved"));
+        let other = folder.path().join("other");
+        fs::create_dir(&other).unwrap();
+        let file = AtomicFile::create(out.join("run.mcap")).unwrap();
+        fs::rename(&out, &moved).unwrap();
+        symlink(&other, &out).unwrap();
+        file.commit().unwrap();
+        assert_eq!(names(&moved), ["run.mcap"]);
+        assert_eq!(names(&other), [""; 0]);
+    }
+
+    #[test]
+    fn several_files_appear_together() {
+        let folder = tempfile::tempdir().unwrap();
+        let paths = ["a", "b"].map(|name| folder.path().join(name));
+        let files = paths.iter().map(|path| prepare(path, b"x").unwrap());
+        commit_all(files.collect()).unwrap();
+        let mut found = names(folder.path());
+        found.sort();
+        assert_eq!(found, ["a", "b"]);
+    }
+
+    #[test]
+    fn names_that_are_not_text_are_names_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(OsStr::from_bytes(b"a\xff.mcap"));
+        let first = AtomicFile::create(&path).unwrap();
+        let second = AtomicFile::create(folder.path().join(OsStr::from_bytes(b"a\xfe.mcap")));
+        second.unwrap().check_alone().unwrap();
+        first.commit().unwrap();
+        assert!(path.exists());
     }
 
     #[test]
@@ -453,7 +599,6 @@ mod tests {
         assert!(error.contains("file/run.svg"), "{error}");
     }
 
-    #[cfg(target_os = "linux")]
     #[test]
     fn devices_are_refused_and_an_unwritable_folder_is_reported_with_the_name_of_the_file() {
         assert!(matches!(
@@ -465,10 +610,8 @@ mod tests {
         assert!(error.contains("cannot write `/proc/run.svg`"), "{error}");
     }
 
-    #[cfg(unix)]
     #[test]
     fn an_output_file_has_the_permissions_of_the_umask() {
-        use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
         let plain = folder.path().join("plain");
         fs::write(&plain, "").unwrap();

@@ -1,36 +1,93 @@
-//! Reads text files of limited size.
+//! Opens input files: regular files only, of limited size.
+//!
+//! Every file opened here is remembered, so that no output of the same process replaces it.
 
-use std::fs::OpenOptions;
+use std::collections::BTreeMap;
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read};
-use std::os::unix::fs::OpenOptionsExt;
-use std::path::Path;
+use std::os::fd::AsFd;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use nix::libc::O_NONBLOCK;
 
 /// Largest size of a settings file, bytes. Real ones have a few thousand.
 pub const MOST_BYTES: u64 = 16 << 20;
 
-/// Reads a regular file of at most [`MOST_BYTES`]. Pipes and devices are refused, because they
-/// could block the process or never end.
+/// Largest size of a controller's image with its debug information, bytes. Real ones have ten million.
+pub const MOST_IMAGE_BYTES: u64 = 256 << 20;
+
+/// The files opened so far, by device and inode.
+static OPENED: Mutex<BTreeMap<(u64, u64), PathBuf>> = Mutex::new(BTreeMap::new());
+
+fn refused(reason: String) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, reason)
+}
+
+/// Opens a regular file. Pipes and devices are refused, because they could block the process or never end.
 ///
 /// # Errors
 /// Those of the system, and [`io::ErrorKind::InvalidInput`] with the reason.
-pub fn read(path: &Path) -> io::Result<String> {
-    let refuse = |reason: String| Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
+pub fn open(path: &Path) -> io::Result<File> {
     // Opening a pipe without a writer would block.
     let file = OpenOptions::new()
         .read(true)
         .custom_flags(O_NONBLOCK)
         .open(path)?;
-    if !file.metadata()?.is_file() {
-        return refuse("it is not a regular file".into());
+    let metadata = file.metadata()?;
+    if !metadata.is_file() {
+        return Err(refused("it is not a regular file".into()));
     }
-    let mut text = String::new();
-    file.take(MOST_BYTES + 1).read_to_string(&mut text)?;
-    if text.len() as u64 > MOST_BYTES {
-        return refuse(format!("it holds more than {MOST_BYTES} bytes"));
+    remember(&metadata, path);
+    Ok(file)
+}
+
+/// Remembers the file behind standard input.
+///
+/// # Errors
+/// Those of the system.
+pub fn remember_standard_input() -> io::Result<()> {
+    let input = File::from(io::stdin().as_fd().try_clone_to_owned()?);
+    remember(&input.metadata()?, Path::new("standard input"));
+    Ok(())
+}
+
+fn remember(file: &Metadata, path: &Path) {
+    let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+    opened.insert((file.dev(), file.ino()), path.to_path_buf());
+}
+
+/// Returns the path under which this process has opened a file, if it has.
+pub fn opened_as(file: &Metadata) -> Option<PathBuf> {
+    let opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+    opened.get(&(file.dev(), file.ino())).cloned()
+}
+
+/// Reads a regular file of at most `most_bytes`.
+///
+/// # Errors
+/// As [`open`].
+pub fn bytes(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.take(most_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most_bytes {
+        return Err(refused(format!("it holds more than {most_bytes} bytes")));
     }
-    Ok(text)
+    Ok(bytes)
+}
+
+/// Reads a text of at most [`MOST_BYTES`] from a regular file.
+///
+/// # Errors
+/// As [`open`], and [`io::ErrorKind::InvalidData`] if it is not UTF-8.
+pub fn read(path: &Path) -> io::Result<String> {
+    text(bytes(path, MOST_BYTES)?)
+}
+
+fn text(bytes: Vec<u8>) -> io::Result<String> {
+    String::from_utf8(bytes)
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not text in UTF-8"))
 }
 
 #[cfg(test)]
@@ -38,14 +95,19 @@ mod tests {
     use super::*;
     use nix::sys::stat::Mode;
     use nix::unistd::mkfifo;
-    use std::fs::File;
 
     #[test]
     fn regular_files_are_read_and_others_are_refused_without_blocking() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scenario.toml");
         std::fs::write(&path, "name = \"é\"").unwrap();
+        let metadata = std::fs::metadata(&path).unwrap();
+        assert_eq!(opened_as(&metadata), None);
         assert_eq!(read(&path).unwrap(), "name = \"é\"");
+        assert_eq!(opened_as(&metadata), Some(path));
+        let binary = folder.path().join("binary");
+        std::fs::write(&binary, b"\xff").unwrap();
+        assert!(read(&binary).unwrap_err().to_string().contains("UTF-8"));
         let pipe = folder.path().join("pipe");
         mkfifo(&pipe, Mode::S_IRWXU).unwrap();
         for path in [&pipe, Path::new("/dev/zero"), folder.path()] {

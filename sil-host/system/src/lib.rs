@@ -1,7 +1,7 @@
 //! Operating-system services of the bench.
 //!
 //! - [`atomic_file`]: output files that appear whole or not at all
-//! - [`input_file`]: text files of limited size
+//! - [`input_file`]: regular files of limited size
 //! - [`realtime`]: absolute deadlines, real-time priority, locked memory
 //! - [`lifetime`]: child processes that never outlive their parent
 //! - [`memory_full`]: the end of a process that finds shared memory full
@@ -14,6 +14,7 @@ pub mod input_file;
 pub mod interrupt;
 pub mod lifetime;
 pub mod memory_full;
+mod output_place;
 pub mod picture;
 pub mod realtime;
 pub mod terminal;

@@ -42,13 +42,12 @@ fn format(path: &Path) -> Result<Option<&'static str>, PictureError> {
     }
 }
 
-/// Reads the path of a figure: `.svg`, or `.png` or `.pdf` if they can be converted; without an
+/// Checks the path of a figure: `.svg`, or `.png` or `.pdf` if they can be converted; without an
 /// extension it is an SVG file.
 ///
 /// # Errors
 /// [`PictureError`] if the extension is another one, or the converter does not start.
-pub fn path(text: &str) -> Result<PathBuf, PictureError> {
-    let path = PathBuf::from(text);
+pub fn path(path: PathBuf) -> Result<PathBuf, PictureError> {
     if let Some(format) = format(&path)? {
         let mut version = Command::new(CONVERTER);
         let version = version.arg("--version").stdin(Stdio::null());
@@ -109,7 +108,7 @@ mod tests {
         ] {
             assert_eq!(format(Path::new(name)).unwrap(), expected, "{name}");
         }
-        let message = path("a.jpeg").unwrap_err().to_string();
+        let message = path("a.jpeg".into()).unwrap_err().to_string();
         assert_eq!(
             message,
             "figures end with .svg, .png or .pdf, not with .jpeg"

@@ -124,7 +124,7 @@ impl Sink for PageFile {
         Ok(())
     }
 
-    fn finish(self: Box<Self>) -> Result<(), RecordError> {
+    fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
         let Self {
             mut file,
             mut description,
@@ -142,7 +142,7 @@ impl Sink for PageFile {
         let path = file.path().to_path_buf();
         file.write_all(html(&description).as_bytes())
             .map_err(|error| RecordError::write(&path, error))?;
-        Ok(file.commit()?)
+        Ok(Some(file))
     }
 }
 

@@ -19,7 +19,7 @@ use self::board_rig::BoardRig;
 pub use self::board_rig::BoardRigError;
 use self::rehearsal::Rehearsal;
 use super::output_error::output;
-use super::{CommandError, say};
+use super::{CommandError, distinct_files, say};
 
 /// Options of `painleve commission`.
 #[derive(Debug, Args)]
@@ -90,6 +90,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     };
     let torque_limit_nm = torque_limit_nm(arguments, &scenario).map_err(range)?;
     let expected = Expected::new(&scenario, torque_limit_nm).map_err(range)?;
+    distinct_files::check(&[("--output", &arguments.output)])?;
     let commissioned = match &arguments.port {
         None => rehearse(arguments, &scenario, &expected),
         Some(port) => on_board(port, &scenario, &expected),
@@ -118,7 +119,8 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
             None => "--rehearse".to_owned(),
         };
         say(format_args!(
-            "next, the second sensors: painleve commission {scenario} {rig} --second-sensors"
+            "next, the second sensors: painleve commission {scenario} {rig} --second-sensors --output {}",
+            arguments.output.with_extension("second.toml").display()
         ))?;
     }
     Ok(())
@@ -169,7 +171,7 @@ fn report(
         return say(json!({
             "corrections": corrections.collect::<Vec<_>>(),
             "friction": friction,
-            "output": arguments.output,
+            "output": arguments.output.display().to_string(),
         }));
     }
     for deviation in deviations {

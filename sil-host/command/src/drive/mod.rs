@@ -18,12 +18,14 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::mounting::SensorParts;
 use painleve_shared::range;
+use painleve_system::input_file;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 use serde::Serialize;
 
 pub use self::operator::{Operator, OperatorCommand};
 use self::view::View;
+use super::distinct_files::check_distinct;
 use super::output::keep_partial;
 use super::output_error::output;
 use super::process_error::ProcessError;
@@ -62,10 +64,10 @@ pub struct DriveArguments {
     forget: bool,
     /// Stop after this time on the board's clock; by default, run until Ctrl-C or the command
     /// `stop`.
-    #[arg(long, value_name = "SECONDS", value_parser = super::seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = super::seconds, conflicts_with_all = ["store", "stored", "forget"])]
     duration: Option<f64>,
     /// Record of every tick, for Foxglove and PlotJuggler.
-    #[arg(long, value_name = "PATH", default_value = "out/drive.mcap")]
+    #[arg(long, value_name = "PATH", default_value = "out/drive.mcap", conflicts_with_all = ["store", "stored", "forget"])]
     record: PathBuf,
     /// Do not write a record.
     #[arg(long, conflicts_with = "record")]
@@ -139,6 +141,9 @@ fn recorder(
     if arguments.no_record {
         return Ok(None);
     }
+    // Its lines are orders.
+    input_file::remember_standard_input()?;
+    check_distinct(&[("--record", &arguments.record)])?;
     let log = McapLog::create(&arguments.record, scenario, Source::Arm).map_err(output)?;
     let configuration = scenario.controller_configuration();
     Recorder::start(&configuration, vec![Box::new(log)])

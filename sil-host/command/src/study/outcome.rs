@@ -9,13 +9,13 @@ use comfy_table::ContentArrangement;
 use comfy_table::presets::ASCII_MARKDOWN;
 use painleve_study::Study;
 use painleve_study::catalogue::{AnyOutcome, AnyStudy};
-use painleve_system::atomic_file::{self, AtomicFile};
+use painleve_system::atomic_file::{commit_all, prepare};
 use painleve_system::picture;
 
 use crate::output_error::output;
 use crate::process_error::ProcessError;
 use crate::progress::{Progress, Shown};
-use crate::{CommandError, say};
+use crate::{CommandError, distinct_files, say};
 
 /// Output files of a study, and the number of threads that compute it.
 #[derive(Clone, Debug, Args)]
@@ -30,7 +30,7 @@ pub struct OutcomeOptions {
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
     /// Write the figure, an SVG, PNG or PDF file by its extension.
-    #[arg(long, value_name = "PATH", value_parser = picture::path)]
+    #[arg(long, value_name = "PATH", value_parser = crate::figure_path())]
     svg: Option<PathBuf>,
     #[command(flatten)]
     threads: Threads,
@@ -89,22 +89,28 @@ impl OutcomeOptions {
         self.write(&*outcome)
     }
 
-    /// Checks that the files can be written.
+    /// Checks that the files can be written and replace nothing that is read.
     fn check(&self) -> Result<(), CommandError> {
-        for path in [&self.csv, &self.svg].into_iter().flatten() {
-            AtomicFile::create(path).map_err(output)?;
-        }
-        Ok(())
+        let files = [
+            ("--csv", self.csv.as_deref()),
+            ("--svg", self.svg.as_deref()),
+        ];
+        let files = files
+            .into_iter()
+            .filter_map(|(option, path)| Some((option, path?)));
+        distinct_files::check(&files.collect::<Vec<_>>())
     }
 
     fn write(&self, outcome: &dyn AnyOutcome) -> Result<(), CommandError> {
+        let mut files = Vec::new();
         if let Some(path) = &self.csv {
-            atomic_file::write(path, &outcome.csv().map_err(output)?).map_err(output)?;
+            files.push(prepare(path, &outcome.csv().map_err(output)?).map_err(output)?);
         }
         if let Some(path) = &self.svg {
             let picture = picture::encoded(path, outcome.svg()).map_err(output)?;
-            atomic_file::write(path, &picture).map_err(output)?;
+            files.push(prepare(path, &picture).map_err(output)?);
         }
+        commit_all(files).map_err(output)?;
         if self.json {
             say(outcome.json().map_err(output)?)
         } else if self.markdown {

@@ -29,13 +29,13 @@ impl Monitor for Recorded {
     }
 }
 
-fn scenario(name: &str, overrides: &[&str]) -> Scenario {
+pub(crate) fn scenario(name: &str, overrides: &[&str]) -> Scenario {
     let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
     Scenario::load(name, &overrides).unwrap()
 }
 
 /// Records a scenario as MCAP and CSV and returns the files' contents.
-fn record(folder: &Path, scenario: &Scenario) -> (Vec<u8>, String) {
+pub(crate) fn record(folder: &Path, scenario: &Scenario) -> (Vec<u8>, String) {
     let (mcap, csv) = (folder.join("out/run.mcap"), folder.join("out/run.csv"));
     let sinks: Vec<Box<dyn Sink>> = vec![
         Box::new(McapLog::create(&mcap, scenario, Source::Simulation).unwrap()),
@@ -133,7 +133,7 @@ fn every_tick_is_recorded_with_its_values_and_the_csv_file_has_the_same() {
     );
 
     let mut exported = Vec::new();
-    ticks_to_csv(&bytes, &mut exported).unwrap();
+    ticks_to_csv(&bytes[..], &mut exported).unwrap();
     let exported = String::from_utf8(exported).unwrap();
     assert_eq!(exported.lines().count(), 3001);
     for (row, (a, b)) in exported.lines().zip(csv_text.lines()).enumerate() {

@@ -30,6 +30,7 @@ pub struct SweepStatus {
 #[derive(Debug, Serialize)]
 pub struct Unusable {
     /// The file.
+    #[serde(serialize_with = "path_as_text")]
     pub file: PathBuf,
     /// The reason.
     #[serde(serialize_with = "as_text")]
@@ -40,12 +41,25 @@ fn as_text<S: Serializer>(reason: &ShardFileError, serializer: S) -> Result<S::O
     serializer.collect_str(reason)
 }
 
+/// Serializes a path as text, in which bytes that are not UTF-8 are replaced: JSON has no others.
+///
+/// # Errors
+/// Those of the serializer.
+pub fn path_as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
+}
+
+fn paths_as_text<S: Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(paths.iter().map(|path| path.display().to_string()))
+}
+
 /// A shard with more than one file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Duplicate {
     /// Number of the shard.
     pub shard: usize,
     /// Its files.
+    #[serde(serialize_with = "paths_as_text")]
     pub files: Vec<PathBuf>,
 }
 

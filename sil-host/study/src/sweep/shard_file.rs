@@ -10,11 +10,10 @@
 //! The file is written under a temporary name and renamed once it is on the disk: it is
 //! either complete or absent. The checksum detects a truncated file.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use csv::ByteRecord;
-use painleve_system::atomic_file;
+use painleve_system::{atomic_file, input_file};
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::SweepError;
@@ -23,6 +22,9 @@ use super::share::rows_of;
 use crate::tabular::Records;
 
 const CHECKSUM: &str = ", xxh3 ";
+
+/// Largest size of a shard, bytes. Real ones have a few million.
+const MOST_BYTES: u64 = 1 << 30;
 
 /// Why a file is not a shard of a sweep, in words that follow the file's name.
 #[derive(Debug, thiserror::Error)]
@@ -123,7 +125,7 @@ fn text(
 /// # Errors
 /// [`ShardFileError`] if the file is not a shard of this sweep.
 pub fn read(path: &Path, manifest: &Manifest) -> Result<Shard, ShardFileError> {
-    let text = fs::read(path)?;
+    let text = input_file::bytes(path, MOST_BYTES)?;
     let whole = text.strip_suffix(b"\n").ok_or(ShardFileError::Truncated)?;
     let start = whole
         .iter()
@@ -186,6 +188,7 @@ mod tests {
     use crate::sweep::manifest::tests::manifest;
     use proptest::prelude::*;
     use proptest::sample::Index;
+    use std::fs;
 
     /// Returns bytes with some of them changed, removed or added.
     fn damaged(mut bytes: Vec<u8>, edits: &[(Index, u8, u8)]) -> Vec<u8> {
