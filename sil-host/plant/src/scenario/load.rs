@@ -9,7 +9,7 @@ use toml::{Table, Value};
 
 use super::override_key::{MOST_LEVELS, with_override};
 use super::{Scenario, built_in, reference_file};
-use crate::mechanics::BuiltInPlant;
+use crate::mechanics::{BuiltInPlant, without_files};
 
 /// Why a scenario cannot be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -232,6 +232,16 @@ impl Scenario {
             source,
         })?;
         Ok(self)
+    }
+
+    /// Returns this scenario with one key changed by somebody who may not read what this process may: files that
+    /// the scenario has loaded stay as they were read, and the value cannot name another one.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence, which contains nothing from any file.
+    pub fn with_remote_override(&self, key: &str, value: &str) -> Result<Self, ScenarioError> {
+        let text = format!("{key}={value}");
+        without_files(|| self.clone().with_overrides("live run", &[text]))
     }
 }
 

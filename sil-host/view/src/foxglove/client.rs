@@ -10,13 +10,13 @@ use painleve_record::messages::{
     CHANNELS, EVENTS, SCENE, TRANSFORMS, TickMessage, channels, event_message, nanoseconds,
 };
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use tungstenite::{Error, Message, WebSocket};
 
 use super::parameters::Parameter;
 use super::services;
 use crate::hub::{ClientQueue, Entry, Hub, Severity, WatchedTick, locked};
-use crate::request::Orders;
+use crate::request::{Desk, TOO_MANY};
 use crate::server::receive;
 
 /// First bytes of binary messages.
@@ -25,9 +25,9 @@ const TIME: u8 = 2;
 const SERVICE_CALL_RESPONSE: u8 = 3;
 const SERVICE_CALL_REQUEST: u8 = 2;
 
-/// A client's message in JSON.
+/// A client's message in JSON, whose name is its field `op`.
 #[derive(Debug, Deserialize)]
-#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+#[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum Request {
     Subscribe {
         subscriptions: Vec<Subscription>,
@@ -51,6 +51,17 @@ enum Request {
     },
 }
 
+impl Request {
+    /// Reads a message. The name is first moved outside: why, [`ViewerRequest`](crate::request::ViewerRequest)
+    /// explains.
+    fn read(text: &str) -> serde_json::Result<Self> {
+        let mut fields: Map<String, Value> = serde_json::from_str(text)?;
+        let name = fields.remove("op").unwrap_or_default();
+        let name = name.as_str().unwrap_or_default();
+        serde_json::from_value(json!({ name: fields }))
+    }
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Subscription {
@@ -59,14 +70,14 @@ struct Subscription {
 }
 
 /// Talks to a client until it leaves; one client too many is turned away.
-pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, orders: &Orders) {
+pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, desk: Desk) {
     let Some(queue) = hub.clients.join() else {
         return;
     };
     let mut client = Client {
         socket,
         hub,
-        orders,
+        desk,
         queue: &queue,
         subscriptions: BTreeMap::new(),
         watched: BTreeSet::new(),
@@ -81,7 +92,7 @@ pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, orders: &Orders) {
 struct Client<'a> {
     socket: WebSocket<TcpStream>,
     hub: &'a Hub,
-    orders: &'a Orders,
+    desk: Desk,
     queue: &'a Arc<Mutex<ClientQueue>>,
     /// Channels by the number of the subscription.
     subscriptions: BTreeMap<u32, usize>,
@@ -123,7 +134,7 @@ impl Client<'_> {
     /// Takes a request and sends what waits.
     fn exchange(&mut self) -> Result<(), Error> {
         match receive(&mut self.socket)? {
-            Some(Message::Text(text)) => match serde_json::from_str(&text) {
+            Some(Message::Text(text)) => match Request::read(&text) {
                 Ok(request) => self.obey(request)?,
                 Err(error) => self.write(&status(Severity::Error, &error.to_string()))?,
             },
@@ -163,10 +174,8 @@ impl Client<'_> {
             Request::SetParameters { parameters, id } => {
                 let names: Vec<String> = parameters.iter().map(|one| one.name.clone()).collect();
                 for parameter in parameters {
-                    // The run itself tells every client about a request that it refuses.
-                    match parameter.request() {
-                        Ok(request) => drop(self.orders.request(request)),
-                        Err(error) => self.write(&status(Severity::Error, &error))?,
+                    if let Err(Some(error)) = self.set(parameter) {
+                        self.write(&status(Severity::Error, &error))?;
                     }
                 }
                 if id.is_some() {
@@ -192,6 +201,16 @@ impl Client<'_> {
         Ok(())
     }
 
+    /// Sets a parameter.
+    ///
+    /// # Errors
+    /// With what the client must be told; the run itself tells every client about a request that it refuses.
+    fn set(&mut self, parameter: Parameter) -> Result<(), Option<String>> {
+        self.desk.admit()?;
+        let request = parameter.request().map_err(Some)?;
+        self.desk.request(request).map_err(|_| None)
+    }
+
     fn update_subscriptions(&self) {
         self.hub
             .set_subscribed(self.queue, !self.subscriptions.is_empty());
@@ -214,8 +233,10 @@ impl Client<'_> {
             return self.write(&status(Severity::Error, "a message cannot be read"));
         };
         let outcome = if call.encoding == b"json" {
-            services::request(call.service, call.payload)
-                .and_then(|request| self.orders.request(request))
+            let admitted = self.desk.admit().map_err(|_| TOO_MANY.to_owned());
+            admitted
+                .and_then(|()| services::request(call.service, call.payload))
+                .and_then(|request| self.desk.request(request))
         } else {
             Err("requests to services must be JSON".to_owned())
         };
