@@ -1,5 +1,5 @@
-"""Checks the FMU with FMPy: its description is valid, it repeats itself, and without control the arm bounces at
-exactly the belt speeds at which the plant itself does (37 speeds, 300 s each).
+"""Checks the FMU with FMPy: its description is valid, it refuses bad calls, it repeats itself, and without control the
+arm bounces at exactly the belt speeds at which the plant itself does (37 speeds, 300 s each).
 
     python3 -m venv venv && venv/bin/pip install 'fmpy==0.3.*'
     venv/bin/python fmu/check.py target/fmu/painleve.fmu
@@ -11,6 +11,7 @@ import re
 import sys
 import tempfile
 
+import calls
 import fmpy
 from fmpy.validation import validate_fmu
 
@@ -40,6 +41,7 @@ def main(fmu):
     assert not problems, problems
     folder = fmpy.extract(fmu, unzipdir=tempfile.mkdtemp())
     model = {"folder": folder, "description": fmpy.read_model_description(folder)}
+    calls.check(pathlib.Path(folder), model["description"])
 
     first, second = (simulate(model, stop_time=1.0, output_interval=1e-3) for _ in range(2))
     assert (first == second).all(), "two runs differ"

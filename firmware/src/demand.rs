@@ -107,7 +107,7 @@ impl<L: Law> TorqueDemand<L> {
             p_per_kg: contact.p_per_kg,
             response: &contact.response,
             contact: contact.touches,
-            saturated: last.is_constrained() && !starts,
+            saturated: last.saturated && !starts,
             reference: target.reference,
             torque_limit_nm: self.torque_limit_nm,
             tick_s: self.tick_s,

@@ -14,10 +14,8 @@ pub struct LastCommand {
     pub counts: [TorqueCounts; 2],
     /// Joint torques that these counts represent, N·m.
     pub torque_nm: JointTorque<f32>,
-    /// Whether a torque was limited.
+    /// Whether a torque was limited: integrators then have to stop.
     pub saturated: bool,
-    /// Whether the contact guard changed the torques.
-    pub guarded: bool,
     /// Contact force (f_t, f_n) that they are meant to cause, N.
     pub contact_force_n: Vector2<f32>,
     /// Expected acceleration of the joints until the next tick, rad/s².
@@ -40,7 +38,6 @@ impl LastCommand {
             counts,
             torque_nm,
             saturated,
-            guarded,
             contact_force_n,
             expected_acceleration_rad_s2,
             contact_acceleration_rad_s2,
@@ -50,7 +47,7 @@ impl LastCommand {
         } = self;
         *counts = [TorqueCounts(0); 2];
         *torque_nm = JointTorque::zeros();
-        (*saturated, *guarded, *at_edge) = (false, false, false);
+        (*saturated, *at_edge) = (false, false);
         // Stored in line in two parts; as one, the compiler calls a loop that takes six times as long.
         compiler_fence(Ordering::SeqCst);
         *contact_force_n = Vector2::zeros();
@@ -58,11 +55,6 @@ impl LastCommand {
         *contact_acceleration_rad_s2 = JointMotion::zeros();
         *reference_velocity_m_s = 0.0;
         *rounding_nm = JointTorque::zeros();
-    }
-
-    /// Whether the torques differ from those requested: integrators then have to stop.
-    pub fn is_constrained(&self) -> bool {
-        self.saturated || self.guarded
     }
 }
 
@@ -77,7 +69,6 @@ mod tests {
             counts: [TorqueCounts(1); 2],
             torque_nm: ones,
             saturated: true,
-            guarded: true,
             contact_force_n: Vector2::new(1.0, 1.0),
             expected_acceleration_rad_s2: JointMotion::new(1.0, 1.0),
             contact_acceleration_rad_s2: JointMotion::new(1.0, 1.0),

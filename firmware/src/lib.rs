@@ -9,8 +9,8 @@
 //! The modules follow the order of one tick: [`controller`] checks the frame; [`estimate`] converts
 //! counts to angles, rates, contact and friction; [`supervise`] decides which actions are allowed;
 //! [`refer`] gives the target position of the tip; [`demand`] computes torques, with the [`law`] or,
-//! to return a thrown tip to the belt, with [`recover`]; [`torque_output`] limits them and, by
-//! [`guard`], keeps the tip pressed. [`telemetry`] exposes the internal state. [`drive`] runs the
+//! to return a thrown tip to the belt, with [`recover`]; [`torque_output`] limits
+//! them. [`telemetry`] exposes the internal state. [`drive`] runs the
 //! ticks on the hardware.
 
 #![no_std]
@@ -23,19 +23,19 @@ pub mod controller;
 pub mod demand;
 pub mod drive;
 pub mod estimate;
-pub mod guard;
 pub mod last_command;
 pub mod law;
 pub mod recover;
 pub mod refer;
+pub mod schedule;
 pub mod supervise;
 pub mod telemetry;
 pub mod torque_output;
 
-/// Hash of the sources of controller and messages, which identifies a build. The host and the board
-/// compare it before the board accepts a configuration.
-pub const BUILD: u64 = match u64::from_str_radix(env!("PAINLEVE_BUILD"), 16) {
-    Ok(build) => build,
+/// Hash of the sources of the controller and of what it shares with the plant. It is displayed, and tells an image of
+/// these sources from one that may behave differently.
+pub const SOURCES: u64 = match u64::from_str_radix(env!("PAINLEVE_SOURCES"), 16) {
+    Ok(hash) => hash.rotate_left(1) ^ painleve_shared::SOURCES,
     Err(_) => panic!("the build script writes sixteen hexadecimal digits"),
 };
 

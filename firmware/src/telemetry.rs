@@ -53,12 +53,8 @@ pub struct Telemetry {
     pub at_edge: bool,
     /// Whether the tip is being returned to the belt.
     pub recovering: bool,
-    /// Whether the contact guard changed the torque.
-    pub guarded: bool,
     /// Whether the torque was limited.
     pub saturated: bool,
-    /// Number of ticks since the start in which the contact guard acted.
-    pub guarded_ticks: u32,
     /// Number of ticks since the start with limited torque.
     pub saturated_ticks: u32,
 }
@@ -102,7 +98,6 @@ impl<'a> TelemetrySink<'a> {
             command,
             recovering,
         } = of;
-        let count = |total: u32, happened: bool| total.wrapping_add(u32::from(happened));
         *telemetry = Telemetry {
             tick,
             state: supervision.state(),
@@ -124,10 +119,10 @@ impl<'a> TelemetrySink<'a> {
             edges_m: target.edges_m.into(),
             at_edge: target.at_edge,
             recovering: *recovering,
-            guarded: command.guarded,
             saturated: command.saturated,
-            guarded_ticks: count(telemetry.guarded_ticks, command.guarded),
-            saturated_ticks: count(telemetry.saturated_ticks, command.saturated),
+            saturated_ticks: telemetry
+                .saturated_ticks
+                .wrapping_add(command.saturated.into()),
         };
     }
 
@@ -140,7 +135,6 @@ impl<'a> TelemetrySink<'a> {
                 torque_nm: JointTorque::zeros(),
                 at_edge: false,
                 recovering: false,
-                guarded: false,
                 saturated: false,
                 ..*telemetry
             };

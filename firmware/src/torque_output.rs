@@ -1,11 +1,8 @@
-//! Converts a law's torque to counts: guarded against lift-off, limited, rounded and checked.
+//! Converts a law's torque to counts: checked, limited and rounded.
 
 use painleve_shared::counts::{LinearConverter, LinearScale, TorqueCounts};
 use painleve_shared::{JointTorque, Real};
 
-use crate::estimate::ContactEstimate;
-use crate::estimate::model::Model;
-use crate::guard::{GuardSettings, HalfPlane, nearest_torque_nm};
 use crate::last_command::LastCommand;
 use crate::law::LawOutput;
 
@@ -16,16 +13,14 @@ pub struct NotFinite;
 /// Limits torques and converts them to counts of the torque stages.
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueOutput {
-    guard: GuardSettings,
     converter: LinearConverter<f32>,
     limit_nm: f32,
 }
 
 impl TorqueOutput {
     /// Makes an output with this scale, of which ±`limit_nm` (N·m) is used.
-    pub fn new(guard: &GuardSettings, scale: LinearScale<f32>, limit_nm: f32) -> Self {
+    pub fn new(scale: LinearScale<f32>, limit_nm: f32) -> Self {
         Self {
-            guard: *guard,
             converter: scale.converter(),
             limit_nm,
         }
@@ -36,45 +31,10 @@ impl TorqueOutput {
     /// # Errors
     /// [`NotFinite`] if the law's torque is not a finite number; the command stays unchanged.
     #[inline]
-    pub fn tick(
-        &self,
-        command: &mut LastCommand,
-        output: &LawOutput,
-        model: &Model,
-        contact: &ContactEstimate,
-    ) -> Result<(), NotFinite> {
-        let (wanted_nm, guarded) = self.pressed(&output.torque_nm, model, contact);
-        self.limit(command, &wanted_nm)?;
-        command.guarded = guarded;
+    pub fn tick(&self, command: &mut LastCommand, output: &LawOutput) -> Result<(), NotFinite> {
+        self.limit(command, &output.torque_nm)?;
         command.contact_force_n = output.contact_force_n;
         Ok(())
-    }
-
-    /// Returns the torque (N·m) closest to the wanted one that keeps a sliding tip pressed on the
-    /// belt, and whether it differs from the wanted one.
-    #[inline]
-    fn pressed(
-        &self,
-        wanted_nm: &JointTorque<f32>,
-        model: &Model,
-        contact: &ContactEstimate,
-    ) -> (JointTorque<f32>, bool) {
-        let friction = &contact.friction;
-        let slides = contact.touches && friction.slip_seen && contact.p_per_kg > 0.0;
-        // The guard assumes a rigid contact, and would cut the impulse that a contact that gives has missed.
-        let catches_up = friction.catch_up != 0.0;
-        if !(self.guard.enabled && slides) || catches_up {
-            return (*wanted_nm, false);
-        }
-        let plane = HalfPlane {
-            normal: model.free_slope_per_kg_m,
-            bound: -contact.p_per_kg * self.guard.minimum_force_n - model.free_offset_m_s2,
-        };
-        match nearest_torque_nm(wanted_nm, &plane, self.limit_nm) {
-            (nearest_nm, true) => (nearest_nm, true),
-            // The torque limit is not applied here: limiting is flagged below.
-            (_, false) => (*wanted_nm, false),
-        }
     }
 
     /// Limits the wanted torques and converts them to counts.
@@ -107,17 +67,13 @@ impl TorqueOutput {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::friction::FrictionEstimate;
-    use crate::estimate::response::ContactResponse;
-    use nalgebra::Vector2;
-    use painleve_shared::{Arm, ArmParameters, GeneralisedTorque, LinkMotion, Posture, Slip};
 
     fn stages() -> TorqueOutput {
         let scale = LinearScale {
             bits: 12,
             range: 5.0,
         };
-        TorqueOutput::new(&GuardSettings::default(), scale, 5.0)
+        TorqueOutput::new(scale, 5.0)
     }
 
     #[test]
@@ -130,46 +86,6 @@ mod tests {
             assert_eq!(stages().limit(&mut command, &wanted), Err(NotFinite));
             assert_eq!(command, LastCommand::default());
         }
-    }
-
-    #[test]
-    fn the_guard_presses_a_tip_that_slides_unless_the_law_catches_up() {
-        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let theta_rad = arm
-            .link_angles_on_belt_rad(0.0, Posture::ElbowDown)
-            .unwrap();
-        let model = Model::new(
-            &arm,
-            theta_rad,
-            LinkMotion::zeros(),
-            &GeneralisedTorque::zeros(),
-        );
-        let mut contact = ContactEstimate {
-            touches: true,
-            lands: false,
-            leaves: false,
-            in_flight: false,
-            force_n: Vector2::new(-6.0, 10.0),
-            friction: FrictionEstimate {
-                coefficient: 0.6,
-                next_coefficient: 0.6,
-                catch_up: 0.0,
-                deviation: 0.0,
-                slip: Slip::Positive,
-                slip_seen: true,
-                sticks: false,
-            },
-            p_per_kg: model.p_per_kg(0.6, Slip::Positive),
-            p_ratio: 0.5,
-            response: ContactResponse::rigid(1.0),
-        };
-        // A torque that lifts the tip.
-        let lifting = model.torque_against_nm(&Vector2::new(0.0, -10.0));
-        let (pressed, guarded) = stages().pressed(&lifting, &model, &contact);
-        assert!(guarded && pressed != lifting);
-        contact.friction.catch_up = -0.3;
-        let result = stages().pressed(&lifting, &model, &contact);
-        assert_eq!(result, (lifting, false));
     }
 
     #[test]
@@ -191,11 +107,11 @@ mod tests {
         stages()
             .limit(&mut command, &JointTorque::new(7.0, -1.0))
             .unwrap();
-        assert!(command.saturated && command.is_constrained());
+        assert!(command.saturated);
         assert!(command.torque_nm.first() <= 5.0);
         stages()
             .limit(&mut command, &JointTorque::new(4.0, -1.0))
             .unwrap();
-        assert!(!command.is_constrained());
+        assert!(!command.saturated);
     }
 }

@@ -305,9 +305,16 @@ impl LapseModel {
     }
 
     fn is_too_much(&self, lapse: Lapse) -> bool {
-        let newest_first = self.history[lapse as usize].iter().rev();
-        let in_a_row = newest_first.take_while(|times| **times > 0);
-        in_a_row.map(|times| u64::from(*times)).sum::<u64>() > u64::from(self.limit)
+        let limit = 2 * i64::from(self.limit);
+        let owed = self.history[lapse as usize].iter().fold(0, |owed, times| {
+            let change = if *times == 0 {
+                -1
+            } else {
+                2 * i64::from(*times)
+            };
+            (owed + change).clamp(0, limit + 2)
+        });
+        owed > limit
     }
 }
 

@@ -2,11 +2,10 @@
 //!
 //! The names of the parameters are those of a scenario's keys.
 
-use fmi::fmi3::{Fmi3Error, Fmi3Res};
+mod interface;
+
 use fmi_export::FmuModel;
-use fmi_export::fmi3::{
-    CSDoStepResult, Context, DefaultLoggingCategory, ModelLoggingCategory, UserModel,
-};
+use fmi_export::fmi3::Model;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::{Plant, Snapshot};
@@ -15,13 +14,21 @@ use painleve_shared::JointTorque;
 /// The scenario whose settings the parameters change.
 const SCENARIO: &str = "open-loop-bounce";
 
+/// Longest communication step, s: some seconds of computation.
+const LONGEST_STEP_S: f64 = 3600.0;
+/// Largest difference of a communication point from the plant's own time, and of the end from the stop time, as a part
+/// of either: simulators add up their steps in several ways.
+const TIME_TOLERANCE: f64 = 1e-9;
+
+/// Why a call fails, in one sentence.
+type Failure = Box<dyn std::error::Error>;
+
 /// Variables of the FMU, and the plant behind them.
 #[derive(Default, FmuModel)]
 #[model(
     description = "Two-link arm whose tip touches a moving belt, with impacts and the Painlevé paradox",
     model_exchange = false,
-    co_simulation = true,
-    user_model = false
+    co_simulation = true
 )]
 struct ArmOnBelt {
     /// Settings of the plant, one `key=value` per line as after `painleve run --set`; the other parameters are applied after them
@@ -82,35 +89,131 @@ struct ArmOnBelt {
     contact_mode: i32,
 
     #[variable(skip = true)]
-    plant: Option<Running>,
+    times: Times,
+    #[variable(skip = true)]
+    plant: Option<BuiltInPlant>,
 }
 
-/// A plant in motion.
-struct Running {
-    plant: BuiltInPlant,
-    /// Time of the simulation at the plant's time zero, s.
+/// Times of the simulation, s.
+#[derive(Clone, Copy, Debug, Default)]
+struct Times {
+    /// That of the plant's time zero.
     start_s: f64,
-    /// Present time of the simulation, s.
     now_s: f64,
+    stop_s: Option<f64>,
 }
 
 impl ArmOnBelt {
-    /// Creates the plant at rest in its initial posture.
-    fn plant(&self) -> Result<BuiltInPlant, Box<dyn std::error::Error>> {
+    /// Returns the variables at their start values, without a plant.
+    fn at_start() -> Self {
+        let mut arm = Self::default();
+        arm.set_start_values();
+        arm
+    }
+
+    /// Returns the plant of the present parameters, at rest in its initial posture.
+    fn new_plant(&self) -> Result<BuiltInPlant, Failure> {
         let mut overrides: Vec<String> = self.settings.lines().map(str::to_owned).collect();
         overrides.retain(|line| !line.trim().is_empty());
+        // TOML writes nan where Rust writes NaN; the scenario then names the range.
+        let number = |value: f64| format!("{value:?}").to_lowercase();
         overrides.extend([
-            format!("belt.friction={:?}", self.friction),
+            format!("belt.friction={}", number(self.friction)),
             format!(
-                "belt.profile={{ kind = 'constant', speed_m_s = {:?} }}",
-                self.belt_speed_m_s
+                "belt.profile={{ kind = 'constant', speed_m_s = {} }}",
+                number(self.belt_speed_m_s)
             ),
-            format!("impact.restitution={:?}", self.restitution),
-            format!("initial.theta1_deg={:?}", self.initial_theta1_deg),
-            format!("initial.theta2_deg={:?}", self.initial_theta2_deg),
+            format!("impact.restitution={}", number(self.restitution)),
+            format!("initial.theta1_deg={}", number(self.initial_theta1_deg)),
+            format!("initial.theta2_deg={}", number(self.initial_theta2_deg)),
         ]);
         let scenario = Scenario::load(SCENARIO, &overrides)?;
         Ok(BuiltInPlant::new(&scenario)?)
+    }
+
+    /// Sets the time at which the simulation starts and the one at which it must have ended, s.
+    fn set_times(&mut self, start_s: f64, stop_s: Option<f64>) -> Result<(), Failure> {
+        if !start_s.is_finite() {
+            return Err(format!("startTime = {start_s} is not a finite number").into());
+        }
+        if let Some(stop_s) = stop_s
+            && !(stop_s.is_finite() && stop_s > start_s)
+        {
+            return Err(format!("stopTime = {stop_s} is not after startTime = {start_s}").into());
+        }
+        self.times = Times {
+            start_s,
+            now_s: start_s,
+            stop_s,
+        };
+        Ok(())
+    }
+
+    /// Shows what a plant of the present parameters would be.
+    fn show_start(&mut self) -> Result<(), Failure> {
+        let plant = self.new_plant()?;
+        self.show(&plant.snapshot());
+        Ok(())
+    }
+
+    /// Starts the plant of the present parameters.
+    fn start(&mut self) -> Result<(), Failure> {
+        let plant = self.new_plant()?;
+        self.show(&plant.snapshot());
+        self.plant = Some(plant);
+        Ok(())
+    }
+
+    /// Holds the torques for a communication step of `step_s` from the communication point `point_s`.
+    fn step(&mut self, point_s: f64, step_s: f64) -> Result<(), Failure> {
+        let Times {
+            start_s,
+            now_s,
+            stop_s,
+        } = self.times;
+        // Both comparisons are false for NaN.
+        if !(step_s > 0.0 && step_s <= LONGEST_STEP_S) {
+            let limit = format!("a step is above 0 s and at most {LONGEST_STEP_S} s");
+            return Err(format!("communicationStepSize = {step_s}: {limit}").into());
+        }
+        let tolerance_s = TIME_TOLERANCE * now_s.abs().max(1.0);
+        let is_at_point = (point_s - now_s).abs() <= tolerance_s.min(step_s);
+        if !is_at_point {
+            let expected = format!("the plant is at {now_s} s");
+            return Err(format!("currentCommunicationPoint = {point_s}: {expected}").into());
+        }
+        let until_s = point_s + step_s;
+        if until_s <= now_s {
+            return Err(format!("communicationStepSize = {step_s} is lost in {point_s} s").into());
+        }
+        if let Some(stop_s) = stop_s
+            && until_s > stop_s + TIME_TOLERANCE * stop_s.abs().max(1.0)
+        {
+            return Err(format!("the step ends at {until_s} s, after stopTime = {stop_s}").into());
+        }
+        let torque_nm = JointTorque::new(self.u1_nm, self.u2_nm);
+        if !(self.u1_nm.is_finite() && self.u2_nm.is_finite()) {
+            let torques = format!("u1_nm = {}, u2_nm = {}", self.u1_nm, self.u2_nm);
+            return Err(format!("{torques}: torques are finite numbers").into());
+        }
+        let plant = self.plant.as_mut().ok_or("there is no plant")?;
+        plant.command_torque(torque_nm, 0.0);
+        let advanced = plant.advance(until_s - start_s, &mut ());
+        let now = plant.snapshot();
+        self.show(&now);
+        self.times.now_s = advanced.as_ref().map_or(start_s + now.time_s, |()| until_s);
+        Ok(advanced?)
+    }
+
+    /// Returns the present time of the simulation, s.
+    fn now_s(&self) -> f64 {
+        self.times.now_s
+    }
+
+    /// Writes the time to a value if it is of the time's type.
+    fn put_time(&self, value: &mut dyn std::any::Any) -> bool {
+        let value = value.downcast_mut::<f64>();
+        value.map(|value| *value = self.now_s()).is_some()
     }
 
     /// Copies a state to the outputs.
@@ -127,70 +230,3 @@ impl ArmOnBelt {
         self.contact_mode = now.mode as i32;
     }
 }
-
-/// Reports why a call failed: in the simulator's log, or on standard error if that log is off.
-fn failed(context: &dyn Context<ArmOnBelt>, cause: impl std::fmt::Display) -> Fmi3Error {
-    let category = DefaultLoggingCategory::error_category();
-    if context.logging_on(category) {
-        context.log(Fmi3Error::Error.into(), category, format_args!("{cause}"));
-    } else {
-        eprintln!("painleve: {cause}");
-    }
-    Fmi3Error::Error
-}
-
-impl UserModel for ArmOnBelt {
-    type LoggingCategory = DefaultLoggingCategory;
-
-    /// Starts the plant when initialization mode ends.
-    fn configurate(&mut self, context: &dyn Context<Self>) -> Result<(), Fmi3Error> {
-        let plant = self.plant().map_err(|cause| failed(context, cause))?;
-        self.show(&plant.snapshot());
-        self.plant = Some(Running {
-            plant,
-            start_s: context.time(),
-            now_s: context.time(),
-        });
-        Ok(())
-    }
-
-    /// Shows the plant's state; before its start or after a reset, that of a new plant.
-    fn calculate_values(&mut self, context: &dyn Context<Self>) -> Result<Fmi3Res, Fmi3Error> {
-        let now = match &self.plant {
-            Some(running) if running.now_s == context.time() => running.plant.snapshot(),
-            _ => self
-                .plant()
-                .map_err(|cause| failed(context, cause))?
-                .snapshot(),
-        };
-        self.show(&now);
-        Ok(Fmi3Res::OK)
-    }
-
-    /// Holds the torques for a step; steps may have any length.
-    fn do_step(
-        &mut self,
-        context: &mut dyn Context<Self>,
-        from_s: f64,
-        step_s: f64,
-        _: bool,
-    ) -> Result<CSDoStepResult, Fmi3Error> {
-        let until_s = from_s + step_s;
-        let torque_nm = JointTorque::new(self.u1_nm, self.u2_nm);
-        let Some(running) = &mut self.plant else {
-            return Err(failed(context, "the plant has not been started"));
-        };
-        let Running { plant, start_s, .. } = running;
-        plant.command_torque(torque_nm, 0.0);
-        if let Err(cause) = plant.advance(until_s - *start_s, &mut ()) {
-            return Err(failed(context, cause));
-        }
-        running.now_s = until_s;
-        let now = running.plant.snapshot();
-        self.show(&now);
-        context.set_time(until_s);
-        Ok(CSDoStepResult::completed(until_s))
-    }
-}
-
-fmi_export::export_fmu!(ArmOnBelt);

@@ -14,45 +14,38 @@ use painleve_record::replica::Replica;
 use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
-use painleve_study::catalogue::{CatalogueEntry, STUDIES};
+use painleve_shared::range::OutOfRange;
+use painleve_study::catalogue::{CatalogueEntry, Progress};
+use painleve_study::studies::{self, STUDIES};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+mod interruptible;
+mod values;
+
+use interruptible::{Interruptible, exception};
+
 /// Loads a scenario by name or as TOML text, with overrides.
 fn load(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Scenario> {
-    let mut texts = Vec::new();
-    if let Some(overrides) = overrides {
-        for (key, value) in overrides {
-            let value: String = value.str()?.extract()?;
-            texts.push(format!(
-                "{}={}",
-                key.extract::<String>()?,
-                toml_value(&value)
-            ));
-        }
-    }
-    let wrong =
-        |error: painleve_plant::scenario::ScenarioError| PyValueError::new_err(error.to_string());
-    if scenario.contains(['=', '\n']) {
-        let scenario = Scenario::from_toml(scenario).map_err(wrong)?;
-        scenario.with_overrides("scenario", &texts).map_err(wrong)
+    let overrides = overrides.map_or(Ok(Vec::new()), values::overrides)?;
+    let loaded = if scenario.contains(['=', '\n']) {
+        Scenario::from_toml(scenario)
+            .and_then(|scenario| scenario.with_overrides("scenario", &overrides))
     } else {
-        Scenario::load(scenario, &texts).map_err(wrong)
-    }
+        Scenario::load(scenario, &overrides)
+    };
+    loaded.map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
-/// Converts Python's truth values to TOML's.
-fn toml_value(value: &str) -> &str {
-    match value {
-        "True" => "true",
-        "False" => "false",
-        other => other,
-    }
+/// Returns the plant of a scenario.
+fn plant(scenario: &Scenario) -> PyResult<Interruptible> {
+    let plant = BuiltInPlant::new(scenario);
+    plant.map(Interruptible::new).map_err(out_of_range)
 }
 
-fn failed(error: impl std::fmt::Display) -> PyErr {
-    PyRuntimeError::new_err(error.to_string())
+fn out_of_range(error: OutOfRange) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }
 
 /// Values of one quantity, one for each tick.
@@ -132,6 +125,8 @@ fn run<'py>(
     let run = PyDict::new(py);
     run.set_item("time_s", columns.time_s)?;
     for (name, _, column) in columns.columns {
+        // A column of a long run takes some ten milliseconds.
+        py.check_signals()?;
         column.put(&name, &run)?;
     }
     Ok(run)
@@ -139,8 +134,8 @@ fn run<'py>(
 
 fn collect(scenario: &Scenario) -> PyResult<Columns> {
     let configuration = scenario.controller_configuration();
-    let simulation = Simulation::new(scenario).map_err(failed)?;
-    let host = InProcess::new(&configuration).map_err(failed)?;
+    let simulation = Simulation::of(plant(scenario)?, scenario).map_err(out_of_range)?;
+    let host = InProcess::new(&configuration).map_err(out_of_range)?;
     let column = |topic: &str, field: &RecordField| {
         let name = format!("{topic}.{}", field.name);
         (name, field.read, Column::new(field.read))
@@ -155,7 +150,9 @@ fn collect(scenario: &Scenario) -> PyResult<Columns> {
     };
     let mut closed_loop = ClosedLoop::new(simulation, host);
     for _ in 0..scenario.run.ticks() {
-        closed_loop.tick(&mut columns).map_err(failed)?;
+        closed_loop
+            .tick(&mut columns)
+            .map_err(|error| exception(&error))?;
     }
     Ok(columns)
 }
@@ -203,10 +200,12 @@ fn state<'py>(py: Python<'py>, plant: Snapshot) -> PyResult<Bound<'py, PyDict>> 
 }
 
 /// The arm on its belt without converters: torques in N·m, one control tick per step.
-#[pyclass(name = "Plant", unsendable)]
+#[pyclass(name = "Plant")]
 struct PyPlant {
-    plant: BuiltInPlant,
-    tick_hz: f64,
+    plant: Interruptible,
+    /// Control ticks a second.
+    #[pyo3(get)]
+    tick_hz: u32,
     ticks: u64,
 }
 
@@ -217,8 +216,8 @@ impl PyPlant {
     fn new(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let scenario = load(scenario, overrides)?;
         Ok(Self {
-            plant: BuiltInPlant::new(&scenario).map_err(failed)?,
-            tick_hz: scenario.run.tick_hz.into(),
+            plant: plant(&scenario)?,
+            tick_hz: scenario.run.tick_hz,
             ticks: 0,
         })
     }
@@ -230,14 +229,19 @@ impl PyPlant {
         u1_nm: f64,
         u2_nm: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let torque_nm = JointTorque::new(u1_nm, u2_nm);
         if !(u1_nm.is_finite() && u2_nm.is_finite()) {
-            return Err(PyValueError::new_err("torques are finite numbers, N·m"));
+            return Err(PyValueError::new_err(format!(
+                "torques {u1_nm}, {u2_nm} N·m: both are finite numbers"
+            )));
         }
-        self.plant
-            .command_torque(JointTorque::new(u1_nm, u2_nm), 0.0);
+        let until_s = (self.ticks + 1) as f64 / f64::from(self.tick_hz);
+        py.detach(|| {
+            self.plant.command_torque(torque_nm, 0.0);
+            self.plant.advance(until_s, &mut ())
+        })
+        .map_err(|error| exception(&error))?;
         self.ticks += 1;
-        let until_s = self.ticks as f64 / self.tick_hz;
-        self.plant.advance(until_s, &mut ()).map_err(failed)?;
         self.state(py)
     }
 
@@ -253,8 +257,12 @@ type Sensor = (u32, u32, u32, u32, i32, i32, u32);
 type Actuator = (u32, u32, i32, i32, i32, i32, u8, u8, u16);
 
 /// The plant with its converters, as the controller sees it.
-#[pyclass(name = "Simulation", unsendable)]
-struct PySimulation(Simulation);
+#[pyclass(name = "Simulation")]
+struct PySimulation {
+    simulation: Simulation<Interruptible>,
+    /// Whether this tick has been sampled.
+    is_sampled: bool,
+}
 
 #[pymethods]
 impl PySimulation {
@@ -262,12 +270,24 @@ impl PySimulation {
     #[pyo3(signature = (scenario = "hybrid-elbow-down", overrides = None))]
     fn new(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let scenario = load(scenario, overrides)?;
-        Ok(Self(Simulation::new(&scenario).map_err(failed)?))
+        let simulation = Simulation::of(plant(&scenario)?, &scenario);
+        Ok(Self {
+            simulation: simulation.map_err(out_of_range)?,
+            is_sampled: false,
+        })
     }
 
     /// Reads the sensors, once a tick: the frame, and whether the link loses it.
-    fn sample(&mut self) -> PyResult<(Sensor, bool)> {
-        let frame = self.0.sample(&mut ()).map_err(failed)?;
+    fn sample(&mut self, py: Python<'_>) -> PyResult<(Sensor, bool)> {
+        if self.is_sampled {
+            return Err(PyRuntimeError::new_err(
+                "advance() comes before the next sample()",
+            ));
+        }
+        let frame = py
+            .detach(|| self.simulation.sample(&mut ()))
+            .map_err(|error| exception(&error))?;
+        self.is_sampled = true;
         let [joint_1, joint_2] = frame.joints.map(|joint| joint.0);
         let sensor = (
             frame.tick,
@@ -278,12 +298,12 @@ impl PySimulation {
             frame.tangential_force.0,
             frame.inputs.0,
         );
-        Ok((sensor, self.0.sensor_frame_is_lost()))
+        Ok((sensor, self.simulation.sensor_frame_is_lost()))
     }
 
     /// Passes the controller's answer, or `None`, to the torque stages and advances to the next tick.
     #[pyo3(signature = (answer))]
-    fn advance(&mut self, answer: Option<Actuator>) -> PyResult<()> {
+    fn advance(&mut self, py: Python<'_>, answer: Option<Actuator>) -> PyResult<()> {
         let frame = answer.map(
             |(tick, sequence, u1, u2, reference_um, estimated_um, state, fault, flags)| {
                 ActuatorFrame {
@@ -298,17 +318,22 @@ impl PySimulation {
                 }
             },
         );
-        self.0.advance(frame.as_ref(), &mut ()).map_err(failed)
+        if !self.is_sampled {
+            return Err(PyRuntimeError::new_err("sample() comes before advance()"));
+        }
+        self.is_sampled = false;
+        py.detach(|| self.simulation.advance(frame.as_ref(), &mut ()))
+            .map_err(|error| exception(&error))
     }
 
     /// The state: `time_s` and the fields of the topic `plant`.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        state(py, self.0.plant().snapshot())
+        state(py, self.simulation.plant().snapshot())
     }
 }
 
 /// The firmware's controller.
-#[pyclass(name = "Controller", unsendable)]
+#[pyclass(name = "Controller")]
 struct PyController {
     controller: painleve_plant::Controller,
     telemetry: Telemetry,
@@ -321,7 +346,7 @@ impl PyController {
     fn new(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let configuration = load(scenario, overrides)?.controller_configuration();
         Ok(Self {
-            controller: painleve_plant::Controller::new(&configuration).map_err(failed)?,
+            controller: painleve_plant::Controller::new(&configuration).map_err(out_of_range)?,
             telemetry: Default::default(),
         })
     }
@@ -364,27 +389,50 @@ impl PyController {
     }
 }
 
-/// Computes a study on all cores and returns the JSON object of `painleve study NAME --json` as text; `arguments` are
-/// that command's options.
+/// Computes a study on all cores and returns the object that `painleve study NAME --json` prints.
+///
+/// Options are those of that command with `_` for `-`: a number or a text, a list or an array for values separated by
+/// commas, True for an option without a value, and a dictionary of keys for `set`::
+///
+///     painleve.study("bifurcation", mu=0.6, v_belt="-0.6:-0.2:0.1", initial=["a", "d"], set={"belt.friction": 0.5})
 #[pyfunction]
-fn study(py: Python<'_>, name: &str, arguments: Vec<String>) -> PyResult<String> {
+#[pyo3(signature = (name, **options))]
+fn study<'py>(
+    py: Python<'py>,
+    name: &str,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
     let unknown = || {
         let names: Vec<&str> = STUDIES.iter().map(|entry| entry.name).collect();
         PyValueError::new_err(format!("unknown study '{name}': {}", names.join(", ")))
     };
-    let entry = CatalogueEntry::find(name).ok_or_else(unknown)?;
+    let entry = studies::find(name).ok_or_else(unknown)?;
+    let arguments = options.map_or(Ok(Vec::new()), values::arguments)?;
+    let json = interruptible::on_threads(py, |go_on| study_json(entry, arguments, go_on))??;
+    py.import("json")?.call_method1("loads", (json,))
+}
+
+/// Computes a study, given the arguments of its command, and returns its JSON object as text.
+fn study_json(
+    entry: &CatalogueEntry,
+    arguments: Vec<String>,
+    progress: Progress<'_>,
+) -> PyResult<String> {
+    let mistake = |error: &dyn std::fmt::Display| {
+        // The command's own usage and help follow an empty line.
+        let message = error.to_string();
+        let message = message.split("\n\n").next().unwrap_or_default();
+        let message = message.strip_prefix("error: ").unwrap_or(message);
+        PyValueError::new_err(values::in_python_names(message))
+    };
     let command = entry.command().no_binary_name(true);
     let options = command
         .try_get_matches_from(arguments)
         .and_then(|matches| (entry.read)(&matches))
-        .map_err(|error| PyValueError::new_err(error.to_string()))?;
-    let study = options
-        .study()
-        .map_err(|error| PyValueError::new_err(error.to_string()))?;
-    let outcome = py
-        .detach(|| study.compute(&|| ()))
-        .map_err(failed)?;
-    outcome.json().map_err(failed)
+        .map_err(|error| mistake(&error))?;
+    let study = options.study().map_err(|error| mistake(&error))?;
+    let outcome = study.compute(progress).map_err(|error| exception(&error))?;
+    outcome.json().map_err(|error| exception(&error))
 }
 
 /// The compiled part of the package.

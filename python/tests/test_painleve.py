@@ -1,3 +1,4 @@
+import numpy
 import painleve
 import pytest
 
@@ -16,6 +17,92 @@ def test_overrides_and_mistakes():
     assert len(run["time_s"]) == 100
     with pytest.raises(ValueError, match="belt.friction"):
         painleve.run("edge", {"belt.friction": -1})
+    with pytest.raises(ValueError, match="no file is called 'egde'"):
+        painleve.run("egde")
+
+
+def test_the_package_has_the_names_that_it_lists():
+    modules = {"gym", "_painleve"}
+    assert {name for name in dir(painleve) if not name.startswith("__")} - modules == set(painleve.__all__)
+
+
+LENGTHS = "arm.link_length_m"
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        [0.2, 0.21],
+        (0.2, 0.21),
+        "[0.2, 0.21]",
+        numpy.array([0.2, 0.21]),
+        numpy.array([0.2, 0.21], numpy.float64)[:, None].ravel(),
+        [numpy.float64(0.2), numpy.float64(0.21)],
+    ],
+)
+def test_overrides_take_lists_in_any_form(value):
+    plain = painleve.Plant("open-loop-bounce", {LENGTHS: "[0.2, 0.21]"}).step(0.1, 0.0)
+    assert painleve.Plant("open-loop-bounce", {LENGTHS: value}).step(0.1, 0.0) == plain
+    assert painleve.Plant("open-loop-bounce").step(0.1, 0.0) != plain
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("belt.friction", numpy.float64(0.5), "0.5"),
+        ("belt.friction", numpy.float32(0.5), "0.5"),
+        ("belt.friction", numpy.array(0.5), "0.5"),
+        ("belt.friction", 1, "1.0"),
+        ("run.seed", numpy.int64(7), "7"),
+        ("belt.profile", {"kind": "sine", "mean_m_s": -0.4, "amplitude_m_s": numpy.float64(0.1), "frequency_hz": 2},
+         "{ kind = 'sine', mean_m_s = -0.4, amplitude_m_s = 0.1, frequency_hz = 2.0 }"),
+        ("impact.law", "energetic", "'energetic'"),
+        ("effects.gear", {"elastic": False}, "{ elastic = false }"),
+        ("effects.gear.elastic", numpy.bool_(False), "false"),
+    ],
+)  # fmt: skip
+def test_overrides_take_values_of_every_kind(key, value, text):
+    overrides = {"run.duration_s": 0.1}
+    run = painleve.run("hybrid-elbow-down", {**overrides, key: value})
+    assert str(run) == str(painleve.run("hybrid-elbow-down", {**overrides, key: text}))
+
+
+LOOP = []
+LOOP.append(LOOP)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "error", "message"),
+    [
+        ({"belt.friction": None}, TypeError, "belt.friction: a value of type NoneType"),
+        ({"belt.friction": 1j}, TypeError, "belt.friction: a value of type complex"),
+        ({"belt.friction": [object()]}, TypeError, "belt.friction: a value of type object"),
+        ({"belt.friction": (0.5, 0.6)}, ValueError, "^belt.friction: invalid type: sequence, expected a number"),
+        ({"belt.friction": float("nan")}, ValueError, "belt.friction = NaN"),
+        ({LENGTHS: LOOP}, ValueError, "more than 16 lists"),
+        ({"run.seed": 2**63}, ValueError, "run.seed = 9223372036854775808 is out of range"),
+        ({"belt.frction": 0.5}, ValueError, "^belt.frction: unknown key 'frction'; did you mean 'friction'"),
+        ({"controller.law.pid.x": 1}, ValueError, "choose it first with controller.law=pid"),
+        ({"belt.friction": ""}, ValueError, "^'belt.friction=' is not of the form"),
+        ({1: 0.5}, TypeError, "override 1: a key is a text"),
+    ],
+)
+def test_mistakes_in_overrides_are_named(overrides, error, message):
+    for make in (painleve.run, painleve.Plant, painleve.Simulation, painleve.Controller):
+        with pytest.raises(error, match=message) as refusal:
+            make("edge", overrides)
+        assert "--set" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("torque", [float("nan"), float("inf"), -float("inf")])
+def test_a_torque_is_a_finite_number(torque):
+    plant = painleve.Plant("edge")
+    for torques in ((torque, 0.0), (0.0, torque)):
+        with pytest.raises(ValueError, match="finite"):
+            plant.step(*torques)
+    with pytest.raises(TypeError):
+        plant.step("strong", 0.0)
+    assert plant.state()["time_s"] == 0.0
 
 
 def test_controller_and_simulation_make_the_same_run_tick_by_tick():
@@ -30,24 +117,22 @@ def test_controller_and_simulation_make_the_same_run_tick_by_tick():
     assert controller.telemetry()["contact_confidence"] >= 0.0
 
 
+def test_sample_and_advance_alternate():
+    simulation = painleve.Simulation("edge")
+    with pytest.raises(RuntimeError, match="sample.. comes before"):
+        simulation.advance(None)
+    sensor, _ = simulation.sample()
+    with pytest.raises(RuntimeError, match="advance.. comes before"):
+        simulation.sample()
+    simulation.advance(None)
+    assert (sensor[0], simulation.sample()[0][0]) == (0, 1)
+
+
 def test_the_plant_falls_off_the_belt_without_control():
     plant = painleve.Plant("open-loop-bounce")
     while plant.state()["time_s"] < 0.2:
         state = plant.step(0.0, 0.0)
     assert state["gap_m"] > 0.0
-
-
-def test_the_environment():
-    gymnasium = pytest.importorskip("gymnasium")
-    from gymnasium.utils.env_checker import check_env
-    from painleve.gym import ArmOnBelt
-
-    check_env(ArmOnBelt(), skip_render_check=True)
-    environment = ArmOnBelt(duration_s=0.01)
-    environment.reset()
-    steps = [environment.step([0.5, 0.8])[3] for _ in range(10)]
-    assert steps == [False] * 9 + [True]
-    assert gymnasium is not None
 
 
 def test_a_study_gives_the_object_of_the_command():
@@ -61,10 +146,28 @@ def test_a_study_gives_the_object_of_the_command():
     assert len(section["rows"]) == 4
 
 
-def test_mistakes_in_a_study_are_named():
-    with pytest.raises(ValueError, match="unknown study 'admisible': .*admissible"):
-        painleve.study("admisible")
-    with pytest.raises(ValueError, match="--mu = -1"):
-        painleve.study("bifurcation", mu=-1)
-    with pytest.raises(ValueError, match="--nu"):
-        painleve.study("admissible", nu=0.6)
+def test_a_study_takes_arrays_and_tuples():
+    expected = painleve.study("bifurcation", mu="0.5,0.6", v_belt="-0.4", initial="a", transient_s=0.1, record_s=0.1)
+    for mu in ([0.5, 0.6], (0.5, 0.6), numpy.array([0.5, 0.6])):
+        found = painleve.study("bifurcation", mu=mu, v_belt=numpy.float64(-0.4), initial=("a",), transient_s=0.1, record_s=0.1)
+        assert found == expected
+    set_ = {"arm.link_length_m": (0.2, 0.21)}
+    assert painleve.study("admissible", mu=0.6, set=set_) != painleve.study("admissible", mu=0.6)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("admisible", {}, "unknown study 'admisible': .*admissible"),
+        ("bifurcation", {"mu": -1}, "^mu = -1"),
+        ("admissible", {"nu": 0.6}, "'nu"),
+        ("bifurcation", {"v_blt": 0.6}, "'v_blt"),
+        ("bifurcation", {"mu": "slippery"}, "mu"),
+        ("admissible", {"set": {"belt.frction": 1}}, "^belt.frction: unknown key"),
+        ("admissible", {"set": {"belt.friction": 1}}, "^belt.friction has no effect here; use mu$"),
+    ],
+)
+def test_mistakes_in_a_study_are_named_as_in_python(name, options, message):
+    with pytest.raises(ValueError, match=message) as refusal:
+        painleve.study(name, **options)
+    assert "--" not in str(refusal.value) and "\n" not in str(refusal.value)

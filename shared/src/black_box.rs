@@ -1,5 +1,6 @@
 //! A board's record of its last reset, crash and fault, which outlives a reset.
 
+use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{ActuatorFrame, SensorFrame};
@@ -8,7 +9,7 @@ use crate::frame::{ActuatorFrame, SensorFrame};
 pub const FILE_LENGTH: usize = 24;
 
 /// Contents of a black box; lost when the power goes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BlackBox {
     /// Reason for the last start of the processor.
@@ -22,7 +23,7 @@ pub struct BlackBox {
 }
 
 /// Reason for a reset.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetCause {
     /// The board does not report one.
@@ -39,7 +40,7 @@ pub enum ResetCause {
 }
 
 /// Reason for a crash of the program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Crash {
     /// An instruction that cannot be executed, a bus that does not answer, or a stack overflow.
@@ -68,7 +69,7 @@ pub enum Crash {
 }
 
 /// A tick that latched a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FaultRecord {
     /// The readings.

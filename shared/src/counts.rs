@@ -3,6 +3,7 @@
 //! Only integers cross the link. Each quantity has its own type, so a force cannot be scaled as an
 //! angle. The plant uses the scalings in `f64`, the controller in `f32`.
 
+use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::range::OutOfRange;
@@ -21,7 +22,7 @@ macro_rules! counts {
         $(#[$documentation])*
         #[repr(C)]
         #[derive(
-            Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+            Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, Schema,
         )]
         #[cfg_attr(feature = "zero-copy", derive(ZeroCopySend))]
         #[cfg_attr(feature = "zero-copy", type_name($type_name))]
@@ -29,7 +30,7 @@ macro_rules! counts {
         pub struct $name(pub $integer);
 
         impl SettingValue for $name {
-            const SHAPE: Shape = Shape::Integer;
+            const SHAPE: Shape = <$integer as SettingValue>::SHAPE;
 
             fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused> {
                 self.0.check(bounds, error)
@@ -62,7 +63,8 @@ impl Micrometres {
     /// Returns this position in m.
     #[inline]
     pub fn to_metres(self) -> f64 {
-        f64::from(self.0) * 1e-6
+        // Unlike the product with 1e-6, the quotient is the number nearest to the decimal.
+        f64::from(self.0) / 1e6
     }
 }
 

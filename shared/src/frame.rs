@@ -5,6 +5,7 @@
 
 pub use ::bitflags;
 use ::bitflags::bitflags;
+use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
@@ -18,7 +19,7 @@ use {
 
 /// Digital inputs of the controller, one bit each.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "zero-copy", derive(ZeroCopySend))]
 #[cfg_attr(feature = "zero-copy", type_name("painleve::DigitalInputs"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -47,7 +48,7 @@ bitflags! {
 
 /// Flags of the controller's state, one bit each.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "zero-copy", derive(ZeroCopySend))]
 #[cfg_attr(feature = "zero-copy", type_name("painleve::StatusFlags"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -61,8 +62,6 @@ bitflags! {
         const SATURATED = 1 << 1;
         /// The last segment of the reference has ended.
         const REFERENCE_DONE = 1 << 2;
-        /// The contact guard changed the torque to keep the tip pressed on the belt.
-        const GUARDED = 1 << 3;
         /// The reference is beyond the edge of the admissible stretch and held at the edge.
         const AT_EDGE = 1 << 4;
         /// The tip is being returned to the belt.
@@ -76,7 +75,7 @@ bitflags! {
 
 /// One sample of all of the controller's inputs.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "zero-copy", derive(ZeroCopySend))]
 #[cfg_attr(feature = "zero-copy", type_name("painleve::SensorFrame"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -97,7 +96,7 @@ pub struct SensorFrame {
 
 /// The controller's answer to one sensor frame.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "zero-copy", derive(ZeroCopySend))]
 #[cfg_attr(feature = "zero-copy", type_name("painleve::ActuatorFrame"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

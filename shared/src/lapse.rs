@@ -2,6 +2,7 @@
 //!
 //! Each is declared once, below, with its limit and the fault latched beyond the limit.
 
+use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::settings;
@@ -41,7 +42,7 @@ macro_rules! lapses {
                 }
             }
 
-            /// Returns the fault that is latched when too many occur in a row.
+            /// Returns the fault that is latched when too many occur.
             pub const fn fault(self) -> Fault {
                 match self {
                     $($(Self::$lapse => Fault::$fault),+),+
@@ -50,7 +51,8 @@ macro_rules! lapses {
         }
 
         settings! {
-            /// Number of lapses of each kind tolerated in a row; one more latches the fault.
+            /// Number of lapses of each kind tolerated in a row; one more latches the fault. Two good ticks make up
+            /// for one lapse.
             ///
             /// One overrun may be a rare branch; two in a row mean that the processor is too slow.
             /// At 1 kHz the arm moves at most 10 mm in 20 ms. A sensor whose answer was disturbed
@@ -74,7 +76,7 @@ macro_rules! lapses {
         }
 
         /// Number of lapses of each kind. Counters wrap.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub struct LapseCounts {
             $($(

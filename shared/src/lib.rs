@@ -10,6 +10,7 @@
 //! - [`wire`], [`message`]: frames, requests and responses as bytes, for links other than shared
 //!   memory
 //! - [`real`], [`range`]: scalars with host-independent functions, and range errors
+//! - [`schema`]: hash of what the bytes of messages and settings mean
 //! - [`settings`](mod@settings): settings declared once, with default, range, unit and meaning
 //!
 //! Equations and symbols are those of Marchese, Coraggio, Hogan and di Bernardo,
@@ -41,6 +42,7 @@ pub mod message;
 pub mod mounting;
 pub mod range;
 pub mod real;
+pub mod schema;
 pub mod settings;
 mod square_root;
 pub mod stages;
@@ -48,6 +50,12 @@ pub mod status;
 pub mod stored;
 pub mod winding;
 pub mod wire;
+
+/// Hash of this crate's sources.
+pub const SOURCES: u64 = match u64::from_str_radix(env!("PAINLEVE_SOURCES"), 16) {
+    Ok(hash) => hash,
+    Err(_) => panic!("the build script writes sixteen hexadecimal digits"),
+};
 
 pub use arm::{Arm, ArmParameters};
 pub use contact::{ContactTerms, Slip, SolutionMode};

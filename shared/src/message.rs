@@ -3,6 +3,7 @@
 //!
 //! The first request carries the configuration, so one image serves every scenario.
 
+use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::black_box::BlackBox;
@@ -11,9 +12,10 @@ use crate::frame::{ActuatorFrame, SensorFrame};
 use crate::lapse::LapseCounts;
 use crate::stored::StoredConfiguration;
 
-/// Version of the messages' meaning: of [`Request`], [`Response`] and their encoding. New variants are
-/// added at the end, so that a host and a board of different versions can still compare this number.
-pub const PROTOCOL: u16 = 4;
+/// Version of the messages' meaning, where their names do not show it, and of their encoding. New variants of
+/// [`Request`] and [`Response`] are added at the end, so that a host and a board of different versions can still
+/// compare this number and the hash of the build.
+pub const PROTOCOL: u16 = 5;
 
 /// Longest encoded message, in bytes: a configuration with a full reference.
 pub const MAXIMUM_LENGTH: usize = 768;
@@ -22,12 +24,12 @@ pub const MAXIMUM_LENGTH: usize = 768;
 pub const MAXIMUM_RESPONSE_LENGTH: usize = 192;
 
 /// A request from the host to the board.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Request<'a> {
     /// Starts afresh; answered by [`Response::Ready`], [`Response::Refused`] or
     /// [`Response::OtherBuild`].
     Configure {
-        /// Identifies the host's build.
+        /// Hash of the host's build, see [`SchemaHash`](crate::schema::SchemaHash).
         build: u64,
         /// Source of the sensor frames.
         source: FrameSource,
@@ -57,7 +59,7 @@ pub enum Request<'a> {
     /// [`FrameSource::StandAlone`]; answered by [`Response::Stored`], [`Response::Refused`] or
     /// [`Response::OtherBuild`].
     Store {
-        /// Identifies the host's build.
+        /// Hash of the host's build, see [`SchemaHash`](crate::schema::SchemaHash).
         build: u64,
         /// Configuration of the controller, encoded by postcard.
         configuration: &'a [u8],
@@ -66,10 +68,12 @@ pub enum Request<'a> {
     Forget,
     /// Asks for the stored configuration; answered by [`Response::Stored`]. Changes nothing.
     Stored,
+    /// Asks for the hash of the sources; answered by [`Response::Sources`]. Changes nothing.
+    Sources,
 }
 
 /// Source of a controller's sensor frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum FrameSource {
     /// The host, in [`Request::Sensor`]; it waits for every answer.
     Lockstep,
@@ -94,7 +98,7 @@ impl FrameSource {
 }
 
 /// A response from the board.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Response {
     /// The configuration is accepted and the control timer runs.
@@ -107,7 +111,7 @@ pub enum Response {
     Refused,
     /// The configuration comes from another build: its bytes may mean something else.
     OtherBuild {
-        /// Identifies the board's build.
+        /// Hash of the board's build, see [`SchemaHash`](crate::schema::SchemaHash).
         build: u64,
     },
     /// The torque is off, and the configuration has been discarded.
@@ -126,7 +130,7 @@ pub enum Response {
     Identity {
         /// The board's [`PROTOCOL`].
         protocol: u16,
-        /// Identifies the board's build.
+        /// Hash of the board's build, see [`SchemaHash`](crate::schema::SchemaHash).
         build: u64,
     },
     /// Whether the drive may arm: false without a configuration for the board's own sensors.
@@ -144,10 +148,12 @@ pub enum Response {
     BlackBox(BlackBox),
     /// The stored configuration.
     Stored(StoredConfiguration),
+    /// Hash of the sources of the board's controller. Those of another program may behave differently.
+    Sources(u64),
 }
 
 /// Counters of a board since its configuration. Counters wrap.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Health {
     /// Largest stack use since the start, bytes.

@@ -130,10 +130,10 @@ impl Bounds {
 pub enum Shape {
     /// True or false.
     Switch,
-    /// A whole number.
-    Integer,
-    /// A number.
-    Number,
+    /// A whole number of the named type.
+    Integer(&'static str),
+    /// A number of the named type.
+    Number(&'static str),
     /// Text.
     Text,
     /// A table of further settings.
@@ -188,7 +188,7 @@ impl Shape {
 
     const fn needs_a_range(&self) -> bool {
         match self {
-            Self::Number => true,
+            Self::Number(_) => true,
             Self::Optional(inner) => inner.needs_a_range(),
             Self::Array { item, .. } | Self::List { item, .. } => item.needs_a_range(),
             _ => false,
@@ -237,7 +237,7 @@ pub fn named(error: &mut OutOfRange, name: &'static str) -> Refused {
 macro_rules! numbers {
     ($shape:ident: $($number:ty as $real:ty),*) => {$(
         impl SettingValue for $number {
-            const SHAPE: Shape = Shape::$shape;
+            const SHAPE: Shape = Shape::$shape(stringify!($number));
 
             // A single copy for all settings saves flash.
             #[inline(never)]
@@ -454,7 +454,7 @@ mod tests {
         assert_eq!(enabled.meaning, "Whether it grips at all.");
         assert_eq!((enabled.range, enabled.shape), (None, Shape::Switch));
         assert_eq!((force.unit, attempts.unit), ("N", ""));
-        let item = &Shape::Number;
+        let item = &Shape::Number("f32");
         assert_eq!(force.shape, Shape::Array { item, length: 2 });
         let Shape::Choice { tag, variants } = Closing::SHAPE else {
             panic!("not a choice");

@@ -57,7 +57,7 @@ pub enum Fault {
     ForceOutOfRange = 3,
     /// sensor frame repeated an old sequence number
     StaleFrame = 4,
-    /// too many sensor frames lost in a row
+    /// too many sensor frames lost
     LostFrames = 5,
     /// control law gave a number that is not finite
     NotFinite = 6,
@@ -67,9 +67,9 @@ pub enum Fault {
     LiftOffTooLong = 8,
     /// control ticks not done when the next was due
     Overrun = 9,
-    /// too many ticks in a row without a sensor frame
+    /// too many ticks without a sensor frame
     MissingFrame = 10,
-    /// too many broken messages in a row
+    /// too many broken messages
     CorruptMessages = 11,
     /// tip left the belt again and again
     RecoveryFailed = 12,

@@ -1,11 +1,12 @@
 //! The configuration that a board keeps over a loss of power, to control its arm without a host.
 
+use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, FromRepr};
 
 /// Whether a board has a configuration of its own, and why not.
 #[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter, FromRepr,
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema, EnumIter, FromRepr,
 )]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -45,7 +46,7 @@ impl StoredState {
 }
 
 /// The configuration that a board has stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StoredConfiguration {
     /// Whether it can be used.

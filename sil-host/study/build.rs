@@ -1,8 +1,7 @@
 //! Passes the Git revision of the build to the program, so that a sweep can refuse to mix two revisions.
 //!
-//! The revision is updated whenever a source changes, but not when a commit changes no source: a
-//! program built
-//! before its commit stays `…-changed`, and is not rebuilt for every commit.
+//! The revision is updated whenever a source changes, but not when a commit changes no source: a program built before its
+//! commit stays `…-changed`, and is not rebuilt for every commit.
 
 use std::process::Command;
 
@@ -12,29 +11,23 @@ fn git(arguments: &[&str]) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
-/// Every source that a sweep's rows can depend on.
-fn sources() -> Vec<String> {
-    let mut sources: Vec<String> = ["../../shared/src", "../../firmware/src", "../../Cargo.lock"]
-        .map(String::from)
-        .into();
-    let crates = std::fs::read_dir("..").into_iter().flatten().flatten();
-    let folders = crates.map(|folder| folder.path().join("src"));
-    let folders = folders.filter(|folder| folder.is_dir());
-    sources.extend(folders.map(|folder| folder.to_string_lossy().into_owned()));
-    sources.sort();
-    sources
-}
+/// The sources that a sweep's rows can depend on, as Git knows them from any folder of the repository.
+const SOURCES: [&str; 4] = [
+    ":(top)shared/src",
+    ":(top)firmware/src",
+    ":(top,glob)sil-host/*/src/**",
+    ":(top)Cargo.lock",
+];
 
 fn main() {
-    let sources = sources();
-    for source in &sources {
+    println!("cargo:rerun-if-changed=build.rs");
+    let ask = |command: &[&str]| git(&[command, &["--"], &SOURCES].concat());
+    for source in ask(&["ls-files"]).iter().flat_map(|files| files.lines()) {
         println!("cargo:rerun-if-changed={source}");
     }
-    let mut status = vec!["status", "--porcelain", "--untracked-files=no", "--"];
-    status.extend(sources.iter().map(String::as_str));
     let revision = match git(&["rev-parse", "--short=12", "HEAD"]) {
         None => "unknown".to_owned(),
-        Some(revision) => match git(&status) {
+        Some(revision) => match ask(&["status", "--porcelain", "--untracked-files=no"]) {
             Some(changes) if changes.is_empty() => revision,
             _ => format!("{revision}-changed"),
         },

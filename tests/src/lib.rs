@@ -22,24 +22,38 @@ use nix::unistd::Pid;
 use painleve_system::interrupt::restore_default_actions;
 use serde_json::Value;
 
-/// Says that a test does nothing, and why. Printed past the test harness, which shows no output of tests
-/// that pass.
+/// Says that a test does nothing, and why. Written to standard error past the test harness, and to the file named by
+/// `PAINLEVE_SKIPPED`, whose lines `cargo xtask test` prints at its end.
 pub fn skipped(reason: &str) {
-    // A notice that cannot be printed must not fail the test.
+    // A notice that cannot be written must not fail the test.
     let _ = writeln!(std::io::stderr(), "SKIPPED: {reason}");
+    if let Some(path) = std::env::var_os("PAINLEVE_SKIPPED") {
+        let notices = std::fs::OpenOptions::new().append(true).open(path);
+        let _ = notices.and_then(|mut file| writeln!(file, "{reason}"));
+    }
 }
 
-/// Returns the path of the program, which is built if missing or out of date, with the checks of the profile `verify`.
+/// Returns the path of the program: the one named by `PAINLEVE_PROGRAM`, else that of the profile `verify`, which is
+/// built if missing or out of date.
 ///
 /// # Panics
 /// If it cannot be built.
 pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
+        if let Some(program) = std::env::var_os("PAINLEVE_PROGRAM") {
+            return program.into();
+        }
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
         let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let built = Command::new(cargo)
-            .args(["build", "--profile", "verify", "--package", "painleve-command"])
+            .args([
+                "build",
+                "--profile",
+                "verify",
+                "--package",
+                "painleve-command",
+            ])
             .args(["--message-format", "json"])
             .current_dir(&workspace)
             .stderr(Stdio::inherit())
@@ -83,7 +97,11 @@ pub fn flash_image() -> &'static Path {
     IMAGE.get_or_init(|| built_image("painleve-f405"))
 }
 
+/// Returns the path of an image: in the folder named by `PAINLEVE_IMAGES`, else built if out of date.
 fn built_image(name: &str) -> PathBuf {
+    if let Some(folder) = std::env::var_os("PAINLEVE_IMAGES") {
+        return Path::new(&folder).join(name);
+    }
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let built = Command::new(cargo)

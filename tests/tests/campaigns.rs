@@ -34,8 +34,8 @@ fn wrong_keys_and_values_are_named_and_nothing_is_written() {
     for study in ["robustness", "ablation", "effects", "capture", "lift-off"] {
         for (wrong, expected) in [
             (
-                "controller.guard.enabld=true",
-                &["controller.guard.enabld", "known: enabled"][..],
+                "controller.disturbance.enabld=true",
+                &["controller.disturbance.enabld", "known: enabled"][..],
             ),
             (
                 "converters.link.frame_loss=2",
@@ -159,12 +159,12 @@ fn an_ablation_has_a_line_for_each_part() {
         assert_eq!(row["runs"], 2);
     }
     assert_eq!(count("│ without "), rows.len() - 1, "{table}");
-    let two = ["--without", "disturbance,guard", "--csv", "a.csv"];
+    let two = ["--without", "disturbance,governor", "--csv", "a.csv"];
     bench.report(&[&all[..], &["--json"], &two].concat());
     let csv = std::fs::read_to_string(bench.path("a.csv")).unwrap_or_default();
     let parts = csv.lines().filter_map(|line| line.split(',').next());
     let parts: Vec<&str> = parts.collect();
-    assert_eq!(parts, ["without", "", "disturbance", "guard"], "{csv}");
+    assert_eq!(parts, ["without", "", "disturbance", "governor"], "{csv}");
 }
 
 #[test]

@@ -197,3 +197,20 @@ fn a_folder_that_cannot_be_used_is_named_with_what_to_do() {
     assert_eq!(code(output.status), 3, "{output:?}");
     assert!(errors(&output).contains("blocked/painleve"), "{output:?}");
 }
+
+/// The doctor used to judge limits that root does not need, and contradicted the runs.
+#[test]
+fn the_doctor_and_a_run_say_the_same_about_real_time() {
+    let ward = Ward::new("doctor-realtime");
+    let state: serde_json::Value = serde_json::from_str(&ward.doctor(&["--json"])).unwrap();
+    let scheduling = state["scheduling"].as_str().unwrap();
+    // What follows depends on the size of the process.
+    let verdict = scheduling.split(", memory").next().unwrap();
+    assert!(verdict.starts_with("real time: "), "{verdict}");
+    let mut rows = state.as_object().unwrap().keys();
+    assert!(rows.all(|row| !row.contains("real-time")), "{state}");
+    let run = ["run", "--pacing", "realtime", "--no-record", "--no-plot"];
+    let short = ["--set", "run.duration_s=0.05"];
+    let output = ward.bench.run(&[&run[..], &short].concat());
+    assert!(errors(&output).contains(verdict), "{}", errors(&output));
+}

@@ -1,9 +1,12 @@
 //! Every failure ends with one message, an exit code, and no leftovers.
 
+use std::process::Output;
+use std::sync::Barrier;
 use std::time::Duration;
 
 use nix::sys::signal::Signal;
 use painleve_tests::{Bench, child_of, code, errors, is_running, signal};
+use serde_json::Value;
 
 /// A peer detects the end of the other within 2 s; the margin is for a machine busy with other
 /// tests. The process must never hang.
@@ -114,6 +117,47 @@ fn a_second_plant_on_a_bus_is_refused() {
     assert_eq!(code(output.status), 3, "{output:?}");
     assert!(errors(&output).contains(&bench.bus), "{output:?}");
     assert!(is_running(plant), "the first plant must not suffer");
+}
+
+/// Of runs that start on one bus at the same moment, one succeeds, and the others name the bus.
+#[test]
+fn one_of_several_simultaneous_runs_succeeds() {
+    let bench = Bench::new("together");
+    let short = [
+        "--json",
+        "--no-record",
+        "--no-plot",
+        "--silence-limit-s",
+        "20",
+    ];
+    let hash = bench.report(&[&["run", "--set", "run.duration_s=200"], &short[..]].concat());
+    let rounds = std::env::var("PAINLEVE_ROUNDS").map_or(8, |rounds| rounds.parse().unwrap());
+    for round in 0..rounds {
+        let count = 2 + round % 4;
+        let barrier = Barrier::new(count);
+        let outputs: Vec<Output> = std::thread::scope(|scope| {
+            let start = || {
+                let fixed = ["run", "--set", "run.duration_s=200", "--bus", &bench.bus];
+                let mut command = bench.command(&[&fixed, &short[..]].concat());
+                barrier.wait();
+                command.output().unwrap()
+            };
+            let runs: Vec<_> = (0..count).map(|_| scope.spawn(start)).collect();
+            runs.into_iter().map(|run| run.join().unwrap()).collect()
+        });
+        let (winners, losers): (Vec<_>, Vec<_>) =
+            outputs.iter().partition(|output| output.status.success());
+        assert_eq!(winners.len(), 1, "round {round}: {outputs:?}");
+        let report: Value = serde_json::from_slice(&winners[0].stdout).unwrap();
+        assert_eq!(report["log_hash"], hash["log_hash"]);
+        for loser in losers {
+            assert_eq!(code(loser.status), 3, "{loser:?}");
+            let message = format!("error: bus `{}` already has a plant", bench.bus);
+            assert!(errors(loser).starts_with(&message), "{loser:?}");
+            assert_eq!(errors(loser).trim().lines().count(), 1, "{loser:?}");
+        }
+    }
+    assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
 }
 
 /// Kills one process of a run and checks that the others end.

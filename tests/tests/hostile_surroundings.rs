@@ -3,7 +3,7 @@
 
 use std::fs::{self, File};
 use std::io::Write;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -98,6 +98,84 @@ fn a_process_stopped_during_its_start_is_detected() {
             start.elapsed()
         );
         assert_eq!(errors(&output).matches("error: ").count(), 1, "{output:?}");
+    }
+}
+
+/// A wall clock that is a day off in one direction or the other, by turns at each reading.
+const UNSTEADY_CLOCK: &str = r"
+#define _GNU_SOURCE
+#include <sys/syscall.h>
+#include <sys/time.h>
+#include <time.h>
+#include <unistd.h>
+int clock_gettime(clockid_t clock, struct timespec *now) {
+    static int readings;
+    int failed = syscall(SYS_clock_gettime, clock, now);
+    if (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE)
+        now->tv_sec += readings++ % 2 ? 86400 : -86400;
+    return failed;
+}
+int gettimeofday(struct timeval *now, void *zone) {
+    struct timespec time;
+    (void)zone;
+    clock_gettime(CLOCK_REALTIME, &time);
+    now->tv_sec = time.tv_sec;
+    now->tv_usec = time.tv_nsec / 1000;
+    return 0;
+}
+time_t time(time_t *now) {
+    struct timespec time;
+    clock_gettime(CLOCK_REALTIME, &time);
+    return now ? *now = time.tv_sec : time.tv_sec;
+}
+";
+
+#[test]
+fn steps_of_the_wall_clock_disturb_neither_pacing_nor_patience() {
+    let bench = Bench::new("wall-clock");
+    fs::write(bench.path("clock.c"), UNSTEADY_CLOCK).unwrap();
+    let compiled = Command::new("cc")
+        .args(["-shared", "-fPIC", "-o", "clock.so", "clock.c"])
+        .current_dir(bench.path(""))
+        .status();
+    assert!(compiled.unwrap().success());
+    let unsteady = |mut command: Command| {
+        command.env("LD_PRELOAD", bench.path("clock.so"));
+        let start = Instant::now();
+        (command.output().unwrap(), start.elapsed())
+    };
+    // The clock is indeed a day off.
+    let mut date = Command::new("date");
+    date.arg("+%s");
+    let said = String::from_utf8(unsteady(date).0.stdout).unwrap();
+    let now = fs::metadata(bench.path("clock.so")).unwrap().mtime();
+    assert!((said.trim().parse::<i64>().unwrap() - now).abs() > 80_000);
+
+    let slow = ["run.tick_hz=50", "controller.estimator.bandwidth_rad_s=100"];
+    let mut run = vec![
+        "run",
+        "--pacing",
+        "realtime",
+        "--json",
+        "--no-record",
+        "--no-plot",
+    ];
+    for key in slow.iter().chain(&["run.duration_s=2"]) {
+        run.extend(["--set", key]);
+    }
+    let (output, took) = unsteady(bench.command(&run));
+    assert_eq!(code(output.status), 0, "{}", errors(&output));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["ticks"], 100);
+    let factor = report["realtime_factor"].as_f64().unwrap();
+    assert!((0.9..1.1).contains(&factor), "{factor}");
+    assert!(took < Duration::from_secs(10), "{took:?}");
+
+    for alone in ["plant", "controller"] {
+        let (output, took) = unsteady(bench.command(&[alone, "--bus", &bench.bus]));
+        assert_eq!(code(output.status), 3, "{}", errors(&output));
+        let waited = Duration::from_millis(1500)..Duration::from_secs(10);
+        assert!(waited.contains(&took), "{took:?}");
     }
 }
 

@@ -65,7 +65,11 @@ fn campaigns_of_random_runs_are_merged_too() {
     for (study, options) in [
         (
             "robustness",
-            &[("runs", "7"), ("seed", "3"), ("without", "governor,guard")][..],
+            &[
+                ("runs", "7"),
+                ("seed", "3"),
+                ("without", "governor,disturbance"),
+            ][..],
         ),
         ("capture", &[("runs", "5"), ("set", "run.tick_hz=500")]),
         ("lift-off", &[("runs", "4"), ("slide-s", "0.3")]),
@@ -282,7 +286,10 @@ fn mistakes_are_reported_and_nothing_is_written() {
     ] {
         refused(&["run", "--shard", shard], part);
     }
-    refused(&["plan", "campaign.toml", "--shards", "4"], "another sweep");
+    refused(
+        &["plan", "campaign.toml", "--shards", "4"],
+        "another sweep is planned here; choose another --folder, or delete the folder out/sweep",
+    );
     for (from, to, part) in [
         ("format = 1", "format = 2", "another version"),
         ("version = \"", "version = \"9", "another version"),

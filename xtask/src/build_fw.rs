@@ -52,7 +52,8 @@ pub fn build(
     match toolchain()? {
         Toolchain::Installed => {
             let build = [&build[..], &["--target-dir", target]].concat();
-            run_with(&cargo(), &build, &[])
+            // Incremental compilation makes larger and slower images, beyond their budgets.
+            run_with(&cargo(), &build, &[("CARGO_INCREMENTAL", "0")])
         }
         Toolchain::Debian => {
             // A separate target folder, because objects of two compilers cannot be mixed.
@@ -76,9 +77,14 @@ pub fn build(
     }
 }
 
+/// Returns the folder of the built images.
+pub fn folder() -> PathBuf {
+    workspace().join("target").join(TARGET).join(PROFILE)
+}
+
 /// Returns the path of a built image.
 pub fn image(name: &str) -> PathBuf {
-    workspace().join(format!("target/{TARGET}/{PROFILE}/{name}"))
+    folder().join(name)
 }
 
 /// Returns whether `rustc` has the target's core library.

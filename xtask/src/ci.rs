@@ -1,7 +1,7 @@
 //! `cargo xtask ci`: formatting, lints, links in doc comments and tests, in this order.
 
-use crate::command::{ChoreError, cargo, run_cargo, run_with};
-use crate::test;
+use crate::command::{ChoreError, PROFILE, cargo, run_cargo, run_with};
+use crate::test::{self, TestArguments};
 
 /// Runs the steps of continuous integration.
 ///
@@ -9,18 +9,18 @@ use crate::test;
 /// If a step fails; later steps are not run.
 pub fn run() -> Result<(), ChoreError> {
     run_cargo(&["fmt", "--all", "--check"])?;
-    run_cargo(&[
+    let clippy = [
         "clippy",
         "--workspace",
         "--all-targets",
-        "--",
-        "-D",
-        "warnings",
-    ])?;
+        "--profile",
+        PROFILE,
+    ];
+    run_cargo(&[&clippy[..], &["--", "-D", "warnings"]].concat())?;
     run_with(
         &cargo(),
-        &["doc", "--workspace", "--no-deps"],
+        &["doc", "--workspace", "--no-deps", "--profile", PROFILE],
         &[("RUSTDOCFLAGS", "-D warnings")],
     )?;
-    test::run()
+    test::run(&TestArguments::default())
 }

@@ -25,6 +25,28 @@ pub fn say(line: &str) -> Result<(), ChoreError> {
         .map_err(|cause| ChoreError(format!("cannot write to stdout: {cause}")))
 }
 
+/// The profile of the program under test and of all tests.
+pub const PROFILE: &str = "verify";
+
+/// Returns the path of the program under test.
+pub fn program() -> PathBuf {
+    workspace().join("target").join(PROFILE).join("painleve")
+}
+
+/// Builds the program under test.
+///
+/// # Errors
+/// As [`run`].
+pub fn build_program() -> Result<(), ChoreError> {
+    run_cargo(&[
+        "build",
+        "--profile",
+        PROFILE,
+        "--package",
+        "painleve-command",
+    ])
+}
+
 /// Returns the workspace's folder.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))

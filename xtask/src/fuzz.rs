@@ -3,7 +3,7 @@
 
 use clap::Args;
 
-use crate::command::{ChoreError, cargo, run_with};
+use crate::command::{ChoreError, PROFILE, cargo, run_with};
 
 /// Options of the fuzzing.
 #[derive(Debug, Args)]
@@ -27,6 +27,18 @@ const FRAMES: &str = "random_frames";
 const BUS: [&str; 4] = ["--package", "painleve-link", "--lib", "both_ends"];
 const BUS_SHARE: u32 = 20;
 
+/// Runs the part that belongs to `cargo xtask test --all`.
+///
+/// # Errors
+/// If a test fails.
+pub fn nightly() -> Result<(), ChoreError> {
+    run(&FuzzArguments {
+        cases: 2000,
+        scenario_ticks: 50,
+        frames: 200_000,
+    })
+}
+
 /// Runs all tests with random input for the requested number of cases.
 ///
 /// # Errors
@@ -35,7 +47,7 @@ pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
     let test = |selection: &[&str], variables: &[(&str, &str)]| {
         run_with(
             &cargo(),
-            &[&["test", "--workspace"], selection].concat(),
+            &[&["test", "--workspace", "--profile", PROFILE], selection].concat(),
             variables,
         )
     };
@@ -51,7 +63,7 @@ pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
     let bus_cases = (arguments.cases / BUS_SHARE).max(1).to_string();
     run_with(
         &cargo(),
-        &[&["test"], &BUS[..]].concat(),
+        &[&["test", "--profile", PROFILE], &BUS[..]].concat(),
         &[("PROPTEST_CASES", &bus_cases)],
     )?;
     let frames = arguments.frames.to_string();

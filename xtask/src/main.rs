@@ -3,6 +3,7 @@
 mod bench;
 mod boards;
 mod build_fw;
+mod campaign;
 mod chaos;
 mod ci;
 mod command;
@@ -10,6 +11,7 @@ mod examples;
 mod flash;
 mod fmu;
 mod fuzz;
+mod measure;
 mod python;
 mod setup;
 mod size;
@@ -30,10 +32,10 @@ struct Xtask {
 
 #[derive(Debug, Subcommand)]
 enum Chore {
-    /// Install the tools that the tests require and run every test.
-    Test,
-    /// Install the microcontroller's Rust target and QEMU.
-    Setup,
+    /// Run the tests of the default tier, or all; install the tools that they require, if missing.
+    Test(test::TestArguments),
+    /// Install the microcontroller's Rust target, QEMU and Unicorn, if missing.
+    Setup(setup::SetupArguments),
     /// Build the controller's images for the microcontroller.
     BuildFw,
     /// Print flash, RAM and stack use of the images, with their limits.
@@ -54,14 +56,16 @@ enum Chore {
     Soak(soak::SoakArguments),
     /// Measure the figures of docs/benchmarks.md on this machine, pinned, and write its table.
     Bench(bench::BenchArguments),
-    /// Run the steps of continuous integration: formatting, clippy, every test.
+    /// Measure the figures that the documentation prints, and write them to docs/measured/*.toml.
+    Measure(measure::MeasureArguments),
+    /// Run the steps of continuous integration: formatting, clippy, links, tests of the default tier.
     Ci,
 }
 
 fn main() -> ExitCode {
     let result = match Xtask::parse().chore {
-        Chore::Test => test::run(),
-        Chore::Setup => setup::run(),
+        Chore::Test(arguments) => test::run(&arguments),
+        Chore::Setup(arguments) => setup::run(&arguments),
         Chore::BuildFw => build_fw::run(),
         Chore::Size => size::run(),
         Chore::Flash(arguments) => flash::run(&arguments),
@@ -72,6 +76,7 @@ fn main() -> ExitCode {
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),
         Chore::Bench(arguments) => bench::run(&arguments),
+        Chore::Measure(arguments) => measure::run(&arguments),
         Chore::Ci => ci::run(),
     };
     match result {

@@ -1,7 +1,7 @@
 //! `cargo xtask python`: builds the Python package, installs its wheel in a virtual environment, tests it,
 //! and executes its notebook.
 
-use crate::command::{ChoreError, run, run_cargo};
+use crate::command::{ChoreError, run};
 
 const MANIFEST: &str = "python/Cargo.toml";
 const FOLDER: &str = "target/python/package";
@@ -33,6 +33,8 @@ pub fn run_chore() -> Result<(), ChoreError> {
         &format!("{FOLDER}/bin/maturin"),
         &[
             "build",
+            "--profile",
+            "verify",
             "--manifest-path",
             MANIFEST,
             "--target-dir",
@@ -53,19 +55,4 @@ pub fn run_chore() -> Result<(), ChoreError> {
     let execute = ["-m", "nbconvert", "--to", "html", "--execute"];
     let to = ["--output-dir", NOTEBOOK_PAGE_FOLDER, NOTEBOOK];
     run(&python, &[&execute[..], &to].concat())
-}
-
-/// Compiles the package, which is a workspace of its own, against the present crates; needs no
-/// Python.
-///
-/// # Errors
-/// If it does not compile.
-pub fn check() -> Result<(), ChoreError> {
-    run_cargo(&[
-        "check",
-        "--manifest-path",
-        MANIFEST,
-        "--target-dir",
-        "target",
-    ])
 }

@@ -3,64 +3,105 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use clap::Args;
+
 use crate::build_fw::{TARGET, debian_can_build, target_is_installed};
 use crate::command::{ChoreError, run_with, workspace};
 
 /// Executes the board's image in tests; see `tests/flash-image`.
 const UNICORN: &str = "unicorn==2.1.4";
 
-/// Installs the Rust target, QEMU and Unicorn, if missing.
-///
-/// # Errors
-/// If neither rustup nor Debian provides the target, or an emulator cannot be installed.
-pub fn run() -> Result<(), ChoreError> {
-    if !target_is_installed()
-        && run_with("rustup", &["target", "add", TARGET], &[]).is_err()
-        && !debian_can_build()
-    {
-        eprintln!("rustup cannot add the target; falling back on Debian's compiler");
-        install(&["rustc-web", "cargo-web", "rust-web-src", "lld"])?;
-    }
-    if !starts("qemu-system-arm") {
-        install(&["qemu-system-arm"])?;
-    }
-    install_unicorn()?;
-    eprintln!("ready: `cargo xtask build-fw` builds the images");
-    Ok(())
+/// Options of `cargo xtask setup`.
+#[derive(Debug, Args)]
+pub struct SetupArguments {
+    /// Also install what `cargo xtask test --all` uses: browser, Python environments, libclang, C++.
+    #[arg(long)]
+    all: bool,
+    /// Install Debian packages with sudo.
+    #[arg(long)]
+    sudo: bool,
 }
 
-/// Programs and files that tests beyond Rust use, each with the Debian package that provides it.
-const TEST_TOOLS: [(&str, &str); 5] = [
+/// Which tools are needed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Tools {
+    /// Those of the default tier of tests.
+    Default,
+    /// Those of all tests.
+    All,
+}
+
+/// Programs and files that tests beyond the default tier use, each with the Debian package that provides it.
+const FURTHER_TOOLS: [(&str, &str); 4] = [
     ("c++", "g++"),
     ("node", "nodejs"),
     ("chromium", "chromium"),
     ("rsvg-convert", "librsvg2-bin"),
-    ("python3", "python3-venv"),
 ];
 
-/// Installs what the tests of pages, pictures, examples, FMU and Python package use, if missing. If it cannot be
-/// installed, those tests are skipped and say so.
-pub fn install_test_tools() {
-    let mut missing: Vec<&str> = TEST_TOOLS
-        .iter()
-        .filter(|(program, _)| !starts(program))
-        .map(|(_, package)| *package)
-        .collect();
-    if !has_virtual_environments() && !missing.contains(&"python3-venv") {
+/// Installs the tools that are missing.
+///
+/// # Errors
+/// If a tool cannot be installed.
+pub fn run(arguments: &SetupArguments) -> Result<(), ChoreError> {
+    let tools = if arguments.all {
+        Tools::All
+    } else {
+        Tools::Default
+    };
+    install_required(arguments.sudo)?;
+    if tools == Tools::All {
+        install(&missing_further(), arguments.sudo)?;
+    }
+    eprintln!("ready: `cargo xtask build-fw` builds the images");
+    Ok(())
+}
+
+/// Installs what the tests of a tier need, without sudo. Returns the packages that could not be installed and that only
+/// further tests need; those tests say that they are skipped.
+///
+/// # Errors
+/// If a tool of the default tier cannot be installed.
+pub fn install_missing(tools: Tools) -> Result<Vec<&'static str>, ChoreError> {
+    install_required(false)?;
+    let missing = match tools {
+        Tools::Default => Vec::new(),
+        Tools::All => missing_further(),
+    };
+    match install(&missing, false) {
+        Ok(()) => Ok(Vec::new()),
+        Err(ChoreError(reason)) => {
+            eprintln!("{reason}");
+            Ok(missing)
+        }
+    }
+}
+
+/// Installs the Rust target, QEMU and Unicorn.
+fn install_required(sudo: bool) -> Result<(), ChoreError> {
+    if !target_is_installed() && !debian_can_build() {
+        eprintln!("missing: the Rust target {TARGET}");
+        if run_with("rustup", &["target", "add", TARGET], &[]).is_err() {
+            eprintln!("rustup cannot add the target; falling back on Debian's compiler");
+            install(&["rustc-web", "cargo-web", "rust-web-src", "lld"], sudo)?;
+        }
+    }
+    if !starts("qemu-system-arm") {
+        install(&["qemu-system-arm"], sudo)?;
+    }
+    install_unicorn(sudo)
+}
+
+fn missing_further() -> Vec<&'static str> {
+    let programs = FURTHER_TOOLS.iter().filter(|(program, _)| !starts(program));
+    let mut missing: Vec<_> = programs.map(|(_, package)| *package).collect();
+    if !has_virtual_environments() {
         missing.push("python3-venv");
     }
     if !has_libclang() {
         missing.push("libclang-dev");
     }
-    if missing.is_empty() {
-        return;
-    }
-    if let Err(ChoreError(reason)) = install(&missing) {
-        eprintln!(
-            "{reason}\ntests that use {} are skipped",
-            missing.join(", ")
-        );
-    }
+    missing
 }
 
 /// Returns whether `python3 -m venv` can create environments with pip.
@@ -92,7 +133,7 @@ pub fn has_libclang() -> bool {
 }
 
 /// Installs the prebuilt Unicorn from PyPI into an environment under `target/`.
-fn install_unicorn() -> Result<(), ChoreError> {
+fn install_unicorn(sudo: bool) -> Result<(), ChoreError> {
     let environment = workspace().join("target/unicorn");
     let installed = environment.join("installed");
     if std::fs::read_to_string(&installed).is_ok_and(|version| version == UNICORN) {
@@ -101,7 +142,7 @@ fn install_unicorn() -> Result<(), ChoreError> {
     let folder = environment.to_string_lossy();
     let make = || run_with("python3", &["-m", "venv", "--clear", &folder], &[]);
     if make().is_err() {
-        install(&["python3-venv"])?;
+        install(&["python3-venv"], sudo)?;
         make()?;
     }
     let python = environment.join("bin/python");
@@ -121,23 +162,29 @@ pub fn starts(program: &str) -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Installs Debian packages, with sudo unless run as root.
-fn install(packages: &[&str]) -> Result<(), ChoreError> {
+/// Installs Debian packages; a user other than root must allow sudo.
+fn install(packages: &[&str], sudo: bool) -> Result<(), ChoreError> {
+    if packages.is_empty() {
+        return Ok(());
+    }
     let names = packages.join(" ");
     if !starts("apt-get") {
         return Err(ChoreError(format!(
             "apt-get not found; install the equivalents of the Debian packages {names}"
         )));
     }
+    if !sudo && !nix::unistd::geteuid().is_root() {
+        return Err(ChoreError(format!(
+            "missing Debian packages: {names}; install them with `sudo apt-get install {names}` or `cargo xtask setup --sudo`"
+        )));
+    }
+    eprintln!("installing the Debian packages {names}");
     let apt = |arguments: &[&str]| {
-        let whoami = Command::new("id").arg("-u").output();
-        let is_root = whoami.is_ok_and(|output| output.stdout == b"0\n");
-        let mut line = Vec::new();
-        if !is_root {
-            line.push("apt-get");
+        if nix::unistd::geteuid().is_root() {
+            run_with("apt-get", arguments, &[])
+        } else {
+            run_with("sudo", &[&["apt-get"], arguments].concat(), &[])
         }
-        line.extend(arguments);
-        run_with(if is_root { "apt-get" } else { "sudo" }, &line, &[])
     };
     apt(&["update"])?;
     let install = ["install", "-y", "--no-install-recommends"];

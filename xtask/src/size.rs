@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::boards;
 use crate::build_fw;
-use crate::command::{ChoreError, run_cargo, say, workspace};
+use crate::command::{ChoreError, build_program, program, say, workspace};
 
 /// All limits; the end-to-end tests check those of the ticks and of the stack as well.
 const BUDGET: &str = include_str!("../../tests/budget.json");
@@ -28,13 +28,21 @@ const TOLERANCE: f64 = 0.03;
 /// Number of largest symbols to print.
 const LARGEST: usize = 12;
 
-/// Builds the images, prints their sizes, and runs one to measure its stack.
+/// Builds the images and the program, and checks the images.
 ///
 /// # Errors
-/// If the build or the measurement fails, or an image exceeds a limit.
+/// If a build fails, or as [`check_images`].
 pub fn run() -> Result<(), ChoreError> {
     build_fw::run()?;
-    run_cargo(&["build", "--release", "--package", "painleve-command"])?;
+    build_program()?;
+    check_images()
+}
+
+/// Prints the sizes of images that are built, and runs one to measure its stack.
+///
+/// # Errors
+/// If the measurement fails, or an image exceeds a limit.
+pub fn check_images() -> Result<(), ChoreError> {
     let mut over = Vec::new();
     let budget = Budget::read()?;
     let boards = boards::all()?;
@@ -142,10 +150,9 @@ fn misprinted(what: &str, chip: &str, size: u64, limit: u64) -> Option<String> {
 /// Returns the largest stack use of any scenario, measured on the emulated board. It occurs while
 /// the configuration is decoded and in the first ticks.
 fn stack_bytes() -> Result<u64, ChoreError> {
-    let program = workspace().join("target/release/painleve");
     let arguments = ["timing", "--json", "--set", "run.duration_s=0.1"];
     let error = |what: &str| ChoreError(format!("`painleve {}` {what}", arguments.join(" ")));
-    let output = Command::new(&program)
+    let output = Command::new(program())
         .args(arguments)
         .current_dir(workspace())
         .stderr(Stdio::inherit())

@@ -4,7 +4,7 @@
 
 use clap::Args;
 
-use crate::command::{ChoreError, cargo, run_with};
+use crate::command::{ChoreError, PROFILE, cargo, run_with};
 
 /// Options of the soak.
 #[derive(Debug, Args)]
@@ -17,6 +17,17 @@ pub struct SoakArguments {
     qemu_hours: f64,
 }
 
+/// Runs the part that belongs to `cargo xtask test --all`.
+///
+/// # Errors
+/// As [`run`].
+pub fn nightly() -> Result<(), ChoreError> {
+    run(&SoakArguments {
+        hours: 2.0,
+        qemu_hours: 0.05,
+    })
+}
+
 /// Runs the soak.
 ///
 /// # Errors
@@ -25,7 +36,17 @@ pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
     let minutes = |hours: f64| ((60.0 * hours).round() as u32).to_string();
     run_with(
         &cargo(),
-        &["test", "--workspace", "--test", "soak", "--", "--nocapture"],
+        &[
+            "test",
+            "--package",
+            "painleve-tests",
+            "--profile",
+            PROFILE,
+            "--test",
+            "soak",
+            "--",
+            "--nocapture",
+        ],
         &[
             ("PAINLEVE_SOAK_MINUTES", &minutes(arguments.hours)),
             ("PAINLEVE_SOAK_QEMU_MINUTES", &minutes(arguments.qemu_hours)),

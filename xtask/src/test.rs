@@ -1,30 +1,211 @@
-//! `cargo xtask test`: all tests.
+//! `cargo xtask test`: the tests, in two tiers.
+//!
+//! The default tier checks every promise. `--all` adds what takes long or requires further tools.
+//! The last lines name the tier, what it left out, and why.
 
-use crate::command::{ChoreError, run_cargo};
-use crate::{chaos, examples, fmu, python, setup, size};
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Command, Stdio};
+use std::time::Instant;
 
-/// Installs the tools that are missing, builds images and programs as users do, then runs every test
-/// of the workspace, the tests of the Python package and of the FMU, every example, and the short part of chaos.
+use clap::Args;
+
+use crate::build_fw;
+use crate::command::{
+    ChoreError, PROFILE, build_program, cargo, program, run_cargo, say, workspace,
+};
+use crate::setup::{self, Tools};
+use crate::{campaign, chaos, examples, fmu, fuzz, python, size, soak};
+
+/// Options of `cargo xtask test`.
+#[derive(Debug, Default, Args)]
+pub struct TestArguments {
+    /// Also run what takes long or requires further tools: campaigns, examples, Python, FMU, malformed input, soak, chaos;
+    /// and install the browser.
+    #[arg(long)]
+    all: bool,
+    /// List the slowest tests; requires cargo-nextest.
+    #[arg(long)]
+    durations: bool,
+}
+
+/// Number of tests that `--durations` lists.
+const LISTED: usize = 25;
+
+/// Longest time for a test of the default tier, s. Longer ones are listed: they belong to `--all`.
+const LONGEST_TEST_S: f64 = 20.0;
+
+/// What `--all` runs after the tests of the workspace, in this order.
+const FURTHER_STEPS: [(&str, Step); 7] = [
+    ("campaigns with a fresh seed", campaign::run),
+    ("examples", examples::run),
+    ("Python package", python::run_chore),
+    ("FMU", fmu::run_chore),
+    ("malformed input, 2,000 cases each", fuzz::nightly),
+    ("soak", soak::nightly),
+    ("chaos, 1,000 injections", chaos::nightly),
+];
+
+type Step = fn() -> Result<(), ChoreError>;
+
+/// Installs missing tools, builds images and program, and runs the tests of a tier.
 ///
 /// # Errors
 /// If a step fails; later steps are not run.
-pub fn run() -> Result<(), ChoreError> {
-    setup::run()?;
-    setup::install_test_tools();
-    // Builds images and programs: the end-to-end tests start the release builds.
-    size::run()?;
-    run_cargo(&["test", "--workspace"])?;
-    if setup::has_virtual_environments() {
-        python::run_chore()?;
+pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
+    let start = Instant::now();
+    let tools = if arguments.all {
+        Tools::All
     } else {
-        eprintln!("SKIPPED: the tests of the Python package (no python3-venv)");
-        python::check()?;
-    }
-    if setup::has_virtual_environments() && setup::has_libclang() {
-        fmu::run_chore()?;
+        Tools::Default
+    };
+    let missing = setup::install_missing(tools)?;
+    build_fw::run()?;
+    build_program()?;
+    size::check_images()?;
+    let mut left_out: Vec<String> = missing
+        .iter()
+        .map(|tool| format!("tests that use {tool}: it cannot be installed"))
+        .collect();
+    left_out.extend(workspace_tests(arguments)?);
+    if arguments.all {
+        for (_, step) in FURTHER_STEPS {
+            step()?;
+        }
     } else {
-        eprintln!("SKIPPED: the FMU (no python3-venv or no libclang-dev)");
+        chaos::short()?;
+        let further: Vec<&str> = FURTHER_STEPS.iter().map(|(name, _)| *name).collect();
+        left_out.push(format!(
+            "left to `cargo xtask test --all`: tests marked #[ignore], {}",
+            further.join(", ")
+        ));
     }
-    examples::run()?;
-    chaos::short()
+    for reason in &left_out {
+        say(&format!("not run: {reason}"))?;
+    }
+    let tier = if arguments.all { "full" } else { "default" };
+    say(&format!(
+        "{tier} tier passed in {:.0} s; {} not run",
+        start.elapsed().as_secs_f64(),
+        match left_out.len() {
+            0 => "nothing".to_owned(),
+            1 => "1 group of tests".to_owned(),
+            groups => format!("{groups} groups of tests"),
+        }
+    ))
+}
+
+/// Runs the tests of all packages, with nextest where it is installed, and those of the documentation. Returns what
+/// tests said that they skipped.
+fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError> {
+    let notices = tempfile::NamedTempFile::new()
+        .map_err(|cause| ChoreError(format!("no temporary file: {cause}")))?;
+    let has_nextest = Command::new(cargo())
+        .args(["nextest", "--version"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success());
+    let mut line = if has_nextest {
+        vec!["nextest", "run", "--workspace", "--cargo-profile", PROFILE]
+    } else {
+        vec![
+            "test",
+            "--workspace",
+            "--profile",
+            PROFILE,
+            "--lib",
+            "--bins",
+            "--tests",
+        ]
+    };
+    match (has_nextest, arguments.all) {
+        (true, true) => line.extend(["--run-ignored", "all"]),
+        (false, true) => line.extend(["--", "--include-ignored"]),
+        (_, false) => {}
+    }
+    let mut tests = Command::new(cargo());
+    tests
+        .args(&line)
+        .current_dir(workspace())
+        .env("PAINLEVE_PROGRAM", program())
+        .env("PAINLEVE_IMAGES", build_fw::folder())
+        .env("PAINLEVE_SKIPPED", notices.path());
+    eprintln!("$ cargo {}", line.join(" "));
+    let durations = passed_through(tests)?;
+    if arguments.durations && !has_nextest {
+        say("--durations: requires cargo-nextest")?;
+    }
+    let is_listed = |rank: usize, seconds: f64| {
+        (arguments.durations && rank < LISTED) || (!arguments.all && seconds > LONGEST_TEST_S)
+    };
+    for (rank, (seconds, test)) in durations.iter().enumerate() {
+        if is_listed(rank, *seconds) {
+            say(&format!("{seconds:>8.1} s  {test}"))?;
+        }
+    }
+    run_cargo(&["test", "--workspace", "--profile", PROFILE, "--doc"])?;
+    let mut skipped: Vec<String> = fs::read_to_string(notices.path())
+        .unwrap_or_default()
+        .lines()
+        .map(str::to_owned)
+        .collect();
+    skipped.sort();
+    skipped.dedup();
+    Ok(skipped)
+}
+
+/// Runs a command and repeats its messages. Returns the tests that it timed, slowest first, with their seconds.
+fn passed_through(mut command: Command) -> Result<Vec<(f64, String)>, ChoreError> {
+    let error = |what: &str| ChoreError(format!("the tests {what}"));
+    let mut child = command
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|cause| error(&format!("cannot be started: {cause}")))?;
+    let mut durations = Vec::new();
+    for line in BufReader::new(
+        child
+            .stderr
+            .take()
+            .ok_or_else(|| error("have no messages"))?,
+    )
+    .lines()
+    {
+        let line = line.map_err(|cause| error(&format!("cannot be read: {cause}")))?;
+        // A closed standard error must not end the tests.
+        let _ = writeln!(std::io::stderr(), "{line}");
+        durations.extend(duration(&line));
+    }
+    durations.sort_by(|a, b| b.0.total_cmp(&a.0));
+    match child.wait() {
+        Ok(status) if status.success() => Ok(durations),
+        Ok(status) => Err(error(&format!("failed ({status})"))),
+        Err(cause) => Err(error(&format!("cannot be awaited: {cause}"))),
+    }
+}
+
+/// Returns seconds and name of a test from a line of nextest such as `PASS [   0.012s] package test`.
+fn duration(line: &str) -> Option<(f64, String)> {
+    let (status, rest) = line.split_once('[')?;
+    let (time, name) = rest.split_once(']')?;
+    let seconds = time.trim().strip_suffix('s')?.parse().ok()?;
+    let is_result = ["PASS", "FAIL"].contains(&status.trim());
+    is_result.then(|| (seconds, name.trim().to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::duration;
+
+    #[test]
+    fn a_line_of_nextest_gives_seconds_and_name() {
+        let line = "        PASS [   1.250s] (12/900) painleve-plant impact::tests::sticks";
+        let expected = "(12/900) painleve-plant impact::tests::sticks".to_owned();
+        assert_eq!(duration(line), Some((1.25, expected)));
+        assert_eq!(duration("   Compiling painleve-plant v0.1.0 ([x])"), None);
+        assert_eq!(
+            duration("        SLOW [> 20.000s] painleve-plant impact"),
+            None
+        );
+    }
 }

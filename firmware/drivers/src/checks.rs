@@ -3,12 +3,10 @@
 
 use painleve_shared::counts::TorqueCounts;
 
+use crate::TURNS;
 use crate::gap::GapCheck;
 use crate::heating::{Heating, HeatingModel};
 use crate::plausibility::{Implausible, Plausibility, SensorReadings};
-
-/// Ticks from one turn of a check to its next.
-pub const TURNS: u8 = 5;
 
 /// What the checks have found at their last turns.
 #[derive(Clone, Copy, Debug)]

@@ -110,6 +110,9 @@ impl EncoderDriver {
 
     /// Returns both angles of the last set of readings as counts of `bits` bits: those of the second encoders
     /// if only they are read, else those of the first.
+    ///
+    /// # Errors
+    /// [`ReadError`] in place of a reading that is lost for this tick.
     pub fn readings(&self, bits: u8) -> [Result<EncoderCounts, ReadError>; 2] {
         self.in_use(&self.readings).map(|angle| {
             angle.map(|it| EncoderCounts(rescale(it.into(), BITS, bits).cast_unsigned()))
@@ -117,6 +120,9 @@ impl EncoderDriver {
     }
 
     /// Returns the angles of the first and of the second encoder of both joints, counts of [`BITS`] bits.
+    ///
+    /// # Errors
+    /// [`ReadError`] in place of a reading that is lost for this tick.
     pub fn pairs(&self) -> [[Result<u16, ReadError>; 2]; 2] {
         let [first_1, first_2, second_1, second_2] = self.readings;
         [[first_1, second_1], [first_2, second_2]]

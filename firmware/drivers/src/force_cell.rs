@@ -74,6 +74,9 @@ impl ForceCellDriver {
     /// Returns (f_t, f_n) of the last set of readings, from the live zero, as counts of `bits` bits: those of the
     /// second converter if only that is read, else those of the first. Each force takes two conversions, and a
     /// third if these two disagree. A code outside the range that `mounting` allows is no reading.
+    ///
+    /// # Errors
+    /// [`ReadError`] in place of a reading that is lost for this tick.
     pub fn readings(
         &self,
         bits: u8,
@@ -96,6 +99,9 @@ impl ForceCellDriver {
 
     /// Returns f_t and f_n, each by the first and by the second converter, from the live zero, in counts of
     /// [`BITS`] bits.
+    ///
+    /// # Errors
+    /// [`ReadError`] in place of a reading that is lost for this tick.
     pub fn pairs(&self, mounting: &Mounting) -> [[Result<i32, ReadError>; 2]; 2] {
         let [first_n, first_t, second_n, second_t] = self.readings;
         [[first_t, second_t], [first_n, second_n]]

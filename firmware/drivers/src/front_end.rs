@@ -11,7 +11,8 @@ use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 
 use crate::ReadError;
-use crate::checks::{Checks, TURNS, Verdict};
+use crate::TURNS;
+use crate::checks::{Checks, Verdict};
 use crate::encoders::EncoderDriver;
 use crate::force_cell::ForceCellDriver;
 use crate::gap::{GapCheck, Scales};

@@ -8,7 +8,7 @@ use painleve_shared::counts::{LinearScale, TorqueCounts};
 use painleve_shared::stages::StageSettings;
 use painleve_shared::winding::WindingSettings;
 
-use crate::checks::TURNS;
+use crate::TURNS;
 
 /// Time between two steps of the estimate, s.
 const STEP_S: f32 = 0.1;

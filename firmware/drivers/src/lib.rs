@@ -36,6 +36,9 @@ pub mod slots;
 pub mod stages;
 pub mod switches;
 
+/// Ticks from one turn of a check to its next.
+pub const TURNS: u8 = 5;
+
 /// Reason for a missing reading in this tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReadError {

@@ -6,7 +6,7 @@
 
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 
-use crate::checks::TURNS;
+use crate::TURNS;
 
 /// Number of checks before readings count as plausible: 50 ticks.
 pub const CHECKS: u16 = 50 / TURNS as u16;

@@ -3,9 +3,8 @@
 //! Received bytes go to a ring buffer. The idle line and every control tick wake the link task, which may be
 //! late by a whole buffer: 11 ms at 921,600 baud.
 
-#![allow(unsafe_code)] // a buffer that DMA writes
-
 use core::marker::PhantomData;
+use core::sync::atomic::{AtomicU8, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
@@ -26,7 +25,7 @@ const CHUNK: usize = 128;
 /// The registers of a serial port and of its two DMA channels.
 pub trait DmaRegisters {
     /// Starts to receive into this buffer, round and round, and to raise the interrupt when the line is idle.
-    fn receive_into(&mut self, buffer: &'static [u8]);
+    fn receive_into(&mut self, buffer: &'static [AtomicU8]);
 
     /// Returns the number of bytes to the end of the receiver's buffer.
     fn bytes_to_end() -> usize;
@@ -58,7 +57,8 @@ pub struct DmaBytes<R> {
 
 /// The link task's end of the port.
 pub struct DmaPort<R> {
-    received: &'static [u8; RECEIVED],
+    /// DMA writes it meanwhile.
+    received: &'static [AtomicU8; RECEIVED],
     /// Index of the next byte to read.
     taken: usize,
     to_send: Producer<'static, u8>,
@@ -67,11 +67,13 @@ pub struct DmaPort<R> {
 
 /// Takes ownership of a configured serial port; `None` on the second call.
 pub fn split<R: DmaRegisters>(mut registers: R) -> Option<(DmaBytes<R>, DmaPort<R>)> {
-    let received = cortex_m::singleton!(RECEIVED_BYTES: [u8; RECEIVED] = [0; RECEIVED])?;
+    let received = cortex_m::singleton!(
+        RECEIVED_BYTES: [AtomicU8; RECEIVED] = [const { AtomicU8::new(0) }; RECEIVED]
+    )?;
     let chunk = cortex_m::singleton!(SENT_BYTES: [u8; CHUNK] = [0; CHUNK])?;
     let queue = cortex_m::singleton!(TO_SEND_BYTES: Queue<u8, TO_SEND> = Queue::new())?;
     let (producer, consumer) = queue.split();
-    let received: &'static [u8; RECEIVED] = received;
+    let received: &'static [AtomicU8; RECEIVED] = received;
     registers.receive_into(received);
     let bytes = DmaBytes {
         registers,
@@ -122,11 +124,11 @@ impl<R: DmaRegisters> Port for DmaPort<R> {
         let filled = RECEIVED.saturating_sub(R::bytes_to_end());
         let mut length = 0;
         for place in buffer {
-            if self.taken == filled % RECEIVED {
+            let waiting = self.received.get(self.taken);
+            let Some(byte) = waiting.filter(|_| self.taken != filled % RECEIVED) else {
                 break;
-            }
-            // SAFETY: within the buffer; DMA writes elsewhere, unless this is late by a whole buffer.
-            *place = unsafe { self.received.as_ptr().add(self.taken).read_volatile() };
+            };
+            *place = byte.load(Ordering::Relaxed);
             self.taken = (self.taken + 1) % RECEIVED;
             length += 1;
         }

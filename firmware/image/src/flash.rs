@@ -82,7 +82,7 @@ impl<R: FlashRegisters> ReadNorFlash for ConfigurationFlash<R> {
         self.0.reading(|| {
             let mut address = R::START + offset;
             for byte in bytes {
-                // SAFETY: within the slots.
+                // SAFETY: `check_read` has found the address within the slots, which are mapped to memory.
                 *byte = unsafe { (address as *const u8).read_volatile() };
                 address += 1;
             }
@@ -120,7 +120,7 @@ impl<R: FlashRegisters> NorFlash for ConfigurationFlash<R> {
             let mut address = R::START + offset;
             for at_once in bytes.chunks_exact(R::WORD) {
                 for word in at_once.as_chunks().0 {
-                    // SAFETY: within the slots, which nothing else refers to.
+                    // SAFETY: `check_write` has found the address within the slots and aligned; nothing refers to them.
                     unsafe { (address as *mut u32).write_volatile(u32::from_le_bytes(*word)) };
                     address += 4;
                 }

@@ -5,7 +5,7 @@ use painleve_drivers::slots::NotWritten;
 use painleve_firmware::drive::ControlTask;
 use painleve_firmware::law::Law;
 use painleve_firmware::supervise::lapses::Lapse;
-use painleve_firmware::{BUILD, Configuration};
+use painleve_firmware::{Configuration, SOURCES};
 use painleve_shared::message::{
     FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Request, Response,
 };
@@ -97,9 +97,11 @@ pub fn link<D, L, P, M>(
                     awaits_control = true;
                     continue;
                 }
-                Ok(Request::Configure { build, .. }) if build != BUILD => {
+                Ok(Request::Configure { build, .. }) if build != Configuration::<L>::BUILD => {
                     control.lock(|control| control.task.stop());
-                    Response::OtherBuild { build: BUILD }
+                    Response::OtherBuild {
+                        build: Configuration::<L>::BUILD,
+                    }
                 }
                 Ok(Request::Configure {
                     source,
@@ -112,9 +114,13 @@ pub fn link<D, L, P, M>(
                             stopwatch_hz,
                         })
                 }
-                Ok(Request::Store { build, .. }) if M::IS_THERE && build != BUILD => {
+                Ok(Request::Store { build, .. })
+                    if M::IS_THERE && build != Configuration::<L>::BUILD =>
+                {
                     control.lock(|control| control.task.stop());
-                    Response::OtherBuild { build: BUILD }
+                    Response::OtherBuild {
+                        build: Configuration::<L>::BUILD,
+                    }
                 }
                 Ok(Request::Store { configuration, .. }) if M::IS_THERE => {
                     stop(&mut control);
@@ -124,7 +130,7 @@ pub fn link<D, L, P, M>(
                     match accepted {
                         None => Response::Refused,
                         Some(_) => {
-                            let written = memory.store(BUILD, configuration);
+                            let written = memory.store(Configuration::<L>::BUILD, configuration);
                             note_written(stored, written)
                         }
                     }
@@ -153,8 +159,9 @@ pub fn link<D, L, P, M>(
                 }
                 Ok(Request::Identify) => Response::Identity {
                     protocol: PROTOCOL,
-                    build: BUILD,
+                    build: Configuration::<L>::BUILD,
                 },
+                Ok(Request::Sources) => Response::Sources(SOURCES),
                 Ok(Request::PermitArming(permitted)) => {
                     Response::Permission(control.lock(|control| {
                         let is_configured = control.task.lapse_counts().is_some();
@@ -221,7 +228,7 @@ fn start_alone<D: BoardDrive, L: Law + DeserializeOwned, M: ConfigurationMemory>
         };
         return StoredConfiguration { state, version: 0 };
     };
-    let state = if content.build != BUILD {
+    let state = if content.build != Configuration::<L>::BUILD {
         StoredState::OtherBuild
     } else if configure(control, decoded, bytes, FrameSource::StandAlone).is_none() {
         StoredState::Refused

@@ -34,6 +34,7 @@ use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
 use crate::refer::governor::EdgeMargins;
 use crate::refer::{References, ReferencesState};
+use crate::schedule::Turn;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::{Supervision, Supervisor};
 use crate::telemetry::{Telemetry, TelemetrySink, TelemetryTick};
@@ -112,7 +113,6 @@ enum Due {
 /// What the update needs of the tick that has been answered, besides the state of the stages.
 #[derive(Clone, Copy, Debug, Default)]
 struct Answered {
-    tick: u32,
     elapsed_ticks: u32,
     /// Whether torque was applied before the tick.
     drove: bool,
@@ -145,6 +145,7 @@ struct State<L: Law> {
     supervision: Supervision,
     references: ReferencesState,
     answered: Answered,
+    turn: Turn,
     arrivals: ArrivalState,
     joint_friction: JointFrictionState,
 }
@@ -167,6 +168,7 @@ impl<L: Law> Controller<L> {
             command: LastCommand::default(),
             before: LastCommand::default(),
             answered: Answered::default(),
+            turn: Turn::default(),
             joint_friction: JointFrictionState::default(),
         };
         Ok(Self {
@@ -237,7 +239,7 @@ impl<L: Law> Controller<L> {
     }
 
     /// Records how many times a lapse occurred around this tick, 0 for none. If it has now occurred
-    /// too often in a row, latches the fault and returns the last answer with zero torque, to be
+    /// too often, latches the fault and returns the last answer with zero torque, to be
     /// output at once.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
@@ -310,12 +312,9 @@ impl<L: Law> Controller<L> {
         let answer = &mut self.last_answer;
         answer.torques = [TorqueCounts(0); 2];
         report(answer, &self.state.supervision);
-        answer.flags.remove(
-            StatusFlags::SATURATED
-                | StatusFlags::GUARDED
-                | StatusFlags::AT_EDGE
-                | StatusFlags::RECOVERING,
-        );
+        answer
+            .flags
+            .remove(StatusFlags::SATURATED | StatusFlags::AT_EDGE | StatusFlags::RECOVERING);
         telemetry.stop(&self.state.supervision);
     }
 }
@@ -359,11 +358,7 @@ impl<L: Law> Stages<L> {
                 configuration.tick_s(),
                 settings.torque_limit_nm,
             ),
-            torques: TorqueOutput::new(
-                &settings.guard,
-                converters.torque,
-                settings.torque_limit_nm,
-            ),
+            torques: TorqueOutput::new(converters.torque, settings.torque_limit_nm),
             joint_friction: JointFriction::new(&settings.estimator, parameters.coulomb_friction_nm),
             ranges: ReadingRanges::of(converters),
         }
@@ -404,7 +399,6 @@ impl<L: Law> Stages<L> {
         let beginning = self
             .references
             .begin(references, model, contact, &phase, landing);
-        state.answered.tick = readings.frame.tick;
         state.answered.elapsed_ticks = readings.elapsed_ticks;
         state.answered.landing_p_ratio = beginning.landing_p_ratio;
         let target = self.references.tick(references, &beginning, model, &phase);
@@ -418,9 +412,7 @@ impl<L: Law> Stages<L> {
                 last: &state.command,
             };
             let output = self.demand.tick(&mut state.demand, &input);
-            let torques = self
-                .torques
-                .tick(&mut state.command, &output, model, contact);
+            let torques = self.torques.tick(&mut state.command, &output);
             state.command.reference_velocity_m_s = target.reference.velocity_m_s;
             state.command.at_edge = target.at_edge;
             if let Err(NotFinite) = torques {
@@ -448,43 +440,42 @@ impl<L: Law> Stages<L> {
         followed
     }
 
-    /// Updates the slow estimates and the edges with the tick that has been answered.
+    /// Updates the estimates with the tick that has been answered, and the slow ones and the edges in turn.
     ///
-    /// Slow estimates and the search for the edges take turns, so that no update is long. Contact and flight have
-    /// branches of their own: each excludes the other's work, as the bound on the update's cycles can see.
+    /// Contact and flight have branches of their own: each excludes the other's work, as the bound on the update's
+    /// cycles can see.
     // Out of line, because the bound leaves it out of a tick that has started the estimates.
     #[inline(never)]
     fn learn(&self, state: &mut State<L>) {
+        let turn = state.turn.take();
         let (estimates, last, answered) = (&mut state.estimates, &state.before, &state.answered);
         let observed = Observed {
             elapsed_ticks: answered.elapsed_ticks,
             drove: answered.drove,
             last,
         };
-        let is_even = answered.tick & 1 == 0;
         let estimators = &self.estimators;
         if estimates.contact.touches {
             let slow = estimators.learn_in_contact(estimates, &observed);
-            if is_even {
-                estimators.skip_balance(estimates, &slow, last);
-                if !estimators.evaluate_response(estimates, &slow, last) {
-                    self.search(state);
+            match turn {
+                Turn::Balance => {
+                    estimators.balance_torques(estimates);
+                    estimators.calibrate(estimates, &slow);
                 }
-            } else {
-                estimators.balance_torques(estimates, &slow, last);
-                estimators.calibrate(estimates, &slow);
+                Turn::Edges => {
+                    if !estimators.evaluate_response(estimates, &slow, last) {
+                        self.search(state);
+                    }
+                }
             }
         } else {
-            let slow = estimators.learn_in_the_air(estimates, &observed);
-            if is_even {
-                estimators.skip_balance(estimates, &slow, last);
+            estimators.learn_in_the_air(estimates, &observed);
+            if turn == Turn::Balance {
+                estimators.balance_torques(estimates);
+            }
+            // A tip that is being returned to the belt needs the edges soon.
+            if turn == Turn::Edges || answered.landing_p_ratio > 0.0 {
                 self.search(state);
-            } else {
-                estimators.balance_torques(estimates, &slow, last);
-                // A tip that is being returned to the belt needs the edges soon.
-                if answered.landing_p_ratio > 0.0 {
-                    self.search(state);
-                }
             }
         }
     }
@@ -546,7 +537,6 @@ fn flags(tick: &TelemetryTick<'_>, reference_done: bool) -> StatusFlags {
     flags.set(StatusFlags::CONTACT, contact.touches);
     flags.set(StatusFlags::SATURATED, command.saturated);
     flags.set(StatusFlags::REFERENCE_DONE, reference_done);
-    flags.set(StatusFlags::GUARDED, command.guarded);
     flags.set(StatusFlags::AT_EDGE, target.at_edge);
     flags.set(StatusFlags::RECOVERING, *recovering);
     flags.set(

@@ -87,6 +87,32 @@ fn an_update_that_is_due_is_done_before_the_next_answer() {
     }
 }
 
+/// Searches for edges and learning used to wait for ticks with odd or even numbers.
+#[test]
+fn what_is_learnt_does_not_depend_on_the_numbers_of_the_ticks() {
+    let after = |number: fn(u32) -> u32| {
+        let mut controller = Controller::new(&configuration()).unwrap();
+        let mut telemetry = Telemetry::default();
+        for sequence in 0..300 {
+            let frame = SensorFrame {
+                tick: number(sequence),
+                ..frame(sequence)
+            };
+            controller.tick_with_telemetry(&frame, &mut telemetry);
+        }
+        Telemetry {
+            tick: 0,
+            ..telemetry
+        }
+    };
+    let usual = after(|sequence| sequence);
+    let [lower_m, upper_m] = usual.edges_m;
+    assert!(lower_m < -0.17 && upper_m < 0.17, "{:?}", usual.edges_m);
+    for number in [|_| 0, |_| 1, |sequence| 3 * sequence + 1] {
+        assert_eq!(after(number), usual);
+    }
+}
+
 #[test]
 fn answers_echo_the_tick_and_count_frames() {
     let mut controller = Controller::new(&configuration()).unwrap();
@@ -118,7 +144,7 @@ fn impossible(tick: u32, lapse: Lapse) -> SensorFrame {
 }
 
 #[test]
-fn impossible_readings_keep_the_torque_and_too_many_in_a_row_are_a_fault() {
+fn impossible_readings_keep_the_torque_and_too_many_are_a_fault() {
     for lapse in [Lapse::EncoderOutOfRange, Lapse::ForceOutOfRange] {
         let limit = LapseLimits::default().of(lapse);
         let mut controller = tracking();
@@ -128,9 +154,11 @@ fn impossible_readings_keep_the_torque_and_too_many_in_a_row_are_a_fault() {
             assert_eq!(answer.torques, before.torques);
             assert_eq!(answer.latched_fault(), None);
         }
-        // The estimator bridges the missing readings, and the count restarts.
-        let good = 21 + limit;
-        assert_eq!(controller.tick(&frame(good)).latched_fault(), None);
+        // The estimator bridges the missing readings, and the good ones make up for them.
+        let good = 20 + 3 * limit;
+        for tick in 21 + limit..=good {
+            assert_eq!(controller.tick(&frame(tick)).latched_fault(), None);
+        }
         for tick in (good + 1..).take(limit as usize) {
             controller.tick(&impossible(tick, lapse));
         }

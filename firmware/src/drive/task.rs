@@ -255,7 +255,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         }
     }
 
-    /// Records an overrun after an answer. If overruns have now occurred too often in a row, the torque is off
+    /// Records an overrun after an answer. If overruns have now occurred too often, the torque is off
     /// on return.
     // Out of line: the bound on a tick's cycles leaves it out, because it proves that no tick overruns.
     #[cold]
@@ -265,7 +265,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
     }
 
     /// Records how many times a lapse occurred between two ticks, 0 for none. If it has now occurred
-    /// too often in a row, the torque is off on return.
+    /// too often, the torque is off on return.
     pub fn note(&mut self, lapse: Lapse, times: u32) {
         if let Some(controller) = &mut self.controller
             && let Some(stopped) = controller.note(lapse, times)

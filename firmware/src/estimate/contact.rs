@@ -51,7 +51,7 @@ settings! {
         force_noise_n: f32 = 0.1, 1e-4..=1e6, "N";
         /// Uncertainty of the gap beyond the encoders' resolution.
         gap_uncertainty_m: f32 = 15e-6, 0.0..=0.01, "m";
-        /// Factor by which the law is slower if the encoders are the evidence: with a stiff motion loop the
+        /// Factor by which the law is slower if contact is detected from the encoders: with a stiff motion loop the
         /// tip follows their noise, which looks like a lift-off.
         encoder_law_speed: f32 = 0.55, 0.1..=1.0;
     }

@@ -32,19 +32,13 @@ settings! {
     }
 }
 
-/// Inputs of the torque balance at one tick.
+/// What a loop through the contact may remove of the residual at an update.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Balance {
-    /// Joint torques of the previous tick, N·m.
-    pub torque_nm: JointTorque<f32>,
-    /// Contact force (f_t, f_n), N.
-    pub force_n: Vector2<f32>,
+pub struct LoopLimit {
     /// p/Q22 of a tip in contact.
     pub p_ratio: Option<f32>,
     /// Part of the force error that a loop through the contact may remove in a tick.
     pub loop_share: f32,
-    /// Time since the previous readings, s.
-    pub elapsed_s: f32,
 }
 
 /// The low-pass of the residual.
@@ -61,16 +55,17 @@ pub struct DisturbanceState {
     pub torque_nm: GeneralisedTorque<f32>,
     /// θ̇ at the previous update, rad/s.
     rate_rad_s: Option<LinkMotion<f32>>,
-    /// The tick skipped since then.
-    skipped: Option<Skipped>,
+    /// What has acted since then.
+    acted: Acted,
 }
 
-/// What acted during a skipped tick.
-#[derive(Clone, Copy, Debug)]
-struct Skipped {
+/// Sums over the ticks since the last update.
+#[derive(Clone, Copy, Debug, Default)]
+struct Acted {
     torque_nm: JointTorque<f32>,
     force_n: Vector2<f32>,
     elapsed_s: f32,
+    ticks: f32,
 }
 
 impl DisturbanceEstimator {
@@ -82,19 +77,16 @@ impl DisturbanceEstimator {
         }
     }
 
-    /// Updates the estimate with one tick of an arm whose `model` includes the present d.
+    /// Updates the estimate of an arm whose `model` includes the present d with the ticks added since the last update.
     #[inline]
-    pub fn update(&self, state: &mut DisturbanceState, model: &Model, balance: &Balance) {
+    pub fn update(&self, state: &mut DisturbanceState, model: &Model, limit: &LoopLimit) {
         let rate_rad_s = model.theta_dot_rad_s;
-        let (mut torque_nm, mut force_n) = (balance.torque_nm, balance.force_n);
-        let mut elapsed_s = balance.elapsed_s;
-        if let Some(skipped) = &state.skipped {
-            // The means over both ticks.
-            torque_nm = (torque_nm + skipped.torque_nm) * 0.5;
-            force_n = (force_n + skipped.force_n) * 0.5;
-            elapsed_s += skipped.elapsed_s;
-            state.skipped = None;
+        let acted = core::mem::take(&mut state.acted);
+        if acted.ticks == 0.0 {
+            return;
         }
+        let per_tick = 1.0 / acted.ticks;
+        let (torque_nm, force_n) = (acted.torque_nm * per_tick, acted.force_n * per_tick);
         let Some(before) = &mut state.rate_rad_s else {
             state.rate_rad_s = Some(rate_rad_s);
             return;
@@ -104,39 +96,40 @@ impl DisturbanceEstimator {
         if !self.settings.enabled {
             return;
         }
-        let acceleration = change / elapsed_s;
+        let acceleration = change / acted.elapsed_s;
         let needed_nm = model.inverse_dynamics_nm(&acceleration, &force_n);
         let residual_nm = (needed_nm - torque_nm).to_links();
-        let limit = self.settings.limit_nm;
+        let limit_nm = self.settings.limit_nm;
         // Estimate and disturbance may be at the limit with opposite signs; more is an impact.
-        if residual_nm.amax() > 2.0 * limit {
+        if residual_nm.amax() > 2.0 * limit_nm {
             return;
         }
-        let share = balance.p_ratio.map_or(1.0, |p_ratio| {
-            (SHARE * p_ratio).limited(0.0, CONTACT_SHARE * balance.loop_share)
+        let share = limit.p_ratio.map_or(1.0, |p_ratio| {
+            (SHARE * p_ratio).limited(0.0, CONTACT_SHARE * limit.loop_share)
         });
         let weight = (self.settings.bandwidth_rad_s * self.period_s).at_most(share);
         state.torque_nm =
-            (state.torque_nm + residual_nm * weight).map(|torque| torque.within(limit));
+            (state.torque_nm + residual_nm * weight).map(|torque| torque.within(limit_nm));
     }
 }
 
 impl DisturbanceState {
-    /// Leaves out a tick that began `elapsed_s` (s) after the previous one, whose torque (N·m) and
-    /// contact force (N) count at the next update.
+    /// Adds a tick that began `elapsed_s` (s) after the previous one, with the joint torques (N·m) until then and the
+    /// contact force (f_t, f_n), N.
     #[inline]
-    pub fn skip(&mut self, torque_nm: &JointTorque<f32>, force_n: &Vector2<f32>, elapsed_s: f32) {
-        self.skipped = Some(Skipped {
-            torque_nm: *torque_nm,
-            force_n: *force_n,
-            elapsed_s,
-        });
+    pub fn add(&mut self, torque_nm: &JointTorque<f32>, force_n: &Vector2<f32>, elapsed_s: f32) {
+        let acted = &mut self.acted;
+        acted.torque_nm += *torque_nm;
+        acted.force_n += force_n;
+        acted.elapsed_s += elapsed_s;
+        acted.ticks += 1.0;
     }
 
-    /// Skips a tick without information, because contact or a reading is in doubt.
+    /// Passes over a tick without information, because contact or a reading is in doubt.
+    #[inline]
     pub fn pause(&mut self) {
         self.rate_rad_s = None;
-        self.skipped = None;
+        self.acted = Acted::default();
     }
 }
 
@@ -165,17 +158,13 @@ mod tests {
             let rate = acceleration * (tick as f32 * TICK_S);
             let truth = Model::new(&arm, theta, rate, &disturbance_nm);
             let model = Model::new(&arm, theta, rate, &state.torque_nm);
-            estimator.update(
-                &mut state,
-                &model,
-                &Balance {
-                    torque_nm: truth.inverse_dynamics_nm(&acceleration, &force_n),
-                    force_n,
-                    p_ratio,
-                    loop_share: 1.0,
-                    elapsed_s: TICK_S,
-                },
-            );
+            let torque_nm = truth.inverse_dynamics_nm(&acceleration, &force_n);
+            state.add(&torque_nm, &force_n, TICK_S);
+            let limit = LoopLimit {
+                p_ratio,
+                loop_share: 1.0,
+            };
+            estimator.update(&mut state, &model, &limit);
         }
         state.torque_nm
     }
@@ -230,14 +219,14 @@ mod tests {
                 rate,
                 &GeneralisedTorque::zeros(),
             );
-            let balance = Balance {
-                torque_nm: model.inverse_dynamics_nm(&LinkMotion::zeros(), &Vector2::zeros()),
-                force_n: Vector2::zeros(),
+            let force_n = Vector2::zeros();
+            let torque_nm = model.inverse_dynamics_nm(&LinkMotion::zeros(), &force_n);
+            state.add(&torque_nm, &force_n, TICK_S);
+            let limit = LoopLimit {
                 p_ratio: None,
                 loop_share: 1.0,
-                elapsed_s: TICK_S,
             };
-            estimator.update(&mut state, &model, &balance);
+            estimator.update(&mut state, &model, &limit);
         }
         state.torque_nm
     }

@@ -6,8 +6,8 @@
 //!
 //! Readings without information about μ are skipped: in the air, at a small normal force, and in
 //! stick, where friction takes any value up to μ f_n in either direction. Stick is detected by a
-//! ratio well below the estimate while the belt drags the tip along; otherwise, or if the ratio stays
-//! there, μ has changed and the filter restarts.
+//! ratio well below the estimate while the belt drags the tip along; otherwise μ has changed and the
+//! filter restarts.
 //! The estimated direction of slip reverses only on a friction force near the opposite side of the
 //! cone, because in stick the sign of the force carries no information.
 //!
@@ -64,6 +64,8 @@ settings! {
     /// Settings of the friction estimator.
     #[derive(Copy)]
     pub struct FrictionSettings {
+        /// Whether μ is estimated; if not, it is taken to be the first guess exactly.
+        enabled: bool = true;
         /// Initial estimate of μ.
         first_guess: f32 = 0.6, 0.0..=2.0;
         /// Standard deviation of the initial estimate, and of μ whenever the filter restarts.
@@ -72,8 +74,6 @@ settings! {
         drift_per_sqrt_s: f32 = 0.0005, 1e-4..=1.0, "1/√s";
         /// Normal force below which friction is not observed.
         observable_n: f32 = 1.0, 0.01..=1e3, "N";
-        /// Time for which a ratio below the estimate counts as stick; after it the filter restarts.
-        stick_limit_s: f32 = 0.5, 0.0..=100.0, "s";
     }
 }
 
@@ -102,7 +102,6 @@ pub struct FrictionEstimate {
 pub struct FrictionEstimator {
     settings: FrictionSettings,
     force_variance_n2: f32,
-    tick_s: f32,
     /// Variance of μ at the start and whenever the filter restarts, and its growth in one tick.
     first_variance: f32,
     drift_variance: f32,
@@ -133,7 +132,6 @@ pub struct FrictionState {
     slip_in_doubt: bool,
     /// Remaining ticks for which the tip counts as sticking.
     stick_ticks: u8,
-    sticking_s: f32,
     /// The last correction, until the update.
     correction: Option<Correction>,
     /// Average of the last innovations.
@@ -161,12 +159,14 @@ impl FrictionEstimator {
     /// Makes an estimator that is called every `tick_s`; `force_noise_n` is the standard deviation
     /// of one reading of the force cell, N.
     pub fn new(settings: &FrictionSettings, force_noise_n: f32, tick_s: f32) -> Self {
+        // A friction that is known has no variance, at the start or later.
+        let unknown = if settings.enabled { 1.0 } else { 0.0 };
+        let square = |deviation: f32| unknown * (deviation * deviation);
         Self {
             settings: *settings,
             force_variance_n2: force_noise_n * force_noise_n,
-            tick_s,
-            first_variance: settings.first_deviation * settings.first_deviation,
-            drift_variance: settings.drift_per_sqrt_s * settings.drift_per_sqrt_s * tick_s,
+            first_variance: square(settings.first_deviation),
+            drift_variance: square(settings.drift_per_sqrt_s) * tick_s,
             clear_force_n2: 9.0 * (force_noise_n * force_noise_n),
             mean_weight: tick_s / (MEAN_S + tick_s),
             changing_weight: tick_s / (CHANGING_S + tick_s),
@@ -186,7 +186,6 @@ impl FrictionEstimator {
             contrary_ticks: 0,
             slip_in_doubt: true,
             stick_ticks: 0,
-            sticking_s: 0.0,
             correction: None,
             mean_innovation: 0.0,
             innovation: 0.0,
@@ -228,11 +227,12 @@ impl FrictionEstimator {
         };
         let falls = beyond(below_n, STICK_DEVIATIONS_SQUARE, variance_n2 + noise_n2);
         if falls && is_dragged(state.slip) {
-            state.sticking_s += self.tick_s;
-            if state.sticking_s < self.settings.stick_limit_s {
-                state.stick_ticks = STICK_TICKS;
-                return;
-            }
+            state.stick_ticks = STICK_TICKS;
+            return;
+        }
+        if !self.settings.enabled {
+            state.stick_ticks = state.stick_ticks.saturating_sub(1);
+            return;
         }
         if falls || beyond(above_n, RISE_DEVIATIONS_SQUARE, variance_n2 + quiet_n2) {
             self.restart(state);
@@ -241,7 +241,6 @@ impl FrictionEstimator {
             state.stick_ticks -= 1;
             return;
         }
-        state.sticking_s = 0.0;
         let innovation = excess_n / normal_n;
         let gain = variance_n2 / (variance_n2 + quiet_n2);
         let change = gain * innovation;
@@ -340,6 +339,9 @@ impl FrictionEstimator {
     /// Raises the estimate after a throw, which shows that μ is at least `critical`, above which
     /// sliding has no solution.
     pub fn thrown(&self, state: &mut FrictionState, critical: f32) {
+        if !self.settings.enabled {
+            return;
+        }
         if state.coefficient < critical {
             state.coefficient = critical;
         }
@@ -454,16 +456,13 @@ mod tests {
     }
 
     #[test]
-    fn stick_does_not_lower_the_friction_estimate_but_a_slippery_belt_does() {
+    fn stick_does_not_lower_the_friction_estimate() {
         let mut tested = Tested::new(0.6);
         slide(&mut tested, 0.6, Slip::Positive, 200);
         tested.2 = true;
-        slide(&mut tested, 0.1, Slip::Positive, 400);
+        slide(&mut tested, 0.1, Slip::Positive, 4000);
         assert!(tested.estimate().sticks);
         assert!((tested.estimate().coefficient - 0.6).abs() < 0.01);
-        slide(&mut tested, 0.1, Slip::Positive, 200);
-        assert!(!tested.estimate().sticks);
-        assert!((tested.estimate().coefficient - 0.1).abs() < 0.02);
     }
 
     #[test]
@@ -591,6 +590,27 @@ mod tests {
         slide(&mut tested, 0.7, Slip::Positive, 5);
         let found = tested.estimate();
         assert!((found.coefficient - 0.7).abs() < 0.02, "{found:?}");
+    }
+
+    #[test]
+    fn a_friction_that_is_not_estimated_stays_the_first_guess() {
+        let settings = FrictionSettings {
+            enabled: false,
+            ..Default::default()
+        };
+        let estimator = FrictionEstimator::new(&settings, NOISE_N, 1e-3);
+        for (friction, drags) in [(0.3, false), (0.3, true), (0.8, false), (0.6, false)] {
+            let mut tested = Tested(estimator, estimator.start(), drags);
+            for slip in [Slip::Negative, Slip::Positive] {
+                slide(&mut tested, friction, slip, 2000);
+                tested.0.thrown(&mut tested.1, 0.9);
+                let found = tested.estimate();
+                assert_eq!((found.coefficient, found.deviation), (0.6, 0.0));
+                assert_eq!((found.next_coefficient, found.catch_up), (0.6, 0.0));
+                // The direction of slip still follows the force, near the other side of the cone.
+                assert!(found.slip == slip || friction < 0.5, "{found:?}");
+            }
+        }
     }
 
     #[test]

@@ -26,8 +26,8 @@ settings! {
         friction_travel_rad: f32 = 1e-3, 1e-6..=1.0, "rad";
         /// Fraction of the arm's Coulomb friction that is compensated.
         friction_compensation: f32 = 0.85, 0.0..=1.0;
-        /// Factor by which tracking loops and hybrid law are faster on an arm with Coulomb friction; no more than 2
-        /// for each kHz of the control rate.
+        /// Factor by which tracking loops and hybrid law are faster on an arm with 0.05 N·m of Coulomb friction or more,
+        /// in proportion with less; no more than 2 for each kHz of the control rate.
         friction_speed_up: f32 = 1.6, 1.0..=5.0;
         /// Twist of each gear for each N·m of commanded torque, if the encoders are on the motors; 0 if they
         /// are on the links. Tracking loops and hybrid law are slower where the arm's natural frequency on

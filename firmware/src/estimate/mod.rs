@@ -27,7 +27,7 @@ use painleve_shared::{Arm, Slip};
 use self::belt::{BeltEstimator, BeltSpeedSettings, BeltState};
 use self::calibration::{CalibrationSettings, CalibrationState, LengthCalibrator};
 use self::contact::{ContactDetector, ContactSettings, ContactState, EncoderReading, Evidence};
-use self::disturbance::{Balance, DisturbanceEstimator, DisturbanceSettings, DisturbanceState};
+use self::disturbance::{DisturbanceEstimator, DisturbanceSettings, DisturbanceState, LoopLimit};
 use self::friction::{FrictionEstimate, FrictionEstimator, FrictionSettings, FrictionState};
 use self::joint_friction::{JointFriction, JointFrictionState};
 use self::joints::{JointEstimator, JointEstimatorSettings, JointState, Restart};
@@ -36,13 +36,10 @@ use self::response::{
     ContactResponse, ForceReading, Place, ResponseEstimator, ResponseSettings, ResponseState,
 };
 use crate::last_command::LastCommand;
+use crate::schedule::Turn;
 
 /// Largest friction above the estimate that may explain a throw.
 const THROWN_BY_FRICTION: f32 = 0.4;
-
-/// Disturbance and calibration are updated at every other tick. The search for the edges takes the ticks
-/// between, so that no tick is long.
-const HEAVY_EVERY_TICKS: f32 = 2.0;
 
 /// Least velocity by which a sticking tip falls behind its reference, m/s.
 const DRAGGED_M_S: f32 = 0.02;
@@ -73,15 +70,11 @@ pub struct ContactEstimate {
     pub response: ContactResponse,
 }
 
-/// What one tick adds to the slow estimates.
+/// What a tick in contact offers to the slow estimates.
 #[derive(Clone, Copy, Debug)]
 pub struct SlowReadings {
-    /// Time since the previous readings, s.
-    elapsed_s: f32,
     /// Whether the gap shows the links' length: the tip certainly touches, and has moved.
     shows_length: bool,
-    /// Whether force and torque show what the model does not explain.
-    is_informative: bool,
     /// Whether a block of the response's readings is complete.
     completes_block: bool,
 }
@@ -181,6 +174,7 @@ impl Estimators {
     /// Makes the estimators with these settings.
     pub fn new(settings: &EstimateSettings<'_>) -> Self {
         let tick_s = 1.0 / settings.tick_hz;
+        let slow_period_s = Turn::COUNT * tick_s;
         let force_cell = settings.force.converter();
         Self {
             force_cell,
@@ -202,14 +196,11 @@ impl Estimators {
             ),
             belt: BeltEstimator::new(settings.belt, tick_s),
             response: ResponseEstimator::new(settings.response, tick_s),
-            disturbance: DisturbanceEstimator::new(
-                settings.disturbance,
-                HEAVY_EVERY_TICKS * tick_s,
-            ),
+            disturbance: DisturbanceEstimator::new(settings.disturbance, slow_period_s),
             calibrator: LengthCalibrator::new(
                 settings.calibration,
                 settings.link_length_m,
-                HEAVY_EVERY_TICKS * tick_s,
+                slow_period_s,
             ),
         }
     }
@@ -355,11 +346,9 @@ impl Estimators {
         state: &mut EstimatesState,
         observed: &Observed<'_>,
     ) -> SlowReadings {
+        let is_informative = self.add_to_balance(state, observed);
         let (model, contact) = (&state.model, &state.contact);
         let force_n = contact.force_n;
-        let mut slow = self.slow_readings(state, observed);
-        // An unchanged reading would gain weight merely with time.
-        slow.shows_length = state.decision.is_certain() && state.joints.has_moved();
         if self.is_in_range(&force_n) {
             self.friction.update(&mut state.friction, &force_n);
         }
@@ -368,45 +357,51 @@ impl Estimators {
             .update(&mut state.belt, model.tip_velocity_m_s.x, Some(&friction));
         let (last, p_per_kg) = (observed.last, contact.p_per_kg);
         let slides = p_per_kg > 0.0 && !friction.sticks;
-        if slow.is_informative && slides && !last.is_constrained() && self.response.is_enabled() {
+        let mut completes_block = false;
+        if is_informative && slides && !last.saturated && self.response.is_enabled() {
             let slope = &model.free_slope_per_kg_m;
             let reading = ForceReading {
                 normal_force_n: force_n.y,
                 withheld_n: last.rounding_nm.vector().dot(slope) / p_per_kg,
             };
-            slow.completes_block = self.response.update(&mut state.response, &reading);
+            completes_block = self.response.update(&mut state.response, &reading);
         } else {
             state.response.pause();
         }
-        slow
+        SlowReadings {
+            // An unchanged reading would gain weight merely with time.
+            shows_length: state.decision.is_certain() && state.joints.has_moved(),
+            completes_block,
+        }
     }
 
     /// Updates friction and belt at a tick without contact.
     #[inline]
-    pub fn learn_in_the_air(
-        &self,
-        state: &mut EstimatesState,
-        observed: &Observed<'_>,
-    ) -> SlowReadings {
+    pub fn learn_in_the_air(&self, state: &mut EstimatesState, observed: &Observed<'_>) {
         if state.contact.leaves {
             self.explain_throw(&mut state.friction, &state.model);
         }
         let tip_velocity_m_s = state.model.tip_velocity_m_s.x;
         self.belt.update(&mut state.belt, tip_velocity_m_s, None);
         state.response.pause();
-        self.slow_readings(state, observed)
+        self.add_to_balance(state, observed);
     }
 
-    /// Returns what a tick adds to the slow estimates with and without contact.
+    /// Adds a tick to the next update of the disturbance; returns whether force and torque show what the model does
+    /// not explain.
     #[inline]
-    fn slow_readings(&self, state: &EstimatesState, observed: &Observed<'_>) -> SlowReadings {
-        let in_range = self.is_in_range(&state.contact.force_n);
-        SlowReadings {
-            elapsed_s: observed.elapsed_ticks as f32 * self.tick_s,
-            is_informative: state.decision.is_certain() && in_range && observed.drove,
-            shows_length: false,
-            completes_block: false,
+    fn add_to_balance(&self, state: &mut EstimatesState, observed: &Observed<'_>) -> bool {
+        let force_n = &state.contact.force_n;
+        let is_informative =
+            state.decision.is_certain() && self.is_in_range(force_n) && observed.drove;
+        if is_informative {
+            let elapsed_s = observed.elapsed_ticks as f32 * self.tick_s;
+            let torque_nm = &observed.last.torque_nm;
+            state.disturbance.add(torque_nm, force_n, elapsed_s);
+        } else {
+            state.disturbance.pause();
         }
+        is_informative
     }
 
     /// Predicts the arm's state at the next tick, given the command until then and whether it drives, and evaluates
@@ -475,22 +470,6 @@ impl Estimators {
         slow.completes_block
     }
 
-    /// Leaves this tick out of the update of the disturbance; its torque and force count at the next one.
-    #[inline]
-    pub fn skip_balance(
-        &self,
-        state: &mut EstimatesState,
-        slow: &SlowReadings,
-        last: &LastCommand,
-    ) {
-        if slow.is_informative {
-            let (torque_nm, force_n) = (&last.torque_nm, &state.contact.force_n);
-            state.disturbance.skip(torque_nm, force_n, slow.elapsed_s);
-        } else {
-            state.disturbance.pause();
-        }
-    }
-
     /// Updates the calibration.
     #[inline]
     pub fn calibrate(&self, state: &mut EstimatesState, slow: &SlowReadings) {
@@ -504,26 +483,14 @@ impl Estimators {
     /// Updates the disturbance.
     // Out of line: contact and flight both contain it.
     #[inline(never)]
-    pub fn balance_torques(
-        &self,
-        state: &mut EstimatesState,
-        slow: &SlowReadings,
-        last: &LastCommand,
-    ) {
-        if slow.is_informative {
-            let contact = &state.contact;
-            let balance = Balance {
-                torque_nm: last.torque_nm,
-                force_n: contact.force_n,
-                p_ratio: contact.touches.then_some(contact.p_ratio),
-                loop_share: contact.response.loop_share,
-                elapsed_s: slow.elapsed_s,
-            };
-            self.disturbance
-                .update(&mut state.disturbance, &state.model, &balance);
-        } else {
-            state.disturbance.pause();
-        }
+    pub fn balance_torques(&self, state: &mut EstimatesState) {
+        let contact = &state.contact;
+        let limit = LoopLimit {
+            p_ratio: contact.touches.then_some(contact.p_ratio),
+            loop_share: contact.response.loop_share,
+        };
+        self.disturbance
+            .update(&mut state.disturbance, &state.model, &limit);
     }
 
     /// Returns the measured height of the tip above the belt, m.

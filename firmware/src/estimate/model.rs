@@ -1,4 +1,4 @@
-//! The arm's model, shared by law, contact guard and recovery. It is evaluated once for each tick, at the state
+//! The arm's model, shared by law and recovery. It is evaluated once for each tick, at the state
 //! that is predicted for it, before its readings arrive.
 
 use nalgebra::{Matrix2, Vector2};
@@ -37,9 +37,7 @@ pub struct Model {
     centripetal_m_s2: Vector2<f32>,
     /// 1 / det J, with the determinant bounded away from zero, 1/m².
     inverse_determinant_per_m2: f32,
-    /// Free normal acceleration b = b₀ + n · (u1, u2) as a function of the joint torques: b₀, m/s².
-    pub free_offset_m_s2: f32,
-    /// n, 1/(kg·m).
+    /// Change of the free normal acceleration b with the joint torques (u1, u2), 1/(kg·m).
     pub free_slope_per_kg_m: Vector2<f32>,
     /// Q11 of Q = J M⁻¹ Jᵀ, 1/kg.
     pub q11_per_kg: f32,
@@ -93,7 +91,6 @@ impl Model {
             centripetal_m_s2,
             // det J = l1 l2 sin(θ2 − θ1).
             inverse_determinant_per_m2: 1.0 / (length_1 * length_2 * bounded),
-            free_offset_m_s2: centripetal_m_s2.y - normal_mobility.dot(bias_nm.vector()),
             free_slope_per_kg_m: Vector2::new(
                 normal_mobility.x,
                 normal_mobility.y - normal_mobility.x,
@@ -291,14 +288,13 @@ mod tests {
             (arm, model) in model(), u1 in -5.0_f32..5.0, u2 in -5.0_f32..5.0,
         ) {
             let torque = JointTorque::new(u1, u2);
-            let (offset, slope) = (model.free_offset_m_s2, model.free_slope_per_kg_m);
-            let b = arm
-                .contact_terms(
-                    &model.theta_rad, &model.theta_dot_rad_s, &Pose::new(&model.theta_rad),
-                    &torque.to_links(),
-                )
-                .b();
-            prop_assert!((offset + slope.dot(torque.vector()) - b).abs() < 1e-3 * (1.0 + b.abs()));
+            let b = |torque: &JointTorque<f32>| {
+                let pose = Pose::new(&model.theta_rad);
+                arm.contact_terms(&model.theta_rad, &model.theta_dot_rad_s, &pose, &torque.to_links()).b()
+            };
+            let change = b(&torque) - b(&JointTorque::zeros());
+            let expected = model.free_slope_per_kg_m.dot(torque.vector());
+            prop_assert!((change - expected).abs() < 1e-3 * (1.0 + b(&torque).abs()));
         }
     }
 }

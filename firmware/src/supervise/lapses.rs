@@ -1,18 +1,24 @@
 //! Counts lapses around a tick, each kind separately, and reports when there are too many.
 //!
 //! A single late tick, broken message or impossible reading is counted and tolerated. More in a row
-//! than the limit is a fault, which the controller latches until a reset.
+//! than the limit is a fault, which the controller latches until a reset. So is a lapse that keeps coming back, for
+//! example at every other tick: it takes several good ticks to make up for one lapse.
 
 pub use painleve_shared::lapse::{Lapse, LapseCounts, LapseLimits};
+
+/// Good ticks that make up for one lapse. With two, a kind that fails at more than a third of the ticks is a fault in
+/// the end, whatever its limit; with one, a kind that fails at every other tick never would be.
+const GOOD_PER_LAPSE: u32 = 2;
 
 /// Lapses of one kind.
 #[derive(Clone, Copy, Debug, Default)]
 struct Count {
     total: u32,
-    in_a_row: u32,
+    /// Good ticks that are needed to make up for the lapses so far.
+    owed: u32,
 }
 
-/// Counts lapses and reports when there are too many in a row.
+/// Counts lapses and reports when there are too many.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LapseMonitor {
     limits: LapseLimits,
@@ -31,19 +37,27 @@ impl LapseMonitor {
     /// Records that `lapse` did not occur this time.
     #[inline]
     pub fn note_good(&mut self, lapse: Lapse) {
-        self.counts[lapse as usize].in_a_row = 0;
+        let owed = &mut self.counts[lapse as usize].owed;
+        *owed = owed.saturating_sub(1);
     }
 
-    /// Records how many times `lapse` occurred, 0 for none; returns whether it has now occurred too
-    /// often in a row.
+    /// Records how many times `lapse` occurred, 0 for none; returns whether it has now occurred too often.
     #[inline]
     #[must_use]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
+        if times == 0 {
+            self.note_good(lapse);
+            return false;
+        }
+        let tolerated = GOOD_PER_LAPSE * self.limits.of(lapse);
         let count = &mut self.counts[lapse as usize];
         count.total = count.total.wrapping_add(times);
-        let in_a_row = count.in_a_row.saturating_add(times);
-        count.in_a_row = if times == 0 { 0 } else { in_a_row };
-        count.in_a_row > self.limits.of(lapse)
+        let owed = count
+            .owed
+            .saturating_add(GOOD_PER_LAPSE.saturating_mul(times));
+        // One lapse too many: an outage is made up for in the same time, however long it was.
+        count.owed = owed.min(tolerated + GOOD_PER_LAPSE);
+        count.owed > tolerated
     }
 
     /// Returns how often `lapse` has occurred; wraps.
@@ -62,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_kind_has_its_own_counter_and_limit_and_a_good_tick_restarts_it() {
+    fn each_kind_has_its_own_counter_and_limit_and_good_ticks_make_up_for_it() {
         for lapse in Lapse::ALL.iter().copied() {
             let limits = LapseLimits::default();
             let limit = limits.of(lapse);
@@ -70,7 +84,9 @@ mod tests {
             for _ in 0..limit {
                 assert!(!monitor.note(lapse, 1), "{lapse:?}");
             }
-            monitor.note_good(lapse);
+            for _ in 0..GOOD_PER_LAPSE * limit {
+                monitor.note_good(lapse);
+            }
             assert!(!monitor.note(lapse, limit));
             for other in Lapse::ALL.iter().copied().filter(|other| *other != lapse) {
                 assert!(!monitor.note(other, 1));
@@ -79,6 +95,38 @@ mod tests {
             assert!(monitor.note(lapse, 1), "{lapse:?}");
             assert_eq!(monitor.total(lapse), 2 * limit + 1);
         }
+    }
+
+    /// Notes lapses at the first of every `period` ticks; returns the tick at which they are too many.
+    fn too_many_at(lapse: Lapse, period: u32) -> Option<u32> {
+        let mut monitor = LapseMonitor::new(LapseLimits::default());
+        (0..10_000).find(|tick| monitor.note(lapse, u32::from(tick % period == 0)))
+    }
+
+    #[test]
+    fn a_lapse_at_every_other_tick_is_too_much_and_at_every_third_is_not() {
+        for lapse in Lapse::ALL.iter().copied() {
+            let limit = LapseLimits::default().of(lapse);
+            assert_eq!(too_many_at(lapse, 1), Some(limit), "{lapse:?}");
+            let tick = too_many_at(lapse, 2);
+            assert!(
+                tick.is_some_and(|tick| tick < 5 * limit),
+                "{lapse:?} {tick:?}"
+            );
+            assert_eq!(too_many_at(lapse, 3), None, "{lapse:?}");
+        }
+    }
+
+    #[test]
+    fn the_longest_outage_is_made_up_for_as_one_lapse_too_many() {
+        let mut monitor = LapseMonitor::new(LapseLimits::default());
+        let lapse = Lapse::MissingFrame;
+        let limit = LapseLimits::default().of(lapse);
+        assert!(monitor.note(lapse, u32::MAX));
+        for _ in 0..GOOD_PER_LAPSE * (limit + 1) {
+            monitor.note_good(lapse);
+        }
+        assert!(!monitor.note(lapse, limit));
     }
 
     #[test]

@@ -280,6 +280,9 @@ macro_rules! check_setting {
 }
 
 /// Checks a value against bounds; `names` are the names of its groups, outermost first, and its own.
+///
+/// # Errors
+/// [`OutOfRange`] with the value's full key.
 #[doc(hidden)]
 #[inline(never)]
 pub fn check_named<T: SettingValue>(

@@ -16,8 +16,8 @@ use command_fds::{CommandFdExt, FdMapping};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::Signal;
-use painleve_firmware::BUILD;
 use painleve_plant::Configuration;
+use painleve_plant::law_choice::build;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire;
@@ -152,13 +152,18 @@ impl Emulator {
             table.print_from(output);
         }
         match emulator.request(&Request::Configure {
-            build: BUILD,
+            build: build(),
             source: FrameSource::Lockstep,
             configuration: &super::encode(configuration)?,
         })? {
-            Response::Ready { .. } => Ok(emulator),
-            Response::Refused => Err(BoardError::Refused),
-            Response::OtherBuild { build } => Err(BoardError::other_build(build)),
+            Response::Ready { .. } => {}
+            Response::Refused => return Err(BoardError::Refused),
+            Response::OtherBuild { build } => return Err(BoardError::other_build(build)),
+            other => return Err(BoardError::OutOfTurn(other)),
+        }
+        // An emulated run promises the same bits as one in this program.
+        match emulator.request(&Request::Sources)? {
+            Response::Sources(board) => BoardError::compare_sources(board).map(|()| emulator),
             other => Err(BoardError::OutOfTurn(other)),
         }
     }

@@ -13,6 +13,7 @@ pub mod drivers;
 pub mod emulator;
 pub mod log;
 pub mod on_board;
+mod port;
 pub mod serial;
 pub mod stored;
 pub mod timing;
@@ -123,12 +124,37 @@ pub enum BoardError {
         /// Error of the system.
         source: io::Error,
     },
+    /// Another program has opened the serial port.
+    #[error(
+        "the serial port {} is in use by another program: only one at a time can talk to a board", .0.display()
+    )]
+    InUse(PathBuf),
+    /// The serial port has disappeared.
+    #[error(
+        "the serial port is gone: the board or its adapter has been unplugged or has lost power"
+    )]
+    Unplugged,
+    /// The serial port has taken no bytes for too long.
+    #[error("the board has taken no bytes for {:.1} s: its image or its USB adapter hangs", .0.as_secs_f64())]
+    Deaf(Duration),
     /// The emulator has ended on its own.
     #[error("the emulated board has stopped ({0}): run with --log to see the log of its image")]
     Ended(ExitStatus),
     /// The board has been silent for too long.
     #[error("the board has not answered for {:.1} s: its image hangs or is missing", .0.as_secs_f64())]
     Silent(Duration),
+    /// What arrives on the serial line are no frames.
+    #[error(
+        "the board has not answered for {:.1} s: received {bytes} bytes, none of them a frame: wrong baud rate, a noisy \
+         line, or not this firmware?",
+        lasted.as_secs_f64()
+    )]
+    NoFrames {
+        /// Bytes since the last frame.
+        bytes: usize,
+        /// Time without a frame.
+        lasted: Duration,
+    },
     /// The received bytes are not a message.
     #[error(
         "the board's answer cannot be read: {0}; its image may be older than this program, see `cargo xtask build-fw`"
@@ -152,7 +178,7 @@ pub enum BoardError {
     /// The board has not stored its configuration.
     #[error("stored state {}: {}", .0.code(), .0.text())]
     NotStored(StoredState),
-    /// Image and program were built from different sources.
+    /// Messages or settings of image and program differ.
     #[error(
         "the image is of build {board:016x} and this program of build {host:016x}: build both from the same sources, see `cargo xtask build-fw`, and flash again"
     )]
@@ -160,6 +186,16 @@ pub enum BoardError {
         /// The image's build.
         board: u64,
         /// This program's build.
+        host: u64,
+    },
+    /// Image and program understand each other, but their controllers were built from different sources.
+    #[error(
+        "the image is of sources {board:016x} and this program of sources {host:016x}: its controller may behave differently; see `cargo xtask build-fw`"
+    )]
+    OtherSources {
+        /// Hash of the image's sources.
+        board: u64,
+        /// Hash of this program's sources.
         host: u64,
     },
     /// The board's parts cannot give the requested counts.
@@ -185,7 +221,17 @@ impl BoardError {
     fn other_build(board: u64) -> Self {
         Self::OtherBuild {
             board,
-            host: painleve_firmware::BUILD,
+            host: painleve_plant::law_choice::build(),
+        }
+    }
+
+    /// Compares the hash of the image's sources with this program's.
+    fn compare_sources(board: u64) -> Result<(), Self> {
+        let host = painleve_firmware::SOURCES;
+        if board == host {
+            Ok(())
+        } else {
+            Err(Self::OtherSources { board, host })
         }
     }
 }

@@ -4,26 +4,20 @@
 //! bytes that are not a message. The host repeats a request that is not answered; a repeated frame
 //! changes nothing on the board.
 
-use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Write};
-use std::os::fd::AsFd;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use nix::errno::Errno;
-use nix::fcntl::OFlag;
-use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use nix::sys::termios::{
-    BaudRate, FlushArg, SetArg, cfmakeraw, cfsetspeed, tcflush, tcgetattr, tcsetattr,
-};
-use painleve_firmware::BUILD;
 use painleve_plant::Configuration;
+use painleve_plant::law_choice::build;
 use painleve_shared::black_box::BlackBox;
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, PROTOCOL, Request, Response};
+use painleve_shared::message::{
+    FrameSource, Health, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Request, Response,
+};
 use painleve_shared::wire::{self, Inbox, WireError};
 
 use super::{BoardError, ConnectedBoard, LineHealth, SILENCE_LIMIT, TimedAnswer};
+use crate::port::SerialPort;
 use crate::timing::Unit;
 
 /// Time allowed for the answer to any request other than a frame.
@@ -40,9 +34,9 @@ const REALTIME_PATIENCE_TICKS: u32 = 3;
 /// Checks that the port can be used, before anything is started.
 ///
 /// # Errors
-/// [`BoardError::Port`].
+/// [`BoardError::Port`] and [`BoardError::InUse`].
 pub fn check(path: &Path) -> Result<(), BoardError> {
-    open(path).map(|_| ())
+    SerialPort::open(path).map(|_| ())
 }
 
 /// Factor by which the allowed time grows with every repetition. In lockstep, five repetitions fit
@@ -51,13 +45,19 @@ const PATIENCE_GROWTH: f32 = 1.5;
 
 /// A flashed and configured board.
 pub struct Serial {
-    port: File,
+    port: SerialPort,
     inbox: Inbox,
     /// Received bytes not decoded yet.
     pending: Vec<u8>,
+    /// Bytes decoded since the last frame.
+    unframed_bytes: usize,
+    /// Whether any frame has arrived.
+    has_answered: bool,
     line: LineHealth,
     frame_patience: Duration,
     pub(crate) silence_limit: Duration,
+    /// Hash of the board's sources, once it is identified.
+    sources: u64,
     stopwatch_hz: u32,
 }
 
@@ -67,8 +67,9 @@ impl Serial {
     /// for longer than `silence_limit` is an error.
     ///
     /// # Errors
-    /// [`BoardError::Port`] if it cannot be opened, [`BoardError::Silent`] if no board
-    /// answers, [`BoardError::Refused`].
+    /// [`BoardError::Port`] or [`BoardError::InUse`] if it cannot be opened, [`BoardError::Silent`] or
+    /// [`BoardError::NoFrames`] if no board answers, [`BoardError::OtherProtocol`], [`BoardError::OtherBuild`],
+    /// [`BoardError::Refused`].
     pub fn open(
         path: &Path,
         configuration: &Configuration,
@@ -77,6 +78,7 @@ impl Serial {
     ) -> Result<Self, BoardError> {
         let mut serial = Self::connect(path)?;
         serial.silence_limit = silence_limit;
+        serial.identify()?;
         serial.configure(configuration, source)?;
         Ok(serial)
     }
@@ -84,23 +86,26 @@ impl Serial {
     /// Opens the port; says nothing to the board yet.
     ///
     /// # Errors
-    /// [`BoardError::Port`] if it cannot be opened.
+    /// [`BoardError::Port`] or [`BoardError::InUse`] if it cannot be opened.
     pub fn connect(path: &Path) -> Result<Self, BoardError> {
-        let mut port = open(path)?;
+        let mut port = SerialPort::open(path)?;
         // Ends a message that the board may have received in part.
-        port.write_all(&[0])?;
+        port.write(&[0], SILENCE_LIMIT)?;
         Ok(Self {
             port,
             inbox: Inbox::new(),
             pending: Vec::new(),
+            unframed_bytes: 0,
+            has_answered: false,
             line: LineHealth::default(),
             frame_patience: LOCKSTEP_PATIENCE,
             silence_limit: SILENCE_LIMIT,
+            sources: 0,
             stopwatch_hz: 0,
         })
     }
 
-    /// Compares the board's protocol and build with this program's.
+    /// Compares the board's protocol and build with this program's, and asks for the board's sources.
     ///
     /// # Errors
     /// [`BoardError::OtherProtocol`] or [`BoardError::OtherBuild`] if they differ, and
@@ -114,11 +119,28 @@ impl Serial {
                     host: PROTOCOL,
                 })
             }
-            Response::Identity { build, .. } if build != BUILD => {
+            Response::Identity { build, .. } if build != self::build() => {
                 Err(BoardError::other_build(build))
             }
-            _ => Ok(()),
+            _ => self.ask_for_sources(),
         }
+    }
+
+    fn ask_for_sources(&mut self) -> Result<(), BoardError> {
+        let is_wanted = |response: &Response| matches!(response, Response::Sources(_));
+        match self.ask(&Request::Sources, PATIENCE, is_wanted)? {
+            Response::Sources(board) => self.sources = board,
+            other => return Err(BoardError::OutOfTurn(other)),
+        }
+        Ok(())
+    }
+
+    /// Returns whether the identified board was built from this program's sources.
+    ///
+    /// # Errors
+    /// [`BoardError::OtherSources`] if it was not.
+    pub fn compare_sources(&self) -> Result<(), BoardError> {
+        BoardError::compare_sources(self.sources)
     }
 
     /// Returns the board's record of its last reset, crash and fault.
@@ -155,7 +177,7 @@ impl Serial {
         };
         let configuration = super::encode(configuration)?;
         let request = Request::Configure {
-            build: BUILD,
+            build: build(),
             source,
             configuration: &configuration,
         };
@@ -180,7 +202,7 @@ impl Serial {
     pub fn send(&mut self, request: &Request<'_>) -> Result<(), BoardError> {
         let mut buffer = [0; MAXIMUM_LENGTH];
         let bytes = wire::encode(request, &mut buffer)?;
-        Ok(self.port.write_all(bytes)?)
+        self.port.write(bytes, self.silence_limit)
     }
 
     /// Takes the torque off, and waits until the board has confirmed it.
@@ -211,13 +233,13 @@ impl Serial {
         let bytes = wire::encode(request, &mut buffer)?;
         let start = Instant::now();
         loop {
-            self.port.write_all(bytes)?;
             let left = self.silence_limit.saturating_sub(start.elapsed());
+            self.port.write(bytes, left)?;
             if let Some(response) = self.receive(patience.min(left), &is_wanted)? {
                 return Ok(response);
             }
             if start.elapsed() >= self.silence_limit {
-                return Err(BoardError::Silent(start.elapsed()));
+                return Err(self.silence(start.elapsed()));
             }
             self.line.repeated_requests += 1;
             patience = patience.mul_f32(PATIENCE_GROWTH);
@@ -239,20 +261,27 @@ impl Serial {
             if left.is_zero() {
                 return Ok(None);
             }
-            // Rounded up, so that the last fraction of a millisecond is not spent polling.
-            let left = PollTimeout::try_from(left + Duration::from_millis(1));
-            let mut ports = [PollFd::new(self.port.as_fd(), PollFlags::POLLIN)];
-            match poll(&mut ports, left.unwrap_or(PollTimeout::MAX)) {
-                Ok(0) | Err(Errno::EINTR) => continue,
-                Ok(_) => {}
-                Err(error) => return Err(io::Error::from(error).into()),
-            }
             let mut bytes = [0; 256];
-            let length = self.port.read(&mut bytes)?;
-            if length == 0 {
-                return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
-            }
+            let length = self.port.read(&mut bytes, left)?;
             self.pending.extend_from_slice(&bytes[..length]);
+        }
+    }
+
+    /// Returns the error for a board that has not answered, from the bytes that have arrived instead.
+    pub(crate) fn silence(&self, lasted: Duration) -> BoardError {
+        // A line that breaks leaves a part of a response behind.
+        let part_of_response = if self.has_answered {
+            MAXIMUM_RESPONSE_LENGTH
+        } else {
+            0
+        };
+        if self.unframed_bytes > part_of_response {
+            BoardError::NoFrames {
+                bytes: self.unframed_bytes,
+                lasted,
+            }
+        } else {
+            BoardError::Silent(lasted)
         }
     }
 
@@ -262,15 +291,19 @@ impl Serial {
         let mut found = None;
         for byte in &self.pending {
             looked_at += 1;
+            self.unframed_bytes += 1;
             let Some(message) = self.inbox.push(*byte) else {
                 continue;
             };
             match wire::decode::<Response>(message) {
-                Ok(response) if is_wanted(&response) => {
-                    found = Some(response);
-                    break;
+                Ok(response) => {
+                    self.unframed_bytes = 0;
+                    self.has_answered = true;
+                    if is_wanted(&response) {
+                        found = Some(response);
+                        break;
+                    }
                 }
-                Ok(_) => {}
                 Err(WireError::Checksum) => self.line.failed_checksums += 1,
                 Err(_) => self.line.garbage += 1,
             }
@@ -285,7 +318,7 @@ impl Drop for Serial {
     fn drop(&mut self) {
         let mut buffer = [0; MAXIMUM_LENGTH];
         if let Ok(bytes) = wire::encode(&Request::Stop, &mut buffer) {
-            let _ = self.port.write_all(bytes);
+            let _ = self.port.write(bytes, PATIENCE);
         }
     }
 }
@@ -322,26 +355,4 @@ impl ConnectedBoard for Serial {
     fn line(&self) -> Option<LineHealth> {
         Some(self.line)
     }
-}
-
-fn open(path: &Path) -> Result<File, BoardError> {
-    open_raw(path).map_err(|source| BoardError::Port {
-        path: path.into(),
-        source,
-    })
-}
-
-fn open_raw(path: &Path) -> io::Result<File> {
-    use std::os::unix::fs::OpenOptionsExt;
-    let port = OpenOptions::new()
-        .read(true)
-        .write(true)
-        .custom_flags(OFlag::O_NOCTTY.bits())
-        .open(path)?;
-    let mut settings = tcgetattr(&port)?;
-    cfmakeraw(&mut settings);
-    cfsetspeed(&mut settings, BaudRate::B921600)?;
-    tcsetattr(&port, SetArg::TCSANOW, &settings)?;
-    tcflush(&port, FlushArg::TCIOFLUSH)?;
-    Ok(port)
 }

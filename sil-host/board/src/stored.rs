@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use painleve_firmware::BUILD;
 use painleve_plant::Configuration;
+use painleve_plant::law_choice::build;
 use painleve_shared::message::{Request, Response};
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 
@@ -20,8 +20,8 @@ impl StoringBoard {
     /// Connects, and compares protocol and build.
     ///
     /// # Errors
-    /// [`BoardError::Port`], [`BoardError::Silent`], [`BoardError::OtherProtocol`] or
-    /// [`BoardError::OtherBuild`].
+    /// [`BoardError::Port`], [`BoardError::InUse`], [`BoardError::Silent`], [`BoardError::NoFrames`],
+    /// [`BoardError::OtherProtocol`] or [`BoardError::OtherBuild`].
     pub fn open(path: &Path) -> Result<Self, BoardError> {
         let mut serial = Serial::connect(path)?;
         serial.identify()?;
@@ -39,7 +39,7 @@ impl StoringBoard {
     ) -> Result<StoredConfiguration, BoardError> {
         let configuration = super::encode(configuration)?;
         self.change(&Request::Store {
-            build: BUILD,
+            build: build(),
             configuration: &configuration,
         })
     }

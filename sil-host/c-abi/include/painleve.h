@@ -14,7 +14,7 @@
 typedef enum {
   // Success.
   PAINLEVE_STATUS_OK = 0,
-  // A pointer is null, or a text is not UTF-8.
+  // A pointer is null or not aligned, or a text is not UTF-8.
   PAINLEVE_STATUS_INVALID_ARGUMENT = 1,
   // The scenario is invalid.
   PAINLEVE_STATUS_INVALID_SCENARIO = 2,
@@ -22,6 +22,8 @@ typedef enum {
   PAINLEVE_STATUS_PLANT_FAILED = 3,
   // A bug in this library; the object must only be freed.
   PAINLEVE_STATUS_PANIC = 4,
+  // Sample and advance do not alternate; the plant is unchanged.
+  PAINLEVE_STATUS_WRONG_ORDER = 5,
 } PainleveStatus;
 
 // A controller with its state.
@@ -127,7 +129,7 @@ void painleve_controller_free(PainleveController *controller);
 // `scenario_toml` is a null-terminated string; `plant` can be written.
 PainleveStatus painleve_plant_new(const char *scenario_toml, PainlevePlant **plant);
 
-// Reads the sensors at this tick; call it once per tick, before [`painleve_plant_advance`]. Sets
+// Reads the sensors at this tick, once per tick and before [`painleve_plant_advance`]; another order is refused. Sets
 // `is_lost` if the scenario loses this frame in transit; the controller must then not receive it.
 //
 // # Safety

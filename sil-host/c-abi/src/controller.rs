@@ -5,7 +5,7 @@ use std::ffi::c_char;
 use painleve_plant::Controller;
 
 use crate::frames::{PainleveActuatorFrame, PainleveSensorFrame};
-use crate::status::{CallError, PainleveStatus, call, give, put, scenario, take_back};
+use crate::status::{PainleveStatus, borrow, borrow_mut, call, give, scenario, take_back, usable};
 
 /// A controller with its state.
 pub struct PainleveController(Controller);
@@ -45,16 +45,14 @@ pub unsafe extern "C" fn painleve_controller_tick(
 ) -> PainleveStatus {
     call(|| {
         // SAFETY: null or valid and not shared, by this function's contract.
-        let controller = unsafe { controller.as_mut() };
-        let controller = controller.ok_or(CallError::Null("controller"))?;
+        let controller = unsafe { borrow_mut(controller, "controller") }?;
         // SAFETY: null or readable, by this function's contract.
-        let sensor = unsafe { sensor.as_ref() }.ok_or(CallError::Null("sensor"))?;
-        if actuator.is_null() {
-            return Err(CallError::Null("actuator"));
-        }
+        let sensor = unsafe { borrow(sensor, "sensor") }?;
+        usable(actuator, "actuator")?;
         let answer = controller.0.tick(&(*sensor).into());
         // SAFETY: writable, by this function's contract.
-        unsafe { put(actuator, "actuator", answer.into()) }
+        unsafe { actuator.write(answer.into()) };
+        Ok(())
     })
 }
 

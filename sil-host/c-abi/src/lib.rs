@@ -16,6 +16,8 @@ pub mod controller;
 pub mod frames;
 pub mod plant;
 pub mod status;
+#[cfg(test)]
+mod tests;
 
 pub use controller::PainleveController;
 pub use frames::{PainleveActuatorFrame, PainleveSensorFrame, PainleveSnapshot};

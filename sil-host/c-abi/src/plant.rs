@@ -7,10 +7,16 @@ use painleve_plant::Plant;
 use painleve_plant::simulation::Simulation;
 
 use crate::frames::{PainleveActuatorFrame, PainleveSensorFrame, PainleveSnapshot};
-use crate::status::{CallError, PainleveStatus, call, give, put, scenario, take_back};
+use crate::status::{
+    CallError, PainleveStatus, borrow, borrow_mut, call, give, scenario, take_back, usable,
+};
 
 /// A plant with its converters.
-pub struct PainlevePlant(Simulation);
+pub struct PainlevePlant {
+    simulation: Simulation,
+    /// Whether this tick has been sampled.
+    is_sampled: bool,
+}
 
 /// Creates the plant of a scenario, at time 0.
 ///
@@ -24,12 +30,18 @@ pub unsafe extern "C" fn painleve_plant_new(
     call(|| {
         // SAFETY: guaranteed by this function's contract.
         let scenario = unsafe { scenario(scenario_toml) }?;
+        let make = || {
+            Ok(PainlevePlant {
+                simulation: Simulation::new(&scenario)?,
+                is_sampled: false,
+            })
+        };
         // SAFETY: guaranteed by this function's contract.
-        unsafe { give(plant, || Ok(PainlevePlant(Simulation::new(&scenario)?))) }
+        unsafe { give(plant, make) }
     })
 }
 
-/// Reads the sensors at this tick; call it once per tick, before [`painleve_plant_advance`]. Sets
+/// Reads the sensors at this tick, once per tick and before [`painleve_plant_advance`]; another order is refused. Sets
 /// `is_lost` if the scenario loses this frame in transit; the controller must then not receive it.
 ///
 /// # Safety
@@ -43,16 +55,22 @@ pub unsafe extern "C" fn painleve_plant_sample(
 ) -> PainleveStatus {
     call(|| {
         // SAFETY: null or valid and not shared, by this function's contract.
-        let plant = unsafe { plant.as_mut() }.ok_or(CallError::Null("plant"))?;
-        if sensor.is_null() || is_lost.is_null() {
-            return Err(CallError::Null("sensor or is_lost"));
+        let plant = unsafe { borrow_mut(plant, "plant") }?;
+        usable(sensor, "sensor")?;
+        usable(is_lost, "is_lost")?;
+        if plant.is_sampled {
+            return Err(CallError::WrongOrder(
+                "this tick has been sampled: advance the plant first",
+            ));
         }
-        let frame = plant.0.sample(&mut ())?;
+        let frame = plant.simulation.sample(&mut ())?;
+        plant.is_sampled = true;
         // SAFETY: both are writable, by this function's contract.
         unsafe {
-            put(sensor, "sensor", frame.into())?;
-            put(is_lost, "is_lost", plant.0.sensor_frame_is_lost())
+            sensor.write(frame.into());
+            is_lost.write(plant.simulation.sensor_frame_is_lost());
         }
+        Ok(())
     })
 }
 
@@ -69,10 +87,20 @@ pub unsafe extern "C" fn painleve_plant_advance(
 ) -> PainleveStatus {
     call(|| {
         // SAFETY: null or valid and not shared, by this function's contract.
-        let plant = unsafe { plant.as_mut() }.ok_or(CallError::Null("plant"))?;
-        // SAFETY: null or readable, by this function's contract.
-        let answer = unsafe { actuator.as_ref() }.map(|frame| (*frame).into());
-        Ok(plant.0.advance(answer.as_ref(), &mut ())?)
+        let plant = unsafe { borrow_mut(plant, "plant") }?;
+        let answer = if actuator.is_null() {
+            None
+        } else {
+            // SAFETY: readable, by this function's contract.
+            Some((*unsafe { borrow(actuator, "actuator") }?).into())
+        };
+        if !plant.is_sampled {
+            return Err(CallError::WrongOrder(
+                "this tick has not been sampled: sample it before the plant advances",
+            ));
+        }
+        plant.is_sampled = false;
+        Ok(plant.simulation.advance(answer.as_ref(), &mut ())?)
     })
 }
 
@@ -88,10 +116,12 @@ pub unsafe extern "C" fn painleve_plant_snapshot(
 ) -> PainleveStatus {
     call(|| {
         // SAFETY: null or valid, by this function's contract.
-        let plant = unsafe { plant.as_ref() }.ok_or(CallError::Null("plant"))?;
-        let now = plant.0.plant().snapshot();
+        let plant = unsafe { borrow(plant, "plant") }?;
+        usable(snapshot, "snapshot")?;
+        let now = plant.simulation.plant().snapshot();
         // SAFETY: writable, by this function's contract.
-        unsafe { put(snapshot, "snapshot", now.into()) }
+        unsafe { snapshot.write(now.into()) };
+        Ok(())
     })
 }
 

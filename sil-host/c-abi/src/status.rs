@@ -14,7 +14,7 @@ use painleve_shared::range::OutOfRange;
 pub enum PainleveStatus {
     /// Success.
     Ok = 0,
-    /// A pointer is null, or a text is not UTF-8.
+    /// A pointer is null or not aligned, or a text is not UTF-8.
     InvalidArgument = 1,
     /// The scenario is invalid.
     InvalidScenario = 2,
@@ -22,6 +22,8 @@ pub enum PainleveStatus {
     PlantFailed = 3,
     /// A bug in this library; the object must only be freed.
     Panic = 4,
+    /// Sample and advance do not alternate; the plant is unchanged.
+    WrongOrder = 5,
 }
 
 /// Why a call failed.
@@ -29,8 +31,12 @@ pub enum PainleveStatus {
 pub(crate) enum CallError {
     #[error("{0} is null")]
     Null(&'static str),
+    #[error("{0} is not aligned")]
+    NotAligned(&'static str),
     #[error("{0} is not UTF-8")]
     NotUtf8(&'static str),
+    #[error("{0}")]
+    WrongOrder(&'static str),
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     #[error(transparent)]
@@ -42,7 +48,10 @@ pub(crate) enum CallError {
 impl CallError {
     fn status(&self) -> PainleveStatus {
         match self {
-            Self::Null(_) | Self::NotUtf8(_) => PainleveStatus::InvalidArgument,
+            Self::Null(_) | Self::NotAligned(_) | Self::NotUtf8(_) => {
+                PainleveStatus::InvalidArgument
+            }
+            Self::WrongOrder(_) => PainleveStatus::WrongOrder,
             Self::Scenario(_) | Self::Range(_) => PainleveStatus::InvalidScenario,
             Self::Plant(_) => PainleveStatus::PlantFailed,
         }
@@ -98,6 +107,43 @@ pub(crate) unsafe fn scenario(text: *const c_char) -> Result<Scenario, CallError
     Ok(Scenario::from_toml(text)?)
 }
 
+/// Checks that a pointer of the caller may be used.
+pub(crate) fn usable<T>(pointer: *const T, name: &'static str) -> Result<(), CallError> {
+    if pointer.is_null() {
+        Err(CallError::Null(name))
+    } else if !pointer.is_aligned() {
+        Err(CallError::NotAligned(name))
+    } else {
+        Ok(())
+    }
+}
+
+/// Borrows what a pointer of the caller points to.
+///
+/// # Safety
+/// `pointer` is null, or can be read for `'a`.
+pub(crate) unsafe fn borrow<'a, T>(
+    pointer: *const T,
+    name: &'static str,
+) -> Result<&'a T, CallError> {
+    usable(pointer, name)?;
+    // SAFETY: usable, and readable by this function's contract.
+    Ok(unsafe { &*pointer })
+}
+
+/// Borrows an object of the caller to change it.
+///
+/// # Safety
+/// `pointer` is null, or comes from [`give`], has not been taken back, and is not shared for `'a`.
+pub(crate) unsafe fn borrow_mut<'a, T>(
+    pointer: *mut T,
+    name: &'static str,
+) -> Result<&'a mut T, CallError> {
+    usable(pointer, name)?;
+    // SAFETY: usable, and valid and not shared by this function's contract.
+    Ok(unsafe { &mut *pointer })
+}
+
 /// Passes ownership of an object to the caller.
 ///
 /// # Safety
@@ -106,25 +152,10 @@ pub(crate) unsafe fn give<T>(
     place: *mut *mut T,
     make: impl FnOnce() -> Result<T, CallError>,
 ) -> Result<(), CallError> {
-    if place.is_null() {
-        return Err(CallError::Null("the place of the new object"));
-    }
+    usable(place, "the place of the new object")?;
     let object = Box::into_raw(Box::new(make()?));
-    // SAFETY: not null, and writable by this function's contract.
+    // SAFETY: usable, and writable by this function's contract.
     unsafe { place.write(object) };
-    Ok(())
-}
-
-/// Writes a result to the caller's variable.
-///
-/// # Safety
-/// `place` is null or can be written.
-pub(crate) unsafe fn put<T>(place: *mut T, name: &'static str, value: T) -> Result<(), CallError> {
-    if place.is_null() {
-        return Err(CallError::Null(name));
-    }
-    // SAFETY: not null, and writable by this function's contract.
-    unsafe { place.write(value) };
     Ok(())
 }
 
@@ -144,49 +175,12 @@ pub(crate) unsafe fn take_back<T>(object: *mut T) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::{painleve_plant_free, painleve_plant_new};
-    use std::ptr;
-
-    fn last_error() -> String {
-        // SAFETY: a null-terminated string of this thread.
-        let text = unsafe { CStr::from_ptr(painleve_last_error()) };
-        text.to_string_lossy().into_owned()
-    }
 
     #[test]
     fn a_panic_becomes_a_status_with_its_message() {
         assert_eq!(call(|| panic!("lost {}", 3)), PainleveStatus::Panic);
-        assert_eq!(last_error(), "panic: lost 3; please report this");
-    }
-
-    #[test]
-    fn null_and_invalid_texts_are_refused_and_null_can_be_freed() {
-        let mut plant = ptr::null_mut();
-        for (text, status, part) in [
-            (
-                None,
-                PainleveStatus::InvalidArgument,
-                "scenario_toml is null",
-            ),
-            (Some(c"\xff"), PainleveStatus::InvalidArgument, "not UTF-8"),
-            (
-                Some(c"belt.friction = 99"),
-                PainleveStatus::InvalidScenario,
-                "belt.friction",
-            ),
-            (Some(c"belt ="), PainleveStatus::InvalidScenario, "line 1"),
-        ] {
-            let text = text.map_or(ptr::null(), CStr::as_ptr);
-            // SAFETY: null or a C string, and a variable of this function.
-            assert_eq!(unsafe { painleve_plant_new(text, &mut plant) }, status);
-            assert!(last_error().contains(part), "{}", last_error());
-            assert!(plant.is_null());
-        }
-        // SAFETY: a C string, and a null output pointer; freeing null is allowed.
-        unsafe {
-            let status = painleve_plant_new(c"".as_ptr(), ptr::null_mut());
-            assert_eq!(status, PainleveStatus::InvalidArgument);
-            painleve_plant_free(ptr::null_mut());
-        }
+        // SAFETY: a null-terminated string of this thread.
+        let message = unsafe { CStr::from_ptr(painleve_last_error()) };
+        assert_eq!(message.to_str(), Ok("panic: lost 3; please report this"));
     }
 }

@@ -4,15 +4,20 @@
 //! Besides criterion's time per round trip it prints round trips per second and their percentiles.
 //! The maximum depends on the scheduler more than on the link.
 //!
-//! Each process is pinned to a processor of its own, because two that share one wait for each other's polls to end.
-//! The two measurements take turns, so that both see the same machine.
+//! Each process is pinned to a processor of its own. Then both share one, as on a busy machine, beside
+//! two processes that wake each other with a bare eventfd: the least that a change of process costs there.
+//! All measurements take turns, so that they see the same machine.
 
+use std::fs::File;
+use std::io::{Read, Write};
+use std::os::fd::AsFd;
 use std::process::{Child, Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use criterion::Criterion;
 use hdrhistogram::Histogram;
 use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
+use nix::sys::eventfd::EventFd;
 use nix::unistd::Pid;
 use painleve_link::lockstep::Lockstep;
 use painleve_link::{BusName, ControllerEnd, LinkError, Pacing, PlantEnd, Received, Session};
@@ -24,6 +29,8 @@ use painleve_system::interrupt::Interrupt;
 
 /// Environment variable of the second process: the bus on which it answers.
 const BUS: &str = "PAINLEVE_BENCH_BUS";
+/// Its value where the second process answers on its standard input and output.
+const STANDARD_STREAMS: &str = "-";
 /// Turns of each measurement, and round trips of a turn.
 const TURNS: usize = 5;
 const ROUND_TRIPS: u32 = 100_000;
@@ -34,6 +41,7 @@ type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> ExitCode {
     let outcome = match std::env::var(BUS) {
+        Ok(bus) if bus == STANDARD_STREAMS => answer_events(),
         Ok(bus) => answer_all(&bus),
         Err(_) => bench(),
     };
@@ -48,18 +56,27 @@ fn main() -> ExitCode {
 
 fn bench() -> Outcome<()> {
     let processors = Processors::of_this_process()?;
+    let shared = Processors {
+        peers: processors.own,
+        ..processors
+    };
     pin(Pid::this(), processors.own)?;
     // `cargo test` runs benches once, without `--bench`.
     if std::env::args().any(|argument| argument == "--bench") {
         let (mut alone, mut lockstep) = (RoundTrips::new()?, RoundTrips::new()?);
+        let (mut events, mut crowded) = (RoundTrips::new()?, RoundTrips::new()?);
         for _ in 0..TURNS {
             let mut ping_pong = PingPong::start(&processors)?;
             alone.add_turn(|| ping_pong.round_trip())?;
             ping_pong.end()?;
             add_lockstep_turn(&mut lockstep, &processors)?;
+            add_event_turn(&mut events, &shared)?;
+            add_lockstep_turn(&mut crowded, &shared)?;
         }
         println!("bare ping-pong of the frames: {alone}");
-        println!("lockstep run, plant included: {lockstep}\n");
+        println!("lockstep run, plant included: {lockstep}");
+        println!("eventfd on one processor: {events}");
+        println!("lockstep run on one processor: {crowded}\n");
     }
     let mut ping_pong = PingPong::start(&processors)?;
     let mut criterion = Criterion::default().configure_from_args();
@@ -109,12 +126,8 @@ fn pin(process: Pid, processor: usize) -> Outcome<()> {
 fn add_lockstep_turn(round_trips: &mut RoundTrips, processors: &Processors) -> Outcome<()> {
     let scenario = Scenario::load(built_in::DEFAULT, &["run.duration_s=1000".into()])?;
     let bus = BusName::unique();
-    let session = Session {
-        tick_hz: scenario.run.tick_hz,
-        pacing: Pacing::Lockstep,
-        configuration: postcard::to_stdvec(&scenario.controller_configuration())?,
-    };
-    let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default())?;
+    let session = Session::new(&scenario, Pacing::Lockstep)?;
+    let mut plant = PlantEnd::create(&bus, None, &session, &Interrupt::default())?;
     let mut controller = AnsweringProcess(
         Command::new(env!("CARGO_BIN_EXE_painleve"))
             .args(["controller", "--wait-s", "5", "--bus", bus.as_str()])
@@ -127,6 +140,42 @@ fn add_lockstep_turn(round_trips: &mut RoundTrips, processors: &Processors) -> O
     closed_loop.finish().1.0.end()?;
     controller.0.wait()?;
     Ok(())
+}
+
+/// Exchanges events with a second process that answers each.
+fn add_event_turn(round_trips: &mut RoundTrips, processors: &Processors) -> Outcome<()> {
+    let (questions, answers) = (EventFd::new()?, EventFd::new()?);
+    let shared = |event: &EventFd| event.as_fd().try_clone_to_owned();
+    let mut echo = AnsweringProcess(
+        Command::new(std::env::current_exe()?)
+            .env(BUS, STANDARD_STREAMS)
+            .stdin(shared(&questions)?)
+            .stdout(shared(&answers)?)
+            .spawn()?,
+    );
+    echo.pin(processors)?;
+    round_trips.add_turn(|| {
+        questions.write(1)?;
+        answers.read().map(|_| ())
+    })?;
+    // Two events at once end the process.
+    questions.write(2)?;
+    echo.0.wait()?;
+    Ok(())
+}
+
+/// Answers every event on standard input with one on standard output.
+fn answer_events() -> Outcome<()> {
+    let mut questions = File::from(std::io::stdin().as_fd().try_clone_to_owned()?);
+    let mut answers = File::from(std::io::stdout().as_fd().try_clone_to_owned()?);
+    let mut event = [0; 8];
+    loop {
+        questions.read_exact(&mut event)?;
+        if u64::from_ne_bytes(event) > 1 {
+            return Ok(());
+        }
+        answers.write_all(&event)?;
+    }
 }
 
 /// The exchange of frames with a second process that echoes them.
@@ -144,7 +193,7 @@ impl PingPong {
             pacing: Pacing::Lockstep,
             configuration: Vec::new(),
         };
-        let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default())?;
+        let mut plant = PlantEnd::create(&bus, None, &session, &Interrupt::default())?;
         let echo = AnsweringProcess::start(&bus)?;
         echo.pin(processors)?;
         plant.wait_for_controller(Duration::from_secs(5))?;
@@ -197,8 +246,12 @@ impl Drop for AnsweringProcess {
 }
 
 fn answer_all(bus: &str) -> Outcome<()> {
-    let (mut controller, _) =
-        ControllerEnd::open(&bus.parse()?, Duration::from_secs(5), &Interrupt::default())?;
+    let (mut controller, _) = ControllerEnd::open(
+        &bus.parse()?,
+        None,
+        Duration::from_secs(5),
+        &Interrupt::default(),
+    )?;
     controller.set_silence_limit(PATIENCE);
     while let Received::Frame(frame) = controller.receive()? {
         controller.send(&ActuatorFrame {

@@ -117,6 +117,9 @@ impl ImageArguments {
 }
 
 /// Carries frames between the bus and the board until the plant's session ends.
+///
+/// # Errors
+/// [`CommandError`] if the bus, the board or the output fails, or the user interrupts.
 pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
     match &arguments.target {
         BridgeTarget::Qemu { bus, image } => {
@@ -136,12 +139,13 @@ pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
         }
         BridgeTarget::Serial { bus, port, timing } => {
             carry(bus, timing.as_deref(), |configuration, pacing| {
-                Serial::open(
-                    port,
-                    configuration,
-                    frame_source(pacing),
-                    bus.plant.patience.board(),
-                )
+                let source = frame_source(pacing);
+                let patience = bus.plant.patience.board();
+                let serial = Serial::open(port, configuration, source, patience)?;
+                if let Err(error) = serial.compare_sources() {
+                    warn(error);
+                }
+                Ok(serial)
             })
         }
     }

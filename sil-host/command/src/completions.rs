@@ -27,6 +27,9 @@ pub struct ManArguments {
 }
 
 /// Prints a completion script.
+///
+/// # Errors
+/// [`CommandError::Output`] if the standard output cannot be written.
 pub fn print(arguments: &CompletionsArguments) -> Result<(), CommandError> {
     let mut script = Vec::new();
     clap_complete::generate(
@@ -39,6 +42,9 @@ pub fn print(arguments: &CompletionsArguments) -> Result<(), CommandError> {
 }
 
 /// Writes `painleve.1` and one page for each subcommand.
+///
+/// # Errors
+/// [`CommandError::Output`] if a page cannot be written.
 pub fn write_manual(arguments: &ManArguments) -> Result<(), CommandError> {
     let folder = &arguments.folder;
     let refuse = |source| {

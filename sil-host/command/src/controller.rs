@@ -20,6 +20,9 @@ pub struct ControllerArguments {
 }
 
 /// Answers the plant's frames until its session ends.
+///
+/// # Errors
+/// [`CommandError`] if the plant is missing, gone or incompatible, or the user interrupts.
 pub fn run(arguments: &ControllerArguments) -> Result<(), CommandError> {
     let interrupt = Interrupt::catch()?;
     or_interrupted(answer_until(arguments, &interrupt), &interrupt)

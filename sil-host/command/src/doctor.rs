@@ -5,8 +5,9 @@ use nix::sys::resource::{Resource, getrlimit};
 use nix::sys::statvfs::statvfs;
 use nix::sys::utsname::uname;
 use painleve_board::emulator;
-use painleve_firmware::BUILD;
+use painleve_firmware::SOURCES;
 use painleve_link::{BusState, LinkError, SegmentState, Survey};
+use painleve_plant::law_choice::build;
 use painleve_system::realtime::request_realtime;
 use painleve_system::terminal;
 
@@ -24,6 +25,9 @@ pub struct DoctorArguments {
 }
 
 /// Repairs first if requested, then surveys the machine and prints a table.
+///
+/// # Errors
+/// [`CommandError`] if a leftover cannot be removed, or the output cannot be written.
 pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     if arguments.repair {
         Survey::repair()?;
@@ -32,7 +36,11 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     let mut row = |what: &str, state: String| rows.push([what.into(), state]);
     row(
         "version",
-        format!("{}, build {BUILD:016x}", env!("CARGO_PKG_VERSION")),
+        format!(
+            "{}, build {:016x}, sources {SOURCES:016x}",
+            env!("CARGO_PKG_VERSION"),
+            build()
+        ),
     );
     row("system", system());
     row("emulator, image", image());
@@ -109,20 +117,14 @@ fn image() -> String {
     }
 }
 
-/// Limits, and the smallest sufficient values.
-const LIMITS: [(&str, Resource, u64); 4] = [
+/// Limits, and the smallest sufficient values. Those of real time are judged by [`request_realtime`] alone: root needs none.
+const LIMITS: [(&str, Resource, u64); 2] = [
     ("open files (ulimit -n)", Resource::RLIMIT_NOFILE, 64),
     (
         "file size (ulimit -f), bytes",
         Resource::RLIMIT_FSIZE,
         1 << 30,
     ),
-    (
-        "locked memory (ulimit -l), bytes",
-        Resource::RLIMIT_MEMLOCK,
-        64 << 20,
-    ),
-    ("real-time priority (ulimit -r)", Resource::RLIMIT_RTPRIO, 1),
 ];
 
 fn limit(resource: Resource, least: u64) -> String {

@@ -29,6 +29,9 @@ pub struct ExportArguments {
 }
 
 /// Writes one row per control tick and one column per quantity.
+///
+/// # Errors
+/// [`CommandError`] if the recording cannot be read, or the table cannot be written.
 pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
     let record = &arguments.record;
     let table = read(record).map_err(|source| InputError::Record {

@@ -12,16 +12,18 @@ use painleve_plant::simulation::Simulation;
 use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
 use painleve_record::replica::Replica;
 use painleve_record::{RecordedTick, RunPlot};
-use painleve_study::catalogue::{AnyOutcome, STUDIES};
+use painleve_study::catalogue::AnyOutcome;
 use painleve_study::figures::page_maker::{Fineness, PageMaker};
 use painleve_study::figures::{self, Page, Section};
+use painleve_study::studies::STUDIES;
 use painleve_system::atomic_file::{self, AtomicFile};
 use serde_json::{Value, json};
 
 use super::CommandError;
 use super::json::JsonOption;
 use super::output_error::output;
-use super::study::outcome::{Threads, progress_bar};
+use super::progress::{Progress, Shown};
+use super::study::outcome::Threads;
 
 /// Options of `painleve figures`.
 #[derive(Debug, Args)]
@@ -47,6 +49,9 @@ const RUNS: [&str; 4] = [
 ];
 
 /// Computes all studies, then writes the page.
+///
+/// # Errors
+/// [`CommandError`] if a study fails, the page cannot be written, or the user interrupts.
 pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
     let folder = &arguments.out;
     let page_path = folder.join("index.html");
@@ -58,15 +63,15 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
             &Fineness::FULL
         },
         progress: &|title, rows| {
-            let bar = progress_bar(title, rows);
-            Box::new(move || bar.inc(1))
+            let progress = Progress::start(title, rows, Shown::with_json(arguments.json.json));
+            Box::new(move || progress.row_done())
         },
     };
     // Written only when all files are ready, so that Ctrl-C cannot leave old figures beside new
     // ones.
     let mut files = Vec::new();
     let mut sections = Vec::new();
-    for study in STUDIES.iter() {
+    for study in &STUDIES {
         for (section, outcome) in arguments.threads.in_pool(|| (study.sections)(&page))?? {
             files.extend(data(folder, &section, &*outcome)?);
             sections.push(section);
@@ -81,7 +86,7 @@ pub fn run(arguments: &FiguresArguments) -> Result<(), CommandError> {
         sections.push(section);
     }
     let page = Page {
-        title: "The paper's studies, computed again".into(),
+        title: "The paper's results, recomputed".into(),
         introduction: format!(
             "Every figure and number of Marchese, Coraggio, Hogan and di Bernardo, Control of Painlevé \
              Paradox in a Robotic System (arXiv:1907.04070), beside what painleve {} finds.",

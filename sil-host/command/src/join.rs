@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Args;
-use painleve_link::{BusName, ControllerEnd, Session};
+use painleve_link::{BusName, ControllerEnd, Pair, Session};
 use painleve_plant::Configuration;
 use painleve_system::interrupt::Interrupt;
 
@@ -22,23 +22,29 @@ pub struct JoinArguments {
     wait_s: f64,
     #[command(flatten)]
     pub patience: PatienceArguments,
+    /// Join only the plant with the same mark: set by `painleve run`.
+    #[arg(long, hide = true)]
+    pair: Option<Pair>,
 }
 
 impl JoinArguments {
     /// Waits for the plant and joins its session; returns the plant's configuration, too.
+    ///
+    /// # Errors
+    /// [`CommandError`] if no plant is there in time, or it is of another build.
     pub fn join(
         &self,
         interrupt: &Interrupt,
     ) -> Result<(ControllerEnd, Session, Configuration), CommandError> {
         let wait = Duration::from_secs_f64(self.wait_s);
-        let (mut end, session) = ControllerEnd::open(&self.bus, wait, interrupt)?;
+        let (mut end, session) = ControllerEnd::open(&self.bus, self.pair, wait, interrupt)?;
         end.set_silence_limit(self.patience.peer());
-        let configuration = postcard::from_bytes(&session.configuration).map_err(|source| {
-            ProcessError::Unreadable {
+        let configuration = session
+            .controller()
+            .map_err(|source| ProcessError::Unreadable {
                 bus: self.bus.clone(),
                 source,
-            }
-        })?;
+            })?;
         Ok((end, session, configuration))
     }
 }

@@ -17,6 +17,7 @@ mod output_error;
 mod patience;
 mod plant;
 mod process_error;
+mod progress;
 mod run;
 mod run_process;
 mod scenarios;
@@ -81,7 +82,7 @@ enum Command {
     /// Report the cost of control ticks: instructions, cycles or wake-up latency, and the worst
     /// tick.
     Timing(timing::TimingArguments),
-    /// Show what earlier runs have left on this machine, and what the machine offers to runs.
+    /// Show what earlier runs have left on this machine, and what this machine supports.
     Doctor(doctor::DoctorArguments),
     /// Write the ticks of a record as a table.
     Export(export::ExportArguments),

@@ -198,6 +198,9 @@ impl Output {
     }
 
     /// Completes the files and returns their paths; without this nothing appears under their names.
+    ///
+    /// # Errors
+    /// [`CommandError::Output`] if a file cannot be completed.
     pub fn finish(self) -> Result<Vec<PathBuf>, CommandError> {
         self.progress.finish_and_clear();
         if let Some(recorder) = self.recorder {

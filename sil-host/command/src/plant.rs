@@ -6,7 +6,7 @@ use clap::Args;
 use painleve_firmware::supervise::lapses::Lapse;
 use painleve_link::lockstep::Lockstep;
 use painleve_link::paced::Paced;
-use painleve_link::{BusName, Pacing, PlantEnd, Session};
+use painleve_link::{BusName, Pacing, Pair, PlantEnd, Session};
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult};
 use painleve_plant::controller_host::ControllerHost;
 use painleve_plant::scenario::{Scenario, ScenarioError};
@@ -47,20 +47,25 @@ pub struct PlantArguments {
     /// In real time, but paced by the board: wait for its answers.
     #[arg(long, hide = true)]
     board_keeps_time: bool,
-    /// Leave the messages about an interruption and about the peer to `painleve run`.
+    /// Set by `painleve run`: admit only the controller with the same mark, and leave the messages
+    /// about an interruption and about the peer to `run`.
     #[arg(long, hide = true)]
-    started_by_run: bool,
+    pair: Option<Pair>,
 }
 
 /// Runs a scenario against the controller on the bus.
+///
+/// # Errors
+/// [`CommandError`] if the scenario is invalid, the run ends early, or a file cannot be written.
 pub fn run(arguments: &PlantArguments) -> Result<(), CommandError> {
     let interrupt = Interrupt::catch()?;
+    let started_by_run = arguments.pair.is_some();
     match run_until(arguments, &interrupt) {
-        Err(error) if arguments.started_by_run && error.exit_code() == INTERRUPTED => {
+        Err(error) if started_by_run && error.exit_code() == INTERRUPTED => {
             Err(CommandError::Told { code: INTERRUPTED })
         }
         // The bridge of a board may know the cause: `run` prints one of the two messages.
-        Err(error) if arguments.started_by_run && error.exit_code() == PEER_FAILED => {
+        Err(error) if started_by_run && error.exit_code() == PEER_FAILED => {
             let message = error.to_string();
             if !message.is_empty() {
                 say(message)?;
@@ -118,8 +123,8 @@ fn simulate(
         source,
     })?;
     let pacing = arguments.scenario.pacing;
-    let session = session(scenario, pacing)?;
-    let mut end = PlantEnd::create(&arguments.bus, &session, interrupt)?;
+    let session = Session::new(scenario, pacing).map_err(ProcessError::Unsendable)?;
+    let mut end = PlantEnd::create(&arguments.bus, arguments.pair, &session, interrupt)?;
     end.set_silence_limit(arguments.patience.peer());
     end.wait_for_controller(Duration::from_secs_f64(arguments.wait_s))?;
 
@@ -151,16 +156,6 @@ fn simulate(
         report.controller = controller;
     }
     Ok(report)
-}
-
-fn session(scenario: &Scenario, pacing: Pacing) -> Result<Session, CommandError> {
-    let configuration = postcard::to_stdvec(&scenario.controller_configuration())
-        .map_err(ProcessError::Unsendable)?;
-    Ok(Session {
-        tick_hz: scenario.run.tick_hz,
-        pacing,
-        configuration,
-    })
 }
 
 fn drive<H: ControllerHost>(

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitStatus;
 
-use painleve_link::BusName;
+use painleve_link::{BusName, UnreadableConfiguration};
 use painleve_shared::range::OutOfRange;
 
 /// Failure of a process, or of a message to it.
@@ -67,7 +67,7 @@ pub enum ProcessError {
         /// The bus.
         bus: BusName,
         /// The reason.
-        source: postcard::Error,
+        source: UnreadableConfiguration,
     },
     /// A configuration is out of range.
     #[error("the plant on bus {bus} sent a configuration that this controller refuses: {source}")]

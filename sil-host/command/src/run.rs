@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use painleve_board::{emulator, serial};
-use painleve_link::{BusName, Pacing};
+use painleve_link::{BusName, Pacing, Pair};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_record::report::RunReport;
 use painleve_study::robustness::{self, Arms};
@@ -219,6 +219,9 @@ fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), 
 }
 
 /// Runs a scenario as two processes and reports.
+///
+/// # Errors
+/// [`CommandError`] if an option is invalid, a process of the run fails, or a condition of `--fail-on` is met.
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let mut arguments = arguments.clone();
     let _standard_input = arguments.scenario.copy_standard_input()?;
@@ -236,26 +239,27 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     }
     let interrupt = Interrupt::catch()?;
     let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
+    let pair = Pair::unique();
 
     let mut plant_arguments: Vec<OsString> = vec!["plant".into()];
     plant_arguments.extend(arguments.scenario.to_arguments());
     plant_arguments.extend(arguments.output.to_arguments());
     plant_arguments.extend(arguments.patience.to_arguments());
-    plant_arguments.extend(["--json".into(), "--started-by-run".into()]);
+    plant_arguments.push("--json".into());
     let host = arguments.host.to_possible_value();
     let host = host.as_ref().map_or("native", |host| host.get_name());
     plant_arguments.extend(["--host-name".into(), host.into()]);
     if arguments.host == Host::Serial {
         plant_arguments.push("--board-keeps-time".into());
     }
-    let mut plant = RunProcess::start(plant_arguments, &bus, Stdio::inherit())?;
+    let mut plant = RunProcess::start(plant_arguments, &bus, pair, Stdio::inherit())?;
     // The controller's messages are shown only if the plant has none; a log is shown at once.
     let stderr = if arguments.image.log {
         Stdio::inherit()
     } else {
         Stdio::piped()
     };
-    let mut controller = RunProcess::start(controller_arguments(arguments), &bus, stderr)?;
+    let mut controller = RunProcess::start(controller_arguments(arguments), &bus, pair, stderr)?;
 
     let status = watch(
         &mut plant,
@@ -296,8 +300,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     }
     if let Some(missed) = report.missed_deadlines.filter(|missed| *missed > 0) {
         warn(format_args!(
-            "real time was missed: {missed} of {} ticks came a whole tick or more late; end other programs or \
-             permit SCHED_FIFO",
+            "real time was missed: {missed} of {} ticks came a whole tick or more late; end other programs \
+             or lower run.tick_hz",
             report.ticks
         ));
     }
@@ -424,6 +428,9 @@ fn failure(status: ExitStatus) -> CommandError {
 }
 
 /// Prints a report as JSON or as a table.
+///
+/// # Errors
+/// [`CommandError::Output`] if the report cannot be written.
 pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
     let text = if json {
         serde_json::to_string(report).map_err(output)?

@@ -6,7 +6,7 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use painleve_link::BusName;
+use painleve_link::{BusName, Pair};
 use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
 
 use super::CommandError;
@@ -31,13 +31,14 @@ pub struct RunProcess {
 }
 
 impl RunProcess {
-    /// Starts this program with these arguments on a bus.
+    /// Starts this program with these arguments on a bus, as one of a pair.
     ///
     /// # Errors
     /// [`CommandError::Process`] if the process or the threads that read its output cannot be started.
     pub fn start(
         arguments: Vec<OsString>,
         bus: &BusName,
+        pair: Pair,
         stderr: Stdio,
     ) -> Result<Self, CommandError> {
         let program = std::env::current_exe()?;
@@ -45,6 +46,7 @@ impl RunProcess {
         command
             .args(arguments)
             .args(["--bus", bus.as_str()])
+            .args(["--pair", &pair.to_string()])
             .args(["--wait-s", START_WAIT_S])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())

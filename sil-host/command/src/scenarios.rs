@@ -26,6 +26,9 @@ pub struct ScenariosArguments {
 }
 
 /// Lists the built-in scenarios, or prints one of them or the schema.
+///
+/// # Errors
+/// [`CommandError`] if the scenario is invalid, or the output cannot be written.
 pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     if let Some(name) = &arguments.scenario {
         let scenario = Scenario::load(name, &arguments.overrides)?;

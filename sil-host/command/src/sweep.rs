@@ -17,6 +17,7 @@ use serde_json::json;
 
 use super::json::JsonOption;
 use super::output_error::output;
+use super::progress::Shown;
 use super::study::campaign::understand;
 use super::study::outcome::Threads;
 use super::{CommandError, say};
@@ -144,6 +145,10 @@ struct SlurmArguments {
 }
 
 /// Runs one step of a sweep.
+///
+/// # Errors
+/// [`CommandError`] if the sweep does not exist or is incomplete, a file cannot be written, or the user
+/// interrupts.
 pub fn run(arguments: &SweepArguments) -> Result<(), CommandError> {
     match &arguments.command {
         SweepCommand::Plan(arguments) => plan(arguments),
@@ -277,7 +282,9 @@ fn compute_shard(
         // An unwritable path is reported before anything is computed.
         atomic_file::AtomicFile::create(&path).map_err(output)?;
     }
-    let records = arguments.threads.compute(&name, &share)?;
+    let records = arguments
+        .threads
+        .compute(&name, &share, Shown::with_json(arguments.json))?;
     shard_file::write(folder, manifest, shard, share.rows(), &records)?;
     Ok(finished(true))
 }

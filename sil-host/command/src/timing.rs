@@ -60,6 +60,9 @@ pub struct TimingArguments {
 }
 
 /// Runs every scenario and reports the cost of its ticks.
+///
+/// # Errors
+/// [`CommandError`] if a scenario or image cannot be used, a run ends early, or a file cannot be written.
 pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
     if arguments.bound {
         let image = arguments.elf.clone();

@@ -26,10 +26,11 @@ pub mod slide;
 pub mod stages;
 
 use painleve_firmware::configuration::Converters;
+use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::mounting::Mounting;
-use painleve_shared::{Arm, LinkMotion, OutOfRange, Posture};
+use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Posture};
 
 pub use mistake::{Deviation, Mistake};
 use readings::Session;
@@ -168,10 +169,17 @@ impl Expected {
     /// [`OutOfRange`] if the arm is out of range.
     pub fn new(scenario: &Scenario, torque_limit_nm: f64) -> Result<Self, OutOfRange> {
         let configuration = scenario.controller_configuration();
+        let arm = ArmParameters {
+            // In double precision: unless another is measured, the corrected scenario has this height.
+            height_m: scenario
+                .arm_model
+                .map_or(scenario.arm.height_m, |model| as_written(model.height_m)),
+            ..configuration.arm.cast()
+        };
         let start = scenario.initial;
         let start = LinkMotion::new(start.theta1_deg.to_radians(), start.theta2_deg.to_radians());
         Ok(Self {
-            arm: Arm::new(configuration.arm.cast())?,
+            arm: Arm::new(arm)?,
             belt_tilt_rad: f64::from(configuration.arm.belt_tilt_rad),
             converters: configuration.converters,
             posture: Posture::of(&start),

@@ -53,6 +53,9 @@ impl<'a, R: Rig> Session<'a, R> {
     }
 
     /// Gives the operator a task.
+    ///
+    /// # Errors
+    /// [`CommissionError::Rig`] if the rig fails.
     pub fn instruct(
         &mut self,
         instruction: crate::OperatorTask,
@@ -66,6 +69,9 @@ impl<'a, R: Rig> Session<'a, R> {
     }
 
     /// Commands joint torques, N·m, limited, and returns the readings.
+    ///
+    /// # Errors
+    /// [`CommissionError::Rig`] if the rig fails.
     pub fn exchange(
         &mut self,
         torque_nm: JointTorque<f64>,
@@ -87,6 +93,9 @@ impl<'a, R: Rig> Session<'a, R> {
     }
 
     /// Returns the mean readings under a torque, after the arm has settled.
+    ///
+    /// # Errors
+    /// [`CommissionError::Rig`] if the rig fails, and [`CommissionError::Refused`] if a sensor is silent.
     pub fn mean(
         &mut self,
         torque_nm: JointTorque<f64>,

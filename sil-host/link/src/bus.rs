@@ -1,7 +1,8 @@
-//! Names of buses, which keep simultaneous runs apart.
+//! Names of buses, which keep simultaneous runs apart, and pairs, which keep strangers out of them.
 
 use std::fmt;
 use std::hash::{BuildHasher, Hasher, RandomState};
+use std::num::ParseIntError;
 use std::str::FromStr;
 
 use thiserror::Error;
@@ -18,8 +19,7 @@ impl BusName {
     /// random bits. The time would repeat after a step of the clock, and other PID namespaces
     /// have the same ids.
     pub fn unique() -> Self {
-        let random = RandomState::new().build_hasher().finish();
-        Self(format!("run-{}-{random:016x}", std::process::id()))
+        Self(format!("run-{}-{}", std::process::id(), Pair::unique()))
     }
 
     /// Returns the name as a string.
@@ -57,6 +57,34 @@ impl fmt::Display for BusName {
     }
 }
 
+/// Mark of a plant and a controller that were started for each other: 64 random bits.
+///
+/// A plant with a mark admits the controller with the same mark only, and that controller joins no
+/// other plant, whatever else starts on their bus at the same moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair(u64);
+
+impl Pair {
+    /// Draws a mark.
+    pub fn unique() -> Self {
+        Self(RandomState::new().build_hasher().finish())
+    }
+}
+
+impl FromStr for Pair {
+    type Err = ParseIntError;
+
+    fn from_str(text: &str) -> Result<Self, ParseIntError> {
+        u64::from_str_radix(text, 16).map(Self)
+    }
+}
+
+impl fmt::Display for Pair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -71,6 +99,13 @@ mod tests {
         for name in ["", "a b", "a/b", "é", "a\n", too_long.as_str()] {
             assert!(name.parse::<BusName>().is_err(), "{name:?}");
         }
+    }
+
+    #[test]
+    fn a_pair_is_read_back_as_it_was_written() {
+        let pair = Pair::unique();
+        assert_eq!(pair.to_string().parse(), Ok(pair));
+        assert_ne!(pair, Pair::unique());
     }
 
     #[test]

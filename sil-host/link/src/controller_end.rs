@@ -5,17 +5,18 @@ use std::time::{Duration, Instant};
 
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
+use super::bell::Bell;
 use super::claim::{Bus, Claim, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::lock_file::{LockFile, Role};
-use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
+use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, LOOK_INTERVAL, Patience, Silence};
 use super::place::Place;
 use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{
     Presence, Receiver, Sender, Services, Unavailable, receiver, sender, transport,
 };
 use super::session::{Announcement, Session, SessionMessage};
-use super::{BusName, LinkError};
+use super::{BusName, LinkError, Pair};
 use painleve_system::interrupt::Interrupt;
 
 /// Interval at which a waiting controller looks for a plant, long enough not to disturb the plant's
@@ -57,6 +58,7 @@ struct Ports {
     _services: Services,
     presence: Presence,
     _left: CallMark,
+    bell: Bell,
     /// Held while the run's shared memory is in use.
     _in_use: LockFile,
 }
@@ -71,7 +73,8 @@ enum Attempt {
 }
 
 impl ControllerEnd {
-    /// Joins the plant on `bus`, waiting at most `timeout` for it, and reads its session.
+    /// Joins the plant on `bus`, waiting at most `timeout` for it, and reads its session. With a
+    /// `pair`, it joins only the plant of that pair; without one, only a plant that belongs to none.
     ///
     /// # Errors
     /// [`LinkError::PlantMissing`] after `timeout`,
@@ -81,15 +84,17 @@ impl ControllerEnd {
     /// [`LinkError::Held`], [`LinkError::Transport`].
     pub fn open(
         bus: &BusName,
+        pair: Option<Pair>,
         timeout: Duration,
         interrupt: &Interrupt,
     ) -> Result<(Self, Session), LinkError> {
-        Self::open_in(Place::of_user()?, bus, timeout, interrupt)
+        Self::open_in(Place::of_user()?, bus, pair, timeout, interrupt)
     }
 
     pub(super) fn open_in(
         place: Place,
         bus: &BusName,
+        pair: Option<Pair>,
         timeout: Duration,
         interrupt: &Interrupt,
     ) -> Result<(Self, Session), LinkError> {
@@ -101,7 +106,7 @@ impl ControllerEnd {
         };
         let mut silence = Silence::default();
         loop {
-            match join(&bus, interrupt)? {
+            match join(&bus, pair, interrupt)? {
                 Attempt::Joined(end, session) => return Ok((*end, session)),
                 Attempt::NoPlant => silence = Silence::default(),
                 Attempt::NotReady => {
@@ -174,6 +179,7 @@ impl ControllerEnd {
 
     fn receive_before(&mut self, deadline: Option<Instant>) -> Result<Option<Received>, LinkError> {
         let mut known_gone = false;
+        let mut longest = LOOK_INTERVAL;
         loop {
             if let Some(frame) = self.take()? {
                 self.patience = Patience::new(self.silence_limit);
@@ -192,7 +198,13 @@ impl ControllerEnd {
                     bus: self.bus().clone(),
                 });
             }
-            match self.patience.pause() {
+            if let Some(deadline) = deadline {
+                longest = deadline.saturating_duration_since(Instant::now());
+                if longest.is_zero() {
+                    return Ok(None);
+                }
+            }
+            match self.patience.pause(&self.ports.bell, longest) {
                 AfterPause::Poll => {}
                 AfterPause::Look if self.interrupt.is_requested() => {
                     return Err(LinkError::Interrupted);
@@ -200,9 +212,6 @@ impl ControllerEnd {
                 // A frame sent just before the plant left still counts: poll once more.
                 AfterPause::Look => known_gone = !self.claim.peer_is_alive(),
                 AfterPause::GiveUp(silence) => return Err(self.silent_for(silence)),
-            }
-            if !known_gone && deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-                return Ok(None);
             }
         }
     }
@@ -217,7 +226,7 @@ impl ControllerEnd {
     pub fn send(&mut self, frame: &ActuatorFrame) -> Result<(), LinkError> {
         self.guardian
             .during(|| self.ports.actuator.send_copy(*frame))
-            .map(|_| ())
+            .map(|_| self.ports.bell.ring())
             .map_err(|cause| {
                 self.ports
                     .presence
@@ -258,7 +267,7 @@ impl ControllerEnd {
                 Some(Announcement::End) => return Ok(None),
                 None => {}
             }
-            match patience.pause() {
+            match patience.pause(&self.ports.bell, LOOK_INTERVAL) {
                 AfterPause::Poll => {}
                 AfterPause::Look if self.interrupt.is_requested() => {
                     return Err(LinkError::Interrupted);
@@ -280,16 +289,19 @@ impl ControllerEnd {
 }
 
 /// Tries to join the run of the plant on the bus.
-fn join(bus: &Bus, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
+fn join(bus: &Bus, pair: Option<Pair>, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
     let Some(lock) = bus.look().filter(|lock| lock.is_held(Role::Plant)) else {
         return Ok(Attempt::NoPlant);
     };
     let in_use = || LinkError::ControllerInUse {
         bus: bus.name.clone(),
     };
-    let Some(run) = RunFiles::ready(&bus.folder(), &bus.place) else {
+    let Some(run) = RunFiles::ready(&bus.folder(), &bus.place, pair) else {
+        // A stranger's plant and controller do not concern a pair, whose plant may yet come.
+        return if pair.is_some() {
+            Ok(Attempt::NoPlant)
         // Another controller has joined, or the plant is not ready yet.
-        return if lock.is_held(Role::Controller) {
+        } else if lock.is_held(Role::Controller) {
             Err(in_use())
         } else {
             Ok(Attempt::NotReady)
@@ -333,6 +345,7 @@ impl Ports {
                 return Err(transport(&bus.name, action, cause));
             }
         };
+        let bell = Bell::hang(&bus.name, &in_use, Role::Controller)?;
         let presence = Presence::new(&bus.name, run)?;
         let services = match Services::open(&presence) {
             Ok(services) => services,
@@ -348,6 +361,7 @@ impl Ports {
             _services: services,
             presence,
             _left: left,
+            bell,
             _in_use: in_use,
         }))
     }

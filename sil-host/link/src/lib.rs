@@ -27,6 +27,7 @@
 //! [`SensorFrame`]: painleve_shared::frame::SensorFrame
 //! [`ActuatorFrame`]: painleve_shared::frame::ActuatorFrame
 
+mod bell;
 mod bus;
 mod bus_drive;
 mod claim;
@@ -46,12 +47,14 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use bus::{BusName, InvalidBusName};
+pub use bus::{BusName, InvalidBusName, Pair};
 pub use bus_drive::BusDrive;
 pub use controller_end::{ControllerEnd, Received};
 pub use error::{FolderError, LinkError};
 pub use patience::DEFAULT_SILENCE_LIMIT;
 pub use plant_end::PlantEnd;
 pub use services::FRAME_BUFFER;
-pub use session::{CONFIGURATION_CAPACITY, ConfigurationTooLong, Pacing, Session};
+pub use session::{
+    CONFIGURATION_CAPACITY, ConfigurationTooLong, Pacing, Session, UnreadableConfiguration,
+};
 pub use survey::{BusState, SegmentState, Segments, Survey};

@@ -52,6 +52,11 @@ impl LockFile {
             .map(Self)
     }
 
+    /// Returns the file, for its contents.
+    pub(super) fn file(&self) -> &File {
+        &self.0
+    }
+
     /// Returns another handle to the same open file; both share its locks.
     pub(super) fn share(&self) -> io::Result<Self> {
         self.0.try_clone().map(Self)

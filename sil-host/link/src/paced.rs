@@ -12,12 +12,6 @@ use painleve_system::realtime::Pacer;
 
 use crate::PlantEnd;
 
-/// How long to poll for an answer without sleeping.
-const BUSY: Duration = Duration::from_micros(100);
-
-/// Sleep between two polls after that.
-const NAP: Duration = Duration::from_micros(50);
-
 /// The plant's end of the link with absolute deadlines.
 pub struct Paced {
     end: PlantEnd,
@@ -60,18 +54,15 @@ impl ControllerHost for Paced {
         let mut answer = None;
         let mut late_fault = None;
         let mut round_trip = self.period;
-        while start.elapsed() < self.patience {
-            match self.end.try_receive().map_err(HostError::new)? {
-                Some(received) if received.tick == frame.tick => {
-                    answer = Some(received);
-                    round_trip = start.elapsed();
-                    break;
-                }
-                // A late answer to a tick that was given up.
-                Some(late) => late_fault = late.latched_fault().map(|_| late),
-                None if start.elapsed() < BUSY => std::thread::yield_now(),
-                None => std::thread::sleep(NAP),
+        let deadline = start + self.patience;
+        while let Some(received) = self.end.receive_before(deadline).map_err(HostError::new)? {
+            if received.tick == frame.tick {
+                answer = Some(received);
+                round_trip = start.elapsed();
+                break;
             }
+            // A late answer to a tick that was given up.
+            late_fault = received.latched_fault().map(|_| received);
         }
         let late = self.pacer.wait().map_err(HostError::new)?;
         let nanoseconds = u64::try_from(late.as_nanos()).unwrap_or(u64::MAX);

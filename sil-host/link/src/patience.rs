@@ -1,24 +1,22 @@
-//! How an end waits for its peer: it spins briefly, then yields, then naps.
+//! How an end waits for its peer: it spins for a moment, then sleeps until the peer wakes it.
 //!
-//! On two idle cores the answer of a lockstep peer arrives during the spin, after about a
-//! microsecond. On a busy machine, and where the scheduler lets both ends share a core, a spin
-//! keeps the peer from running. The wait therefore soon yields the core, and naps if it lasts long
-//! (a real-time tick, an emulator, a debugger).
+//! On two idle processors the answer of a lockstep peer arrives during the spin, after about a
+//! microsecond. The spin is longer than a sleeper takes to wake up, so that one late answer does not
+//! put both ends to sleep for all further ones. Where both ends share a processor, a spin would keep
+//! the peer from running: there the wait sleeps at once.
 
 use std::time::{Duration, Instant};
+
+use super::bell::Bell;
 
 /// Default limit of a peer's silence; a longer silence is an error.
 pub const DEFAULT_SILENCE_LIMIT: Duration = Duration::from_millis(1500);
 
-/// Polls without a pause; they take some microseconds.
-const SPIN_POLLS: u32 = 200;
-/// Time spent yielding before the first nap.
-const YIELD_TIME: Duration = Duration::from_micros(200);
-/// Length of a nap; the kernel adds its timer slack, 50 µs unless the process is real-time.
-const NAP: Duration = Duration::from_micros(20);
+/// Polls of a spin; they take some 50 µs.
+const SPIN_POLLS: u32 = 1000;
 /// Interval between two checks whether the peer's process is alive. A check takes some tens of
-/// microseconds and allocates.
-const LOOK_INTERVAL: Duration = Duration::from_millis(50);
+/// microseconds and allocates. No sleep is longer.
+pub(super) const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 /// Longest time that one pause adds to the silence. A longer pause means that this process was
 /// stopped (Ctrl-Z, a debugger), most likely together with its peer, so the peer gets more time.
 const LONGEST_PAUSE: Duration = Duration::from_millis(100);
@@ -59,10 +57,51 @@ impl Silence {
     }
 }
 
+/// The pauses between the polls of one wait.
+#[derive(Default)]
+pub(super) struct Pauses {
+    polls: u32,
+    is_armed: bool,
+}
+
+impl Pauses {
+    /// Pauses for a few nanoseconds while this end spins; returns `false` once it should sleep.
+    #[inline]
+    fn spin(&mut self, bell: &Bell) -> bool {
+        if self.polls == 0 && !bell.peer_runs_elsewhere() {
+            self.polls = SPIN_POLLS;
+        }
+        let spins = self.polls < SPIN_POLLS;
+        if spins {
+            self.polls += 1;
+            std::hint::spin_loop();
+        }
+        spins
+    }
+
+    /// Sleeps at most `longest`, but only after one more poll, which finds a message that has
+    /// arrived before the bell was armed.
+    fn sleep(&mut self, bell: &Bell, longest: Duration) {
+        if self.is_armed {
+            bell.sleep(longest.min(LOOK_INTERVAL));
+        } else {
+            bell.arm();
+        }
+        self.is_armed = !self.is_armed;
+    }
+
+    /// Pauses once, at most `longest`.
+    pub(super) fn pause(&mut self, bell: &Bell, longest: Duration) {
+        if !self.spin(bell) {
+            self.sleep(bell, longest);
+        }
+    }
+}
+
 /// One wait, from the first unsuccessful poll to the answer.
 pub(super) struct Patience {
     limit: Duration,
-    polls: u32,
+    pauses: Pauses,
     /// Counted only after spinning; until then the clock is not read.
     silence: Silence,
 }
@@ -73,32 +112,27 @@ impl Patience {
     pub(super) fn new(limit: Duration) -> Self {
         Self {
             limit,
-            polls: 0,
+            pauses: Pauses::default(),
             silence: Silence::default(),
         }
     }
 
-    /// Pauses once and returns the next step.
+    /// Pauses once, at most `longest`, and returns the next step.
     #[inline]
-    pub(super) fn pause(&mut self) -> AfterPause {
-        if self.polls < SPIN_POLLS {
-            self.polls += 1;
-            std::hint::spin_loop();
+    pub(super) fn pause(&mut self, bell: &Bell, longest: Duration) -> AfterPause {
+        if self.pauses.spin(bell) {
             AfterPause::Poll
         } else {
-            self.pause_longer()
+            self.pause_longer(bell, longest)
         }
     }
 
     #[cold]
-    fn pause_longer(&mut self) -> AfterPause {
+    fn pause_longer(&mut self, bell: &Bell, longest: Duration) -> AfterPause {
         let next = self.silence.grow(self.limit);
         if let AfterPause::Poll = next {
-            if self.silence.total < YIELD_TIME {
-                std::thread::yield_now();
-            } else {
-                std::thread::sleep(NAP);
-            }
+            let left = self.limit.saturating_sub(self.silence.total);
+            self.pauses.sleep(bell, longest.min(left));
         }
         next
     }
@@ -107,14 +141,24 @@ impl Patience {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::BusName;
+    use crate::lock_file::{LockFile, Role};
+
+    /// A bell whose peer has never waited.
+    fn lonely_bell() -> Bell {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let lock = LockFile::open(file.path(), false).unwrap();
+        Bell::hang(&BusName::unique(), &lock, Role::Plant).unwrap()
+    }
 
     #[test]
     fn a_wait_checks_the_peer_and_then_gives_up() {
         let limit = Duration::from_millis(120);
+        let bell = lonely_bell();
         let mut patience = Patience::new(limit);
         let mut looks = 0;
         let silence = loop {
-            match patience.pause() {
+            match patience.pause(&bell, limit) {
                 AfterPause::Poll => {}
                 AfterPause::Look => looks += 1,
                 AfterPause::GiveUp(silence) => break silence,

@@ -8,15 +8,18 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use nix::sys::statvfs::statvfs;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
+use super::bell::Bell;
 use super::claim::{Bus, Claim, Taken, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::lock_file::{LockFile, Role};
-use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, Patience, Silence};
+use super::patience::{
+    AfterPause, DEFAULT_SILENCE_LIMIT, LOOK_INTERVAL, Patience, Pauses, Silence,
+};
 use super::place::{Place, SHARED_MEMORY};
 use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{Presence, Receiver, Sender, Services, receiver, sender, transport};
 use super::session::{Session, SessionMessage};
-use super::{BusName, LinkError};
+use super::{BusName, LinkError, Pair};
 use painleve_system::interrupt::Interrupt;
 
 /// Time allowed for the controller of a killed plant to leave the bus. It is shorter than the
@@ -38,6 +41,7 @@ pub struct PlantEnd {
     run: RunFiles,
     guardian: Guardian,
     claim: Claim,
+    pair: Option<Pair>,
     begin: SessionMessage,
     silence_limit: Duration,
     /// Silence of the controller in real time.
@@ -55,6 +59,7 @@ struct Ports {
     _services: Services,
     presence: Presence,
     _left: CallMark,
+    bell: Bell,
     /// Held while the run's shared memory is in use.
     _in_use: LockFile,
 }
@@ -64,6 +69,7 @@ impl Ports {
         let in_use = run
             .hold(Role::Plant)
             .map_err(|cause| transport(&bus.name, "mark its shared memory as in use", cause))?;
+        let bell = Bell::hang(&bus.name, &in_use, Role::Plant)?;
         let presence = Presence::new(&bus.name, run)?;
         let services = Services::create(&presence)?;
         let (leaving, left) = guardian.marks();
@@ -75,6 +81,7 @@ impl Ports {
             _services: services,
             presence,
             _left: left,
+            bell,
             _in_use: in_use,
         })
     }
@@ -84,7 +91,8 @@ impl PlantEnd {
     /// Creates the bus and announces `session` on it.
     ///
     /// First removes what killed processes left behind. The controller of a killed plant gets a
-    /// second to leave.
+    /// second to leave. With a `pair`, only its controller can join; without one, any controller
+    /// that belongs to no pair.
     ///
     /// # Errors
     /// [`LinkError::BusInUse`] if a plant is alive on the bus,
@@ -94,15 +102,17 @@ impl PlantEnd {
     /// [`LinkError::Transport`].
     pub fn create(
         bus: &BusName,
+        pair: Option<Pair>,
         session: &Session,
         interrupt: &Interrupt,
     ) -> Result<Self, LinkError> {
-        Self::create_in(Place::of_user()?, bus, session, interrupt)
+        Self::create_in(Place::of_user()?, bus, pair, session, interrupt)
     }
 
     pub(super) fn create_in(
         place: Place,
         bus: &BusName,
+        pair: Option<Pair>,
         session: &Session,
         interrupt: &Interrupt,
     ) -> Result<Self, LinkError> {
@@ -116,12 +126,13 @@ impl PlantEnd {
         let claim = take_over(&bus, interrupt)?;
         let guardian = Guardian::start(&claim)
             .map_err(|cause| transport(&bus.name, "start a thread", cause))?;
-        let (run, ports) = start_run(&bus, &guardian, &begin)?;
+        let (run, ports) = start_run(&bus, pair, &guardian, &begin)?;
         Ok(Self {
             ports,
             run,
             guardian,
             claim,
+            pair,
             begin,
             silence_limit: DEFAULT_SILENCE_LIMIT,
             silence: Silence::default(),
@@ -193,7 +204,7 @@ impl PlantEnd {
     fn restart(&mut self) -> Result<(), LinkError> {
         let bus = self.claim.bus();
         RunFiles::remove_half_made(&bus.folder(), &bus.place);
-        let (run, ports) = start_run(bus, &self.guardian, &self.begin)?;
+        let (run, ports) = start_run(bus, self.pair, &self.guardian, &self.begin)?;
         self.ports = ports;
         std::mem::replace(&mut self.run, run)
             .remove()
@@ -229,7 +240,7 @@ impl PlantEnd {
             if known_gone {
                 return Err(self.gone());
             }
-            match patience.pause() {
+            match patience.pause(&self.ports.bell, LOOK_INTERVAL) {
                 AfterPause::Poll => {}
                 AfterPause::Look if self.interrupt.is_requested() => {
                     return Err(LinkError::Interrupted);
@@ -249,6 +260,27 @@ impl PlantEnd {
     pub fn send(&mut self, frame: &SensorFrame) -> Result<(), LinkError> {
         self.deliver_session()?;
         self.send_to_controller(frame).map(|_| ())
+    }
+
+    /// Waits for the next answer until `deadline`; `None` if none has arrived by then.
+    ///
+    /// # Errors
+    /// As [`PlantEnd::try_receive`].
+    pub fn receive_before(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Option<ActuatorFrame>, LinkError> {
+        let mut pauses = Pauses::default();
+        loop {
+            if let Some(answer) = self.try_receive()? {
+                return Ok(Some(answer));
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            pauses.pause(&self.ports.bell, left);
+        }
     }
 
     /// Returns the next answer, if one has arrived. Call it until it returns `None` to get the
@@ -287,6 +319,7 @@ impl PlantEnd {
     fn deliver_session(&self) -> Result<(), LinkError> {
         self.guardian
             .during(|| self.ports.session.update_connections())
+            .map(|_| self.ports.bell.ring())
             .map_err(|cause| self.transport("announce the session", cause))
     }
 
@@ -294,6 +327,7 @@ impl PlantEnd {
     fn send_to_controller(&self, frame: &SensorFrame) -> Result<usize, LinkError> {
         self.guardian
             .during(|| self.ports.sensor.send_copy(*frame))
+            .inspect(|_| self.ports.bell.ring())
             .map_err(|cause| self.transport("send a sensor frame", cause))
     }
 
@@ -338,6 +372,7 @@ impl PlantEnd {
 /// Creates a run, announces its session and admits a controller.
 fn start_run(
     bus: &Bus,
+    pair: Option<Pair>,
     guardian: &Guardian,
     begin: &SessionMessage,
 ) -> Result<(RunFiles, Ports), LinkError> {
@@ -349,7 +384,7 @@ fn start_run(
     })?;
     run.reserve()
         .map_err(|cause| transport(&bus.name, "reserve its shared memory", cause))?;
-    run.set_ready().map_err(refuse)?;
+    run.set_ready(pair).map_err(refuse)?;
     Ok((run, ports))
 }
 
@@ -357,7 +392,7 @@ fn announce(ports: &Ports, message: SessionMessage) -> Result<(), LinkError> {
     ports
         .session
         .send_copy(message)
-        .map(|_| ())
+        .map(|_| ports.bell.ring())
         .map_err(|cause| ports.presence.transport("announce the session", cause))
 }
 

@@ -8,7 +8,8 @@
 //!
 //! | file in `<bus>/<run>/` | made                                                  |
 //! |------------------------|-------------------------------------------------------|
-//! | `ready`                | by the plant, when a controller may join              |
+//! | `ready`                | by the plant, when any controller may join            |
+//! | `ready-<pair>`         | instead, when only the one of its pair may            |
 //! | `joined`               | by the controller, before it touches anything         |
 //! | `answering`            | by the controller, when it is ready for frames        |
 //! | `nodes/`, `services/`  | by iceoryx2, with its segments in shared memory       |
@@ -31,7 +32,7 @@ use nix::fcntl::posix_fallocate;
 
 use super::lock_file::{LockFile, Role};
 use super::place::{Place, SHARED_MEMORY};
-use super::{FolderError, LinkError};
+use super::{FolderError, LinkError, Pair};
 
 /// Name of this program's own controllers.
 pub(super) const OWN_CONTROLLER: &str = "painleve";
@@ -64,11 +65,12 @@ impl RunFiles {
         Ok(Self::at(folder, place))
     }
 
-    /// Returns the run that waits for a controller on the bus, if there is one.
-    pub(super) fn ready(bus_folder: &Path, place: &Place) -> Option<Self> {
+    /// Returns the run on the bus that waits for a controller of this pair, if there is one.
+    pub(super) fn ready(bus_folder: &Path, place: &Place, pair: Option<Pair>) -> Option<Self> {
         let runs = all(bus_folder, place).unwrap_or_default();
+        let ready = ready_for(pair);
         runs.into_iter()
-            .find(|run| run.has(READY) && !run.has(JOINED))
+            .find(|run| run.has(&ready) && !run.has(JOINED))
     }
 
     fn at(folder: PathBuf, place: &Place) -> Self {
@@ -95,9 +97,9 @@ impl RunFiles {
         Ok(config)
     }
 
-    /// Admits a controller.
-    pub(super) fn set_ready(&self) -> io::Result<()> {
-        fs::write(self.folder.join(READY), "")
+    /// Admits a controller of this pair.
+    pub(super) fn set_ready(&self, pair: Option<Pair>) -> io::Result<()> {
+        fs::write(self.folder.join(ready_for(pair)), "")
     }
 
     /// Joins the run; returns `false` if another controller has joined it before.
@@ -216,6 +218,12 @@ impl RunFiles {
             }
         }
     }
+}
+
+/// Returns the name of the file that admits a controller. Controllers that belong to no pair look for
+/// the plain name.
+fn ready_for(pair: Option<Pair>) -> String {
+    pair.map_or_else(|| READY.into(), |pair| format!("{READY}-{pair}"))
 }
 
 fn all(folder: &Path, place: &Place) -> io::Result<Vec<RunFiles>> {

@@ -2,8 +2,10 @@
 //! frame.
 
 use iceoryx2::prelude::ZeroCopySend;
+use painleve_plant::Configuration;
+use painleve_plant::law_choice::build;
+use painleve_plant::scenario::Scenario;
 use serde::{Deserialize, Serialize};
-
 use thiserror::Error;
 
 /// Largest size of a session's configuration in bytes.
@@ -44,9 +46,53 @@ pub struct Session {
     pub tick_hz: u32,
     /// Pacing of the plant.
     pub pacing: Pacing,
-    /// The controller's configuration, encoded with postcard, at most
-    /// [`CONFIGURATION_CAPACITY`] bytes; the link does not interpret it.
+    /// The plant's build and the controller's configuration, encoded with postcard, at most
+    /// [`CONFIGURATION_CAPACITY`] bytes; the ends do not interpret it.
     pub configuration: Vec<u8>,
+}
+
+/// A controller cannot read the configuration that its plant has sent.
+#[derive(Debug, Error)]
+pub enum UnreadableConfiguration {
+    /// Controller and plant have been built from different sources.
+    #[error(
+        "the plant is build {plant:016x}, this controller build {:016x}: use the same program for both ends",
+        build()
+    )]
+    OtherBuild {
+        /// Build of the plant.
+        plant: u64,
+    },
+    /// It is not a configuration.
+    #[error(transparent)]
+    Malformed(#[from] postcard::Error),
+}
+
+impl Session {
+    /// Returns the session of a run of `scenario`.
+    ///
+    /// # Errors
+    /// If the controller's configuration cannot be encoded.
+    pub fn new(scenario: &Scenario, pacing: Pacing) -> Result<Self, postcard::Error> {
+        Ok(Self {
+            tick_hz: scenario.run.tick_hz,
+            pacing,
+            configuration: postcard::to_stdvec(&(build(), scenario.controller_configuration()))?,
+        })
+    }
+
+    /// Returns the controller's configuration. It is bytes without names, of which another build
+    /// might read a number as its neighbour; so the builds are compared first.
+    ///
+    /// # Errors
+    /// [`UnreadableConfiguration`].
+    pub fn controller(&self) -> Result<Configuration, UnreadableConfiguration> {
+        let (plant, configuration) = postcard::take_from_bytes(&self.configuration)?;
+        if plant != build() {
+            return Err(UnreadableConfiguration::OtherBuild { plant });
+        }
+        Ok(postcard::from_bytes(configuration)?)
+    }
 }
 
 /// Content of a session message after validation.
@@ -174,6 +220,24 @@ mod tests {
         documented!(SensorFrame: tick, sequence, joints, normal_force, tangential_force, inputs);
         documented!(ActuatorFrame: tick, sequence, torques, reference_tip, estimated_tip, state, fault, flags);
         documented!(SessionMessage: kind, tick_hz, pacing, length, configuration);
+    }
+
+    #[test]
+    fn the_configuration_of_another_build_is_refused() {
+        let scenario = Scenario::default();
+        let mut session = Session::new(&scenario, Pacing::Lockstep).unwrap();
+        assert_eq!(
+            session.controller().unwrap(),
+            scenario.controller_configuration()
+        );
+        let other = build().wrapping_add(1);
+        session.configuration =
+            postcard::to_stdvec(&(other, scenario.controller_configuration())).unwrap();
+        let error = session.controller().unwrap_err().to_string();
+        assert!(error.contains(&format!("build {other:016x}")), "{error}");
+        session.configuration.clear();
+        let error = session.controller();
+        assert!(matches!(error, Err(UnreadableConfiguration::Malformed(_))));
     }
 
     #[test]

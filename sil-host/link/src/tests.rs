@@ -28,6 +28,7 @@ const SHORT: Duration = Duration::from_millis(100);
 struct TestBus {
     name: BusName,
     place: Place,
+    pair: Option<Pair>,
     files: Option<Arc<Files>>,
 }
 
@@ -70,6 +71,7 @@ impl TestBus {
         Self {
             name,
             place: Place { folder, prefix },
+            pair: None,
             files: None,
         }
     }
@@ -78,6 +80,7 @@ impl TestBus {
         let mut plant = PlantEnd::create_in(
             self.place.clone(),
             &self.name,
+            self.pair,
             &session(),
             &Interrupt::default(),
         )?;
@@ -89,6 +92,7 @@ impl TestBus {
         let (mut controller, session) = ControllerEnd::open_in(
             self.place.clone(),
             &self.name,
+            self.pair,
             timeout,
             &Interrupt::default(),
         )?;

@@ -106,12 +106,12 @@ fn frames_cross_the_link_without_allocation_on_either_end() {
         pacing: Pacing::Lockstep,
         configuration: vec![7; 100],
     };
-    let mut plant = PlantEnd::create(&bus, &session, &Interrupt::default()).unwrap();
+    let mut plant = PlantEnd::create(&bus, None, &session, &Interrupt::default()).unwrap();
     plant.set_silence_limit(PATIENT);
 
     let controller = std::thread::spawn(move || {
         let (mut controller, _) =
-            ControllerEnd::open(&bus, PATIENT, &Interrupt::default()).unwrap();
+            ControllerEnd::open(&bus, None, PATIENT, &Interrupt::default()).unwrap();
         controller.set_silence_limit(PATIENT);
         let mut before = 0;
         let mut after = 0;

@@ -9,6 +9,7 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};
 
+use painleve_firmware::Configuration;
 use painleve_firmware::law::{Law, LawInput, LawOutput, LawSettings};
 use painleve_shared::OutOfRange;
 use painleve_shared::settings::{Bounds, Refused, SettingValue, Shape, ShapeSource};
@@ -22,18 +23,19 @@ static LAWS: OnceLock<LawSet> = OnceLock::new();
 #[derive(Clone, Copy)]
 struct LawSet {
     shape: Shape,
+    build: u64,
     default: fn() -> LawChoice,
     read: fn(&mut dyn erased_serde::Deserializer<'_>) -> erased_serde::Result<LawChoice>,
 }
 
 /// A set of laws that a scenario may name.
 pub trait ScenarioLaws:
-    Law<State: Send + 'static> + Serialize + DeserializeOwned + PartialEq + Send + Sync + 'static
+    Law<State: Send + Sync + 'static> + Serialize + DeserializeOwned + PartialEq + Send + Sync + 'static
 {
 }
 
 impl<L> ScenarioLaws for L where
-    L: Law<State: Send + 'static>
+    L: Law<State: Send + Sync + 'static>
         + Serialize
         + DeserializeOwned
         + PartialEq
@@ -49,10 +51,16 @@ pub fn install<L: ScenarioLaws>() {
     let _ = LAWS.set(LawSet::of::<L>());
 }
 
+/// Returns [`Configuration::BUILD`] with the laws of this program, which a board's must equal.
+pub fn build() -> u64 {
+    LawSet::installed().build
+}
+
 impl LawSet {
     fn of<L: ScenarioLaws>() -> Self {
         Self {
             shape: L::SHAPE,
+            build: Configuration::<L>::BUILD,
             default: || LawChoice::new(L::default()),
             read: |source| erased_serde::deserialize::<L>(source).map(LawChoice::new),
         }
@@ -165,13 +173,13 @@ impl Debug for LawChoiceState {
 }
 
 /// The state of a law as a trait object.
-trait AnyState: Debug + Send {
+trait AnyState: Debug + Send + Sync {
     fn inner(&self) -> &dyn Any;
     fn inner_mut(&mut self) -> &mut dyn Any;
     fn boxed(&self) -> Box<dyn AnyState>;
 }
 
-impl<S: Clone + Debug + Send + 'static> AnyState for S {
+impl<S: Clone + Debug + Send + Sync + 'static> AnyState for S {
     fn inner(&self) -> &dyn Any {
         self
     }

@@ -3,6 +3,7 @@
 //! - [`plant`]: the interface of a plant
 //! - [`mechanics`]: the arm on its belt, as a hybrid rigid-body model
 //! - [`converters`]: encoders, force cell, torque stages and the link's losses
+//! - [`decimal`]: settings in single precision as they were written
 //! - [`law_choice`]: the control law as a setting, from the program's set of laws
 //! - [`scenario`]: the complete definition of a run, as a TOML file
 //! - [`simulation`]: the plant with its converters, tick by tick
@@ -15,6 +16,7 @@
 pub mod closed_loop;
 pub mod controller_host;
 pub mod converters;
+pub mod decimal;
 pub mod law_choice;
 pub mod mechanics;
 pub mod plant;

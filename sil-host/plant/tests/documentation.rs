@@ -1,16 +1,23 @@
 //! Checks that the generated parts of the documentation are up to date.
 //!
 //! A part begins with `<!-- generated: NAME -->` and ends with `<!-- end -->`.
+//!
+//! Measured figures come from `docs/measured/FILE.toml`, where `cargo xtask measure` writes them:
+//! `<!-- measured: FILE.NAME.KEY -->0.148<!-- /measured -->` is one figure (`KEY:4` with four decimals),
+//! `<!-- measured: FILE -->` to `<!-- /measured -->` the table of a file.
 
 #![allow(clippy::unwrap_used)]
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
+use painleve_firmware::SOURCES;
 use painleve_plant::scenario::describe::settings_table;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::lapse::Lapse;
 use painleve_shared::status::Fault;
+use toml::{Table, Value};
 
 /// The sections of a scenario that do not belong to the controller.
 const SECTIONS: [&str; 10] = [
@@ -66,7 +73,8 @@ fn check(page: &str, name: &str, expected: &str) {
 
 /// One test for all parts, so that two parts of one page are not written at the same time.
 #[test]
-fn generated_parts_are_up_to_date() {
+fn generated_parts_and_measured_figures_are_up_to_date() {
+    check_measured_figures();
     check(
         "controller.md",
         "settings",
@@ -84,5 +92,232 @@ fn every_status_flag_is_documented() {
         let bit = flag.value().bits().trailing_zeros();
         let row = format!("| {bit} | `{}` |", flag.name());
         assert!(page.contains(&row), "no row {row}");
+    }
+}
+
+const END: &str = "<!-- /measured -->";
+
+/// What a result holds beside the figures that are columns of their own.
+const NO_COLUMN: [&str; 8] = [
+    "runs",
+    "successes",
+    "lower_percent",
+    "upper_percent",
+    "source",
+    "commit",
+    "date",
+    "machine",
+];
+
+/// A figure, or several of one command.
+struct Entry {
+    name: String,
+    label: String,
+    command: String,
+    result: Table,
+}
+
+/// Returns the README and the pages of the documentation.
+fn pages() -> Vec<PathBuf> {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folder = fs::read_dir(workspace.join("docs")).unwrap();
+    let mut pages: Vec<_> = folder.map(|entry| entry.unwrap().path()).collect();
+    pages.push(workspace.join("README.md"));
+    pages.retain(|page| page.extension().is_some_and(|it| it == "md"));
+    pages
+}
+
+/// Returns the entries of a file of measured figures that have a result.
+fn entries(file: &str) -> Vec<Entry> {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../docs/measured/{file}.toml"));
+    let text =
+        fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let table: Table = text.parse().unwrap();
+    let entries = table["measured"].as_array().unwrap().iter();
+    let entry = |entry: &Value| {
+        let [name, label, command] =
+            ["name", "label", "command"].map(|key| entry[key].as_str().unwrap().to_owned());
+        let result = entry.get("result")?.as_table()?.clone();
+        Some(Entry {
+            name,
+            label,
+            command,
+            result,
+        })
+    };
+    entries.filter_map(entry).collect()
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value
+        .as_float()
+        .or_else(|| value.as_integer().map(|whole| whole as f64))
+}
+
+fn thousands(whole: i64) -> String {
+    let digits = whole.to_string();
+    let grouped: Vec<_> = digits
+        .as_bytes()
+        .rchunks(3)
+        .rev()
+        .map(|chunk| str::from_utf8(chunk).unwrap())
+        .collect();
+    grouped.join(",")
+}
+
+/// Returns a value as a page prints it, a fraction with four significant digits unless told otherwise.
+fn printed(value: &Value, decimals: Option<usize>) -> String {
+    match value {
+        Value::Integer(whole) if decimals.is_none() => thousands(*whole),
+        Value::String(text) => text.clone(),
+        value => {
+            let value = number(value).unwrap();
+            let magnitude = if value == 0.0 {
+                0.0
+            } else {
+                value.abs().log10().floor()
+            };
+            let decimals = decimals.unwrap_or((3.0 - magnitude).max(0.0) as usize);
+            format!("{value:.decimals$}").replace('-', "−")
+        }
+    }
+}
+
+/// Returns the success of a campaign with its interval: `99.43 % (99.26–99.56 %)`.
+fn success(result: &Table) -> Option<String> {
+    let number = |key| number(result.get(key)?);
+    let (runs, successes) = (number("runs")?, number("successes")?);
+    let decimals = if runs < 10_000.0 { 1 } else { 2 };
+    let percent = |value: f64| match value {
+        100.0 => "100".to_string(),
+        value => format!("{value:.decimals$}"),
+    };
+    let [lower, upper] = ["lower_percent", "upper_percent"]
+        .map(number)
+        .map(Option::unwrap)
+        .map(percent);
+    Some(format!(
+        "{} % ({lower}–{upper} %)",
+        percent(successes / runs * 100.0)
+    ))
+}
+
+/// Returns the table of a file: a row for each entry, with its provenance.
+fn measured_table(entries: &[Entry]) -> String {
+    let first = entries.first().unwrap();
+    let keys = first.result.keys().map(String::as_str);
+    let figures: Vec<&str> = keys.filter(|key| !NO_COLUMN.contains(key)).collect();
+    let is_campaign = success(&first.result).is_some();
+    let mut columns: Vec<String> = figures.iter().map(|key| key.replace('_', " ")).collect();
+    if is_campaign {
+        columns.splice(0..0, ["success (95 % interval)", "runs"].map(String::from));
+        columns.push("seed".into());
+    }
+    columns.push("measured at commit".into());
+    let mut text = format!("| | {} |\n|---|", columns.join(" | "));
+    writeln!(text, "{}", "---|".repeat(columns.len())).unwrap();
+    for Entry {
+        label,
+        command,
+        result,
+        ..
+    } in entries
+    {
+        let cell = |key: &&str| {
+            result
+                .get(*key)
+                .map_or("–".into(), |value| printed(value, None))
+        };
+        let mut cells: Vec<String> = figures.iter().map(cell).collect();
+        if is_campaign {
+            cells.splice(0..0, [success(result).unwrap(), cell(&"runs")]);
+            let seed = command.split_once("--seed ").unwrap().1;
+            cells.push(seed.split(' ').next().unwrap().into());
+        }
+        cells.push(result["commit"].as_str().unwrap().into());
+        writeln!(text, "| {label} | {} |", cells.join(" | ")).unwrap();
+    }
+    text
+}
+
+/// Returns what stands in the block with this head, and the results that it shows.
+fn measured(head: &str) -> (String, Vec<Table>) {
+    let Some((file, rest)) = head.split_once('.') else {
+        let entries = entries(head);
+        let text = format!("\n\n{}\n", measured_table(&entries));
+        return (
+            text,
+            entries.into_iter().map(|entry| entry.result).collect(),
+        );
+    };
+    let (name, key) = rest
+        .rsplit_once('.')
+        .unwrap_or_else(|| panic!("{head} names no key"));
+    let (key, decimals) = match key.split_once(':') {
+        Some((key, decimals)) => (key, Some(decimals.parse().unwrap())),
+        None => (key, None),
+    };
+    let entry = entries(file).into_iter().find(|entry| entry.name == name);
+    let result = entry
+        .unwrap_or_else(|| panic!("{file}.toml has no result of '{name}'"))
+        .result;
+    let text = match key {
+        "success" => success(&result).unwrap_or_else(|| panic!("{file}.{name} is no campaign")),
+        key => printed(
+            result
+                .get(key)
+                .unwrap_or_else(|| panic!("{file}.{name} has no {key}")),
+            decimals,
+        ),
+    };
+    (text, vec![result])
+}
+
+/// Returns a page with its measured blocks as their files have them.
+fn with_measured_figures(page: &str) -> String {
+    let (mut text, mut rest) = (String::new(), page);
+    let mut shown = Vec::new();
+    while let Some((before, after)) = rest.split_once("<!-- measured: ") {
+        let (head, content) = after.split_once(" -->").unwrap();
+        let (present, after) = content.split_at(content.find("<!-- ").unwrap());
+        text += &format!("{before}<!-- measured: {head} -->");
+        // Blocks with another end belong to the tests that measure them.
+        if after.starts_with(END) {
+            let (figures, results) = measured(head);
+            text += &figures;
+            shown.extend(results.into_iter().map(|result| (head, result)));
+        } else {
+            text += present;
+        }
+        rest = after;
+    }
+    text += rest;
+    let states_commits = text.contains("easured at commit");
+    for (head, result) in shown {
+        let [source, commit] = ["source", "commit"].map(|key| result[key].as_str().unwrap());
+        assert!(
+            source == format!("{SOURCES:016x}") || states_commits && text.contains(commit),
+            "{head} was measured with other sources, at commit {commit}: measure it again with `cargo xtask measure`, or \
+             write 'measured at commit {commit}' on its page"
+        );
+    }
+    text
+}
+
+fn check_measured_figures() {
+    for page in pages() {
+        let present = fs::read_to_string(&page).unwrap();
+        let expected = with_measured_figures(&present);
+        if present == expected {
+            continue;
+        }
+        assert!(
+            std::env::var_os("UPDATE_DOCUMENTATION").is_some(),
+            "{}: a measured figure is not that of docs/measured; update it with:\n\
+             UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant --test documentation",
+            page.display()
+        );
+        fs::write(&page, expected).unwrap();
     }
 }

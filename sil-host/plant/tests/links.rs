@@ -1,5 +1,5 @@
-//! Checks that relative links in the README and in `docs/` lead to existing files and headings, and that
-//! the names of settings and tests in these pages occur in the source.
+//! Checks that relative links of the pages in the root and in `docs/` lead to existing files and headings, that paths in these
+//! pages exist, that the names of settings and tests occur in the source, and that the pages stay short.
 
 #![allow(clippy::unwrap_used)]
 
@@ -14,16 +14,24 @@ fn workspace() -> PathBuf {
         .unwrap()
 }
 
-/// Returns the README and all pages of the documentation.
+/// Returns the pages of the documentation and those beside the README.
 fn pages() -> Vec<PathBuf> {
-    let mut pages = vec![workspace().join("README.md")];
-    for entry in fs::read_dir(workspace().join("docs")).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_some_and(|extension| extension == "md") {
-            pages.push(path);
+    let mut pages = Vec::new();
+    for folder in [workspace(), workspace().join("docs")] {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "md") {
+                pages.push(path);
+            }
         }
     }
     pages
+}
+
+/// Returns the pages of the lab book, which keeps what was tried.
+fn lab_book() -> Vec<PathBuf> {
+    let folder = fs::read_dir(workspace().join("docs/lab-book")).unwrap();
+    folder.map(|entry| entry.unwrap().path()).collect()
 }
 
 /// Returns the text of a page without its code blocks.
@@ -54,7 +62,7 @@ fn anchors(page: &Path) -> BTreeSet<String> {
 #[test]
 fn relative_links_lead_to_existing_files_and_headings() {
     let mut broken = Vec::new();
-    for page in pages() {
+    for page in pages().into_iter().chain(lab_book()) {
         let text = prose(&page);
         for part in text.split("](").skip(1) {
             let target = part.split(')').next().unwrap();
@@ -77,6 +85,44 @@ fn relative_links_lead_to_existing_files_and_headings() {
         }
     }
     assert!(broken.is_empty(), "broken links: {broken:#?}");
+}
+
+/// Collects the paths of all files and folders below a folder, without those that a build or a run makes.
+fn collect_paths(folder: &Path, paths: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if ["target", "out", ".git"].contains(&name.as_str()) {
+            continue;
+        }
+        if path.is_dir() {
+            collect_paths(&path, paths);
+        }
+        paths.push(path);
+    }
+}
+
+/// A path is a word with a slash in backticks, such as `firmware/src/lib.rs`, or the name of a Rust file. It may begin in
+/// any folder. Paths of the system, of the output and of what somebody is told to add are left out.
+#[test]
+fn paths_in_the_pages_exist() {
+    let mut paths = Vec::new();
+    collect_paths(&workspace(), &mut paths);
+    let mut missing = Vec::new();
+    for page in pages() {
+        for name in prose(&page).split('`').skip(1).step_by(2) {
+            let is_path = (name.contains('/') || name.ends_with(".rs"))
+                && !["/", "out/", "target/"]
+                    .iter()
+                    .any(|it| name.starts_with(it))
+                && !name.contains([' ', '<', ':'])
+                && !["NAME", "FAMILY"].iter().any(|it| name.contains(it));
+            if is_path && !paths.iter().any(|path| path.ends_with(name)) {
+                missing.push(format!("{}: {name}", page.display()));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "these paths do not exist: {missing:#?}");
 }
 
 /// Collects the text of all source files below a folder.
@@ -155,5 +201,66 @@ fn no_formula_begins_an_emphasis() {
         wrong.is_empty(),
         "write a space after these underscores:\n{}",
         wrong.join("\n")
+    );
+}
+
+/// The number of words that `docs/` may have, without the lab book.
+const MOST_WORDS: usize = 26_000;
+
+/// Returns the number of words that a reader meets: those of prose and tables, but neither code blocks, nor displayed
+/// formulas, nor the marks of generated blocks.
+fn words(page: &Path) -> usize {
+    let text = prose(page);
+    let text: String = text.split("$$").step_by(2).collect();
+    let text: String = text
+        .split("<!--")
+        .map(|part| part.split_once("-->").map_or(part, |(_, after)| after))
+        .collect();
+    let is_word = |word: &&str| word.contains(char::is_alphanumeric);
+    text.split_whitespace().filter(is_word).count()
+}
+
+/// A reader who has to find something among more words does not. History belongs to the lab book.
+#[test]
+fn the_pages_stay_short() {
+    let docs = workspace().join("docs");
+    let in_docs = |page: &PathBuf| page.starts_with(&docs);
+    let sum: usize = pages()
+        .iter()
+        .filter(|page| in_docs(page))
+        .map(|page| words(page))
+        .sum();
+    assert!(
+        sum <= MOST_WORDS,
+        "{sum} words in docs/, more than {MOST_WORDS}"
+    );
+    for name in ["studies.md", "beyond-the-paper.md"] {
+        let words = words(&docs.join(name));
+        assert!(words <= 3_500, "{words} words in docs/{name}");
+    }
+}
+
+/// A range takes an en dash, "99.2–99.5 %", or "to" beside a sign.
+#[test]
+fn no_ellipsis_stands_between_two_numbers() {
+    let mut wrong = Vec::new();
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for (at, _) in text.match_indices(" … ") {
+            let before = text[..at]
+                .split_whitespace()
+                .next_back()
+                .unwrap_or_default();
+            let after = text[at + " … ".len()..].trim_start_matches(['−', '-', '±']);
+            let is_number = |text: &str| text.contains(|c: char| c.is_ascii_digit());
+            if is_number(before) && after.starts_with(|c: char| c.is_ascii_digit()) {
+                let line = text[..at].matches('\n').count() + 1;
+                wrong.push(format!("{}:{line}: {before} …", page.display()));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "write a range with an en dash: {wrong:#?}"
     );
 }

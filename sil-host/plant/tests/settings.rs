@@ -24,8 +24,8 @@ fn right(shape: &Shape, range: Option<Range>) -> Value {
     match shape {
         Shape::Switch => Value::Boolean(true),
         Shape::Text => Value::String("text".into()),
-        Shape::Integer => Value::Integer(range.map_or(1, |range| range.minimum as i64)),
-        Shape::Number => Value::Float(range.map_or(1.0, |range| range.minimum)),
+        Shape::Integer(_) => Value::Integer(range.map_or(1, |range| range.minimum as i64)),
+        Shape::Number(_) => Value::Float(range.map_or(1.0, |range| range.minimum)),
         Shape::Optional(inner) => right(inner, range),
         Shape::Array { item, length } => Value::Array(vec![right(item, range); *length]),
         Shape::Group(_) | Shape::List { .. } | Shape::Choice { .. } | Shape::AtRunTime(_) => {
@@ -43,8 +43,8 @@ fn wrong(
 ) -> Vec<Wrong> {
     match shape {
         Shape::Switch | Shape::Text => Vec::new(),
-        Shape::Integer | Shape::Number => {
-            let whole = *shape == Shape::Integer;
+        Shape::Integer(_) | Shape::Number(_) => {
+            let whole = matches!(shape, Shape::Integer(_));
             let Some(range) = range else {
                 assert!(whole, "{key} has no range");
                 return Vec::new();

@@ -178,8 +178,8 @@ pub const ACTUATOR: Topic = Topic {
         fault: Text = fault_name(sample);
         /// Number of the latched fault, 0 for none.
         fault_number: Whole = sample.actuator.fault.into();
-        /// Flags, one bit each: 1 contact, 2 torque saturated, 4 reference done, 8 guarded,
-        /// 16 at edge, 32 recovering, 64 slip negative, 128 sticks.
+        /// Flags, one bit each: 1 contact, 2 torque saturated, 4 reference done, 16 at edge,
+        /// 32 recovering, 64 slip negative, 128 sticks.
         flags: Whole = sample.actuator.flags.0.into();
         /// Whether this frame answers this tick; otherwise it is the last answer.
         answered: Truth = sample.answered;
@@ -238,12 +238,8 @@ pub const ESTIMATES: Topic = Topic {
         at_edge: Truth = now.at_edge;
         /// Whether the tip is being returned to the belt.
         recovering: Truth = now.recovering;
-        /// Whether the contact guard changed the torque.
-        guarded: Truth = now.guarded;
         /// Whether the torque was limited.
         saturated: Truth = now.saturated;
-        /// Number of ticks since the start in which the contact guard acted; wraps.
-        guarded_ticks: Whole = now.guarded_ticks.into();
         /// Number of ticks since the start with limited torque; wraps.
         saturated_ticks: Whole = now.saturated_ticks.into();
     },

@@ -61,9 +61,8 @@ mod flag {
 
     pub(super) const AT_EDGE: u16 = 1 << 9;
     pub(super) const RECOVERING: u16 = 1 << 10;
-    pub(super) const GUARDED: u16 = 1 << 11;
-    pub(super) const IMPACT: u16 = 1 << 12;
-    pub(super) const IMPACT_WITHOUT_COLLISION: u16 = 1 << 13;
+    pub(super) const IMPACT: u16 = 1 << 11;
+    pub(super) const IMPACT_WITHOUT_COLLISION: u16 = 1 << 12;
 }
 
 type RunBin = Bin<{ signal::COUNT }>;
@@ -124,7 +123,6 @@ impl RunPlot {
         for (status, flag) in [
             (StatusFlags::AT_EDGE, flag::AT_EDGE),
             (StatusFlags::RECOVERING, flag::RECOVERING),
-            (StatusFlags::GUARDED, flag::GUARDED),
         ] {
             if answer.flags.contains(status) {
                 flags |= flag;

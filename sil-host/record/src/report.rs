@@ -26,12 +26,12 @@ pub struct DurationPercentiles {
 impl DurationPercentiles {
     /// Returns the percentiles of a histogram of nanoseconds.
     pub fn of_ns(histogram: &Histogram<u64>) -> Self {
-        let at = |quantile| histogram.value_at_quantile(quantile) as f64 * 1e-3;
+        let at = |quantile| histogram.value_at_quantile(quantile) as f64 / 1e3;
         Self {
             p50: at(0.5),
             p99: at(0.99),
             p999: at(0.999),
-            max: histogram.max() as f64 * 1e-3,
+            max: histogram.max() as f64 / 1e3,
         }
     }
 }
@@ -136,7 +136,9 @@ impl RunReport {
             max_tip_t_m: statistics.max_tip_t_m,
             final_tip_t_m: result.final_tip_t_m,
             final_reference_m: result.final_reference_m,
-            requested_target_m: requested_target_m(scenario),
+            requested_target_m: scenario
+                .target_m()
+                .filter(|_| scenario.controller.law.name() != "off"),
             min_normal_force_n: force.is_finite().then_some(force),
             peak_torque_nm: statistics.peak_torque_nm,
             contact_fraction: statistics.contact_fraction(),
@@ -178,7 +180,7 @@ impl RunReport {
         row(
             "impacts",
             format!(
-                "{} and {} without collision",
+                "{} ({} without collision)",
                 self.impacts, self.impacts_without_collision
             ),
         );
@@ -245,16 +247,6 @@ impl RunReport {
         }
         table.to_string()
     }
-}
-
-/// Returns the end of the scenario's reference, m; `None` without a law or a target.
-fn requested_target_m(scenario: &Scenario) -> Option<f64> {
-    let controller = &scenario.controller;
-    let segments = controller.reference.segments.iter();
-    let target = segments.rev().find_map(|segment| segment.target_m());
-    target
-        .map(f64::from)
-        .filter(|_| controller.law.name() != "off")
 }
 
 fn microseconds(percentiles: &DurationPercentiles) -> String {

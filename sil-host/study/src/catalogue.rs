@@ -1,6 +1,4 @@
-//! The list of studies, shared by the command line, sweeps and the page of figures.
-
-use std::sync::LazyLock;
+//! What command line, sweeps and the page of figures need of a study, whatever its type.
 
 use clap::{ArgMatches, Args, Command};
 use comfy_table::Table;
@@ -11,36 +9,10 @@ use crate::outcome::{self, Figure, Outcome};
 use crate::tabular::{self, Tabular};
 use crate::{Study, StudyError, rows};
 
-inventory::collect!(CatalogueEntry);
-
-/// Every study, in the order of the command's help and of the page. Each registers itself beside its
-/// options, with [`register_study!`](crate::register_study!).
-pub static STUDIES: LazyLock<Vec<&'static CatalogueEntry>> = LazyLock::new(|| {
-    let mut all: Vec<_> = inventory::iter::<CatalogueEntry>().collect();
-    all.sort_by_key(|entry| (entry.order, entry.name));
-    all
-});
-
-/// Adds a study to the catalogue, given the type of its options. Works in any crate that is linked to
-/// the command.
-#[macro_export]
-macro_rules! register_study {
-    ($options:ty) => {
-        $crate::catalogue::inventory::submit! {
-            $crate::catalogue::CatalogueEntry::of::<$options>()
-        }
-    };
-}
-
-#[doc(hidden)]
-pub use inventory;
-
 /// A study as its options define it. The doc comment of the type is its line in the command's help.
 pub trait StudyOptions: Args + Sync + 'static {
     /// The study's name on the command line.
     const NAME: &'static str;
-    /// Place in the command's help and on the page of figures: the lower, the earlier.
-    const ORDER: u32;
     /// [`in_shards`] if a sweep can compute the study in shards.
     const IN_SHARDS: Option<InShards<Self::Study>> = None;
     /// The study.
@@ -86,8 +58,6 @@ pub fn in_shards<S: Tabular + 'static>(study: S) -> Box<dyn tabular::Table> {
 pub struct CatalogueEntry {
     /// Its name on the command line.
     pub name: &'static str,
-    /// Its place in the list.
-    order: u32,
     /// Adds the study's options and its help line to a command.
     pub augment: fn(Command) -> Command,
     /// Whether a sweep can compute the study in shards.
@@ -109,17 +79,11 @@ impl CatalogueEntry {
     pub const fn of<O: StudyOptions>() -> Self {
         Self {
             name: O::NAME,
-            order: O::ORDER,
             augment: O::augment_args,
             has_shards: O::IN_SHARDS.is_some(),
             read: |matches| Ok(Box::new(O::from_arg_matches(matches)?)),
             sections: O::sections,
         }
-    }
-
-    /// Returns the study with this name.
-    pub fn find(name: &str) -> Option<&'static Self> {
-        STUDIES.iter().copied().find(|entry| entry.name == name)
     }
 
     /// Returns the study as a subcommand.
@@ -170,7 +134,7 @@ impl<O: StudyOptions> AnyOptions for O {
     }
 }
 
-/// Called after every row.
+/// Called after every row. A panic in it ends the study.
 pub type Progress<'a> = &'a (dyn Fn() + Sync);
 
 /// Any study.

@@ -25,7 +25,7 @@
 //!
 //! Each study is a folder: `mod.rs` holds its settings and rows, `options.rs` parses the settings
 //! from the command line, `outcome.rs` collects the rows, `figure.rs` draws them, and `page.rs`
-//! compares them with the paper. The [`catalogue`] lists all studies.
+//! compares them with the paper. [`studies`] lists them all.
 //!
 //! A study is a list of independent rows ([`Study`]), which
 //! can be computed in any order, on any number of threads, or in shards.
@@ -63,6 +63,7 @@ pub mod robustness;
 pub mod settled;
 pub mod sliding_range;
 pub mod stiffness;
+pub mod studies;
 pub mod sweep;
 pub mod tabular;
 pub mod trial;
@@ -86,7 +87,7 @@ pub enum StudyError {
     #[error(transparent)]
     Grid(#[from] GridError),
     /// An override sets a key that an option of the study sets.
-    #[error("--set {key} has no effect here; use {option}")]
+    #[error("{key} has no effect here; use {option}")]
     Taken {
         /// The key.
         key: String,
@@ -177,7 +178,7 @@ pub(crate) fn combinations(counts: &[usize]) -> usize {
 }
 
 /// Computes all rows in order on the threads of the current rayon pool; `done` is
-/// called after each row.
+/// called after each row, and no further row begins once it has panicked.
 ///
 /// # Errors
 /// [`StudyError::TooManyRows`], or the error of the first row that fails, whatever the number of threads.
@@ -189,6 +190,7 @@ pub fn rows<S: Study>(study: &S, done: impl Fn() + Sync) -> Result<Vec<S::Row>, 
         .into_par_iter()
         // The cost of rows varies widely.
         .with_max_len(1)
+        .panic_fuse()
         .map(|index| {
             let row = study.row(index);
             done();
@@ -252,5 +254,20 @@ mod tests {
             let error = pool.install(|| rows(&Squares, || ())).unwrap_err();
             assert_eq!(error.to_string(), "z_t = 30 m is out of reach");
         }
+    }
+
+    #[test]
+    fn no_row_begins_after_a_panic_of_the_progress() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let interrupt = || {
+            done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            std::panic::resume_unwind(Box::new("interrupted"));
+        };
+        let study = || pool.unwrap().install(|| rows(&First(30), interrupt));
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(study));
+        assert!(outcome.is_err());
+        // Each of the two threads may have begun one.
+        assert!(done.into_inner() <= 2);
     }
 }

@@ -218,16 +218,25 @@ impl From<PostureOption> for Posture {
 }
 
 /// A length on the command line.
+///
+/// # Errors
+/// The allowed range, if the text is no number within it: 1 µm to 1 m.
 pub fn metres(text: &str) -> Result<f64, String> {
     positive(text, 1e-6, 1.0, "metres")
 }
 
 /// A duration on the command line.
+///
+/// # Errors
+/// The allowed range, if the text is no number within it: 1 ms to 10⁶ s.
 pub fn seconds(text: &str) -> Result<f64, String> {
     positive(text, 1e-3, 1e6, "seconds")
 }
 
 /// A level of an effect on the command line. The range of its key is checked by the scenario.
+///
+/// # Errors
+/// The allowed range, if the text is no finite number of at least 0.
 pub fn level(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(level) if level.is_finite() && level >= 0.0 => Ok(level),
@@ -236,6 +245,9 @@ pub fn level(text: &str) -> Result<f64, String> {
 }
 
 /// A number of runs on the command line.
+///
+/// # Errors
+/// The allowed range, if the text is no number within it: 1 to 10,000,000.
 pub fn runs(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(runs @ 1..=10_000_000) => Ok(runs),

@@ -252,10 +252,9 @@ fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
 }
 
 /// Without any force reading, so that friction and the belt speed must be given.
-const NO_FORCE_CELL: [&str; 8] = [
+const NO_FORCE_CELL: [&str; 7] = [
     "controller.contact.evidence=encoders",
     "controller.law.hybrid.friction={ model = { friction = 0.6, belt_speed_m_s = -0.4 } }",
-    "controller.law.hybrid.force_integral_gain_per_s=0",
     "controller.disturbance.enabled=false",
     "converters.force={ range_n = 0.01, noise_n = 0.0 }",
     "controller.contact.contact_n=0.005",

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use painleve_study::catalogue::{CatalogueEntry, STUDIES};
 use painleve_study::figures::page_maker::{Fineness, PageMaker};
+use painleve_study::studies::{self, STUDIES};
 
 /// Returns the CSV rows that a printed command computes, header first.
 fn rows(command: &str) -> Vec<String> {
@@ -11,7 +11,7 @@ fn rows(command: &str) -> Vec<String> {
     let ["painleve", "study", name, options @ ..] = words.as_slice() else {
         panic!("{command} is not a study");
     };
-    let entry = CatalogueEntry::find(name).unwrap();
+    let entry = studies::find(name).unwrap();
     let parser = entry.command().no_binary_name(true);
     let matches = parser.try_get_matches_from(options).unwrap();
     let study = (entry.read)(&matches).unwrap().study().unwrap();
@@ -30,7 +30,7 @@ fn every_printed_command_reproduces_the_rows_of_its_section() {
         progress: &|_, _| Box::new(|| ()),
     };
     let mut sections = 0;
-    for study in STUDIES.iter() {
+    for study in &STUDIES {
         for (section, outcome) in (study.sections)(&page).unwrap() {
             let mut found: Vec<String> = Vec::new();
             for command in &section.commands {

@@ -29,7 +29,6 @@ class Page {
       ["fault", [["none", ""], ["latched", "--purple"]], (c, i) => (c.fault[i] ? 1 : 0)],
       flag("at edge", "--red", FLAGS.edge),
       flag("recovering", "--orange", FLAGS.recovering),
-      flag("guarded", "--sky", FLAGS.guarded),
     ].map(([label, kinds, kindOf]) => new Ribbon($("ribbons"), label, kinds, kindOf, this.columns, seek));
     this.charts = new Charts($("charts"), this.columns, seek, () => this.drawRibbons());
     this.controls();

@@ -4,7 +4,7 @@
 /** Modes of contact, states of the controller: names by number, with the colour's CSS variable. */
 const MODES = [["flight", "--red"], ["slide +", "--blue"], ["slide −", "--sky"], ["stick", "--green"]];
 const STATES = [["idle", "--faint"], ["armed", "--orange"], ["tracking", "--green"], ["lift-off", "--red"], ["fault", "--purple"]];
-const FLAGS = { contact: 1, saturated: 2, done: 4, guarded: 8, edge: 16, recovering: 32, negative: 64, sticks: 128 };
+const FLAGS = { contact: 1, saturated: 2, done: 4, edge: 16, recovering: 32, negative: 64, sticks: 128 };
 
 /** Columns that follow from others. */
 const DERIVED = ["friction_low", "friction_high"];

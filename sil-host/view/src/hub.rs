@@ -13,7 +13,7 @@ use painleve_record::events::RunEvent;
 use painleve_record::scene::Scene;
 use serde_json::{Value, json};
 
-use crate::foxglove::parameters::Parameter;
+use crate::parameters::Parameter;
 
 /// Most viewers of each kind at once.
 const MOST_VIEWERS: usize = 8;

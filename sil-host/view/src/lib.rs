@@ -6,6 +6,7 @@
 //! - [`server`]: the viewers of a live run on this machine: the same page, and Foxglove
 //! - [`access`]: who may be one; `connection`: a connection until it is
 //! - [`hub`], [`request`]: data on their way to the viewers, and their requests
+//! - [`parameters`]: the settings of a live run, by name
 //! - [`foxglove`]: Foxglove's WebSocket protocol
 //!
 //! `page/` contains the page itself; its scripts need no build step.
@@ -15,6 +16,8 @@ mod connection;
 pub mod foxglove;
 pub mod hub;
 pub mod page;
+pub mod parameters;
+mod receive;
 pub mod request;
 pub mod row;
 pub mod server;

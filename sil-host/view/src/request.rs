@@ -210,7 +210,7 @@ mod tests {
         desk.send(ViewerRequest::Pause).unwrap();
         desk.send(set("a", 7)).unwrap();
         desk.send(set("b", 8)).unwrap();
-        let mut next = || orders.next(Duration::ZERO).map(|order| order.request);
+        let next = || orders.next(Duration::ZERO).map(|order| order.request);
         assert_eq!(next(), Some(set("a", 999)));
         assert_eq!(next(), Some(ViewerRequest::Pause));
         assert_eq!(next(), Some(set("a", 7)));

@@ -5,7 +5,7 @@
 //! viewer has a thread of its own, which sends about 60 times a second what the run has published to the
 //! [`Hub`].
 
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -21,6 +21,7 @@ use crate::access::{Access, Token};
 use crate::connection::{Connection, PATIENCE};
 use crate::foxglove;
 use crate::hub::{Hub, PageQueue, locked};
+use crate::receive::receive;
 use crate::request::{Desk, Orders};
 
 /// Time between two messages to a viewer.
@@ -236,22 +237,6 @@ fn reason(status: StatusCode) -> &'static str {
         }
         StatusCode::NOT_FOUND => "There is nothing at this address.\n",
         _ => "This is not a request for a page or a WebSocket.\n",
-    }
-}
-
-/// Waits for a viewer's message until it is time to send to it.
-pub(crate) fn receive(
-    socket: &mut WebSocket<TcpStream>,
-) -> Result<Option<Message>, tungstenite::Error> {
-    match socket.read() {
-        Ok(Message::Close(_)) => Err(tungstenite::Error::ConnectionClosed),
-        Ok(message) => Ok(Some(message)),
-        Err(tungstenite::Error::Io(error))
-            if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
-        {
-            Ok(None)
-        }
-        Err(error) => Err(error),
     }
 }
 

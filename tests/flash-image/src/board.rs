@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use painleve_firmware::BUILD;
 use painleve_parts::{As5048a, BridgeAmplifier, Mcp3304, SpiPart, Transfer};
+use painleve_plant::law_choice::build;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox};
@@ -312,7 +312,7 @@ impl<C: BoardChip> EmulatedBoard<C> {
     /// Sends a configuration encoded with postcard.
     pub fn configure(&mut self, source: FrameSource, configuration: &[u8]) -> Option<Response> {
         self.send(&Request::Configure {
-            build: BUILD,
+            build: build(),
             source,
             configuration,
         });

@@ -7,11 +7,11 @@ use std::convert::Infallible;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use painleve_drivers::slots::Slots;
-use painleve_firmware::BUILD;
 use painleve_flash_image::bench::{Bench, encoded, scenario};
 use painleve_flash_image::board::{BoardChip, ENABLE, EmulatedBoard, F405, G474, RESET};
 use painleve_flash_image::machine::Reset;
 use painleve_flash_image::{MILLISECOND, Picoseconds, SECOND};
+use painleve_plant::law_choice::build;
 use painleve_shared::message::{Request, Response};
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 
@@ -37,7 +37,7 @@ fn ask<C: BoardChip>(board: &mut EmulatedBoard<C>, request: &Request<'_>) -> Opt
 fn store<C: BoardChip>(board: &mut EmulatedBoard<C>, name: &str) -> Option<Response> {
     let configuration = encoded(&scenario(name));
     let request = Request::Store {
-        build: BUILD,
+        build: build(),
         configuration: &configuration,
     };
     ask(board, &request)
@@ -159,16 +159,16 @@ fn is_refused_with_a_reason<C: BoardChip>() {
     assert_eq!(found_after_power_up(&mut board), nothing);
     let configuration = encoded(&scenario(DEFAULT));
     let request = Request::Store {
-        build: BUILD ^ 1,
+        build: build() ^ 1,
         configuration: &configuration,
     };
-    let other_build = Some(Response::OtherBuild { build: BUILD });
+    let other_build = Some(Response::OtherBuild { build: build() });
     assert_eq!(ask(&mut board, &request), other_build);
     let mut invalid = configuration.clone();
     // The control rate is the first field of the configuration.
     invalid[..4].copy_from_slice(&f32::NAN.to_le_bytes());
     let request = Request::Store {
-        build: BUILD,
+        build: build(),
         configuration: &invalid,
     };
     assert_eq!(ask(&mut board, &request), Some(Response::Refused));
@@ -180,9 +180,9 @@ fn is_refused_with_a_reason<C: BoardChip>() {
         board.machine.chip_mut().slots_mut().bytes().len()
     ]);
     for (version, build, content, state) in [
-        (1, BUILD ^ 1, &configuration, StoredState::OtherBuild),
-        (2, BUILD, &invalid, StoredState::Refused),
-        (3, BUILD, &configuration, StoredState::Intact),
+        (1, build() ^ 1, &configuration, StoredState::OtherBuild),
+        (2, build(), &invalid, StoredState::Refused),
+        (3, build(), &configuration, StoredState::Intact),
     ] {
         let mut buffer = [0; 1024];
         let stored = Slots::new(&mut flash).store(build, content, &mut buffer);

@@ -202,7 +202,10 @@ fn link(machine: &Machine, rows: &mut Vec<Row>) -> Result<(), ChoreError> {
         let first = text.split(' ').next().unwrap_or_default();
         first.parse().unwrap_or(f64::NAN)
     };
-    let share = 100.0 * rate(&lockstep) / rate(&alone);
+    let events = after("eventfd on one processor: ")?;
+    let crowded = after("lockstep run on one processor: ")?;
+    let share = |part: &str, whole: &str| format!("{:.0} %", 100.0 * rate(part) / rate(whole));
+    let (of_exchange, of_events) = (share(&lockstep, &alone), share(&crowded, &events));
     rows.push(Row {
         benchmark: "exchange of frames between two processes, without plant and controller".into(),
         measured: alone,
@@ -210,8 +213,18 @@ fn link(machine: &Machine, rows: &mut Vec<Row>) -> Result<(), ChoreError> {
     });
     rows.push(Row {
         benchmark: "lockstep, including plant and controller".into(),
-        measured: format!("{lockstep}; {share:.0} % of the exchange alone"),
+        measured: format!("{lockstep}; {of_exchange} of the exchange alone"),
         bar: "100,000 ticks/s; 40 %",
+    });
+    rows.push(Row {
+        benchmark: "two processes on one processor that wake each other with an eventfd".into(),
+        measured: events,
+        bar: "–",
+    });
+    rows.push(Row {
+        benchmark: "lockstep on one processor, including plant and controller".into(),
+        measured: format!("{crowded}; {of_events} of the eventfd"),
+        bar: "50 %",
     });
     Ok(())
 }

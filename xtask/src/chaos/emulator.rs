@@ -15,6 +15,9 @@ use super::trial::{
 };
 
 /// Disturbs the emulator of a run, `plan.call` milliseconds after its start.
+///
+/// # Errors
+/// An error of the system if a process cannot be started or watched.
 pub fn disturb_emulator(
     place: &ChaosFolder,
     bus: &str,

@@ -63,6 +63,9 @@ pub const FAULTS: [InjectedFault; 25] = [
 ];
 
 /// Runs one trial in which the victim's `number`-th call of this kind fails.
+///
+/// # Errors
+/// An error of the system if a process cannot be started or watched.
 pub fn run(
     place: &ChaosFolder,
     bus: &str,

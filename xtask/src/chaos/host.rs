@@ -10,6 +10,7 @@ use std::process::{Child, Command, Stdio};
 use clap::ValueEnum;
 use nix::fcntl::OFlag;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use rustix::termios::ioctl_tiocnxcl;
 use serde_json::Value;
 
 use crate::build_fw;
@@ -32,7 +33,7 @@ pub struct ChaosController {
     kind: ChaosHost,
     /// Path of the image, or of the port.
     path: String,
-    _board: Option<SerialBoard>,
+    board: Option<SerialBoard>,
 }
 
 impl ChaosController {
@@ -52,11 +53,7 @@ impl ChaosController {
                 (board.port.clone(), Some(board))
             }
         };
-        Ok(Self {
-            kind,
-            path,
-            _board: board,
-        })
+        Ok(Self { kind, path, board })
     }
 
     /// Returns the arguments that start the controller's process.
@@ -64,7 +61,7 @@ impl ChaosController {
         match self.kind {
             ChaosHost::Native => vec!["controller"],
             ChaosHost::Qemu => vec!["bridge", "qemu", "--elf", &self.path],
-            ChaosHost::Serial => vec!["bridge", "serial", "--port", &self.path],
+            ChaosHost::Serial => self.on_port(vec!["bridge", "serial", "--port", &self.path]),
         }
     }
 
@@ -73,8 +70,19 @@ impl ChaosController {
         match self.kind {
             ChaosHost::Native => vec!["run"],
             ChaosHost::Qemu => vec!["run", "--host", "qemu", "--elf", &self.path],
-            ChaosHost::Serial => vec!["run", "--host", "serial", "--port", &self.path],
+            ChaosHost::Serial => {
+                self.on_port(vec!["run", "--host", "serial", "--port", &self.path])
+            }
         }
+    }
+
+    /// Returns the arguments of a program on the port, after the end of the exclusive mode that a killed one has left
+    /// there: the board's end outlasts it.
+    fn on_port<'a>(&self, arguments: Vec<&'a str>) -> Vec<&'a str> {
+        if let Some(board) = &self.board {
+            let _ = ioctl_tiocnxcl(&board.end);
+        }
+        arguments
     }
 
     /// Returns the part of a report that is the same in every undisturbed run: the hash of all
@@ -95,7 +103,7 @@ struct SerialBoard {
     emulator: Child,
     port: String,
     /// Kept open, because the emulator drops the board's output while this end is closed.
-    _end: File,
+    end: File,
 }
 
 impl SerialBoard {
@@ -127,7 +135,7 @@ impl SerialBoard {
         Ok(Self {
             emulator,
             port,
-            _end: end,
+            end,
         })
     }
 }

@@ -22,7 +22,7 @@ use clap::Args;
 use nix::sys::prctl::set_child_subreaper;
 
 use crate::build_fw;
-use crate::command::{ChoreError, run_cargo, workspace};
+use crate::command::{ChoreError, build_program};
 use fault::{FAULTS, InjectedFault};
 use host::{ChaosController, ChaosHost};
 use place::{ChaosFolder, unused_segments};
@@ -79,26 +79,44 @@ const OTHERS: Duration = Duration::from_secs(10);
 /// wait for one. Of 5 s they are the program's defaults, 1.5 s and 1.7 s.
 const PATIENCE: [f64; 2] = [0.3, 0.34];
 
-/// Runs the part that belongs to `cargo xtask test`: about a minute.
+/// Runs the part that belongs to every `cargo xtask test`.
 ///
 /// # Errors
 /// If a flaw is found.
 pub fn short() -> Result<(), ChoreError> {
     run(&ChaosArguments {
-        first: 1,
-        disturbances: Disturbance::ALL.into(),
-        last: 300,
-        trials: Some(120),
-        seed: 1,
-        jobs: 4,
-        crowd: 0,
-        faults: 0,
-        stop_after_s: None,
-        host: ChaosHost::Native,
-        load: 0,
-        // Tests share their machine with other work.
-        end_s: 20,
+        stop_after_s: Some(30),
+        ..ChaosArguments::of_tests(120)
     })
+}
+
+/// Runs the part that belongs to `cargo xtask test --all`.
+///
+/// # Errors
+/// If a flaw is found.
+pub fn nightly() -> Result<(), ChoreError> {
+    run(&ChaosArguments::of_tests(1000))
+}
+
+impl ChaosArguments {
+    /// Returns trials drawn from all.
+    fn of_tests(trials: usize) -> Self {
+        Self {
+            first: 1,
+            last: 300,
+            disturbances: Disturbance::ALL.into(),
+            trials: Some(trials),
+            stop_after_s: None,
+            seed: 1,
+            faults: 0,
+            // Tests share their machine with other work.
+            end_s: 20,
+            jobs: 4,
+            crowd: 0,
+            host: ChaosHost::Native,
+            load: 0,
+        }
+    }
 }
 
 /// Runs the trials and prints a table of counts.
@@ -106,7 +124,7 @@ pub fn short() -> Result<(), ChoreError> {
 /// # Errors
 /// If a flaw is found.
 pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
-    run_cargo(&["build", "--release", "--package", "painleve-command"])?;
+    build_program()?;
     if arguments.host != ChaosHost::Native {
         build_fw::run()?;
     }
@@ -114,7 +132,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     // A copy, because the program may be rebuilt during the trials.
     let programs = tempfile::tempdir().map_err(system)?;
     let program = programs.path().join("painleve");
-    std::fs::copy(workspace().join("target/release/painleve"), &program).map_err(system)?;
+    std::fs::copy(crate::command::program(), &program).map_err(system)?;
     // This process adopts orphans, as systemd or a container would.
     set_child_subreaper(true).map_err(|error| system(error.into()))?;
     tracer::restore_default_actions().map_err(|error| system(error.into()))?;

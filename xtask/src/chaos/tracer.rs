@@ -12,6 +12,9 @@ use nix::unistd::Pid;
 
 /// Gives the signals that trials send their default action in this process, and so in those that it
 /// starts: a shell's background jobs ignore SIGINT.
+///
+/// # Errors
+/// An error of the system if an action cannot be set.
 #[allow(unsafe_code)]
 pub fn restore_default_actions() -> nix::Result<()> {
     for sent in [Signal::SIGINT, Signal::SIGTERM] {
@@ -38,6 +41,9 @@ pub struct Victim {
 
 impl Victim {
     /// Starts a command, stopped before its first instruction.
+    ///
+    /// # Errors
+    /// An error of the system if the process cannot be started or traced.
     #[allow(unsafe_code)]
     pub fn start(command: &mut Command) -> io::Result<Self> {
         // SAFETY: between fork and exec, one system call that is async-signal-safe.
@@ -57,6 +63,9 @@ impl Victim {
 
     /// Runs the process up to the start of its system call `number`, counted from 1, sends it
     /// `signal` there and detaches from it. Gives up after `limit`.
+    ///
+    /// # Errors
+    /// An error of the system if the process cannot be traced.
     pub fn signal_at(
         &mut self,
         number: u32,

@@ -110,6 +110,9 @@ pub struct TrialOutcome {
 }
 
 /// Runs one trial on `bus` and compares it with `expected`.
+///
+/// # Errors
+/// An error of the system if a process cannot be started or watched.
 pub fn run(
     place: &ChaosFolder,
     bus: &str,
@@ -265,6 +268,9 @@ pub fn orphans(place: &ChaosFolder, deadline: Instant, findings: &mut Vec<Findin
 }
 
 /// Checks that the next run on the same bus is undisturbed and leaves nothing.
+///
+/// # Errors
+/// An error of the system if the process cannot be started or watched.
 pub fn next_run(
     place: &ChaosFolder,
     bus: &str,
@@ -365,6 +371,9 @@ pub struct TrialProcess {
 
 impl TrialProcess {
     /// Starts a command.
+    ///
+    /// # Errors
+    /// An error of the system if the process cannot be started.
     pub fn start(command: &mut Command) -> std::io::Result<Self> {
         let mut child = command.spawn()?;
         Ok(Self {
@@ -375,6 +384,9 @@ impl TrialProcess {
     }
 
     /// Waits for the end of the process; after the deadline, kills it and returns `false`.
+    ///
+    /// # Errors
+    /// An error of the system if the process cannot be watched or killed.
     pub fn wait(&mut self, deadline: Instant) -> std::io::Result<bool> {
         while self.ended.is_none() {
             if let Some(status) = self.child.try_wait()? {

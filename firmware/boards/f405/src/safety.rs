@@ -48,7 +48,8 @@ core::arch::global_asm!(
 
 /// Takes the torque off from any point of the program: stages disabled, and zero torque from the converter.
 pub fn take_torque_off() {
-    // SAFETY: single stores to registers that hold these values whenever the torque is off.
+    // SAFETY: these registers exist whatever the program was doing. What is read, changed and stored here has its value
+    // from the first instructions on, so code that was interrupted between its own read and store does not undo it.
     unsafe {
         let rcc = &*pac::RCC::ptr();
         rcc.ahb1enr().modify(|_, w| w.gpioben().set_bit());

@@ -2,6 +2,8 @@
 
 #![allow(unsafe_code)] // addresses for DMA
 
+use core::sync::atomic::AtomicU8;
+
 use painleve_image::dma_serial::DmaRegisters;
 use stm32f4xx_hal::pac::{self, DMA2, USART1};
 
@@ -31,9 +33,9 @@ impl UartDma {
 }
 
 impl DmaRegisters for UartDma {
-    fn receive_into(&mut self, buffer: &'static [u8]) {
+    fn receive_into(&mut self, buffer: &'static [AtomicU8]) {
         let receiver = self.dma.st(RECEIVER);
-        // SAFETY: the address of a register, and address and length of a static buffer.
+        // SAFETY: the address of a register, and address and length of a static buffer whose bytes may change at any time.
         unsafe {
             receiver.par().write(|w| w.bits(self.data_address()));
             receiver.m0ar().write(|w| w.bits(buffer.as_ptr() as u32));
@@ -73,7 +75,8 @@ impl DmaRegisters for UartDma {
             w.cdmeif7().set_bit().cfeif7().set_bit()
         });
         let stream = self.dma.st(TRANSMITTER);
-        // SAFETY: the address of a register, and address and length of a buffer that stays unchanged.
+        // SAFETY: the address of a register, and address and length of a buffer that stays unchanged meanwhile, by the
+        // contract of the trait.
         unsafe {
             stream.par().write(|w| w.bits(self.data_address()));
             stream.m0ar().write(|w| w.bits(bytes.as_ptr() as u32));

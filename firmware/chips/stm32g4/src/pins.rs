@@ -27,7 +27,8 @@ impl Port {
             Self::B => pac::GPIOB::ptr().cast(),
             Self::C => pac::GPIOC::ptr(),
         };
-        // SAFETY: the registers of a port; every pin has bits of its own.
+        // SAFETY: the address of a port, whose registers are cells. Pins are configured before interrupts are on, so
+        // that nothing comes between a read and its store; later only `bsrr` is written, which changes one pin.
         unsafe { &*address }
     }
 }

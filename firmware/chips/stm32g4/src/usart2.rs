@@ -2,6 +2,8 @@
 
 #![allow(unsafe_code)] // addresses for DMA
 
+use core::sync::atomic::AtomicU8;
+
 use cortex_m::peripheral::NVIC;
 use painleve_image::dma_serial::DmaRegisters;
 
@@ -42,9 +44,9 @@ impl Usart2Dma {
 }
 
 impl DmaRegisters for Usart2Dma {
-    fn receive_into(&mut self, buffer: &'static [u8]) {
+    fn receive_into(&mut self, buffer: &'static [AtomicU8]) {
         let channel = self.dma.ch(RECEIVER);
-        // SAFETY: the address of a register, and address and length of a static buffer.
+        // SAFETY: the address of a register, and address and length of a static buffer whose bytes may change at any time.
         unsafe {
             let data = self.usart.rdr().as_ptr() as u32;
             channel.par().write(|w| w.bits(data));
@@ -76,7 +78,8 @@ impl DmaRegisters for Usart2Dma {
         let channel = self.dma.ch(TRANSMITTER);
         // A channel is configured while it is off.
         channel.cr().write(|w| w.en().clear_bit());
-        // SAFETY: the address of a register, and address and length of a buffer that stays unchanged.
+        // SAFETY: the address of a register, and address and length of a buffer that stays unchanged meanwhile, by the
+        // contract of the trait.
         unsafe {
             let data = self.usart.tdr().as_ptr() as u32;
             channel.par().write(|w| w.bits(data));

@@ -82,8 +82,6 @@ const BREAKING_AWAY_M_S2: f32 = 1.0;
 /// The hybrid law's state.
 #[derive(Clone, Copy, Debug)]
 pub struct HybridState {
-    /// Wanted normal force while it approaches f_n*, N; f_n* itself before the first reset.
-    wanted_force_n: Option<f32>,
     /// K'_I ∫ (f_n* − f_n) dt, N.
     force_integral_n: f32,
     /// Gain times ∫ (z_t* − z_t) dt, m/s².
@@ -107,7 +105,6 @@ pub struct HybridState {
 impl Default for HybridState {
     fn default() -> Self {
         Self {
-            wanted_force_n: None,
             force_integral_n: 0.0,
             position_integral_m_s2: 0.0,
             filtered_friction_n: 0.0,
@@ -135,14 +132,12 @@ impl Law for HybridSettings {
         }
     }
 
-    /// Resets the integrals and starts from the present contact force, at most f_n*: an arm that fell on the
-    /// belt may press with more than the torque can hold.
+    /// Resets the integrals and starts from the present friction, at most that of f_n*.
     fn reset(&self, state: &mut HybridState, input: &LawInput<'_>) {
         let force_n = input.force_n.y.limited(0.0, self.normal_force_n);
         // Limit to the friction cone: a saturated force cell gives any ratio.
         let cone_n = input.friction.coefficient * force_n;
         *state = HybridState {
-            wanted_force_n: (self.force_time_constant_s > 0.0).then_some(force_n),
             filtered_friction_n: input.force_n.x.within(cone_n),
             slow_force_n: input.force_n.y,
             fed_force_n: input.force_n,
@@ -229,10 +224,7 @@ impl HybridSettings {
 
     /// α_f, N.
     fn commanded_force_n(&self, state: &mut HybridState, input: &LawInput<'_>) -> f32 {
-        let approach = input.tick_s / (self.force_time_constant_s + input.tick_s);
-        let before_n = state.wanted_force_n.unwrap_or(self.normal_force_n);
-        let wanted_n = before_n + approach * (self.normal_force_n - before_n);
-        state.wanted_force_n = Some(wanted_n);
+        let wanted_n = self.normal_force_n;
         // Anti-windup: no integration in the air, where there is no force to control, nor while the
         // torque is limited.
         if input.contact && !input.saturated {
@@ -338,7 +330,6 @@ mod tests {
             let model = Model::new(&arm, theta_rad, theta_dot_rad_s, &GeneralisedTorque::zeros());
             let settings = HybridSettings {
                 force_integral_gain_per_s: 0.0,
-                force_time_constant_s: 0.0,
                 position_integral_gain_per_s3: 0.0,
                 friction: FrictionFeedForward::Model { friction, belt_speed_m_s: -1.0 },
                 ..Default::default()
@@ -469,17 +460,6 @@ mod tests {
             input.saturated = true;
             input.force_n = Vector2::zeros();
             assert_eq!(settings.force_drift_m_s2(state, input), learnt);
-        });
-    }
-
-    #[test]
-    fn a_tip_that_presses_too_much_is_wanted_to_press_no_more_than_it_should() {
-        while_sliding(|settings, input, state| {
-            for (force_n, wanted_n) in [(20.0, 10.0), (4.0, 4.0), (-0.2, 0.0)] {
-                input.force_n.y = force_n;
-                settings.reset(state, input);
-                assert_eq!(state.wanted_force_n, Some(wanted_n));
-            }
         });
     }
 

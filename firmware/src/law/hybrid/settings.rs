@@ -35,7 +35,7 @@ settings! {
     /// and 14-bit encoders.
     #[derive(Copy)]
     pub struct HybridSettings {
-        /// Wanted normal force f_n*.
+        /// Desired normal force f_n*.
         normal_force_n: f32 = 10.0, 0.0..=1e3, "N";
         /// Position gain K'_P.
         position_gain_per_s2: f32 = 9000.0, 0.0..=1e6, "1/s²";
@@ -48,17 +48,14 @@ settings! {
         /// Rate at which the law learns the acceleration of the tip along the belt by contact forces other
         /// than those fed forward, which it cancels; 0 for never. Not in the paper.
         force_drift_rad_s: f32 = 1500.0, 0.0..=1e4, "rad/s";
-        /// Time constant with which the wanted force approaches f_n* after landing; 0 for at once,
-        /// as in the paper.
-        force_time_constant_s: f32 = 0.02, 0.0..=10.0, "s";
         /// Whether the pressing force is reduced where the torque limits do not allow f_n*; not in
         /// the paper.
         reduce_force_when_torque_limited: bool = true;
-        /// Integral gain K'_I of the force.
-        force_integral_gain_per_s: f32 = 5.0, 0.0..=1e4, "1/s";
+        /// Integral gain K'_I of the force; 0 for none. The paper's is 650 1/s elbow down and 0 elbow up.
+        force_integral_gain_per_s: f32 = 0.0, 0.0..=1e4, "1/s";
         /// Largest correction by the force integral.
         force_integral_limit_n: f32 = 5.0, 0.0..=1e3, "N";
-        /// Damping of a contact that gives, as a fraction of the change of force.
+        /// Damping of a compliant contact, as a fraction of the change of force.
         contact_damping: f32 = 4.0, 0.0..=10.0;
         /// Rate of change above which it damps.
         contact_damping_rad_s: f32 = 1000.0, 1.0..=1e4, "rad/s";

@@ -57,8 +57,8 @@ impl ConnectedArm {
     /// read its own sensors.
     ///
     /// # Errors
-    /// [`BoardError::Port`], [`BoardError::Silent`], [`BoardError::OtherProtocol`],
-    /// [`BoardError::OtherBuild`] or [`BoardError::Refused`].
+    /// [`BoardError::Port`], [`BoardError::InUse`], [`BoardError::Silent`], [`BoardError::NoFrames`],
+    /// [`BoardError::OtherProtocol`], [`BoardError::OtherBuild`] or [`BoardError::Refused`].
     pub fn open(
         path: &Path,
         configuration: &Configuration,
@@ -75,6 +75,14 @@ impl ConnectedArm {
             heartbeat: now,
             heard: now,
         })
+    }
+
+    /// Returns whether the board was built from this program's sources.
+    ///
+    /// # Errors
+    /// [`BoardError::OtherSources`] if it was not.
+    pub fn compare_sources(&self) -> Result<(), BoardError> {
+        self.serial.compare_sources()
     }
 
     /// Asks the board to permit or forbid arming; the answer is [`ArmEvent::Permission`]. The drive
@@ -108,8 +116,8 @@ impl ConnectedArm {
     /// Returns `None` if no message arrives.
     ///
     /// # Errors
-    /// [`BoardError::Silent`] if the board has been silent for [`SILENCE_LIMIT`], and
-    /// [`BoardError::System`] if the port fails.
+    /// [`BoardError::Silent`] or [`BoardError::NoFrames`] if the board has been silent for
+    /// [`SILENCE_LIMIT`], [`BoardError::Unplugged`] and [`BoardError::System`] if the port fails.
     pub fn next_event(&mut self, limit: Duration) -> Result<Option<ArmEvent>, BoardError> {
         let start = Instant::now();
         loop {
@@ -120,7 +128,7 @@ impl ConnectedArm {
             let left = limit.saturating_sub(start.elapsed()).min(HEARTBEAT);
             let Some(response) = self.serial.listen(left)? else {
                 if self.heard.elapsed() > SILENCE_LIMIT {
-                    return Err(BoardError::Silent(self.heard.elapsed()));
+                    return Err(self.serial.silence(self.heard.elapsed()));
                 }
                 if start.elapsed() >= limit {
                     return Ok(None);
@@ -139,6 +147,7 @@ impl ConnectedArm {
                 },
                 Response::Permission(permitted) => ArmEvent::Permission(permitted),
                 Response::Health(health) => ArmEvent::Health(health),
+                _ if start.elapsed() >= limit => return Ok(None),
                 _ => continue,
             }));
         }

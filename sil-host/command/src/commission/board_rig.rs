@@ -71,6 +71,9 @@ pub struct BoardRig {
 
 impl BoardRig {
     /// Connects to a board and configures it for raw readings and torques of at most `torque_limit_nm`.
+    ///
+    /// # Errors
+    /// [`CommandError`] if the board cannot be connected or refuses, or the standard input cannot be read.
     pub fn open(
         port: &Path,
         scenario: &Scenario,
@@ -101,6 +104,9 @@ impl BoardRig {
     }
 
     /// Takes the torque off.
+    ///
+    /// # Errors
+    /// [`BoardError`] if the board does not answer.
     pub fn stop(&mut self) -> Result<(), BoardError> {
         self.arm.stop()
     }

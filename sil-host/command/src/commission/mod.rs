@@ -71,6 +71,9 @@ fn mistakes() -> clap::builder::PossibleValuesParser {
 }
 
 /// Commissions the arm and writes its corrected scenario; after a refusal, nothing is written.
+///
+/// # Errors
+/// [`CommandError`] if the arm refuses, the board or a file fails, or the user interrupts.
 pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let tick_hz = scenario.run.tick_hz;

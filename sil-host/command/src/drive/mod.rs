@@ -93,6 +93,9 @@ struct DriveReport {
 }
 
 /// Connects to the board, configures it, and monitors it until the operator stops it.
+///
+/// # Errors
+/// [`CommandError`] if the scenario is invalid, the board fails or latches a fault, or a file cannot be written.
 pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     let scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     check_rate(&scenario)?;
@@ -167,12 +170,16 @@ impl Drive {
         };
         let arm = ConnectedArm::open(&arguments.port, &configuration, source)?;
         warn_of_single_sensors(scenario);
+        if let Err(error) = arm.compare_sources() {
+            warn(error);
+        }
         for line in history::lines(&arm.black_box) {
             warn(line);
         }
         warn(format_args!(
-            "connected: build {:016x}, scenario {}{}; orders: arm, disarm, stop",
-            painleve_firmware::BUILD,
+            "connected: build {:016x}, sources {:016x}, scenario {}{}; orders: arm, disarm, stop",
+            painleve_plant::law_choice::build(),
+            painleve_firmware::SOURCES,
             scenario.name,
             if arguments.dry_run {
                 ", torque stages off"

@@ -9,6 +9,9 @@ use crate::output_error::output;
 use crate::{CommandError, say};
 
 /// Asks the board for its own configuration, or changes it.
+///
+/// # Errors
+/// [`CommandError`] if the board does not answer, refuses the configuration or does not store it.
 pub fn run(arguments: &DriveArguments, scenario: &Scenario) -> Result<(), CommandError> {
     let mut board = StoringBoard::open(&arguments.port)?;
     let stored = if arguments.store {

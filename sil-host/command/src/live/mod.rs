@@ -14,9 +14,9 @@ use painleve_plant::simulation::Simulation;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
 use painleve_view::access::Token;
-use painleve_view::foxglove::parameters::parameters;
 use painleve_view::hub::Hub;
 use painleve_view::page::{description, html};
+use painleve_view::parameters::parameters;
 use painleve_view::request::{Order, ViewerRequest};
 use painleve_view::server::Server;
 use serde_json::json;
@@ -36,6 +36,9 @@ const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 
 /// Serves a run that goes on until it is interrupted, to its page and to Foxglove, for those who know the token;
 /// pages of `origins` may connect as Foxglove does.
+///
+/// # Errors
+/// [`CommandError`] if the page cannot be served or the scenario cannot start.
 pub fn run(
     scenario: &Scenario,
     port: u16,

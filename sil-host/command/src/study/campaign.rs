@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use clap::{ArgAction, Command};
 use painleve_plant::scenario::Scenario;
-use painleve_study::catalogue::{CatalogueEntry, STUDIES};
+use painleve_study::studies::{self, STUDIES};
 use painleve_study::sweep::campaign::{Campaign, CampaignError, Understood};
 
 /// Returns the study of a campaign.
@@ -20,7 +20,7 @@ pub fn understand(campaign: &Campaign) -> Result<Understood, CampaignError> {
             shardable: all.map(|entry| entry.name).collect(),
         }
     };
-    let entry = CatalogueEntry::find(name)
+    let entry = studies::find(name)
         .filter(|entry| entry.has_shards)
         .ok_or_else(not_shardable)?;
     let command = entry.command().no_binary_name(true);

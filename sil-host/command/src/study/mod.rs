@@ -5,7 +5,8 @@ pub mod campaign;
 pub mod outcome;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
-use painleve_study::catalogue::{AnyOptions, CatalogueEntry, STUDIES};
+use painleve_study::catalogue::{AnyOptions, CatalogueEntry};
+use painleve_study::studies::{self, STUDIES};
 
 use super::CommandError;
 use outcome::OutcomeOptions;
@@ -31,7 +32,7 @@ impl std::fmt::Debug for StudyCommand {
 
 impl Subcommand for StudyCommand {
     fn augment_subcommands(command: Command) -> Command {
-        let study = |entry: &&CatalogueEntry| entry.augment_with::<OutcomeOptions>();
+        let study = |entry: &CatalogueEntry| entry.augment_with::<OutcomeOptions>();
         command
             .subcommand_required(true)
             .arg_required_else_help(true)
@@ -43,7 +44,7 @@ impl Subcommand for StudyCommand {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        CatalogueEntry::find(name).is_some()
+        studies::find(name).is_some()
     }
 }
 
@@ -51,7 +52,7 @@ impl FromArgMatches for StudyCommand {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
         let (name, matches) = matches.subcommand().ok_or_else(missing)?;
-        let entry = CatalogueEntry::find(name).ok_or_else(missing)?;
+        let entry = studies::find(name).ok_or_else(missing)?;
         Ok(Self {
             options: (entry.read)(matches)?,
             outcome: OutcomeOptions::from_arg_matches(matches)?,
@@ -65,6 +66,9 @@ impl FromArgMatches for StudyCommand {
 }
 
 /// Computes a study and writes its results.
+///
+/// # Errors
+/// [`CommandError`] if the study fails, a file cannot be written, or the user interrupts.
 pub fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     let StudyCommand { options, outcome } = &arguments.study;
     outcome.make(&*options.study()?)

@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use clap::Args;
 use comfy_table::ContentArrangement;
 use comfy_table::presets::ASCII_MARKDOWN;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use painleve_study::Study;
 use painleve_study::catalogue::{AnyOutcome, AnyStudy};
 use painleve_system::atomic_file::{self, AtomicFile};
@@ -15,6 +14,7 @@ use painleve_system::picture;
 
 use crate::output_error::output;
 use crate::process_error::ProcessError;
+use crate::progress::{Progress, Shown};
 use crate::{CommandError, say};
 
 /// Output files of a study, and the number of threads that compute it.
@@ -45,15 +45,18 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Computes the rows of a study with a progress bar.
+    /// Computes the rows of a study and shows the progress.
     ///
     /// # Errors
     /// [`CommandError`] if a row cannot be computed.
-    pub fn compute<S: Study>(&self, name: &str, study: &S) -> Result<Vec<S::Row>, CommandError> {
-        let bar = progress_bar(name, study.len());
-        let rows = self.in_pool(|| painleve_study::rows(study, || bar.inc(1)))?;
-        bar.finish_and_clear();
-        Ok(rows?)
+    pub fn compute<S: Study>(
+        &self,
+        name: &str,
+        study: &S,
+        shown: Shown,
+    ) -> Result<Vec<S::Row>, CommandError> {
+        let progress = Progress::start(name, study.len(), shown);
+        Ok(self.in_pool(|| painleve_study::rows(study, || progress.row_done()))??)
     }
 
     /// Runs `work` on the requested number of threads.
@@ -71,16 +74,18 @@ impl Threads {
 }
 
 impl OutcomeOptions {
-    /// Computes a study with a progress bar, writes the files and prints the result.
+    /// Computes a study and shows the progress, writes the files and prints the result.
     ///
     /// # Errors
     /// [`CommandError`] if an output cannot be written, which is checked first, or if the study
     /// fails.
     pub fn make(&self, study: &dyn AnyStudy) -> Result<(), CommandError> {
         self.check()?;
-        let bar = progress_bar("", study.row_count());
-        let outcome = self.threads.in_pool(|| study.compute(&|| bar.inc(1)))??;
-        bar.finish_and_clear();
+        let progress = Progress::start("", study.row_count(), Shown::with_json(self.json));
+        let outcome = self
+            .threads
+            .in_pool(|| study.compute(&|| progress.row_done()))??;
+        drop(progress);
         self.write(&*outcome)
     }
 
@@ -112,19 +117,4 @@ impl OutcomeOptions {
             say(terminal::readable_table(outcome.table()))
         }
     }
-}
-
-/// Returns a progress bar on stderr if it is a terminal, otherwise a hidden one.
-pub fn progress_bar(name: &str, rows: usize) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(rows as u64), ProgressDrawTarget::stderr())
-        .with_finish(ProgressFinish::AndClear);
-    let template = "{prefix}{bar:40} {percent:>3} %  {pos}/{len} rows  {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
-    if !name.is_empty() {
-        bar.set_prefix(format!("{name}  "));
-    }
-    bar.enable_steady_tick(std::time::Duration::from_millis(200));
-    bar
 }

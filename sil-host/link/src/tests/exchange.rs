@@ -130,14 +130,14 @@ fn an_interrupt_ends_a_wait() {
     let bus = TestBus::new();
     let interrupt = Interrupt::default();
     let mut plant =
-        PlantEnd::create_in(bus.place.clone(), &bus.name, &session(), &interrupt).unwrap();
+        PlantEnd::create_in(bus.place.clone(), &bus.name, None, &session(), &interrupt).unwrap();
     interrupt.request();
     assert!(matches!(
         plant.wait_for_controller(PATIENT),
         Err(LinkError::Interrupted)
     ));
     drop(plant);
-    let opened = ControllerEnd::open_in(bus.place.clone(), &bus.name, PATIENT, &interrupt);
+    let opened = ControllerEnd::open_in(bus.place.clone(), &bus.name, None, PATIENT, &interrupt);
     assert!(matches!(opened, Err(LinkError::Interrupted)));
     bus.assert_nothing_left();
 }

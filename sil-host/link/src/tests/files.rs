@@ -8,7 +8,7 @@ use super::*;
 /// zero.
 fn dead_controller(bus: &TestBus) -> PathBuf {
     let bus = bus.bus();
-    let run = run_files::RunFiles::ready(&bus.folder(), &bus.place).unwrap();
+    let run = run_files::RunFiles::ready(&bus.folder(), &bus.place, None).unwrap();
     assert!(run.join().unwrap());
     let prefix = run.config().unwrap().global.prefix.to_string();
     let segment = Path::new(SHARED_MEMORY).join(format!("{prefix}half-made"));
@@ -46,7 +46,7 @@ fn a_dead_peers_half_made_segment_is_removed_and_a_live_peers_is_kept() {
     let bus = test.bus();
     let claim = bus.claim(lock_file::Role::Plant).unwrap().unwrap();
     let run = run_files::RunFiles::create(&bus.folder(), &bus.place).unwrap();
-    run.set_ready().unwrap();
+    run.set_ready(None).unwrap();
     let guardian = guardian::Guardian::start(&claim).unwrap();
     let segment = dead_controller(&test);
     // A live controller's segment stays, because the controller may still be creating it.

@@ -35,6 +35,27 @@ fn a_second_controller_is_refused_and_the_first_continues() {
 }
 
 #[test]
+fn a_pair_meets_no_stranger() {
+    let stranger = TestBus::new();
+    let pair = TestBus {
+        pair: Some(Pair::unique()),
+        ..stranger.clone()
+    };
+    let other = TestBus {
+        pair: Some(Pair::unique()),
+        ..stranger.clone()
+    };
+    for (plants, refused) in [(&pair, [&stranger, &other]), (&stranger, [&pair, &other])] {
+        let plant = plants.plant().unwrap();
+        for controllers in refused {
+            let error = controllers.controller(SHORT).err().unwrap();
+            assert!(matches!(error, LinkError::PlantMissing { .. }), "{error}");
+        }
+        plants.assert_works(plant);
+    }
+}
+
+#[test]
 fn the_error_about_a_missing_plant_names_the_command_to_start() {
     let bus = TestBus::new();
     let error = bus.controller(SHORT).err().unwrap();

@@ -2,182 +2,15 @@
 
 use std::path::PathBuf;
 
-use painleve_shared::range::OutOfRange;
 use painleve_shared::settings::Settings;
 use painleve_system::input_file;
 use toml::{Table, Value};
 
-use super::override_key::{MOST_LEVELS, with_override};
-use super::{Scenario, built_in, reference_file};
+use super::error::ScenarioError;
+use super::override_key::with_override;
+use super::table::{from_table, parse};
+use super::{Scenario, built_in};
 use crate::mechanics::{BuiltInPlant, without_files};
-
-/// Why a scenario cannot be loaded.
-#[derive(Debug, thiserror::Error)]
-pub enum ScenarioError {
-    /// The name is neither a built-in scenario nor a file.
-    #[error(
-        "no built-in scenario and no file is called '{name}'; built in are: {}",
-        built_in::names().collect::<Vec<_>>().join(", ")
-    )]
-    Unknown {
-        /// The requested name.
-        name: String,
-    },
-    /// The file cannot be read.
-    #[error("cannot read scenario file {}: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Reason.
-        source: std::io::Error,
-    },
-    /// The file is empty.
-    #[error("scenario file {} is empty", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The text is not TOML.
-    #[error("{origin} is not TOML: {source}")]
-    Syntax {
-        /// File or scenario.
-        origin: String,
-        /// What is wrong, and where.
-        source: TomlError,
-    },
-    /// A key is unknown or has the wrong type.
-    #[error("{origin}: {key}: {source}")]
-    Key {
-        /// File, scenario or option.
-        origin: String,
-        /// Path of the key.
-        key: String,
-        /// What is wrong, and what is allowed.
-        source: KeyError,
-    },
-    /// An override is not of the form key=value.
-    #[error("--set '{text}' is not of the form key=value; example: --set belt.friction=0.4")]
-    Override {
-        /// The given text.
-        text: String,
-    },
-    /// An override's key has more levels than any key of a scenario.
-    #[error("--set: a key has at most {MOST_LEVELS} levels (belt.friction has two)")]
-    TooDeep,
-    /// A value is out of range.
-    #[error("{origin}: {source}")]
-    Range {
-        /// File or scenario.
-        origin: String,
-        /// The value and the allowed range.
-        source: OutOfRange,
-    },
-}
-
-/// What is wrong with a TOML text, and in which line.
-#[derive(Debug, thiserror::Error)]
-#[error("{}{}", .line.map_or(String::new(), |line| format!("line {line}: ")), source.message())]
-pub struct TomlError {
-    line: Option<usize>,
-    source: toml::de::Error,
-}
-
-impl TomlError {
-    /// Returns the error of a parser in a text.
-    pub fn new(source: toml::de::Error, text: &str) -> Self {
-        let line = source
-            .span()
-            .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
-        Self { line, source }
-    }
-}
-
-/// Returns a message of serde on one line, with words instead of Rust's names of types.
-fn in_words(message: &str) -> String {
-    let mut words = message.trim().replace('\n', " ");
-    for (names, meaning) in [
-        (&["f32", "f64"][..], "a number"),
-        (&["i32", "i64"], "a whole number"),
-        (
-            &["u8", "u16", "u32", "u64", "usize"],
-            "a whole number from 0",
-        ),
-    ] {
-        for name in names {
-            words = words.replace(&format!("expected {name}"), &format!("expected {meaning}"));
-        }
-    }
-    words = words
-        .replace("missing field", "missing key")
-        .replace('`', "'");
-    // A type's name follows these to the end of the message.
-    for (kind, meaning) in [
-        ("struct ", "a table of keys"),
-        ("internally tagged enum ", "a table with the key 'kind'"),
-        ("enum ", "one of its kinds"),
-    ] {
-        let start = format!("expected {kind}");
-        if let Some((before, _)) = words.split_once(&start) {
-            words = format!("{before}expected {meaning}");
-        }
-    }
-    words
-}
-
-/// What is wrong with a key.
-#[derive(Debug, thiserror::Error)]
-pub enum KeyError {
-    /// The key is unknown or its value has the wrong type.
-    #[error("{}", in_words(.0.message()))]
-    Value(toml::de::Error),
-    /// The scenario cannot be written as a table.
-    #[error(transparent)]
-    Table(#[from] toml::ser::Error),
-    /// A part of the key is unknown.
-    #[error("unknown key '{part}'; {}known: {}", meant(part, known), known.join(", "))]
-    Unknown {
-        /// The part.
-        part: String,
-        /// The keys at its level.
-        known: Vec<String>,
-    },
-    /// A part of the key names a variant that is not the chosen one.
-    #[error("{key} is {chosen}, which has no '{part}'; choose it first with --set {key}={part}")]
-    NotChosen {
-        /// The choice.
-        key: String,
-        /// The chosen variant.
-        chosen: String,
-        /// The part.
-        part: String,
-    },
-    /// A part of the key is not a number of a list's items.
-    #[error("'{part}' is not one of its {count} items, from 0")]
-    NoItem {
-        /// The part.
-        part: String,
-        /// Number of items.
-        count: usize,
-    },
-    /// A file named by the key cannot be used.
-    #[error("{0}")]
-    File(String),
-    /// A part of the key lies inside a number, a text or a switch.
-    #[error("'{0}' would be inside a single value")]
-    InsideValue(String),
-}
-
-/// Smallest similarity of a key that may have been meant, from 0 to 1.
-const SIMILAR: f64 = 0.75;
-
-/// Returns a question about the known key that is most similar to an unknown one; empty if none is.
-fn meant(part: &str, known: &[String]) -> String {
-    let similarity = |key: &&String| strsim::normalized_damerau_levenshtein(part, key);
-    let similar = known.iter().filter(|key| similarity(key) >= SIMILAR);
-    similar
-        .max_by(|one, other| similarity(one).total_cmp(&similarity(other)))
-        .map_or(String::new(), |key| format!("did you mean '{key}'? "))
-}
 
 impl Scenario {
     /// Loads the built-in scenario or file called `name`, applies the overrides `key=value` in
@@ -201,7 +34,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load_unplaced(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
-        from_table(&origin(name), read(name)?)?.with_overrides(&origin(name), overrides)
+        from_table(Some(&origin(name)), read(name)?)?.with_overrides(&origin(name), overrides)
     }
 
     /// Reads a scenario from TOML text and validates it as a whole, except for the start of the
@@ -211,7 +44,7 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user.
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         let origin = "scenario";
-        from_table(origin, parse(origin, text)?)?.with_overrides(origin, &[])
+        from_table(Some(origin), parse(origin, text)?)?.with_overrides(origin, &[])
     }
 
     /// Returns this scenario with overrides `key=value` applied in order and its numbers validated.
@@ -276,26 +109,6 @@ fn read(name: &str) -> Result<Table, ScenarioError> {
     Ok(table)
 }
 
-fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
-    text.parse().map_err(|error| ScenarioError::Syntax {
-        origin: origin.into(),
-        source: TomlError::new(error, text),
-    })
-}
-
-pub(super) fn from_table(origin: &str, mut table: Table) -> Result<Scenario, ScenarioError> {
-    reference_file::expand(&mut table).map_err(|reason| ScenarioError::Key {
-        origin: origin.into(),
-        key: "controller.reference".into(),
-        source: KeyError::File(reason),
-    })?;
-    serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
-        origin: origin.into(),
-        key: error.path().to_string(),
-        source: KeyError::Value(error.into_inner()),
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -340,6 +153,13 @@ mod tests {
     }
 
     #[test]
+    fn targets_keep_their_decimals() {
+        let target = |name| Scenario::load(name, &[]).unwrap().target_m();
+        assert_eq!(target("hybrid-elbow-up"), Some(0.163));
+        assert_eq!(target("capture"), None);
+    }
+
+    #[test]
     fn messages_name_no_types_of_the_program() {
         for (wrong, expected) in [
             ("converters.encoder=3", "expected a table of keys"),
@@ -349,10 +169,25 @@ mod tests {
             ),
             ("effects.friction=step", "missing key 'change'"),
             ("contact=rigid", "expected a table of keys"),
-            ("run.tick_hz=fast", "expected a whole number from 0"),
+            (
+                "run.tick_hz=fast",
+                "expected a whole number from 0 to 4294967295, not \"fast\"",
+            ),
+            (
+                "run.seed=18446744073709551615",
+                "run.seed: expected a whole number from 0 to 9223372036854775807, not \"18446744073709551615\"",
+            ),
+            (
+                "controller.law.hybrid.friction=foo",
+                "friction: unknown name 'foo'; known: measured, filtered, observed, model",
+            ),
+            (
+                "controller.law.pid=3",
+                "controller.law.pid: expected a table",
+            ),
         ] {
             let message = message(&[wrong]);
-            assert!(message.ends_with(expected), "{message}");
+            assert!(message.contains(expected), "{message}");
         }
     }
 
@@ -387,7 +222,7 @@ mod tests {
         );
         let message = message(&["controller.belt.given_m_s=fast"]);
         assert!(
-            message.ends_with("given_m_s: invalid type: string \"fast\", expected a number"),
+            message.ends_with("given_m_s: expected a number, not \"fast\""),
             "{message}"
         );
     }
@@ -406,11 +241,11 @@ mod tests {
             (&["arm_model.lenght_m=0.2"], &["arm_model.lenght_m"]),
             (
                 &["controller.law.pid.integral_gain=1"],
-                &["controller.law is hybrid", "--set controller.law=pid"],
+                &["controller.law is hybrid", "first with controller.law=pid"],
             ),
             (
                 &["controller.law=off", "controller.law.pid.integral_gain=1"],
-                &["controller.law is off", "--set controller.law=pid"],
+                &["controller.law is off", "first with controller.law=pid"],
             ),
             (
                 &["controller.law=pid", "controller.law.pid.integral_gain=1"],
@@ -475,8 +310,9 @@ mod tests {
         assert!(message("[belt\n").contains("line 1"));
         assert!(message("[belt]\nspeed = 1\n").contains("speed"));
         assert!(message("[belt]\nfriction = \"high\"\n").contains("belt.friction"));
-        let missing = Scenario::load("no-such-scenario", &[]).unwrap_err();
-        assert!(missing.to_string().contains("hybrid-elbow-down"));
+        let missing = |name| Scenario::load(name, &[]).unwrap_err().to_string();
+        assert!(missing("no-such-scenario").contains("'; known: hybrid-elbow-down"));
+        assert!(missing("edgee").contains("did you mean 'edge'?"));
         assert!(Scenario::load(folder.path().to_str().unwrap(), &[]).is_err());
     }
 }

@@ -5,16 +5,20 @@
 
 pub mod built_in;
 pub mod describe;
+mod error;
 mod load;
 mod override_key;
 mod plant;
 mod reference_file;
+mod table;
+mod words;
 
 use painleve_firmware::configuration::ControllerSettings;
 use painleve_shared::{ArmParameters, OutOfRange, settings};
 
 use crate::Configuration;
 use crate::converters::ConverterSettings;
+use crate::decimal::as_written;
 use crate::law_choice::LawChoice;
 use crate::mechanics::compliant::TipContact;
 use crate::mechanics::effects::Effects;
@@ -23,7 +27,8 @@ use crate::mechanics::{PlantParameters, SolverSettings};
 
 pub use crate::mechanics::InitialState;
 pub use crate::mechanics::belt::BeltSettings;
-pub use load::ScenarioError;
+pub use error::ScenarioError;
+pub use words::{TomlError, known_names};
 
 settings! {
     /// The complete definition of a run. The default is the paper's hybrid law from x0,d with
@@ -118,6 +123,15 @@ impl Scenario {
             converters: self.converters.scales(),
             settings: self.controller.clone(),
         }
+    }
+
+    /// Returns the target of the last part of the reference that has one, m.
+    pub fn target_m(&self) -> Option<f64> {
+        let segments = self.controller.reference.segments.iter();
+        segments
+            .rev()
+            .find_map(|segment| segment.target_m())
+            .map(as_written)
     }
 
     /// Checks the limits that depend on several parts.

@@ -1,12 +1,10 @@
-//! Changes of single keys of a scenario: `--set key=value`.
+//! Changes of single keys of a scenario: `key=value`, from the command line, a viewer, Python or a simulator.
 
 use toml::{Table, Value};
 
-use super::load::{KeyError, ScenarioError, from_table};
+use super::error::{KeyError, MOST_LEVELS, ScenarioError};
+use super::table::from_table;
 use super::{Scenario, describe};
-
-/// Upper limit of the levels of a key; no scenario key has as many.
-pub(super) const MOST_LEVELS: usize = 16;
 
 /// Returns the scenario with one key changed. The key must exist in the scenario or be optional,
 /// such as `controller.belt.given_m_s`.
@@ -29,7 +27,7 @@ pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, 
         .and_then(|mut table| table.remove("value"))
         .unwrap_or_else(|| Value::String(value.into()));
     let wrong_key = |source| ScenarioError::Key {
-        origin: "--set".into(),
+        origin: None,
         key: key.into(),
         source,
     };
@@ -58,9 +56,10 @@ pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, 
                     } else {
                         variants.iter().map(ToString::to_string).collect()
                     };
+                    let is_optional =
+                        variants.contains(&part) || describe::is_optional(&parts[..=index]);
                     let part = part.into();
                     let unknown = KeyError::Unknown { part, known };
-                    let is_optional = describe::is_optional(&parts[..=index]);
                     missing = Some((!is_optional).then_some(unknown));
                 }
                 let empty = || Value::Table(Table::new());
@@ -89,7 +88,7 @@ pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, 
     let Value::Table(table) = root else {
         return Err(wrong());
     };
-    from_table("--set", table).map_err(|error| missing.flatten().map_or(error, wrong_key))
+    from_table(None, table).map_err(|error| missing.flatten().map_or(error, wrong_key))
 }
 
 /// Returns the name of the variant that a choice without a tag has.

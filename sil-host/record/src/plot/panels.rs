@@ -259,7 +259,6 @@ impl Panels<'_> {
             (state(SupervisorState::Fault), "fault", VERMILLION),
             (flag::AT_EDGE, "at edge", BLUE_INK),
             (flag::RECOVERING, "recovers", PURPLE),
-            (flag::GUARDED, "guarded", BLACK_INK),
         ];
         Panel {
             title: "Controller".into(),

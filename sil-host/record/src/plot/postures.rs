@@ -56,7 +56,7 @@ pub(super) fn panel(bins: &[RunBin], time: &Range<f64>, arm: &ArmParameters<f64>
     };
     Panel {
         title: "Arm and belt".into(),
-        note: "each drawn with its shoulder at its time".into(),
+        note: "each posture placed at its time".into(),
         y: Some(-MARGIN * height_m..(1.0 + MARGIN) * height_m),
         y_ticks: 0,
         height: HEIGHT,

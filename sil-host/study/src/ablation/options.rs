@@ -5,7 +5,6 @@ use clap::Args;
 use super::{Ablation, AblationStudy};
 use crate::StudyError;
 use crate::catalogue::StudyOptions;
-use crate::register_study;
 use crate::robustness::{CampaignOptions, Part, Row};
 
 /// Contribution of each part of the controller to success in the robustness campaign.
@@ -19,11 +18,8 @@ pub struct Options {
     campaign: CampaignOptions,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "ablation";
-    const ORDER: u32 = 80;
     type Study = AblationStudy;
     type Outcome = Ablation;
 

@@ -6,7 +6,6 @@ use super::{Admissible, AdmissibleStudy, page};
 use crate::catalogue::{PageSection, StudyOptions};
 use crate::figures::page_maker::PageMaker;
 use crate::options::BaseOptions;
-use crate::register_study;
 use crate::{StudyError, paper};
 
 /// Table II: tip positions at which p > 0, and the critical friction.
@@ -19,11 +18,8 @@ pub struct Options {
     base: BaseOptions,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "admissible";
-    const ORDER: u32 = 10;
     type Study = AdmissibleStudy;
     type Outcome = Admissible;
 

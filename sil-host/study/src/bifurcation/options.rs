@@ -6,7 +6,6 @@ use super::{Bifurcation, BifurcationDiagram, Row, page};
 use crate::StudyError;
 use crate::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
-use crate::register_study;
 
 use crate::cell_options::CellOptions;
 
@@ -21,11 +20,8 @@ pub struct Options {
     cells: CellOptions,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "bifurcation";
-    const ORDER: u32 = 30;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Bifurcation;
     type Outcome = BifurcationDiagram;

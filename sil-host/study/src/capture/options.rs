@@ -5,7 +5,6 @@ use clap::Args;
 use super::{Capture, Captures, Row};
 use crate::StudyError;
 use crate::catalogue::{InShards, StudyOptions, in_shards};
-use crate::register_study;
 
 use crate::options::RandomRuns;
 
@@ -16,11 +15,8 @@ pub struct Options {
     runs: RandomRuns,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "capture";
-    const ORDER: u32 = 100;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Capture;
     type Outcome = Captures;

@@ -7,7 +7,6 @@ use crate::StudyError;
 use crate::case::Reference;
 use crate::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
-use crate::register_study;
 
 use crate::options::{
     BeltSpeedGrid, ControllerOptions, ConverterOptions, FrictionGrid, InitialOptions, Overrides,
@@ -47,11 +46,8 @@ pub struct Options {
     overrides: Overrides,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "closed-loop-bifurcation";
-    const ORDER: u32 = 60;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = ClosedLoopBifurcation;
     type Outcome = ClosedLoopDiagram;

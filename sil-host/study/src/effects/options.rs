@@ -7,7 +7,6 @@ use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
 use crate::StudyError;
 use crate::catalogue::{InShards, StudyOptions, in_shards};
 use crate::options::{ControllerOptions, RandomRuns, level};
-use crate::register_study;
 
 /// Success against the level of each effect of a real rig, on rigid and on compliant contact.
 #[derive(Debug, Args)]
@@ -46,11 +45,8 @@ pub struct Options {
     runs: RandomRuns,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "effects";
-    const ORDER: u32 = 90;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = EffectsStudy;
     type Outcome = EffectsOutcome;

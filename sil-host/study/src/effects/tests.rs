@@ -7,7 +7,6 @@ use super::outcome::Fall;
 use super::*;
 use crate::belt_line::BeltLine;
 use crate::outcome::{Figure, plain};
-use crate::robustness::judge;
 use crate::rows;
 
 fn study(effects: &[&'static str], runs: usize) -> EffectsStudy {
@@ -107,7 +106,7 @@ fn everything_together_has_targets_away_from_the_edge_of_the_arm_that_moves() {
             let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
             let friction = everything.largest_friction.unwrap()(share, scenario.belt.friction);
             let line = BeltLine::new(&arm, posture);
-            let tau = line.tau(judge::target_m(&scenario)).unwrap();
+            let tau = line.tau(scenario.target_m().unwrap()).unwrap();
             let p_ratio = line.p_ratio(tau, friction, slip);
             assert!(p_ratio > 0.199, "{share}, run {run}: {p_ratio}");
         }

@@ -5,7 +5,6 @@ use clap::Args;
 use super::{LiftOff, LiftOffs, Row};
 use crate::StudyError;
 use crate::catalogue::{InShards, StudyOptions, in_shards};
-use crate::register_study;
 
 use crate::options::{self, RandomRuns};
 
@@ -26,11 +25,8 @@ pub struct Options {
     slide_s: f64,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "lift-off";
-    const ORDER: u32 = 110;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = LiftOff;
     type Outcome = LiftOffs;

@@ -7,7 +7,6 @@ use super::{Map, Regions, RegionsStudy, Theta2, page};
 use crate::catalogue::{PageSection, StudyOptions};
 use crate::figures::page_maker::PageMaker;
 use crate::options::BaseOptions;
-use crate::register_study;
 use crate::{Grid, StudyError, paper};
 
 /// A slip direction on the command line.
@@ -63,11 +62,8 @@ pub struct Options {
     base: BaseOptions,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "regions";
-    const ORDER: u32 = 20;
     type Study = RegionsStudy;
     type Outcome = Regions;
 

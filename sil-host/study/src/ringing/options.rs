@@ -5,7 +5,6 @@ use clap::Args;
 use super::{Ringing, RingingOutcome, Row};
 use crate::catalogue::{InShards, StudyOptions, in_shards};
 use crate::options::Overrides;
-use crate::register_study;
 use crate::{Grid, StudyError};
 
 /// Where the friction observer makes a compliant contact ring, beside the stability limit.
@@ -28,11 +27,8 @@ pub struct Options {
     overrides: Overrides,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "ringing";
-    const ORDER: u32 = 97;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Ringing;
     type Outcome = RingingOutcome;

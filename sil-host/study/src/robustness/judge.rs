@@ -2,7 +2,6 @@
 
 use core::ops::Range;
 
-use painleve_firmware::refer::reference::Segment;
 use painleve_plant::Plant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
@@ -53,7 +52,7 @@ pub fn run<P: Plant>(
     let arm = Arm::new(scenario.moving_arm())?;
     let posture = Posture::of(&theta(&scenario.initial.state()));
     let v_belt_m_s = scenario.belt.profile.speed_m_s(0.0);
-    let target_m = target_m(scenario);
+    let target_m = scenario.target_m().unwrap_or(f64::NAN);
     let enabled_s = scenario.run.enable_at_s;
     let mut trial = Trial::on(plant, scenario)?;
     let start_m = trial.tip_t_m();
@@ -167,16 +166,4 @@ fn stretch_around_m(
         .into_iter()
         .filter(|stretch| stretch.contains(&tip_t_m));
     around.next_back().unwrap_or(tip_t_m..tip_t_m)
-}
-
-/// Returns the target of a scenario's last reference, m; NaN without a reference.
-pub(crate) fn target_m(scenario: &Scenario) -> f64 {
-    let segments = scenario.controller.reference.segments.iter();
-    let mut targets = segments.filter_map(|segment| match segment {
-        Segment::MinimumJerk { target_m, .. }
-        | Segment::Ramp { target_m, .. }
-        | Segment::Step { target_m, .. } => Some(f64::from(*target_m)),
-        _ => None,
-    });
-    targets.next_back().unwrap_or(f64::NAN)
 }

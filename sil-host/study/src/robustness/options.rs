@@ -5,7 +5,6 @@ use clap::Args;
 use super::{Arms, Part, Robustness, RobustnessOutcome, Row};
 use crate::StudyError;
 use crate::catalogue::{InShards, StudyOptions, in_shards};
-use crate::register_study;
 
 use crate::options::RandomRuns;
 
@@ -42,11 +41,8 @@ pub struct Options {
     campaign: CampaignOptions,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "robustness";
-    const ORDER: u32 = 70;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Robustness;
     type Outcome = RobustnessOutcome;

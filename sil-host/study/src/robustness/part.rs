@@ -6,65 +6,74 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
-    /// Guard: limits the torque to the side on which the tip stays pressed.
-    Guard,
     /// Governor: keeps the reference away from the paradox.
     Governor,
     /// Recovery: brings a tip that left the belt back; without it the law continues.
     Recovery,
     /// Calibration of the link lengths.
     Calibration,
-    /// Friction estimate; without it the initial friction is taken as certain.
+    /// Friction estimate; without it the first guess is taken as exact.
     FrictionEstimate,
     /// Feedforward of the estimated friction; without it the last reading is used, as in the paper.
     FrictionFeedForward,
     /// Integral of the position error.
     PositionIntegral,
-    /// Integral of the force error.
-    ForceIntegral,
     /// Reduction of the normal force where the torque is limited.
     ReduceForceWhenTorqueLimited,
-    /// Gradual increase of the normal force after landing.
-    ForceRamp,
     /// Estimate of unknown torques.
     Disturbance,
+    /// Estimate of how much the contact gives; without it the contact is taken to be rigid.
+    Response,
+    /// Probe: small changes of the wanted force that show how much the contact gives.
+    Probe,
+    /// Cancelling of the acceleration by contact forces that were not fed forward.
+    ForceDrift,
+    /// Damping of a contact that gives.
+    ContactDamping,
+    /// Distance from the edge that grows with the restlessness of the force.
+    RestlessDistance,
+    /// Faster loops on an arm with known friction of the joints.
+    FrictionSpeedUp,
 }
 
 impl Part {
     /// All parts.
-    pub const ALL: [Self; 11] = [
-        Self::Guard,
+    pub const ALL: [Self; 14] = [
         Self::Governor,
         Self::Recovery,
         Self::Calibration,
         Self::FrictionEstimate,
         Self::FrictionFeedForward,
         Self::PositionIntegral,
-        Self::ForceIntegral,
         Self::ReduceForceWhenTorqueLimited,
-        Self::ForceRamp,
         Self::Disturbance,
+        Self::Response,
+        Self::Probe,
+        Self::ForceDrift,
+        Self::ContactDamping,
+        Self::RestlessDistance,
+        Self::FrictionSpeedUp,
     ];
 
     /// Returns the overrides that switch the part off.
     pub fn without(self) -> &'static [&'static str] {
         match self {
-            Self::Guard => &["controller.guard.enabled=false"],
             Self::Governor => &["controller.governor.enabled=false"],
             Self::Recovery => &["controller.supervisor.on_lift_off=continue"],
             Self::Calibration => &["controller.calibration.enabled=false"],
-            Self::FrictionEstimate => &[
-                "controller.friction.first_deviation=0.001",
-                "controller.friction.drift_per_sqrt_s=0.0001",
-            ],
+            Self::FrictionEstimate => &["controller.friction.enabled=false"],
             Self::FrictionFeedForward => &["controller.law.hybrid.friction=measured"],
             Self::PositionIntegral => &["controller.law.hybrid.position_integral_gain_per_s3=0"],
-            Self::ForceIntegral => &["controller.law.hybrid.force_integral_gain_per_s=0"],
             Self::ReduceForceWhenTorqueLimited => {
                 &["controller.law.hybrid.reduce_force_when_torque_limited=false"]
             }
-            Self::ForceRamp => &["controller.law.hybrid.force_time_constant_s=0"],
             Self::Disturbance => &["controller.disturbance.enabled=false"],
+            Self::Response => &["controller.response.enabled=false"],
+            Self::Probe => &["controller.response.probe_n=0"],
+            Self::ForceDrift => &["controller.law.hybrid.force_drift_rad_s=0"],
+            Self::ContactDamping => &["controller.law.hybrid.contact_damping=0"],
+            Self::RestlessDistance => &["controller.governor.clearance_m_n=0"],
+            Self::FrictionSpeedUp => &["controller.estimator.friction_speed_up=1"],
         }
     }
 }

@@ -4,13 +4,16 @@ use crate::ablation::{Ablation, AblationStudy};
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::simulation::Simulation;
+use painleve_shared::ArmParameters;
+use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::status::Fault;
 
 use super::*;
 use crate::{Outcome, rows};
 
-/// Nothing is tuned on the runs of this one.
-const HELD_OUT_SEED: u64 = 987_654_321;
+/// A fixed seed, which gates every change: its runs show that a change has broken the controller. They do not measure
+/// success on new seeds, as the campaigns in the documentation do.
+const REGRESSION_SEED: u64 = 987_654_321;
 
 fn campaign(runs: usize) -> Robustness {
     Robustness {
@@ -36,15 +39,16 @@ fn rows_do_not_depend_on_threads() {
     assert_eq!(outcome.worst.len(), failed);
 }
 
-/// Of a seed on which nothing has been tuned.
+/// If 99.45 % of all runs succeed, as in the campaign, fewer than 294 of 300 do with a probability of 0.0015 (binomial); if
+/// 97 %, with one of 0.80.
 #[test]
-fn most_runs_of_a_held_out_seed_succeed() {
+fn the_runs_of_the_regression_seed_succeed() {
     let study = Robustness {
-        seed: HELD_OUT_SEED,
+        seed: REGRESSION_SEED,
         ..campaign(300)
     };
     let outcome = RobustnessOutcome::new(Arms::Paper, study.seed, rows(&study, || ()).unwrap());
-    assert!(outcome.success.lower > 0.93, "{}", outcome.table());
+    assert!(outcome.success.successes >= 294, "{}", outcome.table());
 }
 
 #[test]
@@ -115,8 +119,7 @@ fn general_arms_are_in_their_ranges_and_all_different() {
     assert!(drawn.windows(2).all(|pair| pair[0].arm != pair[1].arm));
 }
 
-/// A seed that nothing was tuned on. With the campaign's 99.5 % fewer than 97 of 100 have a
-/// probability below 0.002.
+/// If 99.5 % of all runs succeed, as in the campaign, fewer than 97 of 100 do with a probability of 0.0017 (binomial).
 #[test]
 fn general_arms_succeed_too() {
     let study = Robustness {
@@ -133,7 +136,7 @@ fn general_arms_succeed_too() {
 #[test]
 fn a_stiff_damped_contact_is_found() {
     let study = Robustness {
-        seed: HELD_OUT_SEED,
+        seed: REGRESSION_SEED,
         overrides: [
             "contact.kind=compliant",
             "contact.stiffness_n_m=1e6",
@@ -161,14 +164,100 @@ fn without_its_governor_the_controller_runs_over_the_edge() {
     assert!(whole.successes > without.successes, "{}", ablation.table());
 }
 
+/// Settings of each part that mean nothing while it is off, if it has others than its switch.
+fn other_settings(part: Part) -> &'static [&'static str] {
+    match part {
+        // The edges also decide where a thrown tip may land; its margins therefore keep their meaning.
+        Part::Governor => &[
+            "controller.governor.braking_m_s2=0.01",
+            "controller.governor.catch_up_m_s=0.01",
+        ],
+        Part::Recovery => &[
+            "controller.recovery.bandwidth_rad_s=20",
+            "controller.recovery.landing_speed_m_s=0.2",
+        ],
+        Part::Calibration => &[
+            "controller.calibration.averaging_s=0.01",
+            "controller.calibration.tolerance=0",
+        ],
+        Part::FrictionEstimate => &[
+            "controller.friction.first_deviation=1",
+            "controller.friction.drift_per_sqrt_s=0.1",
+        ],
+        Part::Disturbance => &[
+            "controller.disturbance.bandwidth_rad_s=200",
+            "controller.disturbance.limit_nm=0.01",
+        ],
+        Part::Response => &[
+            "controller.response.averaging_s=1",
+            "controller.response.probe_n=1",
+            "controller.response.minimum_p_ratio=0.5",
+        ],
+        Part::ContactDamping => &["controller.law.hybrid.contact_damping_rad_s=50"],
+        Part::FrictionFeedForward
+        | Part::PositionIntegral
+        | Part::ReduceForceWhenTorqueLimited
+        | Part::Probe
+        | Part::ForceDrift
+        | Part::RestlessDistance
+        | Part::FrictionSpeedUp => &[],
+    }
+}
+
+/// A run in which the part has something to do: a capture from a bounce or, for most parts, a soft contact,
+/// joints with friction, little torque and a way to the edge.
+fn occasion(part: Part) -> &'static [&'static str] {
+    match part {
+        Part::Recovery => &[],
+        Part::RestlessDistance => &[
+            "contact.kind=compliant",
+            "contact.stiffness_n_m=1e4",
+            "arm.coulomb_friction_nm=[0.01,0.01]",
+            "effects.surface.vibration_m=1e-4",
+            "run.enable_at_s=0.5",
+            "controller.reference=[{ minimum-jerk = { target_m = 0.183, duration_s = 1.0 } }]",
+        ],
+        _ => &[
+            "contact.kind=compliant",
+            "contact.stiffness_n_m=1e4",
+            "arm.coulomb_friction_nm=[0.01,0.01]",
+            "controller.torque_limit_nm=2",
+            "controller.reference=[{ minimum-jerk = { target_m = 0.183, duration_s = 1.0 } }]",
+            "run.enable_at_s=0.5",
+        ],
+    }
+}
+
+/// Returns all answers of the controller.
+fn answers(overrides: &[&[&str]]) -> Vec<ActuatorFrame> {
+    let overrides: Vec<String> = overrides.concat().iter().map(ToString::to_string).collect();
+    let mut scenario = Scenario::load("capture", &overrides).unwrap();
+    scenario.arm_model = Some(ArmParameters {
+        coulomb_friction_nm: scenario.arm.coulomb_friction_nm.map(|nm| nm as f32),
+        ..ArmParameters::default()
+    });
+    let mut trial = Trial::new(&scenario).unwrap();
+    let tick = |_| {
+        trial.tick(&mut ()).unwrap();
+        *trial.answer()
+    };
+    (0..3000).map(tick).collect()
+}
+
+/// A part that is off leaves no trace: whatever its other settings are, the controller gives the same answers.
 #[test]
-fn every_part_can_be_switched_off() {
+fn a_part_that_is_off_has_no_effect() {
     for part in Part::ALL {
-        let mut study = campaign(1);
-        study.overrides = part.without().iter().map(ToString::to_string).collect();
-        let changed = study.scenario(0).unwrap();
-        assert_ne!(changed, campaign(1).scenario(0).unwrap(), "{part:?}");
-        study.check().unwrap();
+        let (occasion, off, settings) = (occasion(part), part.without(), other_settings(part));
+        let usual = answers(&[occasion]);
+        let without = answers(&[occasion, off]);
+        assert!(without != usual, "{part:?} has no effect here");
+        if !settings.is_empty() {
+            let changed = answers(&[occasion, settings]);
+            assert!(changed != usual, "{part:?}: settings without effect here");
+            let changed = answers(&[occasion, off, settings]);
+            assert!(changed == without, "{part:?} is not off");
+        }
     }
 }
 

@@ -96,7 +96,7 @@ impl RangeEnd {
         match self {
             Self::Limit => "p = 0",
             Self::LiftOff => "lift-off",
-            Self::NotReached => "not reached",
+            Self::NotReached => "stops short or late",
             Self::Fault => "fault",
         }
     }
@@ -117,7 +117,7 @@ pub struct Row {
     pub reference: Reference,
     /// Initial tip position, m.
     pub start_m: f64,
-    /// Z_t,sliding, m; null if the first target is not reached.
+    /// Z_t,sliding, m; null if the first target fails.
     pub z_sliding_m: Option<f64>,
     /// Tip position at which p = 0 in this posture, m.
     pub limit_m: f64,

@@ -1,4 +1,4 @@
-//! Options of the study: how far each controller slides.
+//! Options of the study: how far the tip slides under each controller.
 
 use clap::Args;
 
@@ -7,13 +7,16 @@ use crate::StudyError;
 use crate::case::Reference;
 use crate::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use crate::figures::page_maker::PageMaker;
-use crate::register_study;
 
 use crate::options::{
     ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, seconds,
 };
 
-/// How far each controller slides before its tip leaves the belt.
+/// How far the tip slides under each controller before it leaves the belt.
+///
+/// The range ends at the farthest target before the first that fails; `fails by` says how: p = 0 is the limit, or the tip
+/// lifts off, stops short or late, or the controller latches a fault. Targets reached beyond it are in brackets; `–` is a
+/// range without any target.
 #[derive(Debug, Args)]
 #[command(
     mut_arg("controller", |controller| {
@@ -85,11 +88,8 @@ pub struct Options {
     overrides: Overrides,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "sliding-range";
-    const ORDER: u32 = 50;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = SlidingRange;
     type Outcome = SlidingRanges;

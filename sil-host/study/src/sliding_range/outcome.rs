@@ -19,7 +19,7 @@ impl Outcome for SlidingRanges {
             "μ",
             "reference",
             "slides to zₜ (m)",
-            "ends by",
+            "fails by",
             "the paper (m)",
             "p = 0 (m)",
         ]);
@@ -29,7 +29,7 @@ impl Outcome for SlidingRanges {
                 .map_or("–".into(), |metres| format!("{metres:.4}"));
             let beyond = row
                 .reached_beyond_m
-                .map_or(String::new(), |metres| format!(" (also {metres:.3})"));
+                .map_or(String::new(), |metres| format!(" (beyond it: {metres:.3})"));
             table.add_row([
                 row.controller.to_string(),
                 outcome::name(&row.converters),

@@ -1,4 +1,4 @@
-//! How far each controller slides, on the page of figures.
+//! How far the tip slides under each controller, on the page of figures.
 
 use painleve_shared::Posture;
 
@@ -51,7 +51,7 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
 fn ranges(outcome: &SlidingRanges, commands: Vec<String>) -> Section {
     let mut section = section(
         "sliding-range",
-        "Section III: how far each controller slides",
+        "Section III: how far the tip slides under each controller",
         commands,
         outcome,
     );

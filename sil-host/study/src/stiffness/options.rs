@@ -5,7 +5,6 @@ use clap::Args;
 use super::{Row, Stiffness, StiffnessOutcome};
 use crate::catalogue::{InShards, StudyOptions, in_shards};
 use crate::options::{BaseOptions, seconds};
-use crate::register_study;
 use crate::{Grid, StudyError};
 
 /// The compliant contact as it gets stiffer, beside the rigid one: the paradox resolved.
@@ -36,11 +35,8 @@ pub struct Options {
     base: BaseOptions,
 }
 
-register_study!(Options);
-
 impl StudyOptions for Options {
     const NAME: &'static str = "stiffness";
-    const ORDER: u32 = 95;
     const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
     type Study = Stiffness;
     type Outcome = StiffnessOutcome;

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 use xxhash_rust::xxh3::xxh3_128;
 
-use painleve_plant::scenario::ScenarioError;
+use painleve_plant::scenario::{ScenarioError, TomlError, known_names};
 use painleve_system::input_file;
 
 use super::SweepError;
@@ -24,13 +24,8 @@ use crate::StudyError;
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     /// The text is not TOML.
-    #[error("line {line} is not TOML: {}", source.message())]
-    Syntax {
-        /// The line, from 1.
-        line: usize,
-        /// The reason.
-        source: toml::de::Error,
-    },
+    #[error("is not TOML: {0}")]
+    Syntax(TomlError),
     /// The study is not given as a text.
     #[error("study: the value must be a name in quotes")]
     StudyName,
@@ -53,8 +48,8 @@ pub enum CampaignError {
     },
     /// The study has no such option.
     #[error(
-        "unknown option '{key}' in a campaign of the study {study}; known: {}",
-        known.join(", ")
+        "unknown option '{key}' in a campaign of the study {study}; {}",
+        known_names(key, known)
     )]
     UnknownOption {
         /// The given option.
@@ -118,16 +113,9 @@ impl Campaign {
     }
 
     fn parse(text: &str) -> Result<Self, CampaignError> {
-        let table: Table = text.parse().map_err(|source: toml::de::Error| {
-            let line = source.span().map_or(1, |span| {
-                1 + text
-                    .bytes()
-                    .take(span.start)
-                    .filter(|&byte| byte == b'\n')
-                    .count()
-            });
-            CampaignError::Syntax { line, source }
-        })?;
+        let table: Table = text
+            .parse()
+            .map_err(|source| CampaignError::Syntax(TomlError::new(source, text)))?;
         let mut campaign = Self::default();
         for (key, value) in table {
             match (key.as_str(), value) {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use painleve_plant::scenario::TomlError;
 use painleve_system::atomic_file::{self, AtomicFileError};
 use painleve_system::input_file;
 
@@ -30,16 +31,16 @@ const REVISION: &str = env!("PAINLEVE_REVISION");
 #[derive(Debug, thiserror::Error)]
 pub enum ManifestError {
     /// The folder holds the manifest of another sweep.
-    #[error("another sweep is planned here; choose another --folder or remove that sweep")]
-    OtherSweep,
+    #[error("another sweep is planned here; choose another --folder, or delete the folder {}", .0.display())]
+    OtherSweep(PathBuf),
     /// There is no manifest.
     #[error(
         "the file does not exist; plan the sweep first, with `painleve sweep plan`, or give its --folder"
     )]
     Missing,
     /// The file is not a manifest.
-    #[error("is not a manifest: {}", .0.message())]
-    Syntax(toml::de::Error),
+    #[error("is not a manifest: {0}")]
+    Syntax(TomlError),
     /// Another version of the program wrote it.
     #[error(
         "is of another version: {key} is {}, this program's is {ours}; \
@@ -157,7 +158,7 @@ impl Manifest {
         }
         Err(SweepError::Manifest {
             path,
-            source: ManifestError::OtherSweep,
+            source: ManifestError::OtherSweep(folder.into()),
         })
     }
 
@@ -185,7 +186,8 @@ impl Manifest {
     }
 
     fn parse(text: &str) -> Result<Self, ManifestError> {
-        let table: Table = text.parse().map_err(ManifestError::Syntax)?;
+        let syntax = |source| ManifestError::Syntax(TomlError::new(source, text));
+        let table: Table = text.parse().map_err(syntax)?;
         // Checked first, because the other fields may differ between versions.
         let of = |key: &str| table.get(key).map(|value| value.to_string());
         for (key, ours) in [
@@ -198,7 +200,7 @@ impl Manifest {
                 return Err(ManifestError::OtherVersion { key, found, ours });
             }
         }
-        let manifest: Self = table.try_into().map_err(ManifestError::Syntax)?;
+        let manifest: Self = table.try_into().map_err(syntax)?;
         if manifest.shards == 0 || manifest.shards > manifest.rows {
             return Err(ManifestError::ShardCount);
         }

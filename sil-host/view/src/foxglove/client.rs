@@ -13,11 +13,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use tungstenite::{Error, Message, WebSocket};
 
-use super::parameters::Parameter;
 use super::services;
 use crate::hub::{ClientQueue, Entry, Hub, Severity, WatchedTick, locked};
+use crate::parameters::Parameter;
+use crate::receive::receive;
 use crate::request::{Desk, TOO_MANY};
-use crate::server::receive;
 
 /// First bytes of binary messages.
 const MESSAGE_DATA: u8 = 1;

@@ -6,13 +6,11 @@
 //! Specification: <https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>.
 //!
 //! - [`feed`]: the run's messages, made only while a client has subscribed to them
-//! - [`parameters`]: all keys of the scenario, pause and speed
 //! - [`services`]: pause, resume, step, reset, push
 //! - `client`: the conversation with one client
 
 mod client;
 pub mod feed;
-pub mod parameters;
 pub mod services;
 
 pub(crate) use client::serve;

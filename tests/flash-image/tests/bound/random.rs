@@ -107,8 +107,8 @@ fn value(shape: &Shape, range: Option<Range>, random: &mut Random) -> Option<Val
     Some(match shape.resolved() {
         Shape::Switch => Value::Boolean(random.below(2) == 0),
         Shape::Text | Shape::AtRunTime(_) => return None,
-        Shape::Integer => Value::Integer(number(range?, random) as i64),
-        Shape::Number => Value::Float(number(range?, random)),
+        Shape::Integer(_) => Value::Integer(number(range?, random) as i64),
+        Shape::Number(_) => Value::Float(number(range?, random)),
         Shape::Group(fields) => Value::Table(table(fields, random)),
         Shape::Choice { tag, variants } => choice(tag, variants, random)?,
         Shape::Optional(inner) => value(inner, range, random)?,

@@ -126,7 +126,7 @@ fn ctrl_c_and_a_killed_program_take_the_torque_off() {
 /// A board of another build answers; nothing is configured.
 #[test]
 fn another_build_or_protocol_is_refused_and_both_are_named() {
-    let build = painleve_firmware::BUILD;
+    let build = painleve_plant::law_choice::build();
     for (protocol, build, named) in [
         (
             PROTOCOL + 1,

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use painleve_firmware::BUILD;
 use painleve_flash_image::bench::{Bench, encoded, scenario};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405};
 use painleve_flash_image::stm32::WiredChip as _;
 use painleve_flash_image::{MICROSECOND, MILLISECOND};
+use painleve_plant::law_choice::build;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::message::{FrameSource, PROTOCOL, Request, Response};
 use painleve_shared::status::SupervisorState;
@@ -75,7 +75,7 @@ fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
     while board.response(0).is_some() {}
     let mut buffer = [0; 1024];
     let request = Request::Configure {
-        build: BUILD,
+        build: build(),
         source: FrameSource::Sensors,
         configuration: &bytes,
     };
@@ -143,9 +143,12 @@ fn the_image_says_its_protocol_and_build_while_the_arm_is_driven<C: BoardChip>()
     bench.board.send(&Request::Identify);
     let identity = Response::Identity {
         protocol: PROTOCOL,
-        build: BUILD,
+        build: build(),
     };
     assert_eq!(bench.board.reply(5 * MILLISECOND), Some(identity));
+    bench.board.send(&Request::Sources);
+    let sources = Response::Sources(painleve_firmware::SOURCES);
+    assert_eq!(bench.board.reply(5 * MILLISECOND), Some(sources));
     bench.tick();
     assert_eq!(bench.board.torque().enabled, Some(true));
 }
@@ -208,12 +211,12 @@ fn a_dry_run_controls_with_the_stages_off<C: BoardChip>() {
 fn a_configuration_of_another_build_is_refused<C: BoardChip>() {
     let mut bench = driven::<C>();
     bench.board.send(&Request::Configure {
-        build: BUILD ^ 1,
+        build: build() ^ 1,
         source: FrameSource::Sensors,
         configuration: &encoded(&scenario(DEFAULT)),
     });
     let reply = bench.board.reply(20 * MILLISECOND);
-    assert_eq!(reply, Some(Response::OtherBuild { build: BUILD }));
+    assert_eq!(reply, Some(Response::OtherBuild { build: build() }));
     assert_off_in_time(bench);
 }
 

@@ -12,7 +12,8 @@ use crate::scenario::Scenario;
 /// or relative to the section if there is only one.
 pub fn settings_table(sections: &[&str]) -> String {
     let mut table = SettingsTable {
-        text: "| key | default | allowed | meaning |\n|---|---|---|---|\n".to_string(),
+        rows: Vec::new(),
+        lists: Vec::new(),
         path: Vec::new(),
         hidden: usize::from(sections.len() == 1),
         kinds: Vec::new(),
@@ -23,12 +24,41 @@ pub fn settings_table(sections: &[&str]) -> String {
     for field in listed {
         table.add(field);
     }
-    table.text
+    let mut text = "| key | default | allowed | meaning |\n|---|---|---|---|\n".to_string();
+    for row in table.rows {
+        row.write(&mut text);
+    }
+    text
+}
+
+/// A setting.
+#[derive(Clone, PartialEq)]
+struct Row {
+    key: String,
+    /// Names of the variants to which the setting belongs; all of them describe it alike.
+    kinds: Vec<String>,
+    /// Default and allowed values.
+    cells: String,
+    meaning: String,
+}
+
+impl Row {
+    fn write(&self, text: &mut String) {
+        let kinds = match self.kinds.as_slice() {
+            [] => String::new(),
+            kinds => format!(" ({})", kinds.join(", ")),
+        };
+        let (key, cells, meaning) = (&self.key, &self.cells, &self.meaning);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "| `{key}`{kinds} | {cells} | {meaning} |");
+    }
 }
 
 /// The rows so far, and the place of the next one.
 struct SettingsTable {
-    text: String,
+    rows: Vec<Row>,
+    /// The keys whose variants have been listed, and these rows with keys relative to them.
+    lists: Vec<(String, Vec<Row>)>,
     /// Key of the settings that are being added, in parts.
     path: Vec<&'static str>,
     /// Parts of the key that are left out.
@@ -68,7 +98,28 @@ impl SettingsTable {
             _ => format!("`{default}`"),
         };
         self.row(&default, &allowed(field), field.meaning);
+        let above = self.rows.len();
         self.add_variants(&field.shape);
+        self.refer_to_an_equal_list(above);
+    }
+
+    /// Replaces the rows from `above` on by a reference if another key has listed the same variants.
+    fn refer_to_an_equal_list(&mut self, above: usize) {
+        let (key, mut list) = (self.key(), self.rows[above..].to_vec());
+        if list.is_empty() {
+            return;
+        }
+        for row in &mut list {
+            row.key = row.key.trim_start_matches(&key).to_string();
+        }
+        match self.lists.iter().find(|(_, other)| *other == list) {
+            Some((first, _)) => {
+                self.rows.truncate(above);
+                let meaning = &mut self.rows[above - 1].meaning;
+                *meaning = format!("{meaning} Its keys are those of `{first}`.");
+            }
+            None => self.lists.push((key, list)),
+        }
     }
 
     /// Adds the settings of the variants of a choice, or of the choices in a list.
@@ -102,16 +153,23 @@ impl SettingsTable {
         }
     }
 
+    fn key(&self) -> String {
+        self.path[self.hidden..].join(".")
+    }
+
     fn row(&mut self, default: &str, allowed: &str, meaning: &str) {
-        let key = self.path[self.hidden..].join(".");
-        let kinds = match self.kinds.as_slice() {
-            [] => String::new(),
-            kinds => format!(" ({})", kinds.join(", ")),
+        let row = Row {
+            key: self.key(),
+            kinds: self.kinds.iter().map(ToString::to_string).collect(),
+            cells: format!("{default} | {allowed}"),
+            meaning: meaning.to_string(),
         };
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            self.text,
-            "| `{key}`{kinds} | {default} | {allowed} | {meaning} |"
-        );
+        let is_same = |other: &&mut Row| {
+            (&other.key, &other.cells, &other.meaning) == (&row.key, &row.cells, &row.meaning)
+        };
+        match self.rows.iter_mut().find(is_same) {
+            Some(other) => other.kinds.extend(row.kinds),
+            None => self.rows.push(row),
+        }
     }
 }

@@ -176,9 +176,11 @@ fn inside(shape: Shape, part: &str) -> Vec<Shape> {
             let contents = variants.iter().filter_map(|variant| variant.content);
             contents.flat_map(|content| inside(content, part)).collect()
         }
-        Shape::Switch | Shape::Integer | Shape::Number | Shape::Text | Shape::AtRunTime(_) => {
-            Vec::new()
-        }
+        Shape::Switch
+        | Shape::Integer(_)
+        | Shape::Number(_)
+        | Shape::Text
+        | Shape::AtRunTime(_) => Vec::new(),
     }
 }
 

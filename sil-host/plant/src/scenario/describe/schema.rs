@@ -49,13 +49,13 @@ fn value(shape: &Shape, range: Option<Range>, default: &Value) -> Value {
     match shape {
         Shape::Switch => json!({ "type": "boolean" }),
         Shape::Text => json!({ "type": "string" }),
-        Shape::Integer => match range {
+        Shape::Integer(_) => match range {
             Some(range) => json!({
                 "type": "integer", "minimum": range.minimum, "maximum": range.maximum,
             }),
             None => json!({ "type": "integer", "minimum": 0 }),
         },
-        Shape::Number => match range {
+        Shape::Number(_) => match range {
             Some(range) => json!({
                 "type": "number", "minimum": range.minimum, "maximum": range.maximum,
             }),

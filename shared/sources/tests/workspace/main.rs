@@ -1,0 +1,6 @@
+//! Checks of the sources of the whole workspace.
+
+#![allow(clippy::unwrap_used)]
+
+mod imports;
+mod package;

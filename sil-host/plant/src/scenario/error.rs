@@ -1,0 +1,117 @@
+//! Why a scenario cannot be loaded, in one sentence for the user.
+
+use std::path::PathBuf;
+
+use painleve_shared::range::OutOfRange;
+
+use super::built_in;
+use super::words::{TomlError, in_words, known_names};
+
+/// Upper limit of the levels of a key; no scenario key has as many.
+pub(super) const MOST_LEVELS: usize = 16;
+
+/// Why a scenario cannot be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    /// The name is neither a built-in scenario nor a file.
+    #[error(
+        "no built-in scenario and no file is called '{name}'; {}",
+        known_names(name, &built_in::names().collect::<Vec<_>>())
+    )]
+    Unknown {
+        /// The requested name.
+        name: String,
+    },
+    /// The file cannot be read.
+    #[error("cannot read scenario file {}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Reason.
+        source: std::io::Error,
+    },
+    /// The file is empty.
+    #[error("scenario file {} is empty", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The text is not TOML.
+    #[error("{origin} is not TOML: {source}")]
+    Syntax {
+        /// File or scenario.
+        origin: String,
+        /// What is wrong, and where.
+        source: TomlError,
+    },
+    /// A key is unknown or has the wrong type.
+    #[error("{}{key}: {source}", origin.as_ref().map_or(String::new(), |origin| format!("{origin}: ")))]
+    Key {
+        /// File or scenario; absent for an override.
+        origin: Option<String>,
+        /// Path of the key.
+        key: String,
+        /// What is wrong, and what is allowed.
+        source: KeyError,
+    },
+    /// An override is not of the form key=value.
+    #[error("'{text}' is not of the form key=value; example: belt.friction=0.4")]
+    Override {
+        /// The given text.
+        text: String,
+    },
+    /// An override's key has more levels than any key of a scenario.
+    #[error("a key has at most {MOST_LEVELS} levels (belt.friction has two)")]
+    TooDeep,
+    /// A value is out of range.
+    #[error("{origin}: {source}")]
+    Range {
+        /// File or scenario.
+        origin: String,
+        /// The value and the allowed range.
+        source: OutOfRange,
+    },
+}
+
+/// What is wrong with a key.
+#[derive(Debug, thiserror::Error)]
+pub enum KeyError {
+    /// The key is unknown or its value has the wrong type.
+    #[error("{}", in_words(.0.message()))]
+    Value(toml::de::Error),
+    /// The scenario cannot be written as a table.
+    #[error(transparent)]
+    Table(#[from] toml::ser::Error),
+    /// A part of the key is unknown.
+    #[error("unknown key '{part}'; {}", known_names(part, known))]
+    Unknown {
+        /// The part.
+        part: String,
+        /// The keys at its level.
+        known: Vec<String>,
+    },
+    /// A part of the key names a variant that is not the chosen one.
+    #[error("{key} is {chosen}, which has no '{part}'; choose it first with {key}={part}")]
+    NotChosen {
+        /// The choice.
+        key: String,
+        /// The chosen variant.
+        chosen: String,
+        /// The part.
+        part: String,
+    },
+    /// A part of the key is not a number of a list's items.
+    #[error("'{part}' is not one of its {count} items, from 0")]
+    NoItem {
+        /// The part.
+        part: String,
+        /// Number of items.
+        count: usize,
+    },
+    /// A file named by the key cannot be used.
+    #[error("{0}")]
+    File(String),
+    /// A part of the key lies inside a number, a text or a switch.
+    #[error("'{0}' would be inside a single value")]
+    InsideValue(String),
+}

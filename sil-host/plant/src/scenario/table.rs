@@ -1,0 +1,32 @@
+//! Scenarios from TOML tables.
+
+use toml::{Table, Value};
+
+use super::error::{KeyError, ScenarioError};
+use super::words::TomlError;
+use super::{Scenario, reference_file};
+
+/// Reads a table from TOML text; messages name its origin.
+pub(super) fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
+    text.parse().map_err(|error| ScenarioError::Syntax {
+        origin: origin.into(),
+        source: TomlError::new(error, text),
+    })
+}
+
+/// Reads a scenario from a table; its numbers are not validated yet.
+pub(super) fn from_table(
+    origin: Option<&str>,
+    mut table: Table,
+) -> Result<Scenario, ScenarioError> {
+    reference_file::expand(&mut table).map_err(|reason| ScenarioError::Key {
+        origin: origin.map(str::to_owned),
+        key: "controller.reference".into(),
+        source: KeyError::File(reason),
+    })?;
+    serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
+        origin: origin.map(str::to_owned),
+        key: error.path().to_string(),
+        source: KeyError::Value(error.into_inner()),
+    })
+}
