@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 use painleve_tests::live::{LiveRun, UPGRADE};
 use painleve_tests::{Bench, code};
 use serde_json::{Value, json};
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
 /// How long a test waits for anything.
@@ -84,6 +86,68 @@ fn a_flood_of_orders_is_refused_once_and_ctrl_c_is_obeyed_at_once() {
     assert_eq!(code(status), 0);
     assert!(took < Duration::from_secs(1), "{took:?}");
     assert!(memory_mb < 200.0, "{memory_mb} MB");
+}
+
+/// What a client asks to be told is limited by what there is to tell.
+#[test]
+fn the_wishes_of_a_foxglove_client_take_little_memory() {
+    let run = LiveRun::start(&Bench::new("live-wishes"), &[]);
+    let mut request = run.foxglove.as_str().into_client_request().unwrap();
+    let protocol = HeaderValue::from_static("foxglove.sdk.v1");
+    request
+        .headers_mut()
+        .insert("Sec-WebSocket-Protocol", protocol);
+    let (client, _) = tungstenite::client(request, run.connect()).unwrap();
+    let mut client = Viewer(client);
+    let padding = "x".repeat(15_000);
+    for round in 0..20_000 {
+        let name = format!("{padding}{round}");
+        client.order(&json!({ "op": "subscribeParameterUpdates", "parameterNames": [name] }));
+    }
+    client
+        .order(&json!({ "op": "getParameters", "parameterNames": ["belt.friction"], "id": "end" }));
+    let start = Instant::now();
+    while !client
+        .0
+        .read()
+        .unwrap()
+        .to_text()
+        .is_ok_and(|text| text.contains("\"end\""))
+    {
+        assert!(start.elapsed() < PATIENCE, "no answer");
+    }
+    let memory_mb = run.peak_memory_mb();
+    assert!(memory_mb < 200.0, "{memory_mb} MB");
+}
+
+/// Between two looks at the orders and at Ctrl-C lie few ticks if they take long, also after fast ones.
+#[test]
+fn a_run_with_slow_ticks_obeys_at_once() {
+    let bench = Bench::new("live-slow");
+    let slow = [
+        ("controller.estimator.bandwidth_rad_s", "20"),
+        ("run.tick_hz", "10"),
+        ("solver.maximum_step_s", "1e-5"),
+        ("solver.relative_tolerance", "1e-13"),
+        ("solver.absolute_tolerance", "1e-14"),
+    ];
+    let run = LiveRun::start(&bench, &[]);
+    let mut viewer = Viewer::of(&run);
+    viewer.order(&json!({ "speed": { "factor": 0 } }));
+    assert_eq!(viewer.answer().unwrap(), "");
+    std::thread::sleep(Duration::from_millis(300));
+    for (key, value) in slow {
+        viewer.set(key, value);
+        viewer.answer().unwrap();
+    }
+    viewer.order(&json!("reset"));
+    assert_eq!(viewer.answer().unwrap(), "");
+    let start = Instant::now();
+    for _ in 0..10 {
+        while !viewer.0.read().unwrap().is_binary() {}
+    }
+    let took = start.elapsed();
+    assert!(took < Duration::from_secs(4), "{took:?} for 10 looks");
 }
 
 /// The last value of a setting that changes fast is the one that holds.

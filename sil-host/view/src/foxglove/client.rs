@@ -1,6 +1,6 @@
 //! The conversation with one Foxglove client.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::net::TcpStream;
 use std::sync::{Arc, Mutex};
 
@@ -79,7 +79,7 @@ pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, desk: Desk) {
         hub,
         desk,
         queue: &queue,
-        subscriptions: BTreeMap::new(),
+        subscriptions: [None; CHANNELS],
         watched: BTreeSet::new(),
     };
     // Every error means that the client has left.
@@ -94,9 +94,9 @@ struct Client<'a> {
     hub: &'a Hub,
     desk: Desk,
     queue: &'a Arc<Mutex<ClientQueue>>,
-    /// Channels by the number of the subscription.
-    subscriptions: BTreeMap<u32, usize>,
-    /// Parameters whose changes it wants to know.
+    /// The number of its subscription to each channel; the protocol allows one at a time.
+    subscriptions: [Option<u32>; CHANNELS],
+    /// Parameters, among those that there are, whose changes it wants to know.
     watched: BTreeSet<String>,
 }
 
@@ -152,8 +152,8 @@ impl Client<'_> {
         match request {
             Request::Subscribe { subscriptions } => {
                 for Subscription { id, channel_id } in subscriptions {
-                    if channel_id < CHANNELS {
-                        self.subscriptions.insert(id, channel_id);
+                    if let Some(subscription) = self.subscriptions.get_mut(channel_id) {
+                        *subscription = Some(id);
                     } else {
                         let text = format!("there is no channel {channel_id}");
                         self.write(&status(Severity::Error, &text))?;
@@ -162,8 +162,8 @@ impl Client<'_> {
                 self.update_subscriptions();
             }
             Request::Unsubscribe { subscription_ids } => {
-                for id in subscription_ids {
-                    self.subscriptions.remove(&id);
+                for subscription in &mut self.subscriptions {
+                    subscription.take_if(|id| subscription_ids.contains(id));
                 }
                 self.update_subscriptions();
             }
@@ -183,11 +183,8 @@ impl Client<'_> {
                 }
             }
             Request::SubscribeParameterUpdates { parameter_names } => {
-                if parameter_names.is_empty() {
-                    let all = self.hub.parameters().into_iter();
-                    self.watched.extend(all.map(|parameter| parameter.name));
-                }
-                self.watched.extend(parameter_names);
+                let wanted = chosen(self.hub.parameters(), &parameter_names);
+                self.watched.extend(wanted.map(|one| one.name));
             }
             Request::UnsubscribeParameterUpdates { parameter_names } => {
                 if parameter_names.is_empty() {
@@ -213,13 +210,12 @@ impl Client<'_> {
 
     fn update_subscriptions(&self) {
         self.hub
-            .set_subscribed(self.queue, !self.subscriptions.is_empty());
+            .set_subscribed(self.queue, self.subscriptions.iter().any(Option::is_some));
     }
 
     /// Sends the parameters with these names; all if there are none.
     fn send_parameters(&mut self, names: &[String], id: Option<String>) -> Result<(), Error> {
-        let mut parameters = self.hub.parameters();
-        parameters.retain(|one| names.is_empty() || names.contains(&one.name));
+        let parameters: Vec<Parameter> = chosen(self.hub.parameters(), names).collect();
         let mut message = json!({ "op": "parameterValues", "parameters": parameters });
         if let Some(id) = id {
             message["id"] = id.into();
@@ -293,39 +289,40 @@ impl Client<'_> {
     }
 
     fn wants(&self, channel: usize) -> bool {
-        self.subscriptions.values().any(|one| *one == channel)
+        self.subscriptions[channel].is_some()
     }
 
-    /// Sends a message of a channel once for each subscription to it.
+    /// Sends a message of a channel to which there is a subscription.
     fn send_data<M: Serialize>(
         &mut self,
         channel: usize,
         time_s: f64,
         message: impl FnOnce() -> M,
     ) -> Result<(), Error> {
-        if !self.wants(channel) {
+        let Some(id) = self.subscriptions[channel] else {
             return Ok(());
-        }
+        };
         // It contains only finite numbers and text keys, so it can be written as JSON.
         let Ok(json) = serde_json::to_vec(&message()) else {
             return Ok(());
         };
-        for (id, subscribed) in &self.subscriptions {
-            if *subscribed == channel {
-                let mut bytes = Vec::with_capacity(13 + json.len());
-                bytes.push(MESSAGE_DATA);
-                bytes.extend(id.to_le_bytes());
-                bytes.extend(nanoseconds(time_s).to_le_bytes());
-                bytes.extend(&json);
-                self.socket.write(Message::binary(bytes))?;
-            }
-        }
-        Ok(())
+        let mut bytes = Vec::with_capacity(13 + json.len());
+        bytes.push(MESSAGE_DATA);
+        bytes.extend(id.to_le_bytes());
+        bytes.extend(nanoseconds(time_s).to_le_bytes());
+        bytes.extend(&json);
+        self.socket.write(Message::binary(bytes))
     }
 
     fn write(&mut self, message: &Value) -> Result<(), Error> {
         self.socket.write(Message::text(message.to_string()))
     }
+}
+
+/// Returns the parameters with these names; all if there are none.
+fn chosen(parameters: Vec<Parameter>, names: &[String]) -> impl Iterator<Item = Parameter> {
+    let is_chosen = move |one: &Parameter| names.is_empty() || names.contains(&one.name);
+    parameters.into_iter().filter(is_chosen)
 }
 
 fn status(severity: Severity, text: &str) -> Value {
