@@ -99,7 +99,7 @@ function connect(page) {
     form.append(name);
   }
   const any = document.createElement("label"), line = document.createElement("input");
-  Object.assign(line, { type: "text", name: "any", placeholder: "controller.governor.enabled = false" });
+  Object.assign(line, { type: "text", name: "any", placeholder: "run.seed = 2" });
   line.addEventListener("change", () => {
     const [key, ...value] = line.value.split("=");
     if (value.length) send({ set: { key: key.trim(), value: value.join("=").trim() } });
