@@ -24,8 +24,6 @@ pub struct LastCommand {
     pub contact_acceleration_rad_s2: JointMotion<f32>,
     /// Velocity of the reference that the command follows, m/s.
     pub reference_velocity_m_s: f32,
-    /// Whether an edge holds that reference back.
-    pub at_edge: bool,
     /// Torque withheld by rounding to counts, to be added at the next tick, N·m.
     pub(crate) rounding_nm: JointTorque<f32>,
 }
@@ -42,12 +40,11 @@ impl LastCommand {
             expected_acceleration_rad_s2,
             contact_acceleration_rad_s2,
             reference_velocity_m_s,
-            at_edge,
             rounding_nm,
         } = self;
         *counts = [TorqueCounts(0); 2];
         *torque_nm = JointTorque::zeros();
-        (*saturated, *at_edge) = (false, false);
+        *saturated = false;
         // Stored in line in two parts; as one, the compiler calls a loop that takes six times as long.
         compiler_fence(Ordering::SeqCst);
         *contact_force_n = Vector2::zeros();
@@ -73,7 +70,6 @@ mod tests {
             expected_acceleration_rad_s2: JointMotion::new(1.0, 1.0),
             contact_acceleration_rad_s2: JointMotion::new(1.0, 1.0),
             reference_velocity_m_s: 1.0,
-            at_edge: true,
             rounding_nm: ones,
         };
         command.clear();

@@ -12,7 +12,7 @@ export class Chromium {
   static async start(program, { width, height, dark }) {
     const profile = mkdtempSync(join(tmpdir(), "painleve-chromium-"));
     const process_ = spawn(program, [
-      "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--no-first-run", "--disable-gpu",
+      "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--no-first-run", "--disable-gpu", "--disable-background-networking",
       "--disable-dev-shm-usage", "--hide-scrollbars", `--user-data-dir=${profile}`, "about:blank",
     ], { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
     const browser = new Chromium();
@@ -89,6 +89,18 @@ export class Chromium {
     const text = key.length === 1 ? key : undefined;
     await this.send("Input.dispatchKeyEvent", { type: "keyDown", key, text });
     await this.send("Input.dispatchKeyEvent", { type: "keyUp", key });
+  }
+
+  /** Ends the test if the page shows an error or the console contains one. */
+  async quiet(what) {
+    const shown = await this.evaluate("[...document.querySelectorAll('.error')].map((e) => e.textContent).join('')");
+    check(shown === "", `no error is shown ${what}${shown && `: ${shown}`}`);
+    check(this.problems.length === 0, `the console is empty ${what} ${this.problems.join("; ")}`);
+  }
+
+  /** Sets a field or a choice, as a user does. */
+  set(selector, value) {
+    return this.evaluate(`(() => { const e = document.querySelector(${JSON.stringify(selector)}); e.value = ${JSON.stringify(value)}; e.dispatchEvent(new Event("change")); })()`);
   }
 
   /** A picture of the whole page as PNG. */

@@ -1,10 +1,12 @@
 //! Starts the `painleve` program in end-to-end tests and inspects its results and leftovers.
 //!
+//! - [`live`]: a live run and requests to it
 //! - [`mod@line`]: a serial line that can be disturbed, with the image at its end
 //! - [`python`]: virtual environments
 //! - [`printed`]: figures in the documentation against measured ones
 
 pub mod line;
+pub mod live;
 pub mod printed;
 pub mod python;
 

@@ -5,10 +5,10 @@
     reason = "a run that does not start fails its test"
 )]
 
-use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
+use painleve_tests::live::LiveRun;
 use painleve_tests::{Bench, skipped};
 
 /// Returns the name of the first program that starts; prints a notice if there is none.
@@ -65,19 +65,8 @@ fn a_live_run_is_watched_paused_stepped_set_pushed_and_reset() {
 
 /// Operates the page of a live run.
 fn watch_live(bench: &Bench, arguments: &[&str], script: &str) {
-    let mut command = bench.command(&["run", "--live", "0"]);
-    let command = command.args(arguments).stderr(Stdio::piped());
-    let mut run = command.spawn().unwrap();
-    let mut line = String::new();
-    BufReader::new(run.stderr.take().unwrap())
-        .read_line(&mut line)
-        .unwrap();
-    let url = line
-        .split_whitespace()
-        .find(|word| word.starts_with("http"));
-    run_script(script, &[url.unwrap()]);
-    run.kill().unwrap();
-    run.wait().unwrap();
+    let run = LiveRun::start(bench, arguments);
+    run_script(script, &[&run.page]);
 }
 
 #[test]

@@ -3,62 +3,18 @@
 #![allow(clippy::unwrap_used, reason = "a client that fails fails its test")]
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use boon::{Compiler, SchemaIndex, Schemas};
 use painleve_tests::Bench;
+use painleve_tests::live::{LiveRun, UPGRADE};
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
 /// How long a test waits for anything.
 const PATIENCE: Duration = Duration::from_secs(20);
-
-/// A live run on a free port.
-struct LiveRun {
-    process: Child,
-    port: u16,
-}
-
-impl LiveRun {
-    fn start(bench: &Bench, arguments: &[&str]) -> Self {
-        let mut command = bench.command(&["run"]);
-        command.args(arguments).args(["--live", "0"]);
-        let mut process = command.stderr(Stdio::piped()).spawn().unwrap();
-        let mut line = String::new();
-        BufReader::new(process.stderr.take().unwrap())
-            .read_line(&mut line)
-            .unwrap();
-        let port = line.split("ws://localhost:").nth(1).unwrap();
-        let port = port.split(' ').next().unwrap().parse().unwrap();
-        Self { process, port }
-    }
-
-    /// Sends the head of a WebSocket request and returns the status and headers of the answer.
-    fn knock(&self, headers: &str) -> String {
-        let mut stream = TcpStream::connect(("localhost", self.port)).unwrap();
-        let head = format!(
-            "GET / HTTP/1.1\r\nHost: localhost:{}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
-             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{headers}\r\n",
-            self.port
-        );
-        stream.write_all(head.as_bytes()).unwrap();
-        let mut answer = vec![0; 1024];
-        let length = stream.read(&mut answer).unwrap();
-        String::from_utf8_lossy(&answer[..length]).into_owned()
-    }
-}
-
-impl Drop for LiveRun {
-    fn drop(&mut self) {
-        // It runs until it is ended.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
 
 /// What the server sends.
 #[derive(Debug)]
@@ -84,10 +40,9 @@ struct Client {
 
 impl Client {
     fn connect(run: &LiveRun) -> Self {
-        let stream = TcpStream::connect(("localhost", run.port)).unwrap();
+        let stream = run.connect();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
-        let url = format!("ws://localhost:{}", run.port);
-        let mut request = url.into_client_request().unwrap();
+        let mut request = run.foxglove.as_str().into_client_request().unwrap();
         let protocols = "foxglove.sdk.v1.1, foxglove.sdk.v1";
         let header = "Sec-WebSocket-Protocol";
         request
@@ -316,22 +271,27 @@ fn only_the_foxglove_app_and_named_origins_may_connect() {
     let own = "http://localhost:8080";
     let run = LiveRun::start(&bench, &["--live-origin", own]);
     let protocol = "Sec-WebSocket-Protocol: foxglove.websocket.v1\r\n";
+    let knock = |more: &str| {
+        let headers = format!("Host: {}\r\n{UPGRADE}{more}", run.authority());
+        run.knock(&format!("/{}", run.query()), &headers)
+    };
     for (origin, is_allowed) in [
         ("https://app.foxglove.dev", true),
         (own, true),
         ("https://evil.example", false),
+        ("file://", false),
         ("null", false),
     ] {
-        let answer = run.knock(&format!("{protocol}Origin: {origin}\r\n"));
+        let answer = knock(&format!("{protocol}Origin: {origin}\r\n"));
         let status = if is_allowed { "101" } else { "403" };
         assert!(
             answer.starts_with(&format!("HTTP/1.1 {status}")),
             "{answer}"
         );
-        let confirms = answer.contains(protocol);
+        let confirms = answer.to_lowercase().contains(&protocol.to_lowercase());
         assert_eq!(confirms, is_allowed, "{answer}");
     }
     // The origins are those of Foxglove, so only its protocol is open to them.
-    let answer = run.knock("Origin: https://app.foxglove.dev\r\n");
+    let answer = knock("Origin: https://app.foxglove.dev\r\n");
     assert!(answer.starts_with("HTTP/1.1 403"), "{answer}");
 }

@@ -32,7 +32,6 @@ use crate::estimate::joints::Restart;
 use crate::estimate::{EstimateSettings, EstimatesState, Estimators, Observed, Readings};
 use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
-use crate::refer::governor::EdgeMargins;
 use crate::refer::{References, ReferencesState};
 use crate::schedule::Turn;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
@@ -414,7 +413,6 @@ impl<L: Law> Stages<L> {
             let output = self.demand.tick(&mut state.demand, &input);
             let torques = self.torques.tick(&mut state.command, &output);
             state.command.reference_velocity_m_s = target.reference.velocity_m_s;
-            state.command.at_edge = target.at_edge;
             if let Err(NotFinite) = torques {
                 state.supervision.latch(Fault::NotFinite);
                 state.release();
@@ -463,7 +461,7 @@ impl<L: Law> Stages<L> {
                     estimators.calibrate(estimates, &slow);
                 }
                 Turn::Edges => {
-                    if !estimators.evaluate_response(estimates, &slow, last) {
+                    if !estimators.evaluate_response(estimates, &slow) {
                         self.search(state);
                     }
                 }
@@ -489,7 +487,7 @@ impl<L: Law> Stages<L> {
             &state.estimates.arm,
             state.estimates.model.tip_m.x,
             contact.friction,
-            EdgeMargins::of(&contact.response, state.answered.landing_p_ratio),
+            state.answered.landing_p_ratio,
         );
     }
 

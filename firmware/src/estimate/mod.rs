@@ -33,7 +33,7 @@ use self::joint_friction::{JointFriction, JointFrictionState};
 use self::joints::{JointEstimator, JointEstimatorSettings, JointState, Restart};
 use self::model::Model;
 use self::response::{
-    ContactResponse, ForceReading, Place, ResponseEstimator, ResponseSettings, ResponseState,
+    ContactResponse, ForceReading, ResponseEstimator, ResponseSettings, ResponseState,
 };
 use crate::last_command::LastCommand;
 use crate::schedule::Turn;
@@ -43,8 +43,6 @@ const THROWN_BY_FRICTION: f32 = 0.4;
 
 /// Least velocity by which a sticking tip falls behind its reference, m/s.
 const DRAGGED_M_S: f32 = 0.02;
-/// Speed below which a reference that an edge holds back waits there, m/s.
-const WAITING_M_S: f32 = 0.01;
 
 /// The contact estimate at a tick: contact and force from its readings, the rest from those before, evaluated
 /// for the posture predicted for the tick.
@@ -454,18 +452,9 @@ impl Estimators {
 
     /// Evaluates the response of the contact if a block of readings is complete; returns whether it was.
     #[inline]
-    pub fn evaluate_response(
-        &self,
-        state: &mut EstimatesState,
-        slow: &SlowReadings,
-        last: &LastCommand,
-    ) -> bool {
+    pub fn evaluate_response(&self, state: &mut EstimatesState, slow: &SlowReadings) -> bool {
         if slow.completes_block {
-            let place = Place {
-                p_ratio: state.contact.p_ratio,
-                waits_at_edge: last.at_edge && last.reference_velocity_m_s.abs() < WAITING_M_S,
-            };
-            self.response.evaluate(&mut state.response, &place);
+            self.response.evaluate(&mut state.response);
         }
         slow.completes_block
     }

@@ -8,12 +8,10 @@
 //!
 //! An observer that feeds the measured force back at the rate λ takes damping away from the contact. It
 //! is stable while λ < c p²/(Q22 − p), near the edge λ T < ρ p/Q22. ρ therefore limits the part of the
-//! force error that observers and integrals may remove in a tick. Until the response is that of a rigid
-//! contact, the tip is also kept away from the edge.
+//! force error that observers and integrals may remove in a tick.
 //!
 //! A vibration below 100 Hz drowns the response in first differences of the force, but hardly appears in second
-//! differences. These show whether the contact certainly is not rigid. Changes that probe and rounding do not
-//! explain, and that are larger in first than in second differences, as noise is not, show how restless it is.
+//! differences. These show whether the contact certainly is not rigid.
 
 use painleve_shared::{Real, settings};
 
@@ -38,13 +36,6 @@ settings! {
         probe_n: f32 = 0.1, 0.0..=10.0, "N";
         /// Least contact damping c that is assumed.
         least_damping_ns_m: f32 = 15.0, 1e-3..=1e9, "N·s/m";
-        /// Least p/Q22 where the contact is not known to be rigid.
-        minimum_p_ratio: f32 = 0.08, 0.0..=0.9;
-        /// Time of observation near that p/Q22 before the tip may go closer to the edge.
-        observation_s: f32 = 0.3, 0.0..=100.0, "s";
-        /// Speed at which the least p/Q22 then falls while the contact is rigid. It rises four times as
-        /// fast while the contact is compliant.
-        approach_per_s: f32 = 0.1, 0.0..=100.0, "1/s";
     }
 }
 
@@ -61,25 +52,8 @@ const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
 const LEAST_REST: f32 = 0.05;
 /// Time in contact before the correlation starts, s.
 const SETTLING_S: f32 = 0.05;
-/// Changes of force from tick to tick that the loop itself makes of noise near the edge, root mean square, N.
-const CALM_N: f32 = 0.2;
-/// Rate at which a restless contact counts as calm again, N/s.
-const CALMING_N_S: f32 = 0.15;
-/// Most that a restless contact counts, N: by default the governor keeps its largest distance then. The landing of a tip
-/// shakes a contact by newtons, after which it would count as restless for tens of seconds.
-const MOST_RESTLESS_N: f32 = 0.2;
-/// Multiple of `minimum_p_ratio` below which the contact is observed.
-const NEAR: f32 = 3.0;
 /// Time for which a contact that was certainly not rigid counts as one that gives, s.
 const LAGGED_S: f32 = 5.0;
-/// Retreat from the edge as a multiple of the approach.
-const RETREAT: f32 = 4.0;
-/// Rate at which a contact that is watched at the edge counts as soft, or no longer, 1/s.
-const SOFT_PER_S: f32 = 2.0;
-/// Longest control period for which the response of a soft contact is compared as it is, s: in a shorter one every
-/// force that follows the torque late shows less.
-const SOFT_PERIOD_S: f32 = 1e-3;
-
 /// Inputs of one tick in which the tip slides in contact.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceReading {
@@ -87,15 +61,6 @@ pub struct ForceReading {
     pub normal_force_n: f32,
     /// Normal force that the torque withheld by rounding would cause on a rigid contact, N.
     pub withheld_n: f32,
-}
-
-/// Where the tip is when a block is evaluated.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    /// p/Q22.
-    pub p_ratio: f32,
-    /// Whether the reference waits at an edge for a smaller least p/Q22.
-    pub waits_at_edge: bool,
 }
 
 /// What the response allows.
@@ -112,16 +77,8 @@ pub struct ContactResponse {
     /// Whether the contact was certainly not rigid at some time in the last seconds: farther from the edge,
     /// where p is greater, a contact that gives looks rigid.
     pub has_lagged: bool,
-    /// Least p/Q22 at which the tip may be.
-    pub least_p_ratio: f32,
-    /// How far the contact has shown at the edge that it is soft, 0 … 1: it rises to 1 while the upper bound of the
-    /// response in a millisecond is [`gives`](ResponseSettings::gives) or less, and falls where it is 1.5 times that.
-    pub soft: f32,
     /// Probe to be added to the wanted normal force, N.
     pub probe_n: f32,
-    /// Root mean square of the slow changes of force from tick to tick by causes unknown, less 0.2 N that the loop makes of
-    /// noise; at most 0.2 N.
-    pub restless_n: f32,
 }
 
 impl ContactResponse {
@@ -132,10 +89,7 @@ impl ContactResponse {
             give: 0.0,
             lags: 0.0,
             has_lagged: false,
-            least_p_ratio: 0.0,
-            soft: 0.0,
             probe_n: 0.0,
-            restless_n: 0.0,
         }
     }
 }
@@ -147,19 +101,10 @@ pub struct ResponseEstimator {
     tick_s: f32,
     /// Weight of one block in the averages.
     weight: f32,
-    near_p_ratio: f32,
     /// Time from one block to the next, s.
     period_s: f32,
-    /// Approach to the edge in one block, as a change of p/Q22.
-    approach: f32,
     /// Share for each unit of p that is always allowed, kg.
     least_share_kg: f32,
-    /// Fall of the restlessness in a block, N.
-    calming_n: f32,
-    /// Change of the softness in a block.
-    softer: f32,
-    /// Fall of the softness for each unit of the response in a tick.
-    softness_slope: f32,
 }
 
 /// Sums or averages over blocks of ticks, N², of first or of second differences of the force.
@@ -240,19 +185,10 @@ pub struct ResponseState {
     give: f32,
     /// How certainly it is not rigid, from the upper bound of second differences.
     lags: f32,
-    /// How soft it is at present, from the same, and how far it has shown that at the edge, 0 … 1.
-    softness: f32,
-    soft: f32,
     /// Remaining time for which the contact counts as one that has lagged, s.
     lagged_s: f32,
     /// Time since the tip touched, s.
     touched_s: f32,
-    /// Time of observation near the edge, s.
-    near_s: f32,
-    /// Least p/Q22 at which the tip may be.
-    least_p_ratio: f32,
-    /// How restless the contact was lately, N.
-    restless_n: f32,
 }
 
 impl ResponseEstimator {
@@ -263,13 +199,8 @@ impl ResponseEstimator {
             settings: *settings,
             tick_s,
             weight: period_s / settings.averaging_s,
-            near_p_ratio: NEAR * settings.minimum_p_ratio,
             period_s,
-            approach: period_s * settings.approach_per_s,
             least_share_kg: settings.least_damping_ns_m * tick_s,
-            calming_n: period_s * CALMING_N_S,
-            softer: period_s * SOFT_PER_S,
-            softness_slope: 2.0 / settings.gives * (SOFT_PERIOD_S / tick_s).at_least(1.0),
         }
     }
 
@@ -294,13 +225,8 @@ impl ResponseEstimator {
             gain: 0.0,
             give: 0.0,
             lags: 0.0,
-            softness: 0.0,
-            soft: 0.0,
             lagged_s: 0.0,
             touched_s: 0.0,
-            near_s: 0.0,
-            least_p_ratio: self.settings.minimum_p_ratio,
-            restless_n: 0.0,
         }
     }
 
@@ -322,10 +248,7 @@ impl ResponseEstimator {
             give: state.give,
             lags: state.lags,
             has_lagged: state.lagged_s > 0.0,
-            least_p_ratio: state.least_p_ratio,
-            soft: state.soft,
             probe_n: state.probe_n,
-            restless_n: state.restless_n,
         }
     }
 
@@ -365,12 +288,10 @@ impl ResponseEstimator {
 
     /// Updates the averages or the bounds with a complete block.
     #[inline]
-    pub fn evaluate(&self, state: &mut ResponseState, place: &Place) {
+    pub fn evaluate(&self, state: &mut ResponseState) {
         state.block_ticks += 1;
         if state.block_ticks < END_TICKS {
             self.average(state);
-            // With the bounds of the block before, because their update takes long enough.
-            self.move_limit(state, place);
         } else {
             self.bound(state);
         }
@@ -404,47 +325,11 @@ impl ResponseEstimator {
         let (response, deviation) = second.response(weight);
         let upper = response + settings.deviations * deviation;
         state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);
-        // Swings slower than a sixth of the control rate have smaller second differences than first ones, white noise
-        // has larger ones.
-        let unexplained = |of: &Moments| (of.measured - of.expected).at_least(0.0);
-        let slow_n2 = unexplained(first) - unexplained(second);
-        let restless_n = (slow_n2.at_least(0.0) / f32::from(BLOCK_TICKS)).square_root() - CALM_N;
-        state.restless_n = restless_n
-            .at_least(state.restless_n - self.calming_n)
-            .limited(0.0, MOST_RESTLESS_N);
         state.lagged_s = if state.lags > 0.0 {
             LAGGED_S
         } else {
             state.lagged_s - self.period_s
         };
-        state.softness = (3.0 - self.softness_slope * upper).limited(0.0, 1.0);
-    }
-
-    /// Lets the tip closer to the edge while the contact there is rigid or soft, and less close while it gives.
-    fn move_limit(&self, state: &mut ResponseState, place: &Place) {
-        let softness = state.softness;
-        let settings = &self.settings;
-        let harder = state.soft - self.softer;
-        if place.p_ratio > self.near_p_ratio {
-            state.soft = harder.at_least(0.0);
-            return;
-        }
-        state.near_s += self.period_s;
-        if state.near_s < settings.observation_s {
-            return;
-        }
-        state.soft = if place.waits_at_edge {
-            softness.limited(harder, state.soft + self.softer)
-        } else {
-            softness.limited(harder, state.soft)
-        };
-        let least = &mut state.least_p_ratio;
-        if state.upper < settings.gives {
-            *least += RETREAT * self.approach;
-        } else if state.lower > settings.rigid && place.waits_at_edge {
-            *least -= self.approach;
-        }
-        *least = least.limited(0.0, settings.minimum_p_ratio);
     }
 }
 
@@ -493,20 +378,10 @@ mod tests {
         (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
     }
 
-    /// Returns the response after `ticks` of waiting at the edge, for a contact that gives the force (N) in
+    /// Returns the response after `ticks` of a contact that gives the force (N) in
     /// answer to the force commanded at the previous tick.
-    fn observed(ticks: u32, contact: impl FnMut(f32) -> f32) -> ContactResponse {
-        observed_every(TICK_S, ticks, |_| true, contact)
-    }
-
-    /// The same with another control period, at an edge where the tip waits at some ticks.
-    fn observed_every(
-        tick_s: f32,
-        ticks: u32,
-        waits_at_edge: impl Fn(u32) -> bool,
-        mut contact: impl FnMut(f32) -> f32,
-    ) -> ContactResponse {
-        let estimator = ResponseEstimator::new(&ResponseSettings::default(), tick_s);
+    fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
+        let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
         let mut state = estimator.start();
         // The probe of a tick is drawn after the tick before.
         let (mut withheld, mut probe_n, mut commanded) = (0.0, 0.0, 10.0);
@@ -516,12 +391,7 @@ mod tests {
                 withheld_n: withheld,
             };
             if estimator.update(&mut state, &reading) && tick % 2 == 0 {
-                // The tip stands where it may.
-                let place = Place {
-                    p_ratio: state.least_p_ratio,
-                    waits_at_edge: waits_at_edge(tick),
-                };
-                estimator.evaluate(&mut state, &place);
+                estimator.evaluate(&mut state);
             }
             let next = 0.05 * noise(3 * tick + 1);
             commanded = 10.0 + next - withheld + probe_n;
@@ -545,8 +415,6 @@ mod tests {
 
     #[test]
     fn a_rigid_contact_is_found_and_costs_nothing() {
-        let minimum = ResponseSettings::default().minimum_p_ratio;
-        assert_eq!(observed(250, |commanded| commanded).least_p_ratio, minimum);
         let found = observed(1500, |commanded| commanded);
         assert_eq!(found, ContactResponse::rigid(P_RATIO));
     }
@@ -559,68 +427,17 @@ mod tests {
             force += share * (commanded - force);
             force
         });
-        assert_eq!((found.give, found.least_p_ratio), (0.0, 0.0), "{found:?}");
+        assert_eq!(found.give, 0.0, "{found:?}");
     }
 
     #[test]
-    fn the_share_of_a_contact_that_gives_falls_with_its_damping_and_keeps_the_tip_from_the_edge() {
+    fn the_share_of_a_compliant_contact_falls_with_its_damping() {
         let of = |damping| observed(1500, compliant(1e5, damping));
         let (firm, soft) = (of(90.0), of(20.0));
         assert!(soft.loop_share < firm.loop_share && firm.loop_share < P_RATIO);
         assert!(soft.loop_share < 0.5 * P_RATIO, "{soft:?}");
         let softest = observed(1500, compliant(1e4, 5.0));
-        assert!(softest.give > 0.0 && softest.soft > 0.0, "{softest:?}");
-        assert_eq!(observed(1500, compliant(1e6, 240.0)).soft, 0.0);
-        let minimum = ResponseSettings::default().minimum_p_ratio;
-        for found in [firm, soft, softest] {
-            assert_eq!(found.least_p_ratio, minimum, "{found:?}");
-        }
-    }
-
-    #[test]
-    fn only_a_contact_that_is_watched_at_the_edge_counts_as_soft() {
-        let soft = |waits_at_edge: fn(u32) -> bool| {
-            observed_every(TICK_S, 3000, waits_at_edge, compliant(1e4, 5.0)).soft
-        };
-        assert_eq!(soft(|_| true), 1.0);
-        assert_eq!(soft(|_| false), 0.0);
-        assert_eq!(soft(|tick| tick < 2000), 1.0);
-    }
-
-    #[test]
-    fn a_slow_torque_stage_is_not_a_soft_contact_at_any_control_rate() {
-        for tick_s in [1e-3, 0.25e-3] {
-            let mut force = 10.0;
-            let share = 1.0 - libm::expf(-tick_s / 1e-3);
-            let found = observed_every(
-                tick_s,
-                8000,
-                |_| true,
-                |commanded| {
-                    force += share * (commanded - force);
-                    force
-                },
-            );
-            assert_eq!(found.soft, 0.0, "{tick_s}: {found:?}");
-        }
-    }
-
-    #[test]
-    fn the_tip_returns_from_the_edge_if_the_contact_starts_to_give() {
-        let mut soft = compliant(1e4, 5.0);
-        let mut ticks = 0;
-        let found = observed(3000, |commanded| {
-            ticks += 1;
-            if ticks < 1500 {
-                commanded
-            } else {
-                soft(commanded)
-            }
-        });
-        assert_eq!(
-            found.least_p_ratio,
-            ResponseSettings::default().minimum_p_ratio
-        );
+        assert!(softest.give > 0.0, "{softest:?}");
     }
 
     /// Returns the response after `ticks` of a contact whose force swings by `amplitude_n` at 50 Hz during the first second.
@@ -636,23 +453,6 @@ mod tests {
             let phase = core::f32::consts::TAU * 0.05 * tick as f32;
             contact(commanded) + amplitude_n * libm::sinf(phase)
         })
-    }
-
-    #[test]
-    fn a_force_that_swings_is_restless_and_one_that_answers_the_probe_is_calm() {
-        assert_eq!(observed(1000, |commanded| commanded).restless_n, 0.0);
-        // 1.8 N at 50 Hz change by 0.4 N a tick, root mean square, and these changes by 0.12 N; 0.2 N counts as calm.
-        let swings = swinging(1000, 1.8, |commanded| commanded);
-        assert!((swings.restless_n - 0.176).abs() < 0.01, "{swings:?}");
-    }
-
-    #[test]
-    fn a_contact_is_calm_again_soon_after_violent_swings() {
-        let restless_n = |ticks| swinging(ticks, 50.0, |commanded| commanded).restless_n;
-        assert_eq!(restless_n(1000), MOST_RESTLESS_N);
-        assert!(restless_n(2500) > 0.0);
-        // The averages forget 50 N within ten averaging times.
-        assert_eq!(restless_n(4500), 0.0);
     }
 
     #[test]

@@ -9,7 +9,7 @@ pub mod reference;
 use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, Posture};
 
-use self::governor::{EdgeGovernor, EdgeMargins, GovernorSettings, GovernorState, JointErrors};
+use self::governor::{EdgeGovernor, GovernorSettings, GovernorState, JointErrors};
 use self::reference::{Program, ReferenceGenerator, ReferenceState, TipReference};
 use crate::estimate::ContactEstimate;
 use crate::estimate::friction::FrictionEstimate;
@@ -147,7 +147,7 @@ impl References {
         arm: &Arm<f32>,
         tip_t_m: f32,
         friction: FrictionEstimate,
-        margins: EdgeMargins,
+        landing_p_ratio: f32,
     ) {
         let posture = state.posture;
         self.governor.search(
@@ -156,7 +156,7 @@ impl References {
             posture,
             tip_t_m,
             &friction,
-            margins,
+            landing_p_ratio,
         );
     }
 

@@ -35,14 +35,14 @@ struct Run {
 impl Run {
     fn start() -> Result<Self, Box<dyn Error>> {
         let mut process = Command::new(env!("CARGO_BIN_EXE_painleve"))
-            .args(["run", "--live", "0"])
+            .args(["run", "--live", "0", "--no-token"])
             .stderr(Stdio::piped())
             .spawn()?;
         let mut line = String::new();
         let stderr = process.stderr.take().ok_or("no standard error")?;
         BufReader::new(stderr).read_line(&mut line)?;
-        let port = line.split("ws://localhost:").nth(1).ok_or("no port")?;
-        let port = port.split(' ').next().unwrap_or_default().parse()?;
+        let port = line.split("ws://127.0.0.1:").nth(1).ok_or("no port")?;
+        let port = port.split('/').next().unwrap_or_default().parse()?;
         Ok(Self { process, port })
     }
 
@@ -51,8 +51,8 @@ impl Run {
         path: &str,
         protocol: Option<&str>,
     ) -> Result<WebSocket<TcpStream>, Box<dyn Error>> {
-        let stream = TcpStream::connect(("localhost", self.port))?;
-        let url = format!("ws://localhost:{}{path}", self.port);
+        let stream = TcpStream::connect(("127.0.0.1", self.port))?;
+        let url = format!("ws://127.0.0.1:{}{path}", self.port);
         let mut request = url.into_client_request()?;
         if let Some(protocol) = protocol {
             let headers = request.headers_mut();
@@ -126,7 +126,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let run = Run::start()?;
     let mut page = run.connect("/live", None)?;
-    page.send(Message::text("{\"order\":\"speed\",\"factor\":0}"))?;
+    page.send(Message::text("{\"speed\":{\"factor\":0}}"))?;
     std::thread::sleep(MEASURED);
     drop(page);
     let viewers = [Viewer::None, Viewer::Page, Viewer::Foxglove];

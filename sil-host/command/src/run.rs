@@ -15,6 +15,7 @@ use painleve_study::robustness::{self, Arms};
 use painleve_system::input_file;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::{self, warn};
+use painleve_view::access::Token;
 use tempfile::NamedTempFile;
 
 use super::bridge::{ImageArguments, SensorLineArguments};
@@ -211,8 +212,12 @@ pub struct RunArguments {
     #[arg(conflicts_with_all = ["bus", "port", "fail_on", "record", "plot", "html", "csv"])]
     #[arg(conflicts_with_all = ["timing", "verbose", "quiet", "json"])]
     live: Option<u16>,
+    /// With --live: let every user of this machine watch and steer the run, also without the token in the
+    /// printed address.
+    #[arg(long, requires = "live")]
+    no_token: bool,
     /// With --live: let pages of this origin connect as Foxglove does, for example
-    /// http://localhost:8080; may be repeated.
+    /// http://localhost:8080, or file:// for Foxglove's desktop app; may be repeated.
     #[arg(long, value_name = "ORIGIN", requires = "live")]
     live_origin: Vec<String>,
     /// Print errors and warnings only.
@@ -242,7 +247,12 @@ fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), 
     if arguments.host != Host::Native {
         return Err(InputError::LiveHost.into());
     }
-    live::run(scenario, port, &arguments.live_origin, &Interrupt::catch()?)
+    let token = match arguments.no_token {
+        true => None,
+        false => Some(Token::draw()?),
+    };
+    let interrupt = Interrupt::catch()?;
+    live::run(scenario, port, token, &arguments.live_origin, &interrupt)
 }
 
 impl RunArguments {

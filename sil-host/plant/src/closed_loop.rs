@@ -10,6 +10,7 @@ use crate::mechanics::BuiltInPlant;
 use crate::plant::{Event, Plant, PlantError, Probe, State, Step};
 use crate::sample::Sample;
 use crate::simulation::Simulation;
+use crate::smoothness::Smoothness;
 use crate::statistics::Statistics;
 
 /// Settling time at the start of a run, within which the normal force is not recorded, s.
@@ -124,6 +125,7 @@ pub struct ClosedLoop<H, P = BuiltInPlant> {
     simulation: Simulation<P>,
     host: H,
     statistics: Statistics,
+    smoothness: Smoothness,
     log: LogHash,
     round_trips_ns: Histogram<u64>,
     last_answer: ActuatorFrame,
@@ -202,6 +204,8 @@ pub struct LoopResult {
     pub ticks: u64,
     /// Counts and extremes of the plant.
     pub statistics: Statistics,
+    /// Smoothness of torque and force while the controller tracks.
+    pub smoothness: Smoothness,
     /// Tip position at the end, m.
     pub final_tip_t_m: f64,
     /// Reference at the end, m.
@@ -223,10 +227,12 @@ pub struct LoopResult {
 impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
     /// Creates a loop at the start of its simulation.
     pub fn new(simulation: Simulation<P>, host: H) -> Self {
+        let smoothness = Smoothness::new(simulation.tick_hz());
         Self {
             simulation,
             host,
             statistics: Statistics::new(SETTLING_S),
+            smoothness,
             log: LogHash::new(),
             // Three significant digits, as everywhere. It grows with the longest round trip, because to clear the
             // memory of all possible ones would take some per cent of a short run.
@@ -297,6 +303,8 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             monitor: &mut *monitor,
         };
         self.simulation.advance(frame.as_ref(), &mut probe)?;
+        self.smoothness
+            .add(frame.as_ref(), self.statistics.normal_force_n);
         if self.simulation.drive_watchdog_has_tripped() && self.drive_watchdog_tick.is_none() {
             self.drive_watchdog_tick = Some(self.simulation.ticks());
         }
@@ -308,6 +316,7 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
         let result = LoopResult {
             ticks: self.simulation.ticks(),
             statistics: self.statistics,
+            smoothness: self.smoothness,
             final_tip_t_m: self.simulation.plant().snapshot().tip_t_m,
             final_reference_m: self.last_answer.reference_tip.to_metres(),
             saturated_ticks: self.saturated_ticks,

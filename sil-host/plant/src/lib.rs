@@ -23,6 +23,7 @@ pub mod plant;
 pub mod sample;
 pub mod scenario;
 pub mod simulation;
+pub mod smoothness;
 pub mod statistics;
 mod tick_clock;
 

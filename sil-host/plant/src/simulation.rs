@@ -117,6 +117,11 @@ impl<P: Plant> Simulation<P> {
         &self.plant
     }
 
+    /// Returns the control rate, Hz.
+    pub fn tick_hz(&self) -> f64 {
+        self.clock.tick_hz()
+    }
+
     /// Returns the number of ticks since the start.
     pub fn ticks(&self) -> u64 {
         self.clock.tick()

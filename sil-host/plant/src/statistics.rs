@@ -17,6 +17,8 @@ pub struct Statistics {
     pub max_tip_t_m: f64,
     /// Smallest normal force after the settling time, N; zero in flight.
     pub min_normal_force_n: f64,
+    /// Present normal force, N; zero in flight.
+    pub normal_force_n: f64,
     /// Largest joint torque, N·m.
     pub peak_torque_nm: f64,
     /// Time in contact, s.
@@ -36,6 +38,7 @@ impl Statistics {
             impacts_without_collision: 0,
             max_tip_t_m: f64::NEG_INFINITY,
             min_normal_force_n: f64::INFINITY,
+            normal_force_n: 0.0,
             peak_torque_nm: 0.0,
             contact_s: 0.0,
             total_s: 0.0,
@@ -46,6 +49,7 @@ impl Statistics {
     #[inline]
     fn observe(&mut self, at: &Snapshot) {
         self.max_tip_t_m = self.max_tip_t_m.max(at.tip_t_m);
+        self.normal_force_n = at.normal_force_n;
         self.peak_torque_nm = self.peak_torque_nm.max(at.torque_nm.amax());
         if at.time_s >= self.settling_s {
             self.min_normal_force_n = smaller(self.min_normal_force_n, at.normal_force_n);

@@ -21,6 +21,11 @@ pub struct TickClock {
 }
 
 impl TickClock {
+    /// Returns the nominal rate, Hz.
+    pub fn tick_hz(&self) -> f64 {
+        self.tick_hz
+    }
+
     /// Creates a clock at tick 0, which is on time. Each later tick is late by up to `jitter` tick periods, uniformly.
     pub fn new(tick_hz: f64, jitter: f64, seed: u64) -> Self {
         let mut clock = Self {

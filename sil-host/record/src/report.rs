@@ -6,6 +6,7 @@ use comfy_table::CellAlignment;
 use hdrhistogram::Histogram;
 use painleve_plant::closed_loop::LoopResult;
 use painleve_plant::scenario::Scenario;
+use painleve_plant::smoothness::Roughness;
 use painleve_system::terminal;
 use serde::{Deserialize, Serialize};
 
@@ -76,6 +77,19 @@ pub struct RunReport {
     pub min_normal_force_n: Option<f64>,
     /// Largest joint torque, N·m.
     pub peak_torque_nm: f64,
+    /// Change of torque from tick to tick while the tip moves, N·m: root mean square over ticks and joints; null without
+    /// such ticks.
+    #[serde(default)]
+    pub torque_change_moving_nm: Option<f64>,
+    /// The same while it stands.
+    #[serde(default)]
+    pub torque_change_holding_nm: Option<f64>,
+    /// Share of changes of torque that reverse the one before while the tip stands, 0 to 1.
+    #[serde(default)]
+    pub torque_reversals: Option<f64>,
+    /// Standard deviation of the normal force while the tip stands, N.
+    #[serde(default)]
+    pub force_ripple_n: Option<f64>,
     /// Fraction of the time in contact.
     pub contact_fraction: f64,
     /// Number of ticks on which the controller limited its torque.
@@ -119,6 +133,9 @@ impl RunReport {
         let sim_s = result.ticks as f64 / f64::from(scenario.run.tick_hz);
         let wall_s = wall.as_secs_f64();
         let force = statistics.min_normal_force_n;
+        let smoothness = &result.smoothness;
+        let count_nm = f64::from(scenario.converters.scales().torque.per_count());
+        let change_nm = |of: &Roughness| of.torque_change_counts().map(|counts| counts * count_nm);
         Self {
             scenario: scenario.name.clone(),
             controller: scenario.controller.law.name().into(),
@@ -140,6 +157,10 @@ impl RunReport {
                 .filter(|_| scenario.controller.law.name() != "off"),
             min_normal_force_n: force.is_finite().then_some(force),
             peak_torque_nm: statistics.peak_torque_nm,
+            torque_change_moving_nm: change_nm(&smoothness.moving),
+            torque_change_holding_nm: change_nm(&smoothness.holding),
+            torque_reversals: smoothness.holding.reversals(),
+            force_ripple_n: smoothness.holding.force_ripple_n(),
             contact_fraction: statistics.contact_fraction(),
             saturated_ticks: result.saturated_ticks,
             stale_ticks: result.stale_ticks,
@@ -206,6 +227,26 @@ impl RunReport {
             .map_or("–".into(), |force| format!("{force:.2} N"));
         row("smallest normal force", force);
         row("largest torque", format!("{:.2} N·m", self.peak_torque_nm));
+        if let (Some(change_nm), Some(reversals), Some(ripple_n)) = (
+            self.torque_change_holding_nm,
+            self.torque_reversals,
+            self.force_ripple_n,
+        ) {
+            let moving = self
+                .torque_change_moving_nm
+                .map_or(String::new(), |moving_nm| {
+                    format!("{:.0} moving, ", 1e3 * moving_nm)
+                });
+            row(
+                "torque change",
+                format!(
+                    "{moving}{:.0} holding mN·m rms a tick, {:.0} % reversals",
+                    1e3 * change_nm,
+                    100.0 * reversals
+                ),
+            );
+            row("force ripple", format!("{ripple_n:.3} N rms, holding"));
+        }
         row(
             "ticks",
             format!(

@@ -17,8 +17,9 @@ class Page {
       this.events = run.events;
     }
     this.time = this.columns.start;
-    this.header();
-    this.arm = new ArmView($("arm"), run.arm, this.columns);
+    this.arm = new ArmView($("arm"), this.columns);
+    this.describe(run);
+    this.verdict();
     const seek = (time) => this.seek(time);
     const bit = (flag) => (c, i) => (c.flags[i] & flag ? 1 : 0);
     const flag = (name, colour, mask) => [name, [["", ""], ["yes", colour]], bit(mask)];
@@ -37,13 +38,15 @@ class Page {
     requestAnimationFrame((now) => this.frame(now));
   }
 
-  header() {
-    const { run } = this;
+  /** Shows what runs; a live run sends it again when it has changed. */
+  describe(run) {
+    this.run = { ...this.run, ...run };
+    this.arm.fit(run.arm);
+    this.dirty = true;
     document.title = `${run.name} · painleve`;
     $("title").textContent = run.name;
     $("subtitle").textContent = `${run.description ? `${run.description.replace(/\.?$/, ".")} ` : ""}Law ${run.law} · ${run.tick_hz} Hz · μ = ${run.friction} · seed ${run.seed}`;
     $("settings").querySelector("pre").textContent = run.settings;
-    this.verdict();
   }
 
   verdict() {

@@ -2,12 +2,17 @@
 // The arm on its belt at one time, and the bands of modes and states.
 
 class ArmView {
-  constructor(canvas, arm, columns) {
-    Object.assign(this, { canvas, arm, columns });
+  constructor(canvas, columns) {
+    Object.assign(this, { canvas, columns });
+    this.resize();
+  }
+
+  /** Chooses the scale for an arm. */
+  fit(arm) {
+    this.arm = arm;
     const reach = arm.link_length_m[0] + arm.link_length_m[1];
     const across = Math.sqrt(Math.max(reach * reach - arm.height_m * arm.height_m, 0.01 * reach * reach));
     this.half = Math.max(1.35 * across, 0.62 * reach);
-    this.resize();
   }
 
   resize() {

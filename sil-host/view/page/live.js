@@ -4,19 +4,19 @@
 /** Rows and events that stay on the page, simulated time that the charts show. */
 const KEPT_ROWS = 12000, KEPT_EVENTS = 500, SHOWN_S = 10;
 
-function connect(page) {
-  const socket = new WebSocket(`ws://${location.host}/live`);
-  socket.binaryType = "arraybuffer";
-  const rows = [];
-  let listed = 0, turn = 0, outdated = 0;
-  const send = (order, more = {}) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ order, ...more })); };
+/** Forces of the push buttons along the belt and away from it, N; how long they last, s. */
+const PUSHES = [["push ←", [-5, 0]], ["push →", [5, 0]], ["push ↑", [0, 15]]], PUSH_S = 0.05;
 
-  const status = document.createElement("p");
-  status.id = "status";
-  status.setAttribute("role", "status");
+function connect(page) {
+  // The page's own address contains the token.
+  const socket = new WebSocket(`ws://${location.host}/live${location.search}`);
+  socket.binaryType = "arraybuffer";
+  const rows = [], form = $("parameters"), status = $("status");
+  let listed = 0, turn = 0, outdated = 0;
+  const send = (order) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(order)); };
+
+  for (const only of document.querySelectorAll("[data-live]")) only.hidden = false;
   status.textContent = "connecting …";
-  $("hint").before(status);
-  $("reset").hidden = false;
   $("verdict").textContent = "live";
 
   socket.addEventListener("open", () => { status.textContent = "connected"; });
@@ -25,8 +25,11 @@ function connect(page) {
     if (typeof data !== "string") { rows.push(data); return; }
     const message = JSON.parse(data);
     if (message.event) page.events.push(message.event);
+    if (message.run) page.describe(message.run);
     if (message.reset) clear();
-    if (message.error || message.note) show(message.error ?? message.note, Boolean(message.error));
+    // An accepted order has a note, often an empty one, which replaces an earlier error.
+    if ("note" in message) show(message.note);
+    if ("error" in message) show(message.error, "error");
     if (message.status) {
       const { paused, factor, ticks_per_s, real_time_factor, settings } = message.status;
       for (const { key, value } of settings) {
@@ -39,12 +42,15 @@ function connect(page) {
     }
   });
 
+  function show(text, kind = "") { $("message").textContent = text; $("message").className = kind; }
+
   function clear() {
     rows.length = 0;
     page.columns.clear();
     page.events = [];
     listed = 0;
     page.listEvents();
+    page.verdict();
     page.charts.range = null;
     page.follow = true;
     outdateAll();
@@ -55,12 +61,12 @@ function connect(page) {
   function setPlaying(playing) { if (page.playing !== playing) page.play(playing); }
 
   page.toggle = () => send(page.playing ? "pause" : "resume");
-  page.speedChanged = (factor) => send("speed", { factor });
+  page.speedChanged = (factor) => send({ speed: { factor } });
   const stepBack = page.step.bind(page);
   page.step = (ticks) => {
     if (ticks < 0) { send("pause"); stepBack(ticks); return; }
     page.follow = true;
-    send("step", { ticks });
+    send({ step: { ticks } });
   };
   $("reset").addEventListener("click", () => send("reset"));
 
@@ -83,35 +89,28 @@ function connect(page) {
     if (page.events.length !== listed) { page.listEvents(listed); listed = page.events.length; page.verdict(); }
   };
 
-  const form = $("parameters");
-  const errors = document.createElement("p");
-  errors.className = "error";
-  errors.setAttribute("role", "status");
-  const show = (text, wrong) => { errors.textContent = text; errors.style.color = wrong ? "" : "var(--faint)"; };
   for (const { key, label, value, minimum, maximum, step, template } of page.run.parameters) {
     const name = document.createElement("label"), input = document.createElement("input");
     Object.assign(input, { type: "number", name: key, value, min: minimum, max: maximum, step });
     input.addEventListener("change", () => {
-      if (input.value !== "") send("set", { key, value: (template ?? "%").replace("%", Number(input.value).toFixed(9)) });
+      if (input.value !== "") send({ set: { key, value: (template ?? "%").replace("%", Number(input.value).toFixed(9)) } });
     });
     name.append(label, input);
     form.append(name);
   }
   const any = document.createElement("label"), line = document.createElement("input");
-  Object.assign(line, { type: "text", name: "any", placeholder: "controller.governor.enabled = false" });
+  Object.assign(line, { type: "text", name: "any", placeholder: "run.seed = 2" });
   line.addEventListener("change", () => {
     const [key, ...value] = line.value.split("=");
-    if (value.length) send("set", { key: key.trim(), value: value.join("=").trim() });
+    if (value.length) send({ set: { key: key.trim(), value: value.join("=").trim() } });
   });
   any.append("any key = value", line);
   form.append(any);
-  for (const [label, force_n] of [["push ←", [-5, 0]], ["push →", [5, 0]], ["push ↑", [0, 15]]]) {
-    const button = document.createElement("button");
-    Object.assign(button, { type: "button", textContent: label, title: `${Math.hypot(...force_n)} N on the tip for 50 ms` });
-    button.addEventListener("click", () => send("push", { force_n, duration_s: 0.05 }));
-    form.append(button);
-  }
-  form.append(errors);
   form.addEventListener("submit", (event) => event.preventDefault());
-  form.hidden = false;
+  for (const [label, force_n] of PUSHES) {
+    const button = document.createElement("button");
+    Object.assign(button, { type: "button", textContent: label, title: `${Math.hypot(...force_n)} N on the tip for ${1e3 * PUSH_S} ms` });
+    button.addEventListener("click", () => send({ push: { force_n, duration_s: PUSH_S } }));
+    $("pushes").append(button);
+  }
 }

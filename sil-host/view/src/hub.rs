@@ -17,9 +17,11 @@ use crate::parameters::Parameter;
 
 /// Most viewers of each kind at once.
 const MOST_VIEWERS: usize = 8;
-/// Bytes that may wait for a page.
+/// Bytes of rows that may wait for a page.
 const MOST_BYTES: usize = 4 << 20;
-/// Ticks and events that may wait for a Foxglove client: a few seconds.
+/// Messages that may wait for a page: a few hundred events and the answers to some orders.
+const MOST_MESSAGES: usize = 1024;
+/// What may wait for a Foxglove client: ticks and events of a few seconds.
 const MOST_ENTRIES: usize = 8192;
 
 /// The viewers of a run.
@@ -32,13 +34,28 @@ pub struct Hub {
     /// Number of resets of the run.
     session: AtomicU64,
     parameters: Mutex<Vec<Parameter>>,
+    /// What every page is told first: the run as it is now.
+    description: Mutex<Option<String>>,
 }
 
 /// What waits for a page.
 #[derive(Debug, Default)]
 pub(crate) struct PageQueue {
     pub(crate) rows: Vec<u8>,
-    pub(crate) messages: Vec<String>,
+    pub(crate) messages: VecDeque<String>,
+}
+
+impl PageQueue {
+    /// Adds what fits; the oldest is lost.
+    fn push(&mut self, rows: &[u8], messages: &[String]) {
+        if self.rows.len() + rows.len() > MOST_BYTES {
+            self.rows.clear();
+        }
+        self.rows.extend_from_slice(rows);
+        self.messages.extend(messages.iter().cloned());
+        let excess = self.messages.len().saturating_sub(MOST_MESSAGES);
+        self.messages.drain(..excess);
+    }
 }
 
 /// What waits for a Foxglove client.
@@ -98,21 +115,30 @@ impl Hub {
 
     /// Passes rows and messages to every page.
     pub fn publish(&self, rows: &[u8], messages: &[Value]) {
-        self.pages.each(|waiting| {
-            if waiting.rows.len() + rows.len() > MOST_BYTES {
-                waiting.rows.clear();
-            }
-            waiting.rows.extend_from_slice(rows);
-            waiting
-                .messages
-                .extend(messages.iter().map(Value::to_string));
-        });
+        let messages: Vec<String> = messages.iter().map(Value::to_string).collect();
+        self.pages.each(|queue| queue.push(rows, &messages));
     }
 
-    /// Tells every viewer that a request was carried out, and how.
+    /// Tells every page, also those to come, what runs: [`description`](crate::page::description).
+    pub fn describe(&self, run: &Value) {
+        let message = json!({ "run": run });
+        *locked(&self.description) = Some(message.to_string());
+        self.publish(&[], &[message]);
+    }
+
+    /// Adds a page, which is told what runs; `None` if there are too many.
+    pub(crate) fn join_page(&self) -> Option<Arc<Mutex<PageQueue>>> {
+        let queue = self.pages.join()?;
+        locked(&queue).push(&[], locked(&self.description).as_slice());
+        Some(queue)
+    }
+
+    /// Tells every viewer that a request was carried out, and how if there is something to say.
     pub fn note(&self, text: &str) {
         self.publish(&[], &[json!({ "note": text })]);
-        self.send(&[Entry::Status(Severity::Information, text.into())]);
+        if !text.is_empty() {
+            self.send(&[Entry::Status(Severity::Information, text.into())]);
+        }
     }
 
     /// Tells every viewer why something is impossible.
@@ -189,13 +215,13 @@ impl Entry {
 
 impl ClientQueue {
     fn push(&mut self, entry: &Entry) {
-        if entry.is_data() {
-            if !self.is_subscribed {
-                return;
-            }
-            if self.entries.len() >= MOST_ENTRIES {
-                self.entries.retain(|waiting| !waiting.is_data());
-            }
+        if entry.is_data() && !self.is_subscribed {
+            return;
+        }
+        if self.entries.len() >= MOST_ENTRIES {
+            self.entries.retain(|waiting| !waiting.is_data());
+            let excess = (self.entries.len() + 1).saturating_sub(MOST_ENTRIES);
+            self.entries.drain(..excess);
         }
         self.entries.push_back(entry.clone());
     }

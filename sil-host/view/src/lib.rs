@@ -4,12 +4,15 @@
 //! - [`thinning`]: limits the number of rows and keeps the extremes of the contact force
 //! - [`page`]: the page of a recorded run as one file that needs no network
 //! - [`server`]: the viewers of a live run on this machine: the same page, and Foxglove
+//! - [`access`]: who may be one; `connection`: a connection until it is
 //! - [`hub`], [`request`]: data on their way to the viewers, and their requests
 //! - [`parameters`]: the settings of a live run, by name
 //! - [`foxglove`]: Foxglove's WebSocket protocol
 //!
 //! `page/` contains the page itself; its scripts need no build step.
 
+pub mod access;
+mod connection;
 pub mod foxglove;
 pub mod hub;
 pub mod page;

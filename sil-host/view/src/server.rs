@@ -1,64 +1,85 @@
 //! The live page on this machine: HTTP and WebSocket on one port of the loopback interface.
 //!
-//! Requests for another host (DNS rebinding) are refused, and so are connections from pages of another
-//! origin: the live page is open to itself only, and the [`foxglove`](mod@super::foxglove) service to the
-//! Foxglove app and the origins that the user names. Each viewer has a thread of its own, which sends
-//! about 60 times a second what the run has published to the [`Hub`].
+//! [`access`](crate::access) decides who may connect: the live page is open to itself only, and the
+//! [`foxglove`](mod@super::foxglove) service to the Foxglove app and the origins that the user names. Each
+//! viewer has a thread of its own, which sends about 60 times a second what the run has published to the
+//! [`Hub`].
 
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
-use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-use tungstenite::handshake::derive_accept_key;
+use tungstenite::handshake::server::{Request, create_response, write_response};
+use tungstenite::http::StatusCode;
+use tungstenite::http::header::{HeaderValue, SEC_WEBSOCKET_KEY, SEC_WEBSOCKET_PROTOCOL};
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Message, WebSocket};
 
+use crate::access::{Access, Token};
+use crate::connection::{Connection, PATIENCE};
 use crate::foxglove;
 use crate::hub::{Hub, PageQueue, locked};
 use crate::receive::receive;
-use crate::request::{Order, Orders};
+use crate::request::{Desk, Orders};
 
 /// Time between two messages to a viewer.
 const INTERVAL: Duration = Duration::from_millis(16);
-/// How long a connection may take to send its request.
-const PATIENCE: Duration = Duration::from_secs(2);
-/// Longest request head and longest order, bytes.
+/// Time until the next connection after one that cannot be accepted, because the process has no descriptors
+/// left.
+const PAUSE: Duration = Duration::from_millis(100);
+/// Longest order, bytes.
 const MOST_BYTES: usize = 16 << 10;
 
 /// Serves the page until the process ends.
-#[derive(Debug)]
 pub struct Server {
     /// The viewers.
     pub hub: Arc<Hub>,
     /// Their requests.
-    pub orders: Receiver<Order>,
+    pub orders: Arc<Orders>,
     /// Where the page is.
-    pub address: SocketAddr,
+    address: SocketAddr,
+    /// Query of the addresses.
+    query: String,
 }
 
 impl Server {
-    /// Starts to serve `page` on a port of the loopback interface; 0 for any free one. Pages of
-    /// `origins` may connect as Foxglove does.
+    /// Starts to serve `page` on a port of the loopback interface, 0 for any free one, to those who know the
+    /// token, if there is one. Pages of `origins` may connect as Foxglove does.
     ///
     /// # Errors
     /// If the port is taken or a thread cannot be started.
-    pub fn start(port: u16, page: String, origins: &[String]) -> io::Result<Self> {
+    pub fn start(
+        port: u16,
+        page: String,
+        token: Option<Token>,
+        origins: &[String],
+    ) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         let address = listener.local_addr()?;
-        let hub = Arc::<Hub>::default();
-        let (sender, orders) = Orders::channel();
-        let service = Service {
-            page: page.into(),
-            port: address.port(),
-            hub: hub.clone(),
-            orders: sender,
-            origins: origins.into(),
+        let service = Arc::new(Service {
+            page,
+            access: Access {
+                port: address.port(),
+                token,
+                origins: origins.into(),
+            },
+            hub: Arc::default(),
+            orders: Arc::default(),
+        });
+        let server = Self {
+            hub: service.hub.clone(),
+            orders: service.orders.clone(),
+            address,
+            query: service.access.query(),
         };
         let accept = move || {
-            for stream in listener.incoming().flatten() {
+            for stream in listener.incoming() {
+                let Ok(stream) = stream else {
+                    thread::sleep(PAUSE);
+                    continue;
+                };
                 let service = service.clone();
                 // A connection that cannot be served is closed.
                 let _ = thread::Builder::new()
@@ -69,172 +90,169 @@ impl Server {
         thread::Builder::new()
             .name("live page".into())
             .spawn(accept)?;
-        Ok(Self {
-            hub,
-            orders,
-            address,
-        })
+        Ok(server)
+    }
+
+    /// Returns the address of the page, with the token. It names the interface that is served: `localhost`
+    /// may be another one.
+    pub fn page_address(&self) -> String {
+        format!("http://{}/{}", self.address, self.query)
+    }
+
+    /// Returns the address for Foxglove, with the token.
+    pub fn foxglove_address(&self) -> String {
+        format!("ws://{}/{}", self.address, self.query)
     }
 }
 
 /// What every connection needs.
-#[derive(Clone)]
 struct Service {
-    page: Arc<str>,
-    port: u16,
+    page: String,
+    access: Access,
     hub: Arc<Hub>,
-    orders: Orders,
-    /// Origins of further pages that may connect as Foxglove does.
-    origins: Arc<[String]>,
+    orders: Arc<Orders>,
+}
+
+/// What a request asks for.
+enum Visit {
+    /// The page.
+    Page,
+    /// Its data and orders.
+    Live,
+    /// Those for Foxglove, in this version of the protocol.
+    Foxglove(&'static str),
 }
 
 impl Service {
-    fn serve(&self, mut stream: TcpStream) -> io::Result<()> {
-        stream.set_read_timeout(Some(PATIENCE))?;
+    fn serve(&self, stream: TcpStream) -> io::Result<()> {
         stream.set_nodelay(true)?;
-        let head = read_head(&mut stream)?;
-        let mut headers = [httparse::EMPTY_HEADER; 64];
-        let mut request = httparse::Request::new(&mut headers);
-        if !request
-            .parse(&head)
-            .is_ok_and(|status| status.is_complete())
-        {
-            return refuse(&mut stream, "400 Bad Request");
-        }
-        let header = |name: &str| {
-            let found = request
-                .headers
-                .iter()
-                .find(|header| header.name.eq_ignore_ascii_case(name));
-            found.and_then(|header| std::str::from_utf8(header.value).ok())
-        };
-        let own = |authority: &str| {
-            let names = ["localhost", "127.0.0.1"];
-            names
-                .iter()
-                .any(|name| authority == format!("{name}:{}", self.port))
-        };
-        let origin = header("origin");
-        let is_own_host = header("host").is_some_and(own);
-        let is_own_origin =
-            origin.is_none_or(|origin| origin.strip_prefix("http://").is_some_and(own));
-        let protocol = foxglove::subprotocol(header("sec-websocket-protocol").unwrap_or_default());
-        let is_allowed = is_own_origin
-            || protocol.is_some()
-                && origin.is_some_and(|origin| {
-                    foxglove::ORIGINS.contains(&origin)
-                        || self.origins.iter().any(|own| own == origin)
-                });
-        if !is_own_host || !is_allowed {
-            return refuse(&mut stream, "403 Forbidden");
-        }
-        let key = header("sec-websocket-key");
-        match (request.method, request.path, key, protocol) {
-            (Some("GET"), Some("/live"), Some(key), _) if is_own_origin => {
-                stream.write_all(upgrade(key, "").as_bytes())?;
-                self.view(stream)
-            }
-            (Some("GET"), Some("/"), Some(key), Some(protocol)) => {
-                let protocol = format!("Sec-WebSocket-Protocol: {protocol}\r\n");
-                stream.write_all(upgrade(key, &protocol).as_bytes())?;
-                foxglove::serve(web_socket(stream)?, &self.hub, &self.orders);
+        let mut connection = Connection::new(stream);
+        let visit = connection
+            .request()?
+            .and_then(|request| Ok((self.visit(&request)?, request)));
+        match visit {
+            Ok((Visit::Page, _)) => connection.answer(StatusCode::OK, "text/html", &self.page),
+            Ok((Visit::Live, request)) => match upgrade(connection, &request, None)? {
+                Some(socket) => self.view(socket),
+                None => Ok(()),
+            },
+            Ok((Visit::Foxglove(protocol), request)) => {
+                if let Some(socket) = upgrade(connection, &request, Some(protocol))? {
+                    foxglove::serve(socket, &self.hub, Desk::new(self.orders.clone()));
+                }
                 Ok(())
             }
-            (Some("GET"), Some("/"), _, _) => {
-                let answer = format!(
-                    "HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\n\
-                     Content-Length: {}\r\nCache-Control: no-store\r\nX-Frame-Options: DENY\r\n\
-                     Connection: close\r\n\r\n{}",
-                    self.page.len(),
-                    self.page
-                );
-                stream.write_all(answer.as_bytes())
-            }
-            _ => refuse(&mut stream, "404 Not Found"),
+            Err(status) => connection.answer(status, "text/plain", reason(status)),
+        }
+    }
+
+    /// Returns what a request asks for, if it may have it.
+    fn visit(&self, request: &Request) -> Result<Visit, StatusCode> {
+        let headers = request.headers();
+        let offered = headers.get(SEC_WEBSOCKET_PROTOCOL);
+        let offered = offered.and_then(|value| value.to_str().ok());
+        let protocol = offered.and_then(foxglove::subprotocol);
+        self.access.check(request, protocol.is_some())?;
+        let is_socket = headers.contains_key(SEC_WEBSOCKET_KEY);
+        match (request.uri().path(), is_socket, protocol) {
+            ("/", false, _) => Ok(Visit::Page),
+            ("/", true, Some(protocol)) => Ok(Visit::Foxglove(protocol)),
+            ("/live", true, None) => Ok(Visit::Live),
+            _ => Err(StatusCode::NOT_FOUND),
         }
     }
 
     /// Sends to one viewer and takes its orders until it leaves.
-    fn view(&self, stream: TcpStream) -> io::Result<()> {
-        let mut socket = web_socket(stream)?;
-        let Some(waiting) = self.hub.pages.join() else {
+    fn view(&self, mut socket: WebSocket<TcpStream>) -> io::Result<()> {
+        let Some(waiting) = self.hub.join_page() else {
             return Ok(());
         };
-        while self.exchange(&mut socket, &waiting).is_ok() {}
+        let mut desk = Desk::new(self.orders.clone());
+        while exchange(&mut socket, &waiting, &mut desk).is_ok() {}
         self.hub.pages.leave(&waiting);
         Ok(())
     }
+}
 
-    fn exchange(
-        &self,
-        socket: &mut WebSocket<TcpStream>,
-        waiting: &Mutex<PageQueue>,
-    ) -> Result<(), tungstenite::Error> {
-        if let Some(Message::Text(text)) = receive(socket)? {
-            match serde_json::from_str(&text) {
-                Ok(request) => self.orders.send(request),
-                Err(error) => {
-                    let message = serde_json::json!({ "error": error.to_string() });
-                    socket.send(Message::text(message.to_string()))?;
-                }
-            }
+/// Takes an order of a page and sends what waits for it.
+fn exchange(
+    socket: &mut WebSocket<TcpStream>,
+    waiting: &Mutex<PageQueue>,
+    desk: &mut Desk,
+) -> Result<(), tungstenite::Error> {
+    if let Some(Message::Text(text)) = receive(socket)? {
+        let refusal = desk.admit().and_then(|()| {
+            let request = serde_json::from_str(&text).map_err(|error| Some(error.to_string()))?;
+            desk.send(request).map_err(Some)
+        });
+        if let Err(Some(reason)) = refusal {
+            let message = serde_json::json!({ "error": reason });
+            socket.send(Message::text(message.to_string()))?;
         }
-        let PageQueue { rows, messages } = std::mem::take(&mut *locked(waiting));
-        if !rows.is_empty() {
-            socket.send(Message::binary(rows))?;
-        }
-        for message in messages {
-            socket.send(Message::text(message))?;
-        }
-        Ok(())
     }
+    let PageQueue { rows, messages } = std::mem::take(&mut *locked(waiting));
+    if !rows.is_empty() {
+        socket.send(Message::binary(rows))?;
+    }
+    for message in messages {
+        socket.send(Message::text(message))?;
+    }
+    Ok(())
 }
 
-/// Returns the answer that turns a connection into a WebSocket, with a further header.
-fn upgrade(key: &str, header: &str) -> String {
-    let accept = derive_accept_key(key.as_bytes());
-    format!(
-        "HTTP/1.1 101 Switching Protocols\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-         {header}Sec-WebSocket-Accept: {accept}\r\n\r\n"
-    )
-}
-
-fn web_socket(stream: TcpStream) -> io::Result<WebSocket<TcpStream>> {
+/// Turns a connection into a WebSocket; `None` if the request does not ask for one as it must.
+fn upgrade(
+    mut connection: Connection,
+    request: &Request,
+    protocol: Option<&'static str>,
+) -> io::Result<Option<WebSocket<TcpStream>>> {
+    let Ok(mut response) = create_response(request) else {
+        let status = StatusCode::BAD_REQUEST;
+        connection.answer(status, "text/plain", reason(status))?;
+        return Ok(None);
+    };
+    if let Some(protocol) = protocol {
+        let protocol = HeaderValue::from_static(protocol);
+        response
+            .headers_mut()
+            .insert(SEC_WEBSOCKET_PROTOCOL, protocol);
+    }
+    let mut head = Vec::new();
+    write_response(&mut head, &response).map_err(io::Error::other)?;
+    connection.write_all(&head)?;
+    let stream = connection.into_stream();
     stream.set_read_timeout(Some(INTERVAL))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let limits = WebSocketConfig::default().max_message_size(Some(MOST_BYTES));
-    Ok(WebSocket::from_raw_socket(
-        stream,
-        Role::Server,
-        Some(limits),
-    ))
+    let socket = WebSocket::from_raw_socket(stream, Role::Server, Some(limits));
+    Ok(Some(socket))
 }
 
-/// Reads a request up to its empty line.
-fn read_head(stream: &mut TcpStream) -> io::Result<Vec<u8>> {
-    let mut head = Vec::new();
-    let mut part = [0; 1024];
-    while !head.windows(4).any(|end| end == b"\r\n\r\n") {
-        let length = stream.read(&mut part)?;
-        if length == 0 || head.len() + length > MOST_BYTES {
-            return Err(ErrorKind::InvalidData.into());
+/// Says what is wrong with a request.
+fn reason(status: StatusCode) -> &'static str {
+    match status {
+        StatusCode::FORBIDDEN => {
+            "Refused. Open the whole address that painleve has printed, with its token; pages of other origins \
+             need --live-origin.\n"
         }
-        head.extend_from_slice(&part[..length]);
+        StatusCode::NOT_FOUND => "There is nothing at this address.\n",
+        _ => "This is not a request for a page or a WebSocket.\n",
     }
-    Ok(head)
-}
-
-fn refuse(stream: &mut TcpStream, status: &str) -> io::Result<()> {
-    let answer = format!("HTTP/1.1 {status}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
-    stream.write_all(answer.as_bytes())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read;
+    use std::time::Instant;
+
     use super::*;
     use crate::request::ViewerRequest;
 
-    /// Sends a request and returns the first line of the answer.
+    fn server(origins: &[String]) -> Server {
+        Server::start(0, "page".into(), None, origins).unwrap()
+    }
+
+    /// Sends a request and returns the status of the answer.
     fn status(server: &Server, request: &str) -> String {
         let mut stream = TcpStream::connect(server.address).unwrap();
         let request = request.replace("PORT", &server.address.port().to_string());
@@ -242,62 +260,106 @@ mod tests {
         let mut answer = [0; 64];
         let length = stream.read(&mut answer).unwrap();
         let text = String::from_utf8_lossy(&answer[..length]);
-        text.lines().next().unwrap_or_default().to_owned()
+        let line = text.lines().next().unwrap_or_default();
+        line.trim_start_matches("HTTP/1.1 ").to_owned()
     }
 
-    const UPGRADE: &str = "Upgrade: websocket\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+    const KEY: &str =
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
 
     #[test]
     fn only_this_machines_own_pages_are_served() {
-        let server = Server::start(0, "page".into(), &["http://localhost:8080".into()]).unwrap();
+        let server = server(&["http://localhost:8080".into()]);
         assert!(server.address.ip().is_loopback());
-        for (request, expected) in [
+        let host = "Host: localhost:PORT\r\n";
+        let socket =
+            format!("{host}{KEY}Connection: keep-alive, Upgrade\r\nUpgrade: websocket\r\n");
+        let foxglove = "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n";
+        for (path, headers, expected) in [
+            ("/", host.to_owned(), "200 OK"),
+            ("/", "Host: 127.0.0.1:PORT\r\n".into(), "200 OK"),
+            ("/", "Host: evil.example:PORT\r\n".into(), "403 Forbidden"),
+            ("http://evil.example/", host.into(), "403 Forbidden"),
+            ("/", String::new(), "403 Forbidden"),
+            ("/etc", host.into(), "404 Not Found"),
+            ("/", format!("{host}{host}"), "400 Bad Request"),
             (
-                "GET / HTTP/1.1\r\nHost: localhost:PORT\r\n\r\n".to_owned(),
-                "200 OK",
+                "/",
+                format!("{host}Host: evil.example:PORT\r\n"),
+                "400 Bad Request",
             ),
             (
-                "GET / HTTP/1.1\r\nHost: evil.example:PORT\r\n\r\n".to_owned(),
-                "403 Forbidden",
-            ),
-            ("GET / HTTP/1.1\r\n\r\n".to_owned(), "403 Forbidden"),
-            (
-                "GET /etc HTTP/1.1\r\nHost: localhost:PORT\r\n\r\n".to_owned(),
-                "404 Not Found",
-            ),
-            ("nonsense\r\n\r\n".to_owned(), "400 Bad Request"),
-            (
-                format!(
-                    "GET /live HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: http://127.0.0.1:PORT\r\n{UPGRADE}\r\n"
-                ),
+                "/live",
+                format!("{socket}Origin: http://127.0.0.1:PORT\r\n"),
                 "101 Switching Protocols",
             ),
             (
-                format!(
-                    "GET /live HTTP/1.1\r\nHost: localhost:PORT\r\nOrigin: https://evil.example\r\n{UPGRADE}\r\n"
-                ),
+                "/live",
+                format!("{socket}Origin: https://evil.example\r\n"),
                 "403 Forbidden",
             ),
             (
-                format!(
-                    "GET /live HTTP/1.1\r\nHost: localhost:PORT\r\nOrigin: null\r\n{UPGRADE}\r\n"
-                ),
+                "/live",
+                format!("{socket}Origin: null\r\n"),
                 "403 Forbidden",
             ),
+            (
+                "/live",
+                format!(
+                    "{socket}Origin: http://localhost:PORT\r\nOrigin: https://evil.example\r\n"
+                ),
+                "400 Bad Request",
+            ),
+            // The origins of others are welcome to Foxglove's protocol only.
+            (
+                "/live",
+                format!("{socket}Origin: http://localhost:8080\r\n"),
+                "403 Forbidden",
+            ),
+            (
+                "/live",
+                format!("{socket}{foxglove}Origin: http://localhost:8080\r\n"),
+                "404 Not Found",
+            ),
+            (
+                "/",
+                format!("{socket}{foxglove}Origin: http://localhost:8080\r\n"),
+                "101 Switching Protocols",
+            ),
+            (
+                "/",
+                format!("{socket}{foxglove}Origin: file://\r\n"),
+                "403 Forbidden",
+            ),
+            // A key without a request to change the protocol.
+            ("/live", format!("{host}{KEY}"), "400 Bad Request"),
+            ("/", format!("{host}{KEY}{foxglove}"), "400 Bad Request"),
+            ("/", format!("{host}no header\r\n"), "400 Bad Request"),
         ] {
-            assert_eq!(
-                status(&server, &request),
-                format!("HTTP/1.1 {expected}"),
-                "{request}"
-            );
+            let request = format!("GET {path} HTTP/1.1\r\n{headers}\r\n");
+            assert_eq!(status(&server, &request), expected, "{request}");
         }
     }
 
     #[test]
+    fn a_connection_that_sends_slowly_is_closed_in_time() {
+        let server = server(&[]);
+        let mut stream = TcpStream::connect(server.address).unwrap();
+        stream.set_nodelay(true).unwrap();
+        let start = Instant::now();
+        // Each byte comes well within the time that the whole request has.
+        while stream.write_all(b"G").is_ok() {
+            assert!(start.elapsed() < 3 * PATIENCE, "still open");
+            thread::sleep(PATIENCE / 10);
+        }
+        assert!(start.elapsed() > PATIENCE / 2);
+    }
+
+    #[test]
     fn a_viewer_gets_what_is_published_and_its_orders_arrive() {
-        let server = Server::start(0, String::new(), &[]).unwrap();
+        let server = server(&[]);
         let stream = TcpStream::connect(server.address).unwrap();
-        let url = format!("ws://localhost:{}/live", server.address.port());
+        let url = format!("ws://{}/live", server.address);
         let (mut socket, _) = tungstenite::client(url, stream).unwrap();
         while server.hub.viewers() == 0 {
             thread::sleep(Duration::from_millis(1));
@@ -308,21 +370,13 @@ mod tests {
         assert_eq!(socket.read().unwrap(), Message::binary(vec![1, 2, 3]));
         assert_eq!(socket.read().unwrap(), Message::text("{\"a\":1}"));
         socket
-            .send(Message::text("{\"order\":\"step\",\"ticks\":3}"))
+            .send(Message::text("{\"step\":{\"ticks\":3}}"))
             .unwrap();
-        let order = server.orders.recv_timeout(PATIENCE).unwrap();
+        let order = server.orders.next(PATIENCE).unwrap();
         assert_eq!(order.request, ViewerRequest::Step { ticks: 3 });
-        socket
-            .send(Message::text("{\"order\":\"explode\"}"))
-            .unwrap();
-        assert!(
-            socket
-                .read()
-                .unwrap()
-                .into_text()
-                .unwrap()
-                .contains("error")
-        );
+        socket.send(Message::text("\"explode\"")).unwrap();
+        let answer = socket.read().unwrap().into_text().unwrap();
+        assert!(answer.contains("error"), "{answer}");
         socket.close(None).unwrap();
         while server.hub.viewers() > 0 {
             thread::sleep(Duration::from_millis(1));

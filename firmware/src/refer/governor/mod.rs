@@ -2,12 +2,12 @@
 //!
 //! p = Q22 (1 − μ s Q12/Q22) depends on the posture only. From the estimated friction and a margin
 //! for its uncertainty, the governor computes how far along the belt p stays above a given fraction
-//! of Q22: the edges of the admissible stretch around the tip. If the reference could not stop
-//! before an edge, the governor decelerates it within a bound and holds it at the edge.
+//! of Q22 with a given distance to spare: the edges of the admissible stretch
+//! around the tip. If the reference could not stop before an edge, the governor decelerates it within
+//! a bound and holds it at the edge.
 //!
-//! The search for the edges goes outwards from the tip, one or two points at each tick. The time of
-//! a tick is therefore bounded, and the edges follow the friction estimate within a tenth of a
-//! second at 1 kHz.
+//! The search for the edges goes outwards from the tip, one or two points at a time. The time of a tick is
+//! therefore bounded, and the edges follow the friction estimate within a tenth of a second at 1 kHz.
 
 mod search;
 mod settings;
@@ -17,18 +17,16 @@ use painleve_shared::{Arm, Posture, Real};
 use self::search::{Admissibility, Search};
 pub use self::settings::GovernorSettings;
 use crate::estimate::friction::FrictionEstimate;
-use crate::estimate::response::ContactResponse;
 use crate::refer::reference::TipReference;
 
-/// Points evaluated at each tick while the edges are unknown.
-const POINTS_IN_A_HURRY: u32 = 2;
+/// Points evaluated at a time while the edges are unknown.
+const POINTS_WHILE_UNKNOWN: u32 = 2;
 /// Number of points from one end of the reach to the other in the outward search.
-const STEPS_OVER_REACH: f32 = 64.0;
+const STEPS_OVER_REACH: f32 = 32.0;
 /// Fraction of the reach in use: beyond it the arm is almost straight.
 const USABLE_REACH: f32 = 0.995;
 
-/// Longest control period for which the distance kept from the edge suffices, s. With longer ones it grows with their
-/// square: the tip swings further before the controller reacts.
+/// Control period for which the distance from the edge is set, s.
 const PERIOD_S: f32 = 1e-3;
 
 /// A reference farther than this from the last one, m, counts as a jump; the governor catches up
@@ -38,34 +36,6 @@ const JUMP_M: f32 = 2e-3;
 const CAUGHT_M: f32 = 2e-5;
 /// Rate at which the remaining distance to a target decays, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
-
-/// What decides how far the edges stay from the point where p is zero, in addition to the settings.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct EdgeMargins {
-    /// Least p/Q22 where a thrown tip may land. A change of it makes the edges unknown.
-    pub landing_p_ratio: f32,
-    /// Least p/Q22 for which the contact's response asks. The edges follow it.
-    pub contact_p_ratio: f32,
-    /// How far the contact has shown that it is soft, 0 … 1. Its least p/Q22 then replaces the distance that the edges
-    /// keep on a rigid contact.
-    pub soft: f32,
-    /// Slow changes of the contact force from tick to tick by causes unknown, N. The edges follow them, too.
-    pub restless_n: f32,
-}
-
-impl EdgeMargins {
-    /// The margins for a contact with this response, and for a tip that may land where p/Q22 is `landing_p_ratio` or
-    /// more.
-    #[inline]
-    pub fn of(response: &ContactResponse, landing_p_ratio: f32) -> Self {
-        Self {
-            landing_p_ratio,
-            contact_p_ratio: response.least_p_ratio,
-            soft: response.soft,
-            restless_n: response.restless_n,
-        }
-    }
-}
 
 /// What makes the joints' motion uncertain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -86,15 +56,10 @@ pub struct EdgeGovernor {
     braking_m_s2: f32,
     catch_up_m_s: f32,
     tick_s: f32,
-    /// Least p as a fraction of Q22, at this control rate.
+    /// Least p as a fraction of Q22.
     least_p_ratio: f32,
-    /// Distance kept from the point where p has that value, with these encoders, m.
+    /// Distance kept from the point where p has that value, with these joints and this control rate, m.
     distance_m: f32,
-    /// Distance kept from the point where p is zero, because of the joints' friction and play, m.
-    clearance_m: f32,
-    /// The same for each N by which the force changes from tick to tick, and the largest such distance.
-    clearance_m_n: f32,
-    clearance_limit_m: f32,
 }
 
 /// The edges that an [`EdgeGovernor`] has found, and the reference it follows.
@@ -104,8 +69,6 @@ pub struct GovernorState {
     lower_m: f32,
     upper_m: f32,
     search: Option<Search>,
-    /// Edge for the least p/Q22 while the search goes on to the point where p is zero, m.
-    near_m: f32,
     /// Least ratio p/Q22 that the present search requires beyond the setting.
     asked_p_ratio: f32,
     /// Whether both edges have been found since that requirement was set.
@@ -126,7 +89,6 @@ impl GovernorState {
             lower_m: -USABLE_REACH * reach_m,
             upper_m: USABLE_REACH * reach_m,
             search: None,
-            near_m: 0.0,
             asked_p_ratio: 0.0,
             is_fresh: false,
             position_m: 0.0,
@@ -162,26 +124,24 @@ impl GovernorState {
 impl EdgeGovernor {
     /// Makes a governor that is called every `tick_s`, for these joints.
     pub fn new(settings: &GovernorSettings, tick_s: f32, joints: &JointErrors) -> Self {
-        let periods = (tick_s / PERIOD_S).at_least(1.0);
+        let square = |value: f32| value * value;
+        let distance_m2 = square(settings.distance_m * square(tick_s / PERIOD_S))
+            + square(settings.distance_counts * joints.count_m)
+            + square(settings.distance_m_nm * joints.friction_nm)
+            + square(settings.distance_m_rad * joints.play_rad);
         Self {
             enabled: settings.enabled,
             friction_deviations: settings.friction_deviations,
             braking_m_s2: settings.braking_m_s2,
             catch_up_m_s: settings.catch_up_m_s,
             tick_s,
-            least_p_ratio: settings
-                .minimum_p_ratio
-                .at_least(settings.p_ratio_per_s2 * tick_s * tick_s),
-            distance_m: settings.distance_m * (periods * periods)
-                + settings.distance_counts * joints.count_m,
-            clearance_m: settings.clearance_m_nm * joints.friction_nm
-                + settings.clearance_m_rad * joints.play_rad,
-            clearance_m_n: settings.clearance_m_n,
-            clearance_limit_m: settings.clearance_limit_m,
+            least_p_ratio: settings.p_ratio,
+            distance_m: distance_m2.square_root(),
         }
     }
 
-    /// Continues the search for the edges around a tip at `tip_t_m` (m), with the settings' margins and these.
+    /// Continues the search for the edges around a tip at `tip_t_m` (m). Where a thrown tip may land,
+    /// p/Q22 is to be `landing_p_ratio` at least; a change of it makes the edges unknown.
     pub fn search(
         &self,
         state: &mut GovernorState,
@@ -189,70 +149,46 @@ impl EdgeGovernor {
         posture: Posture,
         tip_t_m: f32,
         friction: &FrictionEstimate,
-        margins: EdgeMargins,
+        landing_p_ratio: f32,
     ) {
-        if margins.landing_p_ratio != state.asked_p_ratio {
-            state.asked_p_ratio = margins.landing_p_ratio;
+        if landing_p_ratio != state.asked_p_ratio {
+            state.asked_p_ratio = landing_p_ratio;
             state.search = None;
             state.is_fresh = false;
         }
         let mut search = state.search.unwrap_or(Search::start(1.0, tip_t_m));
-        let margin = self.friction_deviations * friction.deviation;
+        let direction = search.direction;
         let admissibility = Admissibility {
             arm,
             posture,
-            friction: friction.coefficient + margin,
+            friction: friction.coefficient + self.friction_deviations * friction.deviation,
             slip: friction.slip_seen.then_some(friction.slip),
-            minimum_p_ratio: if search.is_beyond {
-                0.0
-            } else {
-                self.least_p_ratio
-                    .at_least(margins.landing_p_ratio)
-                    .at_least(margins.contact_p_ratio)
-            },
+            least_p_ratio: self.least_p_ratio.at_least(landing_p_ratio),
+            distance_m: direction * self.distance_m,
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
-        let points = if state.is_fresh { 1 } else { POINTS_IN_A_HURRY };
+        let points = if state.is_fresh {
+            1
+        } else {
+            POINTS_WHILE_UNKNOWN
+        };
         for _ in 0..points {
             let point = search.point(step, reach);
             search = search.next(point, admissibility.at(point), reach);
         }
-        if search.is_over() {
-            search = self.settle(state, search, tip_t_m, margins);
-        }
         state.search = Some(search);
-    }
-
-    /// Takes over the edge that a search has found, with the distances kept from it; returns the next search.
-    fn settle(
-        &self,
-        state: &mut GovernorState,
-        search: Search,
-        tip_t_m: f32,
-        margins: EdgeMargins,
-    ) -> Search {
-        let direction = search.direction;
-        let clearance_m = (self.clearance_m + self.clearance_m_n * margins.restless_n)
-            .at_most(self.clearance_limit_m);
-        let edge_m = if search.is_beyond {
-            let clear_m = search.inside_m - direction * clearance_m;
-            direction * (direction * clear_m).at_most(direction * state.near_m)
-        } else {
-            search.inside_m - direction * (1.0 - margins.soft) * self.distance_m
-        };
-        if clearance_m > 0.0 && !search.is_beyond {
-            state.near_m = edge_m;
-            return search.beyond();
+        if !search.is_over() {
+            return;
         }
         if direction > 0.0 {
-            state.upper_m = edge_m;
+            state.upper_m = search.inside_m;
         } else {
             // A stretch shorter than both margins shrinks to a point.
-            state.lower_m = edge_m.at_most(state.upper_m);
+            state.lower_m = search.inside_m.at_most(state.upper_m);
             state.is_fresh = true;
         }
-        Search::start(-direction, tip_t_m)
+        state.search = Some(Search::start(-direction, tip_t_m));
     }
 
     /// Returns the reference to follow instead of `wanted`, one tick after the last one.
@@ -334,8 +270,7 @@ mod tests {
 
     fn governor() -> EdgeGovernor {
         let settings = GovernorSettings {
-            minimum_p_ratio: 0.0,
-            p_ratio_per_s2: 0.0,
+            p_ratio: 0.0,
             distance_m: 0.0,
             distance_counts: 0.0,
             ..Default::default()
@@ -346,14 +281,7 @@ mod tests {
     fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> GovernorState {
         let mut state = GovernorState::new(arm().reach_on_belt_m());
         for _ in 0..300 {
-            governor().search(
-                &mut state,
-                &arm(),
-                posture,
-                tip_t_m,
-                friction,
-                EdgeMargins::default(),
-            );
+            governor().search(&mut state, &arm(), posture, tip_t_m, friction, 0.0);
         }
         state
     }
@@ -368,102 +296,58 @@ mod tests {
         }
     }
 
-    /// Returns the upper edge, m, at which the searches settle with the friction 0.6. p is zero at 0.16471 m.
-    fn upper_edge_m(
-        governor: &EdgeGovernor,
-        state: &mut GovernorState,
-        margins: EdgeMargins,
+    /// Returns the distance, m, from the upper edge with the friction 0.6 to where p is zero, 0.16471 m.
+    fn distance_m(
+        settings: &GovernorSettings,
+        joints: &JointErrors,
+        tick_s: f32,
+        landing: f32,
     ) -> f32 {
+        let governor = EdgeGovernor::new(settings, tick_s, joints);
+        let mut state = GovernorState::new(arm().reach_on_belt_m());
         let friction = known(0.6, Slip::Positive);
         for _ in 0..300 {
             let posture = Posture::ElbowDown;
-            governor.search(state, &arm(), posture, -0.1, &friction, margins);
+            governor.search(&mut state, &arm(), posture, -0.1, &friction, landing);
         }
-        state.edges_m().1
+        0.164_71 - state.edges_m().1
     }
 
     #[test]
-    fn joints_with_friction_or_play_keep_their_distance_from_where_p_is_zero() {
-        let edge_m = |joints: JointErrors, contact: f32| {
-            let governor = EdgeGovernor::new(&GovernorSettings::default(), TICK_S, &joints);
-            let mut state = GovernorState::new(arm().reach_on_belt_m());
-            let margins = EdgeMargins {
-                contact_p_ratio: contact,
-                ..Default::default()
-            };
-            upper_edge_m(&governor, &mut state, margins)
-        };
-        let ideal = JointErrors::default();
-        let rough = JointErrors {
+    fn what_moves_the_tip_adds_to_the_distance_in_squares() {
+        let joints = JointErrors {
+            count_m: 1e-3,
             friction_nm: 0.05,
             play_rad: 1e-3,
-            ..ideal
         };
-        // 0.05 N·m and 1 mrad keep 6.8 mm.
-        for contact in [0.0, 0.05] {
-            let edge = edge_m(rough, contact);
-            assert!((edge - (0.164_71 - 0.0068)).abs() < 3e-5, "{edge}");
-        }
-        // The least p/Q22 applies as well, as without friction.
-        assert_eq!(edge_m(rough, 0.8), edge_m(ideal, 0.8));
-        let stiff = JointErrors {
-            friction_nm: 1.0,
-            ..ideal
+        let settings = GovernorSettings {
+            p_ratio: 0.0,
+            ..Default::default()
         };
-        let edge = edge_m(stiff, 0.0);
-        assert!((edge - (0.164_71 - 0.008)).abs() < 3e-5, "{edge}");
+        let distance = distance_m(&settings, &joints, TICK_S, 0.0);
+        // 0.5, 3, 4.25 and 2.55 mm.
+        assert!((distance - 5.82e-3).abs() < 3e-5, "{distance}");
+        let more = distance_m(&GovernorSettings::default(), &joints, TICK_S, 0.0);
+        assert!(more > distance + 0.5e-3, "{more}");
     }
 
     #[test]
-    fn a_restless_force_keeps_the_tip_away_from_the_edge_and_a_calm_one_lets_it_return() {
-        let mut state = GovernorState::new(arm().reach_on_belt_m());
-        let mut edge_m = |restless_n: f32| {
-            let margins = EdgeMargins {
-                restless_n,
+    fn a_tip_that_may_land_asks_for_more() {
+        let (settings, joints) = (GovernorSettings::default(), JointErrors::default());
+        let of = |landing| distance_m(&settings, &joints, TICK_S, landing);
+        assert_eq!(of(0.05), of(0.0));
+        assert!(of(0.3) > 2.0 * of(0.0));
+    }
+
+    #[test]
+    fn the_distance_grows_with_the_square_of_the_period() {
+        for (tick_hz, expected_m) in [(2000.0, 0.125e-3), (1000.0, 0.5e-3), (500.0, 2e-3)] {
+            let settings = GovernorSettings {
+                p_ratio: 0.0,
                 ..Default::default()
             };
-            upper_edge_m(&with_distances(), &mut state, margins)
-        };
-        let calm = edge_m(0.0);
-        // 0.1 N from tick to tick keep 4 mm.
-        let restless = edge_m(0.1);
-        assert!((restless - (0.164_71 - 0.004)).abs() < 3e-5, "{restless}");
-        let most = edge_m(10.0);
-        assert!((most - (0.164_71 - 0.008)).abs() < 3e-5, "{most}");
-        assert_eq!(edge_m(0.0), calm);
-    }
-
-    #[test]
-    fn on_a_soft_contact_the_least_p_ratio_replaces_the_distance() {
-        let edge_m = |contact: f32, soft: f32| {
-            let margins = EdgeMargins {
-                contact_p_ratio: contact,
-                soft,
-                ..Default::default()
-            };
-            let mut state = GovernorState::new(arm().reach_on_belt_m());
-            upper_edge_m(&with_distances(), &mut state, margins)
-        };
-        let soft = edge_m(0.02, 1.0);
-        assert!((soft - edge_m(0.02, 0.0) - 0.5e-3).abs() < 3e-5, "{soft}");
-        assert!(edge_m(0.075, 1.0) < soft);
-    }
-
-    /// A governor with the default settings on an arm without joint errors.
-    fn with_distances() -> EdgeGovernor {
-        EdgeGovernor::new(
-            &GovernorSettings::default(),
-            TICK_S,
-            &JointErrors::default(),
-        )
-    }
-
-    #[test]
-    fn the_distance_from_the_edge_grows_with_the_period_below_1_khz() {
-        let settings = GovernorSettings::default();
-        for (tick_hz, distance_m) in [(4000.0, 0.5e-3), (1000.0, 0.5e-3), (500.0, 2e-3)] {
-            let governor = EdgeGovernor::new(&settings, 1.0 / tick_hz, &JointErrors::default());
-            assert!((governor.distance_m - distance_m).abs() < 1e-6);
+            let distance = distance_m(&settings, &JointErrors::default(), 1.0 / tick_hz, 0.0);
+            assert!((distance - expected_m).abs() < 3e-5, "{distance}");
         }
     }
 

@@ -4,9 +4,9 @@ use painleve_shared::{Arm, Posture, Real, Slip};
 
 /// Largest number of inadmissible points that the search tries: enough to cover the whole reach on
 /// either side of the tip.
-const MOST_REFUSED: u32 = 128;
-/// Halvings of the last step: 6 mm / 2⁹ is 11 µm.
-const HALVINGS: u32 = 9;
+const MOST_REFUSED: u32 = 64;
+/// Halvings of the last step: 12 mm / 2¹⁰ is 11 µm.
+const HALVINGS: u32 = 10;
 
 /// Friction with its margin, for evaluating points of the belt.
 #[derive(Clone, Copy, Debug)]
@@ -17,20 +17,24 @@ pub(super) struct Admissibility<'a> {
     pub(super) friction: f32,
     /// Direction of slip; `None` until a slip has been observed.
     pub(super) slip: Option<Slip>,
-    pub(super) minimum_p_ratio: f32,
+    /// Least p/Q22.
+    pub(super) least_p_ratio: f32,
+    /// How far from a point along the belt it must still hold, m, with its sign.
+    pub(super) distance_m: f32,
 }
 
 impl Admissibility<'_> {
-    /// Returns whether sliding has a solution at this point with p above the margin.
+    /// Returns whether sliding has a solution at this point with the margin.
     pub(super) fn at(&self, tip_t_m: f32) -> bool {
-        let row = self.arm.inverse_inertia_row_on_belt(tip_t_m, self.posture);
+        let there_m = tip_t_m + self.distance_m;
+        let row = self.arm.inverse_inertia_row_on_belt(there_m, self.posture);
         row.is_some_and(|(tangential, normal)| {
             let against = match self.slip {
                 Some(slip) => slip.sign::<f32>() * tangential,
                 // Both directions must be admissible.
                 None => tangential.abs(),
             };
-            normal - self.friction * against >= self.minimum_p_ratio * normal
+            normal - self.friction * against >= self.least_p_ratio * normal
         })
     }
 }
@@ -58,8 +62,6 @@ pub(super) struct Search {
     pub(super) direction: f32,
     /// Last point on the tip's side of the edge, m.
     pub(super) inside_m: f32,
-    /// Whether it looks for the point where p is zero, after that with the least p/Q22.
-    pub(super) is_beyond: bool,
     stage: Stage,
 }
 
@@ -70,17 +72,7 @@ impl Search {
         Self {
             direction,
             inside_m: tip_t_m,
-            is_beyond: false,
             stage: Stage::Entering { refused: 0 },
-        }
-    }
-
-    /// Goes on from the point with the least p/Q22, which has been found, to that where p is zero.
-    pub(super) fn beyond(self) -> Self {
-        Self {
-            is_beyond: true,
-            stage: Stage::Marching,
-            ..self
         }
     }
 

@@ -1,7 +1,10 @@
 //! The operator's commands: lines on standard input.
 
 use std::io::{self, BufRead};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, sync_channel};
+
+/// Most commands that wait; further input is not read until then.
+const MOST_WAITING: usize = 16;
 
 /// A command to the drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,7 +42,7 @@ impl Operator {
     /// # Errors
     /// If the thread cannot be started.
     pub fn listen() -> io::Result<Self> {
-        let (sender, receiver) = channel();
+        let (sender, receiver) = sync_channel(MOST_WAITING);
         std::thread::Builder::new().spawn(move || {
             for line in io::stdin().lock().lines() {
                 let Ok(line) = line else { return };

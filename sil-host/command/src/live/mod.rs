@@ -13,10 +13,11 @@ use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::warn;
+use painleve_view::access::Token;
 use painleve_view::hub::Hub;
 use painleve_view::page::{description, html};
 use painleve_view::parameters::parameters;
-use painleve_view::request::{Order, Outcome, ViewerRequest};
+use painleve_view::request::{Order, ViewerRequest};
 use painleve_view::server::Server;
 use serde_json::json;
 
@@ -28,51 +29,49 @@ use viewers::{Host, Viewers};
 const SLICE: Duration = Duration::from_millis(4);
 /// Most rows for the viewers in a second.
 const ROWS_PER_S: f64 = 2000.0;
-/// Ticks between two looks at the clock when running as fast as possible.
-const TICKS_PER_LOOK: u32 = 64;
 /// Time between two messages about the speed.
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 
-/// Serves a run that goes on until it is interrupted, to its page and to Foxglove; pages of `origins`
-/// may connect as Foxglove does.
+/// Serves a run that goes on until it is interrupted, to its page and to Foxglove, for those who know the token;
+/// pages of `origins` may connect as Foxglove does.
 ///
 /// # Errors
-/// [`CommandError`] if the page cannot be served, or the run ends early.
+/// [`CommandError`] if the page cannot be served or the scenario cannot start.
 pub fn run(
     scenario: &Scenario,
     port: u16,
+    token: Option<Token>,
     origins: &[String],
     interrupt: &Interrupt,
 ) -> Result<(), CommandError> {
     let mut page = description(scenario);
     page["parameters"] = page_settings::settings(scenario);
-    let server = Server::start(port, html(&page), origins)
+    let server = Server::start(port, html(&page), token, origins)
         .map_err(|source| InputError::Port { port, source })?;
     let mut live = Live::new(scenario.clone(), server.hub.clone())?;
     warn(format_args!(
-        "open http://localhost:{port}/ in a browser or ws://localhost:{port} in Foxglove; the run starts with the \
-         first viewer and ends with Ctrl-C",
-        port = server.address.port()
+        "open {} in a browser or {} in Foxglove; the run starts with the first viewer and ends with Ctrl-C",
+        server.page_address(),
+        server.foxglove_address()
     ));
+    // One order between two slices: no number of them delays the run or its end.
     while !interrupt.is_requested() {
-        while let Ok(order) = server.orders.try_recv() {
-            live.execute(order)?;
+        let patience = if live.is_idle { SLICE } else { Duration::ZERO };
+        if let Some(order) = server.orders.next(patience) {
+            live.execute(order);
         }
-        live.slice()?;
+        live.slice();
         live.report();
-        if live.is_waiting()
-            && let Ok(order) = server.orders.recv_timeout(SLICE)
-        {
-            live.execute(order)?;
-        }
     }
-    Err(CommandError::Interrupted)
+    Ok(())
 }
 
 /// A run that can be steered.
 struct Live {
     /// The scenario with what was set.
     scenario: Scenario,
+    /// The part of it that runs: without what waits for the next reset.
+    running: Scenario,
     closed_loop: ClosedLoop<Host>,
     viewers: Viewers,
     hub: Arc<Hub>,
@@ -88,6 +87,7 @@ struct Live {
     clock: Clock,
     status: Instant,
     ticks_at_status: u64,
+    /// Whether there was nothing to simulate.
     is_idle: bool,
 }
 
@@ -103,6 +103,7 @@ impl Live {
         let now = Instant::now();
         let live = Self {
             closed_loop: start(&scenario, &viewers)?,
+            running: scenario.clone(),
             scenario,
             viewers,
             hub,
@@ -121,16 +122,12 @@ impl Live {
             is_idle: true,
         };
         live.publish_parameters();
+        live.describe();
         Ok(live)
     }
 
     fn tick_hz(&self) -> f64 {
-        f64::from(self.scenario.run.tick_hz)
-    }
-
-    /// Whether there was nothing to simulate.
-    fn is_waiting(&self) -> bool {
-        self.is_idle
+        f64::from(self.running.run.tick_hz)
     }
 
     fn restart_clock(&mut self) {
@@ -141,19 +138,22 @@ impl Live {
     }
 
     /// Executes a viewer's request and reports the outcome to the viewers.
-    fn execute(&mut self, order: Order) -> Result<(), CommandError> {
-        let outcome = self.obey(&order.request)?;
-        if let Err(reason) = &outcome {
-            self.hub.refuse(reason);
+    fn execute(&mut self, order: Order) {
+        let outcome = self.obey(&order.request);
+        match &outcome {
+            Ok(note) => self.hub.note(note),
+            Err(reason) => self.hub.refuse(reason),
         }
         self.publish_parameters();
         self.send_status();
-        order.reply(outcome);
-        Ok(())
+        order.reply(outcome.map(drop));
     }
 
-    /// Executes a request; the outcome is a sentence for the viewer if it is impossible.
-    fn obey(&mut self, request: &ViewerRequest) -> Result<Outcome, CommandError> {
+    /// Executes a request and returns what is to be said about it, if anything.
+    ///
+    /// # Errors
+    /// One sentence for the viewer if it is impossible.
+    fn obey(&mut self, request: &ViewerRequest) -> Result<String, String> {
         match *request {
             ViewerRequest::Pause => self.paused = true,
             ViewerRequest::Resume => {
@@ -166,7 +166,7 @@ impl Live {
             }
             ViewerRequest::Speed { factor } => {
                 if !(0.0..=1000.0).contains(&factor) {
-                    return Ok(Err("the speed is 0 to 1000".into()));
+                    return Err("the speed is 0 to 1000".into());
                 }
                 self.factor = factor;
                 self.restart_clock();
@@ -180,14 +180,13 @@ impl Live {
                 let is_sane = force_n.iter().all(|force| force.abs() <= 1000.0)
                     && (0.0..=10.0).contains(&duration_s);
                 if !is_sane {
-                    let text = "a push has at most 1000 N and lasts at most 10 s";
-                    return Ok(Err(text.into()));
+                    return Err("a push has at most 1000 N and lasts at most 10 s".into());
                 }
                 let ticks = (duration_s * self.tick_hz()).ceil() as u32;
                 self.closed_loop.simulation_mut().push(force_n, ticks);
             }
         }
-        Ok(Ok(()))
+        Ok(String::new())
     }
 
     fn publish_parameters(&self) {
@@ -195,53 +194,60 @@ impl Live {
             .set_parameters(parameters(&self.scenario, self.paused, self.factor));
     }
 
-    fn reset(&mut self) -> Result<(), CommandError> {
-        self.viewers = Viewers::new(&self.scenario, self.hub.clone());
-        self.closed_loop = start(&self.scenario, &self.viewers)?;
+    /// Tells the pages what runs.
+    fn describe(&self) {
+        self.hub.describe(&description(&self.running));
+    }
+
+    /// Starts again, with everything that was set. A scenario that cannot start leaves the run as it is.
+    fn reset(&mut self) -> Result<(), String> {
+        let viewers = Viewers::new(&self.scenario, self.hub.clone());
+        self.closed_loop = start(&self.scenario, &viewers).map_err(|error| error.to_string())?;
+        self.viewers = viewers;
+        self.running = self.scenario.clone();
         self.ticks = 0;
         self.ticks_at_status = 0;
+        // Ticks may be slower from now on.
+        self.stride = 1;
         self.restart_clock();
         self.hub.restart();
+        self.describe();
         Ok(())
     }
 
     /// Sets a key. The belt changes at once; a changed controller starts anew where the arm is; any
     /// other part waits for the next reset.
-    fn set(&mut self, key: &str, value: &str) -> Result<Outcome, CommandError> {
-        let changed = self
-            .scenario
-            .clone()
-            .with_overrides("live run", &[format!("{key}={value}")]);
-        let changed = match changed {
-            Ok(changed) => changed,
-            Err(error) => return Ok(Err(error.to_string())),
-        };
-        let before = std::mem::replace(&mut self.scenario, changed);
-        let scenario = &self.scenario;
-        if scenario.belt != before.belt {
-            self.closed_loop.simulation_mut().set_belt(&scenario.belt);
-        }
-        if scenario.controller != before.controller {
-            let controller = Controller::new(&scenario.controller_configuration());
-            self.closed_loop.host_mut().controller =
-                controller.map_err(|source| in_run(scenario, source))?;
-        }
-        let at_once = Scenario {
-            belt: before.belt.clone(),
-            controller: before.controller.clone(),
+    fn set(&mut self, key: &str, value: &str) -> Result<String, String> {
+        let changed = self.scenario.with_remote_override(key, value);
+        let changed = changed.map_err(|error| error.to_string())?;
+        let at_once = |scenario: &Scenario| Scenario {
+            belt: changed.belt.clone(),
+            controller: changed.controller.clone(),
             ..scenario.clone()
-        } == before;
-        let note = if at_once {
-            "set"
-        } else {
-            "set; takes effect at the next reset"
         };
-        self.hub.note(&format!("{key}: {note}"));
-        Ok(Ok(()))
+        let running = at_once(&self.running);
+        if running.controller != self.running.controller {
+            let controller = Controller::new(&running.controller_configuration());
+            let range = |source| in_run(&running, source).to_string();
+            self.closed_loop.host_mut().controller = controller.map_err(range)?;
+        }
+        if running.belt != self.running.belt {
+            self.closed_loop.simulation_mut().set_belt(&running.belt);
+        }
+        let waits = at_once(&self.scenario) != changed;
+        self.running = running;
+        self.scenario = changed;
+        self.describe();
+        let when = if waits {
+            "set; takes effect at the next reset"
+        } else {
+            "set"
+        };
+        Ok(format!("{key}: {when}"))
     }
 
     /// Runs the ticks that are due, for at most a slice of time.
-    fn slice(&mut self) -> Result<(), CommandError> {
+    fn slice(&mut self) {
         let start = Instant::now();
         let watched = self.hub.viewers() > 0;
         if watched && !self.started {
@@ -271,7 +277,8 @@ impl Live {
             }
             self.ticks += 1;
             done += 1;
-            if done % u64::from(TICKS_PER_LOOK) == 0 && start.elapsed() >= SLICE {
+            // The clock costs as much as part of a tick, so it is read at the rate of the rows.
+            if self.ticks.is_multiple_of(self.stride) && start.elapsed() >= SLICE {
                 break;
             }
         }
@@ -285,7 +292,6 @@ impl Live {
         let ticks_per_s = done as f64 / start.elapsed().max(SLICE).as_secs_f64();
         self.stride = ((ticks_per_s / ROWS_PER_S).ceil() as u64).max(1);
         self.viewers.publish();
-        Ok(())
     }
 
     /// Tells the viewers now and then how fast the run is.

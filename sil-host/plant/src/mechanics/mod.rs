@@ -38,6 +38,7 @@ pub mod turned_pose;
 
 pub use arm_on_belt::ArmOnBelt;
 pub use built_in::BuiltInPlant;
+pub(crate) use from_file::without_files;
 pub use motion_error::MotionError;
 pub use parameters::{InitialState, PlantParameters, SolverSettings};
 pub use probe::{ArmProbe, ArmStep};

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use painleve_system::input_file;
 
+use super::from_file::check_permitted;
+
 /// Largest number of rows.
 const MOST_ROWS: usize = 1_000_000;
 /// Largest magnitude of a time or position.
@@ -26,6 +28,7 @@ pub(crate) struct Columns {
 /// # Errors
 /// One sentence with the path, the line, the column and what is allowed.
 pub(crate) fn read(path: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, f64)>), String> {
+    check_permitted(path)?;
     let text = input_file::read(Path::new(path))
         .map_err(|error| format!("cannot read {path}: {error}"))?;
     parse(&text, allowed).map_err(|reason| format!("{path}: {reason}"))

@@ -10,7 +10,7 @@ use super::error::ScenarioError;
 use super::override_key::with_override;
 use super::table::{from_table, parse};
 use super::{Scenario, built_in};
-use crate::mechanics::BuiltInPlant;
+use crate::mechanics::{BuiltInPlant, without_files};
 
 impl Scenario {
     /// Loads the built-in scenario or file called `name`, applies the overrides `key=value` in
@@ -65,6 +65,16 @@ impl Scenario {
             source,
         })?;
         Ok(self)
+    }
+
+    /// Returns this scenario with one key changed by somebody who may not read what this process may: files that
+    /// the scenario has loaded stay as they were read, and the value cannot name another one.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence, which contains nothing from any file.
+    pub fn with_remote_override(&self, key: &str, value: &str) -> Result<Self, ScenarioError> {
+        let text = format!("{key}={value}");
+        without_files(|| self.clone().with_overrides("live run", &[text]))
     }
 }
 

@@ -5,6 +5,7 @@ use core::ops::Range;
 use painleve_plant::Plant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
+use painleve_plant::smoothness::{Roughness, Smoothness};
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
 
@@ -58,6 +59,7 @@ pub fn run<P: Plant>(
     let start_m = trial.tip_t_m();
     let mut contact = ContactProbe::new(enabled_s, CAPTURE_S);
     let mut alarms = FalseAlarms::default();
+    let mut smoothness = Smoothness::new(f64::from(scenario.run.tick_hz));
     let (mut of_target_m, mut of_governed_m) = (0.0_f64, 0.0_f64);
     let mut solved = true;
     for _ in 0..scenario.run.ticks() {
@@ -66,6 +68,7 @@ pub fn run<P: Plant>(
             break;
         }
         alarms.tick(&trial, &contact);
+        smoothness.add(Some(trial.answer()), trial.normal_force_n());
         if trial.time_s() > end_s - WATCHED_S {
             let tip_m = trial.tip_t_m();
             let governed_m = trial.answer().reference_tip.to_metres();
@@ -112,6 +115,8 @@ pub fn run<P: Plant>(
         Ending::NotReached
     };
     let converters = &scenario.converters;
+    let count_nm = f64::from(converters.scales().torque.per_count());
+    let change_nm = |of: &Roughness| of.torque_change_counts().map(|counts| counts * count_nm);
     Ok(Row {
         index,
         ending,
@@ -131,6 +136,9 @@ pub fn run<P: Plant>(
         slid_s: contact
             .captured_s
             .map_or(0.0, |start_s| trial.time_s() - start_s),
+        torque_change_moving_nm: change_nm(&smoothness.moving),
+        torque_change_holding_nm: change_nm(&smoothness.holding),
+        force_ripple_n: smoothness.holding.force_ripple_n(),
         tip_t_m: trial.tip_t_m(),
         target_m,
         posture,

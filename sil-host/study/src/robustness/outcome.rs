@@ -6,6 +6,7 @@ use comfy_table::Table;
 use serde::Serialize;
 
 use super::{Arms, Ending, Row};
+use crate::distribution::Percentiles;
 use crate::outcome::{self, Outcome};
 use crate::proportion::Proportion;
 
@@ -21,6 +22,18 @@ pub struct RobustnessOutcome {
     pub seed: u64,
     /// Success rate.
     pub success: Proportion,
+    /// Share of runs in which the tip stayed on the belt.
+    pub kept: Proportion,
+    /// Error at the end of these runs, m.
+    pub error_m: Option<Percentiles>,
+    /// How far before the edge it ends where the edge holds it, m.
+    pub to_edge_m: Option<Percentiles>,
+    /// Change of torque from tick to tick in these runs while the tip moves, N·m.
+    pub torque_change_moving_nm: Option<Percentiles>,
+    /// The same while it stands.
+    pub torque_change_holding_nm: Option<Percentiles>,
+    /// Standard deviation of the normal force while it stands, N.
+    pub force_ripple_n: Option<Percentiles>,
     /// Number of runs with each ending.
     pub endings: BTreeMap<Ending, usize>,
     /// Number of times that contact was mistaken for flight, before any lift-off.
@@ -46,10 +59,20 @@ impl RobustnessOutcome {
             let errors = other.error_m.total_cmp(&one.error_m);
             other.ending.cmp(&one.ending).then(errors)
         });
+        let kept: Vec<&Row> = rows.iter().filter(|row| row.ending.is_kept()).collect();
+        let of = |value: fn(&Row) -> Option<f64>| {
+            Percentiles::of(kept.iter().filter_map(|row| value(row)).collect())
+        };
         Self {
             arms,
             seed,
             success: Proportion::new(successes, rows.len()),
+            kept: Proportion::new(kept.len(), rows.len()),
+            error_m: of(|row| Some(row.error_m)),
+            to_edge_m: of(|row| (row.ending == Ending::AtEdge).then_some(row.to_edge_m)),
+            torque_change_moving_nm: of(|row| row.torque_change_moving_nm),
+            torque_change_holding_nm: of(|row| row.torque_change_holding_nm),
+            force_ripple_n: of(|row| row.force_ripple_n),
             endings,
             false_alarms: rows.iter().map(|row| row.false_alarms).sum(),
             slid_h: rows.iter().map(|row| row.slid_s).sum::<f64>() / 3600.0,
@@ -79,6 +102,28 @@ impl Outcome for RobustnessOutcome {
             "error (mm)",
         ]);
         table.add_row(["success (95 %)", &self.success.to_string(), "", "", "", ""]);
+        table.add_row(["kept (95 %)", &self.kept.to_string(), "", "", "", ""]);
+        for (name, scale, values) in [
+            ("error (mm)", 1e3, &self.error_m),
+            ("before the edge (mm)", 1e3, &self.to_edge_m),
+            (
+                "torque change, moving (mN·m)",
+                1e3,
+                &self.torque_change_moving_nm,
+            ),
+            (
+                "torque change, holding (mN·m)",
+                1e3,
+                &self.torque_change_holding_nm,
+            ),
+            ("force ripple, holding (N)", 1.0, &self.force_ripple_n),
+        ] {
+            let values = values.as_ref().map_or("–".into(), |values| {
+                let [median, p90] = [values.median, values.p90].map(|value| scale * value);
+                format!("median {median:.3}, 90 %: {p90:.3}")
+            });
+            table.add_row([name, &values, "", "", "", ""]);
+        }
         for (ending, count) in &self.endings {
             table.add_row([&outcome::name(ending), &count.to_string(), "", "", "", ""]);
         }

@@ -30,15 +30,13 @@ pub enum Part {
     ForceDrift,
     /// Damping of a contact that gives.
     ContactDamping,
-    /// Distance from the edge that grows with the restlessness of the force.
-    RestlessDistance,
     /// Faster loops on an arm with known friction of the joints.
     FrictionSpeedUp,
 }
 
 impl Part {
     /// All parts.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 13] = [
         Self::Governor,
         Self::Recovery,
         Self::Calibration,
@@ -51,7 +49,6 @@ impl Part {
         Self::Probe,
         Self::ForceDrift,
         Self::ContactDamping,
-        Self::RestlessDistance,
         Self::FrictionSpeedUp,
     ];
 
@@ -72,7 +69,6 @@ impl Part {
             Self::Probe => &["controller.response.probe_n=0"],
             Self::ForceDrift => &["controller.law.hybrid.force_drift_rad_s=0"],
             Self::ContactDamping => &["controller.law.hybrid.contact_damping=0"],
-            Self::RestlessDistance => &["controller.governor.clearance_m_n=0"],
             Self::FrictionSpeedUp => &["controller.estimator.friction_speed_up=1"],
         }
     }

@@ -26,6 +26,14 @@ pub enum Ending {
 }
 
 impl Ending {
+    /// Whether the tip was captured and never left the belt again.
+    pub fn is_kept(self) -> bool {
+        matches!(
+            self,
+            Self::Reached | Self::AtEdge | Self::StoppedEarly | Self::NotReached
+        )
+    }
+
     /// Whether the run succeeded.
     pub fn is_success(self) -> bool {
         matches!(self, Self::Reached | Self::AtEdge)
@@ -59,6 +67,12 @@ pub struct Row {
     pub false_alarms: u32,
     /// Simulated time after the capture, s.
     pub slid_s: f64,
+    /// Change of torque from tick to tick while the tip moves, N·m: root mean square over ticks and joints.
+    pub torque_change_moving_nm: Option<f64>,
+    /// The same while it stands.
+    pub torque_change_holding_nm: Option<f64>,
+    /// Standard deviation of the normal force while it stands, N.
+    pub force_ripple_n: Option<f64>,
     /// Final tip position, m.
     pub tip_t_m: f64,
     /// Target of the reference, m.

@@ -191,7 +191,6 @@ fn other_settings(part: Part) -> &'static [&'static str] {
         Part::Response => &[
             "controller.response.averaging_s=1",
             "controller.response.probe_n=1",
-            "controller.response.minimum_p_ratio=0.5",
         ],
         Part::ContactDamping => &["controller.law.hybrid.contact_damping_rad_s=50"],
         Part::FrictionFeedForward
@@ -199,7 +198,6 @@ fn other_settings(part: Part) -> &'static [&'static str] {
         | Part::ReduceForceWhenTorqueLimited
         | Part::Probe
         | Part::ForceDrift
-        | Part::RestlessDistance
         | Part::FrictionSpeedUp => &[],
     }
 }
@@ -209,14 +207,6 @@ fn other_settings(part: Part) -> &'static [&'static str] {
 fn occasion(part: Part) -> &'static [&'static str] {
     match part {
         Part::Recovery => &[],
-        Part::RestlessDistance => &[
-            "contact.kind=compliant",
-            "contact.stiffness_n_m=1e4",
-            "arm.coulomb_friction_nm=[0.01,0.01]",
-            "effects.surface.vibration_m=1e-4",
-            "run.enable_at_s=0.5",
-            "controller.reference=[{ minimum-jerk = { target_m = 0.183, duration_s = 1.0 } }]",
-        ],
         _ => &[
             "contact.kind=compliant",
             "contact.stiffness_n_m=1e4",

@@ -1,6 +1,6 @@
 //! The conversation with one Foxglove client.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::net::TcpStream;
 use std::sync::{Arc, Mutex};
 
@@ -10,14 +10,14 @@ use painleve_record::messages::{
     CHANNELS, EVENTS, SCENE, TRANSFORMS, TickMessage, channels, event_message, nanoseconds,
 };
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use tungstenite::{Error, Message, WebSocket};
 
 use super::services;
 use crate::hub::{ClientQueue, Entry, Hub, Severity, WatchedTick, locked};
 use crate::parameters::Parameter;
 use crate::receive::receive;
-use crate::request::Orders;
+use crate::request::{Desk, TOO_MANY};
 
 /// First bytes of binary messages.
 const MESSAGE_DATA: u8 = 1;
@@ -25,9 +25,9 @@ const TIME: u8 = 2;
 const SERVICE_CALL_RESPONSE: u8 = 3;
 const SERVICE_CALL_REQUEST: u8 = 2;
 
-/// A client's message in JSON.
+/// A client's message in JSON, whose name is its field `op`.
 #[derive(Debug, Deserialize)]
-#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+#[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum Request {
     Subscribe {
         subscriptions: Vec<Subscription>,
@@ -51,6 +51,17 @@ enum Request {
     },
 }
 
+impl Request {
+    /// Reads a message. The name is first moved outside: why, [`ViewerRequest`](crate::request::ViewerRequest)
+    /// explains.
+    fn read(text: &str) -> serde_json::Result<Self> {
+        let mut fields: Map<String, Value> = serde_json::from_str(text)?;
+        let name = fields.remove("op").unwrap_or_default();
+        let name = name.as_str().unwrap_or_default();
+        serde_json::from_value(json!({ name: fields }))
+    }
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Subscription {
@@ -59,16 +70,16 @@ struct Subscription {
 }
 
 /// Talks to a client until it leaves; one client too many is turned away.
-pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, orders: &Orders) {
+pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, desk: Desk) {
     let Some(queue) = hub.clients.join() else {
         return;
     };
     let mut client = Client {
         socket,
         hub,
-        orders,
+        desk,
         queue: &queue,
-        subscriptions: BTreeMap::new(),
+        subscriptions: [None; CHANNELS],
         watched: BTreeSet::new(),
     };
     // Every error means that the client has left.
@@ -81,11 +92,11 @@ pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, orders: &Orders) {
 struct Client<'a> {
     socket: WebSocket<TcpStream>,
     hub: &'a Hub,
-    orders: &'a Orders,
+    desk: Desk,
     queue: &'a Arc<Mutex<ClientQueue>>,
-    /// Channels by the number of the subscription.
-    subscriptions: BTreeMap<u32, usize>,
-    /// Parameters whose changes it wants to know.
+    /// The number of its subscription to each channel; the protocol allows one at a time.
+    subscriptions: [Option<u32>; CHANNELS],
+    /// Parameters, among those that there are, whose changes it wants to know.
     watched: BTreeSet<String>,
 }
 
@@ -123,7 +134,7 @@ impl Client<'_> {
     /// Takes a request and sends what waits.
     fn exchange(&mut self) -> Result<(), Error> {
         match receive(&mut self.socket)? {
-            Some(Message::Text(text)) => match serde_json::from_str(&text) {
+            Some(Message::Text(text)) => match Request::read(&text) {
                 Ok(request) => self.obey(request)?,
                 Err(error) => self.write(&status(Severity::Error, &error.to_string()))?,
             },
@@ -141,8 +152,8 @@ impl Client<'_> {
         match request {
             Request::Subscribe { subscriptions } => {
                 for Subscription { id, channel_id } in subscriptions {
-                    if channel_id < CHANNELS {
-                        self.subscriptions.insert(id, channel_id);
+                    if let Some(subscription) = self.subscriptions.get_mut(channel_id) {
+                        *subscription = Some(id);
                     } else {
                         let text = format!("there is no channel {channel_id}");
                         self.write(&status(Severity::Error, &text))?;
@@ -151,8 +162,8 @@ impl Client<'_> {
                 self.update_subscriptions();
             }
             Request::Unsubscribe { subscription_ids } => {
-                for id in subscription_ids {
-                    self.subscriptions.remove(&id);
+                for subscription in &mut self.subscriptions {
+                    subscription.take_if(|id| subscription_ids.contains(id));
                 }
                 self.update_subscriptions();
             }
@@ -163,10 +174,8 @@ impl Client<'_> {
             Request::SetParameters { parameters, id } => {
                 let names: Vec<String> = parameters.iter().map(|one| one.name.clone()).collect();
                 for parameter in parameters {
-                    // The run itself tells every client about a request that it refuses.
-                    match parameter.request() {
-                        Ok(request) => drop(self.orders.request(request)),
-                        Err(error) => self.write(&status(Severity::Error, &error))?,
+                    if let Err(Some(error)) = self.set(parameter) {
+                        self.write(&status(Severity::Error, &error))?;
                     }
                 }
                 if id.is_some() {
@@ -174,11 +183,8 @@ impl Client<'_> {
                 }
             }
             Request::SubscribeParameterUpdates { parameter_names } => {
-                if parameter_names.is_empty() {
-                    let all = self.hub.parameters().into_iter();
-                    self.watched.extend(all.map(|parameter| parameter.name));
-                }
-                self.watched.extend(parameter_names);
+                let wanted = chosen(self.hub.parameters(), &parameter_names);
+                self.watched.extend(wanted.map(|one| one.name));
             }
             Request::UnsubscribeParameterUpdates { parameter_names } => {
                 if parameter_names.is_empty() {
@@ -192,15 +198,24 @@ impl Client<'_> {
         Ok(())
     }
 
+    /// Sets a parameter.
+    ///
+    /// # Errors
+    /// With what the client must be told; the run itself tells every client about a request that it refuses.
+    fn set(&mut self, parameter: Parameter) -> Result<(), Option<String>> {
+        self.desk.admit()?;
+        let request = parameter.request().map_err(Some)?;
+        self.desk.request(request).map_err(|_| None)
+    }
+
     fn update_subscriptions(&self) {
         self.hub
-            .set_subscribed(self.queue, !self.subscriptions.is_empty());
+            .set_subscribed(self.queue, self.subscriptions.iter().any(Option::is_some));
     }
 
     /// Sends the parameters with these names; all if there are none.
     fn send_parameters(&mut self, names: &[String], id: Option<String>) -> Result<(), Error> {
-        let mut parameters = self.hub.parameters();
-        parameters.retain(|one| names.is_empty() || names.contains(&one.name));
+        let parameters: Vec<Parameter> = chosen(self.hub.parameters(), names).collect();
         let mut message = json!({ "op": "parameterValues", "parameters": parameters });
         if let Some(id) = id {
             message["id"] = id.into();
@@ -214,8 +229,10 @@ impl Client<'_> {
             return self.write(&status(Severity::Error, "a message cannot be read"));
         };
         let outcome = if call.encoding == b"json" {
-            services::request(call.service, call.payload)
-                .and_then(|request| self.orders.request(request))
+            let admitted = self.desk.admit().map_err(|_| TOO_MANY.to_owned());
+            admitted
+                .and_then(|()| services::request(call.service, call.payload))
+                .and_then(|request| self.desk.request(request))
         } else {
             Err("requests to services must be JSON".to_owned())
         };
@@ -272,39 +289,40 @@ impl Client<'_> {
     }
 
     fn wants(&self, channel: usize) -> bool {
-        self.subscriptions.values().any(|one| *one == channel)
+        self.subscriptions[channel].is_some()
     }
 
-    /// Sends a message of a channel once for each subscription to it.
+    /// Sends a message of a channel to which there is a subscription.
     fn send_data<M: Serialize>(
         &mut self,
         channel: usize,
         time_s: f64,
         message: impl FnOnce() -> M,
     ) -> Result<(), Error> {
-        if !self.wants(channel) {
+        let Some(id) = self.subscriptions[channel] else {
             return Ok(());
-        }
+        };
         // It contains only finite numbers and text keys, so it can be written as JSON.
         let Ok(json) = serde_json::to_vec(&message()) else {
             return Ok(());
         };
-        for (id, subscribed) in &self.subscriptions {
-            if *subscribed == channel {
-                let mut bytes = Vec::with_capacity(13 + json.len());
-                bytes.push(MESSAGE_DATA);
-                bytes.extend(id.to_le_bytes());
-                bytes.extend(nanoseconds(time_s).to_le_bytes());
-                bytes.extend(&json);
-                self.socket.write(Message::binary(bytes))?;
-            }
-        }
-        Ok(())
+        let mut bytes = Vec::with_capacity(13 + json.len());
+        bytes.push(MESSAGE_DATA);
+        bytes.extend(id.to_le_bytes());
+        bytes.extend(nanoseconds(time_s).to_le_bytes());
+        bytes.extend(&json);
+        self.socket.write(Message::binary(bytes))
     }
 
     fn write(&mut self, message: &Value) -> Result<(), Error> {
         self.socket.write(Message::text(message.to_string()))
     }
+}
+
+/// Returns the parameters with these names; all if there are none.
+fn chosen(parameters: Vec<Parameter>, names: &[String]) -> impl Iterator<Item = Parameter> {
+    let is_chosen = move |one: &Parameter| names.is_empty() || names.contains(&one.name);
+    parameters.into_iter().filter(is_chosen)
 }
 
 fn status(severity: Severity, text: &str) -> Value {

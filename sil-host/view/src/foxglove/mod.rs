@@ -15,8 +15,9 @@ pub mod services;
 
 pub(crate) use client::serve;
 
-/// Origins of the Foxglove app: in the browser and on the desktop.
-pub(crate) const ORIGINS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
+/// Origin of the Foxglove app in the browser. That of the desktop app, `file://`, is also that of any page that
+/// is opened from a file.
+pub(crate) const ORIGIN: &str = "https://app.foxglove.dev";
 
 /// Versions of the protocol, best first. They agree in everything that is used here.
 const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];

@@ -1,0 +1,149 @@
+//! How smooth a controller's torque and contact force are: a rough torque heats windings and wears gears.
+
+use painleve_shared::frame::ActuatorFrame;
+use painleve_shared::status::SupervisorState;
+
+/// Velocity from which a reference counts as moving, m/s. One that an edge holds back creeps with the estimated edge.
+const MOVING_M_S: f64 = 5e-3;
+
+/// Smoothness while the controller tracks a moving reference, and one that stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Smoothness {
+    /// While the reference moves.
+    pub moving: Roughness,
+    /// While it stands.
+    pub holding: Roughness,
+    tick_hz: f64,
+    /// The answer before, if the controller tracked, and the changes of torque that it brought, counts.
+    last: Option<(ActuatorFrame, [i64; 2])>,
+}
+
+/// Sums over ticks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Roughness {
+    ticks: u64,
+    /// Sum over ticks and joints of the squared changes of torque, counts².
+    squares: f64,
+    /// Changes of a joint's torque against the change before.
+    reversals: u64,
+    mean_force_n: f64,
+    /// Sum of the squared deviations from that mean, N².
+    force_squares_n2: f64,
+}
+
+impl Roughness {
+    /// Returns the change of torque from tick to tick, counts: root mean square over ticks and joints; `None` without
+    /// ticks.
+    pub fn torque_change_counts(&self) -> Option<f64> {
+        let changes = 2.0 * self.ticks as f64;
+        (self.ticks > 0).then(|| (self.squares / changes).sqrt())
+    }
+
+    /// Returns the share of changes of torque, 0 … 1, that reverse the one before; `None` without ticks.
+    pub fn reversals(&self) -> Option<f64> {
+        let changes = 2.0 * self.ticks as f64;
+        (self.ticks > 0).then(|| self.reversals as f64 / changes)
+    }
+
+    /// Returns the standard deviation of the normal force at the ends of ticks, N; `None` without ticks.
+    pub fn force_ripple_n(&self) -> Option<f64> {
+        (self.ticks > 0).then(|| (self.force_squares_n2 / self.ticks as f64).sqrt())
+    }
+
+    fn add(&mut self, changes: [i64; 2], before: [i64; 2], normal_force_n: f64) {
+        self.ticks += 1;
+        for (change, before) in changes.into_iter().zip(before) {
+            self.squares += (change * change) as f64;
+            self.reversals += u64::from(change * before < 0);
+        }
+        let deviation_n = normal_force_n - self.mean_force_n;
+        self.mean_force_n += deviation_n / self.ticks as f64;
+        self.force_squares_n2 += deviation_n * (normal_force_n - self.mean_force_n);
+    }
+}
+
+impl Smoothness {
+    /// Starts for a controller of this rate, Hz.
+    pub fn new(tick_hz: f64) -> Self {
+        Self {
+            moving: Roughness::default(),
+            holding: Roughness::default(),
+            tick_hz,
+            last: None,
+        }
+    }
+
+    /// Adds a tick with the controller's answer, if it gave one, and the normal force at its end, N.
+    #[inline]
+    pub fn add(&mut self, answer: Option<&ActuatorFrame>, normal_force_n: f64) {
+        let tracking = Some(SupervisorState::Tracking);
+        let Some(answer) = answer.filter(|answer| answer.supervisor_state() == tracking) else {
+            self.last = None;
+            return;
+        };
+        let mut changes = [0; 2];
+        if let Some((last, before)) = &self.last {
+            for (joint, change) in changes.iter_mut().enumerate() {
+                *change = i64::from(answer.torques[joint].0) - i64::from(last.torques[joint].0);
+            }
+            let way_m = answer.reference_tip.to_metres() - last.reference_tip.to_metres();
+            let roughness = if way_m.abs() * self.tick_hz > MOVING_M_S {
+                &mut self.moving
+            } else {
+                &mut self.holding
+            };
+            roughness.add(changes, *before, normal_force_n);
+        }
+        self.last = Some((*answer, changes));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_shared::counts::{Micrometres, TorqueCounts};
+
+    fn answer(torques: [i32; 2], reference_um: i32) -> ActuatorFrame {
+        ActuatorFrame {
+            torques: torques.map(TorqueCounts),
+            reference_tip: Micrometres(reference_um),
+            state: SupervisorState::Tracking as u8,
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn a_torque_that_alternates_reverses_at_every_change() {
+        let mut smoothness = Smoothness::new(1000.0);
+        for tick in 0..1001 {
+            let torque = if tick % 2 == 0 { 3 } else { -1 };
+            smoothness.add(Some(&answer([torque, 7], 0)), 10.0 + f64::from(torque - 1));
+        }
+        let Smoothness {
+            moving, holding, ..
+        } = smoothness;
+        assert_eq!(moving.torque_change_counts(), None);
+        assert!((holding.torque_change_counts().unwrap() - 8.0_f64.sqrt()).abs() < 1e-9);
+        assert!((holding.reversals().unwrap() - 0.5).abs() < 1e-3);
+        assert!((holding.force_ripple_n().unwrap() - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_ramp_moves_and_ticks_without_an_answer_count_nowhere() {
+        let mut smoothness = Smoothness::new(1000.0);
+        for tick in 0..100 {
+            let frame = answer([tick, -tick], 10 * tick);
+            smoothness.add((tick != 50).then_some(&frame), 10.0);
+        }
+        let Smoothness {
+            moving, holding, ..
+        } = smoothness;
+        assert_eq!(moving.ticks, 97);
+        assert_eq!(holding.ticks, 0);
+        assert_eq!(moving.torque_change_counts(), Some(1.0));
+        assert_eq!(
+            (moving.reversals(), moving.force_ripple_n()),
+            (Some(0.0), Some(0.0))
+        );
+    }
+}
