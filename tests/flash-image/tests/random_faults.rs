@@ -178,6 +178,8 @@ fn take_the_torque_off_or_are_survived<C: BoardChip>(scenario: &Scenario, faults
         bench.restore(&healthy);
         bench.force_is_stuck_at = None;
         bench.second_force_is_stuck_at = None;
+        let phase = random.below(u64::MAX);
+        bench.board.machine.chip_mut().set_watchdog_phase(phase);
         let fault = kinds[random.below(kinds.len() as u64) as usize];
         for _ in 0..random.below(5) {
             bench.tick();

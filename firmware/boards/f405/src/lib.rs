@@ -36,6 +36,7 @@ use painleve_image::memory::FlashMemory;
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
+use painleve_shared::message::RefusedRate;
 use painleve_stm32f4::spi::SpiPort;
 use painleve_stm32f4::timer;
 use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PB0, PC0, PC1, PC2, PinState};
@@ -93,7 +94,7 @@ impl Board for F405 {
         mut core: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
         let watchdog = Independent(device.IWDG);
-        watchdog.start(START_LIMIT_S);
+        watchdog.start(START_LIMIT_S, || ());
         start_crystal(&device.RCC)?;
         let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(168.MHz());
         let mut rcc = device.RCC.freeze(clocks);
@@ -255,10 +256,15 @@ impl ArmPins for F405Pins {
     type ForceSpi = SpiPort<SPI2>;
     type Select = ErasedPin<Output>;
 
+    fn check_rate(&self, tick_hz: f32, drives: bool) -> Result<(), RefusedRate> {
+        self.watchdogs.check_rate(tick_hz, drives)
+    }
+
     fn start_timer(&mut self, tick_hz: f32) {
+        // First, as it takes longer than a period of a fast timer.
+        self.watchdogs.set_period(1.0 / tick_hz);
         timer::set_back(&self.timer);
         timer::start(&self.timer, self.timer_hz / tick_hz);
-        self.watchdogs.set_period(1.0 / tick_hz);
     }
 
     fn begin_tick(&mut self) {

@@ -34,6 +34,7 @@ use painleve_image::memory::FlashMemory;
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
+use painleve_shared::message::RefusedRate;
 use painleve_stm32g4::clock::{self, CORE_HZ};
 use painleve_stm32g4::flash;
 pub use painleve_stm32g4::pac;
@@ -87,7 +88,7 @@ impl Board for G474 {
         mut core: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
         let watchdog = Independent(device.IWDG);
-        watchdog.start(START_LIMIT_S);
+        watchdog.start(START_LIMIT_S, || ());
         let rcc = device.RCC;
         clock::start(&rcc, &device.PWR, &device.FLASH, CRYSTAL_MHZ)
             .map_err(|_| StartFault::Clock)?;
@@ -225,9 +226,14 @@ impl ArmPins for G474Pins {
     type ForceSpi = SpiPort<pac::SPI2>;
     type Select = Output;
 
+    fn check_rate(&self, tick_hz: f32, drives: bool) -> Result<(), RefusedRate> {
+        self.watchdogs.check_rate(tick_hz, drives)
+    }
+
     fn start_timer(&mut self, tick_hz: f32) {
-        timer::restart(&self.timer, CORE_HZ as f32 / tick_hz);
+        // First, as it takes longer than a period of a fast timer.
         self.watchdogs.set_period(1.0 / tick_hz);
+        timer::restart(&self.timer, CORE_HZ as f32 / tick_hz);
     }
 
     fn begin_tick(&mut self) {

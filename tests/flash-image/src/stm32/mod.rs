@@ -97,6 +97,9 @@ pub trait WiredChip: Chip {
     /// Pulls the reset pin low for a moment.
     fn reset_pin(&mut self);
 
+    /// Sets the phases of the prescalers of both watchdogs, which run freely: any number.
+    fn set_watchdog_phase(&mut self, phase: u64);
+
     /// Returns the serial port to the host.
     fn usart(&self) -> &Usart;
 

@@ -134,7 +134,7 @@ impl<O: Outside> Stm32f4<O> {
                 self.timer.read(offset, self.rcc.slow_timer_hz(), now)
             }
             0x4000_2c00 if self.rcc.is_on(0x40, 11) => self.window_watchdog.read(offset),
-            0x4000_3000 => self.watchdog.read(offset),
+            0x4000_3000 => self.watchdog.read(offset, now),
             0x4000_3800 if self.rcc.is_on(0x40, 14) => self.spis[1].read(offset),
             0x4000_7000 if self.rcc.is_on(0x40, 28) => match offset {
                 // Voltage scaling is always ready.
@@ -283,7 +283,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.spis = Default::default();
         self.usart.reset();
         self.timer = Timer::default();
-        self.watchdog = Watchdog::new(self.watchdog.oscillator_hz);
+        self.watchdog.reset();
         self.window_watchdog.reset();
         self.dac.reset();
         self.dma = Default::default();
@@ -462,6 +462,11 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
 
     fn reset_pin(&mut self) {
         self.reset = Some(Reset::Pin);
+    }
+
+    fn set_watchdog_phase(&mut self, phase: u64) {
+        self.watchdog.phase = phase;
+        self.window_watchdog.phase = phase;
     }
 
     fn slots_mut(&mut self) -> &mut FlashSlots {

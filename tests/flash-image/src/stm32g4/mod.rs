@@ -109,7 +109,7 @@ impl<O: Outside> Stm32g4<O> {
         match address & !0x3ff {
             0x4000_0000 => self.timer.read(offset, self.rcc.bus_hz(), now),
             0x4000_2c00 => self.window_watchdog.read(offset),
-            0x4000_3000 => self.watchdog.read(offset),
+            0x4000_3000 => self.watchdog.read(offset, now),
             0x4000_3800 => self.spis[1].read(offset, size),
             0x4000_4400 => self.usart.read(offset),
             0x4000_7000 => match offset {
@@ -208,7 +208,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.spis = Default::default();
         self.usart.reset();
         self.timer = Timer::default();
-        self.watchdog = Watchdog::new(self.watchdog.oscillator_hz);
+        self.watchdog.reset();
         self.window_watchdog.reset();
         self.dac.reset();
         self.dma = Dma::default();
@@ -382,6 +382,11 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
 
     fn reset_pin(&mut self) {
         self.reset = Some(Reset::Pin);
+    }
+
+    fn set_watchdog_phase(&mut self, phase: u64) {
+        self.watchdog.phase = phase;
+        self.window_watchdog.phase = phase;
     }
 
     fn slots_mut(&mut self) -> &mut FlashSlots {
