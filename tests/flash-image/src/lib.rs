@@ -15,6 +15,7 @@ pub mod bench;
 pub mod board;
 pub mod harm;
 pub mod machine;
+pub mod protection;
 pub mod stm32;
 pub mod stm32f4;
 pub mod stm32g4;

@@ -31,8 +31,9 @@ use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
-use painleve_image::flash::ConfigurationFlash;
+use painleve_image::flash::{ConfigurationFlash, FlashRegisters};
 use painleve_image::memory::FlashMemory;
+use painleve_image::protection::{self, Access, Region};
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
@@ -65,6 +66,42 @@ const START_LIMIT_S: f32 = 0.5;
 const ENCODER_BUS_HZ: u32 = 5_250_000;
 const FORCE_BUS_HZ: u32 = 1_312_500;
 
+/// What the memory may be used for (`memory.x`).
+const REGIONS: [Region; 5] = [
+    // SRAM1 with the program, through its alias at 0 and as data, without SRAM2.
+    Region {
+        start: 0,
+        length: 128 << 10,
+        without: 0x80,
+        access: Access::ReadExecute,
+    },
+    Region {
+        start: 0x2000_0000,
+        length: 128 << 10,
+        without: 0x80,
+        access: Access::Read,
+    },
+    Region {
+        start: 0x2001_c000,
+        length: 16 << 10,
+        without: 0,
+        access: Access::ReadWrite,
+    },
+    // The flash, and in it the slots for configurations.
+    Region {
+        start: 0x0800_0000,
+        length: 1 << 20,
+        without: 0,
+        access: Access::ReadExecute,
+    },
+    Region {
+        start: flash::Registers::START,
+        length: 256 << 10,
+        without: 0,
+        access: Access::ReadWrite,
+    },
+];
+
 /// Declares the image for this board with these laws.
 #[macro_export]
 macro_rules! image {
@@ -95,6 +132,7 @@ impl Board for F405 {
     ) -> Result<Parts<Self>, StartFault> {
         let watchdog = Independent(device.IWDG);
         watchdog.start(START_LIMIT_S, || ());
+        protection::start(&core.MPU, &REGIONS);
         start_crystal(&device.RCC)?;
         let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(168.MHz());
         let mut rcc = device.RCC.freeze(clocks);

@@ -29,8 +29,9 @@ use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
-use painleve_image::flash::ConfigurationFlash;
+use painleve_image::flash::{ConfigurationFlash, FlashRegisters};
 use painleve_image::memory::FlashMemory;
+use painleve_image::protection::{self, Access, Region};
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
@@ -58,6 +59,36 @@ const USART: u32 = 7;
 /// 2.1 MHz.
 const ENCODER_DIVIDER: u8 = 4;
 const FORCE_DIVIDER: u8 = 6;
+
+/// What the memory may be used for (`memory.x`).
+const REGIONS: [Region; 4] = [
+    Region {
+        start: 0x2000_0000,
+        length: 128 << 10,
+        without: 0,
+        access: Access::ReadWrite,
+    },
+    // Below the RAM, for a stack that overflows.
+    Region {
+        start: 0x1fff_8000,
+        length: 32 << 10,
+        without: 0,
+        access: Access::None,
+    },
+    // The flash, and in it the slots for configurations.
+    Region {
+        start: 0x0800_0000,
+        length: 512 << 10,
+        without: 0,
+        access: Access::ReadExecute,
+    },
+    Region {
+        start: flash::Registers::START,
+        length: 4 << 10,
+        without: 0,
+        access: Access::ReadWrite,
+    },
+];
 
 /// Declares the image for this board with these laws.
 #[macro_export]
@@ -89,6 +120,7 @@ impl Board for G474 {
     ) -> Result<Parts<Self>, StartFault> {
         let watchdog = Independent(device.IWDG);
         watchdog.start(START_LIMIT_S, || ());
+        protection::start(&core.MPU, &REGIONS);
         let rcc = device.RCC;
         clock::start(&rcc, &device.PWR, &device.FLASH, CRYSTAL_MHZ)
             .map_err(|_| StartFault::Clock)?;
