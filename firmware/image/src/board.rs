@@ -16,6 +16,8 @@ pub enum StartFault {
     Clock,
     /// The link to the host cannot be opened.
     Link,
+    /// The brown-out level could not be programmed.
+    OptionBytes,
 }
 
 /// A board, split into the parts that each task owns.

@@ -138,7 +138,8 @@ impl Board for F405 {
         let mut rcc = device.RCC.freeze(clocks);
         safety::watch_crystal(&rcc);
         pac::PWR::enable(&mut rcc);
-        safety::watch_supply(&device.PWR, &device.EXTI, &device.FLASH, &mut core.NVIC);
+        let (power, lines) = (&device.PWR, &device.EXTI);
+        safety::watch_supply(power, lines, &device.FLASH, &mut core.NVIC, &watchdog)?;
 
         let a = device.GPIOA.split(&mut rcc);
         let b = device.GPIOB.split(&mut rcc);

@@ -124,7 +124,8 @@ impl Board for G474 {
         let rcc = device.RCC;
         clock::start(&rcc, &device.PWR, &device.FLASH, CRYSTAL_MHZ)
             .map_err(|_| StartFault::Clock)?;
-        supply::watch(&device.PWR, &device.EXTI, &device.FLASH, &mut core.NVIC);
+        let (power, lines) = (&device.PWR, &device.EXTI);
+        supply::watch(power, lines, &device.FLASH, &mut core.NVIC, &watchdog)?;
         supply::stop_dead_battery_detection(&device.PWR);
         start_clocks(&rcc);
 

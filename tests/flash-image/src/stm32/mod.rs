@@ -85,6 +85,9 @@ pub trait WiredChip: Chip {
     /// Returns the flash that keeps configurations.
     fn slots_mut(&mut self) -> &mut FlashSlots;
 
+    /// Gives the chip the option bytes of a new one, without a brown-out level.
+    fn set_new_options(&mut self);
+
     /// Stops the crystal.
     fn set_crystal(&mut self, failure: Crystal);
 

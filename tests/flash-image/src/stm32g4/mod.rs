@@ -216,7 +216,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         // The regulator's range 1 without boost.
         self.power[0] = 0x200;
         self.power[32] = 0x100;
-        self.flash.reset();
+        self.flash.reset(now);
         self.external_interrupts = [0; 16];
         self.reset = None;
     }
@@ -391,6 +391,10 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
 
     fn slots_mut(&mut self) -> &mut FlashSlots {
         &mut self.flash.slots
+    }
+
+    fn set_new_options(&mut self) {
+        self.flash.set_new_options();
     }
 
     fn set_crystal(&mut self, failure: Crystal) {

@@ -22,6 +22,7 @@ crate::on_each_board! {
     a_program_that_hangs_takes_the_torque_off,
     a_crystal_that_stops_takes_the_torque_off,
     a_low_supply_takes_the_torque_off,
+    a_new_chip_programs_its_brown_out_level,
     a_reset_takes_the_torque_off,
     the_black_box_outlives_a_reset_and_names_its_reason,
     an_unread_log_does_not_block_the_image,
@@ -138,6 +139,23 @@ fn a_low_supply_takes_the_torque_off<C: BoardChip>() {
         bench.board.machine.chip_mut().set_supply(millivolts);
         assert_off_in_time(bench);
     }
+}
+
+/// Programming takes longer than the watchdog's limit during the start.
+fn a_new_chip_programs_its_brown_out_level<C: BoardChip>() {
+    const LOWEST_MV: u32 = 2690;
+    let mut board = EmulatedBoard::<C>::with_oscillator(C::OSCILLATOR_HZ[2]);
+    board.machine.chip_mut().set_new_options();
+    board.machine.chip_mut().set_supply(LOWEST_MV);
+    board.machine.chip_mut().set_supply(3300);
+    board.machine.run_for(1000 * MILLISECOND);
+    assert_eq!(board.resets(), []);
+    board.machine.chip_mut().set_supply(LOWEST_MV);
+    board.machine.run_for(MILLISECOND);
+    assert_eq!(board.resets(), [Reset::BrownOut]);
+    board.machine.chip_mut().set_supply(3300);
+    board.machine.run_for(20 * MILLISECOND);
+    assert!(matches!(black_box(&mut board).reset, ResetCause::Power));
 }
 
 fn a_reset_takes_the_torque_off<C: BoardChip>() {
