@@ -16,14 +16,15 @@ const PATIENCE: u32 = 100_000;
 /// Cycles of the slow peripherals' clock per count of the window watchdog.
 const WINDOW_CYCLES: f32 = 4096.0;
 
-/// Largest limit of the window watchdog, of six bits.
-const LARGEST_COUNTS: u8 = 63;
+/// Number of limits of the window watchdog, of six bits.
+const COUNTS: f32 = 64.0;
 
 /// Longest delay of a tick by a sensor's interrupt and by code that masks interrupts, s.
 const LATEST_FEED_S: f32 = 10e-6;
 
-/// Step of the search for other rates, relative.
-const RATE_STEP: f32 = 1e-3;
+/// Step of the search for other rates, relative, and the number of steps, which take less than half a millisecond.
+const RATE_STEP: f32 = 0.01;
+const RATE_STEPS: u32 = 300;
 
 /// Limit of an independent watchdog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,16 +68,21 @@ impl WindowLimit {
     pub fn new(period_s: f32, bus_hz: f32, largest_prescaler: u8) -> Option<Self> {
         let shortest_s = period_s + LATEST_FEED_S;
         let middle_s = (shortest_s + 2.0 * period_s) / 2.0;
-        (0..=largest_prescaler).find_map(|prescaler| {
-            let count_s = WINDOW_CYCLES * f32::from(1_u16 << prescaler) / bus_hz;
-            // Rounding down centres the interval from n to n + 1 counts.
-            let counts = (middle_s / count_s) as u8;
-            let counts = counts.saturating_add(u8::from(f32::from(counts) * count_s < shortest_s));
-            (counts <= LARGEST_COUNTS).then_some(Self {
-                prescaler,
-                counts,
-                count_s,
-            })
+        let mut prescaler = 0;
+        let mut count_s = WINDOW_CYCLES / bus_hz;
+        while middle_s >= COUNTS * count_s {
+            if prescaler == largest_prescaler {
+                return None;
+            }
+            prescaler += 1;
+            count_s *= 2.0;
+        }
+        // Rounding down centres the interval from n to n + 1 counts.
+        let counts = (middle_s / count_s) as u8;
+        Some(Self {
+            prescaler,
+            counts: counts + u8::from(f32::from(counts) * count_s < shortest_s),
+            count_s,
         })
     }
 
@@ -107,6 +113,7 @@ pub trait IndependentWatchdog {
 
     /// Starts the watchdog with a timeout of at least `limit_s`, or changes its timeout, and calls `meanwhile` until
     /// that has taken effect. Call it before anything that may hang.
+    #[inline(never)]
     fn start(&self, limit_s: f32, meanwhile: impl Fn()) {
         self.write_key(START);
         self.write_key(OPEN);
@@ -160,7 +167,8 @@ impl<I: IndependentWatchdog, W: WindowWatchdog> Watchdogs<I, W> {
     /// expire within two periods.
     ///
     /// # Errors
-    /// The rate, and the nearest ones that have a limit.
+    /// The rate, and the nearest ones that have a limit, to a hundredth.
+    #[inline(never)]
     pub fn check_rate(&self, tick_hz: f32, drives: bool) -> Result<(), RefusedRate> {
         let fits = |hz: &f32| {
             let period_s = 1.0 / hz;
@@ -170,16 +178,24 @@ impl<I: IndependentWatchdog, W: WindowWatchdog> Watchdogs<I, W> {
         if fits(&tick_hz) {
             return Ok(());
         }
-        let steps = || (1..1000).map(|n| n as f32 * RATE_STEP);
-        let below = steps().map(|step| tick_hz * (1.0 - step)).find(fits);
-        let above = steps().map(|step| tick_hz / (1.0 - step)).find(fits);
+        let [below_hz, above_hz] = [1.0 - RATE_STEP, 1.0 + RATE_STEP].map(|factor| {
+            let mut hz = tick_hz;
+            for _ in 0..RATE_STEPS {
+                hz *= factor;
+                if fits(&hz) {
+                    return hz as u32;
+                }
+            }
+            0
+        });
         Err(RefusedRate {
             tick_hz: tick_hz as u32,
-            below_hz: below.map_or(0, |hz| hz as u32),
-            above_hz: above.map_or(0, |hz| hz as u32 + 1),
+            below_hz,
+            above_hz,
         })
     }
 
+    #[inline(never)]
     fn limit(&self, period_s: f32) -> Option<WindowLimit> {
         WindowLimit::new(period_s, self.bus_hz, W::LARGEST_PRESCALER)
     }

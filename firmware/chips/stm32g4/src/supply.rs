@@ -48,11 +48,10 @@ pub fn stop_dead_battery_detection(power: &pac::PWR) {
 }
 
 /// Programs the brown-out level once in a chip's life: it is stored in the option bytes, and takes effect when
-/// power comes up. A reset in the meantime would spoil them.
+/// power comes up; until then its register gives the last one. A reset while they are programmed would spoil them.
 fn raise_brown_out_level(flash: &pac::FLASH, watchdog: &Independent) -> Result<(), StartFault> {
     const HIGHEST: u8 = 4;
-    let is_highest = || flash.optr().read().bor_lev().bits() == HIGHEST;
-    if is_highest() {
+    if flash.optr().read().bor_lev().bits() == HIGHEST {
         return Ok(());
     }
     let is_done = || {
@@ -83,7 +82,7 @@ fn raise_brown_out_level(flash: &pac::FLASH, watchdog: &Independent) -> Result<(
     flash
         .cr()
         .modify(|_, w| w.optlock().set_bit().lock().set_bit());
-    if errors == 0 && is_highest() {
+    if errors == 0 {
         Ok(())
     } else {
         Err(StartFault::OptionBytes)

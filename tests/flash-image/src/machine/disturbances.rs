@@ -40,29 +40,30 @@ impl<C: Chip> Machine<C> {
     pub fn hang(&mut self) {
         self.unicorn.set(Register::PRIMASK, 1);
         // A branch to itself.
-        self.execute(&[0xe7fe]);
+        self.execute(16, &[0xe7fe]);
     }
 
     /// Calls a function that stores registers on the stack and calls itself.
     pub fn recurse(&mut self) {
-        self.execute(&[0xb5ff, 0xf7ff, 0xfffd]);
+        self.execute(32, &[0xb5ff, 0xf7ff, 0xfffd]);
     }
 
     /// Stores a word at an address, and hangs.
     pub fn store(&mut self, address: u32) {
         let [low, high] = [address as u16, (address >> 16) as u16];
         // ldr r1, [pc, #4]; str r0, [r1]; b .
-        self.execute(&[0x4901, 0x6008, 0xe7fe, 0, low, high]);
+        self.execute(48, &[0x4901, 0x6008, 0xe7fe, 0, low, high]);
     }
 
-    /// Executes instructions, in memory of the program that the image leaves unused.
-    fn execute(&mut self, instructions: &[u16]) {
+    /// Executes instructions, in memory of the program that the image leaves unused: `before_end` bytes before its
+    /// end, a place of their own, because Unicorn keeps what it has translated.
+    fn execute(&mut self, before_end: u32, instructions: &[u16]) {
         let end = if C::ALIASED_RAM > 0 {
             C::ALIASED_RAM as u32
         } else {
             C::SLOTS.0
         };
-        let place = end - 16;
+        let place = end - before_end;
         let bytes: Vec<u8> = instructions
             .iter()
             .flat_map(|it| it.to_le_bytes())

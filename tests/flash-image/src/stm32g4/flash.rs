@@ -34,6 +34,10 @@ pub(super) struct Flash {
     /// Number of keys that have opened the control register and the option bytes.
     keys: [usize; 2],
     pub slots: FlashSlots,
+    /// Option bytes as written to their register and as programmed. The register gives those that were loaded when
+    /// power came up.
+    written_options: u32,
+    programmed_options: u32,
     /// Time until which the option bytes are programmed.
     options_busy_until: Picoseconds,
     /// The first half of a double word that is written.
@@ -52,6 +56,8 @@ impl Flash {
             registers,
             keys: [0; 2],
             slots: FlashSlots::new(SLOTS),
+            written_options: USUAL_OPTIONS,
+            programmed_options: USUAL_OPTIONS,
             options_busy_until: 0,
             half: None,
             is_uncorrectable: false,
@@ -61,7 +67,13 @@ impl Flash {
 
     /// Gives the chip the option bytes of a new one.
     pub fn set_new_options(&mut self) {
-        self.registers[8] = NEW_OPTIONS;
+        self.programmed_options = NEW_OPTIONS;
+        self.load_options();
+    }
+
+    /// Loads the option bytes, as when power comes up.
+    pub fn load_options(&mut self) {
+        self.registers[8] = self.programmed_options;
     }
 
     fn is_busy(&self, now: Picoseconds) -> bool {
@@ -114,7 +126,7 @@ impl Flash {
             (0x08, 0xcdef_89ab, [1, _]) => self.registers[5] &= !LOCK,
             (0x0c, 0x0819_2a3b, _) if self.registers[5] & LOCK == 0 => self.keys[1] = 1,
             (0x0c, 0x4c5d_6e7f, [_, 1]) => self.registers[5] &= !OPTION_LOCK,
-            (0x20, ..) if self.registers[5] & OPTION_LOCK == 0 => self.registers[8] = value,
+            (0x20, ..) if self.registers[5] & OPTION_LOCK == 0 => self.written_options = value,
             (0x00, ..) => self.registers[0] = value,
             (0x14, ..) if self.registers[5] & LOCK == 0 => return self.control(value, now),
             (0x18, ..) if value & 1 << 31 != 0 => self.is_uncorrectable = false,
@@ -127,6 +139,7 @@ impl Flash {
         assert!(!self.is_busy(now), "the flash is busy");
         self.registers[5] = value & !(START | OPTION_START);
         if value & OPTION_START != 0 && self.registers[5] & OPTION_LOCK == 0 {
+            self.programmed_options = self.written_options;
             self.options_busy_until = now + OPTION_TIME;
         }
         if value & LOCK != 0 {

@@ -217,6 +217,9 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.power[0] = 0x200;
         self.power[32] = 0x100;
         self.flash.reset(now);
+        if matches!(reset, Reset::Power | Reset::BrownOut) {
+            self.flash.load_options();
+        }
         self.external_interrupts = [0; 16];
         self.reset = None;
     }
