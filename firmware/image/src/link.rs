@@ -110,7 +110,7 @@ pub fn link<D, L, P, M>(
                 }) => {
                     stop(&mut control);
                     configure(&mut control, decoded, configuration, source)
-                        .map_or_else(|refusal| refusal, |ready| ready)
+                        .unwrap_or_else(|refusal| refusal)
                 }
                 Ok(Request::Store { build, .. })
                     if M::IS_THERE && build != Configuration::<L>::BUILD =>
