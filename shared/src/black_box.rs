@@ -43,7 +43,7 @@ pub enum ResetCause {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Crash {
-    /// An instruction that cannot be executed, a bus that does not answer, or a stack overflow.
+    /// An instruction that cannot be executed, a bus that does not answer, or an access that is not permitted.
     HardFault {
         /// Address of the instruction.
         program_counter: u32,
@@ -66,6 +66,8 @@ pub enum Crash {
         /// End of the source file's name, padded with zeros.
         file: [u8; FILE_LENGTH],
     },
+    /// The stack overflowed.
+    StackOverflow,
 }
 
 /// A tick that latched a fault.

@@ -26,7 +26,7 @@ pub const MAXIMUM_RESPONSE_LENGTH: usize = 192;
 /// A request from the host to the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Request<'a> {
-    /// Starts afresh; answered by [`Response::Ready`], [`Response::Refused`] or
+    /// Starts afresh; answered by [`Response::Ready`], [`Response::Refused`], [`Response::RateRefused`] or
     /// [`Response::OtherBuild`].
     Configure {
         /// Hash of the host's build, see [`SchemaHash`](crate::schema::SchemaHash).
@@ -56,8 +56,8 @@ pub enum Request<'a> {
     /// configuration, and they expire after 50 ms unless they are repeated.
     Torque([TorqueCounts; 2]),
     /// Takes the torque off and stores a configuration, with which the board starts from then on, with
-    /// [`FrameSource::StandAlone`]; answered by [`Response::Stored`], [`Response::Refused`] or
-    /// [`Response::OtherBuild`].
+    /// [`FrameSource::StandAlone`]; answered by [`Response::Stored`], [`Response::Refused`],
+    /// [`Response::RateRefused`] or [`Response::OtherBuild`].
     Store {
         /// Hash of the host's build, see [`SchemaHash`](crate::schema::SchemaHash).
         build: u64,
@@ -150,6 +150,20 @@ pub enum Response {
     Stored(StoredConfiguration),
     /// Hash of the sources of the board's controller. Those of another program may behave differently.
     Sources(u64),
+    /// The board's watchdogs have no limit for the control rate of the configuration.
+    RateRefused(RefusedRate),
+}
+
+/// A control rate for which a board's watchdogs have no limit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RefusedRate {
+    /// The rate, Hz.
+    pub tick_hz: u32,
+    /// The nearest rate below that has a limit, Hz; 0 for none.
+    pub below_hz: u32,
+    /// The nearest rate above that has a limit, Hz; 0 for none.
+    pub above_hz: u32,
 }
 
 /// Counters of a board since its configuration. Counters wrap.

@@ -17,7 +17,7 @@ use painleve_firmware::law::Law;
 use painleve_shared::Arm;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_shared::message::FrameSource;
+use painleve_shared::message::{FrameSource, RefusedRate};
 use painleve_shared::status::SupervisorState;
 
 use crate::board::BoardDrive;
@@ -39,7 +39,13 @@ pub trait ArmPins {
     /// A pin that selects a sensor, low.
     type Select: OutputPin;
 
-    /// Sets the rate of the control timer's interrupt, and the watchdogs' limit to one and a half periods.
+    /// Checks that the watchdogs have a limit for this rate, one within two periods if the torque depends on it.
+    ///
+    /// # Errors
+    /// The rate, and the nearest ones that have a limit.
+    fn check_rate(&self, tick_hz: f32, drives: bool) -> Result<(), RefusedRate>;
+
+    /// Sets the rate of the control timer's interrupt and the watchdogs' limits.
     fn start_timer(&mut self, tick_hz: f32);
 
     /// Clears the control timer's interrupt and feeds the watchdogs.
@@ -152,6 +158,11 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
 }
 
 impl<P: ArmPins> BoardDrive for ArmDrive<P> {
+    fn check_rate(&self, tick_hz: f32, source: FrameSource) -> Result<(), RefusedRate> {
+        // With frames from the host the stages stay off.
+        self.pins.check_rate(tick_hz, source.is_on_board())
+    }
+
     fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource) {
         let converters = &configuration.converters;
         self.stages = Some(StageScale::new(

@@ -5,7 +5,7 @@ use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
 use painleve_shared::black_box::ResetCause;
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::message::FrameSource;
+use painleve_shared::message::{FrameSource, RefusedRate};
 
 use crate::memory::ConfigurationMemory;
 
@@ -16,6 +16,8 @@ pub enum StartFault {
     Clock,
     /// The link to the host cannot be opened.
     Link,
+    /// The brown-out level could not be programmed.
+    OptionBytes,
 }
 
 /// A board, split into the parts that each task owns.
@@ -75,6 +77,15 @@ pub trait Board {
 /// The control task's part of a board: a [`Drive`] with a timer that can be started, and with an
 /// input for frames from the host instead of the board's own sensors.
 pub trait BoardDrive: Drive {
+    /// Checks that the board can watch over ticks at this rate, with frames from `source`.
+    ///
+    /// # Errors
+    /// The rate, and the nearest ones at which it can.
+    fn check_rate(&self, tick_hz: f32, source: FrameSource) -> Result<(), RefusedRate> {
+        let _ = (tick_hz, source);
+        Ok(())
+    }
+
     /// Starts the control timer's interrupt at the configuration's rate, with frames from `source`.
     /// Discards a frame offered before.
     fn start<L: Law>(&mut self, configuration: &Configuration<L>, source: FrameSource);

@@ -17,6 +17,7 @@ pub mod dma_serial;
 pub mod flash;
 pub mod link;
 pub mod memory;
+pub mod protection;
 pub mod sensor_bus;
 pub mod stack;
 pub mod tasks;

@@ -110,9 +110,7 @@ pub fn link<D, L, P, M>(
                 }) => {
                     stop(&mut control);
                     configure(&mut control, decoded, configuration, source)
-                        .map_or(Response::Refused, |stopwatch_hz| Response::Ready {
-                            stopwatch_hz,
-                        })
+                        .unwrap_or_else(|refusal| refusal)
                 }
                 Ok(Request::Store { build, .. })
                     if M::IS_THERE && build != Configuration::<L>::BUILD =>
@@ -128,8 +126,8 @@ pub fn link<D, L, P, M>(
                     let accepted = configure(&mut control, decoded, configuration, source);
                     stop(&mut control);
                     match accepted {
-                        None => Response::Refused,
-                        Some(_) => {
+                        Err(refusal) => refusal,
+                        Ok(_) => {
                             let written = memory.store(Configuration::<L>::BUILD, configuration);
                             note_written(stored, written)
                         }
@@ -193,23 +191,36 @@ fn stop<D: BoardDrive, L: Law>(control: &mut impl Mutex<T = Control<D, L>>) {
     });
 }
 
-/// Starts with a configuration, encoded by postcard; returns the frequency of the stopwatch, Hz, or `None` if
-/// it is refused.
+/// Starts with a configuration, encoded by postcard; returns the response to the host.
+///
+/// # Errors
+/// The response, if the configuration is refused.
 fn configure<D: BoardDrive, L: Law + DeserializeOwned>(
     control: &mut impl Mutex<T = Control<D, L>>,
     decoded: &mut Option<Configuration<L>>,
     bytes: &[u8],
     source: FrameSource,
-) -> Option<u32> {
+) -> Result<Response, Response> {
     decode(decoded, bytes);
-    let configuration = decoded.as_ref()?;
+    let configuration = decoded.as_ref().ok_or(Response::Refused)?;
     control.lock(|control| {
         control.dropped_responses = 0;
         control.expect_host(source, configuration.tick_hz as u32);
-        control.task.configure(configuration, source).ok()?;
+        let accepted = control.task.configure(configuration, source);
+        accepted.map_err(|_| Response::Refused)?;
+        let rate = control
+            .task
+            .drive_mut()
+            .check_rate(configuration.tick_hz, source);
+        if let Err(rate) = rate {
+            control.task.stop();
+            return Err(Response::RateRefused(rate));
+        }
         let drive = control.task.drive_mut();
         drive.start(configuration, source);
-        Some(drive.stopwatch_hz())
+        Ok(Response::Ready {
+            stopwatch_hz: drive.stopwatch_hz(),
+        })
     })
 }
 
@@ -230,7 +241,7 @@ fn start_alone<D: BoardDrive, L: Law + DeserializeOwned, M: ConfigurationMemory>
     };
     let state = if content.build != Configuration::<L>::BUILD {
         StoredState::OtherBuild
-    } else if configure(control, decoded, bytes, FrameSource::StandAlone).is_none() {
+    } else if configure(control, decoded, bytes, FrameSource::StandAlone).is_err() {
         StoredState::Refused
     } else {
         StoredState::Intact

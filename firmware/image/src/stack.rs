@@ -1,8 +1,8 @@
-//! Measures the largest stack use: the free part is painted at the start and inspected later.
+//! The stack. Its largest use is measured: the free part is painted at the start and inspected later.
 
 #![allow(unsafe_code)] // reads and writes the stack below the program's own
 
-use core::ptr::addr_of_mut;
+use core::ptr::{addr_of, addr_of_mut};
 
 /// Pattern of untouched stack.
 const PAINT: u32 = 0xdead_57ac;
@@ -15,6 +15,11 @@ unsafe extern "C" {
     static mut _stack_end: u32;
     /// One past the highest address of the stack.
     static mut _stack_start: u32;
+}
+
+/// Returns whether a word belongs to the stack.
+pub fn contains(word: *const u32) -> bool {
+    (addr_of!(_stack_end)..addr_of!(_stack_start)).contains(&word)
 }
 
 /// Paints the unused part of the stack. Must be called first.

@@ -283,7 +283,6 @@ macro_rules! tasks {
                     $crate::tasks::start::<Hardware>(cx.device, cx.core);
                 let (answers_in, answers_out) = cx.local.answers.split();
                 let (events_in, events_out) = cx.local.events.split();
-                rtic::pend(LINK);
                 let control = Control::new(drive);
                 let local = Local {
                     bytes,
@@ -343,6 +342,8 @@ macro_rules! tasks {
 
             #[idle(shared = [control], local = [events_out])]
             fn idle(cx: idle::Context) -> ! {
+                // Not in `init`, whose stack would not be free yet.
+                rtic::pend(LINK);
                 $crate::tasks::idle::<Hardware, Laws>(cx.shared.control, cx.local.events_out)
             }
         }

@@ -25,7 +25,7 @@ use std::time::Duration;
 
 use painleve_plant::Configuration;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_shared::message::{Health, Response};
+use painleve_shared::message::{Health, RefusedRate, Response};
 use painleve_shared::stored::StoredState;
 use painleve_shared::wire::WireError;
 use serde::{Deserialize, Serialize};
@@ -165,6 +165,13 @@ pub enum BoardError {
         "the image refuses the configuration: it may be older than this program, see `cargo xtask build-fw`"
     )]
     Refused,
+    /// The board's watchdogs have no limit for the control rate.
+    #[error(
+        "run.tick_hz = {}: the board refuses this control rate, because no limit of its window watchdog lies between one tick and two; {}",
+        .0.tick_hz,
+        other_rates(.0)
+    )]
+    RateRefused(RefusedRate),
     /// Image and program speak different protocols.
     #[error(
         "the image speaks protocol {board} and this program protocol {host}: build both from the same sources, see `cargo xtask build-fw`, and flash again"
@@ -214,6 +221,15 @@ pub enum BoardError {
     /// A pipe or a process failed.
     #[error("cannot talk to the board: {0}")]
     System(#[from] io::Error),
+}
+
+/// Says which control rates a board accepts instead.
+fn other_rates(refused: &RefusedRate) -> String {
+    match [refused.below_hz, refused.above_hz] {
+        [0, 0] => "there is none for this board".into(),
+        [hz, 0] | [0, hz] => format!("the nearest that it accepts is {hz} Hz"),
+        [below, above] => format!("the nearest that it accepts are {below} and {above} Hz"),
+    }
 }
 
 impl BoardError {

@@ -69,7 +69,7 @@ impl Serial {
     /// # Errors
     /// [`BoardError::Port`] or [`BoardError::InUse`] if it cannot be opened, [`BoardError::Silent`] or
     /// [`BoardError::NoFrames`] if no board answers, [`BoardError::OtherProtocol`], [`BoardError::OtherBuild`],
-    /// [`BoardError::Refused`].
+    /// [`BoardError::RateRefused`], [`BoardError::Refused`].
     pub fn open(
         path: &Path,
         configuration: &Configuration,
@@ -158,7 +158,7 @@ impl Serial {
     /// Gives the board a configuration, with frames from `source`.
     ///
     /// # Errors
-    /// [`BoardError::Silent`] if no board answers, [`BoardError::OtherBuild`] and
+    /// [`BoardError::Silent`] if no board answers, [`BoardError::OtherBuild`], [`BoardError::RateRefused`] and
     /// [`BoardError::Refused`].
     pub fn configure(
         &mut self,
@@ -184,12 +184,16 @@ impl Serial {
         let is_wanted = |response: &Response| {
             matches!(
                 response,
-                Response::Ready { .. } | Response::Refused | Response::OtherBuild { .. }
+                Response::Ready { .. }
+                    | Response::Refused
+                    | Response::RateRefused(_)
+                    | Response::OtherBuild { .. }
             )
         };
         match self.ask(&request, PATIENCE, is_wanted)? {
             Response::Ready { stopwatch_hz } => self.stopwatch_hz = stopwatch_hz,
             Response::OtherBuild { build } => return Err(BoardError::other_build(build)),
+            Response::RateRefused(rate) => return Err(BoardError::RateRefused(rate)),
             _ => return Err(BoardError::Refused),
         }
         Ok(())

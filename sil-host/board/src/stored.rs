@@ -32,7 +32,7 @@ impl StoringBoard {
     /// Stores a configuration, with which the board starts from then on. Takes the torque off.
     ///
     /// # Errors
-    /// [`BoardError::Refused`], [`BoardError::NotStored`] or [`BoardError::Silent`].
+    /// [`BoardError::Refused`], [`BoardError::RateRefused`], [`BoardError::NotStored`] or [`BoardError::Silent`].
     pub fn store(
         &mut self,
         configuration: &Configuration,
@@ -72,13 +72,17 @@ impl StoringBoard {
         let is_wanted = |response: &Response| {
             matches!(
                 response,
-                Response::Stored(_) | Response::Refused | Response::OtherBuild { .. }
+                Response::Stored(_)
+                    | Response::Refused
+                    | Response::RateRefused(_)
+                    | Response::OtherBuild { .. }
             )
         };
         // Not repeated meanwhile: every repetition would store it again.
         match self.0.ask(request, ERASURE, is_wanted)? {
             Response::Stored(stored) => Ok(stored),
             Response::OtherBuild { build } => Err(BoardError::other_build(build)),
+            Response::RateRefused(rate) => Err(BoardError::RateRefused(rate)),
             _ => Err(BoardError::Refused),
         }
     }

@@ -1,5 +1,7 @@
 //! The core peripherals: interrupt controller, system control block, cycle counter.
 
+use crate::protection::Protection;
+
 /// Number of interrupts, in addition to the sixteen exceptions.
 pub const INTERRUPTS: usize = 96;
 
@@ -37,6 +39,10 @@ pub struct SystemControl {
     coprocessor_access: u32,
     floating_point_context: u32,
     system_control: u32,
+    /// The memory protection unit.
+    pub protection: Protection,
+    /// Configurable fault status.
+    pub fault_status: u32,
 }
 
 impl Default for SystemControl {
@@ -64,6 +70,8 @@ impl SystemControl {
             coprocessor_access: 0,
             floating_point_context: 0xc000_0000,
             system_control: 0,
+            protection: Protection::default(),
+            fault_status: 0,
         }
     }
 
@@ -102,6 +110,11 @@ impl SystemControl {
     pub fn present_priority(&self) -> i32 {
         let active = self.active.iter().map(|it| self.priority(*it));
         active.min().unwrap_or(256)
+    }
+
+    /// Returns what may be done at an address.
+    pub fn permits(&self, address: u32) -> u32 {
+        self.protection.permits(address, self.present_priority())
     }
 
     /// Returns the next exception, if masks and present priority allow it.
@@ -178,8 +191,10 @@ impl SystemControl {
                 let bytes = &self.system_priorities[first + 4..first + 8];
                 u32::from_le_bytes(bytes.try_into().unwrap_or([0; 4]))
             }
+            0xe000_ed28 => self.fault_status,
             0xe000_ed24..=0xe000_ed3f => 0,
             0xe000_ed88 => self.coprocessor_access,
+            0xe000_ed90..=0xe000_eda3 => self.protection.read(address),
             0xe000_edf0 => 0,
             0xe000_edfc => self.trace,
             0xe000_ef34 => self.floating_point_context,
@@ -219,6 +234,7 @@ impl SystemControl {
             0xe000_ed24 => {}
             0xe000_ed28..=0xe000_ed3f => {}
             0xe000_ed88 => self.coprocessor_access = value,
+            0xe000_ed90..=0xe000_eda3 => self.protection.write(address, value),
             0xe000_edfc => self.trace = value,
             0xe000_ef00 => self.latched |= 1 << (value & 0x7f),
             0xe000_ef34 => self.floating_point_context = value,

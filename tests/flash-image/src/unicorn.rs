@@ -71,6 +71,21 @@ impl Register {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnicornError(Status);
 
+impl UnicornError {
+    /// Returns the bits of the configurable fault status (ARMv7-M, section B3.2.15).
+    pub fn fault_status(&self) -> u32 {
+        match self.0 {
+            // Reading or writing what is not mapped; fetching it.
+            6 | 7 => 1 << 9,
+            8 => 1 << 8,
+            // The same of what is protected.
+            12 | 13 => 1 << 1,
+            14 => 1,
+            _ => 1 << 16,
+        }
+    }
+}
+
 impl fmt::Display for UnicornError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Unicorn's error {}", self.0)
@@ -105,6 +120,7 @@ struct Functions {
     close: unsafe extern "C" fn(Handle) -> Status,
     control: unsafe extern "C" fn(Handle, u32, ...) -> Status,
     memory_map: unsafe extern "C" fn(Handle, u64, u64, u32) -> Status,
+    memory_protect: unsafe extern "C" fn(Handle, u64, u64, u32) -> Status,
     memory_map_at: unsafe extern "C" fn(Handle, u64, u64, u32, *mut c_void) -> Status,
     memory_read: unsafe extern "C" fn(Handle, u64, *mut c_void, u64) -> Status,
     memory_write: unsafe extern "C" fn(Handle, u64, *const c_void, u64) -> Status,
@@ -129,6 +145,7 @@ impl Functions {
                 close: *library.get(b"uc_close\0")?,
                 control: *library.get(b"uc_ctl\0")?,
                 memory_map: *library.get(b"uc_mem_map\0")?,
+                memory_protect: *library.get(b"uc_mem_protect\0")?,
                 memory_map_at: *library.get(b"uc_mem_map_ptr\0")?,
                 memory_read: *library.get(b"uc_mem_read\0")?,
                 memory_write: *library.get(b"uc_mem_write\0")?,
@@ -285,8 +302,22 @@ impl<S: Surroundings> Unicorn<S> {
         });
     }
 
-    /// Maps executable memory whose first `alias_length` bytes are also found at address `alias`.
-    pub fn map_with_alias(&mut self, address: u32, length: usize, alias: u32, alias_length: usize) {
+    /// Sets what a mapped block of memory may be used for: reading 1, writing 2, execution 4.
+    pub fn protect(&mut self, address: u32, length: usize, permitted: u32) {
+        let parts = self.parts();
+        // SAFETY: Unicorn checks the addresses; no callback runs.
+        check(unsafe {
+            (parts.processor.functions.memory_protect)(
+                parts.processor.handle,
+                address.into(),
+                length as u64,
+                permitted,
+            )
+        });
+    }
+
+    /// Maps executable memory that is also found at address `alias`.
+    pub fn map_with_alias(&mut self, address: u32, length: usize, alias: u32) {
         let shared = self.shared;
         // SAFETY: see `parts`.
         let parts = unsafe { &mut *shared };
@@ -294,7 +325,7 @@ impl<S: Surroundings> Unicorn<S> {
         let place: *mut c_void = pages.as_mut_ptr().cast();
         parts.shared_memory.push(pages);
         let processor = &parts.processor;
-        for (address, length) in [(address, length), (alias, alias_length.min(length))] {
+        for address in [address, alias] {
             // SAFETY: the pages are at least as long, never move, and are freed after the engine.
             check(unsafe {
                 (processor.functions.memory_map_at)(

@@ -31,6 +31,7 @@ enum InjectedFault {
     ResetPin,
     EnableGlitch,
     BadInstruction,
+    StackOverflow,
     Hang,
     ControlTimer,
     Crystal,
@@ -51,6 +52,7 @@ impl InjectedFault {
         Self::ResetPin,
         Self::EnableGlitch,
         Self::BadInstruction,
+        Self::StackOverflow,
         Self::Hang,
         Self::ControlTimer,
         Self::Crystal,
@@ -100,6 +102,7 @@ impl InjectedFault {
                 board.enable(true);
             }
             Self::BadInstruction => board.machine.hard_fault(),
+            Self::StackOverflow => board.machine.recurse(),
             Self::Hang => board.machine.hang(),
             Self::ControlTimer => board.machine.chip_mut().stop_control_timer(),
             Self::Crystal => board.machine.chip_mut().set_crystal(Crystal::Stops),
@@ -178,6 +181,8 @@ fn take_the_torque_off_or_are_survived<C: BoardChip>(scenario: &Scenario, faults
         bench.restore(&healthy);
         bench.force_is_stuck_at = None;
         bench.second_force_is_stuck_at = None;
+        let phase = random.below(u64::MAX);
+        bench.board.machine.chip_mut().set_watchdog_phase(phase);
         let fault = kinds[random.below(kinds.len() as u64) as usize];
         for _ in 0..random.below(5) {
             bench.tick();

@@ -13,7 +13,10 @@ use stm32f4xx_hal::pac::FLASH;
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
 /// Number of polls for an erasure: more than 4 s, the longest of the data sheet, at eight cycles a poll.
-const PATIENCE: u32 = 100_000_000;
+pub(crate) const PATIENCE: u32 = 100_000_000;
+
+/// Errors of an operation in the status register.
+pub(crate) const ERRORS: u32 = 0xf2;
 
 /// Stores of four bytes at a time need a supply of 2.7 V, below which the chip is held in reset.
 const WORDS: u8 = 2;
@@ -64,7 +67,6 @@ impl FlashRegisters for Registers {
 
     #[inline(never)]
     fn wait(&mut self) -> Result<(), NorFlashErrorKind> {
-        const ERRORS: u32 = 0xf2;
         let flash = &self.0;
         let is_done = (0..PATIENCE).any(|_| flash.sr().read().bsy().bit_is_clear());
         let errors = flash.sr().read().bits() & ERRORS;

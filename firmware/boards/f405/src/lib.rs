@@ -31,11 +31,13 @@ use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
-use painleve_image::flash::ConfigurationFlash;
+use painleve_image::flash::{ConfigurationFlash, FlashRegisters};
 use painleve_image::memory::FlashMemory;
+use painleve_image::protection::{self, Access, Region};
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
+use painleve_shared::message::RefusedRate;
 use painleve_stm32f4::spi::SpiPort;
 use painleve_stm32f4::timer;
 use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PB0, PC0, PC1, PC2, PinState};
@@ -63,6 +65,42 @@ const START_LIMIT_S: f32 = 0.5;
 /// divided.
 const ENCODER_BUS_HZ: u32 = 5_250_000;
 const FORCE_BUS_HZ: u32 = 1_312_500;
+
+/// What the memory may be used for (`memory.x`).
+const REGIONS: [Region; 5] = [
+    // SRAM1 with the program, through its alias at 0 and as data, without SRAM2.
+    Region {
+        start: 0,
+        length: 128 << 10,
+        without: 0x80,
+        access: Access::ReadExecute,
+    },
+    Region {
+        start: 0x2000_0000,
+        length: 128 << 10,
+        without: 0x80,
+        access: Access::Read,
+    },
+    Region {
+        start: 0x2001_c000,
+        length: 16 << 10,
+        without: 0,
+        access: Access::ReadWrite,
+    },
+    // The flash, and in it the slots for configurations.
+    Region {
+        start: 0x0800_0000,
+        length: 1 << 20,
+        without: 0,
+        access: Access::ReadExecute,
+    },
+    Region {
+        start: flash::Registers::START,
+        length: 256 << 10,
+        without: 0,
+        access: Access::ReadWrite,
+    },
+];
 
 /// Declares the image for this board with these laws.
 #[macro_export]
@@ -93,13 +131,15 @@ impl Board for F405 {
         mut core: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
         let watchdog = Independent(device.IWDG);
-        watchdog.start(START_LIMIT_S);
+        watchdog.start(START_LIMIT_S, || ());
+        protection::start(&core.MPU, &REGIONS);
         start_crystal(&device.RCC)?;
         let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(168.MHz());
         let mut rcc = device.RCC.freeze(clocks);
         safety::watch_crystal(&rcc);
         pac::PWR::enable(&mut rcc);
-        safety::watch_supply(&device.PWR, &device.EXTI, &device.FLASH, &mut core.NVIC);
+        let (power, lines) = (&device.PWR, &device.EXTI);
+        safety::watch_supply(power, lines, &device.FLASH, &mut core.NVIC, &watchdog)?;
 
         let a = device.GPIOA.split(&mut rcc);
         let b = device.GPIOB.split(&mut rcc);
@@ -255,10 +295,15 @@ impl ArmPins for F405Pins {
     type ForceSpi = SpiPort<SPI2>;
     type Select = ErasedPin<Output>;
 
+    fn check_rate(&self, tick_hz: f32, drives: bool) -> Result<(), RefusedRate> {
+        self.watchdogs.check_rate(tick_hz, drives)
+    }
+
     fn start_timer(&mut self, tick_hz: f32) {
+        // First, as it takes longer than a period of a fast timer.
+        self.watchdogs.set_period(1.0 / tick_hz);
         timer::set_back(&self.timer);
         timer::start(&self.timer, self.timer_hz / tick_hz);
-        self.watchdogs.set_period(1.0 / tick_hz);
     }
 
     fn begin_tick(&mut self) {

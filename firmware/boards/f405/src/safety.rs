@@ -7,17 +7,17 @@
 #![allow(unsafe_code)] // registers, whatever the program was doing
 
 use painleve_drivers::stages::NO_TORQUE;
+use painleve_image::board::StartFault;
 use painleve_image::watchdogs::{IndependentLimit, IndependentWatchdog, WindowWatchdog};
 use painleve_shared::black_box::ResetCause;
 use stm32f4xx_hal::pac;
+
+use crate::flash::{ERRORS, PATIENCE};
 
 painleve_image::crash_handlers!(crate::F405);
 
 /// Keys that open the option bytes (RM0090, section 3.6.2).
 const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
-
-/// Number of polls of a flag that should change within microseconds.
-const PATIENCE: u32 = 100_000;
 
 // The first instructions after a reset, in assembly because memory is not initialised yet: enable the clock
 // of port B, set PB0 low, then make it an output. Then `program_memory` copies the program.
@@ -91,13 +91,17 @@ pub fn watch_crystal(rcc: &pac::rcc::RegisterBlock) {
 }
 
 /// Starts monitoring the supply: below 2.9 V the interrupt PVD is raised, which is handled as a
-/// crash; below 2.7 V the chip is held in reset.
+/// crash; below 2.7 V the chip is held in reset. Feeds the watchdog meanwhile.
+///
+/// # Errors
+/// [`StartFault::OptionBytes`].
 pub fn watch_supply(
     power: &pac::PWR,
     lines: &pac::EXTI,
     flash: &pac::FLASH,
     interrupts: &mut cortex_m::peripheral::NVIC,
-) {
+    watchdog: &Independent,
+) -> Result<(), StartFault> {
     power
         .cr()
         .modify(|_, w| unsafe { w.pls().bits(7) }.pvde().set_bit());
@@ -109,25 +113,45 @@ pub fn watch_supply(
         interrupts.set_priority(pac::Interrupt::PVD, 0);
         cortex_m::peripheral::NVIC::unmask(pac::Interrupt::PVD);
     }
-    raise_brown_out_level(flash);
+    raise_brown_out_level(flash, watchdog)
 }
 
-/// Programs the brown-out level once in a chip's life: it is stored in the option bytes.
-fn raise_brown_out_level(flash: &pac::FLASH) {
+/// Programs the brown-out level once in a chip's life: it is stored in the option bytes, whose sector is erased
+/// before. A reset in the meantime would spoil them, among them the protection against reading.
+fn raise_brown_out_level(flash: &pac::FLASH, watchdog: &Independent) -> Result<(), StartFault> {
     const HIGHEST: u8 = 0;
-    if flash.optcr().read().bor_lev().bits() == HIGHEST {
-        return;
+    let is_highest = || flash.optcr().read().bor_lev().bits() == HIGHEST;
+    if is_highest() {
+        return Ok(());
     }
-    // SAFETY: the keys of the manual, in its order, with no programming in progress.
+    let is_done = || {
+        (0..PATIENCE).any(|_| {
+            watchdog.feed();
+            flash.sr().read().bsy().bit_is_clear()
+        })
+    };
+    if !is_done() {
+        return Err(StartFault::OptionBytes);
+    }
+    // SAFETY: writing one clears an error; the keys of the manual, in its order, with no programming in progress.
     unsafe {
+        flash.sr().write(|w| w.bits(ERRORS));
         for key in OPTION_KEYS {
             flash.optkeyr().write(|w| w.bits(key));
         }
         flash.optcr().modify(|_, w| w.bor_lev().bits(HIGHEST));
         flash.optcr().modify(|_, w| w.optstrt().set_bit());
     }
-    let _ = (0..PATIENCE).any(|_| flash.sr().read().bsy().bit_is_clear());
+    if !is_done() {
+        return Err(StartFault::OptionBytes);
+    }
+    let errors = flash.sr().read().bits() & ERRORS;
     flash.optcr().modify(|_, w| w.optlock().set_bit());
+    if errors == 0 && is_highest() {
+        Ok(())
+    } else {
+        Err(StartFault::OptionBytes)
+    }
 }
 
 /// The independent watchdog. Its oscillator has 17 to 47 kHz: it resets the chip after 2 to 6 periods.

@@ -29,11 +29,13 @@ use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
 use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
-use painleve_image::flash::ConfigurationFlash;
+use painleve_image::flash::{ConfigurationFlash, FlashRegisters};
 use painleve_image::memory::FlashMemory;
+use painleve_image::protection::{self, Access, Region};
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
+use painleve_shared::message::RefusedRate;
 use painleve_stm32g4::clock::{self, CORE_HZ};
 use painleve_stm32g4::flash;
 pub use painleve_stm32g4::pac;
@@ -57,6 +59,36 @@ const USART: u32 = 7;
 /// 2.1 MHz.
 const ENCODER_DIVIDER: u8 = 4;
 const FORCE_DIVIDER: u8 = 6;
+
+/// What the memory may be used for (`memory.x`).
+const REGIONS: [Region; 4] = [
+    Region {
+        start: 0x2000_0000,
+        length: 128 << 10,
+        without: 0,
+        access: Access::ReadWrite,
+    },
+    // Below the RAM, for a stack that overflows.
+    Region {
+        start: 0x1fff_8000,
+        length: 32 << 10,
+        without: 0,
+        access: Access::None,
+    },
+    // The flash, and in it the slots for configurations.
+    Region {
+        start: 0x0800_0000,
+        length: 512 << 10,
+        without: 0,
+        access: Access::ReadExecute,
+    },
+    Region {
+        start: flash::Registers::START,
+        length: 4 << 10,
+        without: 0,
+        access: Access::ReadWrite,
+    },
+];
 
 /// Declares the image for this board with these laws.
 #[macro_export]
@@ -87,11 +119,13 @@ impl Board for G474 {
         mut core: cortex_m::Peripherals,
     ) -> Result<Parts<Self>, StartFault> {
         let watchdog = Independent(device.IWDG);
-        watchdog.start(START_LIMIT_S);
+        watchdog.start(START_LIMIT_S, || ());
+        protection::start(&core.MPU, &REGIONS);
         let rcc = device.RCC;
         clock::start(&rcc, &device.PWR, &device.FLASH, CRYSTAL_MHZ)
             .map_err(|_| StartFault::Clock)?;
-        supply::watch(&device.PWR, &device.EXTI, &device.FLASH, &mut core.NVIC);
+        let (power, lines) = (&device.PWR, &device.EXTI);
+        supply::watch(power, lines, &device.FLASH, &mut core.NVIC, &watchdog)?;
         supply::stop_dead_battery_detection(&device.PWR);
         start_clocks(&rcc);
 
@@ -225,9 +259,14 @@ impl ArmPins for G474Pins {
     type ForceSpi = SpiPort<pac::SPI2>;
     type Select = Output;
 
+    fn check_rate(&self, tick_hz: f32, drives: bool) -> Result<(), RefusedRate> {
+        self.watchdogs.check_rate(tick_hz, drives)
+    }
+
     fn start_timer(&mut self, tick_hz: f32) {
-        timer::restart(&self.timer, CORE_HZ as f32 / tick_hz);
+        // First, as it takes longer than a period of a fast timer.
         self.watchdogs.set_period(1.0 / tick_hz);
+        timer::restart(&self.timer, CORE_HZ as f32 / tick_hz);
     }
 
     fn begin_tick(&mut self) {

@@ -16,7 +16,10 @@ use crate::supply::FLASH_KEYS;
 use crate::{comes, pac};
 
 /// Number of polls for an erasure: more than 25 ms, the longest of the data sheet.
-const PATIENCE: u32 = 10_000_000;
+pub(crate) const PATIENCE: u32 = 10_000_000;
+
+/// Errors of an operation in the status register.
+pub(crate) const ERRORS: u32 = 0xc3fa;
 
 /// Whether the slots are being read.
 static IS_READING: AtomicBool = AtomicBool::new(false);
@@ -80,7 +83,6 @@ impl FlashRegisters for Registers {
 
     #[inline(never)]
     fn wait(&mut self) -> Result<(), NorFlashErrorKind> {
-        const ERRORS: u32 = 0xc3fa;
         let flash = &self.0;
         let is_done = comes(PATIENCE, || flash.sr().read().bsy().bit_is_clear());
         let errors = flash.sr().read().bits() & ERRORS;

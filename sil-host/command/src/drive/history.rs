@@ -54,6 +54,7 @@ fn crash_text(crash: &Crash) -> String {
             let file = String::from_utf8_lossy(file);
             format!("panic at {}:{line}", file.trim_end_matches('\0'))
         }
+        Crash::StackOverflow => "the stack overflowed".into(),
     }
 }
 

@@ -15,6 +15,8 @@ pub(super) enum Stop {
     Limit,
     Sleep,
     Look,
+    /// What the memory may be used for has changed.
+    Protection,
 }
 
 /// The state of the machine except registers and memory.
@@ -41,6 +43,8 @@ pub(super) struct Core<C> {
     /// Whether the next exception may have changed.
     pub(super) is_dirty: bool,
     pub(super) candidate: bool,
+    /// Whether what the memory may be used for has changed.
+    pub(super) is_reprotected: bool,
 }
 
 impl<C: Chip> Core<C> {
@@ -106,6 +110,9 @@ impl<C: Chip> Surroundings for Core<C> {
             {
                 stop = Some(Stop::Look);
             }
+            if std::mem::take(&mut self.is_reprotected) {
+                stop = Some(Stop::Protection);
+            }
         }
         let opcode = self.opcode(address);
         if stop.is_none() && opcode == 0xbf30 {
@@ -151,6 +158,7 @@ impl<C: Chip> Surroundings for Core<C> {
         }
         if (0xe000_0000..0xe004_0000).contains(&address) {
             self.system.write(address, size, value, self.cycles);
+            self.is_reprotected |= address == 0xe000_ed94;
         } else {
             self.chip.write(address, size, value, self.now);
         }

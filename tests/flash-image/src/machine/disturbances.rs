@@ -38,12 +38,49 @@ impl<C: Chip> Machine<C> {
 
     /// Puts the program into an endless loop without interrupts.
     pub fn hang(&mut self) {
-        // A branch to itself, in memory that the image leaves unused.
-        let place = C::RAM.0;
-        self.unicorn.processor().write_memory(place, &[0xfe, 0xe7]);
-        self.unicorn.surroundings_mut().conditional = 0;
         self.unicorn.set(Register::PRIMASK, 1);
-        self.unicorn.set(Register::PC, place);
+        // A branch to itself.
+        self.execute(16, &[0xe7fe]);
+    }
+
+    /// Calls a function that stores registers on the stack and calls itself.
+    pub fn recurse(&mut self) {
+        self.execute(32, &[0xb5ff, 0xf7ff, 0xfffd]);
+    }
+
+    /// Stores a word at an address, and hangs.
+    pub fn store(&mut self, address: u32) {
+        let [low, high] = [address as u16, (address >> 16) as u16];
+        // ldr r1, [pc, #4]; str r0, [r1]; b .
+        self.execute(48, &[0x4901, 0x6008, 0xe7fe, 0, low, high]);
+    }
+
+    /// Executes instructions, in memory of the program that the image leaves unused: `before_end` bytes before its
+    /// end, a place of their own, because Unicorn keeps what it has translated.
+    fn execute(&mut self, before_end: u32, instructions: &[u16]) {
+        let end = if C::ALIASED_RAM > 0 {
+            C::ALIASED_RAM as u32
+        } else {
+            C::SLOTS.0
+        };
+        let place = end - before_end;
+        let bytes: Vec<u8> = instructions
+            .iter()
+            .flat_map(|it| it.to_le_bytes())
+            .collect();
+        self.unicorn.processor().write_memory(place, &bytes);
+        self.jump(place);
+    }
+
+    /// Continues at an address.
+    pub fn jump(&mut self, address: u32) {
+        self.unicorn.surroundings_mut().conditional = 0;
+        self.unicorn.set(Register::PC, address);
+    }
+
+    /// Returns the stack pointer.
+    pub fn stack_pointer(&self) -> u32 {
+        self.unicorn.get(Register::SP)
     }
 
     /// Writes a word of memory, as a debugger would.

@@ -1,7 +1,8 @@
 //! Entry into exceptions and return from them (ARMv7-M reference manual, sections B1.5.6 and B1.5.8).
 
 use super::{Chip, Machine};
-use crate::system_control::Exception;
+use crate::protection::WRITE;
+use crate::system_control::{Exception, HARD_FAULT};
 use crate::unicorn::Register;
 
 /// Return address of an exception whose frame holds floating-point registers.
@@ -35,11 +36,18 @@ impl<C: Chip> Machine<C> {
         }
         frame[24] = unicorn.get(Register::FPSCR);
         let bytes: Vec<u8> = frame.iter().flat_map(|it| it.to_le_bytes()).collect();
-        assert!(
-            unicorn.processor().write_memory(frame_at, &bytes),
-            "the stack has overflowed"
-        );
+        let system = &unicorn.surroundings().system;
+        let ends = [frame_at, frame_at + bytes.len() as u32 - 4];
+        let is_permitted = ends.iter().all(|it| system.permits(*it) & WRITE != 0);
+        let is_stored = is_permitted && unicorn.processor().write_memory(frame_at, &bytes);
         let core = unicorn.surroundings_mut();
+        // Without room for a frame, the fault of its storing is taken instead (section B1.5.11).
+        let exception = if is_stored {
+            exception
+        } else {
+            core.system.fault_status |= if is_permitted { 1 << 12 } else { 1 << 4 };
+            HARD_FAULT.min(exception)
+        };
         let nested = !core.system.active.is_empty();
         core.system.enter(exception);
         core.is_dirty = true;

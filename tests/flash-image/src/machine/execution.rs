@@ -24,6 +24,7 @@ impl<C: Chip> Machine<C> {
         core.instruction_limit = instruction_limit;
         core.is_dirty = true;
         loop {
+            self.protect();
             let address = self.unicorn.get(Register::PC);
             self.unicorn.surroundings_mut().stop = None;
             let result = self.unicorn.run(address);
@@ -37,6 +38,7 @@ impl<C: Chip> Machine<C> {
                         return;
                     }
                 }
+                (Ok(()), Some(Stop::Protection)) => {}
                 (Ok(()), Some(Stop::Look)) => {
                     if core.system.reset_requested {
                         self.reset(Reset::Software);
@@ -53,6 +55,10 @@ impl<C: Chip> Machine<C> {
                         "locked up at {address:#010x} ({}), {result:?}",
                         self.symbol_at(address),
                     );
+                    if let Err(error) = result {
+                        let system = &mut self.unicorn.surroundings_mut().system;
+                        system.fault_status |= error.fault_status();
+                    }
                     self.enter(HARD_FAULT, address);
                 }
             }

@@ -18,6 +18,7 @@ pub use self::snapshot::MachineSnapshot;
 use self::snapshot::registers;
 use self::trace::Trace;
 use crate::Picoseconds;
+use crate::protection::EVERYTHING;
 use crate::system_control::SystemControl;
 use crate::unicorn::{Processor, Register, Unicorn};
 
@@ -95,6 +96,8 @@ pub enum Reset {
 pub struct Machine<C: Chip> {
     unicorn: Unicorn<Core<C>>,
     symbols: Vec<(String, u32)>,
+    /// Blocks of memory, and what Unicorn permits there.
+    memory: Vec<((u32, usize), u32)>,
     /// Resets since power-up, including the first.
     pub resets: Vec<(Picoseconds, Reset)>,
     /// Number of hard faults.
@@ -131,15 +134,19 @@ impl<C: Chip> Machine<C> {
             trace: None,
             is_dirty: true,
             candidate: false,
+            is_reprotected: false,
         };
         let mut unicorn = Unicorn::new(library, core)
             .unwrap_or_else(|error| panic!("{}: {error}", library.display()));
+        let mut memory = vec![(C::FLASH.0, C::FLASH.1 - C::SLOTS.1)];
         unicorn.map(C::FLASH.0, C::FLASH.1 - C::SLOTS.1);
         if C::ALIASED_RAM > 0 {
-            unicorn.map_with_alias(C::RAM.0, C::RAM.1, 0, C::ALIASED_RAM);
-        } else {
-            unicorn.map(C::RAM.0, C::RAM.1);
+            memory.extend([(C::RAM.0, C::ALIASED_RAM), (0, C::ALIASED_RAM)]);
+            unicorn.map_with_alias(C::RAM.0, C::ALIASED_RAM, 0);
         }
+        let rest = (C::RAM.0 + C::ALIASED_RAM as u32, C::RAM.1 - C::ALIASED_RAM);
+        memory.push(rest);
+        unicorn.map(rest.0, rest.1);
         unicorn.map_peripherals(&[
             (C::SLOTS.0, C::SLOTS.1 as u32),
             (0x4000_0000, 0x0010_0000),
@@ -155,6 +162,7 @@ impl<C: Chip> Machine<C> {
             unicorn,
             symbols,
             resets: Vec::new(),
+            memory: memory.into_iter().map(|it| (it, EVERYTHING)).collect(),
             hard_faults: 0,
             last_fault: None,
         };
@@ -200,6 +208,20 @@ impl<C: Chip> Machine<C> {
     pub fn peripheral_accesses(&self) -> BTreeSet<(u32, u32)> {
         let trace = self.unicorn.surroundings().trace.as_ref();
         trace.map_or_else(BTreeSet::new, |trace| trace.accesses.clone())
+    }
+
+    /// Lets Unicorn permit what the memory protection unit permits.
+    fn protect(&mut self) {
+        for (block, permitted) in &mut self.memory {
+            let (start, length) = *block;
+            let system = &self.unicorn.surroundings().system;
+            let ends = [start, start + length as u32 - 4].map(|it| system.permits(it));
+            assert_eq!(ends[0], ends[1], "a part of the memory at {start:#010x}");
+            if *permitted != ends[0] {
+                *permitted = ends[0];
+                self.unicorn.protect(start, length, *permitted);
+            }
+        }
     }
 
     /// Returns the program counter.

@@ -85,6 +85,9 @@ pub trait WiredChip: Chip {
     /// Returns the flash that keeps configurations.
     fn slots_mut(&mut self) -> &mut FlashSlots;
 
+    /// Gives the chip the option bytes of a new one, without a brown-out level.
+    fn set_new_options(&mut self);
+
     /// Stops the crystal.
     fn set_crystal(&mut self, failure: Crystal);
 
@@ -96,6 +99,9 @@ pub trait WiredChip: Chip {
 
     /// Pulls the reset pin low for a moment.
     fn reset_pin(&mut self);
+
+    /// Sets the phases of the prescalers of both watchdogs, which run freely: any number.
+    fn set_watchdog_phase(&mut self, phase: u64);
 
     /// Returns the serial port to the host.
     fn usart(&self) -> &Usart;

@@ -1,15 +1,61 @@
 //! The watchdogs: the independent one (RM0090, section 21; RM0440, chapter IWDG) runs on an oscillator of its
 //! own, the window watchdog (section 22; chapter WWDG) on the slow peripherals' clock.
+//!
+//! Where the manuals leave a time open, it is the longest, or depends on a phase that tests draw.
 
 use crate::{Picoseconds, SECOND};
+
+/// Longest time until a new limit of the independent watchdog takes effect, cycles of its oscillator.
+const UPDATE_CYCLES: u64 = 5;
+
+/// A register whose new value takes effect later.
+#[derive(Clone, Copy, Debug)]
+struct Delayed {
+    before: u32,
+    value: u32,
+    from: Picoseconds,
+}
+
+impl Delayed {
+    fn new(value: u32) -> Self {
+        Self {
+            before: value,
+            value,
+            from: 0,
+        }
+    }
+
+    fn is_busy(&self, now: Picoseconds) -> bool {
+        now < self.from
+    }
+
+    fn get(&self, now: Picoseconds) -> u32 {
+        if self.is_busy(now) {
+            self.before
+        } else {
+            self.value
+        }
+    }
+
+    fn set(&mut self, value: u32, from: Picoseconds, now: Picoseconds) {
+        assert!(!self.is_busy(now), "the last value has not taken effect");
+        *self = Self {
+            before: self.value,
+            value,
+            from,
+        };
+    }
+}
 
 /// Registers of the independent watchdog.
 #[derive(Clone, Debug)]
 pub struct Watchdog {
     /// Frequency of the watchdog's oscillator, Hz.
     pub oscillator_hz: u64,
-    prescaler: u32,
-    reload: u32,
+    /// Phase of the oscillator at which limits are written; 0 is the worst.
+    pub phase: Picoseconds,
+    prescaler: Delayed,
+    reload: Delayed,
     is_open: bool,
     expires: Picoseconds,
     /// Time of the last feeding.
@@ -21,25 +67,39 @@ impl Watchdog {
     pub fn new(oscillator_hz: u64) -> Self {
         Self {
             oscillator_hz,
-            prescaler: 0,
-            reload: 0xfff,
+            phase: 0,
+            prescaler: Delayed::new(0),
+            reload: Delayed::new(0xfff),
             is_open: false,
             expires: Picoseconds::MAX,
             fed: 0,
         }
     }
 
+    /// Stops the watchdog, as a reset does.
+    pub fn reset(&mut self) {
+        *self = Self {
+            phase: self.phase,
+            ..Self::new(self.oscillator_hz)
+        };
+    }
+
     /// Handles a load.
-    pub fn read(&self, offset: u32) -> u32 {
+    pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
         match offset {
-            0x04 => self.prescaler,
-            0x08 => self.reload,
+            0x04 => self.prescaler.get(now),
+            0x08 => self.reload.get(now),
+            0x0c => {
+                u32::from(self.prescaler.is_busy(now)) | u32::from(self.reload.is_busy(now)) << 1
+            }
             _ => 0,
         }
     }
 
     /// Handles a store.
     pub fn write(&mut self, offset: u32, value: u32, now: Picoseconds) {
+        let cycle = SECOND / self.oscillator_hz;
+        let from = now + UPDATE_CYCLES * cycle - self.phase % cycle;
         match (offset, value) {
             (0x00, 0x5555) => self.is_open = true,
             (0x00, 0xcccc) => {
@@ -51,18 +111,43 @@ impl Watchdog {
                 self.feed(now);
             }
             (0x00, _) => self.is_open = false,
-            (0x04, _) if self.is_open => self.prescaler = value & 7,
-            (0x08, _) if self.is_open => self.reload = value & 0xfff,
+            (0x04, _) if self.is_open => {
+                self.prescaler.set(value & 7, from, now);
+                self.expires = self.at_the_new_pace(self.expires);
+            }
+            (0x08, _) if self.is_open => self.reload.set(value & 0xfff, from, now),
             _ => {}
         }
+    }
+
+    fn cycles_per_count(prescaler: u32) -> u64 {
+        4 << prescaler.min(6)
     }
 
     fn feed(&mut self, now: Picoseconds) {
         self.fed = now;
         if self.expires != Picoseconds::MAX {
-            let counts = (u64::from(self.reload) + 1) * (4 << self.prescaler.min(6));
-            self.expires = now + counts * SECOND / self.oscillator_hz;
+            let counts = u64::from(self.reload.get(now)) + 1;
+            let cycles = counts * Self::cycles_per_count(self.prescaler.get(now));
+            self.expires = now + cycles * SECOND / self.oscillator_hz;
+            if self.prescaler.is_busy(now) {
+                self.expires = self.at_the_new_pace(self.expires);
+            }
         }
+    }
+
+    /// Returns when counts expire whose pace changes with the prescaler.
+    fn at_the_new_pace(&self, expires: Picoseconds) -> Picoseconds {
+        let Delayed {
+            before,
+            value,
+            from,
+        } = self.prescaler;
+        if expires == Picoseconds::MAX {
+            return expires;
+        }
+        let left = expires.saturating_sub(from) / Self::cycles_per_count(before);
+        expires.min(from) + left * Self::cycles_per_count(value)
     }
 
     /// Returns when the watchdog resets the microcontroller.
@@ -72,10 +157,15 @@ impl Watchdog {
 }
 
 /// Registers of the window watchdog; the window is not modelled.
+///
+/// Its prescaler runs freely: feeding does not restart it. The first count after feeding is therefore shorter than
+/// the others, by a time that nobody knows.
 #[derive(Clone, Debug)]
 pub struct WindowWatchdog {
     /// Position and mask of the prescaler in the configuration.
     prescaler: (u32, u32),
+    /// Phase of the prescaler, cycles of its clock.
+    pub phase: u64,
     control: u32,
     configuration: u32,
     expires: Option<Picoseconds>,
@@ -86,6 +176,7 @@ impl WindowWatchdog {
     pub fn new(position: u32, bits: u32) -> Self {
         Self {
             prescaler: (position, (1 << bits) - 1),
+            phase: 0,
             control: 0,
             configuration: 0,
             expires: None,
@@ -115,15 +206,28 @@ impl WindowWatchdog {
                 // Once enabled, it stays enabled.
                 self.control = value & 0x7f | (self.control | value) & 0x80;
                 if self.control & 0x80 != 0 {
-                    let counts = u64::from(self.control & 0x3f) + 1;
-                    let (position, mask) = self.prescaler;
-                    let cycles = counts << (12 + (self.configuration >> position & mask));
-                    self.expires = Some(now + cycles * SECOND / clock_hz.max(1));
+                    self.expires = Some(self.expiry(clock_hz, now));
                 }
             }
             0x04 => self.configuration = value,
             _ => {}
         }
+    }
+
+    /// Returns when bit 6 of the counter falls.
+    fn expiry(&self, clock_hz: u64, now: Picoseconds) -> Picoseconds {
+        if self.control & 0x40 == 0 {
+            return now;
+        }
+        let (position, mask) = self.prescaler;
+        let cycles_per_count = 1 << (12 + (self.configuration >> position & mask));
+        let counts = u64::from(self.control & 0x3f) + 1;
+        let clock_hz = u128::from(clock_hz.max(1));
+        let cycles = u128::from(now) * clock_hz / u128::from(SECOND);
+        let phase = u128::from(self.phase % cycles_per_count);
+        let counted = (cycles + phase) / u128::from(cycles_per_count);
+        let end = (counted + u128::from(counts)) * u128::from(cycles_per_count) - phase;
+        (end * u128::from(SECOND)).div_ceil(clock_hz) as Picoseconds
     }
 
     /// Returns when the watchdog resets the microcontroller.

@@ -14,7 +14,7 @@ use crate::stm32::{
     UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band, store_port,
 };
 use crate::unicorn::Processor;
-use crate::{MICROSECOND, Picoseconds};
+use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 /// Interrupt numbers.
 const PVD: usize = 1;
@@ -36,6 +36,17 @@ const WIDTH: u32 = 3 << 8;
 
 /// Stores of four bytes.
 const WORDS: u32 = 2 << 8;
+
+/// Bit of the option bytes' register that starts their programming.
+const OPTION_START: u32 = 2;
+
+/// Option bytes of a new chip, and those with the highest brown-out level.
+const NEW_OPTIONS: u32 = 0x0fff_aaed;
+const USUAL_OPTIONS: u32 = 0x0fff_aae1;
+
+/// Longest programming of the option bytes: the manual gives no time. Their sector is erased before, and the data
+/// sheet's shortest sector, of 16 KiB, takes up to 800 ms.
+const OPTION_TIME: Picoseconds = 800 * MILLISECOND;
 
 /// First sector of the slots, and its length.
 const FIRST_SECTOR: u32 = 10;
@@ -74,6 +85,8 @@ pub struct Stm32f4<O> {
     supply_mv: u32,
     flash_control: [u32; 8],
     slots: FlashSlots,
+    /// Time until which the option bytes are programmed.
+    options_busy_until: Picoseconds,
     /// Number of keys that have opened the flash's control register.
     keys: usize,
     syscfg: [u32; 16],
@@ -97,8 +110,9 @@ impl<O: Outside> Stm32f4<O> {
             dma: Default::default(),
             power: [0x4000, 0],
             supply_mv: 3300,
-            flash_control: [0, 0, 0, 0, LOCK, 0x0fff_aaed, 0, 0],
+            flash_control: [0, 0, 0, 0, LOCK, USUAL_OPTIONS, 0, 0],
             slots: FlashSlots::new(Self::SLOTS.1),
+            options_busy_until: 0,
             keys: 0,
             syscfg: [0; 16],
             external_interrupts: [0; 8],
@@ -134,7 +148,7 @@ impl<O: Outside> Stm32f4<O> {
                 self.timer.read(offset, self.rcc.slow_timer_hz(), now)
             }
             0x4000_2c00 if self.rcc.is_on(0x40, 11) => self.window_watchdog.read(offset),
-            0x4000_3000 => self.watchdog.read(offset),
+            0x4000_3000 => self.watchdog.read(offset, now),
             0x4000_3800 if self.rcc.is_on(0x40, 14) => self.spis[1].read(offset),
             0x4000_7000 if self.rcc.is_on(0x40, 28) => match offset {
                 // Voltage scaling is always ready.
@@ -155,7 +169,7 @@ impl<O: Outside> Stm32f4<O> {
                 }
             }
             0x4002_3800 => self.rcc.read(offset, now),
-            0x4002_3c00 if offset == 0x0c => u32::from(self.slots.is_busy(now)) << 16,
+            0x4002_3c00 if offset == 0x0c => u32::from(self.flash_is_busy(now)) << 16,
             0x4002_3c00 => self.flash_control[((offset / 4) & 7) as usize],
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].read(offset),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].read(offset),
@@ -226,7 +240,7 @@ impl<O: Outside> Stm32f4<O> {
             (0x04 | 0x0c, _) => {}
             (0x10, _) if !is_open => {}
             (0x10, _) => {
-                assert!(!self.slots.is_busy(now), "the flash is busy");
+                assert!(!self.flash_is_busy(now), "the flash is busy");
                 self.flash_control[4] = value & !START;
                 self.keys *= usize::from(value & LOCK == 0);
                 if value & START != 0 && value & SECTOR_ERASE != 0 {
@@ -238,7 +252,13 @@ impl<O: Outside> Stm32f4<O> {
             }
             (0x08, 0x0819_2a3b) => self.flash_control[2] = 1,
             (0x08, 0x4c5d_6e7f) if self.flash_control[2] == 1 => self.flash_control[5] &= !1,
-            (0x14, _) if self.flash_control[5] & 1 == 0 => self.flash_control[5] = value & !2,
+            (0x14, _) if self.flash_control[5] & 1 == 0 => {
+                assert!(!self.flash_is_busy(now), "the flash is busy");
+                self.flash_control[5] = value & !OPTION_START;
+                if value & OPTION_START != 0 {
+                    self.options_busy_until = now + OPTION_TIME;
+                }
+            }
             (0x14, _) => {}
             (0x08, _) => {}
             _ => self.flash_control[((offset / 4) & 7) as usize] = value,
@@ -247,6 +267,10 @@ impl<O: Outside> Stm32f4<O> {
 }
 
 impl<O> Stm32f4<O> {
+    fn flash_is_busy(&self, now: Picoseconds) -> bool {
+        self.slots.is_busy(now) || now < self.options_busy_until
+    }
+
     fn note_power(&mut self, power: Power) {
         if power == Power::Failed {
             self.reset = Some(Reset::Power);
@@ -255,7 +279,7 @@ impl<O> Stm32f4<O> {
 
     fn store_slot(&mut self, offset: u32, word: u32, size: u32, now: Picoseconds) {
         let control = self.flash_control[4];
-        assert!(!self.slots.is_busy(now), "the flash is busy");
+        assert!(!self.flash_is_busy(now), "the flash is busy");
         assert_eq!(size, 4, "the width of a store");
         assert_eq!(control & (LOCK | WIDTH | PROGRAM), WORDS | PROGRAM);
         let until = now + 16 * MICROSECOND;
@@ -273,6 +297,10 @@ impl<O: Outside> Chip for Stm32f4<O> {
     const ALIASED_RAM: usize = 112 << 10;
 
     fn reset(&mut self, reset: Reset, now: Picoseconds) {
+        assert!(
+            now >= self.options_busy_until,
+            "{reset:?} spoils the option bytes"
+        );
         for (number, port) in self.ports.iter_mut().enumerate() {
             port.reset(gpio_reset(number));
         }
@@ -283,7 +311,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.spis = Default::default();
         self.usart.reset();
         self.timer = Timer::default();
-        self.watchdog = Watchdog::new(self.watchdog.oscillator_hz);
+        self.watchdog.reset();
         self.window_watchdog.reset();
         self.dac.reset();
         self.dma = Default::default();
@@ -304,7 +332,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         }
         let word = match address.checked_sub(Self::SLOTS.0) {
             Some(offset) if offset < Self::SLOTS.1 as u32 => {
-                assert!(!self.slots.is_busy(now), "the flash is busy");
+                assert!(!self.flash_is_busy(now), "the flash is busy");
                 self.slots.word(offset)
             }
             _ => self.load(address & !3, now),
@@ -375,7 +403,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
 
     /// The flash has one bank.
     fn flash_is_stalled(&self, now: Picoseconds) -> bool {
-        self.slots.is_busy(now)
+        self.flash_is_busy(now)
     }
 
     /// Returns whether SYSCFG_MEMRMP maps SRAM1 to address 0 (RM0090, section 9.2.1).
@@ -464,8 +492,17 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
         self.reset = Some(Reset::Pin);
     }
 
+    fn set_watchdog_phase(&mut self, phase: u64) {
+        self.watchdog.phase = phase;
+        self.window_watchdog.phase = phase;
+    }
+
     fn slots_mut(&mut self) -> &mut FlashSlots {
         &mut self.slots
+    }
+
+    fn set_new_options(&mut self) {
+        self.flash_control[5] = NEW_OPTIONS;
     }
 
     fn set_crystal(&mut self, failure: Crystal) {

@@ -1,15 +1,24 @@
 //! The flash's registers and the pages that keep configurations (RM0440, chapter FLASH).
 
 use crate::stm32::{FlashSlots, Power};
-use crate::{MICROSECOND, Picoseconds};
+use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 /// Bits of the control register.
 const LOCK: u32 = 1 << 31;
 const OPTION_LOCK: u32 = 1 << 30;
 const START: u32 = 1 << 16;
+const OPTION_START: u32 = 1 << 17;
 const SECOND_BANK: u32 = 1 << 11;
 const PAGE_ERASE: u32 = 2;
 const PROGRAM: u32 = 1;
+
+/// Option bytes of a new chip, and those with the highest brown-out level.
+const NEW_OPTIONS: u32 = 0xffef_f8aa;
+const USUAL_OPTIONS: u32 = 0xffef_fcaa;
+
+/// Longest programming of the option bytes: the manual gives no time. A page takes up to 25 ms to erase, and both banks
+/// have one.
+const OPTION_TIME: Picoseconds = 50 * MILLISECOND;
 
 /// First page of the slots in the second bank, and its length.
 const FIRST_PAGE: u32 = 126;
@@ -25,6 +34,12 @@ pub(super) struct Flash {
     /// Number of keys that have opened the control register and the option bytes.
     keys: [usize; 2],
     pub slots: FlashSlots,
+    /// Option bytes as written to their register and as programmed. The register gives those that were loaded when
+    /// power came up.
+    written_options: u32,
+    programmed_options: u32,
+    /// Time until which the option bytes are programmed.
+    options_busy_until: Picoseconds,
     /// The first half of a double word that is written.
     half: Option<(u32, u32)>,
     /// Whether a word that cannot be corrected has been read, and its interrupt is pending.
@@ -33,22 +48,44 @@ pub(super) struct Flash {
 }
 
 impl Flash {
-    /// Creates an erased flash with the option bytes of a new chip.
+    /// Creates an erased flash.
     pub fn new() -> Self {
         let mut registers = [0; 16];
-        registers[8] = 0xffef_f8aa;
+        registers[8] = USUAL_OPTIONS;
         Self {
             registers,
             keys: [0; 2],
             slots: FlashSlots::new(SLOTS),
+            written_options: USUAL_OPTIONS,
+            programmed_options: USUAL_OPTIONS,
+            options_busy_until: 0,
             half: None,
             is_uncorrectable: false,
             has_nmi: false,
         }
     }
 
+    /// Gives the chip the option bytes of a new one.
+    pub fn set_new_options(&mut self) {
+        self.programmed_options = NEW_OPTIONS;
+        self.load_options();
+    }
+
+    /// Loads the option bytes, as when power comes up.
+    pub fn load_options(&mut self) {
+        self.registers[8] = self.programmed_options;
+    }
+
+    fn is_busy(&self, now: Picoseconds) -> bool {
+        self.slots.is_busy(now) || now < self.options_busy_until
+    }
+
     /// Resets the registers; option bytes and contents stay.
-    pub fn reset(&mut self) {
+    pub fn reset(&mut self, now: Picoseconds) {
+        assert!(
+            now >= self.options_busy_until,
+            "a reset spoils the option bytes"
+        );
         self.registers[0] = 0x600;
         self.registers[5] = 0xc000_0000;
         self.keys = [0; 2];
@@ -76,7 +113,7 @@ impl Flash {
     /// Returns the value of a register.
     pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
         match offset {
-            0x10 => u32::from(self.slots.is_busy(now)) << 16,
+            0x10 => u32::from(self.is_busy(now)) << 16,
             0x18 => u32::from(self.is_uncorrectable) << 31,
             _ => self.registers[((offset / 4) & 15) as usize],
         }
@@ -89,7 +126,7 @@ impl Flash {
             (0x08, 0xcdef_89ab, [1, _]) => self.registers[5] &= !LOCK,
             (0x0c, 0x0819_2a3b, _) if self.registers[5] & LOCK == 0 => self.keys[1] = 1,
             (0x0c, 0x4c5d_6e7f, [_, 1]) => self.registers[5] &= !OPTION_LOCK,
-            (0x20, ..) if self.registers[5] & OPTION_LOCK == 0 => self.registers[8] = value,
+            (0x20, ..) if self.registers[5] & OPTION_LOCK == 0 => self.written_options = value,
             (0x00, ..) => self.registers[0] = value,
             (0x14, ..) if self.registers[5] & LOCK == 0 => return self.control(value, now),
             (0x18, ..) if value & 1 << 31 != 0 => self.is_uncorrectable = false,
@@ -99,8 +136,12 @@ impl Flash {
     }
 
     fn control(&mut self, value: u32, now: Picoseconds) -> Power {
-        assert!(!self.slots.is_busy(now), "the flash is busy");
-        self.registers[5] = value & !START;
+        assert!(!self.is_busy(now), "the flash is busy");
+        self.registers[5] = value & !(START | OPTION_START);
+        if value & OPTION_START != 0 && self.registers[5] & OPTION_LOCK == 0 {
+            self.programmed_options = self.written_options;
+            self.options_busy_until = now + OPTION_TIME;
+        }
         if value & LOCK != 0 {
             self.keys[0] = 0;
         }

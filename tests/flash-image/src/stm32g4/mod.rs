@@ -109,7 +109,7 @@ impl<O: Outside> Stm32g4<O> {
         match address & !0x3ff {
             0x4000_0000 => self.timer.read(offset, self.rcc.bus_hz(), now),
             0x4000_2c00 => self.window_watchdog.read(offset),
-            0x4000_3000 => self.watchdog.read(offset),
+            0x4000_3000 => self.watchdog.read(offset, now),
             0x4000_3800 => self.spis[1].read(offset, size),
             0x4000_4400 => self.usart.read(offset),
             0x4000_7000 => match offset {
@@ -208,7 +208,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.spis = Default::default();
         self.usart.reset();
         self.timer = Timer::default();
-        self.watchdog = Watchdog::new(self.watchdog.oscillator_hz);
+        self.watchdog.reset();
         self.window_watchdog.reset();
         self.dac.reset();
         self.dma = Dma::default();
@@ -216,7 +216,10 @@ impl<O: Outside> Chip for Stm32g4<O> {
         // The regulator's range 1 without boost.
         self.power[0] = 0x200;
         self.power[32] = 0x100;
-        self.flash.reset();
+        self.flash.reset(now);
+        if matches!(reset, Reset::Power | Reset::BrownOut) {
+            self.flash.load_options();
+        }
         self.external_interrupts = [0; 16];
         self.reset = None;
     }
@@ -384,8 +387,17 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
         self.reset = Some(Reset::Pin);
     }
 
+    fn set_watchdog_phase(&mut self, phase: u64) {
+        self.watchdog.phase = phase;
+        self.window_watchdog.phase = phase;
+    }
+
     fn slots_mut(&mut self) -> &mut FlashSlots {
         &mut self.flash.slots
+    }
+
+    fn set_new_options(&mut self) {
+        self.flash.set_new_options();
     }
 
     fn set_crystal(&mut self, failure: Crystal) {

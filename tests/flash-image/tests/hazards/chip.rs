@@ -15,11 +15,14 @@ crate::on_each_board! {
     the_first_instructions_switch_the_stages_off,
     a_dead_crystal_leaves_the_stages_off,
     a_hard_fault_takes_the_torque_off,
+    a_stack_that_overflows_takes_the_torque_off_and_is_recorded,
+    code_is_not_changed_and_data_is_not_executed,
     an_unexpected_interrupt_takes_the_torque_off,
     a_control_timer_that_stops_takes_the_torque_off,
     a_program_that_hangs_takes_the_torque_off,
     a_crystal_that_stops_takes_the_torque_off,
     a_low_supply_takes_the_torque_off,
+    a_new_chip_programs_its_brown_out_level,
     a_reset_takes_the_torque_off,
     the_black_box_outlives_a_reset_and_names_its_reason,
     an_unread_log_does_not_block_the_image,
@@ -54,6 +57,46 @@ fn a_hard_fault_takes_the_torque_off<C: BoardChip>() {
     let mut bench = driven::<C>();
     bench.board.machine.hard_fault();
     assert_off_in_time(bench);
+}
+
+fn a_stack_that_overflows_takes_the_torque_off_and_is_recorded<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.machine.recurse();
+    assert!(bench.time_until_off().is_some());
+    bench.run_ms(30);
+    assert_eq!(bench.board.resets(), [Reset::Software]);
+    let content = black_box(&mut bench.board);
+    assert_eq!(
+        (content.starts, content.crash),
+        (2, Some(Crash::StackOverflow))
+    );
+    assert_off_in_time(bench);
+}
+
+/// Stores to the program, where it is executed and where it comes from, and executes the stack.
+fn code_is_not_changed_and_data_is_not_executed<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    let healthy = bench.snapshot();
+    let program = bench.board.machine.symbol("main").unwrap() & !3;
+    for address in [program, C::FLASH.0 + 0x1000] {
+        bench.restore(&healthy);
+        bench.board.machine.store(address);
+        assert_eq!(recorded_status(&mut bench) & 0xff, 1 << 1, "{address:#x}");
+    }
+    bench.restore(&healthy);
+    let data = bench.board.machine.stack_pointer() & !3;
+    bench.board.machine.jump(data);
+    assert_eq!(recorded_status(&mut bench) & 0xff, 1);
+}
+
+/// Checks that the torque is taken off; the fault status in the black box.
+fn recorded_status<C: BoardChip>(bench: &mut Bench<C>) -> u32 {
+    assert!(bench.time_until_off().is_some());
+    bench.run_ms(30);
+    match black_box(&mut bench.board).crash {
+        Some(Crash::HardFault { status, .. }) => status,
+        other => panic!("{other:?}"),
+    }
 }
 
 fn an_unexpected_interrupt_takes_the_torque_off<C: BoardChip>() {
@@ -96,6 +139,23 @@ fn a_low_supply_takes_the_torque_off<C: BoardChip>() {
         bench.board.machine.chip_mut().set_supply(millivolts);
         assert_off_in_time(bench);
     }
+}
+
+/// Programming takes longer than the watchdog's limit during the start. The level counts when power has come up again.
+fn a_new_chip_programs_its_brown_out_level<C: BoardChip>() {
+    const LOW_MV: u32 = 2690;
+    let mut board = EmulatedBoard::<C>::with_oscillator(C::OSCILLATOR_HZ[2]);
+    board.machine.chip_mut().set_new_options();
+    board.machine.chip_mut().set_supply(LOW_MV);
+    board.machine.chip_mut().set_supply(3300);
+    board.machine.run_for(1000 * MILLISECOND);
+    assert_eq!(board.resets(), []);
+    assert_eq!(black_box(&mut board).starts, 1);
+    board.machine.reset(Reset::Power);
+    board.machine.run_for(20 * MILLISECOND);
+    board.machine.chip_mut().set_supply(LOW_MV);
+    board.machine.run_for(MILLISECOND);
+    assert_eq!(board.resets(), [Reset::Power, Reset::BrownOut]);
 }
 
 fn a_reset_takes_the_torque_off<C: BoardChip>() {

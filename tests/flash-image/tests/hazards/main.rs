@@ -7,6 +7,7 @@ mod chip;
 mod host;
 mod second_sensors;
 mod sensors;
+mod watchdogs;
 
 use painleve_flash_image::MILLISECOND;
 use painleve_flash_image::bench::{Bench, encoded, scenario};

@@ -1,0 +1,122 @@
+//! The watchdogs: they must neither reset a healthy board nor let a dead one drive on, in any phase of their prescalers.
+
+use painleve_flash_image::bench::{Bench, encoded, with_one_sensor};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard};
+use painleve_flash_image::machine::Reset;
+use painleve_flash_image::{MILLISECOND, SECOND};
+use painleve_plant::scenario::Scenario;
+use painleve_shared::message::{FrameSource, RefusedRate, Response};
+
+use super::DEFAULT;
+
+crate::on_each_board! {
+    a_finished_tick_feeds_the_watchdogs_in_time,
+    a_plant_that_the_host_simulates_may_have_any_rate,
+    a_running_board_can_be_configured_anew,
+}
+
+fn at_rate(tick_hz: u32) -> Scenario {
+    let mut scenario = with_one_sensor(DEFAULT);
+    scenario.run.tick_hz = tick_hz;
+    scenario
+}
+
+/// A board that has booted, with an oscillator of this frequency and these phases of the prescalers.
+fn booted<C: BoardChip>(oscillator_hz: u64, phase: u64) -> EmulatedBoard<C> {
+    let mut board = EmulatedBoard::<C>::with_oscillator(oscillator_hz);
+    board.machine.chip_mut().set_watchdog_phase(phase);
+    board.machine.run_for(20 * MILLISECOND);
+    board
+}
+
+/// Each rate is either watched over or refused: no prescaler makes a limit that is longer than a tick and shorter
+/// than two. One count of the STM32F405 takes 97.5 µs.
+fn a_finished_tick_feeds_the_watchdogs_in_time<C: BoardChip>() {
+    let mut accepted = Vec::new();
+    for tick_hz in [250, 1000, 2000, 5000, 5200, 6600, 8000, 10_000] {
+        match refusal::<C>(tick_hz) {
+            None => {
+                watches_over::<C>(tick_hz);
+                accepted.push(tick_hz);
+            }
+            Some(refused) => {
+                assert_eq!(refused.tick_hz, tick_hz);
+                let nearest = [refused.below_hz, refused.above_hz];
+                for other in nearest.into_iter().filter(|it| *it != 0) {
+                    assert_eq!(refusal::<C>(other), None, "instead of {tick_hz} Hz");
+                }
+                println!("{tick_hz} Hz is refused: {nearest:?}");
+            }
+        }
+    }
+    let expected: &[u32] = match C::IMAGE {
+        "painleve-f405" => &[250, 1000, 2000, 5000, 6600],
+        _ => &[250, 1000, 2000, 5000, 5200, 6600, 8000, 10_000],
+    };
+    assert_eq!(accepted, expected);
+}
+
+fn refusal<C: BoardChip>(tick_hz: u32) -> Option<RefusedRate> {
+    let mut board = booted::<C>(32_000, 0);
+    match board.configure(FrameSource::Sensors, &encoded(&at_rate(tick_hz))) {
+        Some(Response::Ready { .. }) => None,
+        Some(Response::RateRefused(refused)) => Some(refused),
+        other => panic!("{tick_hz} Hz: {other:?}"),
+    }
+}
+
+/// The prescaler meets the ticks of one run in many phases.
+fn watches_over<C: BoardChip>(tick_hz: u32) {
+    let mut bench = Bench::<C>::with_board(&at_rate(tick_hz), booted(32_000, 1234));
+    for tick in 0..500 {
+        bench.tick();
+        assert_eq!(bench.board.resets(), [], "{tick_hz} Hz, tick {tick}");
+    }
+    let healthy = bench.snapshot();
+    for phase in (0..8).map(|it| 512 * it) {
+        bench.restore(&healthy);
+        bench.board.machine.chip_mut().set_watchdog_phase(phase);
+        bench.tick();
+        bench.board.machine.hang();
+        bench.board.machine.run_for(2 * SECOND / u64::from(tick_hz));
+        assert_eq!(
+            bench.board.resets(),
+            [Reset::Watchdog],
+            "{tick_hz} Hz, phase {phase}"
+        );
+        assert_ne!(bench.board.torque().enabled, Some(true));
+    }
+}
+
+/// Without torque stages no promise depends on the watchdogs, which must only not be too early.
+fn a_plant_that_the_host_simulates_may_have_any_rate<C: BoardChip>() {
+    for tick_hz in [250, 5200, 8000, 10_000, 20_000] {
+        let mut board = booted::<C>(32_000, 1234);
+        let response = board.configure(FrameSource::Lockstep, &encoded(&at_rate(tick_hz)));
+        assert!(
+            matches!(response, Some(Response::Ready { .. })),
+            "{response:?}"
+        );
+        board.machine.run_for(100 * MILLISECOND);
+        assert_eq!(board.resets(), [], "{tick_hz} Hz");
+    }
+}
+
+fn a_running_board_can_be_configured_anew<C: BoardChip>() {
+    for oscillator_hz in C::OSCILLATOR_HZ {
+        for (tick_hz, phase) in [(1000, 0), (5000, 0), (5000, 777_777), (6600, 0)] {
+            let scenario = at_rate(tick_hz);
+            let mut board = booted::<C>(oscillator_hz, phase);
+            for _ in 0..3 {
+                let response = board.configure(FrameSource::Sensors, &encoded(&scenario));
+                let is_ready = matches!(response, Some(Response::Ready { .. }));
+                let resets = board.resets();
+                assert!(
+                    is_ready && resets.is_empty(),
+                    "{tick_hz} Hz, oscillator of {oscillator_hz} Hz, phase {phase}: {response:?}, {resets:?}"
+                );
+                board.machine.run_for(5 * MILLISECOND);
+            }
+        }
+    }
+}
