@@ -19,9 +19,11 @@ pub struct FuzzArguments {
     frames: u32,
 }
 
-/// Tests that are targets of their own, and tests within crates.
-const TARGETS: [&str; 2] = ["malformed_input", "state_machines"];
-const WITHIN: [&str; 4] = [
+/// Tests with as many cases as requested.
+const TESTS: [&str; 7] = [
+    "malformed_input",
+    "does_what_its_model_does",
+    "counts_what_its_model_counts",
     "damaged_shards",
     "damaged_manifests",
     "damaged_records",
@@ -62,9 +64,10 @@ pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
         ("PROPTEST_CASES", cases.as_str()),
         ("PAINLEVE_FUZZ_TICKS", ticks.as_str()),
     ];
-    let targets = TARGETS.map(|target| ["--test", target]).concat();
-    test(&[&targets[..], &["--", "--nocapture"]].concat(), &variables)?;
-    test(&[&["--lib", "--"], &WITHIN[..]].concat(), &variables)?;
+    test(
+        &[&["--lib", "--tests", "--"], &TESTS[..]].concat(),
+        &variables,
+    )?;
     let bus_cases = (arguments.cases / BUS_SHARE).max(1).to_string();
     run_with(
         &cargo(),
@@ -72,5 +75,5 @@ pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
         &[("PROPTEST_CASES", &bus_cases)],
     )?;
     let frames = arguments.frames.to_string();
-    test(&["--test", FRAMES], &[("PAINLEVE_FUZZ_TICKS", &frames)])
+    test(&["--tests", FRAMES], &[("PAINLEVE_FUZZ_TICKS", &frames)])
 }

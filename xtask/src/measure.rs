@@ -138,7 +138,6 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
         "verify",
         "--package",
         "painleve-plant",
-        "--test",
         "documentation",
     ];
     let blocks = BLOCKS

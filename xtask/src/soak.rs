@@ -42,7 +42,6 @@ pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
             "painleve-tests",
             "--profile",
             PROFILE,
-            "--test",
             "soak",
             "--",
             "--nocapture",

@@ -38,11 +38,11 @@ settings! {
         /// Desired normal force f_n*.
         normal_force_n: f32 = 10.0, 0.0..=1e3, "N";
         /// Position gain K'_P.
-        position_gain_per_s2: f32 = 9000.0, 0.0..=1e6, "1/s²";
+        position_gain_per_s2: f32 = 5800.0, 0.0..=1e6, "1/s²";
         /// Velocity gain K'_D.
-        velocity_gain_per_s: f32 = 160.0, 0.0..=1e4, "1/s";
+        velocity_gain_per_s: f32 = 128.0, 0.0..=1e4, "1/s";
         /// Gain of ∫ (z_t* − z_t) dt, added to α_v; not in the paper.
-        position_integral_gain_per_s3: f32 = 20_000.0, 0.0..=1e9, "1/s³";
+        position_integral_gain_per_s3: f32 = 10_000.0, 0.0..=1e9, "1/s³";
         /// Largest acceleration due to that integral, and largest one by contact forces that the law cancels.
         position_integral_limit_m_s2: f32 = 200.0, 0.0..=1e6, "m/s²";
         /// Rate at which the law learns the acceleration of the tip along the belt by contact forces other

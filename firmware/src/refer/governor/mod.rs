@@ -325,8 +325,8 @@ mod tests {
             ..Default::default()
         };
         let distance = distance_m(&settings, &joints, TICK_S, 0.0);
-        // 0.5, 3, 4.25 and 2.55 mm.
-        assert!((distance - 5.82e-3).abs() < 3e-5, "{distance}");
+        // 0.5, 3, 3 and 2 mm.
+        assert!((distance - 4.72e-3).abs() < 3e-5, "{distance}");
         let more = distance_m(&GovernorSettings::default(), &joints, TICK_S, 0.0);
         assert!(more > distance + 0.5e-3, "{more}");
     }

@@ -19,9 +19,9 @@ settings! {
         /// The same in encoder counts, as seen at the tip: rounding moves the tip by as much.
         distance_counts: f32 = 3.0, 0.0..=1e3, "counts";
         /// The same for each N·m of the joints' known friction.
-        distance_m_nm: f32 = 0.085, 0.0..=10.0, "m/(N·m)";
+        distance_m_nm: f32 = 0.06, 0.0..=10.0, "m/(N·m)";
         /// The same for each rad of the gears' known play.
-        distance_m_rad: f32 = 2.55, 0.0..=100.0, "m/rad";
+        distance_m_rad: f32 = 2.0, 0.0..=100.0, "m/rad";
         /// Deceleration at which the reference stops before an edge.
         braking_m_s2: f32 = 1.0, 1e-3..=1e3, "m/s²";
         /// Largest speed of the approach to a reference that is away from the tip.

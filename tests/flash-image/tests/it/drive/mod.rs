@@ -16,7 +16,7 @@ use painleve_shared::wire::{self, Inbox};
 use painleve_tests::line::terminal;
 use painleve_tests::{errors, signal};
 
-use crate::rig::{EmulatedRig, StartedProgram};
+use crate::drive::rig::{EmulatedRig, StartedProgram};
 
 fn report(output: &Output) -> serde_json::Value {
     assert!(output.status.success(), "{}", errors(output));

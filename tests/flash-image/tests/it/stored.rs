@@ -203,17 +203,20 @@ fn is_refused_with_a_reason<C: BoardChip>() {
 }
 
 #[test]
+#[ignore = "takes longer than 20 s"]
 fn a_stored_configuration_drives_the_arm_without_a_host() {
     drives_the_arm_without_a_host::<F405>(SECOND);
     drives_the_arm_without_a_host::<G474>(25 * MILLISECOND);
 }
 
 #[test]
+#[ignore = "takes longer than 20 s"]
 fn a_power_failure_at_any_operation_leaves_a_configuration_f405() {
     survives_a_power_failure_at_every_operation::<F405>();
 }
 
 #[test]
+#[ignore = "takes longer than 20 s"]
 fn a_power_failure_at_any_operation_leaves_a_configuration_g474() {
     survives_a_power_failure_at_every_operation::<G474>();
 }

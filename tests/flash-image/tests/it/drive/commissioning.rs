@@ -11,7 +11,7 @@ use painleve_shared::counts::ForceCounts;
 use painleve_shared::{Arm, Posture};
 use painleve_tests::Bench;
 
-use crate::rig::{DEFAULT, EmulatedRig, StartedProgram};
+use crate::drive::rig::{DEFAULT, EmulatedRig, StartedProgram};
 
 /// The arm with its tip on the standing belt, 10 mm from the point below joint 1.
 fn set_down() -> Scenario {

@@ -7,7 +7,8 @@ use painleve_tests::printed::{self, LastFigure, thousands};
 
 #[test]
 fn a_tick_has_bounds_within_the_budget() {
-    let budget: serde_json::Value = serde_json::from_str(include_str!("../budget.json")).unwrap();
+    let budget: serde_json::Value =
+        serde_json::from_str(include_str!("../../budget.json")).unwrap();
     let bound = Bound::of(flash_image()).unwrap_or_else(|error| panic!("{error}"));
     for (cycles, key) in [
         (bound.control.cycles, "bound_cycles_of_control_interrupt"),

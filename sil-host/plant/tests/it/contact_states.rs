@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 use painleve_plant::mechanics::impact::{ImpactLaw, Restitution, collide};
 use painleve_shared::{Arm, ArmParameters, JointTorque, LinkMotion, Pose, Slip};
 
-const STATES: &str = include_str!("data/contact_states.csv");
+const STATES: &str = include_str!("../data/contact_states.csv");
 const RELATIVE: f64 = 1e-9;
 
 fn assert_close(row: usize, name: &str, ours: f64, theirs: f64, scale: f64) {

@@ -4,7 +4,7 @@
 use nalgebra::Matrix2;
 use painleve_shared::{Arm, ArmParameters, JointMotion, Pose};
 
-const ARMS: &str = include_str!("data/mujoco_arms.csv");
+const ARMS: &str = include_str!("../data/mujoco_arms.csv");
 const RELATIVE: f64 = 1e-9;
 
 #[test]

@@ -74,7 +74,7 @@ impl ControllerHost for Both {
 }
 
 fn budget() -> serde_json::Value {
-    serde_json::from_str(include_str!("../budget.json")).expect("valid JSON")
+    serde_json::from_str(include_str!("../../budget.json")).expect("valid JSON")
 }
 
 /// Runs a scenario on both and checks for equal counts within the budget for `key`. Returns the

@@ -330,7 +330,7 @@ fn the_worst_readings_found_by_a_search_stay_below_the_bound() {
             [&watch.control, &watch.starting].map(|longest| longest.most_instructions.instructions);
         let most = control.max(starting);
         let budget: serde_json::Value =
-            serde_json::from_str(include_str!("../../../budget.json")).unwrap();
+            serde_json::from_str(include_str!("../../../../budget.json")).unwrap();
         let limit = &budget["instructions_of_control_interrupt"];
         assert!(u64::from(most) <= limit.as_u64().unwrap(), "{most}");
     });

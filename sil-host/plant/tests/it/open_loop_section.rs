@@ -7,7 +7,7 @@ use painleve_plant::State;
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::mechanics::{ArmOnBelt, ArmProbe, ArmStep, PlantParameters};
 
-const SECTION: &str = include_str!("data/open_loop_section_mu06.csv");
+const SECTION: &str = include_str!("../data/open_loop_section_mu06.csv");
 
 /// Largest observed θ̇1, rad/s.
 struct Fastest(f64);

@@ -2,8 +2,8 @@
 
 use painleve_tests::errors;
 
-use crate::report;
-use crate::rig::{EmulatedRig, StartedProgram};
+use crate::drive::report;
+use crate::drive::rig::{EmulatedRig, StartedProgram};
 
 fn asked(rig: &EmulatedRig, option: &str, more: &[&str]) -> std::process::Output {
     StartedProgram::drive(&rig.port, &[&[option], more].concat())

@@ -1,0 +1,11 @@
+//! Tests of the plant against references, and of the documentation that describes it.
+
+mod alternate_readings;
+mod contact_force;
+mod contact_states;
+mod documentation;
+mod links;
+mod mujoco_arms;
+mod open_loop_section;
+mod random_frames;
+mod settings;

@@ -1,0 +1,6 @@
+//! Tests of the studies as a user runs them.
+
+mod beyond_the_paper;
+mod bifurcation;
+mod malformed_input;
+mod page_commands;

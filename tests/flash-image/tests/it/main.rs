@@ -1,0 +1,11 @@
+//! Tests of the images that are flashed, executed on modelled boards.
+
+mod boot;
+mod bound;
+mod closed_loop;
+mod dead_force_cell;
+mod drive;
+mod hazards;
+mod open_loop;
+mod random_faults;
+mod stored;
