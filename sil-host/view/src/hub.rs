@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 use std::mem;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::sample::Sample;
@@ -13,6 +13,7 @@ use painleve_record::events::RunEvent;
 use painleve_record::scene::Scene;
 use serde_json::{Value, json};
 
+use crate::locked;
 use crate::parameters::Parameter;
 
 /// Most viewers of each kind at once.
@@ -267,9 +268,4 @@ impl<T: Default> Group<T> {
         queues.retain(|other| !Arc::ptr_eq(other, queue));
         self.count.store(queues.len(), Ordering::Relaxed);
     }
-}
-
-/// A thread that panicked has left nothing half-done here.
-pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

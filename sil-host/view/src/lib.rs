@@ -23,4 +23,11 @@ pub mod row;
 pub mod server;
 pub mod thinning;
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 pub use page::PageFile;
+
+/// Locks a mutex. A thread that panicked has left nothing half-done here.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

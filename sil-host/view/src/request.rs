@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 
-use crate::hub::locked;
+use crate::locked;
 
 /// How long a viewer waits for the answer to a request.
 const PATIENCE: Duration = Duration::from_secs(2);

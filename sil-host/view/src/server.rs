@@ -20,7 +20,8 @@ use tungstenite::{Message, WebSocket};
 use crate::access::{Access, Token};
 use crate::connection::{Connection, PATIENCE};
 use crate::foxglove;
-use crate::hub::{Hub, PageQueue, locked};
+use crate::hub::{Hub, PageQueue};
+use crate::locked;
 use crate::receive::receive;
 use crate::request::{Desk, Orders};
 

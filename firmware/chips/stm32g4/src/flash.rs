@@ -12,11 +12,13 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_storage::nor_flash::NorFlashErrorKind;
 use painleve_image::flash::FlashRegisters;
 
-use crate::supply::FLASH_KEYS;
 use crate::{comes, pac};
 
 /// Number of polls for an erasure: more than 25 ms, the longest of the data sheet.
 pub(crate) const PATIENCE: u32 = 10_000_000;
+
+/// Keys that open the control register (RM0440, chapter FLASH: "Unlocking the flash memory").
+pub(crate) const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
 /// Errors of an operation in the status register.
 pub(crate) const ERRORS: u32 = 0xc3fa;
@@ -52,7 +54,7 @@ impl FlashRegisters for Registers {
             return Err(NorFlashErrorKind::Other);
         }
         self.wait().or_else(|_| self.wait())?;
-        for key in FLASH_KEYS {
+        for key in KEYS {
             // SAFETY: the keys of the manual, in its order.
             self.0.keyr().write(|w| unsafe { w.bits(key) });
         }

@@ -6,12 +6,11 @@ use cortex_m::peripheral::NVIC;
 use painleve_image::board::StartFault;
 use painleve_image::watchdogs::IndependentWatchdog;
 
-use crate::flash::{ERRORS, PATIENCE};
+use crate::flash::{ERRORS, KEYS, PATIENCE};
 use crate::watchdogs::Independent;
 use crate::{comes, pac};
 
-/// Keys that open the flash's control register, and those that open the option bytes (RM0440, chapter FLASH: "Option bytes programming").
-pub(crate) const FLASH_KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
+/// Keys that open the option bytes (RM0440, chapter FLASH: "Option bytes programming").
 const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
 
 /// Starts monitoring the supply: below 2.9 V the interrupt PVD_PVM is raised; below 2.8 V the chip is held in
@@ -66,7 +65,7 @@ fn raise_brown_out_level(flash: &pac::FLASH, watchdog: &Independent) -> Result<(
     // SAFETY: writing one clears an error; the keys of the manual, in its order, with no programming in progress.
     unsafe {
         flash.sr().write(|w| w.bits(ERRORS));
-        for key in FLASH_KEYS {
+        for key in KEYS {
             flash.keyr().write(|w| w.bits(key));
         }
         for key in OPTION_KEYS {

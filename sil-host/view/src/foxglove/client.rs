@@ -14,7 +14,8 @@ use serde_json::{Map, Value, json};
 use tungstenite::{Error, Message, WebSocket};
 
 use super::services;
-use crate::hub::{ClientQueue, Entry, Hub, Severity, WatchedTick, locked};
+use crate::hub::{ClientQueue, Entry, Hub, Severity, WatchedTick};
+use crate::locked;
 use crate::parameters::Parameter;
 use crate::receive::receive;
 use crate::request::{Desk, TOO_MANY};
