@@ -23,7 +23,7 @@ use painleve_system::interrupt::Interrupt;
 /// start.
 const PLANT_POLL: Duration = Duration::from_millis(10);
 
-/// Time before a frame is due at which its receiver wakes up, to spin. It covers the slack of Linux's
+/// Time before a frame is due at which its receiver wakes up, to spin until that time after it. It covers the slack of Linux's
 /// timers (50 µs) and the start of an idle processor.
 const WAKE_UP: Duration = Duration::from_micros(120);
 
@@ -195,8 +195,8 @@ impl ControllerEnd {
         expected: Option<Expected>,
     ) -> Result<Option<Received>, LinkError> {
         let mut known_gone = false;
-        let mut is_early = false;
         let mut longest = LOOK_INTERVAL;
+        self.patience.begin(&self.ports.bell);
         loop {
             if let Some(frame) = self.take()? {
                 self.patience = Patience::new(self.silence_limit);
@@ -228,10 +228,9 @@ impl ControllerEnd {
                 if !early.is_zero() {
                     longest = early;
                     self.patience.stop_spinning();
-                } else if is_early {
-                    self.patience.spin_again();
+                } else if now < expected.due + WAKE_UP {
+                    self.patience.spin_again(&self.ports.bell);
                 }
-                is_early = !early.is_zero();
             }
             match self.patience.pause(&self.ports.bell, longest) {
                 AfterPause::Poll => {}
@@ -290,6 +289,7 @@ impl ControllerEnd {
     /// Waits for the plant's session; `None` if the plant has left.
     fn wait_for_begin(&self) -> Result<Option<Session>, LinkError> {
         let mut patience = Patience::new(self.silence_limit);
+        patience.begin(&self.ports.bell);
         loop {
             match self.announcement()? {
                 Some(Announcement::Begin(session)) => return Ok(Some(session)),

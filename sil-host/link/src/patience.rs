@@ -65,12 +65,20 @@ pub(super) struct Pauses {
 }
 
 impl Pauses {
-    /// Pauses for a few nanoseconds while this end spins; returns `false` once it should sleep.
+    /// Call it before the first poll: where both ends share a processor, that poll is then the last one before the
+    /// sleep.
     #[inline]
-    fn spin(&mut self, bell: &Bell) -> bool {
+    fn begin(&mut self, bell: &Bell) {
         if self.polls == 0 && !bell.peer_runs_elsewhere() {
             self.polls = SPIN_POLLS;
+            self.is_armed = true;
+            bell.arm();
         }
+    }
+
+    /// Pauses for a few nanoseconds while this end spins; returns `false` once it should sleep.
+    #[inline]
+    fn spin(&mut self) -> bool {
         let spins = self.polls < SPIN_POLLS;
         if spins {
             self.polls += 1;
@@ -92,7 +100,8 @@ impl Pauses {
 
     /// Pauses once, at most `longest`.
     pub(super) fn pause(&mut self, bell: &Bell, longest: Duration) {
-        if !self.spin(bell) {
+        self.begin(bell);
+        if !self.spin() {
             self.sleep(bell, longest);
         }
     }
@@ -102,8 +111,10 @@ impl Pauses {
 pub(super) struct Patience {
     limit: Duration,
     pauses: Pauses,
-    /// Counted only after spinning; until then the clock is not read.
+    /// Counted only from the second pause after spinning on; until then the clock is not read, since the answer of a
+    /// lockstep peer ends the first one.
     silence: Silence,
+    is_counted: bool,
 }
 
 impl Patience {
@@ -114,7 +125,14 @@ impl Patience {
             limit,
             pauses: Pauses::default(),
             silence: Silence::default(),
+            is_counted: false,
         }
+    }
+
+    /// Call it before the first poll of the wait.
+    #[inline]
+    pub(super) fn begin(&mut self, bell: &Bell) {
+        self.pauses.begin(bell);
     }
 
     /// Sleeps in the pauses that follow.
@@ -123,14 +141,15 @@ impl Patience {
     }
 
     /// Spins in the pauses that follow, as at the beginning of the wait.
-    pub(super) fn spin_again(&mut self) {
+    pub(super) fn spin_again(&mut self, bell: &Bell) {
         self.pauses = Pauses::default();
+        self.pauses.begin(bell);
     }
 
     /// Pauses once, at most `longest`, and returns the next step.
     #[inline]
     pub(super) fn pause(&mut self, bell: &Bell, longest: Duration) -> AfterPause {
-        if self.pauses.spin(bell) {
+        if self.pauses.spin() {
             AfterPause::Poll
         } else {
             self.pause_longer(bell, longest)
@@ -139,7 +158,12 @@ impl Patience {
 
     #[cold]
     fn pause_longer(&mut self, bell: &Bell, longest: Duration) -> AfterPause {
-        let next = self.silence.grow(self.limit);
+        let next = if self.is_counted {
+            self.silence.grow(self.limit)
+        } else {
+            AfterPause::Poll
+        };
+        self.is_counted = true;
         if let AfterPause::Poll = next {
             let left = self.limit.saturating_sub(self.silence.total);
             self.pauses.sleep(bell, longest.min(left));

@@ -225,6 +225,7 @@ impl PlantEnd {
         }
         let mut patience = Patience::new(self.silence_limit);
         let mut known_gone = false;
+        patience.begin(&self.ports.bell);
         loop {
             if let Some(answer) = self.take()? {
                 return if answer.tick == frame.tick {
