@@ -299,7 +299,7 @@ mod tests {
             let expected = (natural_rad_s / 500.0).min(1.0);
             let LoopSpeeds { tracking, law } = speeds(&configuration);
             assert!((tracking - expected).abs() < 1e-3, "{tracking} {expected}");
-            assert!((law - 0.55 * expected).abs() < 1e-3, "{law}");
+            assert!((law - 0.69 * expected).abs() < 1e-3, "{law}");
         }
     }
 }

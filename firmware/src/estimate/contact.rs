@@ -53,7 +53,7 @@ settings! {
         gap_uncertainty_m: f32 = 15e-6, 0.0..=0.01, "m";
         /// Factor by which the law is slower if contact is detected from the encoders: with a stiff motion loop the
         /// tip follows their noise, which looks like a lift-off.
-        encoder_law_speed: f32 = 0.55, 0.1..=1.0;
+        encoder_law_speed: f32 = 0.69, 0.1..=1.0;
     }
 }
 

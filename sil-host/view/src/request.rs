@@ -1,7 +1,7 @@
 //! Requests of viewers to a live run, and their way to it.
 //!
 //! A viewer may ask for as much as it likes: what is too much is refused before it reaches the run, and no
-//! more than [`MOST_WAITING`] orders wait for it.
+//! more than `MOST_WAITING` orders wait for it.
 
 use std::collections::VecDeque;
 use std::mem;
