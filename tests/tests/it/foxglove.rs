@@ -249,10 +249,9 @@ fn services_pause_step_push_and_reset() {
 
     client.call("/resume", &json!({})).unwrap();
     assert_eq!(client.set("live.speed", json!(0)), json!(0.0));
-    let law = "{ \"proportional_nm_rad\": [0.0, 0.0] }";
-    let law: Value = serde_json::from_str(law).unwrap();
-    client.set("controller.law", json!({ "pid": law }));
-    client.call("/push", &json!({ "normal_n": 15.0 })).unwrap();
+    // Nothing else throws the tip off in this scenario.
+    let push = json!({ "normal_n": 60.0, "duration_s": 0.05 });
+    client.call("/push", &push).unwrap();
     client.message("/events", |event| event["kind"] == "lift-off");
 
     client.call("/pause", &json!({})).unwrap();
