@@ -157,7 +157,9 @@ fn names_in_the_pages_occur_in_the_source() {
         .split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
         .collect();
     let mut unknown = Vec::new();
-    for page in pages() {
+    // The changelog also names what is gone.
+    let present = |page: &PathBuf| !page.ends_with("CHANGELOG.md");
+    for page in pages().into_iter().filter(present) {
         for name in prose(&page).split('`').skip(1).step_by(2) {
             let start = name.trim_end_matches('…').trim_end_matches('_');
             let is_name = start.matches('_').count() >= 2
