@@ -66,9 +66,9 @@ pub(super) struct Pauses {
 
 impl Pauses {
     /// Call it before the first poll: where both ends share a processor, that poll is then the last one before the
-    /// sleep.
+    /// sleep. Without it, the wait spins first.
     #[inline]
-    fn begin(&mut self, bell: &Bell) {
+    pub(super) fn begin(&mut self, bell: &Bell) {
         if self.polls == 0 && !bell.peer_runs_elsewhere() {
             self.polls = SPIN_POLLS;
             self.is_armed = true;
@@ -100,7 +100,6 @@ impl Pauses {
 
     /// Pauses once, at most `longest`.
     pub(super) fn pause(&mut self, bell: &Bell, longest: Duration) {
-        self.begin(bell);
         if !self.spin() {
             self.sleep(bell, longest);
         }
@@ -113,8 +112,7 @@ pub(super) struct Patience {
     pauses: Pauses,
     /// Counted only from the second pause after spinning on; until then the clock is not read, since the answer of a
     /// lockstep peer ends the first one.
-    silence: Silence,
-    is_counted: bool,
+    silence: Option<Silence>,
 }
 
 impl Patience {
@@ -124,8 +122,7 @@ impl Patience {
         Self {
             limit,
             pauses: Pauses::default(),
-            silence: Silence::default(),
-            is_counted: false,
+            silence: None,
         }
     }
 
@@ -140,10 +137,12 @@ impl Patience {
         self.pauses.polls = SPIN_POLLS;
     }
 
-    /// Spins in the pauses that follow, as at the beginning of the wait.
+    /// Spins in the pauses that follow, as at the beginning of the wait, unless the peer needs this processor. It
+    /// does not arm the bell: the last poll lies behind, so a message that has arrived since would be slept over.
     pub(super) fn spin_again(&mut self, bell: &Bell) {
-        self.pauses = Pauses::default();
-        self.pauses.begin(bell);
+        if bell.peer_runs_elsewhere() {
+            self.pauses.polls = 0;
+        }
     }
 
     /// Pauses once, at most `longest`, and returns the next step.
@@ -158,14 +157,15 @@ impl Patience {
 
     #[cold]
     fn pause_longer(&mut self, bell: &Bell, longest: Duration) -> AfterPause {
-        let next = if self.is_counted {
-            self.silence.grow(self.limit)
+        let counted = self.silence.is_some();
+        let silence = self.silence.get_or_insert_default();
+        let next = if counted {
+            silence.grow(self.limit)
         } else {
             AfterPause::Poll
         };
-        self.is_counted = true;
         if let AfterPause::Poll = next {
-            let left = self.limit.saturating_sub(self.silence.total);
+            let left = self.limit.saturating_sub(silence.total);
             self.pauses.sleep(bell, longest.min(left));
         }
         next
@@ -200,6 +200,46 @@ mod tests {
         };
         assert!(silence >= limit);
         assert!(looks >= 1);
+    }
+
+    /// Both bells of a run whose ends share the processor of this thread, which stays on it.
+    fn bells_on_one_processor() -> (Bell, Bell) {
+        use nix::sched::{CpuSet, sched_getcpu, sched_setaffinity};
+        let mut here = CpuSet::new();
+        here.set(sched_getcpu().unwrap()).unwrap();
+        sched_setaffinity(nix::unistd::Pid::from_raw(0), &here).unwrap();
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let lock = LockFile::open(file.path(), false).unwrap();
+        let hang = |role| Bell::hang(&BusName::unique(), &lock, role).unwrap();
+        let (own, peers) = (hang(Role::Plant), hang(Role::Controller));
+        assert!(!own.peer_runs_elsewhere());
+        (own, peers)
+    }
+
+    #[test]
+    fn no_wait_sleeps_without_a_poll_after_it_has_armed_its_bell() {
+        let (own, peers) = bells_on_one_processor();
+        let far = Duration::from_secs(60);
+        // Armed before the poll: a message that comes after it ends the sleep.
+        let start = Instant::now();
+        let mut pauses = Pauses::default();
+        pauses.begin(&own);
+        peers.ring();
+        pauses.pause(&own, far);
+        assert!(start.elapsed() < LOOK_INTERVAL);
+        // Not armed: the bell that rings after the poll is not heard, so that the next pause must not sleep.
+        let mut pauses = Pauses::default();
+        peers.ring();
+        pauses.pause(&own, far);
+        assert_eq!((pauses.polls, pauses.is_armed), (1, false));
+        // Nor does a wait that is to spin for a frame that is due.
+        let mut patience = Patience::new(far);
+        patience.stop_spinning();
+        peers.ring();
+        patience.spin_again(&own);
+        patience.pause(&own, far);
+        assert!(start.elapsed() < LOOK_INTERVAL);
+        assert!(patience.pauses.is_armed);
     }
 
     #[test]

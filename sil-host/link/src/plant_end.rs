@@ -272,6 +272,7 @@ impl PlantEnd {
         deadline: Instant,
     ) -> Result<Option<ActuatorFrame>, LinkError> {
         let mut pauses = Pauses::default();
+        pauses.begin(&self.ports.bell);
         loop {
             if let Some(answer) = self.try_receive()? {
                 return Ok(Some(answer));
