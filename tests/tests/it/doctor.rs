@@ -2,11 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::fs;
+use std::fs::{self, File};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use nix::unistd::getuid;
@@ -93,10 +92,13 @@ fn end(mut child: Child) {
     child.wait().unwrap();
 }
 
-/// Shared memory is one for all tests: a repair of one test would remove what another left on purpose.
-fn alone() -> MutexGuard<'static, ()> {
-    static ALONE: Mutex<()> = Mutex::new(());
-    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+/// Shared memory is one for all tests, each of which may be a process of its own: a repair of one test would remove what
+/// another left on purpose. Locked while the file is open.
+fn alone() -> File {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("doctor.lock");
+    let file = File::create(path).unwrap();
+    file.lock().unwrap();
+    file
 }
 
 #[test]
