@@ -167,7 +167,7 @@ fn reprint(row: &str, size: u64, limit: u64) -> Result<(), String> {
 }
 
 /// Returns a number with commas between its thousands.
-fn thousands(number: u64) -> String {
+pub fn thousands(number: u64) -> String {
     match number {
         0..1000 => number.to_string(),
         _ => format!("{},{:03}", thousands(number / 1000), number % 1000),

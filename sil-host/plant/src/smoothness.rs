@@ -3,6 +3,8 @@
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::status::SupervisorState;
 
+use crate::converters::ConverterSettings;
+
 /// Velocity from which a reference counts as moving, m/s. One that an edge holds back creeps with the estimated edge.
 const MOVING_M_S: f64 = 5e-3;
 
@@ -32,9 +34,14 @@ pub struct Roughness {
 }
 
 impl Roughness {
-    /// Returns the change of torque from tick to tick, counts: root mean square over ticks and joints; `None` without
-    /// ticks.
-    pub fn torque_change_counts(&self) -> Option<f64> {
+    /// Returns the change of torque from tick to tick through these converters, N·m: root mean square over ticks and
+    /// joints; `None` without ticks.
+    pub fn torque_change_nm(&self, converters: &ConverterSettings) -> Option<f64> {
+        let count_nm = f64::from(converters.scales().torque.per_count());
+        Some(self.torque_change_counts()? * count_nm)
+    }
+
+    fn torque_change_counts(&self) -> Option<f64> {
         let changes = 2.0 * self.ticks as f64;
         (self.ticks > 0).then(|| (self.squares / changes).sqrt())
     }

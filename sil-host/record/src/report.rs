@@ -6,7 +6,6 @@ use comfy_table::CellAlignment;
 use hdrhistogram::Histogram;
 use painleve_plant::closed_loop::LoopResult;
 use painleve_plant::scenario::Scenario;
-use painleve_plant::smoothness::Roughness;
 use painleve_system::terminal;
 use serde::{Deserialize, Serialize};
 
@@ -134,8 +133,7 @@ impl RunReport {
         let wall_s = wall.as_secs_f64();
         let force = statistics.min_normal_force_n;
         let smoothness = &result.smoothness;
-        let count_nm = f64::from(scenario.converters.scales().torque.per_count());
-        let change_nm = |of: &Roughness| of.torque_change_counts().map(|counts| counts * count_nm);
+        let converters = &scenario.converters;
         Self {
             scenario: scenario.name.clone(),
             controller: scenario.controller.law.name().into(),
@@ -157,8 +155,8 @@ impl RunReport {
                 .filter(|_| scenario.controller.law.name() != "off"),
             min_normal_force_n: force.is_finite().then_some(force),
             peak_torque_nm: statistics.peak_torque_nm,
-            torque_change_moving_nm: change_nm(&smoothness.moving),
-            torque_change_holding_nm: change_nm(&smoothness.holding),
+            torque_change_moving_nm: smoothness.moving.torque_change_nm(converters),
+            torque_change_holding_nm: smoothness.holding.torque_change_nm(converters),
             torque_reversals: smoothness.holding.reversals(),
             force_ripple_n: smoothness.holding.force_ripple_n(),
             contact_fraction: statistics.contact_fraction(),

@@ -15,6 +15,7 @@ use clap::Args;
 use serde_json::Value;
 
 use crate::command::{ChoreError, cargo, run_cargo, say, workspace};
+use crate::size;
 use machine::Machine;
 use samples::Samples;
 
@@ -306,15 +307,7 @@ fn children_cpu_s() -> f64 {
 /// Returns a whole number with separators, in three digits that mean something.
 fn thousands(value: f64) -> String {
     let scale = 10_f64.powf((value.log10().floor() - 2.0).max(0.0));
-    let digits = format!("{:.0}", (value / scale).round() * scale);
-    let mut text = String::new();
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
+    size::thousands(((value / scale).round() * scale) as u64)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use core::ops::Range;
 use painleve_plant::Plant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
-use painleve_plant::smoothness::{Roughness, Smoothness};
+use painleve_plant::smoothness::Smoothness;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
 
@@ -115,8 +115,6 @@ pub fn run<P: Plant>(
         Ending::NotReached
     };
     let converters = &scenario.converters;
-    let count_nm = f64::from(converters.scales().torque.per_count());
-    let change_nm = |of: &Roughness| of.torque_change_counts().map(|counts| counts * count_nm);
     Ok(Row {
         index,
         ending,
@@ -136,8 +134,8 @@ pub fn run<P: Plant>(
         slid_s: contact
             .captured_s
             .map_or(0.0, |start_s| trial.time_s() - start_s),
-        torque_change_moving_nm: change_nm(&smoothness.moving),
-        torque_change_holding_nm: change_nm(&smoothness.holding),
+        torque_change_moving_nm: smoothness.moving.torque_change_nm(converters),
+        torque_change_holding_nm: smoothness.holding.torque_change_nm(converters),
         force_ripple_n: smoothness.holding.force_ripple_n(),
         tip_t_m: trial.tip_t_m(),
         target_m,
