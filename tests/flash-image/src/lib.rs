@@ -6,6 +6,7 @@
 //!   sensors on their buses are in [`painleve_parts`]
 //! - [`board`]: the board's wiring, the host's end of its serial line, the arm's torques
 //! - [`mod@bench`]: the board with the simulated arm on its sensors and stages
+//! - [`bare`]: a bench without an arm, with loop-back wires
 //! - [`harm`]: what the arm does between a failure and the stop of the drive
 //!
 //! The models are not kinder than the manuals:
@@ -32,6 +33,7 @@
 //! Time is counted in instructions: each takes [`machine::CYCLES_PER_INSTRUCTION`] of the clock
 //! that the image has configured. It does not measure the time on silicon.
 
+pub mod bare;
 pub mod bench;
 pub mod board;
 pub mod harm;
