@@ -248,6 +248,18 @@ fn unsaid(error: std::io::Error) -> CommandError {
 
 /// Prints the help, the version or a usage error, and returns the exit code of the process.
 fn tell_usage(usage: &clap::Error) -> ExitCode {
+    if usage.kind() == clap::error::ErrorKind::InvalidUtf8 {
+        // clap does not say which one.
+        let unreadable: Vec<String> = std::env::args_os()
+            .filter(|argument| argument.to_str().is_none())
+            .map(|argument| format!("{argument:?}"))
+            .collect();
+        let arguments = unreadable.join(", ");
+        warn(format_args!(
+            "error: {arguments}: not UTF-8, as the names of scenarios and the values of settings must be"
+        ));
+        return ExitCode::from(2);
+    }
     let written = usage.print().and_then(|()| std::io::stdout().flush());
     match written.map_err(unsaid) {
         Err(error) if !usage.use_stderr() => exit_code_of(&error),

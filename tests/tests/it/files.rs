@@ -435,6 +435,14 @@ fn names_that_are_not_text_are_used_as_they_are() {
         &[b"c\xff.toml"],
     );
     assert_eq!(commissioned["output"], "c\u{fffd}.toml");
+    let refused = bench.command(&["run"]).arg(name(b"c\xff.toml")).output();
+    let refused = refused.unwrap();
+    assert_eq!(code(refused.status), 2, "{refused:?}");
+    let message = errors(&refused);
+    assert!(
+        message.starts_with("error: \"c\\xFF.toml\": not UTF-8"),
+        "{message}"
+    );
 }
 
 #[test]
