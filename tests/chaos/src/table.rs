@@ -1,11 +1,11 @@
 //! Counts of trials and flaws, and how soon peers notice.
 
 use std::collections::BTreeMap;
+use std::io::{self, Write, stdout};
 use std::time::Duration;
 
-use super::ChaosTrial;
-use super::trial::{Flaw, TrialOutcome};
-use crate::command::{ChoreError, say};
+use crate::ChaosTrial;
+use crate::trial::{Flaw, TrialOutcome};
 
 /// Counts of all trials.
 #[derive(Default)]
@@ -68,25 +68,31 @@ impl TrialTable {
         took: Duration,
         segments: &[String],
         patience_s: &[String; 2],
-    ) -> Result<(), ChoreError> {
+    ) -> io::Result<()> {
         let titles: String = FLAWS.map(|(_, title)| format!("{title:>10}")).concat();
-        say(&format!(
+        writeln!(
+            stdout(),
             "{:24}{:>8}{:>12}{titles}",
-            "disturbed", "trials", "injections"
-        ))?;
+            "disturbed",
+            "trials",
+            "injections"
+        )?;
         let mut sum = 0;
         for (name, row) in &self.rows {
             let counts: String = FLAWS
                 .map(|(flaw, _)| format!("{:>10}", row.flaws.get(&flaw).unwrap_or(&0)))
                 .concat();
-            say(&format!(
+            writeln!(
+                stdout(),
                 "{name:24}{:>8}{:>12}{counts}",
-                row.trials, row.injections
-            ))?;
+                row.trials,
+                row.injections
+            )?;
             sum += row.injections;
         }
         self.print_noticed(patience_s)?;
-        say(&format!(
+        writeln!(
+            stdout(),
             "{sum} injections in {:.0} s at a load of {}, {} flaws, {} segments left{}",
             took.as_secs_f64(),
             load(),
@@ -96,19 +102,20 @@ impl TrialTable {
                 .iter()
                 .map(|name| format!("\n  {name}"))
                 .collect::<String>(),
-        ))
+        )
     }
 
-    fn print_noticed(&mut self, [silence_s, wait_s]: &[String; 2]) -> Result<(), ChoreError> {
+    fn print_noticed(&mut self, [silence_s, wait_s]: &[String; 2]) -> io::Result<()> {
         let titles = PERCENTILES.map(|percent| match percent {
             100 => format!("{:>10}", "max ms"),
             percent => format!("{:>10}", format!("p{percent} ms")),
         });
         let titles = titles.concat();
-        say(&format!(
+        writeln!(
+            stdout(),
             "peers were to notice a silence of {silence_s} s, and to wait {wait_s} s for a peer"
-        ))?;
-        say(&format!("{:24}{:>8}{titles}", "peer ended after", "times"))?;
+        )?;
+        writeln!(stdout(), "{:24}{:>8}{titles}", "peer ended after", "times")?;
         for (name, row) in &mut self.rows {
             row.noticed.sort_unstable();
             let times = &row.noticed;
@@ -120,7 +127,7 @@ impl TrialTable {
                 let time = times[at(percent).min(last)];
                 format!("{:>10}", time.as_millis())
             });
-            say(&format!("{name:24}{:>8}{}", times.len(), values.concat()))?;
+            writeln!(stdout(), "{name:24}{:>8}{}", times.len(), values.concat())?;
         }
         Ok(())
     }

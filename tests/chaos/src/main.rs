@@ -1,4 +1,4 @@
-//! `cargo xtask chaos`: disturbs plant and controller at every system call.
+//! `cargo xtask chaos`: a program that disturbs plant and controller at every system call.
 //!
 //! A trial starts plant and controller on a bus and sends one of them a signal at the start of its
 //! n-th system call. It then asserts that within 5 s all have ended with a documented exit code and
@@ -14,24 +14,25 @@ mod table;
 mod tracer;
 mod trial;
 
+use std::io;
+use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use clap::Args;
+use clap::Parser;
 use nix::sys::prctl::set_child_subreaper;
 
-use crate::build_fw;
-use crate::command::{ChoreError, build_program};
 use fault::{FAULTS, InjectedFault};
 use host::{ChaosController, ChaosHost};
 use place::{ChaosFolder, unused_segments};
 use table::TrialTable;
 use trial::{ChaosRole, Disturbance, ExpectedOutcome, Plan, TrialProcess};
 
-/// Options of `cargo xtask chaos`.
-#[derive(Debug, Args)]
-pub struct ChaosArguments {
+/// Disturbs plant and controller at every system call and counts the flaws.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask chaos")]
+struct ChaosArguments {
     /// First system call.
     #[arg(long, default_value_t = 1)]
     first: u32,
@@ -79,42 +80,14 @@ const OTHERS: Duration = Duration::from_secs(10);
 /// wait for one. Of 5 s they are the program's defaults, 1.5 s and 1.7 s.
 const PATIENCE: [f64; 2] = [0.3, 0.34];
 
-/// Runs the part that belongs to every `cargo xtask test`.
-///
-/// # Errors
-/// If a flaw is found.
-pub fn short() -> Result<(), ChoreError> {
-    run(&ChaosArguments {
-        stop_after_s: Some(30),
-        ..ChaosArguments::of_tests(120)
-    })
-}
+const WORKER_PANICKED: &str = "a worker has panicked";
 
-/// Runs the part that belongs to `cargo xtask test --all`.
-///
-/// # Errors
-/// If a flaw is found.
-pub fn nightly() -> Result<(), ChoreError> {
-    run(&ChaosArguments::of_tests(1000))
-}
-
-impl ChaosArguments {
-    /// Returns trials drawn from all.
-    fn of_tests(trials: usize) -> Self {
-        Self {
-            first: 1,
-            last: 300,
-            disturbances: Disturbance::ALL.into(),
-            trials: Some(trials),
-            stop_after_s: None,
-            seed: 1,
-            faults: 0,
-            // Tests share their machine with other work.
-            end_s: 20,
-            jobs: 4,
-            crowd: 0,
-            host: ChaosHost::Native,
-            load: 0,
+fn main() -> ExitCode {
+    match run(&ChaosArguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
         }
     }
 }
@@ -122,21 +95,16 @@ impl ChaosArguments {
 /// Runs the trials and prints a table of counts.
 ///
 /// # Errors
-/// If a flaw is found.
-pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
-    build_program()?;
-    if arguments.host != ChaosHost::Native {
-        build_fw::run()?;
-    }
-    let system = |error: std::io::Error| ChoreError(format!("chaos: {error}"));
+/// If a process cannot be started or watched, or a flaw is found.
+fn run(arguments: &ChaosArguments) -> io::Result<()> {
     // A copy, because the program may be rebuilt during the trials.
-    let programs = tempfile::tempdir().map_err(system)?;
+    let programs = tempfile::tempdir()?;
     let program = programs.path().join("painleve");
-    std::fs::copy(crate::command::program(), &program).map_err(system)?;
+    std::fs::copy(painleve_tests::program(), &program)?;
     // This process adopts orphans, as systemd or a container would.
-    set_child_subreaper(true).map_err(|error| system(error.into()))?;
-    tracer::restore_default_actions().map_err(|error| system(error.into()))?;
-    let runtime = tempfile::tempdir().map_err(system)?;
+    set_child_subreaper(true)?;
+    painleve_system::interrupt::restore_default_actions()?;
+    let runtime = tempfile::tempdir()?;
     let segments_before = unused_segments()?;
 
     let plans = plans(arguments);
@@ -192,26 +160,25 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
                             table.add(plan, outcome);
                         }
                     }
-                    Ok::<(), std::io::Error>(())
+                    Ok::<(), io::Error>(())
                 })
             })
             .collect();
         let ended = workers.into_iter().map(|worker| {
             worker
                 .join()
-                .unwrap_or_else(|_| Err(std::io::Error::other("a worker has panicked")))
+                .unwrap_or_else(|_| Err(io::Error::other(WORKER_PANICKED)))
         });
         // All of them, or the load would go on.
         let ended: Vec<_> = ended.collect();
         is_over.store(true, Ordering::Relaxed);
         ended.into_iter().collect::<Result<(), _>>()
-    })
-    .map_err(system)?;
+    })?;
 
     let mut table = table
         .into_inner()
-        .map_err(|_| ChoreError("a worker has panicked".into()))?;
-    let left = || -> Result<Vec<String>, ChoreError> {
+        .map_err(|_| io::Error::other(WORKER_PANICKED))?;
+    let left = || -> io::Result<Vec<String>> {
         Ok(unused_segments()?
             .difference(&segments_before)
             .cloned()
@@ -227,19 +194,20 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     table.print(start.elapsed(), &segments, &patience_s)?;
     let found = table.findings + segments.len();
     if found > 0 {
-        return Err(ChoreError(format!("chaos found {found} flaws")));
+        return Err(io::Error::other(format!("chaos found {found} flaws")));
     }
     Ok(())
 }
 
 /// Returns the course of an undisturbed run.
-fn undisturbed(place: &ChaosFolder, bus: &str) -> std::io::Result<String> {
+fn undisturbed(place: &ChaosFolder, bus: &str) -> io::Result<String> {
     let mut run = TrialProcess::start(&mut trial::command(place, ChaosRole::Run, bus, ""))?;
     run.wait(Instant::now() + Duration::from_secs(20))?;
     let (_, text) = run.outcome();
-    place.host.course(&text.stdout).ok_or_else(|| {
-        std::io::Error::other(format!("the undisturbed run failed: {}", text.stderr))
-    })
+    place
+        .host
+        .course(&text.stdout)
+        .ok_or_else(|| io::Error::other(format!("the undisturbed run failed: {}", text.stderr)))
 }
 
 /// One trial.

@@ -1,6 +1,6 @@
 //! An SPI master (RM0090, section 28): polled, or with an interrupt for every received word.
 
-use painleve_parts::Transfer;
+use crate::Transfer;
 
 use crate::{Picoseconds, SECOND};
 

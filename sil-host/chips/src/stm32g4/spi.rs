@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use painleve_parts::Transfer;
+use crate::Transfer;
 
 use crate::{Picoseconds, SECOND};
 

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::path::Path;
 
 use painleve_drivers::encoders::EncoderDriver;
 use painleve_drivers::exchange::{Dialogue, SelectTiming};
@@ -133,13 +132,12 @@ impl Bound {
     ///
     /// # Errors
     /// [`BoundError`] naming the file or the code that cannot be bounded.
-    pub fn of(path: &Path) -> Result<Self, BoundError> {
-        let image = Image::read(path)?;
+    pub fn of(image: &Image) -> Result<Self, BoundError> {
         let with_entry = |worst: &Worst| worst.cycles + around(worst.entry, worst.uses_float);
         let worst_of = |handler: &str, analysis: &mut Analysis<'_>| {
             let entry = image.function(handler);
             let entry = entry.ok_or_else(|| BoundError::Image {
-                path: path.to_owned(),
+                path: image.path.clone(),
                 source: ImageError::NoFunction(handler.to_owned()),
             })?;
             let worst = analysis.of(entry)?;
@@ -148,7 +146,7 @@ impl Bound {
         let out_of_line = |function: &str| {
             let address = image.only_function(function);
             address.ok_or_else(|| BoundError::Image {
-                path: path.to_owned(),
+                path: image.path.clone(),
                 source: ImageError::NotOneFunction(function.to_owned()),
             })
         };
@@ -165,12 +163,12 @@ impl Bound {
                 microseconds: microseconds(cycles),
                 around_cycles: cycles - worst.cycles,
                 instructions: worst.instructions,
-                path: stretches(&image, handler, &analysis.path_with_calls(&worst)),
+                path: stretches(image, handler, &analysis.path_with_calls(&worst)),
             })
         };
         let without = |functions: &BTreeSet<u32>| {
             let all = not_called.union(functions).copied().collect();
-            Ok::<_, BoundError>(Analysis::new(&image, &limits)?.without(&all))
+            Ok::<_, BoundError>(Analysis::new(image, &limits)?.without(&all))
         };
         let mut analysis = without(&BTreeSet::new())?;
         let update = of_handler(UPDATE_INTERRUPT, &mut analysis)?;
@@ -205,8 +203,8 @@ impl Bound {
         for bus in SENSOR_BUSES {
             let limits = Limits::of_sensor_bus(bus.timing, bus.clock_hz);
             let takes = BTreeSet::from([out_of_line(bus.takes)?]);
-            let mut of_last_word = Analysis::new(&image, &limits)?;
-            let mut of_word = Analysis::new(&image, &limits)?.without(&takes);
+            let mut of_last_word = Analysis::new(image, &limits)?;
+            let mut of_word = Analysis::new(image, &limits)?.without(&takes);
             let last = with_entry(&worst_of(bus.handler, &mut of_last_word)?);
             let other = with_entry(&worst_of(bus.handler, &mut of_word)?);
             peripheral_accesses.append(&mut accesses(&of_last_word));

@@ -5,8 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::host::ChaosController;
-use crate::command::ChoreError;
+use crate::host::ChaosController;
 
 /// Environment variable that marks every process of a chaos run with the name of its place.
 const MARK: &str = "PAINLEVE_CHAOS";
@@ -110,9 +109,8 @@ fn list(folder: &Path, found: &mut Vec<PathBuf>) {
 ///
 /// # Errors
 /// If shared memory cannot be listed.
-pub fn unused_segments() -> Result<BTreeSet<String>, ChoreError> {
-    let listed = fs::read_dir(SHARED_MEMORY)
-        .map_err(|error| ChoreError(format!("cannot list {SHARED_MEMORY}: {error}")))?;
+pub fn unused_segments() -> std::io::Result<BTreeSet<String>> {
+    let listed = fs::read_dir(SHARED_MEMORY)?;
     let mut names: BTreeSet<String> = listed
         .flatten()
         .map(|entry| entry.file_name().to_string_lossy().into_owned())

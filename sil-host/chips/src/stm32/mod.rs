@@ -14,7 +14,7 @@ pub use timer::Timer;
 pub use usart::{Usart, UsartLayout};
 pub use watchdog::{Watchdog, WindowWatchdog};
 
-use painleve_parts::Transfer;
+use crate::Transfer;
 
 use crate::Picoseconds;
 use crate::machine::Chip;

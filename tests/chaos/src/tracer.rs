@@ -6,23 +6,9 @@ use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
 use nix::sys::ptrace;
-use nix::sys::signal::{SigHandler, Signal, kill, signal};
+use nix::sys::signal::{Signal, kill};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
-
-/// Gives the signals that trials send their default action in this process, and so in those that it
-/// starts: a shell's background jobs ignore SIGINT.
-///
-/// # Errors
-/// An error of the system if an action cannot be set.
-#[allow(unsafe_code)]
-pub fn restore_default_actions() -> nix::Result<()> {
-    for sent in [Signal::SIGINT, Signal::SIGTERM] {
-        // SAFETY: no handler of this process is replaced that other code relies on.
-        unsafe { signal(sent, SigHandler::SigDfl) }?;
-    }
-    Ok(())
-}
 
 /// Result of tracing a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use std::process::{Child, Command};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use super::place::ChaosFolder;
-use super::tracer::{Traced, Victim};
+use crate::place::ChaosFolder;
+use crate::tracer::{Traced, Victim};
 use clap::ValueEnum;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -79,7 +79,7 @@ pub struct Plan {
 
 /// Expected consequences.
 pub struct ExpectedOutcome {
-    /// [Course](super::host::ChaosController::course) of an undisturbed run.
+    /// [Course](crate::host::ChaosController::course) of an undisturbed run.
     pub course: String,
     /// Time within which everything must have ended after a disturbance.
     pub end: Duration,

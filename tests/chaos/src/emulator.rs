@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
-use super::host::EMULATOR;
-use super::place::ChaosFolder;
-use super::trial::{
+use crate::host::EMULATOR;
+use crate::place::ChaosFolder;
+use crate::trial::{
     ChaosRole, Disturbance, ExpectedOutcome, Flaw, NOTICED, Plan, TrialOutcome, TrialProcess,
     command, judge, next_run, orphans,
 };

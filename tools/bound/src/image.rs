@@ -1,15 +1,16 @@
 //! The image's code and its source locations.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
-use painleve_system::input_file;
 
 use crate::{BoundError, ImageError};
 
 /// The code of an ELF file.
 pub struct Image {
+    /// For messages; empty for code without an ELF file.
+    pub(crate) path: PathBuf,
     sections: Vec<(u32, Vec<u8>)>,
     functions: BTreeMap<u32, String>,
     /// Addresses by name: the linker gives functions with equal code one address.
@@ -32,20 +33,19 @@ pub struct Frame {
 }
 
 impl Image {
-    /// Reads an ELF file.
+    /// Parses the ELF file `elf`, which was read from `path`.
     ///
     /// # Errors
     /// [`BoundError::Image`] naming the file.
-    pub fn read(path: &Path) -> Result<Self, BoundError> {
-        Self::read_elf(path).map_err(|source| BoundError::Image {
+    pub fn of(path: &Path, elf: &[u8]) -> Result<Self, BoundError> {
+        Self::parse(path, elf).map_err(|source| BoundError::Image {
             path: path.to_owned(),
             source,
         })
     }
 
-    fn read_elf(path: &Path) -> Result<Self, ImageError> {
-        let bytes = input_file::bytes(path, input_file::MOST_IMAGE_BYTES)?;
-        let file = object::File::parse(&*bytes)?;
+    fn parse(path: &Path, elf: &[u8]) -> Result<Self, ImageError> {
+        let file = object::File::parse(elf)?;
         let mut sections = Vec::new();
         for section in file.sections().filter(|section| {
             matches!(
@@ -74,6 +74,7 @@ impl Image {
         }
         let lines = addr2line::Loader::new(path).map_err(ImageError::Lines)?;
         Ok(Self {
+            path: path.to_owned(),
             sections,
             functions,
             addresses,
@@ -85,6 +86,7 @@ impl Image {
     /// Creates an image of one function's code, without an ELF file.
     pub fn of_code(address: u32, code: &[u8], function: &str) -> Self {
         Self {
+            path: PathBuf::new(),
             sections: vec![(address, code.to_vec())],
             functions: BTreeMap::from([(address, function.to_owned())]),
             addresses: BTreeMap::from([(function.to_owned(), address)]),

@@ -5,8 +5,8 @@ use std::fs;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use super::place::ChaosFolder;
-use super::trial::{
+use crate::place::ChaosFolder;
+use crate::trial::{
     ChaosRole, ExpectedOutcome, Flaw, TrialOutcome, TrialProcess, command, judge, next_run,
     orphans, other,
 };

@@ -4,12 +4,12 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use painleve_chips::wires::{Clock, ModelledBus, SelectPin, SharedPart};
+use painleve_chips::{As5048a, BitErrors, BridgeAmplifier, BridgeFailure, Mcp3304, SpiPart};
 use painleve_drivers::ReadError;
 use painleve_drivers::encoders::{self, EncoderDriver};
 use painleve_drivers::exchange::PolledDriver;
 use painleve_drivers::force_cell::{self, ForceCellDriver};
-use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
-use painleve_parts::{As5048a, BitErrors, BridgeAmplifier, BridgeFailure, Mcp3304, SpiPart};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::mounting::{Mounting, SensorParts};
 

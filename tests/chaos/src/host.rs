@@ -13,8 +13,6 @@ use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use rustix::termios::ioctl_tiocnxcl;
 use serde_json::Value;
 
-use crate::build_fw;
-
 pub const EMULATOR: &str = "qemu-system-arm";
 
 /// Kind of host.
@@ -45,8 +43,8 @@ impl ChaosController {
         let (path, board) = match kind {
             ChaosHost::Native => (String::new(), None),
             ChaosHost::Qemu => {
-                let image = build_fw::image("painleve-qemu");
-                (image.to_string_lossy().into_owned(), None)
+                let image = painleve_tests::image().to_string_lossy();
+                (image.into_owned(), None)
             }
             ChaosHost::Serial => {
                 let board = SerialBoard::start()?;
@@ -115,7 +113,7 @@ impl SerialBoard {
             .args(["-icount", "shift=6,sleep=on"])
             .args(["-chardev", "pty,id=line", "-serial", "chardev:line"])
             .arg("-kernel")
-            .arg(build_fw::image("painleve-qemu-serial"))
+            .arg(painleve_tests::serial_image())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
