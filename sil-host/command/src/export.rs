@@ -155,7 +155,7 @@ fn record_error<T, E: Into<RecordFileError>>(
 
 #[cfg(feature = "parquet")]
 fn columns(table: &[u8]) -> Result<Vec<u8>, CommandError> {
-    painleve_study::sweep::parquet::from_csv(table).map_err(output)
+    painleve_study_sweep::parquet::from_csv(table).map_err(output)
 }
 
 #[cfg(not(feature = "parquet"))]

@@ -32,7 +32,7 @@ pub enum OutputError {
     /// Columns of a table.
     #[cfg(feature = "parquet")]
     #[error(transparent)]
-    Columns(#[from] painleve_study::sweep::parquet::ColumnsError),
+    Columns(#[from] painleve_study_sweep::parquet::ColumnsError),
     /// A part of a file.
     #[error(transparent)]
     Write(#[from] io::Error),

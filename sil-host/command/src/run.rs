@@ -11,7 +11,7 @@ use painleve_board::{emulator, serial};
 use painleve_link::{BusName, Pacing, Pair};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_record::report::RunReport;
-use painleve_study::robustness::{self, Arms};
+use painleve_study_quality::robustness::{self, Arms};
 use painleve_system::input_file;
 use painleve_system::interrupt::Interrupt;
 use painleve_system::terminal::{self, warn};
