@@ -4,6 +4,8 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use painleve_files::atomic_file::{self, commit_all, prepare};
+use painleve_process::terminal::warn;
 use painleve_study_core::outcome;
 use painleve_study_sweep::campaign::{Campaign, Understood};
 use painleve_study_sweep::folder::path_as_text;
@@ -11,8 +13,6 @@ use painleve_study_sweep::manifest::Manifest;
 use painleve_study_sweep::share::{self, ShardOption, Share};
 use painleve_study_sweep::slurm::Job;
 use painleve_study_sweep::{SweepError, array, folder, shard_file};
-use painleve_system::atomic_file::{self, commit_all, prepare};
-use painleve_system::terminal::warn;
 use serde::Serialize;
 use serde_json::json;
 

@@ -103,7 +103,7 @@ fn run(arguments: &ChaosArguments) -> io::Result<()> {
     std::fs::copy(painleve_tests::program(), &program)?;
     // This process adopts orphans, as systemd or a container would.
     set_child_subreaper(true)?;
-    painleve_system::interrupt::restore_default_actions()?;
+    painleve_process::interrupt::restore_default_actions()?;
     let runtime = tempfile::tempdir()?;
     let segments_before = unused_segments()?;
 

@@ -1,16 +1,16 @@
 //! Output files of a study, and the number of threads that compute it.
 
-use painleve_system::terminal;
+use painleve_process::terminal;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::ContentArrangement;
 use comfy_table::presets::ASCII_MARKDOWN;
+use painleve_chart::picture;
+use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_study_core::Study;
 use painleve_study_core::catalogue::{AnyOutcome, AnyStudy};
-use painleve_system::atomic_file::{commit_all, prepare};
-use painleve_system::picture;
 
 use crate::output_error::output;
 use crate::process_error::ProcessError;

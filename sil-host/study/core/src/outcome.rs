@@ -33,7 +33,7 @@ pub fn csv(outcome: &impl Outcome) -> Result<Vec<u8>, csv::Error> {
         .map_err(|error| csv::Error::from(error.into_error()))
 }
 
-pub use painleve_system::terminal::table;
+pub use painleve_process::terminal::table;
 
 /// The name under which a value is serialised.
 pub fn name(value: &impl Serialize) -> String {

@@ -10,9 +10,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use painleve_files::input_file;
 use painleve_plant::scenario::{ScenarioError, TomlError, known_names};
 use painleve_study_core::StudyError;
-use painleve_system::input_file;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 use xxhash_rust::xxh3::xxh3_128;

@@ -25,7 +25,7 @@ pub mod slurm;
 
 use std::path::PathBuf;
 
-use painleve_system::atomic_file::AtomicFileError;
+use painleve_files::atomic_file::AtomicFileError;
 
 use painleve_study_core::StudyError;
 

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use painleve_files::atomic_file::{self, AtomicFileError};
+use painleve_files::input_file;
 use painleve_plant::scenario::TomlError;
 use painleve_study_core::{MOST_ROWS, StudyError};
-use painleve_system::atomic_file::{self, AtomicFileError};
-use painleve_system::input_file;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 use xxhash_rust::xxh3::xxh3_128;

@@ -13,8 +13,8 @@
 use std::path::{Path, PathBuf};
 
 use csv::ByteRecord;
+use painleve_files::{atomic_file, input_file};
 use painleve_study_core::tabular::Records;
-use painleve_system::{atomic_file, input_file};
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::SweepError;
