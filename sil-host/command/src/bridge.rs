@@ -7,12 +7,12 @@ use clap::{Args, Subcommand};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::{TickTimes, TimingReport};
 use painleve_board::{BoardError, ConnectedBoard, Drivers, LineHealth, Serial};
+use painleve_files::atomic_file::AtomicFile;
 use painleve_link::{Pacing, Received};
 use painleve_plant::Configuration;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::warn;
 use painleve_shared::message::FrameSource;
-use painleve_system::atomic_file::AtomicFile;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::terminal::warn;
 
 use super::distinct_files;
 use super::join::JoinArguments;

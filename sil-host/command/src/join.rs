@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use painleve_link::{BusName, ControllerEnd, Pair, Session};
 use painleve_plant::Configuration;
-use painleve_system::interrupt::Interrupt;
+use painleve_process::interrupt::Interrupt;
 
 use super::CommandError;
 use super::patience::{PatienceArguments, WAIT_S};

@@ -5,19 +5,19 @@ use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use painleve_files::atomic_file::AtomicFile;
 use painleve_plant::Event;
 use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::warn;
 use painleve_record::csv_table::CsvTable;
 use painleve_record::events::RunEvent;
 use painleve_record::mcap_log::Source;
 use painleve_record::plot::PlotFile;
 use painleve_record::recorder::Sinks;
 use painleve_record::{McapLog, RecordError, RecordedTick, Recorder, RunPlot, Sink};
-use painleve_system::atomic_file::AtomicFile;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::terminal::warn;
 
 use painleve_view::PageFile;
 

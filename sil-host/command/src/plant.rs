@@ -11,11 +11,11 @@ use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult};
 use painleve_plant::controller_host::ControllerHost;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::realtime::request_realtime;
+use painleve_process::terminal::warn;
 use painleve_record::report::{DurationPercentiles, RunReport};
 use painleve_shared::status::Fault;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::realtime::request_realtime;
-use painleve_system::terminal::warn;
 
 use super::output::{Output, OutputArguments};
 use super::patience::{PatienceArguments, WAIT_S};

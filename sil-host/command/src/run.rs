@@ -8,13 +8,13 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use painleve_board::{emulator, serial};
+use painleve_files::input_file;
 use painleve_link::{BusName, Pacing, Pair};
 use painleve_plant::scenario::{Scenario, built_in};
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::{self, warn};
 use painleve_record::report::RunReport;
-use painleve_study::robustness::{self, Arms};
-use painleve_system::input_file;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::terminal::{self, warn};
+use painleve_study_quality::robustness::{self, Arms};
 use painleve_view::access::Token;
 use tempfile::NamedTempFile;
 

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use painleve_link::{BusName, Pair};
-use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
+use painleve_process::lifetime::{Guarded, Signal, end_with_parent};
 
 use super::CommandError;
 use super::process_error::ProcessError;

@@ -7,18 +7,21 @@ use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
 use painleve_board::timing::{Cyclictest, CyclictestError, Metronome, TimingReport, Unit, report};
 use painleve_board::{ConnectedBoard, Drivers, OnBoard, SILENCE_LIMIT, Serial};
+use painleve_bound::BoundError;
+use painleve_bound::image::Image;
 use painleve_bound::report::Bound;
+use painleve_chart::picture;
+use painleve_files::atomic_file;
+use painleve_files::input_file;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_plant::simulation::Simulation;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::realtime::{FIFO_PRIORITY, request_realtime};
+use painleve_process::terminal::{self, warn};
 use painleve_shared::message::FrameSource;
-use painleve_system::atomic_file;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::picture;
-use painleve_system::realtime::{FIFO_PRIORITY, request_realtime};
-use painleve_system::terminal::{self, warn};
 
 use super::output_error::output;
 use super::run::Host;
@@ -74,7 +77,12 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
     if arguments.bound {
         let image = arguments.elf.clone();
         let image = image.unwrap_or_else(|| emulator::built_image("painleve-f405"));
-        let bound = Bound::of(&image)?;
+        let elf = input_file::bytes(&image, input_file::MOST_IMAGE_BYTES);
+        let elf = elf.map_err(|error| BoundError::Image {
+            path: image.clone(),
+            source: error.into(),
+        })?;
+        let bound = Bound::of(&Image::of(&image, &elf)?)?;
         return if arguments.json {
             say(serde_json::to_string(&bound).map_err(output)?)
         } else {

@@ -7,13 +7,13 @@ use painleve_board::BoardError;
 use painleve_board::arm::{ArmEvent, ConnectedArm};
 use painleve_commission::{OperatorTask, RawReadings, Rig};
 use painleve_plant::scenario::Scenario;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::warn;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::mounting::{Mounting, SensorParts};
 use painleve_shared::status::{Fault, SupervisorState};
-use painleve_system::interrupt::Interrupt;
-use painleve_system::terminal::warn;
 
 use crate::CommandError;
 use crate::drive::{Operator, OperatorCommand};

@@ -12,8 +12,8 @@ use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_shared::ArmParameters;
 use painleve_shared::frame::StatusFlags;
-use painleve_study::robustness::{Arms, Robustness};
-use painleve_study::rows;
+use painleve_study_core::rows;
+use painleve_study_quality::robustness::{Arms, Robustness};
 
 /// 0.5 % of the force cell's range.
 const NOISE: &str = "converters.force.noise_n=0.1";
