@@ -39,7 +39,6 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
-use painleve_bound::BoundError;
 use painleve_chart::picture;
 use painleve_commission::Mistake;
 use painleve_link::LinkError;
@@ -136,9 +135,6 @@ pub enum CommandError {
     /// There is no comparison with another program's wake-ups.
     #[error(transparent)]
     Cyclictest(#[from] CyclictestError),
-    /// The cycles of an image cannot be bounded.
-    #[error(transparent)]
-    Bound(#[from] BoundError),
     /// The arm has a mistake that no setting can describe.
     #[error("{0}")]
     Mounting(Mistake),
@@ -188,10 +184,7 @@ impl CommandError {
     /// 4: an output cannot be written; 5: deadlines missed; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Scenario(_)
-            | Self::Input(_)
-            | Self::Cyclictest(CyclictestError::OtherHost)
-            | Self::Bound(_) => 2,
+            Self::Scenario(_) | Self::Input(_) | Self::Cyclictest(CyclictestError::OtherHost) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
                 StudyError::Unwritable { .. } => 4,

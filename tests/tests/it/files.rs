@@ -360,7 +360,6 @@ fn pipes_and_devices_are_refused_at_once() {
             1,
             "shard-9.csv cannot be read: it is not a regular file",
         ),
-        ("timing --bound --elf pipe", 2, "not a regular file"),
     ] {
         let words: Vec<_> = line.split_whitespace().collect();
         let (output, _) = bench.start(&words).end(SOON);
