@@ -3,7 +3,7 @@
 use super::*;
 use crate::outcome::plain;
 use crate::robustness::tables::rows;
-use crate::robustness::{Arms, Ending};
+use crate::robustness::{Arms, Criterion, Ending};
 
 #[test]
 fn each_part_has_a_line() {
@@ -11,6 +11,7 @@ fn each_part_has_a_line() {
         campaign: Robustness {
             arms: Arms::Paper,
             seed: 7,
+            criterion: Criterion::InPlace,
             runs: 4,
             overrides: Vec::new(),
         },

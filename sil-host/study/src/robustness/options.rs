@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{Arms, Part, Robustness, RobustnessOutcome, Row};
+use super::{Arms, Criterion, Part, Robustness, RobustnessOutcome, Row};
 use crate::StudyError;
 use crate::catalogue::{InShards, StudyOptions, in_shards};
 
@@ -17,6 +17,9 @@ pub struct CampaignOptions {
     /// Parts of the controller to switch off.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
     pub without: Vec<Part>,
+    /// What counts as a success: the tip was kept on the belt without a fault, or is also in place at the end.
+    #[arg(long, value_enum, default_value_t)]
+    criterion: Criterion,
     #[command(flatten)]
     runs: RandomRuns,
 }
@@ -27,6 +30,7 @@ impl CampaignOptions {
         Robustness {
             arms: self.arms,
             seed: self.runs.seed,
+            criterion: self.criterion,
             runs: self.runs.runs,
             overrides: self.runs.overrides(),
         }
@@ -59,6 +63,6 @@ impl StudyOptions for Options {
     }
 
     fn outcome(study: &Robustness, rows: Vec<Row>) -> RobustnessOutcome {
-        RobustnessOutcome::new(study.arms, study.seed, rows)
+        RobustnessOutcome::new(study.arms, study.seed, study.criterion, rows)
     }
 }
