@@ -52,7 +52,7 @@ pub trait LoopStudy: Study {
 /// use painleve_shared::JointTorque;
 /// use painleve_shared::range::OutOfRange;
 /// use painleve_study::loop_study::OnPlant;
-/// use painleve_study::robustness::{Arms, Robustness};
+/// use painleve_study::robustness::{Arms, Criterion, Robustness};
 ///
 /// /// The arm with motors that give 2 % less torque than commanded.
 /// struct WeakMotors(BuiltInPlant);
@@ -80,12 +80,13 @@ pub trait LoopStudy: Study {
 /// let campaign = Robustness {
 ///     arms: Arms::Paper,
 ///     seed: 1,
+///     criterion: Criterion::Kept,
 ///     runs: 2,
 ///     overrides: Vec::new(),
 /// };
 /// let study = OnPlant { study: campaign, plants: WeakMotors::new };
 /// let rows = painleve_study::rows(&study, || ())?;
-/// assert!(rows.iter().all(|row| row.ending.is_success()));
+/// assert!(rows.iter().all(|row| row.ending.is_kept()));
 /// # Ok::<(), painleve_study::StudyError>(())
 /// ```
 #[derive(Clone, Debug)]

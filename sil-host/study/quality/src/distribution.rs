@@ -18,6 +18,8 @@ pub struct Percentiles {
     pub median: f64,
     /// 90th percentile.
     pub p90: f64,
+    /// 95th percentile.
+    pub p95: f64,
     /// 99th percentile.
     pub p99: f64,
     /// The largest value.
@@ -39,6 +41,7 @@ impl Percentiles {
             count: values.len(),
             median: at(0.5),
             p90: at(0.9),
+            p95: at(0.95),
             p99: at(0.99),
             max,
         })
@@ -97,7 +100,7 @@ mod tests {
     #[test]
     fn percentiles_are_among_the_values() {
         let found = Percentiles::of((1..=200).rev().map(f64::from).collect()).unwrap();
-        assert_eq!((found.median, found.p90, found.p99), (100.0, 180.0, 198.0));
+        assert_eq!((found.median, found.p95, found.p99), (100.0, 190.0, 198.0));
         assert_eq!((found.count, found.max), (200, 200.0));
         assert_eq!(Percentiles::of(Vec::new()), None);
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::AblationStudy;
 use crate::paired_difference::PairedDifference;
 use crate::proportion::Proportion;
-use crate::robustness::{Ending, Part, RobustnessOutcome, Row};
+use crate::robustness::{Criterion, Ending, Part, Robustness, RobustnessOutcome, Row};
 
 /// Result of the campaign without one part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -38,13 +38,15 @@ pub struct Ablated {
     pub not_captured: usize,
     /// Runs with a fault, or whose plant could not be solved.
     pub faults: usize,
-    /// Mean distance from target or governed edge at the end, mm.
+    /// Mean distance from the governed reference at the end, mm.
     pub mean_error_mm: f64,
 }
 
 /// The contribution of each part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ablation {
+    /// What counts as a success.
+    pub criterion: Criterion,
     /// The whole controller first, then one line per part.
     pub rows: Vec<Ablated>,
 }
@@ -55,15 +57,21 @@ impl Ablation {
         let runs = study.campaign.runs.max(1);
         let without = std::iter::once(None).chain(study.parts.iter().copied().map(Some));
         let whole = &rows[..runs.min(rows.len())];
+        let Robustness {
+            arms,
+            seed,
+            criterion,
+            ..
+        } = study.campaign;
         let rows = without
             .zip(rows.chunks(runs))
             .map(|(without, rows)| {
-                let campaign =
-                    RobustnessOutcome::new(study.campaign.arms, study.campaign.seed, rows.to_vec());
+                let campaign = RobustnessOutcome::new(arms, seed, criterion, rows.to_vec());
                 let differing = |with: bool| {
                     let pairs = whole.iter().zip(rows);
                     let succeed = |(one, other): &(&Row, &Row)| {
-                        (one.ending.is_success(), other.ending.is_success()) == (with, !with)
+                        (criterion.holds(one.ending), criterion.holds(other.ending))
+                            == (with, !with)
                     };
                     pairs.filter(succeed).count()
                 };
@@ -87,7 +95,7 @@ impl Ablation {
                 }
             })
             .collect();
-        Self { rows }
+        Self { criterion, rows }
     }
 }
 
@@ -118,7 +126,7 @@ impl Outcome for Ablation {
     fn table(&self) -> Table {
         let mut table = outcome::table([
             "controller",
-            "success (95 %)",
+            &format!("{} (95 %)", self.criterion.words()),
             "paired difference (95 %)",
             "lift-off",
             "not reached",

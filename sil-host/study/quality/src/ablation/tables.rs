@@ -4,7 +4,7 @@ use crate::plain;
 
 use super::*;
 use crate::robustness::tables::rows;
-use crate::robustness::{Arms, Ending};
+use crate::robustness::{Arms, Criterion, Ending};
 
 #[test]
 fn each_part_has_a_line() {
@@ -12,6 +12,7 @@ fn each_part_has_a_line() {
         campaign: Robustness {
             arms: Arms::Paper,
             seed: 7,
+            criterion: Criterion::InPlace,
             runs: 4,
             overrides: Vec::new(),
         },

@@ -30,8 +30,10 @@ impl Figure for EffectsOutcome {
         Chart {
             title: "Tolerance of the closed loop to each effect".into(),
             subtitle: format!(
-                "{} random closed loops at each level, seed {}; grey lines: the levels tried",
-                self.runs, self.seed
+                "Share of {} random closed loops at each level, seed {}, that is {}; grey lines: the levels tried",
+                self.runs,
+                self.seed,
+                self.criterion.words()
             ),
             x_title: "Level relative to the typical one given with each name, log₂ (1 is double)"
                 .into(),
@@ -94,7 +96,7 @@ fn panel(all: &[Series], is_first: bool) -> Panel {
         });
         marks.push(Mark::Dots {
             name: if is_first {
-                format!("success below {:.0} %", 100.0 * rate)
+                format!("below {:.0} %", 100.0 * rate)
             } else {
                 String::new()
             },

@@ -1,4 +1,4 @@
-//! Success against the level of each effect of a real rig that the paper's arm lacks.
+//! How often the tip is kept on the belt, and where it ends, against the level of each effect of a real rig that the paper's arm lacks.
 //!
 //! Every cell (controller, contact, effect, level) runs the same random closed loops: an exactly known
 //! arm, friction 0.3 … 0.9, belt 0.1 … 1 m/s, either posture, 1 kHz, encoders of 14 bits, force and
@@ -24,7 +24,7 @@ use painleve_study_core::tabular::Tabular;
 use painleve_study_core::{Study, StudyError};
 use serde::Serialize;
 
-use crate::robustness::{Ending, judge};
+use crate::robustness::{Criterion, Ending, judge};
 
 pub use effect::{Contact, RigEffect};
 pub use list::{EFFECTS, find};
@@ -44,6 +44,8 @@ pub struct EffectsStudy {
     pub levels: Vec<f64>,
     /// Seed of all runs.
     pub seed: u64,
+    /// What counts as a success.
+    pub criterion: Criterion,
     /// Runs of each cell.
     pub runs: usize,
     /// Overrides applied to every scenario after those of the effect.
@@ -82,8 +84,10 @@ pub struct Row {
     pub fault: Option<u8>,
     /// Number of lift-offs after the capture.
     pub lift_offs: u64,
-    /// Largest final distance from target or governed edge, m.
+    /// Largest final distance from the governed reference, m.
     pub error_m: f64,
+    /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.
+    pub to_edge_m: f64,
     /// p in the arm's final posture as a fraction of Q22.
     pub p_ratio: f64,
     /// Final tip position, m.
@@ -175,6 +179,7 @@ impl LoopStudy for EffectsStudy {
             fault: judged.fault,
             lift_offs: judged.lift_offs,
             error_m: judged.error_m,
+            to_edge_m: judged.to_edge_m,
             p_ratio: judged.p_ratio,
             tip_t_m: judged.tip_t_m,
             target_m: judged.target_m,

@@ -7,8 +7,9 @@ use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::options::{ControllerOptions, RandomRuns, level};
 
 use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
+use crate::robustness::Criterion;
 
-/// Success against the level of each effect of a real rig, on rigid and on compliant contact.
+/// How often the tip is kept, and where it ends, against the level of each effect of a real rig.
 #[derive(Debug, Args)]
 #[command(mut_arg("runs", |runs| runs.default_value("100").help("Number of runs of each level")))]
 pub struct Options {
@@ -41,6 +42,9 @@ pub struct Options {
         requires = "effect"
     )]
     level: Vec<f64>,
+    /// What counts as a success: the tip was kept on the belt without a fault, or is also in place at the end.
+    #[arg(long, value_enum, default_value_t)]
+    criterion: Criterion,
     #[command(flatten)]
     runs: RandomRuns,
 }
@@ -73,6 +77,7 @@ impl StudyOptions for Options {
             effects,
             levels: self.level.clone(),
             seed: self.runs.seed,
+            criterion: self.criterion,
             runs: self.runs.runs,
             overrides: self.runs.overrides(),
         };

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::{Contact, EFFECTS, EffectsStudy, RigEffect, Row, find};
 use crate::proportion::Proportion;
+use crate::robustness::{Criterion, Place};
 
 /// Success rates for which the study finds the levels.
 pub const RATES: [f64; 3] = [0.99, 0.9, 0.5];
@@ -17,6 +18,9 @@ pub struct LevelSuccess {
     pub level: f64,
     /// Success rate.
     pub success: Proportion,
+    /// Where the tip ends.
+    #[serde(flatten)]
+    pub place: Place,
 }
 
 /// Success at all levels of an effect.
@@ -57,6 +61,8 @@ pub enum Fall {
 pub struct EffectsOutcome {
     /// Seed of all runs.
     pub seed: u64,
+    /// What counts as a success.
+    pub criterion: Criterion,
     /// Runs of each level.
     pub runs: usize,
     /// Success by controller, contact and effect.
@@ -71,10 +77,14 @@ impl EffectsOutcome {
     pub fn new(study: &EffectsStudy, rows: Vec<Row>) -> Self {
         let mut effects: Vec<Series> = Vec::new();
         for (place, rows) in study.cells().iter().zip(rows.chunks(study.runs.max(1))) {
-            let successes = rows.iter().filter(|row| row.ending.is_success()).count();
+            let succeeds = |row: &&Row| study.criterion.holds(row.ending);
             let cell = LevelSuccess {
                 level: place.level,
-                success: Proportion::new(successes, rows.len()),
+                success: Proportion::new(rows.iter().filter(succeeds).count(), rows.len()),
+                place: Place::of(
+                    rows.iter()
+                        .map(|row| (row.ending, row.error_m, row.to_edge_m)),
+                ),
             };
             let (controller, effect) = (place.controller.to_string(), place.effect);
             match effects.last_mut() {
@@ -102,6 +112,7 @@ impl EffectsOutcome {
         }
         Self {
             seed: study.seed,
+            criterion: study.criterion,
             runs: study.runs,
             effects,
             rows,
@@ -177,7 +188,9 @@ impl Outcome for EffectsOutcome {
         let mut table = outcome::table([
             "controller, contact",
             "effect, its key and unit",
-            "level: success (95 %), %",
+            &format!("level: {} (95 %), %", self.criterion.words()),
+            "error, mm: median (95 %)",
+            "before the edge, mm",
             "below 99 %",
             "90 %",
             "50 %",
@@ -193,6 +206,17 @@ impl Outcome for EffectsOutcome {
                 let level = number(cell.level);
                 format!("{level}: {rate:.0} ({lower:.0}–{upper:.0})")
             });
+            let typical = series.cells.iter().rev().find(|cell| {
+                let effect = series.effect();
+                effect.severity(cell.level) <= 1.0
+            });
+            let place = typical.or(series.cells.first()).map(|cell| &cell.place);
+            let millimetres = |of: fn(&Place) -> Option<Percentiles>| {
+                place.and_then(of).map_or("–".into(), |values| {
+                    let [median, p95] = [values.median, values.p95].map(|value| 1e3 * value);
+                    format!("{median:.2} ({p95:.2})")
+                })
+            };
             let [most, some, half] = series.falls_below.map(|fall| fall.to_string());
             let is_new = before != loop_of;
             table.add_row([
@@ -203,6 +227,8 @@ impl Outcome for EffectsOutcome {
                 },
                 series.name(),
                 cells.collect::<Vec<_>>().join(", "),
+                millimetres(|place| place.error_m),
+                millimetres(|place| place.to_edge_m),
                 most,
                 some,
                 half,

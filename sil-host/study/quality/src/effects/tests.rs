@@ -17,6 +17,7 @@ fn study(effects: &[&'static str], runs: usize) -> EffectsStudy {
         effects: effects.to_vec(),
         levels: Vec::new(),
         seed: 1,
+        criterion: Criterion::InPlace,
         runs,
         overrides: Vec::new(),
     }
@@ -181,7 +182,8 @@ fn the_table_interpolates_between_levels() {
             },
             fault: None,
             lift_offs: 0,
-            error_m: 1e-4,
+            error_m: 1e-4 * (run + 1) as f64,
+            to_edge_m: 2e-3,
             p_ratio: 0.5,
             tip_t_m: 0.1,
             target_m: 0.1,

@@ -6,8 +6,8 @@ use painleve_chart::style::{BLUE_INK, GREY};
 use painleve_chart::{Chart, Mark, Panel};
 use painleve_study_core::outcome::Figure;
 
-use super::Row;
 use super::outcome::RobustnessOutcome;
+use super::{Criterion, Row};
 use crate::proportion::Proportion;
 
 /// Number of bins of a factor.
@@ -36,7 +36,7 @@ const FACTORS: [Factor; 8] = [
 
 impl Figure for RobustnessOutcome {
     fn svg(&self) -> String {
-        let factors = FACTORS.map(|factor| (bins(&self.rows, &factor), factor));
+        let factors = FACTORS.map(|factor| (bins(&self.rows, &factor, self.criterion), factor));
         let lowest = factors
             .iter()
             .flat_map(|(bins, _)| bins)
@@ -50,7 +50,8 @@ impl Figure for RobustnessOutcome {
         Chart {
             title: "Robustness".into(),
             subtitle: format!(
-                "success {}\nin equal bins of each factor, with 95 % intervals; grey: all runs",
+                "{} {}\nin equal bins of each factor, with 95 % intervals; grey: all runs",
+                self.criterion.words(),
                 self.success
             ),
             panels: panels.collect(),
@@ -62,13 +63,13 @@ impl Figure for RobustnessOutcome {
 }
 
 /// Returns the success in each bin of a factor that has runs, with the bin's middle.
-fn bins(rows: &[Row], (_, range, value): &Factor) -> Vec<(f64, Proportion)> {
+fn bins(rows: &[Row], (_, range, value): &Factor, criterion: Criterion) -> Vec<(f64, Proportion)> {
     let width = (range.end - range.start) / BINS as f64;
     let mut counts = [(0, 0); BINS];
     for row in rows {
         let bin = ((value(row) - range.start) / width).max(0.0) as usize;
         let (successes, runs) = &mut counts[bin.min(BINS - 1)];
-        *successes += usize::from(row.ending.is_success());
+        *successes += usize::from(criterion.holds(row.ending));
         *runs += 1;
     }
     let bins = counts.iter().enumerate().filter(|(_, (_, runs))| *runs > 0);
@@ -131,7 +132,7 @@ mod tests {
             row(0.2, Ending::Fault),
             row(1.0, Ending::Reached),
         ];
-        let found = bins(&rows, &FACTORS[0]);
+        let found = bins(&rows, &FACTORS[0], Criterion::Kept);
         let counts: Vec<_> = found.iter().map(|(_, p)| (p.successes, p.runs)).collect();
         assert_eq!(counts, [(1, 2), (1, 1)]);
     }

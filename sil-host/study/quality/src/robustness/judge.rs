@@ -35,7 +35,8 @@ const SHORT_P_RATIO: f64 = 0.1;
 pub enum LiftOffRule {
     /// A single lift-off fails the run.
     Fail,
-    /// Lift-offs are only counted, because the effect throws the tip off, not the controller.
+    /// Lift-offs are only counted, because the effect throws the tip off, not the controller; the tip must be back at
+    /// the end.
     Counted,
 }
 
@@ -101,7 +102,7 @@ pub fn run<P: Plant>(
         Ending::Fault
     } else if !captured {
         Ending::NotCaptured
-    } else if contact.lift_offs > 0 && judged == LiftOffRule::Fail {
+    } else if contact.lift_offs > 0 && (judged == LiftOffRule::Fail || !contact.touches()) {
         Ending::LiftOff
     } else if of_target_m <= tolerance_m {
         Ending::Reached
@@ -122,11 +123,7 @@ pub fn run<P: Plant>(
         capture_s: contact.captured_s.map(|start_s| start_s - enabled_s),
         lift_offs: contact.lift_offs,
         first_lift_off_s: contact.first_lift_off_s,
-        error_m: if at_edge {
-            of_target_m.min(of_governed_m)
-        } else {
-            of_target_m
-        },
+        error_m: of_governed_m,
         tolerance_m,
         to_edge_m,
         p_ratio,

@@ -1,8 +1,9 @@
 //! The robustness campaign: closed loops drawn at random, with an arm, a belt, converters
 //! and a link that the controller does not know.
 //!
-//! A run succeeds if the tip is captured in time, never leaves the belt again, and ends at
-//! its reference or, where that is beyond the edge, at the governed edge.
+//! A run succeeds if the tip is captured in time and never leaves the belt again, without a fault. Where it ends is
+//! told apart from that: its distance from the governed reference, and from the true edge where the governed one holds
+//! it. By [`Criterion::InPlace`], a success must also end in place.
 
 mod arms;
 mod draw;
@@ -29,9 +30,9 @@ pub use draw::scenario;
 pub use false_alarms::FalseAlarms;
 pub use judge::LiftOffRule;
 pub use options::{CampaignOptions, Options};
-pub use outcome::RobustnessOutcome;
+pub use outcome::{Place, RobustnessOutcome};
 pub use part::Part;
-pub use row::{Ending, Row};
+pub use row::{Criterion, Ending, Row};
 
 /// Settings of the campaign.
 #[derive(Clone, Debug)]
@@ -40,6 +41,8 @@ pub struct Robustness {
     pub arms: Arms,
     /// Seed of all runs.
     pub seed: u64,
+    /// What counts as a success.
+    pub criterion: Criterion,
     /// Number of runs.
     pub runs: usize,
     /// Overrides applied to every scenario after it is drawn.

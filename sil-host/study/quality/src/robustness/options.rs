@@ -5,7 +5,7 @@ use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::options::RandomRuns;
 
-use super::{Arms, Part, Robustness, RobustnessOutcome, Row};
+use super::{Arms, Criterion, Part, Robustness, RobustnessOutcome, Row};
 
 /// Options of studies that run the campaign.
 #[derive(Debug, Args)]
@@ -16,6 +16,9 @@ pub struct CampaignOptions {
     /// Parts of the controller to switch off.
     #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
     pub without: Vec<Part>,
+    /// What counts as a success: the tip was kept on the belt without a fault, or is also in place at the end.
+    #[arg(long, value_enum, default_value_t)]
+    criterion: Criterion,
     #[command(flatten)]
     runs: RandomRuns,
 }
@@ -26,6 +29,7 @@ impl CampaignOptions {
         Robustness {
             arms: self.arms,
             seed: self.runs.seed,
+            criterion: self.criterion,
             runs: self.runs.runs,
             overrides: self.runs.overrides(),
         }
@@ -58,6 +62,6 @@ impl StudyOptions for Options {
     }
 
     fn outcome(study: &Robustness, rows: Vec<Row>) -> RobustnessOutcome {
-        RobustnessOutcome::new(study.arms, study.seed, rows)
+        RobustnessOutcome::new(study.arms, study.seed, study.criterion, rows)
     }
 }

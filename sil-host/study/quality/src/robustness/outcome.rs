@@ -6,12 +6,35 @@ use comfy_table::Table;
 use painleve_study_core::outcome::{self, Outcome};
 use serde::Serialize;
 
-use super::{Arms, Ending, Row};
+use super::{Arms, Criterion, Ending, Row};
 use crate::distribution::Percentiles;
 use crate::proportion::Proportion;
 
 /// Number of worst runs listed.
 const WORST: usize = 20;
+
+/// Where the tip ends in the runs in which it was kept.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Place {
+    /// Distance from the governed reference, m.
+    pub error_m: Option<Percentiles>,
+    /// Distance from the true edge where the governed edge holds it, m.
+    pub to_edge_m: Option<Percentiles>,
+}
+
+impl Place {
+    /// Collects the endings of runs: each with its error and its distance from the edge, m.
+    pub fn of(runs: impl Iterator<Item = (Ending, f64, f64)> + Clone) -> Self {
+        let kept = runs.filter(|(ending, ..)| ending.is_kept());
+        let at_edge = kept
+            .clone()
+            .filter(|(ending, ..)| *ending == Ending::AtEdge);
+        Self {
+            error_m: Percentiles::of(kept.map(|(_, error_m, _)| error_m).collect()),
+            to_edge_m: Percentiles::of(at_edge.map(|(.., to_edge_m)| to_edge_m).collect()),
+        }
+    }
+}
 
 /// Outcome of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -20,14 +43,14 @@ pub struct RobustnessOutcome {
     pub arms: Arms,
     /// Seed of the campaign.
     pub seed: u64,
+    /// What counts as a success.
+    pub criterion: Criterion,
     /// Success rate.
     pub success: Proportion,
-    /// Share of runs in which the tip stayed on the belt.
-    pub kept: Proportion,
-    /// Error at the end of these runs, m.
-    pub error_m: Option<Percentiles>,
-    /// How far before the edge it ends where the edge holds it, m.
-    pub to_edge_m: Option<Percentiles>,
+    /// Distance of the tip from the governed reference at the end of the runs in which it was kept, and how far before
+    /// the edge it ends where the edge holds it.
+    #[serde(flatten)]
+    pub place: Place,
     /// Change of torque from tick to tick in these runs while the tip moves, N·m.
     pub torque_change_moving_nm: Option<Percentiles>,
     /// The same while it stands.
@@ -48,13 +71,13 @@ pub struct RobustnessOutcome {
 
 impl RobustnessOutcome {
     /// Collects all rows.
-    pub fn new(arms: Arms, seed: u64, rows: Vec<Row>) -> Self {
+    pub fn new(arms: Arms, seed: u64, criterion: Criterion, rows: Vec<Row>) -> Self {
         let mut endings = BTreeMap::new();
         for row in &rows {
             *endings.entry(row.ending).or_insert(0) += 1;
         }
-        let successes = rows.iter().filter(|row| row.ending.is_success()).count();
-        let mut failed: Vec<&Row> = rows.iter().filter(|row| !row.ending.is_success()).collect();
+        let (succeeded, mut failed): (Vec<&Row>, Vec<&Row>) =
+            rows.iter().partition(|row| criterion.holds(row.ending));
         failed.sort_by(|one, other| {
             let errors = other.error_m.total_cmp(&one.error_m);
             other.ending.cmp(&one.ending).then(errors)
@@ -66,10 +89,12 @@ impl RobustnessOutcome {
         Self {
             arms,
             seed,
-            success: Proportion::new(successes, rows.len()),
-            kept: Proportion::new(kept.len(), rows.len()),
-            error_m: of(|row| Some(row.error_m)),
-            to_edge_m: of(|row| (row.ending == Ending::AtEdge).then_some(row.to_edge_m)),
+            criterion,
+            success: Proportion::new(succeeded.len(), rows.len()),
+            place: Place::of(
+                rows.iter()
+                    .map(|row| (row.ending, row.error_m, row.to_edge_m)),
+            ),
             torque_change_moving_nm: of(|row| row.torque_change_moving_nm),
             torque_change_holding_nm: of(|row| row.torque_change_holding_nm),
             force_ripple_n: of(|row| row.force_ripple_n),
@@ -101,11 +126,11 @@ impl Outcome for RobustnessOutcome {
             "rate (Hz)",
             "error (mm)",
         ]);
-        table.add_row(["success (95 %)", &self.success.to_string(), "", "", "", ""]);
-        table.add_row(["kept (95 %)", &self.kept.to_string(), "", "", "", ""]);
+        let success = format!("{} (95 %)", self.criterion.words());
+        table.add_row([&success, &self.success.to_string(), "", "", "", ""]);
         for (name, scale, values) in [
-            ("error (mm)", 1e3, &self.error_m),
-            ("before the edge (mm)", 1e3, &self.to_edge_m),
+            ("error (mm)", 1e3, &self.place.error_m),
+            ("before the edge (mm)", 1e3, &self.place.to_edge_m),
             (
                 "torque change, moving (mN·m)",
                 1e3,
@@ -119,8 +144,8 @@ impl Outcome for RobustnessOutcome {
             ("force ripple, holding (N)", 1.0, &self.force_ripple_n),
         ] {
             let values = values.as_ref().map_or("–".into(), |values| {
-                let [median, p90] = [values.median, values.p90].map(|value| scale * value);
-                format!("median {median:.3}, 90 %: {p90:.3}")
+                let [median, p95] = [values.median, values.p95].map(|value| scale * value);
+                format!("median {median:.3}, 95 %: {p95:.3}")
             });
             table.add_row([name, &values, "", "", "", ""]);
         }

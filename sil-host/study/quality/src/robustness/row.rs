@@ -1,7 +1,37 @@
 //! One run of the campaign and its ending.
 
+use clap::ValueEnum;
 use painleve_shared::Posture;
 use serde::Serialize;
+
+/// When a run counts as a success.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Criterion {
+    /// The tip was captured and kept on the belt, without a fault.
+    #[default]
+    Kept,
+    /// It also ends within 1 mm of target or governed edge, and that edge is near the true one.
+    InPlace,
+}
+
+impl Criterion {
+    /// Whether a run with this ending is a success.
+    pub fn holds(self, ending: Ending) -> bool {
+        match self {
+            Self::Kept => ending.is_kept(),
+            Self::InPlace => matches!(ending, Ending::Reached | Ending::AtEdge),
+        }
+    }
+
+    /// Returns the name in tables and figures.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Kept => "kept",
+            Self::InPlace => "in place",
+        }
+    }
+}
 
 /// Ending of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -15,7 +45,7 @@ pub enum Ending {
     StoppedEarly,
     /// Elsewhere.
     NotReached,
-    /// The tip left the belt after its capture.
+    /// The tip left the belt after its capture, or is in the air at the end.
     LiftOff,
     /// The tip was not captured in time.
     NotCaptured,
@@ -26,17 +56,12 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// Whether the tip was captured and never left the belt again.
+    /// Whether the tip was captured and kept on the belt, without a fault.
     pub fn is_kept(self) -> bool {
         matches!(
             self,
             Self::Reached | Self::AtEdge | Self::StoppedEarly | Self::NotReached
         )
-    }
-
-    /// Whether the run succeeded.
-    pub fn is_success(self) -> bool {
-        matches!(self, Self::Reached | Self::AtEdge)
     }
 }
 
@@ -55,7 +80,7 @@ pub struct Row {
     pub lift_offs: u64,
     /// Time of the first lift-off after the capture, s.
     pub first_lift_off_s: Option<f64>,
-    /// Largest final distance from target or governed edge, m.
+    /// Largest final distance from the governed reference, m.
     pub error_m: f64,
     /// Tolerance of the final distance, m.
     pub tolerance_m: f64,

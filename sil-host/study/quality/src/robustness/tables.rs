@@ -57,6 +57,7 @@ fn every_ending_is_counted_and_the_most_severe_come_first() {
     let found = RobustnessOutcome::new(
         Arms::Paper,
         7,
+        Criterion::InPlace,
         rows(&[
             (Ending::Reached, 1e-4),
             (Ending::LiftOff, 0.02),

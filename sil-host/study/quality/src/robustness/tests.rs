@@ -19,6 +19,7 @@ fn campaign(runs: usize) -> Robustness {
     Robustness {
         arms: Arms::Paper,
         seed: 1,
+        criterion: Criterion::InPlace,
         runs,
         overrides: Vec::new(),
     }
@@ -33,7 +34,7 @@ fn rows_do_not_depend_on_threads() {
     };
     let found = on(1);
     assert_eq!(found, on(3));
-    let outcome = RobustnessOutcome::new(Arms::Paper, 1, found);
+    let outcome = RobustnessOutcome::new(Arms::Paper, 1, Criterion::InPlace, found);
     assert_eq!(outcome.endings.values().sum::<usize>(), 12);
     let failed = 12 - outcome.success.successes;
     assert_eq!(outcome.worst.len(), failed);
@@ -47,7 +48,12 @@ fn the_runs_of_the_regression_seed_succeed() {
         seed: REGRESSION_SEED,
         ..campaign(300)
     };
-    let outcome = RobustnessOutcome::new(Arms::Paper, study.seed, rows(&study, || ()).unwrap());
+    let outcome = RobustnessOutcome::new(
+        Arms::Paper,
+        study.seed,
+        study.criterion,
+        rows(&study, || ()).unwrap(),
+    );
     assert!(outcome.success.successes >= 294, "{}", outcome.table());
 }
 
@@ -127,7 +133,12 @@ fn general_arms_succeed_too() {
         seed: 77_003,
         ..campaign(100)
     };
-    let outcome = RobustnessOutcome::new(Arms::General, study.seed, rows(&study, || ()).unwrap());
+    let outcome = RobustnessOutcome::new(
+        Arms::General,
+        study.seed,
+        study.criterion,
+        rows(&study, || ()).unwrap(),
+    );
     assert!(outcome.success.successes >= 97, "{}", outcome.table());
 }
 
