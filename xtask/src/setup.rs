@@ -83,7 +83,7 @@ fn install_required(sudo: bool) -> Result<(), ChoreError> {
         eprintln!("missing: the Rust target {TARGET}");
         if run_with("rustup", &["target", "add", TARGET], &[]).is_err() {
             eprintln!("rustup cannot add the target; falling back on Debian's compiler");
-            install(&["rustc-web", "cargo-web", "rust-web-src", "lld"], sudo)?;
+            install(&["rustc-web", "cargo-web", "rust-web-src", "lld-19"], sudo)?;
         }
     }
     if !starts("qemu-system-arm") {
