@@ -86,7 +86,7 @@ fn install_required(sudo: bool) -> Result<(), ChoreError> {
         eprintln!("missing: the Rust targets {}", missing.join(", "));
         if run_with("rustup", &[&["target", "add"], &missing[..]].concat(), &[]).is_err() {
             eprintln!("rustup cannot add the targets; falling back on Debian's compiler");
-            install(&["rustc-web", "cargo-web", "rust-web-src", "lld"], sudo)?;
+            install(&["rustc-web", "cargo-web", "rust-web-src", "lld-19"], sudo)?;
         }
     }
     if !starts("qemu-system-arm") {

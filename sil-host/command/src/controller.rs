@@ -7,16 +7,17 @@ use painleve_plant::law_choice::LawChoice;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::realtime::request_realtime;
 use painleve_process::terminal::warn;
+use serde::{Deserialize, Serialize};
 
 use super::join::JoinArguments;
 use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve controller`.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Serialize, Deserialize)]
 pub struct ControllerArguments {
     #[command(flatten)]
-    plant: JoinArguments,
+    pub plant: JoinArguments,
 }
 
 /// Answers the plant's frames until its session ends.

@@ -16,14 +16,17 @@ mod live;
 mod output;
 mod output_error;
 mod patience;
+mod plan;
 mod plant;
 mod process_error;
 mod progress;
 mod run;
 mod run_process;
+mod scenario;
 mod scenarios;
 mod study;
 mod sweep;
+mod system_path;
 mod timing;
 
 use std::io::Write;
@@ -54,6 +57,7 @@ use painleve_study_sweep::SweepError;
 use commission::BoardRigError;
 use fail_on::FailedCondition;
 use output_error::{InputError, OutputError, output};
+use plan::Plan;
 use process_error::ProcessError;
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
@@ -72,12 +76,8 @@ pub struct Cli {
 enum Command {
     /// Run plant and controller as two processes and print a report.
     Run(run::RunArguments),
-    /// Simulate belt and arm, and wait for a controller on the bus.
-    Plant(plant::PlantArguments),
-    /// Run the controller for the plant on the bus.
-    Controller(controller::ControllerArguments),
-    /// Connect the controller's image on a board to the plant's bus.
-    Bridge(bridge::BridgeArguments),
+    #[command(flatten)]
+    Process(Plan),
     /// Measure how the sensors and torque stages of an arm are mounted, and correct its scenario.
     Commission(commission::CommissionArguments),
     /// Drive a real arm through its board: watch, permit arming, record, stop.
@@ -310,15 +310,16 @@ pub fn main_with<L: ScenarioLaws>() -> ExitCode {
 
 /// Runs the command line and returns the exit code of the process.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(usage) => return tell_usage(&usage),
+    let command = match (Plan::of_this_process(), Cli::try_parse()) {
+        (Some(plan), _) => Command::Process(plan),
+        (None, Ok(cli)) => cli.command.unwrap_or(Command::Run(cli.run)),
+        (None, Err(usage)) => return tell_usage(&usage),
     };
     panic::set_hook(Box::new(tell_panic));
     // Values that a panic may have left inconsistent are not used afterwards.
     let result = panic::catch_unwind(AssertUnwindSafe(|| {
         ignore_file_size_limit()?;
-        execute(cli.command.unwrap_or(Command::Run(cli.run)))
+        execute(command)
     }));
     // The panic hook has already reported the panic.
     let result = result.unwrap_or(Err(CommandError::Told {
@@ -378,7 +379,7 @@ fn tell_panic(panic: &PanicHookInfo) {
 fn execute(command: Command) -> Result<(), CommandError> {
     match &command {
         // These commands clean up peers, files or boards themselves.
-        Command::Plant(_) | Command::Controller(_) | Command::Bridge(_) => {
+        Command::Process(_) => {
             exit_when_shared_memory_is_full(PEER_FAILED)?;
         }
         Command::Run(_)
@@ -398,9 +399,9 @@ fn execute(command: Command) -> Result<(), CommandError> {
     }
     match command {
         Command::Run(arguments) => run::run(&arguments),
-        Command::Plant(arguments) => plant::run(&arguments),
-        Command::Controller(arguments) => controller::run(&arguments),
-        Command::Bridge(arguments) => bridge::run(&arguments),
+        Command::Process(Plan::Plant(arguments)) => plant::run(&arguments),
+        Command::Process(Plan::Controller(arguments)) => controller::run(&arguments),
+        Command::Process(Plan::Bridge(arguments)) => bridge::run(&arguments),
         Command::Commission(arguments) => commission::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),

@@ -4,10 +4,10 @@ use core::ops::Range;
 
 use painleve_plant::scenario::Scenario;
 use painleve_shared::ArmParameters;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The arms of the campaign.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Arms {
     /// The paper's arm, with errors of up to 5 % and 20 % that the controller does not know.
