@@ -66,13 +66,8 @@ pub fn build(
             let environment = [
                 ("RUSTC", DEBIAN_RUSTC),
                 ("RUSTC_BOOTSTRAP", "1"),
-<<<<<<< HEAD
-                // Debian's compiler lacks the linker that the target specifies.
-                (&linker, "ld.lld"),
-=======
                 // Debian's compiler lacks the linker that the target specifies. Those before 17 cannot remap `memory.x`.
-                ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld-19"),
->>>>>>> h-layout
+                (&linker, "ld.lld-19"),
             ];
             run_with("/usr/bin/cargo", &build, &environment)?;
             for name in images {

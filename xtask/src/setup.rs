@@ -7,7 +7,7 @@ use clap::Args;
 
 use crate::build_fw::{debian_can_build, target_is_installed};
 use crate::command::{ChoreError, run_with, workspace};
-use crate::examples;
+use crate::{examples, policy};
 
 /// Executes the board's image in tests; see `tests/flash-image`.
 const UNICORN: &str = "unicorn==2.1.4";
@@ -15,7 +15,7 @@ const UNICORN: &str = "unicorn==2.1.4";
 /// Options of `cargo xtask setup`.
 #[derive(Debug, Args)]
 pub struct SetupArguments {
-    /// Also install what `cargo xtask test --all` uses: browser, Python environments, libclang, C++.
+    /// Also install what `cargo xtask test --all` uses: browser, Python environments, libclang, C++, the least Rust version.
     #[arg(long)]
     all: bool,
     /// Install Debian packages with sudo.
@@ -53,6 +53,7 @@ pub fn run(arguments: &SetupArguments) -> Result<(), ChoreError> {
     install_required(arguments.sudo)?;
     if tools == Tools::All {
         install(&missing_further(), arguments.sudo)?;
+        policy::install();
     }
     eprintln!("ready: `cargo xtask build-fw` builds the images");
     Ok(())
@@ -69,13 +70,17 @@ pub fn install_missing(tools: Tools) -> Result<Vec<&'static str>, ChoreError> {
         Tools::Default => Vec::new(),
         Tools::All => missing_further(),
     };
-    match install(&missing, false) {
-        Ok(()) => Ok(Vec::new()),
+    let mut missing = match install(&missing, false) {
+        Ok(()) => Vec::new(),
         Err(ChoreError(reason)) => {
             eprintln!("{reason}");
-            Ok(missing)
+            missing
         }
+    };
+    if tools == Tools::All {
+        missing.extend(policy::install());
     }
+    Ok(missing)
 }
 
 /// Installs the Rust targets, QEMU and Unicorn.
