@@ -5,6 +5,7 @@ use painleve_study_core::outcome::{self, Outcome};
 use serde::Serialize;
 
 use super::{Contact, EFFECTS, EffectsStudy, RigEffect, Row, find};
+use crate::distribution::Percentiles;
 use crate::proportion::Proportion;
 use crate::robustness::{Criterion, Place};
 
