@@ -5,8 +5,9 @@ use std::process::{Command, Stdio};
 
 use clap::Args;
 
-use crate::build_fw::{TARGET, debian_can_build, target_is_installed};
+use crate::build_fw::{debian_can_build, target_is_installed};
 use crate::command::{ChoreError, run_with, workspace};
+use crate::examples;
 
 /// Executes the board's image in tests; see `tests/flash-image`.
 const UNICORN: &str = "unicorn==2.1.4";
@@ -77,12 +78,14 @@ pub fn install_missing(tools: Tools) -> Result<Vec<&'static str>, ChoreError> {
     }
 }
 
-/// Installs the Rust target, QEMU and Unicorn.
+/// Installs the Rust targets, QEMU and Unicorn.
 fn install_required(sudo: bool) -> Result<(), ChoreError> {
-    if !target_is_installed() && !debian_can_build() {
-        eprintln!("missing: the Rust target {TARGET}");
-        if run_with("rustup", &["target", "add", TARGET], &[]).is_err() {
-            eprintln!("rustup cannot add the target; falling back on Debian's compiler");
+    let chips = examples::CHIPS.iter().map(|(chip, _)| *chip);
+    let missing: Vec<_> = chips.filter(|chip| !target_is_installed(chip)).collect();
+    if !missing.is_empty() && !debian_can_build() {
+        eprintln!("missing: the Rust targets {}", missing.join(", "));
+        if run_with("rustup", &[&["target", "add"], &missing[..]].concat(), &[]).is_err() {
+            eprintln!("rustup cannot add the targets; falling back on Debian's compiler");
             install(&["rustc-web", "cargo-web", "rust-web-src", "lld-19"], sudo)?;
         }
     }

@@ -61,6 +61,7 @@ pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
     };
     let missing = setup::install_missing(tools)?;
     build_fw::run()?;
+    examples::own_firmware()?;
     build_program()?;
     size::check_images()?;
     let mut left_out: Vec<String> = missing

@@ -42,7 +42,6 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
-use painleve_bound::BoundError;
 use painleve_chart::picture;
 use painleve_commission::Mistake;
 use painleve_link::LinkError;
@@ -136,9 +135,6 @@ pub enum CommandError {
     /// There is no comparison with another program's wake-ups.
     #[error(transparent)]
     Cyclictest(#[from] CyclictestError),
-    /// The cycles of an image cannot be bounded.
-    #[error(transparent)]
-    Bound(#[from] BoundError),
     /// The arm has a mistake that no setting can describe.
     #[error("{0}")]
     Mounting(Mistake),
@@ -188,10 +184,7 @@ impl CommandError {
     /// 4: an output cannot be written; 5: deadlines missed; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Scenario(_)
-            | Self::Input(_)
-            | Self::Cyclictest(CyclictestError::OtherHost)
-            | Self::Bound(_) => 2,
+            Self::Scenario(_) | Self::Input(_) | Self::Cyclictest(CyclictestError::OtherHost) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
                 StudyError::Unwritable { .. } => 4,
@@ -248,6 +241,18 @@ fn unsaid(error: std::io::Error) -> CommandError {
 
 /// Prints the help, the version or a usage error, and returns the exit code of the process.
 fn tell_usage(usage: &clap::Error) -> ExitCode {
+    if usage.kind() == clap::error::ErrorKind::InvalidUtf8 {
+        // clap does not say which one.
+        let unreadable: Vec<String> = std::env::args_os()
+            .filter(|argument| argument.to_str().is_none())
+            .map(|argument| format!("{argument:?}"))
+            .collect();
+        let arguments = unreadable.join(", ");
+        warn(format_args!(
+            "error: {arguments}: not UTF-8, as the names of scenarios and the values of settings must be"
+        ));
+        return ExitCode::from(2);
+    }
     let written = usage.print().and_then(|()| std::io::stdout().flush());
     match written.map_err(unsaid) {
         Err(error) if !usage.use_stderr() => exit_code_of(&error),

@@ -19,7 +19,13 @@ pub mod report;
 pub mod trace;
 pub mod worst;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// Returns the path of the F405's image in this workspace.
+pub fn built_image() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../target/thumbv7em-none-eabihf/firmware/painleve-f405")
+}
 
 /// Why a bound cannot be found.
 #[derive(Debug, thiserror::Error)]

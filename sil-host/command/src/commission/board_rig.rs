@@ -111,18 +111,26 @@ impl BoardRig {
         self.arm.stop()
     }
 
-    /// Returns the next tick with readings, if one arrives soon.
-    fn next_tick(&mut self) -> Result<Option<(SensorFrame, ActuatorFrame)>, BoardRigError> {
+    /// Returns what the board says next, if it says something soon.
+    fn next_event(&mut self) -> Result<Option<ArmEvent>, BoardRigError> {
         if self.interrupt.is_requested() {
             return Err(BoardRigError::Interrupted);
         }
-        let Some(ArmEvent::Tick { sensor, answer }) = self.arm.next_event(PATIENCE)? else {
-            return Ok(None);
-        };
-        if let Some(fault) = answer.latched_fault() {
+        let event = self.arm.next_event(PATIENCE)?;
+        if let Some(ArmEvent::Tick { answer, .. }) = &event
+            && let Some(fault) = answer.latched_fault()
+        {
             return Err(BoardRigError::Faulted(fault));
         }
-        Ok(sensor.map(|sensor| (sensor, answer)))
+        Ok(event)
+    }
+
+    /// Returns the next tick with readings, if one arrives soon.
+    fn next_tick(&mut self) -> Result<Option<(SensorFrame, ActuatorFrame)>, BoardRigError> {
+        Ok(match self.next_event()? {
+            Some(ArmEvent::Tick { sensor, answer }) => sensor.map(|sensor| (sensor, answer)),
+            _ => None,
+        })
     }
 
     /// Returns whether the operator has pressed the return key since the last call.
@@ -137,8 +145,12 @@ impl BoardRig {
     /// Waits until the operator has done a task.
     fn wait_for_operator(&mut self) -> Result<(), BoardRigError> {
         while !self.is_confirmed()? {
-            self.next_tick()?;
+            self.next_event()?;
         }
+        // On a busy machine, ticks from before the task was done may still wait on the line: all ticks behind the
+        // board's answer are later.
+        self.arm.ask_for_health()?;
+        while !matches!(self.next_event()?, Some(ArmEvent::Health(_))) {}
         Ok(())
     }
 
