@@ -41,4 +41,5 @@ pub const SOURCES: u64 = match u64::from_str_radix(env!("PAINLEVE_SOURCES"), 16)
 
 pub use configuration::Configuration;
 pub use controller::Controller;
+pub use painleve_shared::{OutOfRange, counts, frame, status};
 pub use telemetry::Telemetry;

@@ -15,8 +15,8 @@ use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
-use painleve_study::catalogue::{CatalogueEntry, Progress};
-use painleve_study::studies::{self, STUDIES};
+use painleve_study::STUDIES;
+use painleve_study_core::catalogue::{CatalogueEntry, Progress};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -406,7 +406,7 @@ fn study<'py>(
         let names: Vec<&str> = STUDIES.iter().map(|entry| entry.name).collect();
         PyValueError::new_err(format!("unknown study '{name}': {}", names.join(", ")))
     };
-    let entry = studies::find(name).ok_or_else(unknown)?;
+    let entry = painleve_study::find(name).ok_or_else(unknown)?;
     let arguments = options.map_or(Ok(Vec::new()), values::arguments)?;
     let json = interruptible::on_threads(py, |go_on| study_json(entry, arguments, go_on))??;
     py.import("json")?.call_method1("loads", (json,))

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use painleve_system::interrupt::restore_default_actions;
+use painleve_process::interrupt::restore_default_actions;
 use serde_json::Value;
 
 /// Says that a test does nothing, and why. Written to standard error past the test harness, and to the file named by

@@ -18,8 +18,8 @@ use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
 use painleve_board::{SILENCE_LIMIT, Serial};
 use painleve_plant::scenario::Scenario;
+use painleve_process::lifetime::{Guarded, end_with_parent};
 use painleve_shared::message::FrameSource;
-use painleve_system::lifetime::{Guarded, end_with_parent};
 
 use crate::serial_image;
 

@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::boards;
 use crate::command::{ChoreError, cargo, run_with, workspace};
 
-/// The microcontroller's target.
+/// The boards' target.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The profile of the images.
@@ -34,22 +34,23 @@ pub fn run() -> Result<(), ChoreError> {
         selection.extend(["--package", &board.package]);
     }
     let images: Vec<_> = boards.iter().flat_map(|board| &board.images).collect();
-    build(&selection, "target", PROFILE, &images)
+    build(TARGET, &selection, "target", PROFILE, &images)
 }
 
-/// Builds `images`, the programs that `selection` selects for cargo, with the profile `profile`
-/// into the workspace's folder `target`.
+/// Builds for the target `chip` what `selection` selects for cargo, among it the programs `images`, with the profile
+/// `profile` into the workspace's folder `target`.
 ///
 /// # Errors
 /// If the target is not installed, or the build fails.
 pub fn build(
+    chip: &str,
     selection: &[&str],
     target: &str,
     profile: &str,
     images: &[&String],
 ) -> Result<(), ChoreError> {
-    let build = [&["build", "--target", TARGET], selection].concat();
-    match toolchain()? {
+    let build = [&["build", "--target", chip], selection].concat();
+    match toolchain(chip)? {
         Toolchain::Installed => {
             let build = [&build[..], &["--target-dir", target]].concat();
             // Incremental compilation makes larger and slower images, beyond their budgets.
@@ -60,16 +61,18 @@ pub fn build(
             let folder = workspace().join("target/debian");
             let folder = folder.to_string_lossy();
             let build = [&build[..], &["-Zbuild-std=core", "--target-dir", &folder]].concat();
+            let variable = chip.to_uppercase().replace(['-', '.'], "_");
+            let linker = format!("CARGO_TARGET_{variable}_LINKER");
             let environment = [
                 ("RUSTC", DEBIAN_RUSTC),
                 ("RUSTC_BOOTSTRAP", "1"),
-                // Debian's compiler lacks the linker that the target specifies.
-                ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld"),
+                // Debian's compiler lacks the linker that the target specifies. Those before 17 cannot remap `memory.x`.
+                (&linker, "ld.lld-19"),
             ];
             run_with("/usr/bin/cargo", &build, &environment)?;
             for name in images {
-                let built = workspace().join(format!("target/debian/{TARGET}/{profile}/{name}"));
-                let image = workspace().join(format!("{target}/{TARGET}/{profile}/{name}"));
+                let built = workspace().join(format!("target/debian/{chip}/{profile}/{name}"));
+                let image = workspace().join(format!("{target}/{chip}/{profile}/{name}"));
                 copy(&built, &image)?;
             }
             Ok(())
@@ -87,11 +90,11 @@ pub fn image(name: &str) -> PathBuf {
     folder().join(name)
 }
 
-/// Returns whether `rustc` has the target's core library.
-pub fn target_is_installed() -> bool {
+/// Returns whether `rustc` has the core library of a target.
+pub fn target_is_installed(chip: &str) -> bool {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
     let Ok(output) = Command::new(rustc)
-        .args(["--print", "target-libdir", "--target", TARGET])
+        .args(["--print", "target-libdir", "--target", chip])
         .current_dir(workspace())
         .output()
     else {
@@ -118,14 +121,14 @@ pub fn debian_can_build() -> bool {
     })
 }
 
-fn toolchain() -> Result<Toolchain, ChoreError> {
-    if target_is_installed() {
+fn toolchain(chip: &str) -> Result<Toolchain, ChoreError> {
+    if target_is_installed(chip) {
         Ok(Toolchain::Installed)
     } else if debian_can_build() {
         Ok(Toolchain::Debian)
     } else {
         Err(ChoreError(format!(
-            "the Rust target {TARGET} is not installed: run `cargo xtask setup`"
+            "the Rust target {chip} is not installed: run `cargo xtask setup`"
         )))
     }
 }

@@ -10,18 +10,50 @@ use crate::{boards, build_fw};
 /// A common target folder of all examples, because they share most dependencies.
 const TARGET: &str = "target/examples";
 
-/// Handles every folder of `examples/` that has a `Cargo.toml`, sorted by name: builds the image
+/// A firmware that is not ours, with the controller in it.
+const OWN_FIRMWARE: &str = "examples/own-firmware/Cargo.toml";
+
+/// The targets for which it is built, and what of it: `cortex-m-rt`, with which its program starts, is for ARM. The
+/// boards' target is one of them.
+pub const CHIPS: [(&str, &str); 4] = [
+    (build_fw::TARGET, "--bins"),
+    ("thumbv6m-none-eabi", "--bins"),
+    ("thumbv8m.main-none-eabihf", "--bins"),
+    ("riscv32imac-unknown-none-elf", "--lib"),
+];
+
+/// Builds the example of a firmware for all its chips, and runs its tests on this machine.
+///
+/// # Errors
+/// If it does not build, or fails a test.
+pub fn own_firmware() -> Result<(), ChoreError> {
+    let manifest = ["--manifest-path", OWN_FIRMWARE];
+    for (chip, part) in CHIPS {
+        build_fw::build(
+            chip,
+            &[&[part], &manifest[..]].concat(),
+            TARGET,
+            "debug",
+            &[],
+        )?;
+    }
+    let test = ["test", "--lib", "--target-dir", TARGET];
+    run_cargo(&[&test[..], &manifest[..]].concat())
+}
+
+/// Handles the firmware, then every other folder of `examples/` that has a `Cargo.toml`, sorted by name: builds the image
 /// named by `[package.metadata] image`, runs the program, then its tests.
 ///
 /// # Errors
 /// If an example does not build, ends with an error, or fails a test.
 pub fn run() -> Result<(), ChoreError> {
+    own_firmware()?;
     for manifest in manifests()? {
         let manifest_path = manifest.to_string_lossy();
         let of_example = ["--release", "--manifest-path", &manifest_path];
         for image in images(&manifest)? {
             let selection = [&of_example[..], &["--bin", &image]].concat();
-            build_fw::build(&selection, TARGET, "release", &[&image])?;
+            build_fw::build(build_fw::TARGET, &selection, TARGET, "release", &[&image])?;
         }
         for chore in ["run", "test"] {
             run_cargo(&[&[chore], &of_example[..], &["--target-dir", TARGET]].concat())?;
@@ -44,7 +76,7 @@ fn manifests() -> Result<Vec<PathBuf>, ChoreError> {
     let mut manifests = Vec::new();
     for entry in fs::read_dir(&folder).map_err(error)? {
         let manifest = entry.map_err(error)?.path().join("Cargo.toml");
-        if manifest.is_file() {
+        if manifest.is_file() && !manifest.ends_with(OWN_FIRMWARE) {
             manifests.push(manifest);
         }
     }

@@ -12,6 +12,7 @@ mod flash;
 mod fmu;
 mod fuzz;
 mod measure;
+mod policy;
 mod python;
 mod setup;
 mod size;

@@ -5,8 +5,9 @@ use std::process::{Command, Stdio};
 
 use clap::Args;
 
-use crate::build_fw::{TARGET, debian_can_build, target_is_installed};
+use crate::build_fw::{debian_can_build, target_is_installed};
 use crate::command::{ChoreError, run_with, workspace};
+use crate::{examples, policy};
 
 /// Executes the board's image in tests; see `tests/flash-image`.
 const UNICORN: &str = "unicorn==2.1.4";
@@ -14,7 +15,7 @@ const UNICORN: &str = "unicorn==2.1.4";
 /// Options of `cargo xtask setup`.
 #[derive(Debug, Args)]
 pub struct SetupArguments {
-    /// Also install what `cargo xtask test --all` uses: browser, Python environments, libclang, C++.
+    /// Also install what `cargo xtask test --all` uses: browser, Python environments, libclang, C++, the least Rust version.
     #[arg(long)]
     all: bool,
     /// Install Debian packages with sudo.
@@ -52,6 +53,7 @@ pub fn run(arguments: &SetupArguments) -> Result<(), ChoreError> {
     install_required(arguments.sudo)?;
     if tools == Tools::All {
         install(&missing_further(), arguments.sudo)?;
+        policy::install();
     }
     eprintln!("ready: `cargo xtask build-fw` builds the images");
     Ok(())
@@ -68,22 +70,28 @@ pub fn install_missing(tools: Tools) -> Result<Vec<&'static str>, ChoreError> {
         Tools::Default => Vec::new(),
         Tools::All => missing_further(),
     };
-    match install(&missing, false) {
-        Ok(()) => Ok(Vec::new()),
+    let mut missing = match install(&missing, false) {
+        Ok(()) => Vec::new(),
         Err(ChoreError(reason)) => {
             eprintln!("{reason}");
-            Ok(missing)
+            missing
         }
+    };
+    if tools == Tools::All {
+        missing.extend(policy::install());
     }
+    Ok(missing)
 }
 
-/// Installs the Rust target, QEMU and Unicorn.
+/// Installs the Rust targets, QEMU and Unicorn.
 fn install_required(sudo: bool) -> Result<(), ChoreError> {
-    if !target_is_installed() && !debian_can_build() {
-        eprintln!("missing: the Rust target {TARGET}");
-        if run_with("rustup", &["target", "add", TARGET], &[]).is_err() {
-            eprintln!("rustup cannot add the target; falling back on Debian's compiler");
-            install(&["rustc-web", "cargo-web", "rust-web-src", "lld"], sudo)?;
+    let chips = examples::CHIPS.iter().map(|(chip, _)| *chip);
+    let missing: Vec<_> = chips.filter(|chip| !target_is_installed(chip)).collect();
+    if !missing.is_empty() && !debian_can_build() {
+        eprintln!("missing: the Rust targets {}", missing.join(", "));
+        if run_with("rustup", &[&["target", "add"], &missing[..]].concat(), &[]).is_err() {
+            eprintln!("rustup cannot add the targets; falling back on Debian's compiler");
+            install(&["rustc-web", "cargo-web", "rust-web-src", "lld-19"], sudo)?;
         }
     }
     if !starts("qemu-system-arm") {

@@ -8,6 +8,7 @@ pub mod open_loop;
 mod task;
 
 pub use self::task::{Answered, ControlTask, TaskCounts};
+pub use painleve_shared::message::FrameSource;
 
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 

@@ -8,12 +8,12 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
 
+use painleve_chips::wires::{Clock, ModelledBus, SelectPin, SharedPart};
+use painleve_chips::{As5048a, BitErrors, BridgeAmplifier, Mcp3304};
 use painleve_drivers::encoders::{self, EncoderDriver};
 use painleve_drivers::exchange::PolledDriver;
 use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_firmware::supervise::lapses::Lapse;
-use painleve_parts::wires::{Clock, ModelledBus, SelectPin, SharedPart};
-use painleve_parts::{As5048a, BitErrors, BridgeAmplifier, Mcp3304};
 use painleve_plant::{Configuration, Controller};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::SensorFrame;

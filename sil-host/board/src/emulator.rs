@@ -16,13 +16,13 @@ use command_fds::{CommandFdExt, FdMapping};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::Signal;
+use painleve_files::input_file;
 use painleve_plant::Configuration;
 use painleve_plant::law_choice::build;
+use painleve_process::lifetime::{Guarded, end_with_parent};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire;
-use painleve_system::input_file;
-use painleve_system::lifetime::{Guarded, end_with_parent};
 
 use super::{BoardError, ConnectedBoard, TimedAnswer, log};
 use crate::timing::Unit;

@@ -4,8 +4,8 @@ use std::io::Read;
 use std::path::Path;
 
 use defmt_decoder::DecodeError;
-use painleve_system::input_file;
-use painleve_system::terminal::warn;
+use painleve_files::input_file;
+use painleve_process::terminal::warn;
 
 use super::BoardError;
 

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use painleve_board::{BoardError, ConnectedBoard as _, Drivers, OnBoard};
-use painleve_parts::BridgeFailure;
+use painleve_chips::BridgeFailure;
 use painleve_plant::closed_loop::{ClosedLoop, LoopResult};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
 use painleve_plant::scenario::{Scenario, built_in};

@@ -1,4 +1,4 @@
-//! Charts as SVG, laid out as in the paper.
+//! Charts, laid out as in the paper.
 //!
 //! - [`chart`]: panels of curves, points and regions, stacked over one shared axis or side by side
 //! - [`canvas`]: shapes and text as an SVG file, for light and dark screens
@@ -6,6 +6,7 @@
 //! - [`style`]: colours, fonts and ticks common to all figures
 //! - [`decimate`]: runs of any length in bounded memory, with their extremes
 //! - [`axis`]: ranges that are robust to outliers, and their labels
+//! - [`picture`]: figures as SVG, PNG or PDF
 //!
 //! ```
 //! use painleve_chart::style::BLUE_INK;
@@ -31,6 +32,7 @@ pub mod chart;
 mod dark;
 pub mod decimate;
 pub mod markup;
+pub mod picture;
 pub mod style;
 
 pub use chart::{Chart, Mark, Panel};

@@ -24,8 +24,8 @@ use painleve_link::{BusName, ControllerEnd, LinkError, Pacing, PlantEnd, Receive
 use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
+use painleve_process::interrupt::Interrupt;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_system::interrupt::Interrupt;
 
 /// Environment variable of the second process: the bus on which it answers.
 const BUS: &str = "PAINLEVE_BENCH_BUS";

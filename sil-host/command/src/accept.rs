@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use painleve_accept::{AcceptError, StepReport, Verdict, accept};
 use painleve_board::Serial;
-use painleve_system::atomic_file;
-use painleve_system::terminal::warn;
+use painleve_files::atomic_file;
+use painleve_process::terminal::warn;
 
 use super::output_error::output;
 use super::{CommandError, distinct_files, say};

@@ -7,27 +7,30 @@ use clap::{Args, Subcommand};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::{TickTimes, TimingReport};
 use painleve_board::{BoardError, ConnectedBoard, Drivers, LineHealth, Serial};
+use painleve_files::atomic_file::AtomicFile;
 use painleve_link::{Pacing, Received};
 use painleve_plant::Configuration;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::warn;
 use painleve_shared::message::FrameSource;
-use painleve_system::atomic_file::AtomicFile;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::terminal::warn;
+use serde::{Deserialize, Serialize};
 
 use super::distinct_files;
 use super::join::JoinArguments;
 use super::output_error::output;
+use super::system_path::SystemPath;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve bridge`.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Serialize, Deserialize)]
 pub struct BridgeArguments {
     #[command(subcommand)]
-    target: BridgeTarget,
+    pub target: BridgeTarget,
 }
 
-#[derive(Debug, Subcommand)]
-enum BridgeTarget {
+/// Where the controller runs.
+#[derive(Debug, Subcommand, Serialize, Deserialize)]
+pub enum BridgeTarget {
     /// Run the image under QEMU: deterministic, with instruction counts.
     Qemu {
         #[command(flatten)]
@@ -43,7 +46,7 @@ enum BridgeTarget {
         lines: SensorLineArguments,
         /// Write the cost of every tick as JSON.
         #[arg(long, value_name = "PATH")]
-        timing: Option<PathBuf>,
+        timing: Option<SystemPath>,
     },
     /// Use a flashed board behind a serial port.
     Serial {
@@ -51,24 +54,25 @@ enum BridgeTarget {
         bus: BusArguments,
         /// Serial port, for example /dev/ttyUSB0.
         #[arg(long, value_name = "PATH")]
-        port: PathBuf,
+        port: SystemPath,
         /// Write the cost of every tick as JSON.
         #[arg(long, value_name = "PATH")]
-        timing: Option<PathBuf>,
+        timing: Option<SystemPath>,
     },
 }
 
-#[derive(Debug, Args)]
-struct BusArguments {
+/// The plant to join, and what the report says of it.
+#[derive(Debug, Args, Serialize, Deserialize)]
+pub struct BusArguments {
     #[command(flatten)]
-    plant: JoinArguments,
-    /// Scenario of the plant, for the report.
-    #[arg(long, hide = true, default_value = "")]
-    scenario_name: String,
+    pub plant: JoinArguments,
+    /// Name of the scenario, which `painleve run` knows.
+    #[arg(skip)]
+    pub scenario_name: String,
 }
 
 /// Disturbances of the sensor lines.
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args, Serialize, Deserialize)]
 pub struct SensorLineArguments {
     /// With --host drivers: probability that a bit on a sensor line is flipped.
     #[arg(long, value_name = "PROBABILITY", default_value_t = 0.0, value_parser = probability)]
@@ -83,37 +87,24 @@ fn probability(text: &str) -> Result<f64, String> {
 }
 
 /// The image to run, and which of its output to keep.
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args, Serialize, Deserialize)]
 pub struct ImageArguments {
     /// The controller's image; by default the workspace's own build.
     #[arg(long, value_name = "PATH")]
-    pub elf: Option<PathBuf>,
+    pub elf: Option<SystemPath>,
     /// Print the image's log.
     #[arg(long)]
     pub log: bool,
     /// Write the cost of every tick as JSON.
     #[arg(long, value_name = "PATH")]
-    pub timing: Option<PathBuf>,
+    pub timing: Option<SystemPath>,
 }
 
 impl ImageArguments {
     /// Returns the path of the image.
     pub fn path(&self) -> PathBuf {
-        self.elf.clone().unwrap_or_else(emulator::default_image)
-    }
-
-    /// Returns the same options as command-line arguments for a child process.
-    pub fn to_arguments(&self) -> Vec<std::ffi::OsString> {
-        let mut arguments = Vec::new();
-        for (option, path) in [("--elf", &self.elf), ("--timing", &self.timing)] {
-            if let Some(path) = path {
-                arguments.extend([option.into(), path.into()]);
-            }
-        }
-        if self.log {
-            arguments.push("--log".into());
-        }
-        arguments
+        let given = self.elf.as_deref().map(Path::to_path_buf);
+        given.unwrap_or_else(emulator::default_image)
     }
 }
 

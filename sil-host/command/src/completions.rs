@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
-use painleve_system::atomic_file::{AtomicFile, commit_all, prepare};
+use painleve_files::atomic_file::{AtomicFile, commit_all, prepare};
 use serde_json::json;
 
 use super::json::JsonOption;

@@ -4,19 +4,20 @@ use clap::Args;
 use painleve_firmware::drive::ControlTask;
 use painleve_link::{BusDrive, Pacing};
 use painleve_plant::law_choice::LawChoice;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::realtime::request_realtime;
-use painleve_system::terminal::warn;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::realtime::request_realtime;
+use painleve_process::terminal::warn;
+use serde::{Deserialize, Serialize};
 
 use super::join::JoinArguments;
 use super::process_error::ProcessError;
 use super::{CommandError, or_interrupted};
 
 /// Options of `painleve controller`.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Serialize, Deserialize)]
 pub struct ControllerArguments {
     #[command(flatten)]
-    plant: JoinArguments,
+    pub plant: JoinArguments,
 }
 
 /// Answers the plant's frames until its session ends.

@@ -7,8 +7,8 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Component, Path, PathBuf};
 
-use painleve_system::atomic_file::AtomicFile;
-use painleve_system::input_file;
+use painleve_files::atomic_file::AtomicFile;
+use painleve_files::input_file;
 
 use super::CommandError;
 use super::output_error::{InputError, output};

@@ -8,8 +8,8 @@ use painleve_board::emulator;
 use painleve_firmware::SOURCES;
 use painleve_link::{BusState, LinkError, SegmentState, Survey};
 use painleve_plant::law_choice::build;
-use painleve_system::realtime::request_realtime;
-use painleve_system::terminal;
+use painleve_process::realtime::request_realtime;
+use painleve_process::terminal;
 
 use super::{CommandError, say};
 

@@ -4,10 +4,10 @@ use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all, prepare};
+use painleve_files::input_file;
+use painleve_process::terminal::warn;
 use painleve_record::export::{ExportError, Exported, ticks_to_csv};
-use painleve_system::atomic_file::{AtomicFile, AtomicFileError, commit_all, prepare};
-use painleve_system::input_file;
-use painleve_system::terminal::warn;
 use serde_json::json;
 
 use super::output_error::{InputError, RecordFileError, output};
@@ -155,7 +155,7 @@ fn record_error<T, E: Into<RecordFileError>>(
 
 #[cfg(feature = "parquet")]
 fn columns(table: &[u8]) -> Result<Vec<u8>, CommandError> {
-    painleve_study::sweep::parquet::from_csv(table).map_err(output)
+    painleve_study_sweep::parquet::from_csv(table).map_err(output)
 }
 
 #[cfg(not(feature = "parquet"))]

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_plant::Event;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult, Monitor};
 use painleve_plant::controller_host::InProcess;
@@ -12,11 +13,10 @@ use painleve_plant::simulation::Simulation;
 use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
 use painleve_record::replica::Replica;
 use painleve_record::{RecordedTick, RunPlot};
-use painleve_study::catalogue::AnyOutcome;
-use painleve_study::figures::page_maker::{Fineness, PageMaker};
-use painleve_study::figures::{self, Page, Section};
-use painleve_study::studies::STUDIES;
-use painleve_system::atomic_file::{commit_all, prepare};
+use painleve_study::STUDIES;
+use painleve_study_core::catalogue::AnyOutcome;
+use painleve_study_core::figures::page_maker::{Fineness, PageMaker};
+use painleve_study_core::figures::{self, Page, Section};
 use serde_json::{Value, json};
 
 use super::json::JsonOption;

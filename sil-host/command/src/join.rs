@@ -5,26 +5,27 @@ use std::time::Duration;
 use clap::Args;
 use painleve_link::{BusName, ControllerEnd, Pair, Session};
 use painleve_plant::Configuration;
-use painleve_system::interrupt::Interrupt;
+use painleve_process::interrupt::Interrupt;
+use serde::{Deserialize, Serialize};
 
 use super::CommandError;
 use super::patience::{PatienceArguments, WAIT_S};
 use super::process_error::ProcessError;
 
 /// The plant to join.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Serialize, Deserialize)]
 pub struct JoinArguments {
     /// Bus of the plant.
     #[arg(long)]
     pub bus: BusName,
     /// Longest wait for the plant, s.
     #[arg(long, value_name = "SECONDS", default_value_t = WAIT_S, value_parser = super::seconds)]
-    wait_s: f64,
+    pub wait_s: f64,
     #[command(flatten)]
     pub patience: PatienceArguments,
     /// Join only the plant with the same mark: set by `painleve run`.
-    #[arg(long, hide = true)]
-    pair: Option<Pair>,
+    #[arg(skip)]
+    pub pair: Option<Pair>,
 }
 
 impl JoinArguments {

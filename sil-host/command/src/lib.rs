@@ -17,14 +17,17 @@ mod live;
 mod output;
 mod output_error;
 mod patience;
+mod plan;
 mod plant;
 mod process_error;
 mod progress;
 mod run;
 mod run_process;
+mod scenario;
 mod scenarios;
 mod study;
 mod sweep;
+mod system_path;
 mod timing;
 
 use std::io::Write;
@@ -41,22 +44,22 @@ use clap::{Parser, Subcommand};
 use painleve_accept::AcceptError;
 use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
-use painleve_bound::BoundError;
+use painleve_chart::picture;
 use painleve_commission::Mistake;
 use painleve_link::LinkError;
 use painleve_plant::closed_loop::LoopError;
 use painleve_plant::law_choice::{self, ScenarioLaws};
 use painleve_plant::scenario::ScenarioError;
-use painleve_study::StudyError;
-use painleve_study::sweep::SweepError;
-use painleve_system::interrupt::{Interrupt, exit_when_requested, ignore_file_size_limit};
-use painleve_system::memory_full::exit_when_shared_memory_is_full;
-use painleve_system::picture;
-use painleve_system::terminal::{self, warn};
+use painleve_process::interrupt::{Interrupt, exit_when_requested, ignore_file_size_limit};
+use painleve_process::memory_full::exit_when_shared_memory_is_full;
+use painleve_process::terminal::{self, warn};
+use painleve_study_core::StudyError;
+use painleve_study_sweep::SweepError;
 
 use commission::BoardRigError;
 use fail_on::FailedCondition;
 use output_error::{InputError, OutputError, output};
+use plan::Plan;
 use process_error::ProcessError;
 
 /// Real-time control of a robot arm pressing on a moving belt, with its simulated plant.
@@ -75,12 +78,8 @@ pub struct Cli {
 enum Command {
     /// Run plant and controller as two processes and print a report.
     Run(run::RunArguments),
-    /// Simulate belt and arm, and wait for a controller on the bus.
-    Plant(plant::PlantArguments),
-    /// Run the controller for the plant on the bus.
-    Controller(controller::ControllerArguments),
-    /// Connect the controller's image on a board to the plant's bus.
-    Bridge(bridge::BridgeArguments),
+    #[command(flatten)]
+    Process(Plan),
     /// Test a bare board, without an arm: chip, clock, watchdogs, flash, line and pins; writes a report.
     Accept(accept::AcceptArguments),
     /// Measure how the sensors and torque stages of an arm are mounted, and correct its scenario.
@@ -140,9 +139,6 @@ pub enum CommandError {
     /// There is no comparison with another program's wake-ups.
     #[error(transparent)]
     Cyclictest(#[from] CyclictestError),
-    /// The cycles of an image cannot be bounded.
-    #[error(transparent)]
-    Bound(#[from] BoundError),
     /// The arm has a mistake that no setting can describe.
     #[error("{0}")]
     Mounting(Mistake),
@@ -201,8 +197,7 @@ impl CommandError {
             Self::Scenario(_)
             | Self::Input(_)
             | Self::Cyclictest(CyclictestError::OtherHost)
-            | Self::Accept(_)
-            | Self::Bound(_) => 2,
+            | Self::Accept(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
                 StudyError::Unwritable { .. } => 4,
@@ -262,6 +257,18 @@ fn unsaid(error: std::io::Error) -> CommandError {
 
 /// Prints the help, the version or a usage error, and returns the exit code of the process.
 fn tell_usage(usage: &clap::Error) -> ExitCode {
+    if usage.kind() == clap::error::ErrorKind::InvalidUtf8 {
+        // clap does not say which one.
+        let unreadable: Vec<String> = std::env::args_os()
+            .filter(|argument| argument.to_str().is_none())
+            .map(|argument| format!("{argument:?}"))
+            .collect();
+        let arguments = unreadable.join(", ");
+        warn(format_args!(
+            "error: {arguments}: not UTF-8, as the names of scenarios and the values of settings must be"
+        ));
+        return ExitCode::from(2);
+    }
     let written = usage.print().and_then(|()| std::io::stdout().flush());
     match written.map_err(unsaid) {
         Err(error) if !usage.use_stderr() => exit_code_of(&error),
@@ -319,15 +326,16 @@ pub fn main_with<L: ScenarioLaws>() -> ExitCode {
 
 /// Runs the command line and returns the exit code of the process.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(usage) => return tell_usage(&usage),
+    let command = match (Plan::of_this_process(), Cli::try_parse()) {
+        (Some(plan), _) => Command::Process(plan),
+        (None, Ok(cli)) => cli.command.unwrap_or(Command::Run(cli.run)),
+        (None, Err(usage)) => return tell_usage(&usage),
     };
     panic::set_hook(Box::new(tell_panic));
     // Values that a panic may have left inconsistent are not used afterwards.
     let result = panic::catch_unwind(AssertUnwindSafe(|| {
         ignore_file_size_limit()?;
-        execute(cli.command.unwrap_or(Command::Run(cli.run)))
+        execute(command)
     }));
     // The panic hook has already reported the panic.
     let result = result.unwrap_or(Err(CommandError::Told {
@@ -387,7 +395,7 @@ fn tell_panic(panic: &PanicHookInfo) {
 fn execute(command: Command) -> Result<(), CommandError> {
     match &command {
         // These commands clean up peers, files or boards themselves.
-        Command::Plant(_) | Command::Controller(_) | Command::Bridge(_) => {
+        Command::Process(_) => {
             exit_when_shared_memory_is_full(PEER_FAILED)?;
         }
         Command::Run(_)
@@ -408,9 +416,9 @@ fn execute(command: Command) -> Result<(), CommandError> {
     }
     match command {
         Command::Run(arguments) => run::run(&arguments),
-        Command::Plant(arguments) => plant::run(&arguments),
-        Command::Controller(arguments) => controller::run(&arguments),
-        Command::Bridge(arguments) => bridge::run(&arguments),
+        Command::Process(Plan::Plant(arguments)) => plant::run(&arguments),
+        Command::Process(Plan::Controller(arguments)) => controller::run(&arguments),
+        Command::Process(Plan::Bridge(arguments)) => bridge::run(&arguments),
         Command::Accept(arguments) => accept::run(&arguments),
         Command::Commission(arguments) => commission::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),

@@ -1,45 +1,44 @@
 //! The output files of a run, written while it runs.
 
-use std::ffi::OsString;
-use std::path::PathBuf;
-
 use clap::Args;
+use clap::builder::TypedValueParser as _;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use painleve_files::atomic_file::AtomicFile;
 use painleve_plant::Event;
 use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::warn;
 use painleve_record::csv_table::CsvTable;
 use painleve_record::events::RunEvent;
 use painleve_record::mcap_log::Source;
 use painleve_record::plot::PlotFile;
 use painleve_record::recorder::Sinks;
 use painleve_record::{McapLog, RecordError, RecordedTick, Recorder, RunPlot, Sink};
-use painleve_system::atomic_file::AtomicFile;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::terminal::warn;
-
 use painleve_view::PageFile;
+use serde::{Deserialize, Serialize};
 
 use super::CommandError;
 use super::distinct_files::{self, check_distinct};
 use super::output_error::output;
+use super::system_path::SystemPath;
 
 /// The files that a run writes.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
 pub struct OutputArguments {
     /// Record of every tick, for Foxglove and PlotJuggler.
     #[arg(long, value_name = "PATH", default_value = "out/run.mcap")]
-    record: PathBuf,
+    record: SystemPath,
     /// Do not write a record.
     #[arg(long, conflicts_with = "record")]
     no_record: bool,
     /// Figure of the run: an SVG, PNG or PDF file, by its extension.
-    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = super::figure_path())]
-    plot: PathBuf,
+    #[arg(long, value_name = "PATH", default_value = "out/run.svg", value_parser = super::figure_path().map(|path| SystemPath::from(path.into_os_string())))]
+    plot: SystemPath,
     /// Page that plays the run in the browser, without a network.
     #[arg(long, value_name = "PATH", default_value = "out/run.html")]
-    html: PathBuf,
+    html: SystemPath,
     /// Do not write a page.
     #[arg(long, conflicts_with = "html")]
     no_html: bool,
@@ -48,7 +47,7 @@ pub struct OutputArguments {
     no_plot: bool,
     /// Table of every tick, a CSV file.
     #[arg(long, value_name = "PATH")]
-    csv: Option<PathBuf>,
+    csv: Option<SystemPath>,
     /// Print the events of the run on standard error: changes of mode and state, lift-offs, impacts,
     /// faults.
     #[arg(short, long)]
@@ -56,26 +55,9 @@ pub struct OutputArguments {
 }
 
 impl OutputArguments {
-    /// Returns the same options as command-line arguments for a child process.
-    pub fn to_arguments(&self) -> Vec<OsString> {
-        let mut arguments = Vec::new();
-        for (option, path) in self.files() {
-            arguments.extend([option.into(), path.into()]);
-        }
-        for (option, given) in [
-            ("--no-record", self.no_record),
-            ("--no-html", self.no_html && !self.no_plot),
-            ("--no-plot", self.no_plot),
-            ("--verbose", self.verbose),
-        ] {
-            arguments.extend(given.then(|| option.into()));
-        }
-        arguments
-    }
-
     /// Returns the files to write, each with its option.
     pub fn files(&self) -> Vec<distinct_files::Output<'_>> {
-        let wanted: [(_, Option<&PathBuf>); 4] = [
+        let wanted: [(_, Option<&SystemPath>); 4] = [
             ("--record", (!self.no_record).then_some(&self.record)),
             ("--plot", (!self.no_plot).then_some(&self.plot)),
             (
@@ -86,7 +68,7 @@ impl OutputArguments {
         ];
         wanted
             .into_iter()
-            .filter_map(|(option, path)| Some((option, path?.as_path())))
+            .filter_map(|(option, path)| Some((option, &**path?)))
             .collect()
     }
 

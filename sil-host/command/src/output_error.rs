@@ -3,11 +3,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use painleve_chart::picture::PictureError;
 use painleve_commission::simulated::SimulatedError;
+use painleve_files::atomic_file::AtomicFileError;
 use painleve_record::export::ExportError;
 use painleve_record::recorder::RecordError;
-use painleve_system::atomic_file::AtomicFileError;
-use painleve_system::picture::PictureError;
 
 use super::CommandError;
 
@@ -32,7 +32,7 @@ pub enum OutputError {
     /// Columns of a table.
     #[cfg(feature = "parquet")]
     #[error(transparent)]
-    Columns(#[from] painleve_study::sweep::parquet::ColumnsError),
+    Columns(#[from] painleve_study_sweep::parquet::ColumnsError),
     /// A part of a file.
     #[error(transparent)]
     Write(#[from] io::Error),

@@ -1,18 +1,18 @@
 //! Longest waits for a peer that is missing, and for a peer or board that is silent.
 
-use std::ffi::OsString;
 use std::time::Duration;
 
 use clap::Args;
 use painleve_board::SILENCE_LIMIT;
 use painleve_link::DEFAULT_SILENCE_LIMIT;
+use serde::{Deserialize, Serialize};
 
 /// Default longest wait for a missing peer, s: a process that waits in vain has ended after 2 s, its
 /// start and end included.
 pub const WAIT_S: f64 = 1.7;
 
 /// The option `--silence-limit-s`.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
 pub struct PatienceArguments {
     /// Longest silence of the other process, s; the run then ends with code 3. For a board the limit
     /// is two thirds of it. Increase it on a busy machine, or to stop at breakpoints.
@@ -35,14 +35,6 @@ impl PatienceArguments {
     /// before the plant misses the bridge.
     pub fn board(&self) -> Duration {
         SILENCE_LIMIT.mul_f64(self.silence_limit_s / DEFAULT_SILENCE_LIMIT.as_secs_f64())
-    }
-
-    /// Returns the same options as command-line arguments for a child process.
-    pub fn to_arguments(&self) -> [OsString; 2] {
-        [
-            "--silence-limit-s".into(),
-            self.silence_limit_s.to_string().into(),
-        ]
     }
 }
 

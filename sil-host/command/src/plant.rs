@@ -11,46 +11,48 @@ use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult};
 use painleve_plant::controller_host::ControllerHost;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::realtime::request_realtime;
+use painleve_process::terminal::{self, warn};
 use painleve_record::report::{DurationPercentiles, RunReport};
 use painleve_shared::status::Fault;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::realtime::request_realtime;
-use painleve_system::terminal::warn;
+use serde::{Deserialize, Serialize};
 
 use super::output::{Output, OutputArguments};
+use super::output_error::output;
 use super::patience::{PatienceArguments, WAIT_S};
 use super::process_error::ProcessError;
-use super::run::ScenarioArguments;
+use super::scenario::ScenarioArguments;
 use super::{CommandError, INTERRUPTED, PEER_FAILED, or_interrupted, say};
 
 /// Options of `painleve plant`.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Serialize, Deserialize)]
 pub struct PlantArguments {
     #[command(flatten)]
-    scenario: ScenarioArguments,
+    pub scenario: ScenarioArguments,
     /// Bus on which to wait for the controller.
     #[arg(long)]
-    bus: BusName,
+    pub bus: BusName,
     #[command(flatten)]
-    output: OutputArguments,
+    pub output: OutputArguments,
     /// Print one JSON object instead of the table.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     /// Longest wait for the controller, s.
     #[arg(long, value_name = "SECONDS", default_value_t = WAIT_S, value_parser = super::seconds)]
-    wait_s: f64,
+    pub wait_s: f64,
     #[command(flatten)]
-    patience: PatienceArguments,
+    pub patience: PatienceArguments,
     /// Name of the controller's host in the report.
-    #[arg(long, hide = true, default_value = "native")]
-    host_name: String,
+    #[arg(skip = "native".to_owned())]
+    pub host_name: String,
     /// In real time, but paced by the board: wait for its answers.
-    #[arg(long, hide = true)]
-    board_keeps_time: bool,
+    #[arg(skip)]
+    pub board_keeps_time: bool,
     /// Set by `painleve run`: admit only the controller with the same mark, and leave the messages
     /// about an interruption and about the peer to `run`.
-    #[arg(long, hide = true)]
-    pair: Option<Pair>,
+    #[arg(skip)]
+    pub pair: Option<Pair>,
 }
 
 /// Runs a scenario against the controller on the bus.
@@ -82,7 +84,7 @@ fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), Co
     match simulate(arguments, &scenario, interrupt, &mut output) {
         Ok(mut report) => {
             report.files = output.finish()?;
-            super::run::print(&report, arguments.json)?;
+            print(&report, arguments.json)?;
             match report.fault.and_then(Fault::from_code) {
                 Some(fault)
                     if arguments.scenario.pacing == Pacing::Realtime && is_of_deadlines(fault) =>
@@ -172,4 +174,17 @@ fn drive<H: ControllerHost>(
     let wall = start.elapsed();
     let (result, host) = closed_loop.finish();
     Ok((result, host, wall))
+}
+
+/// Prints a report as JSON or as a table.
+///
+/// # Errors
+/// [`CommandError::Output`] if the report cannot be written.
+pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
+    let text = if json {
+        serde_json::to_string(report).map_err(output)?
+    } else {
+        terminal::readable(report.table())
+    };
+    say(text)
 }

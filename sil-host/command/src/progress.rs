@@ -5,7 +5,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
-use painleve_system::terminal::warn;
+use painleve_process::terminal::warn;
 
 /// Time between two redraws of the bar.
 const REDRAW: Duration = Duration::from_millis(200);

@@ -1,141 +1,35 @@
 //! `painleve run`: plant and controller as two processes, started, monitored and ended together.
 
-use std::ffi::OsString;
-use std::io::Read;
-use std::path::PathBuf;
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use painleve_board::{emulator, serial};
-use painleve_link::{BusName, Pacing, Pair};
-use painleve_plant::scenario::{Scenario, built_in};
+use painleve_link::{BusName, Pair};
+use painleve_plant::scenario::Scenario;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::warn;
 use painleve_record::report::RunReport;
-use painleve_study::robustness::{self, Arms};
-use painleve_system::input_file;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::terminal::{self, warn};
 use painleve_view::access::Token;
-use tempfile::NamedTempFile;
 
-use super::bridge::{ImageArguments, SensorLineArguments};
+use super::bridge::{
+    BridgeArguments, BridgeTarget, BusArguments, ImageArguments, SensorLineArguments,
+};
+use super::controller::ControllerArguments;
 use super::distinct_files::check_distinct;
 use super::fail_on::{self, FailOn};
+use super::join::JoinArguments;
 use super::live;
 use super::output::OutputArguments;
-use super::output_error::{InputError, output};
+use super::output_error::InputError;
 use super::patience::PatienceArguments;
+use super::plan::Plan;
+use super::plant::{self, PlantArguments};
 use super::process_error::ProcessError;
 use super::run_process::{RunProcess, WATCH};
-use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, say};
-
-/// A run of the robustness campaign.
-#[derive(Clone, Copy, Debug)]
-struct Replay {
-    seed: u64,
-    index: u64,
-}
-
-impl std::str::FromStr for Replay {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        text.split_once(':')
-            .and_then(|(seed, index)| {
-                Some(Self {
-                    seed: seed.parse().ok()?,
-                    index: index.parse().ok()?,
-                })
-            })
-            .ok_or_else(|| {
-                "expected the campaign's seed and the number of the run as SEED:INDEX, for example 1:42".into()
-            })
-    }
-}
-
-/// The scenario and its pacing.
-#[derive(Clone, Debug, Args)]
-pub struct ScenarioArguments {
-    /// Built-in scenario or TOML file; `-` reads standard input.
-    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
-    name: String,
-    /// Built-in scenario or TOML file, as an option instead of an argument.
-    #[arg(long = "scenario", value_name = "SCENARIO", conflicts_with = "name")]
-    option: Option<String>,
-    /// Repeat run INDEX of `study robustness --seed SEED` instead of a scenario.
-    #[arg(
-        long,
-        value_name = "SEED:INDEX",
-        conflicts_with_all = ["name", "option"],
-        allow_hyphen_values = true
-    )]
-    replay: Option<Replay>,
-    /// With --replay: the study's option --arms.
-    #[arg(long, value_enum, default_value = "paper", requires = "replay")]
-    arms: Arms,
-    /// Override one key, for example belt.friction=0.4; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    overrides: Vec<String>,
-    /// As fast as possible and deterministic, or in real time.
-    #[arg(long, value_enum, default_value = "lockstep")]
-    pub pacing: Pacing,
-}
-
-impl ScenarioArguments {
-    fn name(&self) -> &str {
-        self.option.as_deref().unwrap_or(&self.name)
-    }
-
-    /// Returns the scenario with its overrides, after validation.
-    ///
-    /// # Errors
-    /// [`CommandError`] with one sentence for the user.
-    pub fn load(&self) -> Result<Scenario, CommandError> {
-        match self.replay {
-            Some(Replay { seed, index }) => {
-                let drawn = robustness::scenario(self.arms, seed, index)?;
-                Ok(drawn.with_overrides("replayed run", &self.overrides)?)
-            }
-            None => Ok(Scenario::load(self.name(), &self.overrides)?),
-        }
-    }
-
-    /// Copies a scenario from standard input, if it is requested as `-`, to a file that every process
-    /// of the run can read, and which lasts as long as the returned handle.
-    fn copy_standard_input(&mut self) -> Result<Option<NamedTempFile>, CommandError> {
-        if self.replay.is_some() || self.name() != "-" {
-            return Ok(None);
-        }
-        let mut file = tempfile::Builder::new()
-            .prefix("painleve-standard-input-")
-            .suffix(".toml")
-            .tempfile()?;
-        input_file::remember_standard_input()?;
-        // As much as of a file, so that an endless input is refused as one.
-        let input = std::io::stdin().lock().take(input_file::MOST_BYTES + 1);
-        std::io::copy(&mut { input }, &mut file)?;
-        self.option = Some(file.path().display().to_string());
-        Ok(Some(file))
-    }
-
-    fn to_arguments(&self) -> Vec<OsString> {
-        let mut arguments: Vec<OsString> = match self.replay {
-            Some(Replay { seed, index }) => {
-                let mut line = vec!["--replay".into(), format!("{seed}:{index}").into()];
-                if self.arms == Arms::General {
-                    line.extend(["--arms".into(), "general".into()]);
-                }
-                line
-            }
-            None => vec![self.name().into()],
-        };
-        for text in &self.overrides {
-            arguments.extend(["--set".into(), text.into()]);
-        }
-        arguments.extend(["--pacing".into(), self.pacing.name().into()]);
-        arguments
-    }
-}
+use super::scenario::ScenarioArguments;
+use super::system_path::SystemPath;
+use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED};
 
 /// Host of the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -194,7 +88,7 @@ pub struct RunArguments {
     host: Host,
     /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH", required_if_eq("host", "serial"))]
-    port: Option<PathBuf>,
+    port: Option<SystemPath>,
     #[command(flatten)]
     image: ImageArguments,
     #[command(flatten)]
@@ -227,6 +121,10 @@ pub struct RunArguments {
     #[arg(long)]
     json: bool,
 }
+
+/// Start-up time of a child, s. The processes of a run notice each other's end, so this can be
+/// generous.
+const START_WAIT_S: f64 = 10.0;
 
 /// Time for the plant to notice and report that the controller is gone. Even with a forced stop
 /// after that, all processes end within 2 s.
@@ -299,23 +197,31 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
     let pair = Pair::unique();
 
-    let mut plant_arguments: Vec<OsString> = vec!["plant".into()];
-    plant_arguments.extend(arguments.scenario.to_arguments());
-    plant_arguments.extend(arguments.output.to_arguments());
-    plant_arguments.extend(arguments.patience.to_arguments());
-    plant_arguments.push("--json".into());
-    plant_arguments.extend(["--host-name".into(), arguments.host.name().into()]);
-    if arguments.host == Host::Serial {
-        plant_arguments.push("--board-keeps-time".into());
-    }
-    let mut plant = RunProcess::start(plant_arguments, &bus, pair, Stdio::inherit())?;
+    let plan = Plan::Plant(PlantArguments {
+        scenario: arguments.scenario.clone(),
+        bus: bus.clone(),
+        output: arguments.output.clone(),
+        json: true,
+        wait_s: START_WAIT_S,
+        patience: arguments.patience.clone(),
+        host_name: arguments.host.name(),
+        board_keeps_time: arguments.host == Host::Serial,
+        pair: Some(pair),
+    });
+    let mut plant = RunProcess::start(&plan, Stdio::inherit())?;
     // The controller's messages are shown only if the plant has none; a log is shown at once.
     let stderr = if arguments.image.log {
         Stdio::inherit()
     } else {
         Stdio::piped()
     };
-    let mut controller = RunProcess::start(controller_arguments(arguments), &bus, pair, stderr)?;
+    let join = JoinArguments {
+        bus,
+        wait_s: START_WAIT_S,
+        patience: arguments.patience.clone(),
+        pair: Some(pair),
+    };
+    let mut controller = RunProcess::start(&controller_plan(arguments, join), stderr)?;
 
     let status = watch(
         &mut plant,
@@ -352,7 +258,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let text = plant.stdout.text();
     let report: RunReport = serde_json::from_str(&text).map_err(ProcessError::NoReport)?;
     if !arguments.quiet {
-        print(&report, arguments.json)?;
+        plant::print(&report, arguments.json)?;
     }
     if let Some(missed) = report.missed_deadlines.filter(|missed| *missed > 0) {
         warn(format_args!(
@@ -438,35 +344,28 @@ fn watch(
     }
 }
 
-fn controller_arguments(arguments: &RunArguments) -> Vec<OsString> {
-    let image = &arguments.image;
-    let patience = arguments.patience.to_arguments();
-    let mut line: Vec<OsString> = match arguments.host {
-        Host::Native => return ["controller".into()].into_iter().chain(patience).collect(),
-        Host::Drivers => vec!["bridge".into(), "drivers".into()],
-        Host::Qemu => vec!["bridge".into(), "qemu".into()],
-        Host::Serial => vec!["bridge".into(), "serial".into()],
+/// Returns the plan of the process that runs the controller or leads to it.
+fn controller_plan(arguments: &RunArguments, plant: JoinArguments) -> Plan {
+    let bus = BusArguments {
+        plant,
+        scenario_name: arguments.scenario.name().to_owned(),
     };
-    line.extend(patience);
-    line.extend(["--scenario-name".into(), arguments.scenario.name().into()]);
-    let paths: &[(&str, &Option<PathBuf>)] = match arguments.host {
-        Host::Serial => &[("--port", &arguments.port), ("--timing", &image.timing)],
-        Host::Drivers => &[("--timing", &image.timing)],
-        Host::Native | Host::Qemu => &[],
+    let image = arguments.image.clone();
+    let target = match arguments.host {
+        Host::Native => return Plan::Controller(ControllerArguments { plant: bus.plant }),
+        Host::Drivers => BridgeTarget::Drivers {
+            bus,
+            lines: arguments.lines.clone(),
+            timing: image.timing,
+        },
+        Host::Qemu => BridgeTarget::Qemu { bus, image },
+        Host::Serial => BridgeTarget::Serial {
+            bus,
+            port: arguments.port.clone().unwrap_or_default(),
+            timing: image.timing,
+        },
     };
-    for (option, path) in paths {
-        if let Some(path) = path {
-            line.extend([option.into(), path.into()]);
-        }
-    }
-    if arguments.host == Host::Drivers {
-        let probability = arguments.lines.bit_errors.to_string();
-        line.extend(["--bit-errors".into(), probability.into()]);
-    }
-    if arguments.host == Host::Qemu {
-        line.extend(image.to_arguments());
-    }
-    line
+    Plan::Bridge(BridgeArguments { target })
 }
 
 /// Returns the error of an ended plant: one that exited with a code has printed its error, one that
@@ -481,17 +380,4 @@ fn failure(status: ExitStatus) -> CommandError {
             complaint: String::new(),
         }),
     }
-}
-
-/// Prints a report as JSON or as a table.
-///
-/// # Errors
-/// [`CommandError::Output`] if the report cannot be written.
-pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
-    let text = if json {
-        serde_json::to_string(report).map_err(output)?
-    } else {
-        terminal::readable(report.table())
-    };
-    say(text)
 }

@@ -1,20 +1,15 @@
 //! A child process of a run, with its output.
 
-use std::ffi::OsString;
 use std::io::Read;
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use painleve_link::{BusName, Pair};
-use painleve_system::lifetime::{Guarded, Signal, end_with_parent};
+use painleve_process::lifetime::{Guarded, Signal, end_with_parent};
 
 use super::CommandError;
+use super::plan::Plan;
 use super::process_error::ProcessError;
-
-/// Start-up time of a child, s. The processes of a run notice each other's end, so this can be
-/// generous.
-const START_WAIT_S: &str = "10";
 
 /// Interval between two checks of the children.
 pub const WATCH: Duration = Duration::from_millis(10);
@@ -31,23 +26,14 @@ pub struct RunProcess {
 }
 
 impl RunProcess {
-    /// Starts this program with these arguments on a bus, as one of a pair.
+    /// Starts this program with a plan.
     ///
     /// # Errors
     /// [`CommandError::Process`] if the process or the threads that read its output cannot be started.
-    pub fn start(
-        arguments: Vec<OsString>,
-        bus: &BusName,
-        pair: Pair,
-        stderr: Stdio,
-    ) -> Result<Self, CommandError> {
+    pub fn start(plan: &Plan, stderr: Stdio) -> Result<Self, CommandError> {
         let program = std::env::current_exe()?;
-        let mut command = Command::new(&program);
+        let mut command = plan.command(&program).map_err(std::io::Error::from)?;
         command
-            .args(arguments)
-            .args(["--bus", bus.as_str()])
-            .args(["--pair", &pair.to_string()])
-            .args(["--wait-s", START_WAIT_S])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(stderr);

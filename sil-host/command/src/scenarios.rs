@@ -3,7 +3,7 @@
 use clap::Args;
 use painleve_plant::scenario::{Scenario, built_in, describe};
 
-use painleve_system::terminal;
+use painleve_process::terminal;
 use serde_json::{Value, json};
 
 use super::output_error::output;

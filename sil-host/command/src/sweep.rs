@@ -4,15 +4,15 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use painleve_study::outcome;
-use painleve_study::sweep::campaign::{Campaign, Understood};
-use painleve_study::sweep::folder::path_as_text;
-use painleve_study::sweep::manifest::Manifest;
-use painleve_study::sweep::share::{self, ShardOption, Share};
-use painleve_study::sweep::slurm::Job;
-use painleve_study::sweep::{SweepError, array, folder, shard_file};
-use painleve_system::atomic_file::{self, commit_all, prepare};
-use painleve_system::terminal::warn;
+use painleve_files::atomic_file::{self, commit_all, prepare};
+use painleve_process::terminal::warn;
+use painleve_study_core::outcome;
+use painleve_study_sweep::campaign::{Campaign, Understood};
+use painleve_study_sweep::folder::path_as_text;
+use painleve_study_sweep::manifest::Manifest;
+use painleve_study_sweep::share::{self, ShardOption, Share};
+use painleve_study_sweep::slurm::Job;
+use painleve_study_sweep::{SweepError, array, folder, shard_file};
 use serde::Serialize;
 use serde_json::json;
 
@@ -348,7 +348,7 @@ fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
     let mut files = vec![prepare(path, &text).map_err(output)?];
     #[cfg(feature = "parquet")]
     if let Some(path) = &arguments.parquet {
-        let columns = painleve_study::sweep::parquet::from_csv(&text).map_err(output)?;
+        let columns = painleve_study_sweep::parquet::from_csv(&text).map_err(output)?;
         files.push(prepare(path, &columns).map_err(output)?);
     }
     commit_all(files).map_err(output)?;

@@ -7,18 +7,17 @@ use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::figure;
 use painleve_board::timing::{Cyclictest, CyclictestError, Metronome, TimingReport, Unit, report};
 use painleve_board::{ConnectedBoard, Drivers, OnBoard, SILENCE_LIMIT, Serial};
-use painleve_bound::report::Bound;
+use painleve_chart::picture;
+use painleve_files::atomic_file;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::{ControllerHost, InProcess};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_plant::simulation::Simulation;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::realtime::{FIFO_PRIORITY, request_realtime};
+use painleve_process::terminal::warn;
 use painleve_shared::message::FrameSource;
-use painleve_system::atomic_file;
-use painleve_system::interrupt::Interrupt;
-use painleve_system::picture;
-use painleve_system::realtime::{FIFO_PRIORITY, request_realtime};
-use painleve_system::terminal::{self, warn};
 
 use super::output_error::output;
 use super::run::Host;
@@ -43,10 +42,6 @@ pub struct TimingArguments {
     /// The controller's image; by default the workspace's own build.
     #[arg(long, value_name = "PATH")]
     elf: Option<PathBuf>,
-    /// Bound the cycles of the flash image's control interrupt and of the update after it from its machine code and
-    /// show the paths that attain the bounds, instead of running a scenario; --elf selects another image.
-    #[arg(long, conflicts_with_all = ["names", "overrides", "host", "port", "svg", "cyclictest"])]
-    bound: bool,
     /// With --host native: run cyclictest (Debian's package rt-tests) beside each scenario, at the same rate
     /// and priority. Its row shows the latency of the machine itself.
     #[arg(long)]
@@ -71,16 +66,6 @@ impl TimingArguments {
 /// # Errors
 /// [`CommandError`] if a scenario or image cannot be used, a run ends early, or a file cannot be written.
 pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
-    if arguments.bound {
-        let image = arguments.elf.clone();
-        let image = image.unwrap_or_else(|| emulator::built_image("painleve-f405"));
-        let bound = Bound::of(&image)?;
-        return if arguments.json {
-            say(serde_json::to_string(&bound).map_err(output)?)
-        } else {
-            say(terminal::readable(bound.text()))
-        };
-    }
     let names: Vec<&str> = match arguments.names.as_slice() {
         [] => built_in::names().collect(),
         names => names.iter().map(String::as_str).collect(),

@@ -2,13 +2,14 @@
 
 use std::fmt;
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::num::ParseIntError;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Name of a bus: 1 to 64 characters of `A-Z a-z 0-9 _ -`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String")]
 pub struct BusName(String);
 
 impl BusName {
@@ -51,6 +52,14 @@ impl FromStr for BusName {
     }
 }
 
+impl TryFrom<String> for BusName {
+    type Error = InvalidBusName;
+
+    fn try_from(name: String) -> Result<Self, InvalidBusName> {
+        name.parse()
+    }
+}
+
 impl fmt::Display for BusName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
@@ -61,21 +70,13 @@ impl fmt::Display for BusName {
 ///
 /// A plant with a mark admits the controller with the same mark only, and that controller joins no
 /// other plant, whatever else starts on their bus at the same moment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Pair(u64);
 
 impl Pair {
     /// Draws a mark.
     pub fn unique() -> Self {
         Self(RandomState::new().build_hasher().finish())
-    }
-}
-
-impl FromStr for Pair {
-    type Err = ParseIntError;
-
-    fn from_str(text: &str) -> Result<Self, ParseIntError> {
-        u64::from_str_radix(text, 16).map(Self)
     }
 }
 
@@ -99,13 +100,6 @@ mod tests {
         for name in ["", "a b", "a/b", "é", "a\n", too_long.as_str()] {
             assert!(name.parse::<BusName>().is_err(), "{name:?}");
         }
-    }
-
-    #[test]
-    fn a_pair_is_read_back_as_it_was_written() {
-        let pair = Pair::unique();
-        assert_eq!(pair.to_string().parse(), Ok(pair));
-        assert_ne!(pair, Pair::unique());
     }
 
     #[test]

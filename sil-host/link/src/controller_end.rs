@@ -17,7 +17,7 @@ use super::services::{
 };
 use super::session::{Announcement, Session, SessionMessage};
 use super::{BusName, LinkError, Pair};
-use painleve_system::interrupt::Interrupt;
+use painleve_process::interrupt::Interrupt;
 
 /// Interval at which a waiting controller looks for a plant, long enough not to disturb the plant's
 /// start.

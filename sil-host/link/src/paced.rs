@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
 use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
+use painleve_process::realtime::Pacer;
 use painleve_shared::frame::SensorFrame;
-use painleve_system::realtime::Pacer;
 
 use crate::PlantEnd;
 

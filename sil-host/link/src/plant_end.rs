@@ -20,7 +20,7 @@ use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{Presence, Receiver, Sender, Services, receiver, sender, transport};
 use super::session::{Session, SessionMessage};
 use super::{BusName, LinkError, Pair};
-use painleve_system::interrupt::Interrupt;
+use painleve_process::interrupt::Interrupt;
 
 /// Time allowed for the controller of a killed plant to leave the bus. It is shorter than the
 /// silence limit, so that a controller waiting for this plant does not report it as silent.

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use painleve_process::interrupt::Interrupt;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_system::interrupt::Interrupt;
 
 use super::place::{Place, SHARED_MEMORY};
 use super::*;

@@ -15,8 +15,8 @@ use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
+use painleve_process::interrupt::Interrupt;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_system::interrupt::Interrupt;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };

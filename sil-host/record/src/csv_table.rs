@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use painleve_system::atomic_file::AtomicFile;
+use painleve_files::atomic_file::AtomicFile;
 
 use crate::fields::{Read, TOPICS};
 use crate::recorder::{RecordError, RecordedTick, Sink};

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 use mcap::McapError;
 use mcap::records::{MessageHeader, Metadata};
+use painleve_files::atomic_file::AtomicFile;
 use painleve_plant::scenario::Scenario;
-use painleve_system::atomic_file::AtomicFile;
 use serde::Serialize;
 
 use crate::events::RunEvent;

@@ -13,12 +13,12 @@ use std::path::PathBuf;
 
 use painleve_chart::Chart;
 use painleve_chart::decimate::{Bin, Decimator};
+use painleve_chart::picture;
+use painleve_files::atomic_file::{self, AtomicFile, AtomicFileError};
 use painleve_plant::scenario::Scenario;
 use painleve_plant::{ContactMode, Event};
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::status::SupervisorState;
-use painleve_system::atomic_file::{self, AtomicFile, AtomicFileError};
-use painleve_system::picture;
 
 use crate::events::{EventKind, RunEvent};
 use crate::recorder::{RecordError, RecordedTick, Sink};

@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
+use painleve_chart::picture::PictureError;
+use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all};
 use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::sample::Sample;
 use painleve_plant::{Configuration, Event};
-use painleve_system::atomic_file::{AtomicFile, AtomicFileError, commit_all};
-use painleve_system::picture::PictureError;
 
 use crate::events::{ControllerEvents, EventKind, RunEvent};
 use crate::replica::Replica;

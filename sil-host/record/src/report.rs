@@ -6,7 +6,7 @@ use comfy_table::CellAlignment;
 use hdrhistogram::Histogram;
 use painleve_plant::closed_loop::LoopResult;
 use painleve_plant::scenario::Scenario;
-use painleve_system::terminal;
+use painleve_process::terminal;
 use serde::{Deserialize, Serialize};
 
 /// Percentiles of a duration, µs.

@@ -6,10 +6,10 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use painleve_plant::mechanics::PlantParameters;
-use painleve_study::bifurcation::Bifurcation;
-use painleve_study::cells::{Cells, RELATIVE_TOLERANCE};
-use painleve_study::initial::Initial;
-use painleve_study::{Grid, Study, rows};
+use painleve_study_core::initial::Initial;
+use painleve_study_core::{Grid, Study, rows};
+use painleve_study_paper::bifurcation::Bifurcation;
+use painleve_study_paper::cells::{Cells, RELATIVE_TOLERANCE};
 
 fn study(v_belt: &str) -> Bifurcation {
     let values = |text: &str| {

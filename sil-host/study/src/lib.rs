@@ -1,273 +1,39 @@
-//! The paper's studies: pure functions from settings to rows.
+//! The list of studies, for the command line, sweeps and the page of figures.
 //!
-//! - [`grid`]: the values of a parameter, `FROM:TO:STEP` or a list
-//! - [`outcome`]: the outcome of a study as JSON, CSV, table and figure
-//! - [`paper`]: the paper's values for comparison
-//! - [`admissible`]: Table II, where on the belt p > 0; [`belt_line`]: the postures on the belt
-//! - [`regions`]: Fig. 3, the solution modes over (θ1, θ̇1)
-//! - [`sliding_range`]: Z_t,sliding, how far a controller slides
-//! - [`closed_loop_bifurcation`]: Fig. 12, bifurcation over the belt speed with the controller in the loop
-//! - [`robustness`]: random arms, belts and converters; [`ablation`]: the contribution of each part of the controller
-//! - [`effects`]: success against the level of each effect of a real rig, on rigid and compliant contact
-//! - [`stiffness`]: the compliant contact as it gets stiffer, beside the rigid one
-//! - [`ringing`]: where the friction observer makes a compliant contact ring, beside the stability limit
-//! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
-//! - [`contact_probe`], [`distribution`], [`proportion`], [`paired_difference`]: contact, distributions and success rates
-//! - [`case`], [`trial`]: closed loops to study, and their execution in this process;
-//!   [`loop_study`]: the same with a user-defined plant
-//! - [`bifurcation`]: Fig. 4, where over μ × v_belt the arm keeps bouncing
-//! - [`cells`], [`initial`]: the cells of such a diagram; [`attractor`], [`settled`]: the long-term motion of one
-//! - [`poincare`]: Fig. 5, periodic and chaotic bouncing
-//! - [`tabular`]: rows as lines of a table, one row at a time
-//! - [`chaos`]: classification as periodic or chaotic by the largest Lyapunov exponent
-//! - [`figures`]: the page that compares the studies with the paper
-//! - [`sweep`]: studies in shards, on many machines
+//! [`core`](painleve_study_core) says what a study is, [`paper`](painleve_study_paper) computes the paper's figures,
+//! [`quality`](painleve_study_quality) how well the controller works, and `sweep` computes any of them in shards, on many
+//! machines.
 //!
 //! Each study is a folder: `mod.rs` holds its settings and rows, `options.rs` parses the settings
 //! from the command line, `outcome.rs` collects the rows, `figure.rs` draws them, and `page.rs`
-//! compares them with the paper. [`studies`] lists them all.
-//!
-//! A study is a list of independent rows ([`Study`]), which
-//! can be computed in any order, on any number of threads, or in shards.
+//! compares them with the paper.
 
-pub mod ablation;
-pub mod admissible;
-pub mod attractor;
-pub mod belt_line;
-pub mod bifurcation;
-pub mod capture;
-pub mod case;
-pub mod catalogue;
-mod cell_options;
-pub mod cells;
-pub mod chaos;
-pub mod closed_loop_bifurcation;
-pub mod contact_probe;
-pub mod distribution;
-pub mod effects;
-pub mod figures;
-pub mod grid;
-pub mod initial;
-pub mod lift_off;
-pub mod loop_study;
-pub mod options;
-pub mod outcome;
-pub mod paired_difference;
-pub mod paper;
-mod places;
-pub mod poincare;
-pub mod proportion;
-pub mod regions;
-pub mod ringing;
-pub mod robustness;
-pub mod settled;
-pub mod sliding_range;
-pub mod stiffness;
-pub mod studies;
-pub mod sweep;
-pub mod tabular;
-pub mod trial;
+use painleve_study_core::catalogue::CatalogueEntry;
+use painleve_study_paper::{
+    admissible, bifurcation, closed_loop_bifurcation, poincare, regions, sliding_range,
+};
+use painleve_study_quality::{
+    ablation, capture, effects, lift_off, ringing, robustness, stiffness,
+};
 
-use painleve_plant::PlantError;
-use painleve_plant::closed_loop::LoopError;
-use painleve_plant::scenario::ScenarioError;
-use painleve_shared::range::OutOfRange;
-use rayon::prelude::*;
+/// Every study, in the order of the command's help and of the page.
+pub static STUDIES: [CatalogueEntry; 13] = [
+    CatalogueEntry::of::<admissible::Options>(),
+    CatalogueEntry::of::<regions::Options>(),
+    CatalogueEntry::of::<bifurcation::Options>(),
+    CatalogueEntry::of::<poincare::Options>(),
+    CatalogueEntry::of::<sliding_range::Options>(),
+    CatalogueEntry::of::<closed_loop_bifurcation::Options>(),
+    CatalogueEntry::of::<robustness::Options>(),
+    CatalogueEntry::of::<ablation::Options>(),
+    CatalogueEntry::of::<effects::Options>(),
+    CatalogueEntry::of::<stiffness::Options>(),
+    CatalogueEntry::of::<ringing::Options>(),
+    CatalogueEntry::of::<capture::Options>(),
+    CatalogueEntry::of::<lift_off::Options>(),
+];
 
-pub use grid::{Grid, GridError};
-pub use outcome::Outcome;
-
-/// Why a study has no outcome.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// The scenario of the study is invalid.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// The text of a grid is invalid.
-    #[error(transparent)]
-    Grid(#[from] GridError),
-    /// An override sets a key that an option of the study sets.
-    #[error("{key} has no effect here; use {option}")]
-    Taken {
-        /// The key.
-        key: String,
-        /// The option.
-        option: String,
-    },
-    /// Levels without exactly one effect whose levels they are.
-    #[error("--level needs exactly one effect other than none in --effect")]
-    LevelsOfSeveralEffects,
-    /// A position is out of reach.
-    #[error("z_t = {tip_t_m} m is out of reach")]
-    OutOfReach {
-        /// Position along the belt, m.
-        tip_t_m: f64,
-    },
-    /// No θ1 of a grid puts the tip on the belt.
-    #[error(
-        "no θ1 of the grid puts the tip on the belt; |θ1| must be below {below_deg:.2} degrees"
-    )]
-    OffTheBelt {
-        /// Limit of |θ1|, degrees.
-        below_deg: f64,
-    },
-    /// p is not positive anywhere within reach.
-    #[error("the arm has no admissible tip position")]
-    NothingAdmissible,
-    /// A row cannot be written as a line of a table.
-    #[error("row {index} cannot be written: {source}")]
-    Unwritable {
-        /// Number of the row.
-        index: usize,
-        /// The reason.
-        source: csv::Error,
-    },
-    /// The values of the options have more combinations than can be computed.
-    #[error("{0} rows: at most {MOST_ROWS} can be computed; give coarser grids or fewer runs")]
-    TooManyRows(usize),
-    /// A parameter is out of range.
-    #[error(transparent)]
-    Range(#[from] OutOfRange),
-    /// The plant of one row cannot continue.
-    #[error("{row}: {source}")]
-    Plant {
-        /// The row's parameters.
-        row: String,
-        /// The reason.
-        source: PlantError,
-    },
-    /// The closed loop of one row cannot continue.
-    #[error("{row}: {source}")]
-    Loop {
-        /// The row's parameters.
-        row: String,
-        /// The reason.
-        source: LoopError,
-    },
-}
-
-/// A numbered list of rows, each of which depends only on its number.
-pub trait Study: Sync {
-    /// One row of the outcome.
-    type Row: Send;
-
-    /// Returns the number of rows.
-    fn len(&self) -> usize;
-
-    /// Whether there are no rows.
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Computes row `index`, less than [`len`](Study::len).
-    ///
-    /// # Errors
-    /// [`StudyError`] if the row cannot be computed.
-    fn row(&self, index: usize) -> Result<Self::Row, StudyError>;
-}
-
-/// Largest number of rows of a study: more than a machine computes in a year.
-pub const MOST_ROWS: usize = 10_000_000;
-
-/// Returns the number of combinations of these numbers of values; [`usize::MAX`] on
-/// overflow.
-pub(crate) fn combinations(counts: &[usize]) -> usize {
-    counts
-        .iter()
-        .fold(1, |product: usize, &count| product.saturating_mul(count))
-}
-
-/// Computes all rows in order on the threads of the current rayon pool; `done` is
-/// called after each row, and no further row begins once it has panicked.
-///
-/// # Errors
-/// [`StudyError::TooManyRows`], or the error of the first row that fails, whatever the number of threads.
-pub fn rows<S: Study>(study: &S, done: impl Fn() + Sync) -> Result<Vec<S::Row>, StudyError> {
-    if study.len() > MOST_ROWS {
-        return Err(StudyError::TooManyRows(study.len()));
-    }
-    let rows: Vec<Result<S::Row, StudyError>> = (0..study.len())
-        .into_par_iter()
-        // The cost of rows varies widely.
-        .with_max_len(1)
-        .panic_fuse()
-        .map(|index| {
-            let row = study.row(index);
-            done();
-            row
-        })
-        .collect();
-    rows.into_iter().collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    struct Squares;
-
-    impl Study for Squares {
-        type Row = usize;
-
-        fn len(&self) -> usize {
-            100
-        }
-
-        fn row(&self, index: usize) -> Result<usize, StudyError> {
-            match index {
-                70 | 30 => Err(StudyError::OutOfReach {
-                    tip_t_m: index as f64,
-                }),
-                _ => Ok(index * index),
-            }
-        }
-    }
-
-    struct First(usize);
-
-    impl Study for First {
-        type Row = usize;
-
-        fn len(&self) -> usize {
-            self.0
-        }
-
-        fn row(&self, index: usize) -> Result<usize, StudyError> {
-            Squares.row(index)
-        }
-    }
-
-    #[test]
-    fn rows_and_errors_do_not_depend_on_the_number_of_threads() {
-        for threads in [1, 2, 7] {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
-            let done = std::sync::atomic::AtomicUsize::new(0);
-            let count = || {
-                done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            };
-            let expected: Vec<usize> = (0..30).map(|i| i * i).collect();
-            assert_eq!(pool.install(|| rows(&First(30), count)).unwrap(), expected);
-            assert_eq!(done.into_inner(), 30);
-            let error = pool.install(|| rows(&Squares, || ())).unwrap_err();
-            assert_eq!(error.to_string(), "z_t = 30 m is out of reach");
-        }
-    }
-
-    #[test]
-    fn no_row_begins_after_a_panic_of_the_progress() {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
-        let done = std::sync::atomic::AtomicUsize::new(0);
-        let interrupt = || {
-            done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            std::panic::resume_unwind(Box::new("interrupted"));
-        };
-        let study = || pool.unwrap().install(|| rows(&First(30), interrupt));
-        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(study));
-        assert!(outcome.is_err());
-        // Each of the two threads may have begun one.
-        assert!(done.into_inner() <= 2);
-    }
+/// Returns the study with this name.
+pub fn find(name: &str) -> Option<&'static CatalogueEntry> {
+    STUDIES.iter().find(|entry| entry.name == name)
 }

@@ -18,6 +18,8 @@ const MOST_BYTES: usize = 16 << 10;
 pub(crate) struct Connection {
     stream: TcpStream,
     deadline: Instant,
+    /// What came behind the request.
+    rest: Vec<u8>,
 }
 
 impl Connection {
@@ -25,6 +27,7 @@ impl Connection {
         Self {
             stream,
             deadline: Instant::now() + PATIENCE,
+            rest: Vec::new(),
         }
     }
 
@@ -42,7 +45,10 @@ impl Connection {
             }
             head.extend_from_slice(&part[..length]);
             match Request::try_parse(&head) {
-                Ok(Some((_, request))) => return Ok(Ok(request)),
+                Ok(Some((length, request))) => {
+                    self.rest = head.split_off(length);
+                    return Ok(Ok(request));
+                }
                 Ok(None) if head.len() <= MOST_BYTES => {}
                 _ => return Ok(Err(StatusCode::BAD_REQUEST)),
             }
@@ -60,12 +66,13 @@ impl Connection {
         self.write_all(answer.as_bytes())
     }
 
-    pub(crate) fn into_stream(self) -> TcpStream {
-        self.stream
+    /// The stream, and what has been read of it behind the request.
+    pub(crate) fn into_parts(self) -> (TcpStream, Vec<u8>) {
+        (self.stream, self.rest)
     }
 
     /// Time until the deadline.
-    fn rest(&self) -> io::Result<Option<Duration>> {
+    fn time_left(&self) -> io::Result<Option<Duration>> {
         let rest = self.deadline.saturating_duration_since(Instant::now());
         if rest.is_zero() {
             return Err(ErrorKind::TimedOut.into());
@@ -76,14 +83,14 @@ impl Connection {
 
 impl Read for Connection {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.stream.set_read_timeout(self.rest()?)?;
+        self.stream.set_read_timeout(self.time_left()?)?;
         self.stream.read(bytes)
     }
 }
 
 impl Write for Connection {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.stream.set_write_timeout(self.rest()?)?;
+        self.stream.set_write_timeout(self.time_left()?)?;
         self.stream.write(bytes)
     }
 

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::io::Write;
 
 use data_encoding::BASE64;
+use painleve_files::atomic_file::AtomicFile;
 use painleve_plant::scenario::Scenario;
 use painleve_record::events::RunEvent;
 use painleve_record::{RecordError, RecordedTick, Sink};
-use painleve_system::atomic_file::AtomicFile;
 use serde_json::{Value, json};
 
 use crate::row::{BYTE_COLUMNS, COLUMNS, ROW_BYTES, Row};

@@ -221,11 +221,11 @@ fn upgrade(
     let mut head = Vec::new();
     write_response(&mut head, &response).map_err(io::Error::other)?;
     connection.write_all(&head)?;
-    let stream = connection.into_stream();
+    let (stream, read) = connection.into_parts();
     stream.set_read_timeout(Some(INTERVAL))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let limits = WebSocketConfig::default().max_message_size(Some(MOST_BYTES));
-    let socket = WebSocket::from_raw_socket(stream, Role::Server, Some(limits));
+    let socket = WebSocket::from_partially_read(stream, read, Role::Server, Some(limits));
     Ok(Some(socket))
 }
 
@@ -354,6 +354,23 @@ mod tests {
             thread::sleep(PATIENCE / 10);
         }
         assert!(start.elapsed() > PATIENCE / 2);
+    }
+
+    #[test]
+    fn an_order_that_comes_with_the_request_is_carried_out() {
+        let server = server(&[]);
+        let address = server.address;
+        let mut stream = TcpStream::connect(address).unwrap();
+        let head = format!(
+            "GET /live HTTP/1.1\r\nHost: {address}\r\n{KEY}Connection: Upgrade\r\nUpgrade: websocket\r\n\r\n"
+        );
+        // The text "reset" with its quotation marks, masked by zeros.
+        let frame = b"\x81\x87\0\0\0\0\"reset\"";
+        stream
+            .write_all(&[head.as_bytes(), frame].concat())
+            .unwrap();
+        let order = server.orders.next(PATIENCE).unwrap();
+        assert_eq!(order.request, ViewerRequest::Reset);
     }
 
     #[test]

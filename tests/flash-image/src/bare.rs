@@ -1,7 +1,7 @@
 //! A bench without an arm: loop-back wires at the pins, healthy or with a defect, and open lines.
 
 use crate::board::{ENABLE, RESET, STAGES, STAGES_READY};
-use crate::stm32::{Pin, PinLevel};
+use painleve_chips::stm32::{Pin, PinLevel};
 
 /// The pin that captures the start of a tick, and the select of encoder 1, to which it is wired.
 const CAPTURE: Pin = (0, 0);

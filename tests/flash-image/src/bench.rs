@@ -1,6 +1,6 @@
 //! The board with the simulated arm on its sensors and torque stages.
 
-use painleve_parts::BridgeAmplifier;
+use painleve_chips::BridgeAmplifier;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
@@ -11,8 +11,8 @@ use painleve_shared::message::{FrameSource, Request, Response};
 use painleve_shared::mounting::{Mounting, SensorParts};
 
 use crate::board::{BoardChip, BoardSnapshot, EmulatedBoard, F405, G474};
-use crate::stm32::Pin;
-use crate::{MICROSECOND, MILLISECOND, Picoseconds};
+use painleve_chips::stm32::Pin;
+use painleve_chips::{MICROSECOND, MILLISECOND, Picoseconds};
 
 /// Ticks before the switch is closed.
 const BEFORE_ENABLE: u32 = 100;

@@ -2,18 +2,18 @@
 
 use std::path::PathBuf;
 
-use painleve_parts::{As5048a, BridgeAmplifier, Mcp3304, SpiPart, Transfer};
+use painleve_chips::{As5048a, BridgeAmplifier, Mcp3304, SpiPart, Transfer};
 use painleve_plant::law_choice::build;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox};
 
 use crate::bare::BareBench;
-use crate::machine::{Machine, MachineSnapshot, Reset};
-use crate::stm32::{Outside, Pin, PinLevel, PinMode, WiredChip};
-use crate::stm32f4::Stm32f4;
-use crate::stm32g4::Stm32g4;
-use crate::{MILLISECOND, Picoseconds, SECOND};
+use painleve_chips::machine::{Machine, MachineSnapshot, Reset};
+use painleve_chips::stm32::{Outside, Pin, PinLevel, PinMode, WiredChip};
+use painleve_chips::stm32f4::Stm32f4;
+use painleve_chips::stm32g4::Stm32g4;
+use painleve_chips::{MILLISECOND, Picoseconds, SECOND};
 
 /// The pin that enables the torque stages.
 pub const STAGES: Pin = (1, 0);

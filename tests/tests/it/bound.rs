@@ -1,6 +1,7 @@
 //! The cycle bounds of the control interrupt and of the update after it, computed from the machine code of the flashed
 //! image, exist, are within the budget, and are those of the documentation.
 
+use painleve_bound::image::Image;
 use painleve_bound::report::{Bound, CORE_HZ};
 use painleve_tests::flash_image;
 use painleve_tests::printed::{self, LastFigure, thousands};
@@ -9,7 +10,9 @@ use painleve_tests::printed::{self, LastFigure, thousands};
 fn a_tick_has_bounds_within_the_budget() {
     let budget: serde_json::Value =
         serde_json::from_str(include_str!("../../budget.json")).unwrap();
-    let bound = Bound::of(flash_image()).unwrap_or_else(|error| panic!("{error}"));
+    let elf = std::fs::read(flash_image()).unwrap();
+    let image = Image::of(flash_image(), &elf).unwrap_or_else(|error| panic!("{error}"));
+    let bound = Bound::of(&image).unwrap_or_else(|error| panic!("{error}"));
     for (cycles, key) in [
         (bound.control.cycles, "bound_cycles_of_control_interrupt"),
         (bound.update.cycles, "bound_cycles_of_update"),

@@ -92,15 +92,6 @@ impl Board {
         }
     }
 
-    /// Waits until the program has received the arm's new state, also behind a queue of older ticks.
-    fn wait_until_told(&self) {
-        let told = self.state.sent_ticks.load(Ordering::SeqCst) + 100;
-        let is_told = || self.state.sent_ticks.load(Ordering::SeqCst) > told;
-        while !is_told() && self.state.broken.get().is_none() {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    }
-
     fn wait_for_ticks(&self, ticks: usize) {
         let start = Instant::now();
         while self.state.sent_ticks.load(Ordering::SeqCst) < ticks {
@@ -272,7 +263,6 @@ fn commission(board: &Board, bench: &Bench) -> (Output, Instant, String) {
         };
         if let Some(task) = task {
             board.arm.lock().unwrap().instruct(task).unwrap();
-            board.wait_until_told();
             // The program may have ended meanwhile.
             let _ = child.stdin.as_mut().unwrap().write_all(b"\n");
         }

@@ -9,10 +9,10 @@ use nix::sys::signal::Signal;
 use painleve_link::{BusName, Pacing, PlantEnd, Session};
 use painleve_plant::law_choice::build;
 use painleve_plant::scenario::Scenario;
+use painleve_process::interrupt::Interrupt;
 use painleve_shared::counts::{ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::status::{Fault, SupervisorState};
-use painleve_system::interrupt::Interrupt;
 use painleve_tests::{Bench, child_of, code, errors, signal};
 use serde_json::Value;
 

@@ -97,7 +97,7 @@ fn the_commands_of_the_tutorials_succeed() {
         assert!(bench.path(file).exists(), "{file}");
     }
     let merged = fs::read_to_string(bench.path("out/sweep/merged.csv")).unwrap();
-    assert!(merged.lines().count() > 10, "{merged}");
+    assert!(merged.lines().count() > 2, "{merged}");
 }
 
 #[test]

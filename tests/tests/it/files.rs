@@ -360,7 +360,6 @@ fn pipes_and_devices_are_refused_at_once() {
             1,
             "shard-9.csv cannot be read: it is not a regular file",
         ),
-        ("timing --bound --elf pipe", 2, "not a regular file"),
     ] {
         let words: Vec<_> = line.split_whitespace().collect();
         let (output, _) = bench.start(&words).end(SOON);
@@ -435,6 +434,14 @@ fn names_that_are_not_text_are_used_as_they_are() {
         &[b"c\xff.toml"],
     );
     assert_eq!(commissioned["output"], "c\u{fffd}.toml");
+    let refused = bench.command(&["run"]).arg(name(b"c\xff.toml")).output();
+    let refused = refused.unwrap();
+    assert_eq!(code(refused.status), 2, "{refused:?}");
+    let message = errors(&refused);
+    assert!(
+        message.starts_with("error: \"c\\xFF.toml\": not UTF-8"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use painleve_plant::Configuration;
 use painleve_plant::controller_host::{Answer, ControllerHost, HostError, InProcess};
+use painleve_process::realtime::Pacer;
 use painleve_shared::frame::SensorFrame;
-use painleve_system::realtime::Pacer;
 
 use super::TickTimes;
 

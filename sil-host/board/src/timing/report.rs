@@ -1,8 +1,8 @@
 //! The report of tick costs, as JSON and as a table.
 
 use comfy_table::CellAlignment;
+use painleve_process::terminal;
 use painleve_shared::message::Health;
-use painleve_system::terminal;
 use serde::{Deserialize, Serialize};
 
 use super::tick_times::WorstTick;

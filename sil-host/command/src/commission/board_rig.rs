@@ -7,13 +7,13 @@ use painleve_board::BoardError;
 use painleve_board::arm::{ArmEvent, ConnectedArm};
 use painleve_commission::{OperatorTask, RawReadings, Rig};
 use painleve_plant::scenario::Scenario;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::warn;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::FrameSource;
 use painleve_shared::mounting::{Mounting, SensorParts};
 use painleve_shared::status::{Fault, SupervisorState};
-use painleve_system::interrupt::Interrupt;
-use painleve_system::terminal::warn;
 
 use crate::CommandError;
 use crate::drive::{Operator, OperatorCommand};
@@ -111,18 +111,26 @@ impl BoardRig {
         self.arm.stop()
     }
 
-    /// Returns the next tick with readings, if one arrives soon.
-    fn next_tick(&mut self) -> Result<Option<(SensorFrame, ActuatorFrame)>, BoardRigError> {
+    /// Returns what the board says next, if it says something soon.
+    fn next_event(&mut self) -> Result<Option<ArmEvent>, BoardRigError> {
         if self.interrupt.is_requested() {
             return Err(BoardRigError::Interrupted);
         }
-        let Some(ArmEvent::Tick { sensor, answer }) = self.arm.next_event(PATIENCE)? else {
-            return Ok(None);
-        };
-        if let Some(fault) = answer.latched_fault() {
+        let event = self.arm.next_event(PATIENCE)?;
+        if let Some(ArmEvent::Tick { answer, .. }) = &event
+            && let Some(fault) = answer.latched_fault()
+        {
             return Err(BoardRigError::Faulted(fault));
         }
-        Ok(sensor.map(|sensor| (sensor, answer)))
+        Ok(event)
+    }
+
+    /// Returns the next tick with readings, if one arrives soon.
+    fn next_tick(&mut self) -> Result<Option<(SensorFrame, ActuatorFrame)>, BoardRigError> {
+        Ok(match self.next_event()? {
+            Some(ArmEvent::Tick { sensor, answer }) => sensor.map(|sensor| (sensor, answer)),
+            _ => None,
+        })
     }
 
     /// Returns whether the operator has pressed the return key since the last call.
@@ -137,8 +145,12 @@ impl BoardRig {
     /// Waits until the operator has done a task.
     fn wait_for_operator(&mut self) -> Result<(), BoardRigError> {
         while !self.is_confirmed()? {
-            self.next_tick()?;
+            self.next_event()?;
         }
+        // On a busy machine, ticks from before the task was done may still wait on the line: all ticks behind the
+        // board's answer are later.
+        self.arm.ask_for_health()?;
+        while !matches!(self.next_event()?, Some(ArmEvent::Health(_))) {}
         Ok(())
     }
 

@@ -9,10 +9,10 @@ use clap::Args;
 use painleve_commission::second_sensors::{self, SecondSensors};
 use painleve_commission::simulated::{BuiltInMistake, SimulatedRig};
 use painleve_commission::{CommissionError, Commissioned, Deviation, Expected, commission};
+use painleve_files::atomic_file;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_shared::mounting::SensorParts;
 use painleve_shared::range::OutOfRange;
-use painleve_system::atomic_file;
 use serde_json::json;
 
 use self::board_rig::BoardRig;

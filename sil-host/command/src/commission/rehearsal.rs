@@ -2,8 +2,8 @@
 
 use painleve_commission::simulated::{SimulatedError, SimulatedRig};
 use painleve_commission::{OperatorTask, RawReadings, Rig};
+use painleve_process::terminal::warn;
 use painleve_shared::counts::TorqueCounts;
-use painleve_system::terminal::warn;
 
 /// Shows the operator's tasks of a rehearsal.
 pub struct Rehearsal(pub SimulatedRig);

@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use painleve_board::LineHealth;
 use painleve_plant::sample::Sample;
+use painleve_process::terminal::warn;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs};
 use painleve_shared::lapse::Lapse;
 use painleve_shared::message::Health;
 use painleve_shared::status::SupervisorState;
-use painleve_system::terminal::warn;
 
 /// Time between two redraws.
 const REDRAW: Duration = Duration::from_millis(100);

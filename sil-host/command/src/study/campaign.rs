@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use clap::{ArgAction, Command};
 use painleve_plant::scenario::Scenario;
-use painleve_study::studies::{self, STUDIES};
-use painleve_study::sweep::campaign::{Campaign, CampaignError, Understood};
+use painleve_study::STUDIES;
+use painleve_study_sweep::campaign::{Campaign, CampaignError, Understood};
 
 /// Returns the study of a campaign.
 ///
@@ -20,7 +20,7 @@ pub fn understand(campaign: &Campaign) -> Result<Understood, CampaignError> {
             shardable: all.map(|entry| entry.name).collect(),
         }
     };
-    let entry = studies::find(name)
+    let entry = painleve_study::find(name)
         .filter(|entry| entry.has_shards)
         .ok_or_else(not_shardable)?;
     let command = entry.command().no_binary_name(true);
@@ -72,7 +72,7 @@ fn arguments(campaign: &Campaign, mut study: Command) -> Result<Vec<String>, Cam
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_study::effects::{EFFECTS, RigEffect};
+    use painleve_study_quality::effects::{EFFECTS, RigEffect};
 
     fn campaign(study: &str, options: &[(&str, &[&str])]) -> Campaign {
         let owned = |values: &[&str]| values.iter().map(ToString::to_string).collect();

@@ -5,8 +5,8 @@ pub mod campaign;
 pub mod outcome;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
-use painleve_study::catalogue::{AnyOptions, CatalogueEntry};
-use painleve_study::studies::{self, STUDIES};
+use painleve_study::STUDIES;
+use painleve_study_core::catalogue::{AnyOptions, CatalogueEntry};
 
 use super::CommandError;
 use outcome::OutcomeOptions;
@@ -44,7 +44,7 @@ impl Subcommand for StudyCommand {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        studies::find(name).is_some()
+        painleve_study::find(name).is_some()
     }
 }
 
@@ -52,7 +52,7 @@ impl FromArgMatches for StudyCommand {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
         let (name, matches) = matches.subcommand().ok_or_else(missing)?;
-        let entry = studies::find(name).ok_or_else(missing)?;
+        let entry = painleve_study::find(name).ok_or_else(missing)?;
         Ok(Self {
             options: (entry.read)(matches)?,
             outcome: OutcomeOptions::from_arg_matches(matches)?,

@@ -1,16 +1,16 @@
 //! Output files of a study, and the number of threads that compute it.
 
-use painleve_system::terminal;
+use painleve_process::terminal;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::ContentArrangement;
 use comfy_table::presets::ASCII_MARKDOWN;
-use painleve_study::Study;
-use painleve_study::catalogue::{AnyOutcome, AnyStudy};
-use painleve_system::atomic_file::{commit_all, prepare};
-use painleve_system::picture;
+use painleve_chart::picture;
+use painleve_files::atomic_file::{commit_all, prepare};
+use painleve_study_core::Study;
+use painleve_study_core::catalogue::{AnyOutcome, AnyStudy};
 
 use crate::output_error::output;
 use crate::process_error::ProcessError;
@@ -56,7 +56,7 @@ impl Threads {
         shown: Shown,
     ) -> Result<Vec<S::Row>, CommandError> {
         let progress = Progress::start(name, study.len(), shown);
-        Ok(self.in_pool(|| painleve_study::rows(study, || progress.row_done()))??)
+        Ok(self.in_pool(|| painleve_study_core::rows(study, || progress.row_done()))??)
     }
 
     /// Runs `work` on the requested number of threads.

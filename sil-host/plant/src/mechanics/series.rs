@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use painleve_system::input_file;
+use painleve_files::input_file;
 
 use super::from_file::check_permitted;
 

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use painleve_files::input_file;
 use painleve_shared::settings::Settings;
-use painleve_system::input_file;
 use toml::{Table, Value};
 
 use super::error::ScenarioError;

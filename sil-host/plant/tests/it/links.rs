@@ -149,7 +149,7 @@ fn source(folder: &Path, text: &mut String) {
 fn names_in_the_pages_occur_in_the_source() {
     let mut text = String::new();
     for folder in [
-        "shared", "firmware", "sil-host", "tests", "xtask", "examples",
+        "shared", "firmware", "sil-host", "tests", "tools", "xtask", "examples",
     ] {
         source(&workspace().join(folder), &mut text);
     }

@@ -12,8 +12,8 @@ use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_shared::ArmParameters;
 use painleve_shared::frame::StatusFlags;
-use painleve_study::robustness::{Arms, Robustness};
-use painleve_study::rows;
+use painleve_study_core::rows;
+use painleve_study_quality::robustness::{Arms, Criterion, Robustness};
 
 /// 0.5 % of the force cell's range.
 const NOISE: &str = "converters.force.noise_n=0.1";
@@ -242,11 +242,14 @@ fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
         let campaign = Robustness {
             arms: Arms::Paper,
             seed: 2,
+            criterion: Criterion::InPlace,
             runs: 60,
             overrides: overrides.iter().map(ToString::to_string).collect(),
         };
         let rows = rows(&campaign, || ()).unwrap();
-        rows.iter().filter(|row| row.ending.is_success()).count()
+        rows.iter()
+            .filter(|row| campaign.criterion.holds(row.ending))
+            .count()
     };
     const ENCODERS: &str = "controller.contact.evidence=encoders";
     let with = successes(&[ENCODERS]);

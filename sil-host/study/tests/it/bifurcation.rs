@@ -2,12 +2,12 @@
 //! the number of threads.
 
 use painleve_plant::mechanics::PlantParameters;
-use painleve_study::bifurcation::{Bifurcation, BifurcationDiagram};
-use painleve_study::cells::{Cells, RELATIVE_TOLERANCE};
-use painleve_study::chaos::Regime;
-use painleve_study::initial::Initial;
-use painleve_study::poincare::Poincare;
-use painleve_study::{Study, outcome, rows};
+use painleve_study_core::initial::Initial;
+use painleve_study_core::{Study, outcome, rows};
+use painleve_study_paper::bifurcation::{Bifurcation, BifurcationDiagram};
+use painleve_study_paper::cells::{Cells, RELATIVE_TOLERANCE};
+use painleve_study_paper::chaos::Regime;
+use painleve_study_paper::poincare::Poincare;
 
 fn cells(mu: &[f64], v_belt_m_s: &[f64], initial: &[Initial]) -> Cells {
     let cells = Cells {

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use painleve_study::figures::page_maker::{Fineness, PageMaker};
-use painleve_study::studies::{self, STUDIES};
+use painleve_study::STUDIES;
+use painleve_study_core::figures::page_maker::{Fineness, PageMaker};
 
 /// Returns the CSV rows that a printed command computes, header first.
 fn rows(command: &str) -> Vec<String> {
@@ -11,7 +11,7 @@ fn rows(command: &str) -> Vec<String> {
     let ["painleve", "study", name, options @ ..] = words.as_slice() else {
         panic!("{command} is not a study");
     };
-    let entry = studies::find(name).unwrap();
+    let entry = painleve_study::find(name).unwrap();
     let parser = entry.command().no_binary_name(true);
     let matches = parser.try_get_matches_from(options).unwrap();
     let study = (entry.read)(&matches).unwrap().study().unwrap();

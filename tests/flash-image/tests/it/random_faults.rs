@@ -1,9 +1,9 @@
 //! Injects a thousand random faults at random instructions.
 
+use painleve_chips::stm32::Crystal;
+use painleve_chips::{BitErrors, BridgeFailure};
 use painleve_flash_image::bench::{Bench, scenario, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, F405, G474};
-use painleve_flash_image::stm32::Crystal;
-use painleve_parts::{BitErrors, BridgeFailure};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::mounting::SensorParts;
 

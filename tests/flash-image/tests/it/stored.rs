@@ -6,11 +6,11 @@
 use std::convert::Infallible;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use painleve_chips::machine::Reset;
+use painleve_chips::{MILLISECOND, Picoseconds, SECOND};
 use painleve_drivers::slots::Slots;
 use painleve_flash_image::bench::{Bench, encoded, scenario};
 use painleve_flash_image::board::{BoardChip, ENABLE, EmulatedBoard, F405, G474, RESET};
-use painleve_flash_image::machine::Reset;
-use painleve_flash_image::{MILLISECOND, Picoseconds, SECOND};
 use painleve_plant::law_choice::build;
 use painleve_shared::message::{Request, Response};
 use painleve_shared::stored::{StoredConfiguration, StoredState};

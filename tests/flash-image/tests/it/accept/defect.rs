@@ -1,6 +1,6 @@
 //! Defects that can be built into a bare board.
 
-use painleve_flash_image::MICROSECOND;
+use painleve_chips::MICROSECOND;
 use painleve_flash_image::bare::{BareBench, LINES, OBSERVER};
 use painleve_flash_image::board::{BoardChip, ENABLE, RESET, STAGES_READY};
 

@@ -8,9 +8,9 @@ mod port;
 
 use painleve_accept::{Acceptance, Verdict, accept};
 use painleve_board::Serial;
+use painleve_chips::{MICROSECOND, MILLISECOND};
 use painleve_flash_image::bare::{BareBench, Output};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405, G474};
-use painleve_flash_image::{MICROSECOND, MILLISECOND};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use painleve_board::{BoardError, Port};
+use painleve_chips::{MICROSECOND, Picoseconds};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard};
-use painleve_flash_image::{MICROSECOND, Picoseconds};
 
 /// Steps in which the board runs until something arrives.
 const STEP: Picoseconds = 100 * MICROSECOND;

@@ -174,9 +174,14 @@ impl<'a> BoundCheck<'a> {
     }
 }
 
+fn flashed() -> Image {
+    let path = board::image("painleve-f405");
+    Image::of(&path, &std::fs::read(&path).unwrap()).unwrap()
+}
+
 fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
-    let image = Image::read(&board::image("painleve-f405")).unwrap();
-    let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
+    let image = flashed();
+    let bound = Bound::of(&image).unwrap_or_else(|error| panic!("{error}"));
     let mut watch = BoundCheck::new(&image, &bound);
     run(&mut watch);
     watch.update.report("update", &bound.update, &image);
@@ -254,7 +259,7 @@ const PORTS: std::ops::Range<u32> = 0x4002_0000..0x4002_2400;
 /// where that is not needed.
 #[test]
 fn peripherals_at_addresses_computed_at_run_time_are_those_of_pins() {
-    let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
+    let bound = Bound::of(&flashed()).unwrap_or_else(|error| panic!("{error}"));
     let mut charged = 0;
     let [encoders, force] = SENSOR_INTERRUPTS;
     for handler in [CONTROL_INTERRUPT, UPDATE_INTERRUPT, encoders, force] {
@@ -441,12 +446,12 @@ fn the_worst_settings_found_by_a_search_stay_below_the_bound() {
 /// The settings depend on their number alone, not on the number of threads.
 #[test]
 fn random_settings_stay_below_the_bound() {
-    let bound = Bound::of(&board::image("painleve-f405")).unwrap_or_else(|error| panic!("{error}"));
+    let bound = Bound::of(&flashed()).unwrap_or_else(|error| panic!("{error}"));
     let settings = tries(800).div_ceil(FRAMES_PER_SETTINGS);
     let threads = std::thread::available_parallelism().map_or(1, |it| it.get() as u64);
     // What was found, and the settings with most cycles.
     let run = |thread: u64| {
-        let image = Image::read(&board::image("painleve-f405")).unwrap();
+        let image = flashed();
         let mut watch = BoundCheck::new(&image, &bound);
         let mut worst = String::new();
         for number in (thread..settings).step_by(threads as usize) {

@@ -1,10 +1,10 @@
 //! The microcontroller itself fails: reset, clock, supply, program.
 
-use painleve_flash_image::MILLISECOND;
+use painleve_chips::MILLISECOND;
+use painleve_chips::machine::Reset;
+use painleve_chips::stm32::Crystal;
 use painleve_flash_image::bench::{Bench, scenario};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard};
-use painleve_flash_image::machine::Reset;
-use painleve_flash_image::stm32::Crystal;
 use painleve_shared::black_box::{BlackBox, Crash, ResetCause};
 use painleve_shared::message::{Request, Response};
 use painleve_shared::status::Fault;

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use painleve_chips::stm32::WiredChip as _;
+use painleve_chips::{MICROSECOND, MILLISECOND};
 use painleve_flash_image::bench::{Bench, encoded, scenario};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405};
-use painleve_flash_image::stm32::WiredChip as _;
-use painleve_flash_image::{MICROSECOND, MILLISECOND};
 use painleve_plant::law_choice::build;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::message::{FrameSource, PROTOCOL, Request, Response};

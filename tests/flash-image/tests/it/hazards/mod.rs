@@ -9,7 +9,7 @@ mod second_sensors;
 mod sensors;
 mod watchdogs;
 
-use painleve_flash_image::MILLISECOND;
+use painleve_chips::MILLISECOND;
 use painleve_flash_image::bench::{Bench, encoded, scenario};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard};
 use painleve_plant::simulation::Simulation;

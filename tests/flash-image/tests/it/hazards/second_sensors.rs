@@ -1,9 +1,9 @@
 //! An arm with two sensors on each channel: what one of them shows wrongly, the other contradicts.
 
+use painleve_chips::BitErrors;
 use painleve_flash_image::bench::{Bench, encoded, scenario, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard};
 use painleve_flash_image::harm::Harm;
-use painleve_parts::BitErrors;
 use painleve_plant::plant::Plant as _;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::message::{FrameSource, Response};

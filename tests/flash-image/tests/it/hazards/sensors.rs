@@ -1,10 +1,10 @@
 //! Sensors, switches and torque stages fail.
 
+use painleve_chips::BridgeFailure;
+use painleve_chips::MILLISECOND;
 use painleve_drivers::force_cell::LIVE_ZERO;
-use painleve_flash_image::MILLISECOND;
 use painleve_flash_image::bench::{Bench, encoded, scenario, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard, STAGES_READY};
-use painleve_parts::BridgeFailure;
 use painleve_plant::plant::Plant as _;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::ForceCounts;

@@ -1,9 +1,9 @@
 //! The watchdogs: they must neither reset a healthy board nor let a dead one drive on, in any phase of their prescalers.
 
+use painleve_chips::machine::Reset;
+use painleve_chips::{MILLISECOND, SECOND};
 use painleve_flash_image::bench::{Bench, encoded, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard};
-use painleve_flash_image::machine::Reset;
-use painleve_flash_image::{MILLISECOND, SECOND};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::message::{FrameSource, RefusedRate, Response};
 

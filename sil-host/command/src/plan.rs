@@ -1,0 +1,52 @@
+//! What a process of a run is to do, as `painleve run` hands it over: the options of its subcommand, serialised.
+//!
+//! The process is started as `painleve NAME --plan PLAN`, an option that the parser of the command line does not know.
+
+use std::path::Path;
+use std::process::Command;
+
+use clap::Subcommand;
+use serde::{Deserialize, Serialize};
+
+use super::bridge::BridgeArguments;
+use super::controller::ControllerArguments;
+use super::plant::PlantArguments;
+
+const OPTION: &str = "--plan";
+
+/// A process of a run: its subcommand and options.
+#[derive(Debug, Subcommand, Serialize, Deserialize)]
+pub enum Plan {
+    /// Simulate belt and arm, and wait for a controller on the bus.
+    Plant(PlantArguments),
+    /// Run the controller for the plant on the bus.
+    Controller(ControllerArguments),
+    /// Connect the controller's image on a board to the plant's bus.
+    Bridge(BridgeArguments),
+}
+
+impl Plan {
+    /// Returns the command that starts the process.
+    ///
+    /// # Errors
+    /// If the plan cannot be serialised, which plain structs can.
+    pub fn command(&self, program: &Path) -> serde_json::Result<Command> {
+        let name = match self {
+            Self::Plant(_) => "plant",
+            Self::Controller(_) => "controller",
+            Self::Bridge(_) => "bridge",
+        };
+        let mut command = Command::new(program);
+        command.args([name, OPTION, &serde_json::to_string(self)?]);
+        Ok(command)
+    }
+
+    /// Returns the plan of this process, if `run` has started it.
+    pub fn of_this_process() -> Option<Self> {
+        let arguments: Vec<_> = std::env::args_os().skip(2).collect();
+        match arguments.as_slice() {
+            [option, plan] if option == OPTION => serde_json::from_str(plan.to_str()?).ok(),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The scenario of a run, as its options select it.
+
+use std::io::Read;
+
+use clap::Args;
+use painleve_files::input_file;
+use painleve_link::Pacing;
+use painleve_plant::scenario::{Scenario, built_in};
+use painleve_study_quality::robustness::{self, Arms};
+use serde::{Deserialize, Serialize};
+use tempfile::NamedTempFile;
+
+use super::CommandError;
+
+/// A run of the robustness campaign.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Replay {
+    seed: u64,
+    index: u64,
+}
+
+impl std::str::FromStr for Replay {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        text.split_once(':')
+            .and_then(|(seed, index)| {
+                Some(Self {
+                    seed: seed.parse().ok()?,
+                    index: index.parse().ok()?,
+                })
+            })
+            .ok_or_else(|| {
+                "expected the campaign's seed and the number of the run as SEED:INDEX, for example 1:42".into()
+            })
+    }
+}
+
+/// The scenario and its pacing.
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
+pub struct ScenarioArguments {
+    /// Built-in scenario or TOML file; `-` reads standard input.
+    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
+    name: String,
+    /// Built-in scenario or TOML file, as an option instead of an argument.
+    #[arg(long = "scenario", value_name = "SCENARIO", conflicts_with = "name")]
+    option: Option<String>,
+    /// Repeat run INDEX of `study robustness --seed SEED` instead of a scenario.
+    #[arg(
+        long,
+        value_name = "SEED:INDEX",
+        conflicts_with_all = ["name", "option"],
+        allow_hyphen_values = true
+    )]
+    replay: Option<Replay>,
+    /// With --replay: the study's option --arms.
+    #[arg(long, value_enum, default_value = "paper", requires = "replay")]
+    arms: Arms,
+    /// Override one key, for example belt.friction=0.4; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// As fast as possible and deterministic, or in real time.
+    #[arg(long, value_enum, default_value = "lockstep")]
+    pub pacing: Pacing,
+}
+
+impl ScenarioArguments {
+    /// Name or path of the scenario.
+    pub fn name(&self) -> &str {
+        self.option.as_deref().unwrap_or(&self.name)
+    }
+
+    /// Returns the scenario with its overrides, after validation.
+    ///
+    /// # Errors
+    /// [`CommandError`] with one sentence for the user.
+    pub fn load(&self) -> Result<Scenario, CommandError> {
+        match self.replay {
+            Some(Replay { seed, index }) => {
+                let drawn = robustness::scenario(self.arms, seed, index)?;
+                Ok(drawn.with_overrides("replayed run", &self.overrides)?)
+            }
+            None => Ok(Scenario::load(self.name(), &self.overrides)?),
+        }
+    }
+
+    /// Copies a scenario from standard input, if it is requested as `-`, to a file that every process
+    /// of the run can read, and which lasts as long as the returned handle.
+    ///
+    /// # Errors
+    /// If standard input or the file fails.
+    pub fn copy_standard_input(&mut self) -> Result<Option<NamedTempFile>, CommandError> {
+        if self.replay.is_some() || self.name() != "-" {
+            return Ok(None);
+        }
+        let mut file = tempfile::Builder::new()
+            .prefix("painleve-standard-input-")
+            .suffix(".toml")
+            .tempfile()?;
+        input_file::remember_standard_input()?;
+        // As much as of a file, so that an endless input is refused as one.
+        let input = std::io::stdin().lock().take(input_file::MOST_BYTES + 1);
+        std::io::copy(&mut { input }, &mut file)?;
+        self.option = Some(file.path().display().to_string());
+        Ok(Some(file))
+    }
+}

@@ -1,0 +1,12 @@
+//! A process of the bench among others.
+//!
+//! - [`interrupt`]: Ctrl-C and requests to end; [`memory_full`]: the end where shared memory is full
+//! - [`lifetime`]: child processes that never outlive their parent
+//! - [`realtime`]: absolute deadlines, real-time priority, locked memory
+//! - [`terminal`]: standard output and error that may be closed or full
+
+pub mod interrupt;
+pub mod lifetime;
+pub mod memory_full;
+pub mod realtime;
+pub mod terminal;

@@ -1,0 +1,229 @@
+//! What a study is: a numbered list of independent rows, its options, and the outcome of its rows.
+//!
+//! - [`grid`]: the values of a parameter, `FROM:TO:STEP` or a list
+//! - [`options`]: options that several studies share; [`initial`]: initial conditions
+//! - [`catalogue`]: what command line, sweeps and the page of figures need of a study, whatever its type
+//! - [`outcome`]: the outcome of a study as JSON, CSV, table and figure; [`tabular`]: rows as lines of a table, one row
+//!   at a time
+//! - [`case`], [`trial`]: closed loops to study, and their execution in this process;
+//!   [`loop_study`]: the same with a user-defined plant
+//! - [`belt_line`]: the postures on the belt
+//! - [`figures`]: the page that compares the studies with the paper
+//!
+//! The rows of a [`Study`] can be computed in any order, on any number of threads, or in shards.
+
+pub mod belt_line;
+pub mod case;
+pub mod catalogue;
+pub mod figures;
+pub mod grid;
+pub mod initial;
+pub mod loop_study;
+pub mod options;
+pub mod outcome;
+pub mod tabular;
+pub mod trial;
+
+use painleve_plant::PlantError;
+use painleve_plant::closed_loop::LoopError;
+use painleve_plant::scenario::ScenarioError;
+use painleve_shared::range::OutOfRange;
+use rayon::prelude::*;
+
+pub use grid::{Grid, GridError};
+pub use outcome::Outcome;
+
+/// Why a study has no outcome.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// The scenario of the study is invalid.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The text of a grid is invalid.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// An override sets a key that an option of the study sets.
+    #[error("{key} has no effect here; use {option}")]
+    Taken {
+        /// The key.
+        key: String,
+        /// The option.
+        option: String,
+    },
+    /// Levels without exactly one effect whose levels they are.
+    #[error("--level needs exactly one effect other than none in --effect")]
+    LevelsOfSeveralEffects,
+    /// A position is out of reach.
+    #[error("z_t = {tip_t_m} m is out of reach")]
+    OutOfReach {
+        /// Position along the belt, m.
+        tip_t_m: f64,
+    },
+    /// No θ1 of a grid puts the tip on the belt.
+    #[error(
+        "no θ1 of the grid puts the tip on the belt; |θ1| must be below {below_deg:.2} degrees"
+    )]
+    OffTheBelt {
+        /// Limit of |θ1|, degrees.
+        below_deg: f64,
+    },
+    /// p is not positive anywhere within reach.
+    #[error("the arm has no admissible tip position")]
+    NothingAdmissible,
+    /// A row cannot be written as a line of a table.
+    #[error("row {index} cannot be written: {source}")]
+    Unwritable {
+        /// Number of the row.
+        index: usize,
+        /// The reason.
+        source: csv::Error,
+    },
+    /// The values of the options have more combinations than can be computed.
+    #[error("{0} rows: at most {MOST_ROWS} can be computed; give coarser grids or fewer runs")]
+    TooManyRows(usize),
+    /// A parameter is out of range.
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
+    /// The plant of one row cannot continue.
+    #[error("{row}: {source}")]
+    Plant {
+        /// The row's parameters.
+        row: String,
+        /// The reason.
+        source: PlantError,
+    },
+    /// The closed loop of one row cannot continue.
+    #[error("{row}: {source}")]
+    Loop {
+        /// The row's parameters.
+        row: String,
+        /// The reason.
+        source: LoopError,
+    },
+}
+
+/// A numbered list of rows, each of which depends only on its number.
+pub trait Study: Sync {
+    /// One row of the outcome.
+    type Row: Send;
+
+    /// Returns the number of rows.
+    fn len(&self) -> usize;
+
+    /// Whether there are no rows.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Computes row `index`, less than [`len`](Study::len).
+    ///
+    /// # Errors
+    /// [`StudyError`] if the row cannot be computed.
+    fn row(&self, index: usize) -> Result<Self::Row, StudyError>;
+}
+
+/// Largest number of rows of a study: more than a machine computes in a year.
+pub const MOST_ROWS: usize = 10_000_000;
+
+/// Returns the number of combinations of these numbers of values; [`usize::MAX`] on
+/// overflow.
+pub fn combinations(counts: &[usize]) -> usize {
+    counts
+        .iter()
+        .fold(1, |product: usize, &count| product.saturating_mul(count))
+}
+
+/// Computes all rows in order on the threads of the current rayon pool; `done` is
+/// called after each row, and no further row begins once it has panicked.
+///
+/// # Errors
+/// [`StudyError::TooManyRows`], or the error of the first row that fails, whatever the number of threads.
+pub fn rows<S: Study>(study: &S, done: impl Fn() + Sync) -> Result<Vec<S::Row>, StudyError> {
+    if study.len() > MOST_ROWS {
+        return Err(StudyError::TooManyRows(study.len()));
+    }
+    let rows: Vec<Result<S::Row, StudyError>> = (0..study.len())
+        .into_par_iter()
+        // The cost of rows varies widely.
+        .with_max_len(1)
+        .panic_fuse()
+        .map(|index| {
+            let row = study.row(index);
+            done();
+            row
+        })
+        .collect();
+    rows.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Squares;
+
+    impl Study for Squares {
+        type Row = usize;
+
+        fn len(&self) -> usize {
+            100
+        }
+
+        fn row(&self, index: usize) -> Result<usize, StudyError> {
+            match index {
+                70 | 30 => Err(StudyError::OutOfReach {
+                    tip_t_m: index as f64,
+                }),
+                _ => Ok(index * index),
+            }
+        }
+    }
+
+    struct First(usize);
+
+    impl Study for First {
+        type Row = usize;
+
+        fn len(&self) -> usize {
+            self.0
+        }
+
+        fn row(&self, index: usize) -> Result<usize, StudyError> {
+            Squares.row(index)
+        }
+    }
+
+    #[test]
+    fn rows_and_errors_do_not_depend_on_the_number_of_threads() {
+        for threads in [1, 2, 7] {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            let done = std::sync::atomic::AtomicUsize::new(0);
+            let count = || {
+                done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            };
+            let expected: Vec<usize> = (0..30).map(|i| i * i).collect();
+            assert_eq!(pool.install(|| rows(&First(30), count)).unwrap(), expected);
+            assert_eq!(done.into_inner(), 30);
+            let error = pool.install(|| rows(&Squares, || ())).unwrap_err();
+            assert_eq!(error.to_string(), "z_t = 30 m is out of reach");
+        }
+    }
+
+    #[test]
+    fn no_row_begins_after_a_panic_of_the_progress() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let interrupt = || {
+            done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            std::panic::resume_unwind(Box::new("interrupted"));
+        };
+        let study = || pool.unwrap().install(|| rows(&First(30), interrupt));
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(study));
+        assert!(outcome.is_err());
+        // Each of the two threads may have begun one.
+        assert!(done.into_inner() <= 2);
+    }
+}

@@ -1,0 +1,44 @@
+//! The outcome of a study as JSON, CSV, table and figure.
+
+use comfy_table::Table;
+use serde::Serialize;
+
+/// The outcome of a study. Serialised it is the JSON object of `--json`, whose names are
+/// a contract: add to them, never rename.
+pub trait Outcome: Serialize {
+    /// The lines of the CSV file: flat structs, whose field names are the header.
+    fn lines(&self) -> impl IntoIterator<Item: Serialize>;
+
+    /// The outcome as a table, with the paper's values beside.
+    fn table(&self) -> Table;
+}
+
+/// An outcome that can be drawn.
+pub trait Figure {
+    /// The figure as SVG text.
+    fn svg(&self) -> String;
+}
+
+/// The CSV file of an outcome, header included.
+///
+/// # Errors
+/// If the lines cannot be written as CSV, which flat structs can.
+pub fn csv(outcome: &impl Outcome) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for line in outcome.lines() {
+        writer.serialize(line)?;
+    }
+    writer
+        .into_inner()
+        .map_err(|error| csv::Error::from(error.into_error()))
+}
+
+pub use painleve_process::terminal::table;
+
+/// The name under which a value is serialised.
+pub fn name(value: &impl Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(name)) => name,
+        other => format!("{other:?}"),
+    }
+}

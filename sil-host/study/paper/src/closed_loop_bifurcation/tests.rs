@@ -1,0 +1,88 @@
+//! Controllers that keep the tip on the belt, and one that does not.
+
+use super::*;
+
+fn study(controller: ControllerChoice) -> ClosedLoopBifurcation {
+    ClosedLoopBifurcation {
+        controllers: vec![controller],
+        converters: vec![ConverterChoice::Hardware],
+        mu: vec![0.6],
+        v_belt_m_s: vec![-0.9, -0.4],
+        initial: vec![Initial::D, Initial::U],
+        seed: 1,
+        reference: Reference::MinimumJerk(1.0),
+        target_m: None,
+        transient_s: 2.0,
+        record_s: 0.5,
+        overrides: Vec::new(),
+    }
+}
+
+#[test]
+fn the_hybrid_law_keeps_the_tip_on_the_belt_from_either_posture() {
+    let study = study(ControllerChoice::Hybrid);
+    study.check().unwrap();
+    let rows = painleve_study_core::rows(&study, || ()).unwrap();
+    assert_eq!(rows.len(), 4);
+    for (row, (speed, initial)) in
+        rows.iter()
+            .zip([(-0.9, "d"), (-0.9, "u"), (-0.4, "d"), (-0.4, "u")])
+    {
+        assert_eq!((row.v_belt_m_s, row.initial.as_str()), (speed, initial));
+        assert_eq!((row.bouncing, row.lift_offs, row.fault), (false, 0, None));
+        assert_eq!(row.contact_fraction, 1.0);
+        assert!((row.tip_t_m - row.target_m).abs() < 2e-3, "{row:?}");
+    }
+}
+
+#[test]
+fn lift_offs_are_counted_and_the_rest_of_the_motion_is_recorded() {
+    let study = ClosedLoopBifurcation {
+        initial: vec![Initial::U],
+        ..study(ControllerChoice::Pid)
+    };
+    let diagram = ClosedLoopDiagram::new(painleve_study_core::rows(&study, || ()).unwrap());
+    assert!(
+        diagram
+            .rows
+            .iter()
+            .all(|row| row.lift_offs > 0 && row.first_lift_off_s.is_some())
+    );
+    assert_eq!(diagram.sections.len(), 1);
+    assert_eq!(diagram.sections[0].lifted_m_s, [-0.9, -0.4]);
+}
+
+#[test]
+fn random_starts_are_followed_in_their_own_posture() {
+    let study = ClosedLoopBifurcation {
+        initial: (1..=12).map(Initial::Random).collect(),
+        v_belt_m_s: vec![-0.4],
+        ..study(ControllerChoice::Hybrid)
+    };
+    let targets: Vec<f64> = (0..study.len())
+        .map(|index| study.scenario(index).unwrap().0.target_m)
+        .collect();
+    assert!(
+        targets.contains(&0.148) && targets.contains(&0.163),
+        "{targets:?}"
+    );
+}
+
+#[test]
+fn out_of_range_values_are_reported_before_any_cell_runs() {
+    let far = ClosedLoopBifurcation {
+        target_m: Some(0.5),
+        ..study(ControllerChoice::Hybrid)
+    };
+    let error = far.check().unwrap_err().to_string();
+    assert!(error.contains("target_m = 0.5"), "{error}");
+    let fast = ClosedLoopBifurcation {
+        v_belt_m_s: vec![1e9],
+        ..study(ControllerChoice::Hybrid)
+    };
+    assert!(
+        fast.check().unwrap_err().to_string().contains("belt."),
+        "{:?}",
+        fast.check()
+    );
+}

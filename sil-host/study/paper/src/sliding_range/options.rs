@@ -1,0 +1,133 @@
+//! Options of the study: how far the tip slides under each controller.
+
+use clap::Args;
+use painleve_study_core::StudyError;
+use painleve_study_core::case::Reference;
+use painleve_study_core::catalogue::{InShards, PageSection, StudyOptions, in_shards};
+use painleve_study_core::figures::page_maker::PageMaker;
+use painleve_study_core::options::{
+    ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, seconds,
+};
+
+use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
+
+/// How far the tip slides under each controller before it leaves the belt.
+///
+/// The range ends at the farthest target before the first that fails; `fails by` says how: p = 0 is the limit, or the tip
+/// lifts off, stops short or late, or the controller latches a fault. Targets reached beyond it are in brackets; `–` is a
+/// range without any target.
+#[derive(Debug, Args)]
+#[command(
+    mut_arg("controller", |controller| {
+        controller.default_value("pid,hybrid-paper,hybrid-paper-model,hybrid")
+    }),
+    mut_arg("converters", |converters| converters.default_value("ideal,hardware"))
+)]
+pub struct Options {
+    #[command(flatten)]
+    controllers: ControllerOptions,
+    #[command(flatten)]
+    converters: ConverterOptions,
+    /// Postures to start in.
+    #[arg(
+        long,
+        value_name = "POSTURES",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "elbow-down,elbow-up"
+    )]
+    posture: Vec<PostureOption>,
+    #[command(flatten)]
+    friction: FrictionGrid,
+    /// References: minimum-jerk:SECONDS, ramp:SECONDS or step; separate several with commas.
+    #[arg(
+        long,
+        value_name = "REFERENCES",
+        value_delimiter = ',',
+        default_value = "minimum-jerk:3"
+    )]
+    reference: Vec<Reference>,
+    /// Largest distance from the target at which it counts as reached, m.
+    #[arg(
+        long,
+        value_name = "METRES",
+        default_value_t = Criterion::default().within_m,
+        value_parser = metres,
+        allow_negative_numbers = true
+    )]
+    within_m: f64,
+    /// Longest settling time after the end of the reference, s.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = Criterion::default().patience_s,
+        value_parser = seconds,
+        allow_negative_numbers = true
+    )]
+    patience_s: f64,
+    /// Spacing of the targets tried first, m.
+    #[arg(
+        long,
+        value_name = "METRES",
+        default_value_t = Criterion::default().scan_step_m,
+        value_parser = metres,
+        allow_negative_numbers = true
+    )]
+    scan_step_m: f64,
+    /// Accuracy of the result, m.
+    #[arg(
+        long,
+        value_name = "METRES",
+        default_value_t = Criterion::default().resolution_m,
+        value_parser = metres,
+        allow_negative_numbers = true
+    )]
+    resolution_m: f64,
+    #[command(flatten)]
+    overrides: Overrides,
+}
+
+impl StudyOptions for Options {
+    const NAME: &'static str = "sliding-range";
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
+    type Study = SlidingRange;
+    type Outcome = SlidingRanges;
+
+    fn study(&self) -> Result<SlidingRange, StudyError> {
+        self.overrides.refuse(&[
+            ("belt.friction", "--mu"),
+            ("initial", "--posture"),
+            ("controller.reference", "--reference"),
+            ("run.duration_s", "--patience-s"),
+        ])?;
+        let study = SlidingRange {
+            controllers: self.controllers.controller.clone(),
+            converters: self.converters.converters.clone(),
+            postures: self.posture.iter().map(|&posture| posture.into()).collect(),
+            mu: self.friction.mu.values().to_vec(),
+            references: self.reference.clone(),
+            overrides: self.overrides.overrides.clone(),
+            criterion: Criterion {
+                within_m: self.within_m,
+                patience_s: self.patience_s,
+                scan_step_m: self.scan_step_m,
+                resolution_m: self.resolution_m,
+                ..Criterion::default()
+            },
+        };
+        study.check()?;
+        Ok(study)
+    }
+
+    fn scenarios(&self) -> Vec<String> {
+        self.controllers.scenarios()
+    }
+
+    fn outcome(_: &SlidingRange, rows: Vec<Row>) -> SlidingRanges {
+        SlidingRanges { rows }
+    }
+
+    fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+        page::sections(page)
+    }
+}

@@ -1,0 +1,36 @@
+//! Options of the study: capture of a bouncing arm.
+
+use clap::Args;
+use painleve_study_core::StudyError;
+use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
+use painleve_study_core::options::RandomRuns;
+
+use super::{Capture, Captures, Row};
+
+/// Time until a bouncing arm is captured.
+#[derive(Debug, Args)]
+pub struct Options {
+    #[command(flatten)]
+    runs: RandomRuns,
+}
+
+impl StudyOptions for Options {
+    const NAME: &'static str = "capture";
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
+    type Study = Capture;
+    type Outcome = Captures;
+
+    fn study(&self) -> Result<Capture, StudyError> {
+        let study = Capture {
+            seed: self.runs.seed,
+            runs: self.runs.runs,
+            overrides: self.runs.overrides(),
+        };
+        study.check()?;
+        Ok(study)
+    }
+
+    fn outcome(_: &Capture, rows: Vec<Row>) -> Captures {
+        Captures::new(rows)
+    }
+}

@@ -1,0 +1,95 @@
+//! Options of the study of effects.
+
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use painleve_study_core::StudyError;
+use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
+use painleve_study_core::options::{ControllerOptions, RandomRuns, level};
+
+use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
+use crate::robustness::Criterion;
+
+/// How often the tip is kept, and where it ends, against the level of each effect of a real rig.
+#[derive(Debug, Args)]
+#[command(mut_arg("runs", |runs| runs.default_value("100").help("Number of runs of each level")))]
+pub struct Options {
+    #[command(flatten)]
+    controllers: ControllerOptions,
+    /// Contacts.
+    #[arg(
+        long,
+        value_name = "CONTACTS",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "rigid,compliant"
+    )]
+    contact: Vec<Contact>,
+    /// Effects, after the runs without any; all effects by default.
+    #[arg(
+        long,
+        value_name = "EFFECTS",
+        value_delimiter = ',',
+        value_parser = PossibleValuesParser::new(EFFECTS.iter().map(|effect| effect.name)),
+    )]
+    effect: Vec<String>,
+    /// Levels of the one chosen effect, in its unit, in place of its own levels.
+    #[arg(
+        long,
+        value_name = "LEVELS",
+        value_delimiter = ',',
+        value_parser = level,
+        allow_negative_numbers = true,
+        requires = "effect"
+    )]
+    level: Vec<f64>,
+    /// What counts as a success: the tip was kept on the belt without a fault, or is also in place at the end.
+    #[arg(long, value_enum, default_value_t)]
+    criterion: Criterion,
+    #[command(flatten)]
+    runs: RandomRuns,
+}
+
+impl StudyOptions for Options {
+    const NAME: &'static str = "effects";
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
+    type Study = EffectsStudy;
+    type Outcome = EffectsOutcome;
+
+    fn study(&self) -> Result<EffectsStudy, StudyError> {
+        let none = EFFECTS[0].name;
+        let mut effects = vec![none];
+        if self.effect.is_empty() {
+            effects.extend(EFFECTS[1..].iter().map(|effect| effect.name));
+        } else {
+            let chosen = self.effect.iter().filter_map(|name| find(name));
+            effects.extend(
+                chosen
+                    .map(|effect| effect.name)
+                    .filter(|name| *name != none),
+            );
+        }
+        if !self.level.is_empty() && effects.len() != 2 {
+            return Err(StudyError::LevelsOfSeveralEffects);
+        }
+        let study = EffectsStudy {
+            controllers: self.controllers.controller.clone(),
+            contacts: self.contact.clone(),
+            effects,
+            levels: self.level.clone(),
+            seed: self.runs.seed,
+            criterion: self.criterion,
+            runs: self.runs.runs,
+            overrides: self.runs.overrides(),
+        };
+        study.check()?;
+        Ok(study)
+    }
+
+    fn outcome(study: &EffectsStudy, rows: Vec<Row>) -> EffectsOutcome {
+        EffectsOutcome::new(study, rows)
+    }
+
+    fn scenarios(&self) -> Vec<String> {
+        self.controllers.scenarios()
+    }
+}

@@ -1,0 +1,50 @@
+//! `cargo xtask chaos`: the test in `tests/chaos`, which builds what it disturbs.
+
+use clap::Args;
+
+use crate::command::{ChoreError, PROFILE, run_cargo};
+
+/// Options of the test, which `--help` lists.
+#[derive(Debug, Args)]
+#[command(disable_help_flag = true)]
+pub struct ChaosArguments {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    options: Vec<String>,
+}
+
+/// Runs the part that belongs to every `cargo xtask test`.
+///
+/// # Errors
+/// If a flaw is found.
+pub fn short() -> Result<(), ChoreError> {
+    start(&["--trials=120", "--stop-after-s=30", "--end-s=20"])
+}
+
+/// Runs the part that belongs to `cargo xtask test --all`.
+///
+/// # Errors
+/// If a flaw is found.
+pub fn nightly() -> Result<(), ChoreError> {
+    start(&["--trials=1000", "--end-s=20"])
+}
+
+/// Runs the test.
+///
+/// # Errors
+/// If it does not build, or finds a flaw.
+pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
+    let options: Vec<_> = arguments.options.iter().map(String::as_str).collect();
+    start(&options)
+}
+
+fn start(options: &[&str]) -> Result<(), ChoreError> {
+    let test = [
+        "run",
+        "--profile",
+        PROFILE,
+        "--package",
+        "painleve-chaos",
+        "--",
+    ];
+    run_cargo(&[&test, options].concat())
+}

@@ -1,0 +1,65 @@
+//! What `cargo xtask test --all` checks of the workspace as a whole: that the least Rust version compiles it, and that
+//! its dependencies have the licences and come from the sources that `deny.toml` allows.
+
+use std::process::{Command, Stdio};
+
+use crate::command::{ChoreError, PROFILE, run};
+use crate::setup::starts;
+
+/// The least Rust version, from the workspace's `Cargo.toml`.
+const LEAST_RUST: &str = env!("CARGO_PKG_RUST_VERSION");
+
+/// Checker of licences and sources; installed by hand, because its compilation takes minutes.
+const DENY: &str = "cargo-deny";
+
+/// Installs the least Rust version, if rustup can, and returns what is missing.
+pub fn install() -> Vec<&'static str> {
+    let install = ["toolchain", "install", LEAST_RUST, "--profile", "minimal"];
+    let has_rust = has_least_rust() || run("rustup", &install).is_ok();
+    [(has_rust, "the least Rust version"), (starts(DENY), DENY)]
+        .into_iter()
+        .filter_map(|(has, tool)| (!has).then_some(tool))
+        .collect()
+}
+
+fn has_least_rust() -> bool {
+    Command::new("rustup")
+        .args(["run", LEAST_RUST, "rustc", "--version"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
+/// Checks that the least Rust version compiles the workspace with its tests, if it is installed.
+///
+/// # Errors
+/// If it does not.
+pub fn least_rust() -> Result<(), ChoreError> {
+    if !has_least_rust() {
+        return Ok(());
+    }
+    let check = [
+        "check",
+        "--workspace",
+        "--all-targets",
+        "--profile",
+        PROFILE,
+    ];
+    run(
+        "rustup",
+        &[&["run", LEAST_RUST, "cargo"], &check[..]].concat(),
+    )
+}
+
+/// Checks licences and sources of the dependencies, if `cargo deny` is installed. Its advisories come from a database that changes
+/// without a change here.
+///
+/// # Errors
+/// If a dependency is not allowed.
+pub fn dependencies() -> Result<(), ChoreError> {
+    if !starts(DENY) {
+        return Ok(());
+    }
+    run("cargo", &["deny", "check", "licenses", "bans", "sources"])
+}
