@@ -12,8 +12,8 @@ use crate::report::Check;
 /// Requests without an answer, 17 bytes each: half a second of the line.
 const TO_BOARD: usize = 2700;
 
-/// Requests with long answers, and how many are under way at once.
-const TO_HOST: usize = 400;
+/// Requests with an answer, and how many are under way at once.
+const TO_HOST: usize = 2000;
 const TOGETHER: usize = 4;
 
 /// Sends as fast as the line permits, in either direction.

@@ -54,7 +54,10 @@ impl<C: Chip> Machine<C> {
             *random = random
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1);
-            core.now += (*random >> 33) % *longest;
+            let delay = (*random >> 33) % *longest;
+            core.now += delay;
+            let hz = u128::from(core.chip.core_hz());
+            core.cycles += (u128::from(delay) * hz / u128::from(crate::SECOND)) as u64;
         }
         let nested = !core.system.active.is_empty();
         core.system.enter(exception);
