@@ -112,7 +112,7 @@ const SPARE: [SpareBits; 13] = [
         last: 0x4001_2308,
         mask: u32::MAX,
     },
-    // The codes of the torque stages, until the next tick.
+    // The codes of the torque stages, until the next answer.
     SpareBits::of_word(0x4000_7420, 0x0fff_0fff),
     // Mode and function of PA0; mode, pull and level of PC6 to PC11.
     SpareBits::of_word(0x4002_0000, 3),

@@ -50,14 +50,14 @@ pub fn steps<P: Port>() -> [Step<P>; COUNT] {
             carry_out: options::measure,
         },
         Step {
-            name: "ticks",
-            question: "Are a closed loop's answers those of this program, bit by bit, and within the bound of cycles?",
-            carry_out: ticks::measure,
-        },
-        Step {
             name: "line",
             question: "Does the serial line carry its full rate without errors, in both directions?",
             carry_out: line::measure,
+        },
+        Step {
+            name: "ticks",
+            question: "Are a closed loop's answers those of this program, bit by bit, and within the bound of cycles?",
+            carry_out: ticks::measure,
         },
         Step {
             name: "converter",

@@ -10,3 +10,4 @@ mod hazards;
 mod open_loop;
 mod random_faults;
 mod stored;
+mod tables;

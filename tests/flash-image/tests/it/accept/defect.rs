@@ -37,6 +37,19 @@ pub enum Defect {
     ErasesBothSlots,
 }
 
+/// The line's own step, and those after it, in which single messages are missing.
+const ON_THE_LINE: &[&str] = &[
+    "line",
+    "ticks",
+    "converter",
+    "enable",
+    "sensors",
+    "release",
+    "watchdogs",
+    "flash",
+    "log",
+];
+
 impl Defect {
     /// Every defect, with the steps that find it: one looks for it, others may rely on the same part.
     pub const ALL: &[(Self, &[&str])] = &[
@@ -47,9 +60,9 @@ impl Defect {
         (Self::ReadProtected, &["options"]),
         (Self::SlowFlash, &["ticks"]),
         (Self::FlippedConstant, &["ticks"]),
-        (Self::NoiseToBoard, &["line"]),
-        (Self::NoiseToHost, &["line"]),
-        (Self::LostBytes, &["line"]),
+        (Self::NoiseToBoard, ON_THE_LINE),
+        (Self::NoiseToHost, ON_THE_LINE),
+        (Self::LostBytes, ON_THE_LINE),
         (Self::FirstOutputDead, &["converter"]),
         (Self::SecondOutputLoaded, &["converter"]),
         (Self::EnableStuckHigh, &["enable"]),

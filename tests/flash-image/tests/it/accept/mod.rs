@@ -5,6 +5,7 @@
 
 mod defect;
 mod port;
+mod program;
 
 use painleve_accept::{Acceptance, Verdict, accept};
 use painleve_board::Serial;
@@ -114,39 +115,12 @@ fn every_defect_is_found_by_its_step_on_the_g474() {
 
 #[test]
 #[ignore = "takes longer than 20 s"]
-fn nothing_is_found_on_fifty_healthy_boards() {
+fn nothing_is_found_on_fifty_healthy_boards_with_the_f405() {
     nothing_is_found::<F405>(HEALTHY);
-    nothing_is_found::<G474>(HEALTHY);
 }
 
-/// Prints what one board's acceptance finds, for a look at it: the defect's name in `DEFECT`.
 #[test]
-#[ignore = "prints"]
-fn print() {
-    let name = std::env::var("DEFECT").unwrap_or_default();
-    let all = Defect::ALL.iter().map(|(defect, _)| *defect);
-    let defect = all.into_iter().find(|it| format!("{it:?}") == name);
-    show::<F405>(defect);
-    show::<G474>(defect);
-}
-
-fn show<C: BoardChip>(defect: Option<Defect>) {
-    let start = std::time::Instant::now();
-    let board = Serial::over(board::<C>(FIRST_SEED, defect)).unwrap();
-    let outcome = accept(board, |step| {
-        println!(
-            "{} {:?} {:.2} s, {:?}",
-            step.name,
-            step.verdict,
-            step.duration_s,
-            start.elapsed()
-        );
-        for it in &step.checks {
-            println!(
-                "    {} | {} | {} | {:?}",
-                it.what, it.measured, it.expected, it.verdict
-            );
-        }
-    });
-    println!("{:?}", outcome.map(|it| it.failed()));
+#[ignore = "takes longer than 20 s"]
+fn nothing_is_found_on_fifty_healthy_boards_with_the_g474() {
+    nothing_is_found::<G474>(HEALTHY);
 }
