@@ -21,6 +21,7 @@ use painleve_shared::message::{FrameSource, RefusedRate};
 use painleve_shared::status::SupervisorState;
 
 use crate::board::BoardDrive;
+use crate::probe::SpareBits;
 use crate::sensor_bus::{self, SensorBus, SpiWords};
 
 /// Control rate while there is no configuration, Hz. The control timer runs from the start, so that only
@@ -38,6 +39,9 @@ pub trait ArmPins {
     type ForceSpi: SpiWords;
     /// A pin that selects a sensor, low.
     type Select: OutputPin;
+
+    /// Bits that a host may change while nothing is driven.
+    const SPARE: &'static [SpareBits];
 
     /// Checks that the watchdogs have a limit for this rate, one within two periods if the torque depends on it.
     ///
@@ -158,6 +162,8 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
 }
 
 impl<P: ArmPins> BoardDrive for ArmDrive<P> {
+    const SPARE: &'static [SpareBits] = P::SPARE;
+
     fn check_rate(&self, tick_hz: f32, source: FrameSource) -> Result<(), RefusedRate> {
         // With frames from the host the stages stay off.
         self.pins.check_rate(tick_hz, source.is_on_board())
@@ -171,10 +177,7 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
             &converters.mounting,
         ));
         self.source = source;
-        self.is_driven = matches!(
-            source,
-            FrameSource::Sensors | FrameSource::Commissioning | FrameSource::StandAlone
-        );
+        self.is_driven = source.drives();
         self.from_host = None;
         // The switch has to be opened and closed again, and the sensors are checked anew.
         let is_mounted = source != FrameSource::Commissioning;

@@ -7,7 +7,7 @@ use painleve_firmware::law::Law;
 use painleve_firmware::supervise::lapses::Lapse;
 use painleve_firmware::{Configuration, SOURCES};
 use painleve_shared::message::{
-    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Request, Response,
+    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Probe, Request, Response,
 };
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 use painleve_shared::wire::{self, Inbox, WireError};
@@ -17,6 +17,7 @@ use serde::de::DeserializeOwned;
 use crate::black_box;
 use crate::board::{BoardDrive, Port};
 use crate::memory::ConfigurationMemory;
+use crate::probe;
 use crate::stack;
 use crate::tasks::Control;
 use crate::watch::health;
@@ -28,6 +29,8 @@ pub struct Link<L: Law> {
     received: [u8; MAXIMUM_LENGTH],
     /// The stored configuration, as found at the start or stored since; `None` before the first call.
     stored: Option<StoredConfiguration>,
+    /// Whether the host has changed a register: until the next reset nothing is driven.
+    is_changed: bool,
 }
 
 impl<L: Law> Link<L> {
@@ -38,6 +41,7 @@ impl<L: Law> Link<L> {
             decoded: None,
             received: [0; MAXIMUM_LENGTH],
             stored: None,
+            is_changed: false,
         }
     }
 }
@@ -66,6 +70,7 @@ pub fn link<D, L, P, M>(
         decoded,
         received,
         stored,
+        is_changed,
     } = state;
     let stored = stored.get_or_insert_with(|| start_alone(&mut control, memory, decoded));
     if let Some(fault) = control.lock(|control| control.fault_to_record.take()) {
@@ -102,6 +107,10 @@ pub fn link<D, L, P, M>(
                     Response::OtherBuild {
                         build: Configuration::<L>::BUILD,
                     }
+                }
+                Ok(Request::Configure { source, .. }) if *is_changed && source.drives() => {
+                    control.lock(|control| control.task.stop());
+                    Response::Refused
                 }
                 Ok(Request::Configure {
                     source,
@@ -159,6 +168,24 @@ pub fn link<D, L, P, M>(
                     protocol: PROTOCOL,
                     build: Configuration::<L>::BUILD,
                 },
+                Ok(Request::Probe(probe)) => {
+                    let drives = control.lock(|control| {
+                        let task = &control.task;
+                        task.lapse_counts().is_some() && task.source().drives()
+                    });
+                    match Some(probe)
+                        .filter(|_| !drives)
+                        .and_then(|probe| probe::carry_out(probe, D::SPARE))
+                    {
+                        Some(value) => {
+                            *is_changed |= matches!(probe, Probe::Store { .. });
+                            let stopwatch =
+                                control.lock(|control| control.task.drive().stopwatch());
+                            Response::Probed { value, stopwatch }
+                        }
+                        None => Response::Refused,
+                    }
+                }
                 Ok(Request::Sources) => Response::Sources(SOURCES),
                 Ok(Request::PermitArming(permitted)) => {
                     Response::Permission(control.lock(|control| {

@@ -1,5 +1,6 @@
 //! The `painleve` command: subcommands, options and errors.
 
+mod accept;
 mod bridge;
 mod commission;
 mod compare;
@@ -44,6 +45,7 @@ use painleve_shared::status::Fault;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, Subcommand};
+use painleve_accept::AcceptError;
 use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
 use painleve_chart::picture;
@@ -82,6 +84,8 @@ enum Command {
     Run(run::RunArguments),
     #[command(flatten)]
     Process(Plan),
+    /// Test a bare board, without an arm: chip, clock, watchdogs, flash, line and pins; writes a report.
+    Accept(accept::AcceptArguments),
     /// Measure how the sensors and torque stages of an arm are mounted, and correct its scenario.
     Commission(commission::CommissionArguments),
     /// Drive a real arm through its board: watch, permit arming, record, stop.
@@ -151,6 +155,12 @@ pub enum CommandError {
     /// A real arm cannot be commissioned: its torque stages do not come on or stay on.
     #[error(transparent)]
     Rig(BoardRigError),
+    /// A board cannot be tested.
+    #[error(transparent)]
+    Accept(AcceptError),
+    /// Steps of a board's acceptance have failed.
+    #[error("the board is not accepted: {}", .0.join(", "))]
+    NotAccepted(Vec<&'static str>),
     /// A file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -194,7 +204,10 @@ impl CommandError {
     /// 4: an output cannot be written; 5: deadlines missed; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Scenario(_) | Self::Input(_) | Self::Cyclictest(CyclictestError::OtherHost) => 2,
+            Self::Scenario(_)
+            | Self::Input(_)
+            | Self::Cyclictest(CyclictestError::OtherHost)
+            | Self::Accept(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
                 StudyError::Unwritable { .. } => 4,
@@ -211,7 +224,10 @@ impl CommandError {
             Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,
             Self::Sweep(SweepError::Output(_)) => 4,
             Self::Sweep(_) => 2,
-            Self::Loop(LoopError::Plant(_)) | Self::Faulted(_) | Self::Mounting(_) => 1,
+            Self::Loop(LoopError::Plant(_))
+            | Self::Faulted(_)
+            | Self::Mounting(_)
+            | Self::NotAccepted(_) => 1,
             Self::Link(LinkError::Interrupted) => INTERRUPTED,
             Self::Loop(LoopError::Host(_) | LoopError::NotUnderstood { .. })
             | Self::Link(_)
@@ -397,7 +413,8 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Drive(_)
         | Command::Timing(_)
         | Command::Doctor(_) => {}
-        Command::Completions(_)
+        Command::Accept(_)
+        | Command::Completions(_)
         | Command::Man(_)
         | Command::Compare(_)
         | Command::Diff(_)
@@ -415,6 +432,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Process(Plan::Plant(arguments)) => plant::run(&arguments),
         Command::Process(Plan::Controller(arguments)) => controller::run(&arguments),
         Command::Process(Plan::Bridge(arguments)) => bridge::run(&arguments),
+        Command::Accept(arguments) => accept::run(&arguments),
         Command::Commission(arguments) => commission::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),

@@ -71,6 +71,12 @@ impl Flash {
         self.load_options();
     }
 
+    /// Changes bits of the option bytes, as a programmer would.
+    pub fn flip_options(&mut self, bits: u32) {
+        self.programmed_options ^= bits;
+        self.load_options();
+    }
+
     /// Loads the option bytes, as when power comes up.
     pub fn load_options(&mut self) {
         self.registers[8] = self.programmed_options;
@@ -89,7 +95,7 @@ impl Flash {
         self.registers[0] = 0x600;
         self.registers[5] = 0xc000_0000;
         self.keys = [0; 2];
-        self.slots.reset();
+        self.slots.reset(now);
         self.half = None;
         self.is_uncorrectable = false;
         self.has_nmi = false;

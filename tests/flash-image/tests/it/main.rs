@@ -1,5 +1,6 @@
 //! Tests of the images that are flashed, executed on modelled boards.
 
+mod accept;
 mod boot;
 mod bound;
 mod closed_loop;
