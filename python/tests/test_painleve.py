@@ -22,7 +22,7 @@ def test_overrides_and_mistakes():
 
 
 def test_the_package_has_the_names_that_it_lists():
-    modules = {"gym", "_painleve"}
+    modules = {"gym", "runs", "_painleve"}
     assert {name for name in dir(painleve) if not name.startswith("__")} - modules == set(painleve.__all__)
 
 
