@@ -13,7 +13,7 @@ const KEYS: [&str; 5] = [
     "controller.law.hybrid.velocity_gain_per_s=20:300",
 ];
 const OFF: &str = "[run]\nduration_s = 1.0\n[controller]\nreference = [{ minimum-jerk = { target_m = 0.0, duration_s = 0.7 } }]\n\
-    [controller.law.hybrid]\nvelocity_gain_per_s = 40.0\n";
+    [controller.law.hybrid]\nvelocity_gain_per_s = 250.0\n";
 
 fn tune(bench: &Bench, trials: &str) -> Value {
     bench.report(&[&KEYS[..], &["--cases", "1", "--trials", trials]].concat())
