@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::response::decibels;
+pub(super) fn decibels(gain: f64) -> f64 {
+    20.0 * gain.log10()
+}
 
 /// Returns |value|.
 pub(super) fn size(value: Complex<f64>) -> f64 {

@@ -6,7 +6,7 @@ use nalgebra::Complex;
 
 use super::Point;
 use super::at_rest::AtRest;
-use super::margins::{angle, size, turned};
+use super::margins::{angle, decibels, size, turned};
 use painleve_study_core::StudyError;
 
 /// Duration of the recorded response to a disturbance of one tick, s: the slowest mode of the paper's PID has a time
@@ -191,8 +191,4 @@ pub(super) fn phase_deg(value: Complex<f64>) -> f64 {
     } else {
         degrees
     }
-}
-
-pub(super) fn decibels(gain: f64) -> f64 {
-    20.0 * gain.log10()
 }
