@@ -16,7 +16,7 @@ use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
 use painleve_shared::Arm;
 use painleve_shared::counts::TorqueCounts;
-use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::{FrameSource, RefusedRate};
 use painleve_shared::status::SupervisorState;
 
@@ -67,8 +67,13 @@ pub trait ArmPins {
     /// Disables the torque stages; the converter puts out zero torque.
     fn switch_stages_off(&mut self);
 
-    /// Returns the processor's clock, Hz, which the cycle counter counts.
-    fn core_hz(&self) -> u32;
+    /// Returns the count of a free-running counter: that of the processor's cycles, which must run.
+    fn stopwatch(&self) -> u32 {
+        DWT::cycle_count()
+    }
+
+    /// Returns the frequency of the stopwatch, Hz.
+    fn stopwatch_hz(&self) -> u32;
 }
 
 /// The control task's part of a board.
@@ -87,7 +92,7 @@ pub struct ArmDrive<P: ArmPins> {
 }
 
 impl<P: ArmPins> ArmDrive<P> {
-    /// Starts the control timer. The cycle counter must run.
+    /// Starts the control timer.
     pub fn new(
         mut pins: P,
         encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 4>,
@@ -104,6 +109,14 @@ impl<P: ArmPins> ArmDrive<P> {
             is_driven: false,
             from_host: None,
         }
+    }
+
+    /// Waits for the next tick, which the host's frame asks for; its frames never drive the stages.
+    // Out of line: the bound on a tick's cycles leaves it out.
+    #[cold]
+    #[inline(never)]
+    fn prolong_tick(&self) {
+        while !self.pins.next_tick_is_due() {}
     }
 
     /// Returns the readings that were started at the last tick, and starts the next.
@@ -129,7 +142,13 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
 
     fn sample(&mut self) -> Option<SensorFrame> {
         match self.source {
-            FrameSource::Lockstep | FrameSource::Realtime => self.from_host.take(),
+            FrameSource::Lockstep | FrameSource::Realtime => {
+                let frame = self.from_host.take();
+                if frame.is_some_and(|it| it.inputs.contains(DigitalInputs::OVERLOAD)) {
+                    self.prolong_tick();
+                }
+                frame
+            }
             _ => Some(self.read_sensors()),
         }
     }
@@ -157,7 +176,7 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
     }
 
     fn stopwatch(&self) -> u32 {
-        DWT::cycle_count()
+        self.pins.stopwatch()
     }
 }
 
@@ -231,6 +250,6 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
     }
 
     fn stopwatch_hz(&self) -> u32 {
-        self.pins.core_hz()
+        self.pins.stopwatch_hz()
     }
 }

@@ -126,8 +126,11 @@ pub trait Bytes {
 
 /// The link task's part of a board: bytes to and from the host.
 pub trait Port {
-    /// Returns whether further bytes have to wait until the host has read its answer.
-    const HALF_DUPLEX: bool;
+    /// Returns whether the host sends nothing until its last frame is answered, and [`receive`](Self::receive) waits for
+    /// it. The port of a chip does neither.
+    fn is_half_duplex(&self) -> bool {
+        false
+    }
 
     /// Moves received bytes into `buffer`; returns their number, 0 if there are none.
     fn receive(&mut self, buffer: &mut [u8]) -> usize;

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! #[cfg(target_os = "none")]
-//! painleve_qemu_board::image!(MyLaws);
+//! painleve_f405_board::image!(MyLaws);
 //! ```
 
 #![no_std]

@@ -27,6 +27,8 @@ pub struct Link<L: Law> {
     inbox: Inbox,
     decoded: Option<Configuration<L>>,
     received: [u8; MAXIMUM_LENGTH],
+    /// Whether a frame has been received whose answer has not been sent.
+    awaits_answer: bool,
     /// The stored configuration, as found at the start or stored since; `None` before the first call.
     stored: Option<StoredConfiguration>,
     /// Whether the host has changed a register: until the next reset nothing is driven.
@@ -40,6 +42,7 @@ impl<L: Law> Link<L> {
             inbox: Inbox::new(),
             decoded: None,
             received: [0; MAXIMUM_LENGTH],
+            awaits_answer: false,
             stored: None,
             is_changed: false,
         }
@@ -69,6 +72,7 @@ pub fn link<D, L, P, M>(
         inbox,
         decoded,
         received,
+        awaits_answer,
         stored,
         is_changed,
     } = state;
@@ -78,13 +82,14 @@ pub fn link<D, L, P, M>(
     }
     while let Some(answer) = answers.dequeue() {
         send(port, &answer);
+        *awaits_answer = false;
     }
-    loop {
+    // A later tick has the answer.
+    while !(*awaits_answer && port.is_half_duplex()) {
         let length = port.receive(received);
         if length == 0 {
             return;
         }
-        let mut awaits_control = false;
         for byte in received.iter().take(length) {
             let Some(message) = inbox.push(*byte) else {
                 continue;
@@ -99,7 +104,7 @@ pub fn link<D, L, P, M>(
             let response = match request {
                 Ok(Request::Sensor(frame)) => {
                     control.lock(|control| control.task.drive_mut().offer(frame));
-                    awaits_control = true;
+                    *awaits_answer = true;
                     continue;
                 }
                 Ok(Request::Configure { build, .. }) if build != Configuration::<L>::BUILD => {
@@ -201,10 +206,6 @@ pub fn link<D, L, P, M>(
                 Err(_) => continue,
             };
             send(port, &response);
-        }
-        if awaits_control && P::HALF_DUPLEX {
-            // `control` invokes this task again when it has an answer.
-            return;
         }
     }
 }

@@ -10,7 +10,7 @@
 //!   memory may be used for
 //! - [`unicorn`]: executes instructions
 //!
-//! The microcontrollers are not kinder than the manuals: [what these leave open](../../../docs/flashing.md#what-the-models-assume),
+//! The microcontrollers are not kinder than the manuals: [what these leave open](../README.md),
 //! and what is not modelled.
 //!
 //! Time is counted in instructions: each takes [`machine::CYCLES_PER_INSTRUCTION`] of the clock

@@ -3,14 +3,17 @@
 mod accept;
 mod bridge;
 mod commission;
+mod compare;
 mod completions;
 mod controller;
+mod diff;
 mod distinct_files;
 mod doctor;
 mod drive;
 mod export;
 mod fail_on;
 mod figures;
+mod given_scenario;
 mod join;
 mod json;
 mod live;
@@ -29,6 +32,7 @@ mod study;
 mod sweep;
 mod system_path;
 mod timing;
+mod tune;
 
 use std::io::Write;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
@@ -93,6 +97,12 @@ enum Command {
     Doctor(doctor::DoctorArguments),
     /// Write the ticks of a record as a table.
     Export(export::ExportArguments),
+    /// Overlay runs in one page and one figure, and tell how much they differ.
+    Compare(compare::CompareArguments),
+    /// Search keys of a scenario for a smaller error, ripple and change of torque.
+    Tune(tune::TuneArguments),
+    /// List the keys in which two scenarios or records differ.
+    Diff(diff::DiffArguments),
     /// Print a completion script for a shell.
     Completions(completions::CompletionsArguments),
     /// Write a manual page for every command.
@@ -406,6 +416,9 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Accept(_)
         | Command::Completions(_)
         | Command::Man(_)
+        | Command::Compare(_)
+        | Command::Diff(_)
+        | Command::Tune(_)
         | Command::Export(_)
         | Command::Scenarios(_)
         | Command::Study(_)
@@ -422,6 +435,9 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Accept(arguments) => accept::run(&arguments),
         Command::Commission(arguments) => commission::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Diff(arguments) => diff::run(&arguments),
+        Command::Tune(arguments) => tune::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),

@@ -329,7 +329,7 @@ impl ArmPins for G474Pins {
         put_out(&self.converter, [NO_TORQUE; 2]);
     }
 
-    fn core_hz(&self) -> u32 {
+    fn stopwatch_hz(&self) -> u32 {
         CORE_HZ
     }
 }

@@ -34,22 +34,18 @@ pub fn measure<P: Port>(bench: &mut Bench<P>) -> Result<Vec<Check>, StepError> {
         bench.wait(Duration::from_millis(1))?;
     }
     let mut checks = Vec::new();
-    for channel in 0..2 {
+    for (channel, name) in NAMES.into_iter().enumerate() {
         let mut found = Vec::new();
         for code in CODES {
-            let other = 4095 - code;
-            let [own, both] = if channel == 0 {
-                [code, other << 16 | code]
-            } else {
-                [other, other << 16 | code]
-            };
+            let codes = [code, 4095 - code];
+            let both = (codes[1] << 16) | codes[0];
             let reading = read(bench, converter, channel, Some((chip.codes, both)))?;
-            found.push((own, reading));
+            found.push((codes[channel], reading));
         }
         let worst = found.iter().map(|(code, it)| code.abs_diff(*it)).max();
         let words = found.iter().map(|(code, it)| format!("{code} → {it}"));
         checks.push(Check::new(
-            format_args!("{}, code → reading", NAMES[channel]),
+            format_args!("{name}, code → reading"),
             words.collect::<Vec<_>>().join(", "),
             format_args!("the same ± {TOLERANCE}"),
             worst.is_some_and(|it| it <= TOLERANCE),

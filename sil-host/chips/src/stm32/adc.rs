@@ -57,7 +57,9 @@ impl Adc {
         match (self.layout, offset) {
             (AdcLayout::Plain, 0x00) => u32::from(has_ended) << 1,
             (AdcLayout::Plain, 0x08) | (AdcLayout::Regulated, 0x108) => self.control,
-            (AdcLayout::Regulated, 0x100) => u32::from(has_ended) * CONVERTED | self.control & 1,
+            (AdcLayout::Regulated, 0x100) => {
+                (u32::from(has_ended) * CONVERTED) | (self.control & 1)
+            }
             (AdcLayout::Plain, 0x4c) | (AdcLayout::Regulated, 0x140) => {
                 if has_ended {
                     self.ends = None;

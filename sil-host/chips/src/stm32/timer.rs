@@ -42,6 +42,14 @@ impl Default for Timer {
 }
 
 impl Timer {
+    /// Resets the registers, as the clock control's reset of this peripheral does.
+    pub fn reset(&mut self) {
+        *self = Self {
+            updates: self.updates,
+            ..Self::default()
+        };
+    }
+
     fn runs(&self) -> bool {
         self.control & 1 != 0
     }

@@ -251,7 +251,12 @@ impl<O: Outside> Stm32f4<O> {
                     self.carry(&wired, now);
                 }
             }
-            0x4002_3800 => self.rcc.write(offset, value, now),
+            0x4002_3800 => {
+                self.rcc.write(offset, value, now);
+                if self.rcc.is_on(0x20, 0) {
+                    self.timer.reset();
+                }
+            }
             0x4002_3c00 => self.store_flash(offset, value, now),
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].write(offset, value),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].write(offset, value),

@@ -1,15 +1,18 @@
-//! The tables of hazards and of the models' assumptions in docs/flashing.md name tests that exist.
+//! The tables of hazards and of the models' assumptions name tests that exist.
 
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::Path;
 
-/// Headings of the sections with these tables.
-const SECTIONS: [&str; 3] = [
-    "## Hazards",
-    "### What takes longer than two ticks",
-    "### What the models assume",
+/// Pages and headings of the sections with these tables.
+const SECTIONS: [(&str, &str); 3] = [
+    ("docs/flashing.md", "## Hazards"),
+    ("docs/flashing.md", "### What takes longer than two ticks"),
+    (
+        "sil-host/chips/README.md",
+        "# What the models of the chips assume",
+    ),
 ];
 
 /// Returns the sources of all tests in a folder.
@@ -41,9 +44,9 @@ fn every_test_that_the_tables_name_exists() {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut tests = sources(&workspace.join("tests/flash-image/tests"));
     tests += &sources(&workspace.join("sil-host/chips/tests"));
-    let page = fs::read_to_string(workspace.join("docs/flashing.md")).unwrap();
     let mut count = 0;
-    for heading in SECTIONS {
+    for (page, heading) in SECTIONS {
+        let page = fs::read_to_string(workspace.join(page)).unwrap();
         let section = page.split(&format!("{heading}\n")).nth(1).unwrap();
         let section = section.split("\n#").next().unwrap();
         for row in section.lines().filter(|it| it.starts_with("| ")) {
