@@ -2,7 +2,7 @@
 //!
 //! The torque stages stay off throughout. Outputs are observed through loop-back wires ([`chip::WIRES`]) and by the
 //! chip's own converter and timer. Every step compares what it has measured with what is expected; a step that fails
-//! does not end the acceptance, unless the chip is unknown. The steps, in their order, are the modules of [`steps`].
+//! does not end the acceptance, unless the chip is unknown. The steps, in their order, are the modules of [`steps`](mod@steps).
 //!
 //! The board takes part with one request, [`Probe`](painleve_shared::message::Probe): it loads words and stores bits
 //! on which no torque depends. All knowledge about the chips is here ([`chip`]).
@@ -16,7 +16,7 @@ pub mod steps;
 use painleve_board::{BoardError, Port, Serial};
 use painleve_shared::stored::StoredState;
 
-pub use bench::Bench;
+pub use bench::{Bench, StepError};
 pub use report::{Acceptance, Check, StepReport, Verdict};
 
 use crate::steps::steps;
