@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use painleve_accept::{AcceptError, StepReport, Verdict, accept};
 use painleve_board::Serial;
-use painleve_files::atomic_file;
+use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_process::terminal::warn;
 
 use super::output_error::output;
@@ -39,8 +39,11 @@ pub fn run(arguments: &AcceptArguments) -> Result<(), CommandError> {
         AcceptError::Stored => CommandError::Accept(error),
     })?;
     let json = serde_json::to_string_pretty(&acceptance).map_err(output)?;
-    atomic_file::write(page, acceptance.html().as_bytes()).map_err(output)?;
-    atomic_file::write(&object, json.as_bytes()).map_err(output)?;
+    commit_all(vec![
+        prepare(page, acceptance.html().as_bytes()).map_err(output)?,
+        prepare(&object, json.as_bytes()).map_err(output)?,
+    ])
+    .map_err(output)?;
     if arguments.json {
         say(json)?;
     } else {

@@ -62,13 +62,14 @@ pub fn run(arguments: &TuneArguments) -> Result<(), CommandError> {
         seed: arguments.seed,
     };
     tuning.check()?;
+    distinct_files::check(&[
+        ("--out", &arguments.out),
+        ("--table", &arguments.table),
+        ("--plot", &arguments.plot),
+    ])?;
     let given = tuning.score(&tuning.scenario, tuning.cases, tuning.seed)?;
     let all = arguments.trials as usize;
     let mut trials = continued(&arguments.table, &tuning, &given, all)?;
-    distinct_files::check_distinct(&[
-        ("--out", arguments.out.as_path()),
-        ("--plot", arguments.plot.as_path()),
-    ])?;
     let progress = progress(all, trials.len());
     while trials.len() < all {
         trials.extend(tuning.next_trials(&trials, all, &given)?);
