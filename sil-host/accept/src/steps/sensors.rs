@@ -17,10 +17,6 @@ const CHECKED: Duration = Duration::from_millis(120);
 /// Ticks that are looked at in each state of the lines.
 const TICKS: usize = 20;
 
-/// Readings that are missing.
-const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
-const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
-
 /// Shorts and opens both lines.
 ///
 /// # Errors
@@ -65,10 +61,11 @@ fn readings<P: Port>(
     let (mut joints, mut forces, mut enabled) = (0, 0, 0);
     for (sensor, _) in bench.ticks(TICKS)? {
         // All zeros are a reading, with which the board does not arm.
-        let is_joint = |it: &EncoderCounts| ![NO_ENCODER, EncoderCounts(0)].contains(it);
+        let is_joint =
+            |it: &EncoderCounts| ![EncoderCounts::MISSING, EncoderCounts(0)].contains(it);
         joints += u32::from(sensor.joints.iter().any(is_joint));
         let of_forces = [sensor.tangential_force, sensor.normal_force];
-        forces += u32::from(of_forces.iter().any(|it| *it != NO_FORCE));
+        forces += u32::from(of_forces.iter().any(|it| *it != ForceCounts::MISSING));
         enabled += u32::from(sensor.inputs.contains(DigitalInputs::ENABLE));
     }
     let is_defined = level.is_some();
