@@ -178,10 +178,12 @@ pub fn link<D, L, P, M>(
                         let task = &control.task;
                         task.lapse_counts().is_some() && task.source().drives()
                     });
-                    match Some(probe)
-                        .filter(|_| !drives)
-                        .and_then(|probe| probe::carry_out(probe, D::SPARE))
-                    {
+                    let probed = if drives {
+                        None
+                    } else {
+                        probe::carry_out(probe, D::SPARE)
+                    };
+                    match probed {
                         Some(value) => {
                             *is_changed |= matches!(probe, Probe::Store { .. });
                             let stopwatch =

@@ -47,8 +47,11 @@ pub fn is_free() -> bool {
 }
 
 /// Runs `idle` with an empty stack: what the start has left there is never used again, and the tasks that interrupt `idle` have
-/// the whole stack. `idle` owns or refers to static values only; RTIC's resources do.
-pub fn empty_for<F: FnOnce() -> Infallible>(idle: F) -> ! {
+/// the whole stack.
+///
+/// # Safety
+/// `idle` owns or refers to static values only, and nothing else refers to what is on the stack.
+pub unsafe fn empty_for<F: FnOnce() -> Infallible>(idle: F) -> ! {
     // No interrupt may use the stack's upper end while `idle` is still in what was below it.
     cortex_m::interrupt::disable();
     let mut idle = core::mem::ManuallyDrop::new(idle);

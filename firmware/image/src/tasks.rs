@@ -343,10 +343,12 @@ macro_rules! tasks {
 
             #[idle(shared = [control], local = [events_out])]
             fn idle(cx: idle::Context) -> ! {
-                $crate::stack::empty_for(move || {
+                let idle = move || {
                     rtic::pend(LINK);
                     $crate::tasks::idle::<Hardware, Laws>(cx.shared.control, cx.local.events_out)
-                })
+                };
+                // SAFETY: RTIC's resources are static, and its start leaves nothing on the stack that is used again.
+                unsafe { $crate::stack::empty_for(idle) }
             }
         }
 
