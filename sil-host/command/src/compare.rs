@@ -8,13 +8,13 @@ use painleve_chart::picture;
 use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_files::input_file;
 use painleve_process::terminal;
-use painleve_record::comparison::{Alignment, COLUMNS, Comparison, MOST_RUNS, Run};
+use painleve_record::comparison::{Alignment, COLUMNS, Comparison, Difference, MOST_RUNS, Run};
 use painleve_record::run_table::RunTable;
 use painleve_view::comparison::comparison_html;
 use serde_json::json;
 
 use super::json::JsonOption;
-use super::output_error::{InputError, RecordFileError, output};
+use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, given_scenario};
 
 /// Options of `painleve compare`.
@@ -75,39 +75,22 @@ pub fn run(arguments: &CompareArguments) -> Result<(), CommandError> {
     let comparison = Comparison::new(&runs, arguments.align.into()).map_err(InputError::NoEvent)?;
     let (html, plot) = (&arguments.html, &arguments.plot);
     distinct_files::check(&[("--html", html), ("--plot", plot)])?;
-    let page = comparison_html(&runs, &comparison, scenario);
+    let (outcomes, differences) = (comparison.outcomes(), comparison.differences());
+    let page = comparison_html(&comparison, &outcomes, &differences, scenario);
     let figure = picture::encoded(plot, comparison.svg()).map_err(output)?;
     commit_all(vec![
         prepare(html, page.as_bytes()).map_err(output)?,
         prepare(plot, &figure).map_err(output)?,
     ])
     .map_err(output)?;
-    let differences = comparison.differences();
-    let mut table = terminal::table([
-        "run",
-        "quantity",
-        "mean",
-        "RMS",
-        "largest",
-        "after the event, s",
-    ]);
+    let mut table = terminal::table(Difference::HEAD);
     for one in &differences {
-        let numbers =
-            [one.mean, one.rms, one.largest, one.at_s].map(|value| Comparison::decimals(value, 3));
-        let [mean, rms, largest, at] = numbers;
-        table.add_row([
-            one.run.clone(),
-            Comparison::label(one.quantity),
-            mean,
-            rms,
-            largest,
-            at,
-        ]);
+        table.add_row(one.cells());
     }
     let result = json!({
         "html": html.display().to_string(),
         "plot": plot.display().to_string(),
-        "outcomes": comparison.outcomes(),
+        "outcomes": outcomes,
         "differences": differences,
     });
     let table = terminal::readable_table(table);
@@ -131,11 +114,7 @@ fn label(path: &Path, all: &[PathBuf]) -> String {
 }
 
 fn read(path: &Path, label: &str) -> Result<Run, CommandError> {
-    let unusable = |source: RecordFileError| InputError::Record {
-        path: path.to_path_buf(),
-        source,
-    };
-    let file = input_file::open(path).map_err(|error| unusable(error.into()))?;
+    let file = input_file::open(path).map_err(|error| InputError::record(path, error))?;
     let file = BufReader::with_capacity(1 << 20, file);
     let is_record = given_scenario::is_record(path);
     let table = if is_record {
@@ -145,7 +124,7 @@ fn read(path: &Path, label: &str) -> Result<Run, CommandError> {
     };
     Ok(Run {
         label: label.into(),
-        table: table.map_err(|error| unusable(error.into()))?,
+        table: table.map_err(|error| InputError::record(path, error))?,
         scenario: is_record
             .then(|| given_scenario::of_record(path))
             .transpose()?,

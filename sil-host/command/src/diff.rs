@@ -36,13 +36,8 @@ pub fn run(arguments: &DiffArguments) -> Result<(), CommandError> {
         return arguments.json.say(&result, "no key differs");
     }
     let mut table = terminal::table(["key", &arguments.first, &arguments.second]);
-    let absent = || "absent".to_owned();
-    for one in differences {
-        table.add_row([
-            one.key,
-            one.first.unwrap_or_else(absent),
-            one.second.unwrap_or_else(absent),
-        ]);
+    for one in &differences {
+        table.add_row(one.cells());
     }
     arguments.json.say(&result, terminal::readable_table(table))
 }

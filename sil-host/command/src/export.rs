@@ -180,11 +180,7 @@ fn record_error<T, E: Into<RecordFileError>>(
     arguments: &ExportArguments,
     result: Result<T, E>,
 ) -> Result<T, CommandError> {
-    result.map_err(|source| {
-        let path = arguments.record.clone();
-        let source = source.into();
-        InputError::Record { path, source }.into()
-    })
+    result.map_err(|source| InputError::record(&arguments.record, source).into())
 }
 
 #[cfg(feature = "parquet")]

@@ -37,14 +37,10 @@ pub fn load(name: &str) -> Result<Scenario, CommandError> {
 /// # Errors
 /// [`CommandError`] if the file is not a record of a run.
 pub fn of_record(path: &Path) -> Result<Scenario, CommandError> {
-    let unusable = |source: RecordFileError| InputError::Record {
-        path: path.to_path_buf(),
-        source,
-    };
-    let file = input_file::open(path).map_err(|error| unusable(error.into()))?;
-    let notes =
-        record_file::notes(BufReader::new(file)).map_err(|damage| unusable(damage.into()))?;
+    let file = input_file::open(path).map_err(|error| InputError::record(path, error))?;
+    let notes = record_file::notes(BufReader::new(file))
+        .map_err(|damage| InputError::record(path, damage))?;
     let settings = notes.and_then(|mut notes| notes.remove("configuration"));
-    let settings = settings.ok_or_else(|| unusable(RecordFileError::NoSettings))?;
+    let settings = settings.ok_or_else(|| InputError::record(path, RecordFileError::NoSettings))?;
     Ok(Scenario::from_toml(&settings)?)
 }

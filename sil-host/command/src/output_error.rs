@@ -170,6 +170,16 @@ pub enum InputError {
     },
 }
 
+impl InputError {
+    /// A record, or a table of ticks, that cannot be used.
+    pub fn record(path: &Path, source: impl Into<RecordFileError>) -> Self {
+        Self::Record {
+            path: path.to_path_buf(),
+            source: source.into(),
+        }
+    }
+}
+
 /// Returns how an output's path leads to an input of another path.
 fn also(path: &Path, input: &Path) -> String {
     if path == input {

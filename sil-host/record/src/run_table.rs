@@ -1,6 +1,6 @@
 //! The ticks of a run as columns of numbers, read from a record or from its table.
 
-use std::io::{self, BufReader, PipeReader, Read};
+use std::io::{self, BufReader, Read};
 use std::thread;
 
 use crate::export::{ExportError, ticks_to_csv};
@@ -57,22 +57,19 @@ impl RunTable {
         let (reader, writer) = io::pipe()?;
         thread::scope(|scope| {
             let exported = scope.spawn(move || ticks_to_csv(record, io::BufWriter::new(writer)));
-            let table = Self::of_pipe(reader, names);
+            // Owned, so that a table that is refused closes the pipe.
+            let table = Self::of_csv(BufReader::new(reader), names);
             match exported.join() {
                 Ok(Ok(exported)) => match exported.damage {
                     Some(damage) => Err(ExportError::Nothing(damage).into()),
                     None => table,
                 },
-                // A table that was refused closes the pipe; that says more than the broken pipe.
+                // Why it was refused says more than the broken pipe.
                 Ok(Err(ExportError::Write(_))) if table.is_err() => table,
                 Ok(Err(error)) => Err(error.into()),
                 Err(panic) => std::panic::resume_unwind(panic),
             }
         })
-    }
-
-    fn of_pipe(pipe: PipeReader, names: &[&'static str]) -> Result<Self, TableError> {
-        Self::of_csv(BufReader::new(pipe), names)
     }
 
     /// Reads the named columns of a table. One that the table lacks is unknown.
@@ -120,6 +117,15 @@ impl RunTable {
     pub fn column(&self, name: &str) -> &[f64] {
         let place = self.names.iter().position(|column| *column == name);
         place.map_or(&[], |place| &self.columns[place])
+    }
+
+    /// Returns the changes of a column: time, s, the value before and the value since.
+    pub fn changes(&self, name: &str) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+        let pairs = self.column(name).windows(2);
+        let times = self.time_s.iter().skip(1);
+        pairs.zip(times).filter_map(|(pair, time_s)| {
+            (pair[0] != pair[1]).then_some((*time_s, pair[0], pair[1]))
+        })
     }
 
     /// Whether any value of a column is known.

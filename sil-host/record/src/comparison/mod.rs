@@ -1,18 +1,16 @@
 //! How much recorded runs differ: aligned by an event, as numbers and as a figure.
 
+mod figure;
+mod quantity;
+
 use std::fmt;
 
-use painleve_chart::decimate::Decimator;
-use painleve_chart::style::{BLACK_INK, BLUE_INK, Colour, GREEN, ORANGE, PURPLE, SKY, VERMILLION};
-use painleve_chart::{Chart, Mark, Panel};
 use painleve_plant::scenario::Scenario;
 use serde::Serialize;
 
-use crate::plot::points;
+use self::quantity::{QUANTITIES, Quantity};
 use crate::run_table::RunTable;
 
-/// Colours of the runs, in their order.
-const COLOURS: [Colour; MOST_RUNS] = [BLACK_INK, ORANGE, BLUE_INK, GREEN, PURPLE, SKY, VERMILLION];
 /// Most runs in one comparison: more colours could not be told apart.
 pub const MOST_RUNS: usize = 7;
 
@@ -102,107 +100,11 @@ impl Run {
         let tick = flags.position(|flags| *flags as u32 & bit != 0)?;
         self.table.time_s.get(tick).copied()
     }
-}
 
-/// A quantity that is compared.
-struct Quantity {
-    key: &'static str,
-    title: &'static str,
-    unit: &'static str,
-    scale: f64,
-    /// The column of the simulated arm, and the controller's estimate of the same.
-    columns: [&'static str; 2],
-    /// What is subtracted.
-    minus: Option<[&'static str; 2]>,
-}
-
-const REFERENCE: [&str; 2] = ["plant.reference_tip_t_m", "estimates.reference_m"];
-
-const QUANTITIES: [Quantity; 7] = [
-    quantity(
-        "tip_mm",
-        "Tip position zₜ",
-        "mm",
-        ["plant.tip_t_m", "estimates.tip_t_m"],
-        None,
-    ),
-    quantity(
-        "error_mm",
-        "Tracking error zₜ − zₜ*",
-        "mm",
-        ["plant.tip_t_m", "estimates.tip_t_m"],
-        Some(REFERENCE),
-    ),
-    quantity("gap_mm", "Gap", "mm", ["plant.gap_m", "plant.gap_m"], None),
-    quantity(
-        "normal_force_n",
-        "Normal force fₙ",
-        "N",
-        ["plant.normal_force_n", "estimates.normal_force_n"],
-        None,
-    ),
-    quantity(
-        "u1_nm",
-        "Torque u₁",
-        "N·m",
-        ["plant.u1_nm", "estimates.u1_nm"],
-        None,
-    ),
-    quantity(
-        "u2_nm",
-        "Torque u₂",
-        "N·m",
-        ["plant.u2_nm", "estimates.u2_nm"],
-        None,
-    ),
-    quantity(
-        "friction",
-        "Estimated friction coefficient μ",
-        "",
-        ["estimates.friction", "estimates.friction"],
-        None,
-    ),
-];
-
-const fn quantity(
-    key: &'static str,
-    title: &'static str,
-    unit: &'static str,
-    columns: [&'static str; 2],
-    minus: Option<[&'static str; 2]>,
-) -> Quantity {
-    let scale = match unit.as_bytes() {
-        b"mm" => 1e3,
-        _ => 1.0,
-    };
-    Quantity {
-        key,
-        title,
-        unit,
-        scale,
-        columns,
-        minus,
-    }
-}
-
-impl Quantity {
-    fn label(&self) -> String {
-        match self.unit {
-            "" => self.title.into(),
-            unit => format!("{} ({unit})", self.title),
-        }
-    }
-
-    /// Returns the values of a run: of the simulated arm, or as estimated.
-    fn values(&self, table: &RunTable, estimated: usize) -> Vec<f64> {
-        let values = table.column(self.columns[estimated]).iter();
-        match self.minus.map(|minus| table.column(minus[estimated])) {
-            Some(minus) => values
-                .zip(minus)
-                .map(|(one, other)| self.scale * (one - other))
-                .collect(),
-            None => values.map(|value| self.scale * value).collect(),
-        }
+    /// Returns the times at which the tip leaves the belt, s; none for a real arm, whose mode is not known.
+    pub fn lift_offs_s(&self) -> impl Iterator<Item = f64> + '_ {
+        let changes = self.table.changes("plant.mode_number");
+        changes.filter_map(|(time_s, from, to)| (from != 0.0 && to == 0.0).then_some(time_s))
     }
 }
 
@@ -255,6 +157,74 @@ pub struct Outcome {
     pub final_error_mm: Option<f64>,
 }
 
+impl Difference {
+    /// Names of [`cells`](Self::cells).
+    pub const HEAD: [&str; 6] = [
+        "run",
+        "quantity",
+        "mean",
+        "RMS",
+        "largest",
+        "after the event, s",
+    ];
+
+    /// Returns the difference as a table shows it.
+    pub fn cells(&self) -> [String; 6] {
+        let quantity = QUANTITIES
+            .iter()
+            .find(|quantity| quantity.key == self.quantity);
+        [
+            self.run.clone(),
+            quantity.map_or_else(String::new, Quantity::label),
+            decimals(self.mean, 3),
+            decimals(self.rms, 3),
+            decimals(self.largest, 3),
+            decimals(self.at_s, 3),
+        ]
+    }
+}
+
+impl Outcome {
+    /// Names of [`cells`](Self::cells).
+    pub const HEAD: [&str; 8] = [
+        "run",
+        "event, s",
+        "duration after it, s",
+        "lift-offs after it",
+        "first, s",
+        "fault",
+        "final tip, mm",
+        "final error, mm",
+    ];
+
+    /// Returns the outcome as a table shows it.
+    pub fn cells(&self) -> [String; 8] {
+        let unknown = || "–".to_owned();
+        let number = |value: Option<f64>, digits| {
+            value.map_or_else(unknown, |value| decimals(value, digits))
+        };
+        [
+            self.run.clone(),
+            decimals(self.event_s, 3),
+            decimals(self.duration_s, 3),
+            self.lift_offs
+                .map_or_else(unknown, |count| count.to_string()),
+            number(self.first_lift_off_s, 3),
+            match self.fault {
+                0 => "none".into(),
+                fault => fault.to_string(),
+            },
+            number(self.final_tip_mm, 2),
+            number(self.final_error_mm, 2),
+        ]
+    }
+}
+
+/// Returns a number with this many decimals.
+fn decimals(value: f64, digits: i32) -> String {
+    painleve_chart::axis::label(value, 2.0 * 10_f64.powi(-digits))
+}
+
 /// A run lacks the event.
 #[derive(Debug, thiserror::Error)]
 #[error("{run}: {event} does not happen in it; align the runs by another event with --align")]
@@ -292,6 +262,11 @@ impl<'a> Comparison<'a> {
             runs,
             alignment,
         })
+    }
+
+    /// Returns the runs, the first of which the others are compared with.
+    pub fn runs(&self) -> &'a [Run] {
+        self.runs
     }
 
     /// Returns the time by which a run is shifted to meet the first one, s.
@@ -357,12 +332,9 @@ impl<'a> Comparison<'a> {
         let runs = self.runs.iter().zip(&self.zero_s).zip(&self.values);
         runs.map(|((run, zero_s), values)| {
             let table = &run.table;
-            let modes = table.column("plant.mode_number");
-            let lift_offs: Vec<f64> = modes
-                .windows(2)
-                .zip(table.time_s.iter().skip(1))
-                .filter(|(pair, _)| pair[0] != 0.0 && pair[1] == 0.0)
-                .map(|(_, time_s)| time_s - zero_s)
+            let lift_offs: Vec<f64> = run
+                .lift_offs_s()
+                .map(|time_s| time_s - zero_s)
                 .filter(|after_s| *after_s >= 0.0)
                 .collect();
             let last =
@@ -384,95 +356,6 @@ impl<'a> Comparison<'a> {
         })
         .collect()
     }
-
-    /// Returns a number with this many decimals, as its tables show it.
-    pub fn decimals(value: f64, digits: i32) -> String {
-        painleve_chart::axis::label(value, 2.0 * 10_f64.powi(-digits))
-    }
-
-    /// Returns title and unit of a quantity by its key.
-    pub fn label(key: &str) -> String {
-        let quantity = QUANTITIES.iter().find(|quantity| quantity.key == key);
-        quantity.map_or_else(String::new, Quantity::label)
-    }
-
-    /// Returns the runs over time after the event as SVG text.
-    pub fn svg(&self) -> String {
-        let curves: Vec<_> = (0..self.runs.len())
-            .map(|run| self.decimated(run))
-            .collect();
-        let mut panels: Vec<Panel> = (0..QUANTITIES.len())
-            .map(|quantity| {
-                let lines = curves
-                    .iter()
-                    .enumerate()
-                    .map(|(run, bins)| self.line(run, points(bins.bins(), quantity)));
-                self.panel(QUANTITIES[quantity].label(), lines.collect())
-            })
-            .filter(has_points)
-            .collect();
-        let differences = (1..self.runs.len()).map(|run| {
-            let mut bins = Decimator::<1>::default();
-            for (time_s, difference) in self.curve_of_difference(run, 0) {
-                bins.push(time_s, [difference], 0);
-            }
-            self.line(run, points(bins.bins(), 0))
-        });
-        let title = format!("Tip: difference from {} (mm)", self.runs[0].label);
-        panels.insert(
-            panels.len().min(1),
-            self.panel(title, differences.collect()),
-        );
-        Chart {
-            title: "Comparison of runs".into(),
-            subtitle: format!("Time zero is {}", self.alignment),
-            x_title: format!("Time after {} (s)", self.alignment),
-            panels,
-            one_legend: true,
-            ..Chart::default()
-        }
-        .svg()
-    }
-
-    fn decimated(&self, run: usize) -> Decimator<{ QUANTITIES.len() }> {
-        let mut bins = Decimator::default();
-        for (tick, time_s) in self.runs[run].table.time_s.iter().enumerate() {
-            let values = self.values[run]
-                .each_ref()
-                .map(|values| values.get(tick).copied().unwrap_or(f64::NAN));
-            bins.push(time_s - self.zero_s[run], values, 0);
-        }
-        bins
-    }
-
-    fn line(&self, run: usize, points: Vec<(f64, f64)>) -> Mark {
-        Mark::Line {
-            name: self.runs[run].label.clone(),
-            colour: COLOURS[run % MOST_RUNS],
-            // The first run lies below the others, and shows beside them.
-            width: if run == 0 { 6 } else { 4 },
-            dashed: false,
-            points,
-        }
-    }
-
-    fn panel(&self, title: String, marks: Vec<Mark>) -> Panel {
-        Panel {
-            title,
-            height: 170,
-            y_ticks: 5,
-            minimum_span: 0.01,
-            marks,
-            ..Panel::default()
-        }
-    }
-}
-
-fn has_points(panel: &Panel) -> bool {
-    panel.marks.iter().any(|mark| match mark {
-        Mark::Line { points, .. } => points.iter().any(|point| point.1.is_finite()),
-        _ => false,
-    })
 }
 
 #[cfg(test)]

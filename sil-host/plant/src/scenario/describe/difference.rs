@@ -18,6 +18,15 @@ pub struct Difference {
     pub second: Option<String>,
 }
 
+impl Difference {
+    /// Returns key and both values as a table shows them.
+    pub fn cells(&self) -> [&str; 3] {
+        let [first, second] =
+            [&self.first, &self.second].map(|value| value.as_deref().unwrap_or("absent"));
+        [&self.key, first, second]
+    }
+}
+
 impl Scenario {
     /// Returns the scenario as TOML without the keys that have their defaults. Reading the text gives the same
     /// scenario.
