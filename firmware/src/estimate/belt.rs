@@ -110,19 +110,6 @@ impl BeltEstimator {
         tip_velocity_m_s > slowest_m_s - BOUND_ERROR_M_S
             && tip_velocity_m_s < fastest_m_s + BOUND_ERROR_M_S
     }
-
-    /// Returns the direction of slip of a tip with this velocity (m/s); `None` where the bounds do
-    /// not decide it.
-    pub fn slip(&self, state: &BeltState, tip_velocity_m_s: f32) -> Option<Slip> {
-        let (slowest_m_s, fastest_m_s) = self.bounds_m_s(state);
-        if tip_velocity_m_s > fastest_m_s {
-            Some(Slip::Positive)
-        } else if tip_velocity_m_s < slowest_m_s {
-            Some(Slip::Negative)
-        } else {
-            None
-        }
-    }
 }
 
 #[cfg(test)]
@@ -145,13 +132,10 @@ mod tests {
     fn sliding_both_ways_closes_the_bounds() {
         let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
         let mut state = BeltState::default();
-        assert_eq!(belt.slip(&state, 0.0), None);
         belt.update(&mut state, 0.1, Some(&friction(Slip::Positive, false)));
-        assert_eq!(belt.slip(&state, 0.2), Some(Slip::Positive));
         belt.update(&mut state, -0.3, Some(&friction(Slip::Negative, false)));
         let (slowest, fastest) = belt.bounds_m_s(&state);
         assert!((slowest + 0.3).abs() < 1e-6 && (fastest - 0.102).abs() < 1e-3);
-        assert_eq!(belt.slip(&state, -0.4), Some(Slip::Negative));
     }
 
     #[test]

@@ -336,34 +336,19 @@ impl FrictionEstimator {
         }
     }
 
-    /// Raises the estimate after a throw, which shows that μ is at least `critical`, above which
-    /// sliding has no solution.
-    pub fn thrown(&self, state: &mut FrictionState, critical: f32) {
-        if !self.settings.enabled {
-            return;
-        }
-        if state.coefficient < critical {
-            state.coefficient = critical;
-        }
+    /// Forgets how well μ is known: the tip has left the belt, and more friction than estimated may have thrown it off.
+    pub fn doubt(&self, state: &mut FrictionState) {
         state.variance = self.first_variance;
     }
 }
 
 impl FrictionState {
-    /// Sets the direction in which a landing tip will slip.
-    pub fn expect_slip(&mut self, slip: Slip) {
-        self.slip = slip;
-        self.slip_seen = true;
-        self.slip_in_doubt = false;
-    }
-
-    /// Takes over into an estimate what a reading corrects; `gives` states whether the contact does: a rigid one
-    /// would follow the excess at once.
+    /// Takes over into an estimate what a reading corrects.
     #[inline]
-    pub fn correct_estimate(&self, estimate: &mut FrictionEstimate, gives: bool) {
+    pub fn correct_estimate(&self, estimate: &mut FrictionEstimate) {
         estimate.coefficient = self.coefficient;
         estimate.next_coefficient = self.coefficient + LEAD_TICKS * self.rate_per_tick;
-        estimate.catch_up = if gives { self.catch_up } else { 0.0 };
+        estimate.catch_up = self.catch_up;
         estimate.slip = self.slip;
         estimate.slip_seen = self.slip_seen;
         estimate.sticks = self.stick_ticks > 0;
@@ -603,7 +588,6 @@ mod tests {
             let mut tested = Tested(estimator, estimator.start(), drags);
             for slip in [Slip::Negative, Slip::Positive] {
                 slide(&mut tested, friction, slip, 2000);
-                tested.0.thrown(&mut tested.1, 0.9);
                 let found = tested.estimate();
                 assert_eq!((found.coefficient, found.deviation), (0.6, 0.0));
                 assert_eq!((found.next_coefficient, found.catch_up), (0.6, 0.0));
@@ -611,12 +595,5 @@ mod tests {
                 assert!(found.slip == slip || friction < 0.5, "{found:?}");
             }
         }
-    }
-
-    #[test]
-    fn a_throw_shows_that_friction_is_at_least_critical() {
-        let mut tested = Tested::new(0.5);
-        tested.0.thrown(&mut tested.1, 0.58);
-        assert_eq!(tested.estimate().coefficient, 0.58);
     }
 }

@@ -38,9 +38,6 @@ use self::response::{
 use crate::last_command::LastCommand;
 use crate::schedule::Turn;
 
-/// Largest friction above the estimate that may explain a throw.
-const THROWN_BY_FRICTION: f32 = 0.4;
-
 /// Least velocity by which a sticking tip falls behind its reference, m/s.
 const DRAGGED_M_S: f32 = 0.02;
 
@@ -288,9 +285,6 @@ impl Estimators {
         contact.leaves = touched && !touches;
         contact.in_flight = state.decision.is_in_flight();
         contact.force_n = force_n;
-        if contact.lands {
-            self.expect_slip(state);
-        }
         self.correct_friction(state, last.reference_velocity_m_s);
         followed
     }
@@ -312,10 +306,7 @@ impl Estimators {
             self.friction
                 .correct(&mut state.friction, &contact.force_n, is_dragged);
         }
-        let has_lagged = contact.response.has_lagged;
-        state
-            .friction
-            .correct_estimate(&mut contact.friction, has_lagged);
+        state.friction.correct_estimate(&mut contact.friction);
         contact.p_per_kg = state
             .model
             .p_per_kg(contact.friction.coefficient, contact.friction.slip);
@@ -326,15 +317,6 @@ impl Estimators {
     fn is_in_range(&self, force_n: &Vector2<f32>) -> bool {
         let range_n = self.force_range_n;
         force_n.x.abs() < range_n && force_n.y.abs() < range_n
-    }
-
-    /// Sets the direction in which a landing tip will slip, where the belt's speed decides it.
-    fn expect_slip(&self, state: &mut EstimatesState) {
-        let tip_velocity_m_s = state.model.tip_velocity_m_s.x;
-        if let Some(slip) = self.belt.slip(&state.belt, tip_velocity_m_s) {
-            // The correction of friction that follows evaluates p.
-            state.friction.expect_slip(slip);
-        }
     }
 
     /// Updates friction, belt and response of a contact with the force at the last tick.
@@ -377,7 +359,7 @@ impl Estimators {
     #[inline]
     pub fn learn_in_the_air(&self, state: &mut EstimatesState, observed: &Observed<'_>) {
         if state.contact.leaves {
-            self.explain_throw(&mut state.friction, &state.model);
+            self.friction.doubt(&mut state.friction);
         }
         let tip_velocity_m_s = state.model.tip_velocity_m_s.x;
         self.belt.update(&mut state.belt, tip_velocity_m_s, None);
@@ -506,17 +488,6 @@ impl Estimators {
             moved: state.joints.has_moved(),
             release: release.dot(&self.joints.innovation_counts(&state.joints)),
             full_release: release.norm_squared(),
-        }
-    }
-
-    /// Handles the loss of contact. If a little more friction than estimated explains the lift-off,
-    /// it is taken as the cause.
-    fn explain_throw(&self, state: &mut FrictionState, model: &Model) {
-        let friction = state.estimate();
-        let coupling = friction.slip.sign::<f32>() * model.q12_per_kg;
-        let critical = model.q22_per_kg / coupling;
-        if coupling > 0.0 && critical < friction.coefficient + THROWN_BY_FRICTION {
-            self.friction.thrown(state, critical);
         }
     }
 

@@ -2,8 +2,8 @@
 //!
 //! On a rigid contact f_n = −b/p: the force follows a change of torque at once. On a spring and damper
 //! the tip must move first, and within a tick T only the fraction ρ ≈ c p T + ½ k p T² shows. The
-//! rounding of the torque to counts changes the torque like noise at every tick, by a known amount; near
-//! the edge, a small probe is added. ρ is the correlation of the measured changes of force with those
+//! rounding of the torque to counts changes the torque like noise at every tick, by a known amount; until ρ shows whether
+//! the contact is rigid, a small probe is added. ρ is the correlation of the measured changes of force with those
 //! that a rigid contact would show.
 //!
 //! An observer that feeds the measured force back at the rate λ takes damping away from the contact. It
@@ -25,14 +25,13 @@ settings! {
         averaging_s: f32 = 0.25, 1e-3..=1e3, "s";
         /// Number of standard deviations from the estimated response to its bounds.
         deviations: f32 = 3.0, 0.0..=10.0;
-        /// Lower bound of the response that allows the observers their full gain.
-        full_gain: f32 = 0.5, 1e-3..=10.0;
-        /// Lower bound of the response above which the contact is taken to be rigid.
+        /// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full
+        /// gain.
         rigid: f32 = 0.5, 1e-3..=1.0;
         /// Upper bound of the response below which the law damps the contact.
         gives: f32 = 0.2, 1e-3..=1.0;
-        /// Amplitude of the probe, a noise-like force that is added to the desired normal force near the
-        /// edge until the contact is known to be rigid.
+        /// Amplitude of the probe, a noise-like force that is added to the desired normal force until the contact is known
+        /// to be rigid, or not to be.
         probe_n: f32 = 0.1, 0.0..=10.0, "N";
         /// Least contact damping c that is assumed.
         least_damping_ns_m: f32 = 15.0, 1e-3..=1e9, "N·s/m";
@@ -52,8 +51,9 @@ const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
 const LEAST_REST: f32 = 0.05;
 /// Time in contact before the correlation starts, s.
 const SETTLING_S: f32 = 0.05;
-/// Time for which a contact that was certainly not rigid counts as one that gives, s.
-const LAGGED_S: f32 = 5.0;
+/// Upper bound of the response, as a fraction of that of a rigid contact, at which a contact certainly is not rigid.
+const CERTAINLY_NOT_RIGID: f32 = 0.5;
+
 /// Inputs of one tick in which the tip slides in contact.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceReading {
@@ -74,9 +74,6 @@ pub struct ContactResponse {
     /// How certainly the contact is not rigid, 0 … 1: 0 where the upper bound of the response is that of a
     /// rigid contact, 1 where it is half of that or less.
     pub lags: f32,
-    /// Whether the contact was certainly not rigid at some time in the last seconds: farther from the edge,
-    /// where p is greater, a contact that gives looks rigid.
-    pub has_lagged: bool,
     /// Probe to be added to the wanted normal force, N.
     pub probe_n: f32,
 }
@@ -88,7 +85,6 @@ impl ContactResponse {
             loop_share: p_ratio.at_least(0.0),
             give: 0.0,
             lags: 0.0,
-            has_lagged: false,
             probe_n: 0.0,
         }
     }
@@ -101,8 +97,6 @@ pub struct ResponseEstimator {
     tick_s: f32,
     /// Weight of one block in the averages.
     weight: f32,
-    /// Time from one block to the next, s.
-    period_s: f32,
     /// Share for each unit of p that is always allowed, kg.
     least_share_kg: f32,
 }
@@ -185,8 +179,6 @@ pub struct ResponseState {
     give: f32,
     /// How certainly it is not rigid, from the upper bound of second differences.
     lags: f32,
-    /// Remaining time for which the contact counts as one that has lagged, s.
-    lagged_s: f32,
     /// Time since the tip touched, s.
     touched_s: f32,
 }
@@ -199,7 +191,6 @@ impl ResponseEstimator {
             settings: *settings,
             tick_s,
             weight: period_s / settings.averaging_s,
-            period_s,
             least_share_kg: settings.least_damping_ns_m * tick_s,
         }
     }
@@ -225,7 +216,6 @@ impl ResponseEstimator {
             gain: 0.0,
             give: 0.0,
             lags: 0.0,
-            lagged_s: 0.0,
             touched_s: 0.0,
         }
     }
@@ -247,7 +237,6 @@ impl ResponseEstimator {
                 .limited(0.0, p_ratio.at_least(0.0)),
             give: state.give,
             lags: state.lags,
-            has_lagged: state.lagged_s > 0.0,
             probe_n: state.probe_n,
         }
     }
@@ -273,7 +262,9 @@ impl ResponseEstimator {
         if state.touched_s < SETTLING_S {
             return false;
         }
-        if state.lower < self.settings.rigid {
+        let rigid = self.settings.rigid;
+        let is_known = state.lower >= rigid || state.upper <= CERTAINLY_NOT_RIGID * rigid;
+        if !is_known {
             state.draw_probe(self.settings.probe_n);
         }
         if state.block_ticks < BLOCK_TICKS {
@@ -320,16 +311,12 @@ impl ResponseEstimator {
         let (response, deviation) = first.response(weight);
         state.lower = response - settings.deviations * deviation;
         state.upper = response + settings.deviations * deviation;
-        state.gain = state.lower / settings.full_gain;
+        state.gain = state.lower / settings.rigid;
         state.give = (1.0 - state.upper / settings.gives).at_least(0.0);
         let (response, deviation) = second.response(weight);
         let upper = response + settings.deviations * deviation;
-        state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);
-        state.lagged_s = if state.lags > 0.0 {
-            LAGGED_S
-        } else {
-            state.lagged_s - self.period_s
-        };
+        let doubt = upper / settings.rigid - CERTAINLY_NOT_RIGID;
+        state.lags = (1.0 - doubt / (1.0 - CERTAINLY_NOT_RIGID)).limited(0.0, 1.0);
     }
 }
 
@@ -432,11 +419,12 @@ mod tests {
 
     #[test]
     fn the_share_of_a_compliant_contact_falls_with_its_damping() {
-        let of = |damping| observed(1500, compliant(1e5, damping));
+        let of = |damping| observed(300, compliant(1e5, damping));
         let (firm, soft) = (of(90.0), of(20.0));
         assert!(soft.loop_share < firm.loop_share && firm.loop_share < P_RATIO);
         assert!(soft.loop_share < 0.5 * P_RATIO, "{soft:?}");
         let softest = observed(1500, compliant(1e4, 5.0));
+        assert_eq!(softest.probe_n, 0.0, "nothing is left to find out");
         assert!(softest.give > 0.0, "{softest:?}");
     }
 

@@ -32,17 +32,12 @@ const CALMER_OBSERVER: f32 = 0.7;
 /// Slowing of the rate at which the law learns the acceleration by other contact forces, for each unit of p, kg.
 const SLOWER_KG: f32 = 1.0;
 
-/// Rate limit of the friction feed-forward, as a fraction of f_n, 1/s: at a reversal of slip it
-/// passes through stick without a jerk.
-const FRICTION_SLEW_PER_S: f32 = 1000.0;
-
 /// Fraction of the torque limit available for pressing the tip on the belt; the rest is for motion.
 const TORQUE_USED: f32 = 0.95;
+/// Least desired force by which the present one is divided, N.
+const LEAST_FORCE_N: f32 = 1e-3;
 /// Least fraction of the wanted contact force.
 const LEAST_PRESSING: f32 = 0.1;
-/// Rate at which the pressing recovers on a contact that gives, 1/s.
-const RECOVERY_PER_S: f32 = 10.0;
-
 /// Returns the fraction of `pressing_nm` that keeps both joints within ±`limit_nm` together with
 /// `motion_nm`.
 #[inline]
@@ -76,9 +71,6 @@ fn affordable_part(
         .limited(LEAST_PRESSING, 1.0)
 }
 
-/// Wanted acceleration above which the law makes a sticking tip break away, m/s².
-const BREAKING_AWAY_M_S2: f32 = 1.0;
-
 /// The hybrid law's state.
 #[derive(Clone, Copy, Debug)]
 pub struct HybridState {
@@ -90,8 +82,6 @@ pub struct HybridState {
     filtered_friction_n: f32,
     /// Slip direction of the last friction feed-forward.
     slip: Option<Slip>,
-    /// Last friction feed-forward as a ratio f_t/f_n.
-    fed_ratio: f32,
     /// Fraction of the wanted contact force for which torque is available.
     pressing: f32,
     /// Low-passed normal force, N.
@@ -109,7 +99,6 @@ impl Default for HybridState {
             position_integral_m_s2: 0.0,
             filtered_friction_n: 0.0,
             slip: None,
-            fed_ratio: 0.0,
             pressing: 1.0,
             slow_force_n: 0.0,
             fed_force_n: Vector2::zeros(),
@@ -132,12 +121,14 @@ impl Law for HybridSettings {
         }
     }
 
-    /// Resets the integrals and starts from the present friction, at most that of f_n*.
+    /// Resets the integrals and starts from the present contact force, at most f_n*: an arm that fell on the
+    /// belt may press with more than the torque can hold.
     fn reset(&self, state: &mut HybridState, input: &LawInput<'_>) {
         let force_n = input.force_n.y.limited(0.0, self.normal_force_n);
         // Limit to the friction cone: a saturated force cell gives any ratio.
         let cone_n = input.friction.coefficient * force_n;
         *state = HybridState {
+            pressing: force_n / self.normal_force_n.at_least(LEAST_FORCE_N),
             filtered_friction_n: input.force_n.x.within(cone_n),
             slow_force_n: input.force_n.y,
             fed_force_n: input.force_n,
@@ -149,8 +140,7 @@ impl Law for HybridSettings {
     fn tick(&self, state: &mut HybridState, input: &LawInput<'_>) -> LawOutput {
         let tangential_acceleration = self.commanded_acceleration_m_s2(state, input);
         let normal_force = self.commanded_force_n(state, input);
-        let friction_force =
-            self.compensated_friction_n(state, input, normal_force, tangential_acceleration);
+        let friction_force = self.compensated_friction_n(state, input, normal_force);
         let force_drift = self.force_drift_m_s2(state, input);
         let acceleration = input
             .model
@@ -167,13 +157,11 @@ impl Law for HybridSettings {
         } else {
             1.0
         };
-        state.pressing = if input.response.has_lagged {
-            // A pressing that followed the torque left by the motion would drive the ringing of the contact.
-            let step = RECOVERY_PER_S * input.tick_s * (share - state.pressing);
-            share.at_most(state.pressing + step)
-        } else {
-            share
-        };
+        // A force that rose at once would make a contact with little damping ring: after landing, and where it
+        // followed the torque that the motion leaves.
+        let rise = self.pressing_rate_per_s * input.tick_s;
+        let approach = rise / (1.0 + rise);
+        state.pressing = share.at_most(state.pressing + approach * (share - state.pressing));
         state.fed_force_n = wanted * state.pressing;
         LawOutput {
             torque_nm: motion_nm + pressing_nm * state.pressing,
@@ -247,13 +235,12 @@ impl HybridSettings {
         wanted_n + state.force_integral_n - damping_n + response.probe_n
     }
 
-    /// Returns the f_t to feed forward, N, for α_f (N) and α_v (m/s²).
+    /// Returns the f_t to feed forward, N, for α_f (N).
     fn compensated_friction_n(
         &self,
         state: &mut HybridState,
         input: &LawInput<'_>,
         normal_force_n: f32,
-        tangential_acceleration_m_s2: f32,
     ) -> f32 {
         match self.friction {
             FrictionFeedForward::Measured => input.force_n.x,
@@ -264,28 +251,14 @@ impl HybridSettings {
             }
             FrictionFeedForward::Observed { time_constant_s } => {
                 let friction = input.friction;
-                // In stick the friction force follows the feed-forward. Feeding forward the friction
-                // of the wanted slip brings it to the edge of its cone, where the tip breaks away
-                // without a jerk.
-                let wants_slip = tangential_acceleration_m_s2.abs() > BREAKING_AWAY_M_S2;
-                let slip = if friction.sticks && wants_slip {
-                    Slip::of(tangential_acceleration_m_s2)
-                } else {
-                    friction.slip
-                };
-                let slip = friction.slip_seen.then_some(slip);
+                let slip = friction.slip_seen.then_some(friction.slip);
                 let coefficient = (friction.next_coefficient + friction.catch_up).at_least(0.0);
                 let ratio = slip.map_or(0.0, |slip| -coefficient * slip.sign::<f32>());
                 if slip != state.slip {
                     state.filtered_friction_n = 0.0;
-                    if state.slip.is_none() {
-                        state.fed_ratio = ratio;
-                    }
                     state.slip = slip;
                 }
-                let step = FRICTION_SLEW_PER_S * input.tick_s;
-                state.fed_ratio += (ratio - state.fed_ratio).within(step);
-                let expected = state.fed_ratio * normal_force_n;
+                let expected = ratio * normal_force_n;
                 // Where the contact gives, the difference is mostly noise of the force cell.
                 let calm = 1.0 - CALMER_OBSERVER * input.response.lags;
                 let weight = (calm * input.tick_s / (time_constant_s + input.tick_s))
@@ -330,6 +303,7 @@ mod tests {
             let model = Model::new(&arm, theta_rad, theta_dot_rad_s, &GeneralisedTorque::zeros());
             let settings = HybridSettings {
                 force_integral_gain_per_s: 0.0,
+                pressing_rate_per_s: 1e6,
                 position_integral_gain_per_s3: 0.0,
                 friction: FrictionFeedForward::Model { friction, belt_speed_m_s: -1.0 },
                 ..Default::default()
@@ -402,7 +376,6 @@ mod tests {
     fn gives() -> ContactResponse {
         ContactResponse {
             lags: 1.0,
-            has_lagged: true,
             ..ContactResponse::rigid(1.0)
         }
     }
@@ -483,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn the_force_falls_at_once_but_recovers_slowly_on_a_contact_that_gives() {
+    fn the_force_falls_at_once_but_rises_slowly() {
         while_sliding(|settings, input, state| {
             settings.reset(state, input);
             settings.tick(state, input);
@@ -493,15 +466,23 @@ mod tests {
             let reduced = state.pressing;
             assert!(reduced < 0.9, "{reduced}");
             input.torque_limit_nm = 50.0;
-            for _ in 0..10 {
+            (0..10).for_each(|_| {
                 settings.tick(state, input);
-            }
+            });
             let share = (state.pressing - reduced) / (1.0 - reduced);
-            assert!((share - 0.1).abs() < 0.01, "{share}");
-            // A rigid contact does not ring.
-            let response = &ContactResponse::rigid(1.0);
-            settings.tick(state, &LawInput { response, ..*input });
-            assert_eq!(state.pressing, 1.0);
+            let expected = 1.0 - (1.0 + settings.pressing_rate_per_s * input.tick_s).powi(-10);
+            assert!((share - expected).abs() < 1e-3, "{share} {expected}");
+        });
+    }
+
+    #[test]
+    fn the_force_begins_with_the_present_one_but_with_no_more_than_desired() {
+        while_sliding(|settings, input, state| {
+            for (force_n, share) in [(20.0, 1.0), (4.0, 0.4), (-0.2, 0.0)] {
+                input.force_n.y = force_n;
+                settings.reset(state, input);
+                assert_eq!(state.pressing, share);
+            }
         });
     }
 }

@@ -48,6 +48,9 @@ settings! {
         /// Rate at which the law learns the acceleration of the tip along the belt by contact forces other
         /// than those fed forward, which it cancels; 0 for never. Not in the paper.
         force_drift_rad_s: f32 = 1500.0, 0.0..=1e4, "rad/s";
+        /// Rate at which the normal force rises to f_n*, as a fraction of it: after landing, and after a motion that left
+        /// too little torque for it. The paper's law presses at once.
+        pressing_rate_per_s: f32 = 20.0, 0.1..=1e6, "1/s";
         /// Whether the pressing force is reduced where the torque limits do not allow f_n*; not in
         /// the paper.
         reduce_force_when_torque_limited: bool = true;

@@ -20,6 +20,8 @@ pub enum Part {
     PositionIntegral,
     /// Reduction of the normal force where the torque is limited.
     ReduceForceWhenTorqueLimited,
+    /// Gradual rise of the normal force: after landing, and where the torque was limited.
+    ForceRamp,
     /// Estimate of unknown torques.
     Disturbance,
     /// Estimate of how much the contact gives; without it the contact is taken to be rigid.
@@ -36,7 +38,7 @@ pub enum Part {
 
 impl Part {
     /// All parts.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Governor,
         Self::Recovery,
         Self::Calibration,
@@ -44,6 +46,7 @@ impl Part {
         Self::FrictionFeedForward,
         Self::PositionIntegral,
         Self::ReduceForceWhenTorqueLimited,
+        Self::ForceRamp,
         Self::Disturbance,
         Self::Response,
         Self::Probe,
@@ -64,6 +67,7 @@ impl Part {
             Self::ReduceForceWhenTorqueLimited => {
                 &["controller.law.hybrid.reduce_force_when_torque_limited=false"]
             }
+            Self::ForceRamp => &["controller.law.hybrid.pressing_rate_per_s=1e6"],
             Self::Disturbance => &["controller.disturbance.enabled=false"],
             Self::Response => &["controller.response.enabled=false"],
             Self::Probe => &["controller.response.probe_n=0"],

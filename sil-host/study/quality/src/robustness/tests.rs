@@ -207,6 +207,7 @@ fn other_settings(part: Part) -> &'static [&'static str] {
         Part::FrictionFeedForward
         | Part::PositionIntegral
         | Part::ReduceForceWhenTorqueLimited
+        | Part::ForceRamp
         | Part::Probe
         | Part::ForceDrift
         | Part::FrictionSpeedUp => &[],
@@ -217,7 +218,7 @@ fn other_settings(part: Part) -> &'static [&'static str] {
 /// joints with friction, little torque and a way to the edge.
 fn occasion(part: Part) -> &'static [&'static str] {
     match part {
-        Part::Recovery => &[],
+        Part::Recovery | Part::ForceRamp => &[],
         _ => &[
             "contact.kind=compliant",
             "contact.stiffness_n_m=1e4",
