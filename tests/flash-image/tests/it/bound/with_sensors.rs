@@ -13,18 +13,19 @@ use painleve_tests::printed::{self, LastFigure, thousands};
 use super::random::{Random, mutated, with_random_settings};
 use super::{BoundCheck, Found, Longest, OBJECTIVES, flashed, trace_ticks, tries};
 
-/// Settings under which a search with the board's own sensors (`worst_settings_with_sensors`) has found the longest ticks.
-const WORST_SETTINGS: (&str, &[&str]) =
-    ("pid-elbow-down", &["controller.contact.evidence=encoders"]);
+/// The scenario with the settings under which a search (`worst_settings_with_sensors`) has found the longest tick.
+fn worst_found() -> Scenario {
+    let settings = include_str!("worst_settings.txt").lines();
+    let settings: Vec<String> = settings.map(str::to_owned).collect();
+    Scenario::load("pid-elbow-down", &settings).unwrap()
+}
 
 /// With the board's own sensors: worst found with the built-in settings and with valid ones.
 #[test]
 fn the_worst_readings_found_by_a_search_stay_below_the_bound() {
     let image = flashed::<F405>();
     let bound = Bound::of(&image).unwrap_or_else(|error| panic!("{error}"));
-    let (name, settings) = WORST_SETTINGS;
-    let settings: Vec<String> = settings.iter().map(|it| (*it).to_owned()).collect();
-    let valid = Scenario::load(name, &settings).unwrap();
+    let valid = worst_found();
     let built_in = ["hybrid-elbow-down", "pid-elbow-down", "capture"].map(scenario);
     let mut table = String::from(
         "| | control interrupt, instructions | cycles | update, instructions | cycles | both, instructions | cycles |\n\
@@ -132,7 +133,7 @@ fn worst_readings(
 /// Hill climbing on settings, and on the readings of the board's own sensors under each. Settings that do not drive the arm
 /// are left out.
 #[test]
-#[ignore = "a search of minutes, for `WORST_SETTINGS`"]
+#[ignore = "a search of minutes, for `worst_settings.txt`"]
 fn worst_settings_with_sensors() {
     let threads = std::thread::available_parallelism().map_or(1, |it| it.get() as u64);
     let search = |thread: u64| {
@@ -140,9 +141,7 @@ fn worst_settings_with_sensors() {
         let bound = Bound::of(&image).unwrap_or_else(|error| panic!("{error}"));
         let mut watch = BoundCheck::new(&image, &bound);
         let mut random = Random(thread << 32 | 5);
-        let (name, settings) = WORST_SETTINGS;
-        let settings: Vec<String> = settings.iter().map(|it| (*it).to_owned()).collect();
-        let mut worst = (Scenario::load(name, &settings).unwrap(), String::new(), 0);
+        let mut worst = (worst_found(), String::new(), 0);
         for _ in 0..tries(600).div_ceil(20) {
             let (tried, changes) = with_random_settings(worst.0.clone(), &mut random);
             let mut bench = BoardBench::new(&tried);
@@ -156,7 +155,7 @@ fn worst_settings_with_sensors() {
                 worst = (tried, worst.1 + &changes, cycles);
                 let instructions = watch.control.most_instructions.instructions;
                 println!(
-                    "{cycles} cycles, control {instructions} instructions: {name}{}",
+                    "{cycles} cycles, control {instructions} instructions:{}",
                     worst.1
                 );
             }
