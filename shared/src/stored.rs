@@ -22,8 +22,6 @@ pub enum StoredState {
     Refused = 3,
     /// The memory could not be erased or written.
     NotWritten = 4,
-    /// The board has no memory for a configuration.
-    NoMemory = 5,
 }
 
 impl StoredState {
@@ -40,7 +38,6 @@ impl StoredState {
             Self::OtherBuild => "the stored configuration is of another build: store it again",
             Self::Refused => "the stored configuration is out of range: store another",
             Self::NotWritten => "the board's flash could not be written",
-            Self::NoMemory => "the board cannot store a configuration",
         }
     }
 }

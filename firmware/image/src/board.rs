@@ -1,5 +1,6 @@
 //! The interface between the tasks and a board. Boards differ in nothing else.
 
+use embedded_storage::nor_flash::NorFlash;
 use painleve_firmware::Configuration;
 use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
@@ -7,7 +8,7 @@ use painleve_shared::black_box::ResetCause;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, RefusedRate};
 
-use crate::memory::ConfigurationMemory;
+use crate::memory::FlashMemory;
 use crate::probe::SpareBits;
 
 /// Reason for a failed start of a board.
@@ -30,7 +31,7 @@ pub struct Parts<B: Board> {
     /// Part of the link task.
     pub port: B::Port,
     /// Part of the link task: keeps a configuration.
-    pub memory: B::Memory,
+    pub memory: FlashMemory<B::Flash>,
 }
 
 /// A microcontroller board with the arm, or a stand-in for it, on its pins.
@@ -43,8 +44,8 @@ pub trait Board {
     type Bytes: Bytes;
     /// Type that the link task owns.
     type Port: Port;
-    /// Type that keeps a configuration over a loss of power.
-    type Memory: ConfigurationMemory;
+    /// Flash that keeps a configuration over a loss of power.
+    type Flash: NorFlash;
 
     /// Name, for the log.
     const NAME: &'static str;

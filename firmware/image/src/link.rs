@@ -1,5 +1,6 @@
 //! The link task: requests from the host, responses to it; and the start with the board's own configuration.
 
+use embedded_storage::nor_flash::NorFlash;
 use heapless::spsc::Consumer;
 use painleve_drivers::slots::NotWritten;
 use painleve_firmware::drive::ControlTask;
@@ -16,7 +17,7 @@ use serde::de::DeserializeOwned;
 
 use crate::black_box;
 use crate::board::{BoardDrive, Port};
-use crate::memory::ConfigurationMemory;
+use crate::memory::FlashMemory;
 use crate::probe;
 use crate::stack;
 use crate::tasks::Control;
@@ -56,17 +57,17 @@ impl<L: Law> Default for Link<L> {
 }
 
 /// Sends the waiting answers, then serves requests until no bytes are left.
-pub fn link<D, L, P, M>(
+pub fn link<D, L, P, F>(
     mut control: impl Mutex<T = Control<D, L>>,
     port: &mut P,
-    memory: &mut M,
+    memory: &mut FlashMemory<F>,
     answers: &mut Consumer<'static, Response>,
     state: &mut Link<L>,
 ) where
     D: BoardDrive,
     L: Law + DeserializeOwned,
     P: Port,
-    M: ConfigurationMemory,
+    F: NorFlash,
 {
     let Link {
         inbox,
@@ -126,15 +127,13 @@ pub fn link<D, L, P, M>(
                     configure(&mut control, decoded, configuration, source)
                         .unwrap_or_else(|refusal| refusal)
                 }
-                Ok(Request::Store { build, .. })
-                    if M::IS_THERE && build != Configuration::<L>::BUILD =>
-                {
+                Ok(Request::Store { build, .. }) if build != Configuration::<L>::BUILD => {
                     control.lock(|control| control.task.stop());
                     Response::OtherBuild {
                         build: Configuration::<L>::BUILD,
                     }
                 }
-                Ok(Request::Store { configuration, .. }) if M::IS_THERE => {
+                Ok(Request::Store { configuration, .. }) => {
                     stop(&mut control);
                     let source = FrameSource::StandAlone;
                     let accepted = configure(&mut control, decoded, configuration, source);
@@ -147,14 +146,12 @@ pub fn link<D, L, P, M>(
                         }
                     }
                 }
-                Ok(Request::Forget) if M::IS_THERE => {
+                Ok(Request::Forget) => {
                     stop(&mut control);
                     let written = memory.forget().map(|()| 0);
                     note_written(stored, written)
                 }
-                Ok(Request::Store { .. } | Request::Forget | Request::Stored) => {
-                    Response::Stored(*stored)
-                }
+                Ok(Request::Stored) => Response::Stored(*stored),
                 Ok(Request::Health) => {
                     let mut health =
                         control.lock(|control| health(&control.task, control.dropped_responses));
@@ -256,18 +253,13 @@ fn configure<D: BoardDrive, L: Law + DeserializeOwned>(
 
 /// Starts with the configuration that the board has stored, if it has one.
 #[inline(never)]
-fn start_alone<D: BoardDrive, L: Law + DeserializeOwned, M: ConfigurationMemory>(
+fn start_alone<D: BoardDrive, L: Law + DeserializeOwned, F: NorFlash>(
     control: &mut impl Mutex<T = Control<D, L>>,
-    memory: &mut M,
+    memory: &mut FlashMemory<F>,
     decoded: &mut Option<Configuration<L>>,
 ) -> StoredConfiguration {
     let Some((content, bytes)) = memory.newest() else {
-        let state = if M::IS_THERE {
-            StoredState::Empty
-        } else {
-            StoredState::NoMemory
-        };
-        return StoredConfiguration { state, version: 0 };
+        return StoredConfiguration::default();
     };
     let state = if content.build != Configuration::<L>::BUILD {
         StoredState::OtherBuild

@@ -246,6 +246,7 @@ macro_rules! tasks {
             use $crate::heapless::spsc::{Consumer, Producer, Queue};
             use $crate::painleve_shared::message::Response;
             use $crate::link::Link;
+            use $crate::memory::FlashMemory;
             use $crate::tasks::{ANSWERS, Change, Control, EVENTS};
 
             use super::*;
@@ -265,7 +266,7 @@ macro_rules! tasks {
             struct Local {
                 bytes: <Hardware as Board>::Bytes,
                 port: <Hardware as Board>::Port,
-                memory: <Hardware as Board>::Memory,
+                memory: FlashMemory<<Hardware as Board>::Flash>,
                 answers_in: Producer<'static, Response>,
                 answers_out: Consumer<'static, Response>,
                 events_in: Producer<'static, Change>,

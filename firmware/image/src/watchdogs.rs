@@ -19,9 +19,6 @@ const WINDOW_CYCLES: f32 = 4096.0;
 /// Number of limits of the window watchdog, of six bits.
 const COUNTS: f32 = 64.0;
 
-/// Longest delay of a tick by a sensor's interrupt and by code that masks interrupts, s.
-const LATEST_FEED_S: f32 = 10e-6;
-
 /// Step of the search for other rates, relative, and the number of steps, which take less than half a millisecond.
 const RATE_STEP: f32 = 0.01;
 const RATE_STEPS: u32 = 300;
@@ -63,11 +60,14 @@ pub struct WindowLimit {
 }
 
 impl WindowLimit {
-    /// Returns the limit in the middle between one period and two on a bus of `bus_hz`, or a longer one if that may
-    /// expire before the next tick; `None` for periods that are too long.
-    pub fn new(period_s: f32, bus_hz: f32, largest_prescaler: u8) -> Option<Self> {
-        let shortest_s = period_s + LATEST_FEED_S;
-        let middle_s = (shortest_s + 2.0 * period_s) / 2.0;
+    /// Returns the limit in the middle between the shortest and the longest on a bus of `bus_hz`, or a longer one if that may
+    /// expire before the shortest; `None` for limits that are too long.
+    pub fn new(
+        [shortest_s, longest_s]: [f32; 2],
+        bus_hz: f32,
+        largest_prescaler: u8,
+    ) -> Option<Self> {
+        let middle_s = (shortest_s + longest_s) / 2.0;
         let mut prescaler = 0;
         let mut count_s = WINDOW_CYCLES / bus_hz;
         while middle_s >= COUNTS * count_s {
@@ -135,6 +135,8 @@ pub trait IndependentWatchdog {
 pub trait WindowWatchdog {
     /// Largest prescaler.
     const LARGEST_PRESCALER: u8;
+    /// Longest delay of a tick by a sensor's interrupt or by code that masks interrupts, s.
+    const LATEST_FEED_S: f32;
 
     /// Sets the prescaler, and permits to feed at any time.
     fn set_prescaler(&self, prescaler: u8);
@@ -197,7 +199,12 @@ impl<I: IndependentWatchdog, W: WindowWatchdog> Watchdogs<I, W> {
 
     #[inline(never)]
     fn limit(&self, period_s: f32) -> Option<WindowLimit> {
-        WindowLimit::new(period_s, self.bus_hz, W::LARGEST_PRESCALER)
+        let shortest_s = period_s + W::LATEST_FEED_S;
+        WindowLimit::new(
+            [shortest_s, 2.0 * period_s],
+            self.bus_hz,
+            W::LARGEST_PRESCALER,
+        )
     }
 
     /// Sets the timeouts for this period, that of the independent watchdog to at least two.

@@ -52,7 +52,7 @@ impl OpenLoop {
     /// Requests torques from now on; without effect while the drive is not armed.
     pub fn request(&mut self, torques: [TorqueCounts; 2]) {
         if self.armed_at.is_some() {
-            let limited = |it: TorqueCounts| TorqueCounts(it.0.clamp(-self.limit, self.limit));
+            let limited = |it: TorqueCounts| TorqueCounts(it.0.min(self.limit).max(-self.limit));
             self.torques = torques.map(limited);
             self.age = 0;
         }

@@ -44,7 +44,7 @@ pub fn accept<P: Port>(
 ) -> Result<Acceptance, AcceptError> {
     board.identify()?;
     let stored = board.stored()?.state;
-    if !matches!(stored, StoredState::Empty | StoredState::NoMemory) {
+    if stored != StoredState::Empty {
         return Err(AcceptError::Stored);
     }
     let mut bench = Bench::new(board);

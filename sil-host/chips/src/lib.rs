@@ -8,6 +8,7 @@
 //! - [`stm32f4`], [`stm32g4`]: the microcontrollers' peripherals, [`stm32`] what they have in common
 //! - [`machine`]: exceptions, sleep, resets, time; [`system_control`]: the core's peripherals; [`protection`]: what
 //!   memory may be used for
+//! - [`registers`]: which registers and bits the chips have, by tables that others made
 //! - [`unicorn`]: executes instructions
 //!
 //! The microcontrollers are not kinder than the manuals: [what these leave open](../README.md),
@@ -22,6 +23,7 @@ mod bridge_amplifier;
 pub mod machine;
 mod mcp3304;
 pub mod protection;
+pub mod registers;
 pub mod stm32;
 pub mod stm32f4;
 pub mod stm32g4;

@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
+use crate::cycles::Chip;
 use crate::{BoundError, ImageError};
 
 /// The code of an ELF file.
 pub struct Image {
     /// For messages; empty for code without an ELF file.
     pub(crate) path: PathBuf,
+    /// The chip that executes it.
+    pub chip: &'static Chip,
     sections: Vec<(u32, Vec<u8>)>,
     functions: BTreeMap<u32, String>,
     /// Addresses by name: the linker gives functions with equal code one address.
@@ -73,8 +76,10 @@ impl Image {
             }
         }
         let lines = addr2line::Loader::new(path).map_err(ImageError::Lines)?;
+        let first = sections.iter().map(|(address, _)| *address).min();
         Ok(Self {
             path: path.to_owned(),
+            chip: Chip::of_program(first.unwrap_or_default()),
             sections,
             functions,
             addresses,
@@ -83,10 +88,20 @@ impl Image {
         })
     }
 
+    /// Returns the functions: where each begins and ends, and its name.
+    pub fn functions(&self) -> impl Iterator<Item = (u32, u32, &str)> {
+        /// No function is longer.
+        const LONGEST: u32 = 1 << 16;
+        let next = self.functions.keys().skip(1).copied().chain([u32::MAX]);
+        let functions = self.functions.iter().zip(next);
+        functions.map(|((start, name), next)| (*start, next.min(start + LONGEST), name.as_str()))
+    }
+
     /// Creates an image of one function's code, without an ELF file.
     pub fn of_code(address: u32, code: &[u8], function: &str) -> Self {
         Self {
             path: PathBuf::new(),
+            chip: Chip::of_program(address),
             sections: vec![(address, code.to_vec())],
             functions: BTreeMap::from([(address, function.to_owned())]),
             addresses: BTreeMap::from([(function.to_owned(), address)]),

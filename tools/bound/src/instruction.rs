@@ -10,6 +10,7 @@ use capstone::prelude::*;
 
 use crate::BoundError;
 use crate::cycles::InstructionKind;
+use crate::effect::{Effect, effect};
 use crate::image::Image;
 
 /// Control flow after an instruction.
@@ -40,17 +41,6 @@ pub enum Flow {
     Table,
     /// Stops: an intentionally undefined instruction.
     Trap,
-}
-
-/// Effect of an instruction on a register that is used for addresses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effect {
-    /// The register is set to a constant.
-    Set(u16, u32),
-    /// The register's upper half is set to a constant.
-    SetUpper(u16, u32),
-    /// The register is set to the sum of another register and a constant.
-    Add(u16, u16, i32),
 }
 
 /// Loads and stores of one register of the core that the pipeline overlaps with their neighbours (TRM, section
@@ -95,6 +85,37 @@ pub struct Instruction {
 }
 
 impl Instruction {
+    /// Checks that its cost is known.
+    ///
+    /// # Errors
+    /// [`BoundError::UnknownInstruction`].
+    pub fn check(&self) -> Result<(), BoundError> {
+        if self.kind != InstructionKind::Unknown {
+            return Ok(());
+        }
+        Err(BoundError::UnknownInstruction {
+            address: self.address,
+            text: self.text.clone(),
+        })
+    }
+
+    /// Returns whether it loads from memory.
+    pub fn loads(&self) -> bool {
+        matches!(
+            self.kind,
+            InstructionKind::Load(_) | InstructionKind::TableBranch
+        )
+    }
+
+    /// Returns the number of words that it loads or stores; `None` if it accesses no memory.
+    pub fn words(&self) -> Option<u32> {
+        match self.kind {
+            InstructionKind::Load(words) | InstructionKind::Store(words) => Some(words),
+            InstructionKind::TableBranch => Some(1),
+            _ => None,
+        }
+    }
+
     /// Returns whether it uses the floating-point unit.
     pub fn uses_float(&self) -> bool {
         self.text.starts_with('v')
@@ -109,8 +130,16 @@ impl Instruction {
 /// Decodes the instructions of an image.
 pub struct Decoder(Capstone);
 
-/// Number of the register that holds a function's second argument.
-pub const SECOND_ARGUMENT: u16 = ArmReg::ARM_REG_R1 as u16;
+/// Registers that hold a function's arguments.
+pub const ARGUMENTS: [u16; 4] = [
+    ArmReg::ARM_REG_R0 as u16,
+    ArmReg::ARM_REG_R1 as u16,
+    ArmReg::ARM_REG_R2 as u16,
+    ArmReg::ARM_REG_R3 as u16,
+];
+
+/// Number of the stack pointer.
+pub const STACK_POINTER: u16 = ArmReg::ARM_REG_SP as u16;
 
 /// Number of the program counter.
 pub const PROGRAM_COUNTER: u16 = ArmReg::ARM_REG_PC as u16;
@@ -146,7 +175,7 @@ impl Decoder {
     /// instruction makes it conditional.
     ///
     /// # Errors
-    /// [`BoundError`] if there is no instruction, or none of known cost.
+    /// [`BoundError`] if there is no instruction, or its destination is unknown.
     pub fn at(
         &self,
         image: &Image,
@@ -313,7 +342,7 @@ impl Decoder {
         } else if SIMPLE.iter().any(|simple| base.starts_with(simple)) {
             InstructionKind::Simple
         } else {
-            return Err(unknown(&text));
+            InstructionKind::Unknown
         };
         if to_counter && matches!(flow, Flow::Next) {
             if !matches!(kind, InstructionKind::Load(_)) || operands.iter().any(|o| matches!(o.op_type, ArmOperandType::Mem(m) if m.base().0 != ArmReg::ARM_REG_SP as u16)) {
@@ -321,7 +350,7 @@ impl Decoder {
             }
             flow = Flow::Return { conditional };
         }
-        let effect = effect(base, &operands, immediate, conditional);
+        let mut effect = effect(base, &operands, immediate, conditional);
         if any(&[ARM_INS_PUSH, ARM_INS_POP, ARM_INS_VPUSH, ARM_INS_VPOP]) {
             address_from = vec![ArmReg::ARM_REG_SP as u16];
         } else if memory.is_none()
@@ -329,6 +358,18 @@ impl Decoder {
             && let Some(ArmOperandType::Reg(register)) = operands.first().map(|it| &it.op_type)
         {
             address_from = vec![register.0];
+        }
+        let loaded = |register: u16| {
+            let mut names = operands.iter().map(|it| &it.op_type);
+            let is =
+                |it: &ArmOperandType| matches!(it, ArmOperandType::Reg(it) if it.0 == register);
+            names.any(is)
+        };
+        if arm.writeback()
+            && let Some(base) = address_from.first()
+            && (memory.is_none() || !loaded(*base))
+        {
+            effect = Some(Effect::Advance(*base));
         }
         let bytes = instruction.bytes().len() as u32;
         let neighbours = (bytes == 2 || address.is_multiple_of(4))
@@ -371,29 +412,4 @@ const SIMPLE: [&str; 65] = [
 
 fn is_double(register: u16) -> bool {
     (ArmReg::ARM_REG_D0 as u16..=ArmReg::ARM_REG_D31 as u16).contains(&register)
-}
-
-/// Returns the effect of an instruction on a register used for addresses.
-fn effect(
-    name: &str,
-    operands: &[ArmOperand],
-    immediate: Option<i32>,
-    conditional: bool,
-) -> Option<Effect> {
-    let register = |place: usize| match operands.get(place).map(|operand| &operand.op_type) {
-        Some(ArmOperandType::Reg(register)) => Some(register.0),
-        _ => None,
-    };
-    let to = register(0)?;
-    let value = immediate?;
-    match (name, operands.len()) {
-        _ if conditional => None,
-        ("mov" | "movs" | "movw", 2) => Some(Effect::Set(to, value as u32)),
-        ("movt", 2) => Some(Effect::SetUpper(to, value as u32)),
-        ("add" | "adds" | "addw", 3) => Some(Effect::Add(to, register(1)?, value)),
-        ("add" | "adds", 2) => Some(Effect::Add(to, to, value)),
-        ("sub" | "subs" | "subw", 3) => Some(Effect::Add(to, register(1)?, -value)),
-        ("sub" | "subs", 2) => Some(Effect::Add(to, to, -value)),
-        _ => None,
-    }
 }

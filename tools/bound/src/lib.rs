@@ -2,21 +2,25 @@
 //! code.
 //!
 //! The image is decoded ([`instruction`]) into a control-flow graph for each function ([`graph`]).
-//! The cycle model bounds the cost of every block ([`cycles`], [`cost`]), loops have declared
+//! The cycle model bounds the cost of every block ([`cycles`], [`values`], [`cost`]), loops have declared
 //! limits ([`loops`]), and a linear programme finds the most expensive path ([`worst`]). [`report`]
 //! prints it with source lines. [`profile`] shows where executed ticks spend their instructions.
 //!
 //! The bounds hold for every configuration and every frame, because they depend on neither.
 
+pub mod connected;
 pub mod cost;
 pub mod cycles;
+pub mod effect;
 pub mod graph;
 pub mod image;
 pub mod instruction;
 pub mod loops;
 pub mod profile;
 pub mod report;
+pub mod sections;
 pub mod trace;
+pub mod values;
 pub mod worst;
 
 use std::path::{Path, PathBuf};
@@ -48,6 +52,18 @@ pub enum BoundError {
         address: u32,
         /// Disassembly.
         text: String,
+    },
+    /// No handler calls a function.
+    #[error("no handler calls the function at 0x{address:08x}")]
+    NotFollowed {
+        /// Address.
+        address: u32,
+    },
+    /// A function returns with interrupts masked.
+    #[error("the section at 0x{address:08x} does not end in its function")]
+    LeftMasked {
+        /// Address.
+        address: u32,
     },
     /// A function is recursive.
     #[error("the function at 0x{address:08x} calls itself")]

@@ -6,6 +6,7 @@ use painleve_drivers::encoders::EncoderDriver;
 use painleve_drivers::exchange::{Dialogue, SelectTiming};
 use painleve_drivers::force_cell::ForceCellDriver;
 
+use crate::cycles::Chip;
 use crate::graph::Graph;
 use crate::image::Image;
 
@@ -20,9 +21,6 @@ pub const CLEARED_BYTES: u32 = 48;
 
 /// Function that clears memory: its second argument is the number of bytes.
 pub const CLEARS: &str = "__aeabi_memclr";
-
-/// Cycles of a nanosecond, at 168 MHz.
-const CYCLES_PER_NS: f64 = 0.168;
 
 /// Functions that a tick does not call if the bound holds, with the reason. Each has to be out of line.
 pub const NOT_CALLED: [(&str, &str); 4] = [
@@ -80,7 +78,7 @@ pub struct Limits(pub Vec<Declared>);
 
 impl Limits {
     /// Returns the declarations for the interrupts of a tick: control and update.
-    pub fn of_tick() -> Self {
+    pub fn of_tick(chip: &Chip) -> Self {
         let declare = |function, limit, because| Declared {
             function,
             limit,
@@ -102,7 +100,7 @@ impl Limits {
             ),
             declare(
                 "::set_up",
-                wait(longest_setup_ns, 0.0),
+                wait(chip, longest_setup_ns, 0.0),
                 "the longer set-up time of the two buses, which are started together",
             ),
             declare("plausibility::", Limit::Times(2), "two joints"),
@@ -127,7 +125,7 @@ impl Limits {
 
     /// Returns the declarations for the interrupt of a sensor's bus: the times around an exchange, and half
     /// a period of the bus' clock, by which the last word comes early.
-    pub fn of_sensor_bus(timing: SelectTiming, bus_hz: f64) -> Self {
+    pub fn of_sensor_bus(chip: &Chip, timing: SelectTiming, bus_hz: f64) -> Self {
         let declare = |function, limit| Declared {
             function,
             limit,
@@ -135,11 +133,11 @@ impl Limits {
         };
         let half_period_ns = 0.5e9 / bus_hz;
         let mut all = vec![
-            declare("::set_up", wait(timing.setup_ns, 0.0)),
-            declare("::hold", wait(timing.hold_ns, half_period_ns)),
-            declare("::pause", wait(timing.pause_ns, 0.0)),
+            declare("::set_up", wait(chip, timing.setup_ns, 0.0)),
+            declare("::hold", wait(chip, timing.hold_ns, half_period_ns)),
+            declare("::pause", wait(chip, timing.pause_ns, 0.0)),
         ];
-        all.extend(Self::of_tick().0);
+        all.extend(Self::of_tick(chip).0);
         Self(all)
     }
 
@@ -185,7 +183,7 @@ fn ends_where_it_repeats(graph: &Graph, header: u32, blocks: &BTreeSet<u32>) -> 
 }
 
 /// Returns the limit of a wait: the time, rounded up by the driver to whole cycles, and one more.
-fn wait(time_ns: u32, early_ns: f64) -> Limit {
-    let cycles = (f64::from(time_ns) + early_ns) * CYCLES_PER_NS;
+fn wait(chip: &Chip, time_ns: u32, early_ns: f64) -> Limit {
+    let cycles = (f64::from(time_ns) + early_ns) * 1e-9 * chip.core_hz;
     Limit::Cycles(cycles.ceil() as u32 + 2)
 }

@@ -8,9 +8,11 @@ use painleve_drivers::exchange::{Dialogue, SelectTiming};
 use painleve_drivers::force_cell::ForceCellDriver;
 use serde::Serialize;
 
-use crate::cycles::around;
+use crate::cycles::Chip;
 use crate::image::Image;
 use crate::loops::{EVALUATES, Limits, NOT_CALLED, STARTS};
+use crate::sections::{self, Section};
+use crate::values::{Program, Values};
 use crate::worst::{Analysis, Loop, Visit, Worst};
 use crate::{BoundError, ImageError};
 
@@ -24,8 +26,6 @@ pub const UPDATE_INTERRUPT: &str = "TIM3";
 struct SensorBus {
     handler: &'static str,
     timing: SelectTiming,
-    /// Its clock (`firmware/boards/f405/src/lib.rs`), Hz.
-    clock_hz: f64,
     /// Exchanges in a tick, with every reading disturbed and repeated as often as its driver allows: with one sensor
     /// on each channel, and with two.
     exchanges: [u32; 2],
@@ -43,7 +43,6 @@ const SENSOR_BUSES: [SensorBus; 2] = [
     SensorBus {
         handler: "SPI1",
         timing: EncoderDriver::TIMING,
-        clock_hz: 5_250_000.0,
         exchanges: EncoderDriver::MOST_EXCHANGES,
         words: 1,
         takes: "::take_encoders",
@@ -51,19 +50,18 @@ const SENSOR_BUSES: [SensorBus; 2] = [
     SensorBus {
         handler: "SPI2",
         timing: ForceCellDriver::TIMING,
-        clock_hz: 1_312_500.0,
         exchanges: ForceCellDriver::MOST_EXCHANGES,
         words: 3,
         takes: "::take_forces",
     },
 ];
 
-/// The core's clock, Hz.
-pub const CORE_HZ: f64 = 168e6;
-
 /// Bounds on the interrupts of a tick.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bound {
+    /// The chip.
+    #[serde(serialize_with = "name")]
+    pub chip: &'static Chip,
     /// The control interrupt.
     pub control: HandlerBound,
     /// The update after it.
@@ -77,6 +75,8 @@ pub struct Bound {
     pub sensor_cycles_of_both: u32,
     /// Cycles of the longest of these interrupts, which may delay the control interrupt.
     pub longest_sensor_cycles: u32,
+    /// Sections of other tasks that mask the control interrupt, the longest last.
+    pub sections: Vec<Section>,
     /// Highest control rate at which all interrupts of a tick end before the next one, Hz.
     pub proves_hz: u32,
     /// The same with two sensors on each channel, Hz.
@@ -97,6 +97,10 @@ pub struct Bound {
     /// peripheral.
     #[serde(skip)]
     pub peripheral_accesses: BTreeSet<u32>,
+}
+
+fn name<S: serde::Serializer>(chip: &&Chip, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(chip.name)
 }
 
 /// A bound on one interrupt.
@@ -133,13 +137,22 @@ impl Bound {
     /// # Errors
     /// [`BoundError`] naming the file or the code that cannot be bounded.
     pub fn of(image: &Image) -> Result<Self, BoundError> {
-        let with_entry = |worst: &Worst| worst.cycles + around(worst.entry, worst.uses_float);
-        let worst_of = |handler: &str, analysis: &mut Analysis<'_>| {
+        let chip = image.chip;
+        let address_of = |handler: &str| {
             let entry = image.function(handler);
-            let entry = entry.ok_or_else(|| BoundError::Image {
+            entry.ok_or_else(|| BoundError::Image {
                 path: image.path.clone(),
                 source: ImageError::NoFunction(handler.to_owned()),
-            })?;
+            })
+        };
+        let handlers = [CONTROL_INTERRUPT, UPDATE_INTERRUPT].into_iter();
+        let handlers = handlers.chain(SENSOR_INTERRUPTS).map(address_of);
+        let handlers = handlers.collect::<Result<Vec<_>, _>>()?;
+        let entries = handlers.iter().map(|it| (*it, Values::new())).collect();
+        let program = Program::of(image, entries, &BTreeSet::new())?;
+        let with_entry = |worst: &Worst| worst.cycles + chip.around(worst.entry, worst.uses_float);
+        let worst_of = |handler: &str, analysis: &mut Analysis<'_>| {
+            let entry = address_of(handler)?;
             let worst = analysis.of(entry)?;
             worst.ok_or(BoundError::NeverReturns { address: entry })
         };
@@ -150,7 +163,7 @@ impl Bound {
                 source: ImageError::NotOneFunction(function.to_owned()),
             })
         };
-        let limits = Limits::of_tick();
+        let limits = Limits::of_tick(chip);
         let mut not_called = BTreeSet::new();
         for (function, _) in NOT_CALLED {
             not_called.insert(out_of_line(function)?);
@@ -160,7 +173,7 @@ impl Bound {
             let cycles = with_entry(&worst);
             Ok::<_, BoundError>(HandlerBound {
                 cycles,
-                microseconds: microseconds(cycles),
+                microseconds: chip.microseconds(cycles),
                 around_cycles: cycles - worst.cycles,
                 instructions: worst.instructions,
                 path: stretches(image, handler, &analysis.path_with_calls(&worst)),
@@ -168,19 +181,19 @@ impl Bound {
         };
         let without = |functions: &BTreeSet<u32>| {
             let all = not_called.union(functions).copied().collect();
-            Ok::<_, BoundError>(Analysis::new(image, &limits)?.without(&all))
+            Analysis::new(&program, &limits).without(&all)
         };
-        let mut analysis = without(&BTreeSet::new())?;
+        let mut analysis = without(&BTreeSet::new());
         let update = of_handler(UPDATE_INTERRUPT, &mut analysis)?;
         // A tick either starts the estimates, or continues them.
         let evaluates = out_of_line(EVALUATES)?;
-        let mut continuing = without(&BTreeSet::from([evaluates]))?;
+        let mut continuing = without(&BTreeSet::from([evaluates]));
         let continues = of_handler(CONTROL_INTERRUPT, &mut continuing)?;
         let mut not_called_at_start = BTreeSet::new();
         for (function, _) in STARTS {
             not_called_at_start.insert(out_of_line(function)?);
         }
-        let mut starting = without(&not_called_at_start)?;
+        let mut starting = without(&not_called_at_start);
         let starts = of_handler(CONTROL_INTERRUPT, &mut starting)?;
         let update_at_start = of_handler(UPDATE_INTERRUPT, &mut starting)?;
         let tick_cycles =
@@ -200,11 +213,11 @@ impl Bound {
         };
         let mut peripheral_accesses = accesses(&analysis);
         let (mut sensor_cycles, mut longest_sensor_cycles) = ([0; 2], 0);
-        for bus in SENSOR_BUSES {
-            let limits = Limits::of_sensor_bus(bus.timing, bus.clock_hz);
+        for (bus, bus_hz) in SENSOR_BUSES.into_iter().zip(chip.bus_hz) {
+            let limits = Limits::of_sensor_bus(chip, bus.timing, bus_hz);
             let takes = BTreeSet::from([out_of_line(bus.takes)?]);
-            let mut of_last_word = Analysis::new(image, &limits)?;
-            let mut of_word = Analysis::new(image, &limits)?.without(&takes);
+            let mut of_last_word = Analysis::new(&program, &limits);
+            let mut of_word = Analysis::new(&program, &limits).without(&takes);
             let last = with_entry(&worst_of(bus.handler, &mut of_last_word)?);
             let other = with_entry(&worst_of(bus.handler, &mut of_word)?);
             peripheral_accesses.append(&mut accesses(&of_last_word));
@@ -216,12 +229,14 @@ impl Bound {
         let [sensor_cycles, sensor_cycles_of_both] = sensor_cycles;
         let proves_hz = |sensor_cycles: u32| {
             let all = tick_cycles + sensor_cycles;
-            (CORE_HZ / f64::from(all)) as u32
+            (chip.core_hz / f64::from(all)) as u32
         };
         Ok(Self {
+            chip,
             sensor_cycles,
             sensor_cycles_of_both,
             longest_sensor_cycles,
+            sections: sections::of(image, &handlers)?,
             proves_hz: proves_hz(sensor_cycles),
             proves_hz_with_both: proves_hz(sensor_cycles_of_both),
             control,
@@ -238,6 +253,14 @@ impl Bound {
         })
     }
 
+    /// Returns the most cycles by which another interrupt or a section that masks the control interrupt delays it, with
+    /// its entry. One of them is executed when the timer asks for the control interrupt, which has precedence over the others.
+    pub fn release_cycles(&self) -> u32 {
+        let sections = self.sections.iter().map(|it| it.cycles);
+        let longest = sections.max().unwrap_or(0).max(self.longest_sensor_cycles);
+        longest + self.control.around_cycles
+    }
+
     /// Returns the report as text.
     pub fn text(&self) -> String {
         let mut text = String::new();
@@ -252,11 +275,12 @@ impl Bound {
                 "Bound of the {name}: {} cycles, {:.1} µs at {} MHz, with {} instructions on the worst path.\n",
                 handler.cycles,
                 handler.microseconds,
-                CORE_HZ / 1e6,
+                self.chip.core_hz / 1e6,
                 handler.instructions,
             );
         }
         let both = self.tick_cycles;
+        let microseconds = |cycles| self.chip.microseconds(cycles);
         let _ = write!(
             text,
             "Both in a tick: {both} cycles, {:.1} µs. After the longest control interrupt, which starts the estimates, the update \
@@ -265,8 +289,8 @@ impl Bound {
              {:.1} µs each at most.\n\
              Together they prove control rates up to {} Hz.\n\
              With one sensor on each channel: {} cycles, {:.1} µs in a tick, and up to {} Hz.\n\
-             Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss. Tasks of lower \
-             priority that mask the interrupts come on top.",
+             Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss.\n\n\
+             Sections of other tasks that mask the interrupts and may delay the control interrupt, the longest last:\n",
             microseconds(both),
             self.sensor_cycles_of_both,
             microseconds(self.sensor_cycles_of_both),
@@ -276,6 +300,9 @@ impl Bound {
             microseconds(self.sensor_cycles),
             self.proves_hz,
         );
+        for section in &self.sections {
+            let _ = writeln!(text, "{section}");
+        }
         text
     }
 }
@@ -296,10 +323,6 @@ impl HandlerBound {
         let around = self.around_cycles;
         let _ = writeln!(text, "{around:>7}  entry to and exit from the interrupt");
     }
-}
-
-fn microseconds(cycles: u32) -> f64 {
-    f64::from(cycles) / CORE_HZ * 1e6
 }
 
 fn stretches(image: &Image, handler: &str, path: &[Visit]) -> Vec<PathStretch> {

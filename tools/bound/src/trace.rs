@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 
 use crate::BoundError;
 use crate::cost::Walk;
-use crate::cycles::around;
 use crate::image::Image;
 use crate::instruction::{Decoder, Instruction};
+use crate::values::Values;
 use crate::worst::Loop;
 
 /// Cost of an executed interrupt.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Executed {
-    /// Cycles under the model, with a miss for every line, including entry and exit.
+    /// Cycles under the model, including entry and exit, without waits for loads from addresses that the instructions do not show.
     pub cycles: u32,
     /// Instructions.
     pub instructions: u32,
@@ -47,10 +47,11 @@ impl<'a> Tracer<'a> {
         for address in addresses {
             if !self.decoded.contains_key(address) {
                 let instruction = self.decoder.at(self.image, *address, false)?;
+                instruction.check()?;
                 self.decoded.insert(*address, instruction);
             }
         }
-        let mut walk = Walk::default();
+        let mut walk = Walk::from(self.image.chip, Values::new());
         for (place, address) in addresses.iter().enumerate() {
             let instruction = &self.decoded[address];
             let next = addresses.get(place + 1).map(|next| &self.decoded[next]);
@@ -63,7 +64,7 @@ impl<'a> Tracer<'a> {
         }
         let handler = addresses.first().copied().unwrap_or_default();
         Ok(Executed {
-            cycles: walk.cycles() + around(handler, true),
+            cycles: walk.cycles() + self.image.chip.around(handler, true),
             instructions: addresses.len() as u32,
         })
     }

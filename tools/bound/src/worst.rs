@@ -13,11 +13,13 @@ use microlp::{
 };
 
 use crate::BoundError;
+use crate::connected::strongly_connected;
 use crate::cost;
 use crate::graph::Graph;
-use crate::image::{Frame, Image};
-use crate::instruction::{Decoder, SECOND_ARGUMENT};
+use crate::image::Frame;
+use crate::instruction::{ARGUMENTS, Instruction};
 use crate::loops::{CLEARED_BYTES, CLEARS, Limit, Limits};
+use crate::values::{Program, Value, Values, after};
 
 /// Smaller counts are rounding errors of the linear programme.
 const LEAST_FLOW: f64 = 1e-6;
@@ -77,26 +79,21 @@ impl Loop {
 
 /// Finds the worst case of functions, once each.
 pub struct Analysis<'a> {
-    image: &'a Image,
-    decoder: Decoder,
+    program: &'a Program<'a>,
     limits: &'a Limits,
     known: BTreeMap<u32, Option<Worst>>,
     not_called: BTreeSet<u32>,
 }
 
 impl<'a> Analysis<'a> {
-    /// Creates an analysis of an image.
-    ///
-    /// # Errors
-    /// [`BoundError::Decoder`].
-    pub fn new(image: &'a Image, limits: &'a Limits) -> Result<Self, BoundError> {
-        Ok(Self {
-            image,
-            decoder: Decoder::new()?,
+    /// Creates an analysis of a program.
+    pub fn new(program: &'a Program<'a>, limits: &'a Limits) -> Self {
+        Self {
+            program,
             limits,
             known: BTreeMap::new(),
             not_called: BTreeSet::new(),
-        })
+        }
     }
 
     /// Excludes paths that call one of these functions.
@@ -132,7 +129,7 @@ impl<'a> Analysis<'a> {
         all
     }
 
-    /// Returns the worst case of the function at `entry`; `None` if it never returns.
+    /// Returns the worst case of the program's function at `entry`; `None` if it never returns.
     ///
     /// # Errors
     /// [`BoundError`] for code that cannot be bounded.
@@ -145,12 +142,28 @@ impl<'a> Analysis<'a> {
             Some(worst) => return Ok(worst.clone()),
             None => self.known.insert(entry, None),
         };
-        let graph = Graph::of(self.image, &self.decoder, entry)?;
+        let program = self.program;
+        let function = program.function(entry);
+        let (graph, values) = function.ok_or(BoundError::NotFollowed { address: entry })?;
+        let worst = self.of_graph(graph, values)?;
+        self.known.insert(entry, worst.clone());
+        Ok(worst)
+    }
+
+    /// Returns the worst case of a part of a function; `None` if no path ends there.
+    ///
+    /// # Errors
+    /// [`BoundError`] for code that cannot be bounded.
+    pub fn of_graph(
+        &mut self,
+        graph: &Graph,
+        values: &BTreeMap<u32, Values>,
+    ) -> Result<Option<Worst>, BoundError> {
         let mut calls = BTreeMap::new();
         let mut uses_float = graph.uses_float();
         for block in graph.blocks.values() {
             if let Some(callee) = block.call {
-                if callee == entry {
+                if callee == graph.entry {
                     return Err(BoundError::Recursion { address: callee });
                 }
                 let worst = self.of(callee)?;
@@ -161,31 +174,32 @@ impl<'a> Analysis<'a> {
                 );
             }
         }
-        let worst = self.solve(&graph, &calls)?.map(|worst| Worst {
+        let worst = self.solve(graph, values, &calls)?;
+        Ok(worst.map(|worst| Worst {
             uses_float,
             ..worst
-        });
-        self.known.insert(entry, worst.clone());
-        Ok(worst)
+        }))
     }
 
     fn solve(
         &self,
         graph: &Graph,
+        values: &BTreeMap<u32, Values>,
         calls: &BTreeMap<u32, Option<(u32, u32)>>,
     ) -> Result<Option<Worst>, BoundError> {
-        let constants = cost::constants(graph);
+        let (image, chip) = (self.program.image, self.program.image.chip);
         let loops = self.loops(graph)?;
         let mut costs: BTreeMap<u32, u32> = BTreeMap::new();
-        let mut ends_at = BTreeMap::new();
         let mut peripheral_accesses = Vec::new();
         for (address, block) in &graph.blocks {
-            let known = constants.get(address).cloned().unwrap_or_default();
+            block.instructions.iter().try_for_each(Instruction::check)?;
+            let known = values.get(address).cloned().unwrap_or_default();
             if let Some(callee) = block.call
-                && self.image.name(callee).contains(CLEARS)
+                && image.name(callee).contains(CLEARS)
             {
-                let bytes = cost::constant_after(block, &known, SECOND_ARGUMENT);
-                if bytes.is_none_or(|bytes| bytes > CLEARED_BYTES) {
+                let arguments = after(block, chip, &known);
+                let few = |bytes: &Value| matches!(bytes, Value::Constant(..=CLEARED_BYTES));
+                if !arguments.get(&ARGUMENTS[1]).is_some_and(few) {
                     return Err(BoundError::ClearsTooMuch { address: *address });
                 }
             }
@@ -193,19 +207,17 @@ impl<'a> Analysis<'a> {
             let call = call.map_or(0, |(cycles, _)| {
                 // Call and return.
                 let callee = block.call.unwrap_or(*address);
-                cycles + cost::branch(callee) + cost::branch(*address)
+                cycles + chip.branch(callee) + chip.branch(*address)
             });
-            let own = cost::of_block(block, &known);
-            peripheral_accesses.extend(cost::peripheral_accesses(block, &known));
-            costs.insert(*address, own.cycles + call);
-            ends_at.insert(*address, own);
+            peripheral_accesses.extend(cost::peripheral_accesses(block, chip, &known));
+            costs.insert(*address, cost::of_block(block, chip, &known) + call);
         }
         // A wait for hardware costs its time plus two iterations, however often it iterates.
         let mut entered: BTreeMap<u32, u32> = BTreeMap::new();
         for one in &loops {
             if let Limit::Cycles(cycles) = one.limit {
                 let round: u32 = one.blocks.iter().map(|block| costs[block]).sum();
-                let edges = one.blocks.len() as u32 * cost::branch(one.header);
+                let edges = one.blocks.len() as u32 * chip.branch(one.header);
                 entered.insert(one.header, cycles + 2 * (round + edges));
                 for block in &one.blocks {
                     costs.insert(*block, 0);
@@ -244,7 +256,7 @@ impl<'a> Analysis<'a> {
                 if !(waits.contains(from) && waits.contains(to)) {
                     // The cost of the call includes the way into the function and back.
                     let taken = *taken && block.call.is_none();
-                    cycles += cost::of_edge(block, &ends_at[from], &graph.blocks[to], taken);
+                    cycles += cost::of_edge(chip, block, &graph.blocks[to], taken);
                 }
                 if !inside {
                     cycles += entered.get(to).copied().unwrap_or(0);
@@ -348,6 +360,7 @@ impl<'a> Analysis<'a> {
     /// Returns the loops of a function with their limits, one for each header of a strongly
     /// connected component.
     fn loops(&self, graph: &Graph) -> Result<Vec<Loop>, BoundError> {
+        let image = self.program.image;
         let mut loops = Vec::new();
         let mut parts = vec![graph.blocks.keys().copied().collect::<BTreeSet<u32>>()];
         while let Some(part) = parts.pop() {
@@ -370,9 +383,9 @@ impl<'a> Analysis<'a> {
                 };
                 let limit = self
                     .limits
-                    .of(self.image, graph, header, &connected)
+                    .of(image, graph, header, &connected)
                     .ok_or_else(|| {
-                        let frames = self.image.frames(header);
+                        let frames = image.frames(header);
                         let ours = |frame: &&Frame| frame.function.contains("painleve");
                         let innermost = frames.first().filter(|frame| !ours(frame));
                         let places: Vec<String> = innermost
@@ -428,54 +441,6 @@ fn in_order(
     }
     left.reverse();
     left
-}
-
-/// Returns the strongly connected components within `part` that have more than one block, or one
-/// that follows itself.
-fn strongly_connected(graph: &Graph, part: &BTreeSet<u32>) -> Vec<BTreeSet<u32>> {
-    let successors = |from: u32| {
-        let block = graph.blocks.get(&from);
-        let all = block.into_iter().flat_map(|block| &block.successors);
-        all.map(|(to, _)| *to).filter(|to| part.contains(to))
-    };
-    // Kosaraju's algorithm: the finishing order of one search, then searches along reversed edges.
-    let (mut seen, mut order) = (BTreeSet::new(), Vec::new());
-    for root in part {
-        let mut stack = vec![(*root, false)];
-        while let Some((at, done)) = stack.pop() {
-            if done {
-                order.push(at);
-            } else if seen.insert(at) {
-                stack.push((at, true));
-                stack.extend(successors(at).map(|to| (to, false)));
-            }
-        }
-    }
-    let mut before: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for from in part {
-        for to in successors(*from) {
-            before.entry(to).or_default().push(*from);
-        }
-    }
-    let (mut taken, mut found) = (BTreeSet::new(), Vec::new());
-    for root in order.into_iter().rev() {
-        let mut connected = BTreeSet::new();
-        let mut stack = vec![root];
-        while let Some(at) = stack.pop() {
-            if taken.insert(at) {
-                connected.insert(at);
-                stack.extend(before.get(&at).into_iter().flatten());
-            }
-        }
-        let again = connected.len() > 1
-            || connected
-                .iter()
-                .any(|at| successors(*at).any(|to| to == *at));
-        if again && !connected.is_empty() {
-            found.push(connected);
-        }
-    }
-    found
 }
 
 #[cfg(test)]

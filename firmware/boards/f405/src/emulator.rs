@@ -72,8 +72,6 @@ pub struct Link {
     requests: RawFd,
     responses: RawFd,
     log: RawFd,
-    /// Index of the next byte of the log.
-    logged: u32,
 }
 
 /// No descriptor.
@@ -92,17 +90,17 @@ impl Link {
             requests: open(c"/dev/fd/100", OpenMode::RDONLY_BINARY),
             responses: open(c"/dev/fd/101", OpenMode::WRONLY_TRUNC_BINARY),
             log: open(c":tt", OpenMode::WRONLY_TRUNC),
-            logged: 0,
         }
     }
 
     /// Writes what has been logged, as a debugger would read it.
-    fn pass_log_on(&mut self) {
+    fn pass_log_on(&self) {
         // SAFETY: defmt-rtt's, with the layout that SEGGER's RTT prescribes.
         let channel = unsafe { &LOG };
         let written = channel.written.load(Ordering::Acquire);
-        while self.logged != written {
-            let end = if self.logged < written {
+        let mut read = channel.read.load(Ordering::Relaxed);
+        while read != written {
+            let end = if read < written {
                 written
             } else {
                 channel.size
@@ -110,13 +108,11 @@ impl Link {
             // SAFETY: `written` is below the size of the buffer, and the bytes before it stay for a whole round.
             let bytes = unsafe {
                 let start = channel.buffer as *const u8;
-                core::slice::from_raw_parts(
-                    start.add(self.logged as usize),
-                    (end - self.logged) as usize,
-                )
+                core::slice::from_raw_parts(start.add(read as usize), (end - read) as usize)
             };
             write(self.log, bytes);
-            self.logged = if end == channel.size { 0 } else { end };
+            read = if end == channel.size { 0 } else { end };
+            channel.read.store(read, Ordering::Release);
         }
     }
 }

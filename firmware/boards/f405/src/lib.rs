@@ -157,7 +157,7 @@ impl Board for F405 {
     type Drive = ArmDrive<F405Pins>;
     type Bytes = DmaBytes<UartDma>;
     type Port = Link;
-    type Memory = FlashMemory<ConfigurationFlash<flash::Registers>>;
+    type Flash = ConfigurationFlash<flash::Registers>;
 
     const NAME: &'static str = "STM32F405";
 

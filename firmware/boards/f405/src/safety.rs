@@ -183,6 +183,7 @@ pub struct Window(pub pac::WWDG);
 
 impl WindowWatchdog for Window {
     const LARGEST_PRESCALER: u8 = 3;
+    const LATEST_FEED_S: f32 = 10e-6;
 
     fn set_prescaler(&self, prescaler: u8) {
         // SAFETY: prescalers have two bits; a window of 0x7f disables the window.

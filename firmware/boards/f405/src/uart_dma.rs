@@ -14,9 +14,6 @@ const RECEIVER: usize = 2;
 const TRANSMITTER: usize = 7;
 const CHANNEL: u8 = 4;
 
-/// The flag's bit in the status register.
-const TRANSMISSION_COMPLETE: u16 = 1 << 6;
-
 /// Without DMA, the number of bytes to the end of the receiver's buffer; 0 with DMA, which counts them itself.
 static WITHOUT_DMA: AtomicUsize = AtomicUsize::new(0);
 
@@ -127,10 +124,7 @@ impl DmaRegisters for UartDma {
             stream.m0ar().write(|w| w.bits(bytes.as_ptr() as u32));
             stream.ndtr().write(|w| w.bits(bytes.len() as u32));
         }
-        // SAFETY: writing zero clears a flag, writing one leaves it unchanged.
-        self.usart
-            .sr()
-            .write(|w| unsafe { w.bits(!TRANSMISSION_COMPLETE) });
+        self.usart.sr().write(|w| w.tc().clear_bit());
         stream.cr().write(|w| {
             // SAFETY: channels have three bits.
             unsafe { w.chsel().bits(CHANNEL) };

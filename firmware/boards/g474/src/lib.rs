@@ -141,7 +141,7 @@ impl Board for G474 {
     type Drive = ArmDrive<G474Pins>;
     type Bytes = DmaBytes<Usart2Dma>;
     type Port = DmaPort<Usart2Dma>;
-    type Memory = FlashMemory<ConfigurationFlash<flash::Registers>>;
+    type Flash = ConfigurationFlash<flash::Registers>;
 
     const NAME: &'static str = "NUCLEO-G474RE";
 

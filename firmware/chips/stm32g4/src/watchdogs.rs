@@ -36,6 +36,7 @@ pub struct Window(pub pac::WWDG);
 
 impl WindowWatchdog for Window {
     const LARGEST_PRESCALER: u8 = 7;
+    const LATEST_FEED_S: f32 = 15e-6;
 
     fn set_prescaler(&self, prescaler: u8) {
         // SAFETY: prescalers have three bits; a window of 0x7f disables the window.

@@ -6,11 +6,15 @@ use super::Chip;
 use super::systick::SysTick;
 use super::trace::Trace;
 use crate::Picoseconds;
+use crate::registers::Registers;
 use crate::system_control::{Exception, SystemControl};
 use crate::unicorn::{Processor, Register, Surroundings};
 
 /// Addresses of the SysTick timer.
 const SYSTICK: std::ops::Range<u32> = 0xe000_e010..0xe000_e020;
+
+/// Addresses of the chip's peripherals, and of its debug unit.
+const PERIPHERALS: [std::ops::Range<u32>; 2] = [0x4000_0000..0x6000_0000, 0xe004_0000..0xe010_0000];
 
 /// Why [`Core::before_instruction`] stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +31,7 @@ pub(super) enum Stop {
 #[derive(Clone)]
 pub(super) struct Core<C> {
     pub(super) chip: C,
+    pub(super) registers: Arc<Registers>,
     pub(super) system: SystemControl,
     pub(super) flash: Arc<[u8]>,
     /// The program that the image copies to the RAM at address 0.
@@ -72,6 +77,13 @@ impl<C: Chip> Core<C> {
         self.chip.advance(self.now, memory);
         self.systick.advance(self.chip.core_hz(), self.now);
         self.refresh();
+    }
+
+    /// Checks that the chip has what is loaded or, with a value, stored.
+    fn check(&self, address: u32, size: u32, stored: Option<u32>) {
+        if PERIPHERALS.iter().any(|it| it.contains(&address)) {
+            self.registers.check(address, size, stored);
+        }
     }
 
     fn exception(&self, processor: &Processor) -> Option<Exception> {
@@ -159,6 +171,7 @@ impl<C: Chip> Surroundings for Core<C> {
         } else if (0xe000_0000..0xe004_0000).contains(&address) {
             self.system.read(address, self.cycles)
         } else {
+            self.check(address, size, None);
             self.chip.read(address, size, self.now)
         }
     }
@@ -175,6 +188,7 @@ impl<C: Chip> Surroundings for Core<C> {
             self.system.write(address, size, value, self.cycles);
             self.is_reprotected |= address == 0xe000_ed94;
         } else {
+            self.check(address, size, Some(value));
             self.chip.write(address, size, value, self.now);
         }
     }

@@ -2,7 +2,6 @@
 
 use super::{Chip, Machine};
 use crate::Picoseconds;
-use crate::system_control::{Exception, HARD_FAULT};
 use crate::unicorn::Register;
 
 impl<C: Chip> Machine<C> {
@@ -51,24 +50,24 @@ impl<C: Chip> Machine<C> {
         places.len()
     }
 
-    /// Raises a hard fault, as an invalid instruction would.
-    pub fn hard_fault(&mut self) {
-        self.hard_faults += 1;
-        let address = self.program_counter();
-        self.enter(HARD_FAULT, address);
+    /// Executes an instruction that is undefined; returns its address.
+    pub fn execute_undefined(&mut self) -> u32 {
+        self.execute(64, &[0xde00])
     }
 
-    /// Raises an exception regardless of the interrupt controller, as a disturbance would.
-    pub fn raise(&mut self, exception: Exception) {
-        let address = self.program_counter();
-        self.enter(exception, address);
+    /// Enables an interrupt that no peripheral in use raises, and raises it.
+    pub fn raise_unexpected(&mut self) {
+        // ldr r1, [pc, #12]; ldr r2, [pc, #16]; movs r0, #1; lsls r0, #8; str r0, [r1]; str r0, [r2]; b .
+        // Interrupt 40 in the second registers of the interrupt controller that enable and that raise.
+        let registers = [0xe104, 0xe000, 0xe204, 0xe000];
+        let code = [0x4903, 0x4a04, 0x2001, 0x0200, 0x6008, 0x6010, 0xe7fe, 0];
+        self.execute(96, &[&code[..], &registers].concat());
     }
 
     /// Puts the program into an endless loop without interrupts.
     pub fn hang(&mut self) {
-        self.unicorn.set(Register::PRIMASK, 1);
-        // A branch to itself.
-        self.execute(16, &[0xe7fe]);
+        // cpsid i; b .
+        self.execute(16, &[0xb672, 0xe7fe]);
     }
 
     /// Calls a function that stores registers on the stack and calls itself.
@@ -84,8 +83,8 @@ impl<C: Chip> Machine<C> {
     }
 
     /// Executes instructions, in memory of the program that the image leaves unused: `before_end` bytes before its
-    /// end, a place of their own, because Unicorn keeps what it has translated.
-    fn execute(&mut self, before_end: u32, instructions: &[u16]) {
+    /// end, a place of their own, because Unicorn keeps what it has translated. Returns the place.
+    fn execute(&mut self, before_end: u32, instructions: &[u16]) -> u32 {
         let end = if C::ALIASED_RAM > 0 {
             C::ALIASED_RAM as u32
         } else {
@@ -98,6 +97,7 @@ impl<C: Chip> Machine<C> {
             .collect();
         self.unicorn.processor().write_memory(place, &bytes);
         self.jump(place);
+        place
     }
 
     /// Continues at an address.

@@ -21,6 +21,7 @@ use self::systick::SysTick;
 use self::trace::Trace;
 use crate::Picoseconds;
 use crate::protection::EVERYTHING;
+use crate::registers::Registers;
 use crate::system_control::SystemControl;
 use crate::unicorn::{Processor, Register, Unicorn};
 
@@ -38,6 +39,8 @@ pub trait Chip: Clone {
     const RAM: (u32, usize);
     /// Bytes of the RAM that can be mapped to address 0, where the flash is otherwise.
     const ALIASED_RAM: usize;
+    /// Table of the [registers](crate::registers) of its peripherals.
+    const REGISTERS: &'static str;
 
     /// Resets the peripherals for the given cause.
     fn reset(&mut self, reset: Reset, now: Picoseconds);
@@ -121,6 +124,7 @@ impl<C: Chip> Machine<C> {
         } = Program::read::<C>(image);
         let core = Core {
             chip,
+            registers: Registers::parse(C::REGISTERS).into(),
             system: SystemControl::new(),
             flash: flash.as_slice().into(),
             program: program.into(),

@@ -352,6 +352,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
     const SLOTS: (u32, usize) = (0x080c_0000, 2 * SECTOR);
     const RAM: (u32, usize) = (0x2000_0000, 128 << 10);
     const ALIASED_RAM: usize = 112 << 10;
+    const REGISTERS: &'static str = include_str!("../registers/stm32f405.txt");
 
     fn reset(&mut self, reset: Reset, now: Picoseconds) {
         assert!(

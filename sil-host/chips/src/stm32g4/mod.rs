@@ -227,6 +227,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
     const SLOTS: (u32, usize) = (0x0807_f000, SLOTS);
     const RAM: (u32, usize) = (0x2000_0000, 96 << 10);
     const ALIASED_RAM: usize = 0;
+    const REGISTERS: &'static str = include_str!("../registers/stm32g474.txt");
 
     fn reset(&mut self, reset: Reset, now: Picoseconds) {
         for (number, port) in self.ports.iter_mut().enumerate() {

@@ -9,5 +9,6 @@ mod drive;
 mod hazards;
 mod open_loop;
 mod random_faults;
+mod release;
 mod stored;
 mod tables;

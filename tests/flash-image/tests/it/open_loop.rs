@@ -3,12 +3,21 @@
 
 #![allow(clippy::unwrap_used)]
 
-use painleve_flash_image::bench::{BoardBench, encoded, scenario, with_one_sensor};
-use painleve_flash_image::board::FlashedBoard;
+use painleve_flash_image::bench::{Bench, encoded, scenario, with_one_sensor};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::message::{FrameSource, Request, Response};
 use painleve_shared::status::Fault;
+
+crate::on_each_board! {
+    torques_from_the_host_are_limited_by_the_board,
+    a_torque_that_is_not_repeated_expires,
+    without_permission_or_switch_there_is_no_torque,
+    torques_from_the_host_do_nothing_to_a_law,
+    a_joint_that_moves_far_takes_the_torque_off,
+    switch_sensors_stages_and_host_take_the_torque_off_as_with_a_law,
+}
 
 /// 1 N·m of 5 N·m in 12 bits.
 const LIMIT_COUNTS: i32 = 410;
@@ -21,8 +30,8 @@ fn limited() -> Scenario {
 }
 
 /// A board that is configured for commissioning, with the arm held in the air.
-fn configured() -> BoardBench {
-    let mut bench = BoardBench::without_configuration(&limited(), FlashedBoard::booted());
+fn configured<C: BoardChip>() -> Bench<C> {
+    let mut bench = Bench::<C>::without_configuration(&limited(), EmulatedBoard::booted());
     bench.host_is_there = true;
     bench.hold([-40.0, -60.0]);
     let response = bench
@@ -35,15 +44,15 @@ fn configured() -> BoardBench {
     bench
 }
 
-fn request(bench: &mut BoardBench, torques: [i32; 2]) {
+fn request<C: BoardChip>(bench: &mut Bench<C>, torques: [i32; 2]) {
     bench
         .board
         .send(&Request::Torque(torques.map(TorqueCounts)));
 }
 
 /// A board whose stages are on at zero torque.
-fn armed() -> BoardBench {
-    let mut bench = configured();
+fn armed<C: BoardChip>() -> Bench<C> {
+    let mut bench = configured::<C>();
     assert!(bench.board.permit_arming());
     for _ in 0..120 {
         bench.tick();
@@ -54,8 +63,8 @@ fn armed() -> BoardBench {
 }
 
 /// A board that puts out a torque.
-fn driven() -> BoardBench {
-    let mut bench = armed();
+fn driven<C: BoardChip>() -> Bench<C> {
+    let mut bench = armed::<C>();
     request(&mut bench, [300, -200]);
     bench.tick();
     bench.tick();
@@ -64,7 +73,7 @@ fn driven() -> BoardBench {
 }
 
 /// Returns the fault latched in the newest answer.
-fn latched_fault(bench: &mut BoardBench) -> Option<Fault> {
+fn latched_fault<C: BoardChip>(bench: &mut Bench<C>) -> Option<Fault> {
     let mut fault = None;
     for _ in 0..5 {
         bench.tick();
@@ -77,9 +86,8 @@ fn latched_fault(bench: &mut BoardBench) -> Option<Fault> {
     fault
 }
 
-#[test]
-fn torques_from_the_host_are_limited_by_the_board() {
-    let mut bench = armed();
+fn torques_from_the_host_are_limited_by_the_board<C: BoardChip>() {
+    let mut bench = armed::<C>();
     for torques in [[2000, -2000], [i32::MAX, i32::MIN], [411, -411]] {
         request(&mut bench, torques);
         bench.tick();
@@ -88,9 +96,8 @@ fn torques_from_the_host_are_limited_by_the_board() {
     }
 }
 
-#[test]
-fn a_torque_that_is_not_repeated_expires() {
-    let mut bench = driven();
+fn a_torque_that_is_not_repeated_expires<C: BoardChip>() {
+    let mut bench = driven::<C>();
     let is_still_there = (0..45).all(|_| {
         bench.tick();
         bench.board.torque().counts == [300, -200]
@@ -102,10 +109,9 @@ fn a_torque_that_is_not_repeated_expires() {
     assert_eq!(bench.board.torque().counts, [0; 2]);
 }
 
-#[test]
-fn without_permission_or_switch_there_is_no_torque() {
+fn without_permission_or_switch_there_is_no_torque<C: BoardChip>() {
     for (permitted, closed) in [(false, true), (true, false)] {
-        let mut bench = configured();
+        let mut bench = configured::<C>();
         bench.closes_switch = closed;
         if permitted {
             assert!(bench.board.permit_arming());
@@ -119,11 +125,10 @@ fn without_permission_or_switch_there_is_no_torque() {
     }
 }
 
-#[test]
-fn torques_from_the_host_do_nothing_to_a_law() {
-    let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));
+fn torques_from_the_host_do_nothing_to_a_law<C: BoardChip>() {
+    let mut bench = Bench::<C>::new(&scenario("hybrid-elbow-down"));
     bench.drive();
-    let mut undisturbed = BoardBench::new(&scenario("hybrid-elbow-down"));
+    let mut undisturbed = Bench::<C>::new(&scenario("hybrid-elbow-down"));
     undisturbed.drive();
     for _ in 0..50 {
         request(&mut bench, [2000, 2000]);
@@ -134,10 +139,9 @@ fn torques_from_the_host_do_nothing_to_a_law() {
 }
 
 /// Either encoder, in either direction: nothing is known about the signs yet.
-#[test]
-fn a_joint_that_moves_far_takes_the_torque_off() {
+fn a_joint_that_moves_far_takes_the_torque_off<C: BoardChip>() {
     for (joint, turn) in [(0, 600), (0, -600_i16), (1, 600), (1, -600)] {
-        let mut bench = driven();
+        let mut bench = driven::<C>();
         bench.encoder_offset[joint] = turn.cast_unsigned();
         bench.present();
         // One tick to read the encoder, then two.
@@ -152,26 +156,25 @@ fn a_joint_that_moves_far_takes_the_torque_off() {
     }
 }
 
-#[test]
-fn switch_sensors_stages_and_host_take_the_torque_off_as_with_a_law() {
-    let mut bench = driven();
+fn switch_sensors_stages_and_host_take_the_torque_off_as_with_a_law<C: BoardChip>() {
+    let mut bench = driven::<C>();
     bench.board.enable(false);
     assert!(bench.time_until_off().is_some());
 
-    let mut bench = driven();
+    let mut bench = driven::<C>();
     bench.board.wiring().encoders[0].dead = Some(true);
     bench.tick();
     assert!(bench.time_until_off().is_some());
 
-    let mut bench = driven();
+    let mut bench = driven::<C>();
     bench.drive_pin(painleve_flash_image::board::STAGES_READY, Some(false));
     assert!(bench.time_until_off().is_some());
 
-    let mut bench = driven();
-    bench.board.machine.hard_fault();
+    let mut bench = driven::<C>();
+    bench.board.machine.execute_undefined();
     assert!(bench.time_until_off().is_some());
 
-    let mut bench = driven();
+    let mut bench = driven::<C>();
     bench.host_is_there = false;
     for _ in 0..210 {
         bench.tick();

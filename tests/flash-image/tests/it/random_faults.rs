@@ -101,7 +101,7 @@ impl InjectedFault {
                 board.machine.run_for(1_100_000_000);
                 board.enable(true);
             }
-            Self::BadInstruction => board.machine.hard_fault(),
+            Self::BadInstruction => drop(board.machine.execute_undefined()),
             Self::StackOverflow => board.machine.recurse(),
             Self::Hang => board.machine.hang(),
             Self::ControlTimer => board.machine.chip_mut().stop_control_timer(),

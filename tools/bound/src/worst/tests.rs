@@ -1,7 +1,9 @@
 //! Worst cases of code short enough to count by hand.
 
 use super::*;
-use crate::cycles::{FLASH_WAIT_STATES, PIPELINE_REFILL};
+use crate::cycles::{G474, PIPELINE_REFILL};
+use crate::image::Image;
+use crate::instruction::KEPT_BY_CALLS;
 use crate::loops::Declared;
 
 const AT: u32 = 0x0800_1000;
@@ -33,7 +35,11 @@ fn worst_without(
         because: "",
     });
     let limits = Limits(declared.collect());
-    Analysis::new(&image, &limits)?.without(left_out).of(at)
+    // r1 to r5 point to variables.
+    let known = ARGUMENTS[1..].iter().chain(&KEPT_BY_CALLS[..2]);
+    let known = known.map(|it| (*it, Value::Data)).collect();
+    let program = Program::of(&image, BTreeMap::from([(at, known)]), &BTreeSet::new())?;
+    Analysis::new(&program, &limits).without(left_out).of(at)
 }
 
 /// movs r0, #3; again: subs r0, #1; bne again; bx lr
@@ -47,10 +53,10 @@ fn a_loop_costs_its_iterations() {
         assert_eq!(worst.instructions, 2 + 2 * times);
         worst.cycles
     };
-    // Subtract, branch, refill, read of the line.
+    // Subtract, branch, refill, the end of a read of the flash, that of the line.
     assert_eq!(
         cycles(3) - cycles(2),
-        1 + 1 + PIPELINE_REFILL + FLASH_WAIT_STATES
+        1 + 1 + PIPELINE_REFILL + G474.fetch_wait(AT)
     );
     assert_eq!(cycles(1), 4);
 }
@@ -77,7 +83,7 @@ fn code_in_ram_waits_for_no_line() {
     let count_down = |at| worst_at(at, &COUNT_DOWN, &limits).unwrap().unwrap().cycles;
     assert_eq!(
         count_down(AT) - count_down(AT_IN_RAM),
-        2 * FLASH_WAIT_STATES
+        2 * G474.fetch_wait(AT)
     );
 }
 
@@ -98,7 +104,7 @@ fn a_loop_without_a_limit_is_refused_by_name() {
 fn the_more_expensive_path_is_taken() {
     // cmp r0, #0; beq end; vdiv.f32 s0, s0, s1; end: bx lr
     let code = [0x2800, 0xd001, 0xee80, 0x0a20, 0x4770];
-    let worst = worst(&code, &[]).unwrap().unwrap();
+    let worst = worst_at(AT_IN_RAM, &code, &[]).unwrap().unwrap();
     // At the end of a block, the next instruction is assumed to use the quotient.
     assert_eq!(worst.cycles, 1 + 1 + 15 + 1);
     assert_eq!(worst.path.len(), 3);
@@ -127,7 +133,7 @@ fn immediately_used_results_and_peripheral_accesses_cost_waits() {
     };
     let peripheral = load(0x4001).unwrap().unwrap().cycles;
     let memory = load(0x2000).unwrap().unwrap().cycles;
-    assert_eq!(peripheral, memory + crate::cycles::PERIPHERAL_WAIT);
+    assert_eq!(peripheral, memory + G474.peripheral_wait);
 }
 
 /// The cycles of code in RAM without those of its return.
@@ -157,13 +163,38 @@ fn loads_and_stores_overlap_as_in_the_manual() {
 
 #[test]
 fn loads_and_stores_do_not_overlap_where_the_manual_excludes_it() {
-    // ldr r0, [r1]; ldr r1, [r0]: the address is loaded
-    assert_eq!(cycles_in_ram(&[0x6808, 0x6801]), 4);
+    // ldr r0, [r1]; ldr r1, [r0]: the address is loaded, and may be one of the program
+    assert_eq!(cycles_in_ram(&[0x6808, 0x6801]), 4 + 2);
     // str r0, [r1, r2]; ldr r0, [r3]: nothing overlaps with a store to the sum of two registers
     assert_eq!(cycles_in_ram(&[0x5088, 0x6818]), 4);
     // nop; str.w r0, [r1]; ldr r0, [r1], #4; ldr r2, [r3]: an odd half-word; an updated base
     assert_eq!(cycles_in_ram(&[0xbf00, 0xf8c1, 0x0000]), 3);
     assert_eq!(cycles_in_ram(&[0xf851, 0x0b04, 0x681a]), 4);
+}
+
+/// Also if it is computed, or passed to a function.
+#[test]
+fn a_load_is_one_from_the_program_unless_its_address_is_known() {
+    // ldr r0, [r1]; ldr r0, [r6]
+    let [data, unknown] = [0x6808, 0x6830].map(|load| cycles_in_ram(&[load]));
+    assert_eq!(unknown, data + 2);
+    // add r6, r1, r0; ldr r0, [r6], then add r6, r0, r0 and ldr r0, [r1]; ldr r1, [r1]; ldr r0, [r1]
+    assert_eq!(cycles_in_ram(&[0x180e, 0x6830]), 1 + data + 1);
+    assert_eq!(cycles_in_ram(&[0x1806, 0x6830]), 1 + unknown + 1);
+    assert_eq!(cycles_in_ram(&[0x6809, 0x6808]), 2 + unknown);
+    // mov r0, r1 (then r6); bl callee; bx lr; callee: ldr r0, [r0]; bx lr
+    let called = |copy: u16| cycles_in_ram(&[copy, 0xf000, 0xf801, 0x4770, 0x6800]);
+    assert_eq!(called(0x4630), called(0x4608) + 2);
+}
+
+/// Flash: each line of four short instructions is waited for.
+#[test]
+fn every_line_of_the_flash_is_waited_for() {
+    let code = |length| [vec![0x2003; length], vec![0x4770]].concat();
+    let cycles = |length| worst(&code(length), &[]).unwrap().unwrap().cycles;
+    assert_eq!(cycles(3), 4);
+    assert_eq!(cycles(4), 5 + G474.flash_wait_states);
+    assert_eq!(cycles(8), 9 + 2 * G474.flash_wait_states);
 }
 
 #[test]

@@ -12,15 +12,16 @@ use painleve_bound::report::{
     Bound, CONTROL_INTERRUPT, HandlerBound, SENSOR_INTERRUPTS, UPDATE_INTERRUPT,
 };
 use painleve_bound::trace::{Executed, Tracer, rounds};
-use painleve_flash_image::bench::{BoardBench, encoded, scenario};
-use painleve_flash_image::board::{self, FlashedBoard};
+use painleve_flash_image::bench::{Bench, BoardBench, encoded, scenario};
+use painleve_flash_image::board::{self, BoardChip, EmulatedBoard, F405, FlashedBoard, G474};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
-use painleve_shared::frame::{DigitalInputs, SensorFrame};
+use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Response};
 
-mod random;
+pub mod random;
+mod with_sensors;
 
 use random::{Random, mutated, with_random_settings};
 
@@ -110,7 +111,7 @@ impl<'a> BoundCheck<'a> {
     }
 
     /// Returns the most cycles of the ticks executed since the last call.
-    fn look(&mut self, board: &mut FlashedBoard) -> Found {
+    fn look<C: BoardChip>(&mut self, board: &mut EmulatedBoard<C>) -> Found {
         let mut found = Found::default();
         for addresses in board.machine.take_traces() {
             let mut executed = addresses.iter();
@@ -174,13 +175,14 @@ impl<'a> BoundCheck<'a> {
     }
 }
 
-fn flashed() -> Image {
-    let path = board::image("painleve-f405");
+/// Returns the image of a board.
+pub fn flashed<C: BoardChip>() -> Image {
+    let path = board::image(C::IMAGE);
     Image::of(&path, &std::fs::read(&path).unwrap()).unwrap()
 }
 
-fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
-    let image = flashed();
+fn with_bound<C: BoardChip>(run: impl FnOnce(&mut BoundCheck<'_>)) {
+    let image = flashed::<C>();
     let bound = Bound::of(&image).unwrap_or_else(|error| panic!("{error}"));
     let mut watch = BoundCheck::new(&image, &bound);
     run(&mut watch);
@@ -199,7 +201,7 @@ fn with_bound(run: impl FnOnce(&mut BoundCheck<'_>)) {
 }
 
 /// Starts recording the control interrupt and the update.
-fn trace_ticks(board: &mut FlashedBoard) {
+fn trace_ticks<C: BoardChip>(board: &mut EmulatedBoard<C>) {
     let handler = |name| board.machine.symbol(name).unwrap();
     let handlers = [CONTROL_INTERRUPT, UPDATE_INTERRUPT].map(handler);
     board.machine.trace(&handlers);
@@ -221,7 +223,7 @@ fn configured(scenario: &Scenario) -> FlashedBoard {
 /// Built-in scenarios with a simulated arm and frames over the serial line.
 #[test]
 fn scenarios_stay_below_the_bound() {
-    with_bound(|watch| {
+    with_bound::<F405>(|watch| {
         for name in built_in::names() {
             let scenario = scenario(name);
             let mut simulation = Simulation::new(&scenario).unwrap();
@@ -241,8 +243,17 @@ fn scenarios_stay_below_the_bound() {
 /// The arm on the board's own sensors.
 #[test]
 fn ticks_with_sensors_stay_below_the_bound() {
-    with_bound(|watch| {
-        let mut bench = BoardBench::new(&scenario("hybrid-elbow-down"));
+    ticks_with_sensors::<F405>();
+}
+
+#[test]
+fn ticks_of_the_nucleo_stay_below_the_bound() {
+    ticks_with_sensors::<G474>();
+}
+
+fn ticks_with_sensors<C: BoardChip>() {
+    with_bound::<C>(|watch| {
+        let mut bench = Bench::<C>::new(&scenario("hybrid-elbow-down"));
         trace_ticks(&mut bench.board);
         bench.drive();
         for _ in 0..50 {
@@ -259,7 +270,7 @@ const PORTS: std::ops::Range<u32> = 0x4002_0000..0x4002_2400;
 /// where that is not needed.
 #[test]
 fn peripherals_at_addresses_computed_at_run_time_are_those_of_pins() {
-    let bound = Bound::of(&flashed()).unwrap_or_else(|error| panic!("{error}"));
+    let bound = Bound::of(&flashed::<F405>()).unwrap_or_else(|error| panic!("{error}"));
     let mut charged = 0;
     let [encoders, force] = SENSOR_INTERRUPTS;
     for handler in [CONTROL_INTERRUPT, UPDATE_INTERRUPT, encoders, force] {
@@ -286,65 +297,10 @@ fn peripherals_at_addresses_computed_at_run_time_are_those_of_pins() {
     assert!(charged > 0);
 }
 
-/// Hill climbing with the board's own sensors: starts in the state before the worst tick of a closed loop, and
-/// searches for readings and positions of the switch that make one of the next ticks more expensive. The control
-/// interrupt is also within its budget of instructions.
-#[test]
-fn the_worst_readings_found_by_a_search_stay_below_the_bound() {
-    with_bound(|watch| {
-        let mut random = Random(4);
-        let names = ["hybrid-elbow-down", "pid-elbow-down", "capture"];
-        for (name, cycles_of) in searches(&names) {
-            let mut bench = BoardBench::new(&scenario(name));
-            trace_ticks(&mut bench.board);
-            bench.drive();
-            watch.look(&mut bench.board);
-            let mut start = (bench.snapshot(), 0);
-            for _ in 0..50 {
-                let before = bench.snapshot();
-                bench.tick();
-                let cycles = cycles_of(watch.look(&mut bench.board));
-                if cycles > start.1 {
-                    start = (before, cycles);
-                }
-            }
-            bench.restore(&start.0);
-            // The readings of the next ticks; each attempt disturbs those of one.
-            let mut best = [bench.frame; 6];
-            let mut most = 0;
-            for _ in 0..tries(60) / 3 {
-                let mut tried = best;
-                let place = random.below(tried.len() as u64) as usize;
-                tried[place] = mutated(&tried[place], &mut random);
-                bench.restore(&start.0);
-                let mut cycles = 0;
-                for frame in tried {
-                    bench.show(frame);
-                    bench
-                        .board
-                        .enable(frame.inputs.contains(DigitalInputs::ENABLE));
-                    bench.wait_for_tick();
-                    cycles = cycles.max(cycles_of(watch.look(&mut bench.board)));
-                }
-                if cycles >= most {
-                    (most, best) = (cycles, tried);
-                }
-            }
-        }
-        let [control, starting] =
-            [&watch.control, &watch.starting].map(|longest| longest.most_instructions.instructions);
-        let most = control.max(starting);
-        let budget: serde_json::Value =
-            serde_json::from_str(include_str!("../../../../budget.json")).unwrap();
-        let limit = &budget["instructions_of_control_interrupt"];
-        assert!(u64::from(most) <= limit.as_u64().unwrap(), "{most}");
-    });
-}
-
 /// Frames of a closed loop with random disturbances.
 #[test]
 fn random_frames_stay_below_the_bound() {
-    with_bound(|watch| {
+    with_bound::<F405>(|watch| {
         let names: Vec<&str> = built_in::names().collect();
         let all = tries(400);
         let mut random = Random(1);
@@ -425,7 +381,7 @@ fn random_frames(watch: &mut BoundCheck<'_>, scenario: &Scenario, random: &mut R
 /// other random frames.
 #[test]
 fn the_worst_settings_found_by_a_search_stay_below_the_bound() {
-    with_bound(|watch| {
+    with_bound::<F405>(|watch| {
         let mut random = Random(3);
         let names = ["edge", "pid-elbow-down", "capture"];
         let attempts = tries(600).div_ceil(FRAMES_PER_SETTINGS * names.len() as u64);
@@ -446,12 +402,12 @@ fn the_worst_settings_found_by_a_search_stay_below_the_bound() {
 /// The settings depend on their number alone, not on the number of threads.
 #[test]
 fn random_settings_stay_below_the_bound() {
-    let bound = Bound::of(&flashed()).unwrap_or_else(|error| panic!("{error}"));
+    let bound = Bound::of(&flashed::<F405>()).unwrap_or_else(|error| panic!("{error}"));
     let settings = tries(800).div_ceil(FRAMES_PER_SETTINGS);
     let threads = std::thread::available_parallelism().map_or(1, |it| it.get() as u64);
     // What was found, and the settings with most cycles.
     let run = |thread: u64| {
-        let image = flashed();
+        let image = flashed::<F405>();
         let mut watch = BoundCheck::new(&image, &bound);
         let mut worst = String::new();
         for number in (thread..settings).step_by(threads as usize) {
@@ -507,7 +463,7 @@ fn random_settings_stay_below_the_bound() {
 /// expensive frames.
 #[test]
 fn the_worst_frames_found_by_a_search_stay_below_the_bound() {
-    with_bound(|watch| {
+    with_bound::<F405>(|watch| {
         let mut random = Random(2);
         let names = ["edge", "pid-elbow-down", "capture"];
         for (name, cycles_of) in searches(&names) {

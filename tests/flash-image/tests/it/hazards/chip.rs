@@ -55,7 +55,7 @@ fn a_dead_crystal_leaves_the_stages_off<C: BoardChip>() {
 
 fn a_hard_fault_takes_the_torque_off<C: BoardChip>() {
     let mut bench = driven::<C>();
-    bench.board.machine.hard_fault();
+    bench.board.machine.execute_undefined();
     assert_off_in_time(bench);
 }
 
@@ -101,7 +101,7 @@ fn recorded_status<C: BoardChip>(bench: &mut Bench<C>) -> u32 {
 
 fn an_unexpected_interrupt_takes_the_torque_off<C: BoardChip>() {
     let mut bench = driven::<C>();
-    bench.board.machine.raise(16 + 40);
+    bench.board.machine.raise_unexpected();
     assert_off_in_time(bench);
 }
 
@@ -186,8 +186,7 @@ fn the_black_box_outlives_a_reset_and_names_its_reason<C: BoardChip>() {
     bench.board.wiring().force.dead = Some(true);
     assert!(bench.time_until_off().is_some());
     bench.assert_stays_off(5);
-    let before = bench.board.machine.program_counter();
-    bench.board.machine.hard_fault();
+    let address = bench.board.machine.execute_undefined();
     bench.run_ms(30);
     let content = black_box(&mut bench.board);
     assert_eq!(content.reset, ResetCause::Software);
@@ -195,8 +194,8 @@ fn the_black_box_outlives_a_reset_and_names_its_reason<C: BoardChip>() {
     let fault = content.fault.expect("the fault of the force cell");
     assert_eq!(fault.answer.latched_fault(), Some(Fault::ForceOutOfRange));
     assert!(fault.sensor.normal_force.0 > 1 << 20);
-    let is_there = |crash| matches!(crash, Some(Crash::HardFault { program_counter, .. }) if program_counter == before);
-    assert!(is_there(content.crash), "{content:?}, {before:#x}");
+    let is_there = |crash| matches!(crash, Some(Crash::HardFault { program_counter, .. }) if program_counter == address);
+    assert!(is_there(content.crash), "{content:?}, {address:#x}");
     bench.board.machine.hang();
     bench.run_ms(30);
     assert_eq!(black_box(&mut bench.board).reset, ResetCause::Watchdog);

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use painleve_chips::stm32::WiredChip as _;
 use painleve_chips::{MICROSECOND, MILLISECOND};
 use painleve_flash_image::bench::{Bench, encoded, scenario};
-use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405, G474};
 use painleve_plant::law_choice::build;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::message::{FrameSource, PROTOCOL, Request, Response};
@@ -51,10 +50,20 @@ fn a_simulated_plant_never_switches_the_stages_on<C: BoardChip>() {
 #[test]
 #[ignore = "takes longer than 20 s"]
 fn a_refused_configuration_leaves_the_torque_off_at_any_time_of_a_tick() {
+    leaves_the_torque_off_at_any_time_of_a_tick::<F405>();
+}
+
+#[test]
+#[ignore = "takes longer than 20 s"]
+fn a_refused_configuration_leaves_the_torque_off_at_any_time_of_a_tick_of_the_nucleo() {
+    leaves_the_torque_off_at_any_time_of_a_tick::<G474>();
+}
+
+fn leaves_the_torque_off_at_any_time_of_a_tick<C: BoardChip>() {
     const THREADS: usize = 4;
     let results = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..THREADS)
-            .map(|share| scope.spawn(move || torque_on_after_ticks(share, THREADS)))
+            .map(|share| scope.spawn(move || torque_on_after_ticks::<C>(share, THREADS)))
             .collect();
         let join = |thread: std::thread::ScopedJoinHandle<'_, _>| thread.join().unwrap();
         threads.into_iter().map(join).collect::<Vec<_>>()
@@ -67,8 +76,8 @@ fn a_refused_configuration_leaves_the_torque_off_at_any_time_of_a_tick() {
 
 /// Tests every `of`-th instant, starting with `share`. Returns their number, and the functions in
 /// which a tick left the torque on.
-fn torque_on_after_ticks(share: usize, of: usize) -> (usize, BTreeSet<String>) {
-    let mut bench = driven::<F405>();
+fn torque_on_after_ticks<C: BoardChip>(share: usize, of: usize) -> (usize, BTreeSet<String>) {
+    let mut bench = driven::<C>();
     let mut bytes = encoded(&scenario(DEFAULT));
     // The control rate is the first field of the configuration.
     bytes[..4].copy_from_slice(&f32::NAN.to_le_bytes());
