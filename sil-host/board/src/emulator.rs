@@ -24,11 +24,14 @@ use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Health, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire;
 
-use super::{BoardError, ConnectedBoard, TimedAnswer, log};
+use super::{BoardError, ConnectedBoard, TimedAnswer};
 use crate::timing::Unit;
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
+
+/// The program that decodes an image's log, defmt's own.
+const LOG_PRINTER: &str = "defmt-print";
 
 /// QEMU's descriptor of the pipe from which the image reads requests, `/dev/fd/100` to the image.
 const REQUESTS: i32 = 100;
@@ -64,21 +67,41 @@ pub fn built_image(name: &str) -> PathBuf {
         .unwrap_or(image)
 }
 
-/// Checks that image and emulator exist, before anything is started.
+/// Checks that image, emulator and, `with_log`, the program that prints the image's log exist, before anything is
+/// started.
 ///
 /// # Errors
-/// [`BoardError::ImageMissing`], [`BoardError::EmulatorMissing`].
-pub fn check(image: &Path) -> Result<(), BoardError> {
+/// [`BoardError::ImageMissing`], [`BoardError::EmulatorMissing`], [`BoardError::LogPrinterMissing`].
+pub fn check(image: &Path, with_log: bool) -> Result<(), BoardError> {
     if !image.is_file() {
         return Err(BoardError::ImageMissing(image.into()));
     }
     // From now on it is known as an input. An image that cannot be read is reported where it is read.
     let _ = input_file::open(image);
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    if !std::env::split_paths(&path).any(|folder| folder.join(PROGRAM).is_file()) {
+    if !is_installed(PROGRAM) {
         return Err(BoardError::EmulatorMissing);
     }
+    if with_log && !is_installed(LOG_PRINTER) {
+        return Err(BoardError::LogPrinterMissing);
+    }
     Ok(())
+}
+
+fn is_installed(program: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
+}
+
+/// Starts the program that prints the log of `image` on stderr, and returns its end for the log. It ends with the log.
+fn log_printer(image: &Path) -> Result<Stdio, BoardError> {
+    let (log, log_end) = io::pipe()?;
+    Command::new(LOG_PRINTER)
+        .arg("-e")
+        .arg(image)
+        .stdin(log)
+        .stdout(io::stderr().as_fd().try_clone_to_owned()?)
+        .spawn()?;
+    Ok(log_end.into())
 }
 
 /// A configured image running under QEMU.
@@ -98,7 +121,7 @@ pub struct Emulator {
 
 impl Emulator {
     /// Starts `image` and sends it its configuration. With `with_log`, prints the image's log on
-    /// stderr. An image that is silent for longer than `silence_limit` is an error.
+    /// stderr through `defmt-print`. An image that is silent for longer than `silence_limit` is an error.
     ///
     /// # Errors
     /// Any [`BoardError`].
@@ -108,10 +131,8 @@ impl Emulator {
         with_log: bool,
         silence_limit: Duration,
     ) -> Result<Self, BoardError> {
-        check(image)?;
-        let table = with_log
-            .then(|| log::LogTable::of_image(image))
-            .transpose()?;
+        check(image, with_log)?;
+        let printer = with_log.then(|| log_printer(image)).transpose()?;
         // Pipes without names leave nothing behind, whenever a process is killed.
         let (request_end, requests) = io::pipe()?;
         let (responses, response_end) = io::pipe()?;
@@ -125,11 +146,7 @@ impl Emulator {
             .arg("-kernel")
             .arg(image)
             .stdin(Stdio::null())
-            .stdout(if with_log {
-                Stdio::piped()
-            } else {
-                Stdio::null()
-            });
+            .stdout(printer.unwrap_or_else(Stdio::null));
         command
             .fd_mappings(vec![
                 FdMapping {
@@ -151,9 +168,6 @@ impl Emulator {
             silence_limit,
             shift,
         };
-        if let (Some(table), Some(output)) = (table, emulator.process.child().stdout.take()) {
-            table.print_from(output);
-        }
         match emulator.request(&Request::Configure {
             build: build(),
             source: FrameSource::Lockstep,

@@ -4,14 +4,12 @@
 //! - [`emulator`]: the image under QEMU, in deterministic lockstep
 //! - [`serial`]: a flashed board behind a serial port
 //! - [`arm`]: a flashed board that drives a real arm by its own sensors
-//! - [`log`]: the image's log, decoded with the table in the image
 //! - [`on_board`]: a board of this process in a closed loop
 //! - [`timing`]: the cost of control ticks, on a board or on this machine
 
 pub mod arm;
 pub mod drivers;
 pub mod emulator;
-pub mod log;
 pub mod on_board;
 mod port;
 pub mod serial;
@@ -104,19 +102,16 @@ pub enum BoardError {
     /// The image does not exist.
     #[error("no image at {}: build it with `cargo xtask build-fw`, or give its path with --elf", .0.display())]
     ImageMissing(PathBuf),
-    /// The image cannot be read.
-    #[error("cannot use the image {}: {source}", path.display())]
-    Image {
-        /// The image.
-        path: PathBuf,
-        /// What is wrong with the image.
-        source: log::LogTableError,
-    },
     /// The emulator is not installed.
     #[error(
         "qemu-system-arm is not installed: run `cargo xtask setup` or `apt-get install qemu-system-arm`"
     )]
     EmulatorMissing,
+    /// The program that decodes the image's log is not installed.
+    #[error(
+        "defmt-print is not installed: run `cargo install defmt-print --locked`, or leave out --log"
+    )]
+    LogPrinterMissing,
     /// The serial port cannot be used.
     #[error("cannot use the serial port {}: {source}", path.display())]
     Port {

@@ -92,7 +92,7 @@ pub struct ImageArguments {
     /// The controller's image; by default the workspace's own build.
     #[arg(long, value_name = "PATH")]
     pub elf: Option<SystemPath>,
-    /// Print the image's log.
+    /// Print the image's log; needs `defmt-print`.
     #[arg(long)]
     pub log: bool,
     /// Write the cost of every tick as JSON.
@@ -115,7 +115,7 @@ impl ImageArguments {
 pub fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
     match &arguments.target {
         BridgeTarget::Qemu { bus, image } => {
-            emulator::check(&image.path())?;
+            emulator::check(&image.path(), image.log)?;
             carry(bus, image.timing.as_deref(), |configuration, _| {
                 Emulator::start(
                     &image.path(),

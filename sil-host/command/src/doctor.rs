@@ -111,7 +111,7 @@ fn system() -> String {
 }
 
 fn image() -> String {
-    match emulator::check(&emulator::default_image()) {
+    match emulator::check(&emulator::default_image(), false) {
         Ok(()) => "ready for --host qemu".into(),
         Err(error) => error.to_string(),
     }

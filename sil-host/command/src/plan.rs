@@ -50,3 +50,17 @@ impl Plan {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::bridge::SensorLineArguments;
+
+    #[test]
+    fn numbers_reach_the_process_to_the_last_bit() {
+        for bit_errors in (1..1000).map(|i| 0.1 / f64::from(i)) {
+            let json = serde_json::to_string(&SensorLineArguments { bit_errors }).unwrap();
+            let read: SensorLineArguments = serde_json::from_str(&json).unwrap();
+            assert_eq!(read.bit_errors, bit_errors, "{json}");
+        }
+    }
+}

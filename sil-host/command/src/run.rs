@@ -182,7 +182,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         return live(arguments, &scenario, port);
     }
     if arguments.host == Host::Qemu {
-        emulator::check(&arguments.image.path())?;
+        emulator::check(&arguments.image.path(), arguments.image.log)?;
     }
     let timing = arguments
         .image

@@ -81,7 +81,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         ("--port", arguments.port.is_some(), &[Serial]),
     ])?;
     if arguments.host == Qemu {
-        emulator::check(&arguments.image())?;
+        emulator::check(&arguments.image(), false)?;
     }
     if let Some(path) = &arguments.svg {
         distinct_files::check(&[("--svg", path)])?;

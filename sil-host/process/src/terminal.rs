@@ -5,6 +5,7 @@ use std::io::{self, Write};
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{Cell, ColumnConstraint, ContentArrangement, Row, Table, Width};
+use rustix::termios::tcgetwinsize;
 
 /// Writes a line to standard output.
 ///
@@ -41,11 +42,19 @@ pub fn table(header: impl Into<Row>) -> Table {
         .load_style(UTF8_FULL_CONDENSED)
         .set_content_arrangement(ContentArrangement::Dynamic)
         .set_header(header);
-    let columns = std::env::var("COLUMNS").ok();
-    if let Some(columns) = columns.and_then(|columns| columns.parse().ok()) {
+    if let Some(columns) = columns() {
         table.set_width(columns);
     }
     table
+}
+
+/// Returns the width of tables, if it is limited.
+fn columns() -> Option<u16> {
+    let named = std::env::var("COLUMNS").ok();
+    let named = named.and_then(|columns| columns.parse().ok());
+    named
+        .or_else(|| Some(tcgetwinsize(io::stdout()).ok()?.ws_col))
+        .filter(|&columns| columns > 0)
 }
 
 /// Returns a text for readers: in ASCII where the locale asks for it.

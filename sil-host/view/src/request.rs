@@ -23,9 +23,7 @@ const SECOND: Duration = Duration::from_secs(1);
 /// What a viewer is told that gives more.
 pub(crate) const TOO_MANY: &str = "more than 100 orders in a second: the others are refused";
 
-/// A viewer's request. In JSON `"pause"` or `{"step": {"ticks": 1}}`: the variant's name is outside, because
-/// serde reads no fraction inside an internally tagged enum once any crate of the program switches on
-/// `serde_json/arbitrary_precision`, as `defmt-decoder` does.
+/// A viewer's request. In JSON `"pause"` or `{"step": {"ticks": 1}}`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ViewerRequest {

@@ -5,7 +5,9 @@
 // Helper functions of tests may panic as tests do.
 #![allow(clippy::unwrap_used)]
 
+use std::fs::Permissions;
 use std::io::Write;
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -25,7 +27,7 @@ use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::Health;
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_tests::printed::{self, LastFigure, thousands};
-use painleve_tests::{Bench, child_of, image, is_running, signal};
+use painleve_tests::{Bench, child_of, errors, image, is_running, signal};
 
 /// Sends every frame to both controllers and compares their answers.
 struct Both {
@@ -326,6 +328,44 @@ fn the_error_about_a_missing_image_names_the_build_command() {
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains("cargo xtask build-fw"), "{text}");
+}
+
+#[test]
+fn the_log_is_printed_by_defmt_print() {
+    let bench = Bench::new("log");
+    let image = image().to_str().unwrap();
+    let tools = bench.path("tools");
+    std::fs::create_dir(&tools).unwrap();
+    let qemu = Command::new("/bin/sh")
+        .args(["-c", "command -v qemu-system-arm"])
+        .output()
+        .unwrap();
+    let qemu = String::from_utf8(qemu.stdout).unwrap();
+    symlink(qemu.trim_end(), tools.join("qemu-system-arm")).unwrap();
+    let qemu = ["run", "--host", "qemu", "--log", "--elf", image];
+    let mut run = bench.command(&[&qemu[..], &SHORT, &QUIET].concat());
+    run.env("PATH", &tools);
+
+    let output = run.output().unwrap();
+    assert_eq!(output.status.code(), Some(3), "{output:?}");
+    assert!(
+        errors(&output).contains("cargo install defmt-print"),
+        "{output:?}"
+    );
+
+    let printer = tools.join("defmt-print");
+    std::fs::write(
+        &printer,
+        "#!/bin/sh\nPATH=/bin:/usr/bin; echo \"log of $2: $(wc -c) bytes\"",
+    )
+    .unwrap();
+    std::fs::set_permissions(&printer, Permissions::from_mode(0o755)).unwrap();
+    let output = run.output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    assert!(
+        errors(&output).contains(&format!("log of {image}: ")),
+        "{output:?}"
+    );
 }
 
 #[test]

@@ -77,8 +77,8 @@ pub enum ScenarioError {
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The key is unknown or its value has the wrong type.
-    #[error("{}", in_words(.0.message()))]
-    Value(toml::de::Error),
+    #[error("{}", in_words(&.0.to_string()))]
+    Value(erased_serde::Error),
     /// The scenario cannot be written as a table.
     #[error(transparent)]
     Table(#[from] toml::ser::Error),

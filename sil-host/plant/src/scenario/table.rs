@@ -1,5 +1,6 @@
 //! Scenarios from TOML tables.
 
+use serde_path_to_error::{Deserializer, Track};
 use toml::{Table, Value};
 
 use super::error::{KeyError, ScenarioError};
@@ -24,14 +25,16 @@ pub(super) fn from_table(
         key: "controller.reference".into(),
         source: KeyError::File(reason),
     })?;
-    let scenario: Scenario =
-        serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| {
-            ScenarioError::Key {
-                origin: origin.map(str::to_owned),
-                key: error.path().to_string(),
-                source: KeyError::Value(error.into_inner()),
-            }
-        })?;
+    let mut track = Track::new();
+    // Erased, because every type of a scenario is compiled once for each type of deserializer.
+    let source = Deserializer::new(Value::Table(table), &mut track);
+    let scenario: Result<Scenario, _> =
+        erased_serde::deserialize(&mut <dyn erased_serde::Deserializer<'_>>::erase(source));
+    let scenario = scenario.map_err(|error| ScenarioError::Key {
+        origin: origin.map(str::to_owned),
+        key: track.path().to_string(),
+        source: KeyError::Value(error),
+    })?;
     initial_key::check(&scenario.initial).map_err(|(key, source)| ScenarioError::Key {
         origin: origin.map(str::to_owned),
         key: key.into(),

@@ -38,9 +38,11 @@ pub fn known_names<N: AsRef<str>>(unknown: &str, known: &[N]) -> String {
 
 /// Returns a message of serde or of the TOML parser in our words, on one line.
 pub(super) fn in_words(message: &str) -> String {
-    // The parser repeats the key in a last line.
+    // The parser repeats the keys in last lines.
     let lines = message.trim().lines().map(str::trim);
-    let lines: Vec<&str> = lines.filter(|line| !line.starts_with("in `")).collect();
+    let lines: Vec<&str> = lines
+        .filter(|line| !line.is_empty() && !line.starts_with("in `"))
+        .collect();
     let message = lines.join(" ").replace('`', "'");
     let after = |start| message.strip_prefix(start);
     for (start, what) in [
@@ -139,6 +141,10 @@ mod tests {
             (
                 "unknown variant `foo`, expected one of `model`, `food`, `off`\nin `friction`\n",
                 "unknown name 'foo'; did you mean 'food'? known: model, food, off",
+            ),
+            (
+                "invalid type: string \"x\", expected u32\nin `b`\n\nin `a`\n\n",
+                "expected a whole number from 0 to 4294967295, not \"x\"",
             ),
             (
                 "unknown field `x`, expected `one` or `two`",
