@@ -10,6 +10,7 @@ mod drive;
 mod export;
 mod fail_on;
 mod figures;
+mod identify;
 mod join;
 mod json;
 mod live;
@@ -44,6 +45,7 @@ use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
 use painleve_chart::picture;
 use painleve_commission::Mistake;
+use painleve_identify::Refusal;
 use painleve_link::LinkError;
 use painleve_plant::closed_loop::LoopError;
 use painleve_plant::law_choice::{self, ScenarioLaws};
@@ -80,6 +82,8 @@ enum Command {
     Process(Plan),
     /// Measure how the sensors and torque stages of an arm are mounted, and correct its scenario.
     Commission(commission::CommissionArguments),
+    /// Measure the geometry of an arm by slides along its belt, and how well it is known.
+    Identify(identify::IdentifyArguments),
     /// Drive a real arm through its board: watch, permit arming, record, stop.
     Drive(drive::DriveArguments),
     /// Report the cost of control ticks: instructions, cycles or wake-up latency, and the worst
@@ -138,6 +142,9 @@ pub enum CommandError {
     /// The arm has a mistake that no setting can describe.
     #[error("{0}")]
     Mounting(Mistake),
+    /// The slides of an arm do not give its geometry.
+    #[error("{0}")]
+    Geometry(Refusal),
     /// A real arm cannot be commissioned: its torque stages do not come on or stay on.
     #[error(transparent)]
     Rig(BoardRigError),
@@ -201,7 +208,10 @@ impl CommandError {
             Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,
             Self::Sweep(SweepError::Output(_)) => 4,
             Self::Sweep(_) => 2,
-            Self::Loop(LoopError::Plant(_)) | Self::Faulted(_) | Self::Mounting(_) => 1,
+            Self::Loop(LoopError::Plant(_))
+            | Self::Faulted(_)
+            | Self::Mounting(_)
+            | Self::Geometry(_) => 1,
             Self::Link(LinkError::Interrupted) => INTERRUPTED,
             Self::Loop(LoopError::Host(_) | LoopError::NotUnderstood { .. })
             | Self::Link(_)
@@ -384,6 +394,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         }
         Command::Run(_)
         | Command::Commission(_)
+        | Command::Identify(_)
         | Command::Drive(_)
         | Command::Timing(_)
         | Command::Doctor(_) => {}
@@ -403,6 +414,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Process(Plan::Controller(arguments)) => controller::run(&arguments),
         Command::Process(Plan::Bridge(arguments)) => bridge::run(&arguments),
         Command::Commission(arguments) => commission::run(&arguments),
+        Command::Identify(arguments) => identify::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),

@@ -46,6 +46,8 @@ pub struct JointErrors {
     pub friction_nm: f32,
     /// Play of the gears, rad.
     pub play_rad: f32,
+    /// Standard deviation of the tip's distance from the edges, m.
+    pub tip_deviation_m: f32,
 }
 
 /// The governor's settings for one arm and rate.
@@ -128,7 +130,8 @@ impl EdgeGovernor {
         let distance_m2 = square(settings.distance_m * square(tick_s / PERIOD_S))
             + square(settings.distance_counts * joints.count_m)
             + square(settings.distance_m_nm * joints.friction_nm)
-            + square(settings.distance_m_rad * joints.play_rad);
+            + square(settings.distance_m_rad * joints.play_rad)
+            + square(settings.distance_deviations * joints.tip_deviation_m);
         Self {
             enabled: settings.enabled,
             friction_deviations: settings.friction_deviations,
@@ -138,6 +141,11 @@ impl EdgeGovernor {
             least_p_ratio: settings.p_ratio,
             distance_m: distance_m2.square_root(),
         }
+    }
+
+    /// Returns the distance kept from the point where p/Q22 has its least value, m.
+    pub fn distance_m(&self) -> f32 {
+        self.distance_m
     }
 
     /// Continues the search for the edges around a tip at `tip_t_m` (m). Where a thrown tip may land,
@@ -319,14 +327,15 @@ mod tests {
             count_m: 1e-3,
             friction_nm: 0.05,
             play_rad: 1e-3,
+            tip_deviation_m: 2e-3,
         };
         let settings = GovernorSettings {
             p_ratio: 0.0,
             ..Default::default()
         };
         let distance = distance_m(&settings, &joints, TICK_S, 0.0);
-        // 0.5, 3, 3 and 2 mm.
-        assert!((distance - 4.72e-3).abs() < 3e-5, "{distance}");
+        // 0.5, 3, 3, 2 and 4 mm.
+        assert!((distance - 6.18e-3).abs() < 3e-5, "{distance}");
         let more = distance_m(&GovernorSettings::default(), &joints, TICK_S, 0.0);
         assert!(more > distance + 0.5e-3, "{more}");
     }
