@@ -52,6 +52,16 @@ counts!(
     /// Position along the belt in µm, for display and logs.
     Micrometres(i32), "painleve::Micrometres");
 
+impl EncoderCounts {
+    /// In place of a reading: out of every range, so that the controller counts it as a lapse.
+    pub const MISSING: Self = Self(u32::MAX);
+}
+
+impl ForceCounts {
+    /// In place of a reading, as [`EncoderCounts::MISSING`].
+    pub const MISSING: Self = Self(i32::MAX);
+}
+
 impl Micrometres {
     /// Rounds to a whole number of µm; saturates, and NaN gives 0.
     #[inline]

@@ -40,8 +40,8 @@ bitflags! {
         const GAP_AGAINST_FORCE = 1 << 4;
         /// A torque stage's winding is too hot while the drive is armed.
         const WINDING_HOT = 1 << 5;
-        /// Prolongs the tick until the next one is due, to test the lapse monitor. Only an emulated
-        /// board and a real-time process have this input.
+        /// Prolongs the tick until the next one is due, to test the lapse monitor. Only a board with frames from the
+        /// host, whose stages are off, and a real-time process have this input.
         const OVERLOAD = 1 << 31;
     }
 }

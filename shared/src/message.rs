@@ -70,6 +70,26 @@ pub enum Request<'a> {
     Stored,
     /// Asks for the hash of the sources; answered by [`Response::Sources`]. Changes nothing.
     Sources,
+    /// Looks at a word of a board that drives nothing, or changes one; answered by [`Response::Probed`] or
+    /// [`Response::Refused`]. After a store the board drives no arm until its next reset.
+    Probe(Probe),
+}
+
+/// An access to the memory or a register of a bare board, for its acceptance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Probe {
+    /// Loads a word. An address that does not answer resets the board.
+    Load {
+        /// Address of the word.
+        address: u32,
+    },
+    /// Stores those bits of a word on which no torque depends; refused for a word without such bits.
+    Store {
+        /// Address of the word.
+        address: u32,
+        /// The word.
+        value: u32,
+    },
 }
 
 /// Source of a controller's sensor frames.
@@ -91,6 +111,11 @@ pub enum FrameSource {
 }
 
 impl FrameSource {
+    /// Returns whether an arm is driven: whether the torque stages can come on.
+    pub fn drives(self) -> bool {
+        matches!(self, Self::Sensors | Self::Commissioning | Self::StandAlone)
+    }
+
     /// Returns whether the board reads its own sensors.
     pub fn is_on_board(self) -> bool {
         !matches!(self, Self::Lockstep | Self::Realtime)
@@ -152,6 +177,13 @@ pub enum Response {
     Sources(u64),
     /// The board's watchdogs have no limit for the control rate of the configuration.
     RateRefused(RefusedRate),
+    /// The word of a [`Probe`], after it has been stored if it was.
+    Probed {
+        /// The word.
+        value: u32,
+        /// The board's stopwatch after the access.
+        stopwatch: u32,
+    },
 }
 
 /// A control rate for which a board's watchdogs have no limit.

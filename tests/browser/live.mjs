@@ -60,6 +60,11 @@ try {
   check(!await browser.evaluate("document.querySelector('#subtitle').textContent.includes('seed 77')"), "the header waits for the reset");
   await browser.set(field("any"), "controller.law = { pid = {} }");
   await browser.until("document.querySelector('#subtitle').textContent.includes('Law pid')", "the header shows the present law");
+  const saved = (id) => browser.evaluate(`decodeURIComponent(document.querySelector("#${id}").href)`);
+  const settings = await saved("save");
+  for (const part of ["friction = 1.2", "seed = 77", "[controller.law.pid]"]) check(settings.includes(part), `${part} is saved`);
+  const changes = await saved("save-changes");
+  for (const part of ["painleve run ", "--set 'belt.friction=1.2'", "--set 'run.seed=77'", "--set 'controller.law={ pid = {} }'"]) check(changes.includes(part), `${part} is among the changes`);
   await browser.quiet("after settings");
 
   await browser.set(field("belt.friction"), "7000");

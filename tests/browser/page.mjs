@@ -50,6 +50,13 @@ try {
   await browser.until("page.charts.range !== null", "dragging zooms");
   const shown = await browser.evaluate("page.charts.plots.map(({ plot }) => [plot.scales.x.min, plot.scales.x.max])");
   check(shown.every(([from, to]) => from === shown[0][0] && to === shown[0][1] && to - from < 0.3 * end), "all charts show the stretch");
+  const labels = await browser.evaluate("page.charts.plots.map(({ plot }) => plot.axes.map((axis) => axis._values?.filter((text) => text)))");
+  check(labels.flat().every((texts) => !texts || new Set(texts).size === texts.length), "no label of an axis repeats");
+  check(await browser.evaluate("page.time >= page.charts.range[0] && page.time <= page.charts.range[1]"), "the time is in the window");
+  check(await browser.evaluate("page.charts.plots.every(({ playhead }) => !playhead.hidden)"), "the cursor is in every chart");
+  const tip = await browser.evaluate("(() => { const { plot } = page.charts.plots[0]; const [a, b] = plot.series[0].idxs; const tip = plot.data[2].slice(a, b + 1).filter((v) => v !== null); return [plot.scales.y.max - plot.scales.y.min, Math.max(...tip) - Math.min(...tip)]; })()");
+  check(tip[0] <= 3.5 * Math.max(tip[1], 2), "the values fill the window");
+  check(!(await browser.evaluate("document.body.innerText")).includes("−0.0000"), "zero has no sign");
   const double = (type) => browser.send("Input.dispatchMouseEvent", { type, x: box.x + 0.5 * box.width, y: box.y + 0.5 * box.height, button: "left", clickCount: 2 });
   await double("mousePressed");
   await double("mouseReleased");

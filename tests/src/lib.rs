@@ -69,30 +69,12 @@ pub fn program() -> &'static Path {
     })
 }
 
-/// Returns the path of the controller's image for the emulated board in lockstep, which is built if
-/// out of date.
+/// Returns the path of the image of the STM32F405, which is flashed and which the emulator runs; it is built if out of
+/// date.
 ///
 /// # Panics
 /// If it cannot be built.
 pub fn image() -> &'static Path {
-    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    IMAGE.get_or_init(|| built_image("painleve-qemu"))
-}
-
-/// Returns the path of the image that uses the flash target's serial port as its link.
-///
-/// # Panics
-/// If it cannot be built.
-pub fn serial_image() -> &'static Path {
-    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    IMAGE.get_or_init(|| built_image("painleve-qemu-serial"))
-}
-
-/// Returns the path of the image that is flashed.
-///
-/// # Panics
-/// If it cannot be built.
-pub fn flash_image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
     IMAGE.get_or_init(|| built_image("painleve-f405"))
 }

@@ -21,7 +21,7 @@ use painleve_plant::scenario::Scenario;
 use painleve_process::lifetime::{Guarded, end_with_parent};
 use painleve_shared::message::FrameSource;
 
-use crate::serial_image;
+use crate::image;
 
 /// Duration of a byte: start bit, eight bits, stop bit at 921,600 baud.
 const BYTE: Duration = Duration::from_nanos(10_851);
@@ -121,7 +121,7 @@ impl SerialLine {
             // waits, the board follows the host's clock.
             .args(["-icount", "shift=6,sleep=on"])
             .args(["-serial", "chardev:line", "-kernel"])
-            .arg(serial_image())
+            .arg(image())
             .stdin(Stdio::null())
             .stdout(Stdio::null());
         let child = end_with_parent(&mut command, Signal::SIGKILL).spawn();

@@ -4,8 +4,7 @@ use clap::Args;
 
 use crate::boards::{self, BoardPackage};
 use crate::build_fw;
-use crate::command::{ChoreError, run_with};
-use crate::setup::starts;
+use crate::command::{ChoreError, run_with, starts};
 
 /// The board to flash.
 #[derive(Debug, Args)]

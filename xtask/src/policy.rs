@@ -3,8 +3,7 @@
 
 use std::process::{Command, Stdio};
 
-use crate::command::{ChoreError, PROFILE, run};
-use crate::setup::starts;
+use crate::command::{ChoreError, PROFILE, run, starts};
 
 /// The least Rust version, from the workspace's `Cargo.toml`.
 const LEAST_RUST: &str = env!("CARGO_PKG_RUST_VERSION");

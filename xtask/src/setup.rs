@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use clap::Args;
 
 use crate::build_fw::{debian_can_build, target_is_installed};
-use crate::command::{ChoreError, run_with, workspace};
+use crate::command::{ChoreError, run_with, starts, workspace};
 use crate::{examples, policy};
 
 /// Executes the board's image in tests; see `tests/flash-image`.
@@ -158,16 +158,6 @@ fn install_unicorn(sudo: bool) -> Result<(), ChoreError> {
     run_with(&python.to_string_lossy(), &pip, &[])?;
     std::fs::write(&installed, UNICORN)
         .map_err(|cause| ChoreError(format!("cannot write {}: {cause}", installed.display())))
-}
-
-/// Returns whether a program can be started.
-pub fn starts(program: &str) -> bool {
-    Command::new(program)
-        .arg("--version")
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success())
 }
 
 /// Installs Debian packages; a user other than root must allow sudo.

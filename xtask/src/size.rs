@@ -78,10 +78,10 @@ pub fn check_images() -> Result<(), ChoreError> {
             say(&format!("  {:>7}  {name:#}", symbol.size()))?;
         }
     }
-    say("painleve-qemu, maximum over all built-in scenarios")?;
+    say("painleve-f405 under QEMU, maximum over all built-in scenarios")?;
     let stack_limit = budget.limit(&["stack_bytes"])?;
     let stack = stack_bytes()?;
-    over.extend(check("painleve-qemu", "stack", stack, stack_limit)?);
+    over.extend(check("painleve-f405", "stack", stack, stack_limit)?);
     over.extend(misprinted("stack", "", stack, stack_limit));
     if over.is_empty() {
         Ok(())

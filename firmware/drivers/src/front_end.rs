@@ -21,10 +21,6 @@ use crate::plausibility::{Implausible, SensorReadings};
 use crate::second_channel::{SecondChannel, Tolerance};
 use crate::switches::Switches;
 
-/// Count of a sensor without a reading: out of every range, so that the controller counts it as a lapse.
-const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
-const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
-
 /// Largest difference of two AS5048A over a turn by their nonlinearity, ±1.6° together (DS000298, ±0.8° each),
 /// from one end of it to the other, counts.
 const ENCODER_RANGE: u16 = 146;
@@ -258,8 +254,8 @@ impl FrontEnd {
             }
             _ => (
                 false,
-                joints.map(|it| it.unwrap_or(NO_ENCODER)),
-                forces.map(|it| it.unwrap_or(NO_FORCE)),
+                joints.map(|it| it.unwrap_or(EncoderCounts::MISSING)),
+                forces.map(|it| it.unwrap_or(ForceCounts::MISSING)),
             ),
         };
         self.is_fit = is_complete && levels.stages_ready;

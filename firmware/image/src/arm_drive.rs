@@ -16,11 +16,12 @@ use painleve_firmware::drive::Drive;
 use painleve_firmware::law::Law;
 use painleve_shared::Arm;
 use painleve_shared::counts::TorqueCounts;
-use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::message::{FrameSource, RefusedRate};
 use painleve_shared::status::SupervisorState;
 
 use crate::board::BoardDrive;
+use crate::probe::SpareBits;
 use crate::sensor_bus::{self, SensorBus, SpiWords};
 
 /// Control rate while there is no configuration, Hz. The control timer runs from the start, so that only
@@ -38,6 +39,9 @@ pub trait ArmPins {
     type ForceSpi: SpiWords;
     /// A pin that selects a sensor, low.
     type Select: OutputPin;
+
+    /// Bits that a host may change while nothing is driven.
+    const SPARE: &'static [SpareBits];
 
     /// Checks that the watchdogs have a limit for this rate, one within two periods if the torque depends on it.
     ///
@@ -63,8 +67,13 @@ pub trait ArmPins {
     /// Disables the torque stages; the converter puts out zero torque.
     fn switch_stages_off(&mut self);
 
-    /// Returns the processor's clock, Hz, which the cycle counter counts.
-    fn core_hz(&self) -> u32;
+    /// Returns the count of a free-running counter: that of the processor's cycles, which must run.
+    fn stopwatch(&self) -> u32 {
+        DWT::cycle_count()
+    }
+
+    /// Returns the frequency of the stopwatch, Hz.
+    fn stopwatch_hz(&self) -> u32;
 }
 
 /// The control task's part of a board.
@@ -83,7 +92,7 @@ pub struct ArmDrive<P: ArmPins> {
 }
 
 impl<P: ArmPins> ArmDrive<P> {
-    /// Starts the control timer. The cycle counter must run.
+    /// Starts the control timer.
     pub fn new(
         mut pins: P,
         encoders: SensorBus<P::EncoderSpi, P::Select, EncoderDriver, 4>,
@@ -100,6 +109,14 @@ impl<P: ArmPins> ArmDrive<P> {
             is_driven: false,
             from_host: None,
         }
+    }
+
+    /// Waits for the next tick, which the host's frame asks for; its frames never drive the stages.
+    // Out of line: the bound on a tick's cycles leaves it out.
+    #[cold]
+    #[inline(never)]
+    fn prolong_tick(&self) {
+        while !self.pins.next_tick_is_due() {}
     }
 
     /// Returns the readings that were started at the last tick, and starts the next.
@@ -125,7 +142,13 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
 
     fn sample(&mut self) -> Option<SensorFrame> {
         match self.source {
-            FrameSource::Lockstep | FrameSource::Realtime => self.from_host.take(),
+            FrameSource::Lockstep | FrameSource::Realtime => {
+                let frame = self.from_host.take();
+                if frame.is_some_and(|it| it.inputs.contains(DigitalInputs::OVERLOAD)) {
+                    self.prolong_tick();
+                }
+                frame
+            }
             _ => Some(self.read_sensors()),
         }
     }
@@ -153,11 +176,13 @@ impl<P: ArmPins> Drive for ArmDrive<P> {
     }
 
     fn stopwatch(&self) -> u32 {
-        DWT::cycle_count()
+        self.pins.stopwatch()
     }
 }
 
 impl<P: ArmPins> BoardDrive for ArmDrive<P> {
+    const SPARE: &'static [SpareBits] = P::SPARE;
+
     fn check_rate(&self, tick_hz: f32, source: FrameSource) -> Result<(), RefusedRate> {
         // With frames from the host the stages stay off.
         self.pins.check_rate(tick_hz, source.is_on_board())
@@ -171,10 +196,7 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
             &converters.mounting,
         ));
         self.source = source;
-        self.is_driven = matches!(
-            source,
-            FrameSource::Sensors | FrameSource::Commissioning | FrameSource::StandAlone
-        );
+        self.is_driven = source.drives();
         self.from_host = None;
         // The switch has to be opened and closed again, and the sensors are checked anew.
         let is_mounted = source != FrameSource::Commissioning;
@@ -228,6 +250,6 @@ impl<P: ArmPins> BoardDrive for ArmDrive<P> {
     }
 
     fn stopwatch_hz(&self) -> u32 {
-        self.pins.core_hz()
+        self.pins.stopwatch_hz()
     }
 }

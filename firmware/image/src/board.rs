@@ -8,6 +8,7 @@ use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, RefusedRate};
 
 use crate::memory::ConfigurationMemory;
+use crate::probe::SpareBits;
 
 /// Reason for a failed start of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
@@ -77,6 +78,9 @@ pub trait Board {
 /// The control task's part of a board: a [`Drive`] with a timer that can be started, and with an
 /// input for frames from the host instead of the board's own sensors.
 pub trait BoardDrive: Drive {
+    /// Bits that a host may change while nothing is driven.
+    const SPARE: &'static [SpareBits] = &[];
+
     /// Checks that the board can watch over ticks at this rate, with frames from `source`.
     ///
     /// # Errors
@@ -122,8 +126,11 @@ pub trait Bytes {
 
 /// The link task's part of a board: bytes to and from the host.
 pub trait Port {
-    /// Returns whether further bytes have to wait until the host has read its answer.
-    const HALF_DUPLEX: bool;
+    /// Returns whether the host sends nothing until its last frame is answered, and [`receive`](Self::receive) waits for
+    /// it. The port of a chip does neither.
+    fn is_half_duplex(&self) -> bool {
+        false
+    }
 
     /// Moves received bytes into `buffer`; returns their number, 0 if there are none.
     fn receive(&mut self, buffer: &mut [u8]) -> usize;

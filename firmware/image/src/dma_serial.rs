@@ -118,8 +118,6 @@ impl<R: DmaRegisters> Bytes for DmaBytes<R> {
 }
 
 impl<R: DmaRegisters> Port for DmaPort<R> {
-    const HALF_DUPLEX: bool = false;
-
     fn receive(&mut self, buffer: &mut [u8]) -> usize {
         let filled = RECEIVED.saturating_sub(R::bytes_to_end());
         let mut length = 0;

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! #[cfg(target_os = "none")]
-//! painleve_qemu_board::image!(MyLaws);
+//! painleve_f405_board::image!(MyLaws);
 //! ```
 
 #![no_std]
@@ -17,6 +17,7 @@ pub mod dma_serial;
 pub mod flash;
 pub mod link;
 pub mod memory;
+pub mod probe;
 pub mod protection;
 pub mod sensor_bus;
 pub mod stack;

@@ -7,7 +7,7 @@ use painleve_firmware::law::Law;
 use painleve_firmware::supervise::lapses::Lapse;
 use painleve_firmware::{Configuration, SOURCES};
 use painleve_shared::message::{
-    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Request, Response,
+    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Probe, Request, Response,
 };
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 use painleve_shared::wire::{self, Inbox, WireError};
@@ -17,6 +17,7 @@ use serde::de::DeserializeOwned;
 use crate::black_box;
 use crate::board::{BoardDrive, Port};
 use crate::memory::ConfigurationMemory;
+use crate::probe;
 use crate::stack;
 use crate::tasks::Control;
 use crate::watch::health;
@@ -26,8 +27,12 @@ pub struct Link<L: Law> {
     inbox: Inbox,
     decoded: Option<Configuration<L>>,
     received: [u8; MAXIMUM_LENGTH],
+    /// Whether a frame has been received whose answer has not been sent.
+    awaits_answer: bool,
     /// The stored configuration, as found at the start or stored since; `None` before the first call.
     stored: Option<StoredConfiguration>,
+    /// Whether the host has changed a register: until the next reset nothing is driven.
+    is_changed: bool,
 }
 
 impl<L: Law> Link<L> {
@@ -37,7 +42,9 @@ impl<L: Law> Link<L> {
             inbox: Inbox::new(),
             decoded: None,
             received: [0; MAXIMUM_LENGTH],
+            awaits_answer: false,
             stored: None,
+            is_changed: false,
         }
     }
 }
@@ -65,7 +72,9 @@ pub fn link<D, L, P, M>(
         inbox,
         decoded,
         received,
+        awaits_answer,
         stored,
+        is_changed,
     } = state;
     let stored = stored.get_or_insert_with(|| start_alone(&mut control, memory, decoded));
     if let Some(fault) = control.lock(|control| control.fault_to_record.take()) {
@@ -73,13 +82,14 @@ pub fn link<D, L, P, M>(
     }
     while let Some(answer) = answers.dequeue() {
         send(port, &answer);
+        *awaits_answer = false;
     }
-    loop {
+    // A later tick has the answer.
+    while !(*awaits_answer && port.is_half_duplex()) {
         let length = port.receive(received);
         if length == 0 {
             return;
         }
-        let mut awaits_control = false;
         for byte in received.iter().take(length) {
             let Some(message) = inbox.push(*byte) else {
                 continue;
@@ -94,7 +104,7 @@ pub fn link<D, L, P, M>(
             let response = match request {
                 Ok(Request::Sensor(frame)) => {
                     control.lock(|control| control.task.drive_mut().offer(frame));
-                    awaits_control = true;
+                    *awaits_answer = true;
                     continue;
                 }
                 Ok(Request::Configure { build, .. }) if build != Configuration::<L>::BUILD => {
@@ -102,6 +112,10 @@ pub fn link<D, L, P, M>(
                     Response::OtherBuild {
                         build: Configuration::<L>::BUILD,
                     }
+                }
+                Ok(Request::Configure { source, .. }) if *is_changed && source.drives() => {
+                    control.lock(|control| control.task.stop());
+                    Response::Refused
                 }
                 Ok(Request::Configure {
                     source,
@@ -159,6 +173,26 @@ pub fn link<D, L, P, M>(
                     protocol: PROTOCOL,
                     build: Configuration::<L>::BUILD,
                 },
+                Ok(Request::Probe(probe)) => {
+                    let drives = control.lock(|control| {
+                        let task = &control.task;
+                        task.lapse_counts().is_some() && task.source().drives()
+                    });
+                    let probed = if drives {
+                        None
+                    } else {
+                        probe::carry_out(probe, D::SPARE)
+                    };
+                    match probed {
+                        Some(value) => {
+                            *is_changed |= matches!(probe, Probe::Store { .. });
+                            let stopwatch =
+                                control.lock(|control| control.task.drive().stopwatch());
+                            Response::Probed { value, stopwatch }
+                        }
+                        None => Response::Refused,
+                    }
+                }
                 Ok(Request::Sources) => Response::Sources(SOURCES),
                 Ok(Request::PermitArming(permitted)) => {
                     Response::Permission(control.lock(|control| {
@@ -174,10 +208,6 @@ pub fn link<D, L, P, M>(
                 Err(_) => continue,
             };
             send(port, &response);
-        }
-        if awaits_control && P::HALF_DUPLEX {
-            // `control` invokes this task again when it has an answer.
-            return;
         }
     }
 }

@@ -2,7 +2,9 @@
 
 #![allow(unsafe_code)] // reads and writes the stack below the program's own
 
+use core::convert::Infallible;
 use core::ptr::{addr_of, addr_of_mut};
+use core::sync::atomic::{AtomicBool, Ordering};
 
 /// Pattern of untouched stack.
 const PAINT: u32 = 0xdead_57ac;
@@ -34,6 +36,46 @@ pub fn paint() {
             word = word.add(1);
         }
     }
+}
+
+/// Whether the start has left the stack.
+static IS_FREE: AtomicBool = AtomicBool::new(false);
+
+/// Returns whether what the start needed of the stack is free again.
+pub fn is_free() -> bool {
+    IS_FREE.load(Ordering::Relaxed)
+}
+
+/// Runs `idle` with an empty stack: what the start has left there is never used again, and the tasks that interrupt `idle` have
+/// the whole stack.
+///
+/// # Safety
+/// `idle` owns or refers to static values only, and nothing else refers to what is on the stack.
+pub unsafe fn empty_for<F: FnOnce() -> Infallible>(idle: F) -> ! {
+    // No interrupt may use the stack's upper end while `idle` is still in what was below it.
+    cortex_m::interrupt::disable();
+    let mut idle = core::mem::ManuallyDrop::new(idle);
+    // SAFETY: never returns, so that all below the old stack pointer is free. `resume` moves `idle`, which lies deeper in the old
+    // stack than its own frame, and permits interrupts again.
+    unsafe {
+        core::arch::asm!(
+            "msr msp, {top}",
+            "bx {resume}",
+            top = in(reg) addr_of!(_stack_start),
+            resume = in(reg) resume::<F> as extern "C" fn(*mut F) -> !,
+            in("r0") &raw mut *idle,
+            options(noreturn),
+        )
+    }
+}
+
+extern "C" fn resume<F: FnOnce() -> Infallible>(idle: *mut F) -> ! {
+    // SAFETY: `empty_for` passes a value that is in place, and does not use it again.
+    let idle = unsafe { idle.read() };
+    IS_FREE.store(true, Ordering::Relaxed);
+    // SAFETY: nothing that was on the old stack is used from now on.
+    unsafe { cortex_m::interrupt::enable() };
+    match idle() {}
 }
 
 /// Returns the largest stack use since [`paint`], bytes.

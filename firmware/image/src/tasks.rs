@@ -121,14 +121,14 @@ pub fn control<D: BoardDrive, L: Law>(control: &mut Control<D, L>) {
     control.task.answer();
 }
 
-/// Finishes a control tick. Returns whether there is an answer for the link.
+/// Finishes a control tick, and puts its answer, if there is one, in the link's queue.
 #[inline]
 pub fn update<D: BoardDrive, L: Law>(
     control: &mut Control<D, L>,
     answers: &mut Producer<'static, Response>,
     events: &mut Producer<'static, Change>,
     reported: &mut Change,
-) -> bool {
+) {
     let Control {
         task,
         dropped_responses,
@@ -143,7 +143,7 @@ pub fn update<D: BoardDrive, L: Law>(
         elapsed,
     }) = task.update()
     else {
-        return false;
+        return;
     };
     // Each kind is built in its place in the queue.
     let sent = match sensor {
@@ -176,7 +176,6 @@ pub fn update<D: BoardDrive, L: Law>(
             *reported = change;
         }
     }
-    true
 }
 
 /// Logs events and, once a second, the statistics.
@@ -243,7 +242,7 @@ macro_rules! tasks {
     ) => {
         #[::rtic::app(device = $($device)::+, peripherals = true)]
         mod tasks {
-            use $crate::board::{Board, BoardDrive, Bytes, Parts, Port};
+            use $crate::board::{Board, BoardDrive, Bytes, Parts};
             use $crate::heapless::spsc::{Consumer, Producer, Queue};
             use $crate::painleve_shared::message::Response;
             use $crate::link::Link;
@@ -307,14 +306,12 @@ macro_rules! tasks {
                    local = [answers_in, events_in, reported])]
             fn update(mut cx: update::Context) {
                 let local = cx.local;
-                let answered = cx.shared.control.lock(|control| {
+                cx.shared.control.lock(|control| {
                     let (answers, events) = (local.answers_in, local.events_in);
-                    $crate::tasks::update(control, answers, events, local.reported)
+                    $crate::tasks::update(control, answers, events, local.reported);
                 });
                 // Bytes may have arrived without the idle line that would have woken `link`.
-                if answered || !<<Hardware as Board>::Port as Port>::HALF_DUPLEX {
-                    rtic::pend(LINK);
-                }
+                rtic::pend(LINK);
             }
 
             $($(
@@ -335,6 +332,10 @@ macro_rules! tasks {
             #[task(binds = $link, priority = 1, shared = [control],
                    local = [port, memory, answers_out, state: Link<Laws> = Link::new()])]
             fn link(cx: link::Context) {
+                // A tick may have raised it between `init` and `idle`.
+                if !$crate::stack::is_free() {
+                    return;
+                }
                 let local = cx.local;
                 let (port, memory) = (local.port, local.memory);
                 $crate::link::link(cx.shared.control, port, memory, local.answers_out, local.state);
@@ -342,9 +343,12 @@ macro_rules! tasks {
 
             #[idle(shared = [control], local = [events_out])]
             fn idle(cx: idle::Context) -> ! {
-                // Not in `init`, whose stack would not be free yet.
-                rtic::pend(LINK);
-                $crate::tasks::idle::<Hardware, Laws>(cx.shared.control, cx.local.events_out)
+                let idle = move || {
+                    rtic::pend(LINK);
+                    $crate::tasks::idle::<Hardware, Laws>(cx.shared.control, cx.local.events_out)
+                };
+                // SAFETY: RTIC's resources are static, and its start leaves nothing on the stack that is used again.
+                unsafe { $crate::stack::empty_for(idle) }
             }
         }
 

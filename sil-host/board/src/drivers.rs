@@ -23,10 +23,6 @@ use painleve_shared::mounting::Mounting;
 use super::{BoardError, ConnectedBoard, TimedAnswer};
 use crate::timing::Unit;
 
-/// Counts of a sensor without a reading: out of every range, so that the controller counts a lapse.
-const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
-const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
-
 /// Clocks of the board's buses, Hz.
 const ENCODER_BUS_HZ: u64 = 5_250_000;
 const FORCE_BUS_HZ: u64 = 1_312_500;
@@ -137,9 +133,9 @@ impl Drivers {
             .read()
             .readings(self.force_bits, &self.mounting);
         SensorFrame {
-            joints: joints.map(|it| it.unwrap_or(NO_ENCODER)),
-            normal_force: normal.unwrap_or(NO_FORCE),
-            tangential_force: tangential.unwrap_or(NO_FORCE),
+            joints: joints.map(|it| it.unwrap_or(EncoderCounts::MISSING)),
+            normal_force: normal.unwrap_or(ForceCounts::MISSING),
+            tangential_force: tangential.unwrap_or(ForceCounts::MISSING),
             ..*frame
         }
     }

@@ -47,7 +47,7 @@ const INSTRUCTIONS_PER_TICK: f32 = 6000.0;
 
 /// Returns the path of the image in the workspace that built this program.
 pub fn default_image() -> PathBuf {
-    built_image("painleve-qemu")
+    built_image("painleve-f405")
 }
 
 /// Returns the path of the workspace's own build of an image, relative to this program. The image

@@ -15,7 +15,7 @@ pub mod log;
 pub mod on_board;
 mod port;
 pub mod serial;
-pub mod stored;
+mod stored;
 pub mod timing;
 
 use std::io;
@@ -33,6 +33,7 @@ use serde::{Deserialize, Serialize};
 pub use drivers::Drivers;
 pub use emulator::Emulator;
 pub use on_board::OnBoard;
+pub use port::{Port, SerialPort};
 pub use serial::Serial;
 
 use crate::timing::Unit;
@@ -162,7 +163,7 @@ pub enum BoardError {
     Wire(#[from] WireError),
     /// The configuration is out of range for the image.
     #[error(
-        "the image refuses the configuration: it may be older than this program, see `cargo xtask build-fw`"
+        "the image refuses the configuration: it may be older than this program, see `cargo xtask build-fw`; or `painleve accept` has not reset the board, which then drives no arm until a reset"
     )]
     Refused,
     /// The board's watchdogs have no limit for the control rate.

@@ -21,8 +21,29 @@ use rustix::termios::{ioctl_tiocexcl, ioctl_tiocnxcl};
 
 use crate::BoardError;
 
+/// A line to a board, with a clock.
+pub trait Port {
+    /// Reads what has arrived, after at most `limit`; returns the number of bytes, 0 if there are none.
+    ///
+    /// # Errors
+    /// [`BoardError::Unplugged`], or [`BoardError::System`] if the port fails in another way.
+    fn read(&mut self, bytes: &mut [u8], limit: Duration) -> Result<usize, BoardError>;
+
+    /// Writes all bytes within `limit`.
+    ///
+    /// # Errors
+    /// [`BoardError::Deaf`] if they have not been taken in time; otherwise as [`Port::read`].
+    fn write(&mut self, bytes: &[u8], limit: Duration) -> Result<(), BoardError>;
+
+    /// Returns the time since some instant.
+    fn now(&self) -> Duration;
+}
+
 /// An open port. No call waits longer than it is told to.
-pub(crate) struct SerialPort(File);
+pub struct SerialPort {
+    file: File,
+    opened: Instant,
+}
 
 impl SerialPort {
     /// Opens the port and discards what it has received before.
@@ -52,18 +73,28 @@ impl SerialPort {
             Err(TryLockError::Error(error)) => return Err(unusable(error)),
         }
         configure(&file).map_err(unusable)?;
-        Ok(Self(file))
+        let opened = Instant::now();
+        Ok(Self { file, opened })
     }
 
-    /// Reads what has arrived, after at most `limit`; returns the number of bytes, 0 if there are none.
-    ///
-    /// # Errors
-    /// [`BoardError::Unplugged`], or [`BoardError::System`] if the port fails in another way.
-    pub(crate) fn read(&mut self, bytes: &mut [u8], limit: Duration) -> Result<usize, BoardError> {
+    fn is_ready(&self, event: PollFlags, limit: Duration) -> Result<bool, BoardError> {
+        // Rounded up, so that the last fraction of a millisecond is not spent polling.
+        let limit = PollTimeout::try_from(limit + Duration::from_millis(1));
+        let mut ports = [PollFd::new(self.file.as_fd(), event)];
+        match poll(&mut ports, limit.unwrap_or(PollTimeout::MAX)) {
+            Ok(0) | Err(Errno::EINTR) => Ok(false),
+            Ok(_) => Ok(true),
+            Err(error) => Err(failure(error.into())),
+        }
+    }
+}
+
+impl Port for SerialPort {
+    fn read(&mut self, bytes: &mut [u8], limit: Duration) -> Result<usize, BoardError> {
         if !self.is_ready(PollFlags::POLLIN, limit)? {
             return Ok(0);
         }
-        match self.0.read(bytes) {
+        match self.file.read(bytes) {
             Ok(0) => Err(BoardError::Unplugged),
             Ok(length) => Ok(length),
             Err(error) if is_passing(&error) => Ok(0),
@@ -71,14 +102,10 @@ impl SerialPort {
         }
     }
 
-    /// Writes all bytes within `limit`.
-    ///
-    /// # Errors
-    /// [`BoardError::Deaf`] if they have not been taken in time; otherwise as [`SerialPort::read`].
-    pub(crate) fn write(&mut self, mut bytes: &[u8], limit: Duration) -> Result<(), BoardError> {
+    fn write(&mut self, mut bytes: &[u8], limit: Duration) -> Result<(), BoardError> {
         let start = Instant::now();
         while !bytes.is_empty() {
-            match self.0.write(bytes) {
+            match self.file.write(bytes) {
                 Ok(length) => bytes = &bytes[length..],
                 Err(error) if is_passing(&error) => {
                     let left = limit.saturating_sub(start.elapsed());
@@ -93,22 +120,15 @@ impl SerialPort {
         Ok(())
     }
 
-    fn is_ready(&self, event: PollFlags, limit: Duration) -> Result<bool, BoardError> {
-        // Rounded up, so that the last fraction of a millisecond is not spent polling.
-        let limit = PollTimeout::try_from(limit + Duration::from_millis(1));
-        let mut ports = [PollFd::new(self.0.as_fd(), event)];
-        match poll(&mut ports, limit.unwrap_or(PollTimeout::MAX)) {
-            Ok(0) | Err(Errno::EINTR) => Ok(false),
-            Ok(_) => Ok(true),
-            Err(error) => Err(failure(error.into())),
-        }
+    fn now(&self) -> Duration {
+        self.opened.elapsed()
     }
 }
 
 /// Ends the exclusive mode, which would outlast this process while another program has the port open.
 impl Drop for SerialPort {
     fn drop(&mut self) {
-        let _ = ioctl_tiocnxcl(&self.0);
+        let _ = ioctl_tiocnxcl(&self.file);
     }
 }
 

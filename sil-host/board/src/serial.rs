@@ -5,7 +5,7 @@
 //! changes nothing on the board.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use painleve_plant::Configuration;
 use painleve_plant::law_choice::build;
@@ -17,7 +17,7 @@ use painleve_shared::message::{
 use painleve_shared::wire::{self, Inbox, WireError};
 
 use super::{BoardError, ConnectedBoard, LineHealth, SILENCE_LIMIT, TimedAnswer};
-use crate::port::SerialPort;
+use crate::port::{Port, SerialPort};
 use crate::timing::Unit;
 
 /// Time allowed for the answer to any request other than a frame.
@@ -44,8 +44,8 @@ pub fn check(path: &Path) -> Result<(), BoardError> {
 const PATIENCE_GROWTH: f32 = 1.5;
 
 /// A flashed and configured board.
-pub struct Serial {
-    port: SerialPort,
+pub struct Serial<P: Port = SerialPort> {
+    port: P,
     inbox: Inbox,
     /// Received bytes not decoded yet.
     pending: Vec<u8>,
@@ -88,7 +88,16 @@ impl Serial {
     /// # Errors
     /// [`BoardError::Port`] or [`BoardError::InUse`] if it cannot be opened.
     pub fn connect(path: &Path) -> Result<Self, BoardError> {
-        let mut port = SerialPort::open(path)?;
+        Self::over(SerialPort::open(path)?)
+    }
+}
+
+impl<P: Port> Serial<P> {
+    /// Takes a line to a board; says nothing to the board yet.
+    ///
+    /// # Errors
+    /// [`BoardError::System`] if the port fails.
+    pub fn over(mut port: P) -> Result<Self, BoardError> {
         // Ends a message that the board may have received in part.
         port.write(&[0], SILENCE_LIMIT)?;
         Ok(Self {
@@ -133,6 +142,11 @@ impl Serial {
             other => return Err(BoardError::OutOfTurn(other)),
         }
         Ok(())
+    }
+
+    /// Returns the hash of the identified board's sources.
+    pub fn sources(&self) -> u64 {
+        self.sources
     }
 
     /// Returns whether the identified board was built from this program's sources.
@@ -218,6 +232,11 @@ impl Serial {
         self.ask(&Request::Stop, PATIENCE, is_stopped).map(|_| ())
     }
 
+    /// Returns the time on the line's clock.
+    pub fn now(&self) -> Duration {
+        self.port.now()
+    }
+
     /// Waits for a message that the board sends unasked; `None` after `limit`.
     ///
     /// # Errors
@@ -227,23 +246,38 @@ impl Serial {
     }
 
     /// Sends a request, and repeats it with growing patience until it is answered.
-    pub(crate) fn ask(
+    ///
+    /// # Errors
+    /// [`BoardError::Silent`] or [`BoardError::NoFrames`] if no board answers.
+    pub fn ask(
+        &mut self,
+        request: &Request<'_>,
+        patience: Duration,
+        is_wanted: impl Fn(&Response) -> bool,
+    ) -> Result<Response, BoardError> {
+        self.ask_within(request, patience, self.silence_limit, is_wanted)
+    }
+
+    /// The same with another limit of the board's silence.
+    pub(crate) fn ask_within(
         &mut self,
         request: &Request<'_>,
         mut patience: Duration,
+        silence_limit: Duration,
         is_wanted: impl Fn(&Response) -> bool,
     ) -> Result<Response, BoardError> {
         let mut buffer = [0; MAXIMUM_LENGTH];
         let bytes = wire::encode(request, &mut buffer)?;
-        let start = Instant::now();
+        let start = self.port.now();
         loop {
-            let left = self.silence_limit.saturating_sub(start.elapsed());
+            let left = silence_limit.saturating_sub(self.port.now() - start);
             self.port.write(bytes, left)?;
             if let Some(response) = self.receive(patience.min(left), &is_wanted)? {
                 return Ok(response);
             }
-            if start.elapsed() >= self.silence_limit {
-                return Err(self.silence(start.elapsed()));
+            let elapsed = self.port.now() - start;
+            if elapsed >= silence_limit {
+                return Err(self.silence(elapsed));
             }
             self.line.repeated_requests += 1;
             patience = patience.mul_f32(PATIENCE_GROWTH);
@@ -256,12 +290,12 @@ impl Serial {
         limit: Duration,
         is_wanted: impl Fn(&Response) -> bool,
     ) -> Result<Option<Response>, BoardError> {
-        let start = Instant::now();
+        let start = self.port.now();
         loop {
             if let Some(response) = self.take(&is_wanted) {
                 return Ok(Some(response));
             }
-            let left = limit.saturating_sub(start.elapsed());
+            let left = limit.saturating_sub(self.port.now() - start);
             if left.is_zero() {
                 return Ok(None);
             }
@@ -318,7 +352,7 @@ impl Serial {
 }
 
 /// Makes the board discard its configuration, if the line still carries the request.
-impl Drop for Serial {
+impl<P: Port> Drop for Serial<P> {
     fn drop(&mut self) {
         let mut buffer = [0; MAXIMUM_LENGTH];
         if let Ok(bytes) = wire::encode(&Request::Stop, &mut buffer) {
@@ -327,7 +361,7 @@ impl Drop for Serial {
     }
 }
 
-impl ConnectedBoard for Serial {
+impl<P: Port> ConnectedBoard for Serial<P> {
     const HOST: &'static str = "serial";
 
     fn unit(&self) -> Unit {

@@ -1,6 +1,5 @@
 //! The configuration that a board keeps in its flash.
 
-use std::path::Path;
 use std::time::Duration;
 
 use painleve_plant::Configuration;
@@ -8,27 +7,12 @@ use painleve_plant::law_choice::build;
 use painleve_shared::message::{Request, Response};
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 
-use crate::{BoardError, Serial};
+use crate::{BoardError, Port, Serial};
 
 /// Longest wait for the erasure of two sectors.
 const ERASURE: Duration = Duration::from_secs(10);
 
-/// A board that is asked about its own configuration.
-pub struct StoringBoard(Serial);
-
-impl StoringBoard {
-    /// Connects, and compares protocol and build.
-    ///
-    /// # Errors
-    /// [`BoardError::Port`], [`BoardError::InUse`], [`BoardError::Silent`], [`BoardError::NoFrames`],
-    /// [`BoardError::OtherProtocol`] or [`BoardError::OtherBuild`].
-    pub fn open(path: &Path) -> Result<Self, BoardError> {
-        let mut serial = Serial::connect(path)?;
-        serial.identify()?;
-        serial.silence_limit = ERASURE;
-        Ok(Self(serial))
-    }
-
+impl<P: Port> Serial<P> {
     /// Stores a configuration, with which the board starts from then on. Takes the torque off.
     ///
     /// # Errors
@@ -39,6 +23,18 @@ impl StoringBoard {
     ) -> Result<StoredConfiguration, BoardError> {
         let configuration = super::encode(configuration)?;
         self.change(&Request::Store {
+            build: build(),
+            configuration: &configuration,
+        })
+    }
+
+    /// Sends a configuration to store, and does not wait until it is.
+    ///
+    /// # Errors
+    /// [`BoardError::System`] if the port fails.
+    pub fn begin_to_store(&mut self, configuration: &Configuration) -> Result<(), BoardError> {
+        let configuration = super::encode(configuration)?;
+        self.send(&Request::Store {
             build: build(),
             configuration: &configuration,
         })
@@ -57,18 +53,18 @@ impl StoringBoard {
     /// # Errors
     /// [`BoardError::Silent`] if the board does not answer.
     pub fn stored(&mut self) -> Result<StoredConfiguration, BoardError> {
-        self.ask(&Request::Stored)
+        self.ask_for_stored(&Request::Stored)
     }
 
     fn change(&mut self, request: &Request<'_>) -> Result<StoredConfiguration, BoardError> {
-        let stored = self.ask(request)?;
+        let stored = self.ask_for_stored(request)?;
         match stored.state {
             StoredState::Empty | StoredState::Intact => Ok(stored),
             state => Err(BoardError::NotStored(state)),
         }
     }
 
-    fn ask(&mut self, request: &Request<'_>) -> Result<StoredConfiguration, BoardError> {
+    fn ask_for_stored(&mut self, request: &Request<'_>) -> Result<StoredConfiguration, BoardError> {
         let is_wanted = |response: &Response| {
             matches!(
                 response,
@@ -79,7 +75,7 @@ impl StoringBoard {
             )
         };
         // Not repeated meanwhile: every repetition would store it again.
-        match self.0.ask(request, ERASURE, is_wanted)? {
+        match self.ask_within(request, ERASURE, ERASURE, is_wanted)? {
             Response::Stored(stored) => Ok(stored),
             Response::OtherBuild { build } => Err(BoardError::other_build(build)),
             Response::RateRefused(rate) => Err(BoardError::RateRefused(rate)),

@@ -10,26 +10,8 @@
 //!   memory may be used for
 //! - [`unicorn`]: executes instructions
 //!
-//! The microcontrollers are not kinder than the manuals:
-//!
-//! | | open or slow in the manuals | here |
-//! |---|---|---|
-//! | window watchdog | phase of its prescaler, which runs freely | any, drawn by tests |
-//! | | the window itself | not modelled: the image opens it wholly |
-//! | independent watchdog | frequency of its oscillator | lowest, usual and highest in tests |
-//! | | time until a limit takes effect | five cycles, or a drawn phase less; the next limit must wait for it |
-//! | option bytes | time to program them | 800 ms and 50 ms; a reset meanwhile ends the test |
-//! | | what their register gives afterwards | STM32G474: the old ones until power comes up |
-//! | flash | time to erase a sector | 1 ms, except in tests that ask for seconds |
-//! | | access while it is busy | ends the test |
-//! | memory protection | all regions | as the image sets them; not inside the slots for configurations |
-//! | exceptions | a frame that cannot be stored | a hard fault |
-//! | crystal | time to start | 2 ms, or never |
-//! | serial port | overrun | modelled; noise and framing errors are not |
-//! | SPI | overrun | modelled on the STM32G474 |
-//! | DMA | errors | not modelled |
-//! | supply | slow ramps and thresholds' tolerance | not modelled |
-//! | all registers | reserved bits, errata, wait states, contention on the bus | not modelled |
+//! The microcontrollers are not kinder than the manuals: [what these leave open](../README.md),
+//! and what is not modelled.
 //!
 //! Time is counted in instructions: each takes [`machine::CYCLES_PER_INSTRUCTION`] of the clock
 //! that the image has configured. It does not measure the time on silicon.

@@ -13,6 +13,9 @@ pub const NMI: Exception = 2;
 /// Hard fault.
 pub const HARD_FAULT: Exception = 3;
 
+/// The SysTick timer's exception.
+const SYSTICK: Exception = 15;
+
 /// Implemented bits of a priority, from the top of its byte.
 const PRIORITY_MASK: u8 = 0xf0;
 
@@ -28,6 +31,8 @@ pub struct SystemControl {
     pub active: Vec<Exception>,
     /// Whether a non-maskable interrupt is pending.
     pub nmi_pending: bool,
+    /// Whether the SysTick timer's exception is pending.
+    pub systick_pending: bool,
     /// Address of the vector table; 0 after a reset.
     pub vector_table: u32,
     /// Whether a reset has been requested.
@@ -62,6 +67,7 @@ impl SystemControl {
             system_priorities: [0; 16],
             active: Vec::new(),
             nmi_pending: false,
+            systick_pending: false,
             vector_table: 0,
             reset_requested: false,
             cycle_counter_enabled: false,
@@ -94,7 +100,7 @@ impl SystemControl {
 
     /// Returns whether any exception would wake the processor.
     pub fn wakes(&self) -> bool {
-        self.nmi_pending || self.pending() != 0
+        self.nmi_pending || self.systick_pending || self.pending() != 0
     }
 
     fn priority(&self, exception: Exception) -> i32 {
@@ -123,10 +129,11 @@ impl SystemControl {
             return Some(NMI);
         }
         let pending = self.pending();
-        if pending == 0 || primask || faultmask {
+        let systick = self.systick_pending;
+        if (pending == 0 && !systick) || primask || faultmask {
             return None;
         }
-        let mut best = None;
+        let mut best = systick.then(|| (SYSTICK, self.priority(SYSTICK)));
         for interrupt in 0..INTERRUPTS {
             if pending & 1 << interrupt != 0 {
                 let priority = self.priority(interrupt + 16);
@@ -145,8 +152,10 @@ impl SystemControl {
 
     /// Enters an exception.
     pub fn enter(&mut self, exception: Exception) {
-        if exception == NMI {
-            self.nmi_pending = false;
+        match exception {
+            NMI => self.nmi_pending = false,
+            SYSTICK => self.systick_pending = false,
+            _ => {}
         }
         if exception >= 16 {
             self.latched &= !(1 << (exception - 16));
@@ -166,7 +175,6 @@ impl SystemControl {
             0xe000_1000 => u32::from(self.cycle_counter_enabled) | 0x4000_0000,
             0xe000_1004 if self.cycle_counter_enabled => (cycles - self.cycle_counter_zero) as u32,
             0xe000_1004 | 0xe000_1fb4 | 0xe000_1fb0 => 0,
-            0xe000_e010..=0xe000_e01f => 0,
             0xe000_e100..0xe000_e110 => word(self.enabled, 0xe000_e100),
             0xe000_e180..0xe000_e190 => word(self.enabled, 0xe000_e180),
             0xe000_e200..0xe000_e210 => word(self.pending(), 0xe000_e200),

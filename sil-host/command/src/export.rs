@@ -8,6 +8,8 @@ use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all, prepa
 use painleve_files::input_file;
 use painleve_process::terminal::warn;
 use painleve_record::export::{ExportError, Exported, ticks_to_csv};
+use painleve_record::record_file;
+use painleve_record::ros2::{self, BagError};
 use serde_json::json;
 
 use super::output_error::{InputError, RecordFileError, output};
@@ -19,11 +21,14 @@ pub struct ExportArguments {
     /// Record of a run, for example out/run.mcap.
     record: PathBuf,
     /// Write CSV, by default beside the record.
-    #[arg(long, value_name = "PATH", num_args = 0..=1, required_unless_present = "parquet")]
+    #[arg(long, value_name = "PATH", num_args = 0..=1, required_unless_present_any = ["parquet", "ros2"])]
     csv: Option<Option<PathBuf>>,
     /// Write Parquet, by default beside the record; requires the cargo feature parquet.
     #[arg(long, value_name = "PATH", num_args = 0..=1)]
     parquet: Option<Option<PathBuf>>,
+    /// Write a ROS 2 bag, by default beside the record.
+    #[arg(long, value_name = "PATH", num_args = 0..=1, conflicts_with = "recover")]
+    ros2: Option<Option<PathBuf>>,
     /// Export what is whole of a damaged or truncated record: the ticks before the damage.
     #[arg(long)]
     recover: bool,
@@ -50,7 +55,12 @@ pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
     if parquet.is_some() && !cfg!(feature = "parquet") {
         return Err(InputError::NoParquet.into());
     }
-    let wanted = [("--csv", csv.as_deref()), ("--parquet", parquet.as_deref())];
+    let bag = beside(&arguments.ros2, "ros2.mcap");
+    let wanted = [
+        ("--csv", csv.as_deref()),
+        ("--parquet", parquet.as_deref()),
+        ("--ros2", bag.as_deref()),
+    ];
     let wanted: Vec<_> = wanted
         .into_iter()
         .filter_map(|(option, path)| Some((option, path?)))
@@ -72,6 +82,12 @@ pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
         let mut table = Vec::new();
         exported = Some(export(arguments, path, &mut table)?);
         files.push(prepare(path, &columns(&table)?).map_err(output)?);
+    }
+    let mut rows = exported.as_ref().map(|exported| exported.rows);
+    if let Some(path) = &bag {
+        let (bag, ticks) = export_bag(arguments, path)?;
+        rows = rows.or(Some(ticks));
+        files.push(bag);
     }
     commit_all(files).map_err(output)?;
 
@@ -98,7 +114,7 @@ pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
     if arguments.json {
         return say(json!({
             "record": record.display().to_string(),
-            "rows": exported.as_ref().map(|exported| exported.rows),
+            "rows": rows,
             "files": wanted.iter().map(|(_, path)| path.display().to_string()).collect::<Vec<_>>(),
             "damage": damage.map(|(reason, exported)| {
                 json!({ "reason": reason, "whole_bytes": exported.whole_bytes, "bytes": bytes })
@@ -141,16 +157,30 @@ fn export(
     }
 }
 
+/// Writes the bag, and returns it with the number of its ticks.
+fn export_bag(arguments: &ExportArguments, path: &Path) -> Result<(AtomicFile, u64), CommandError> {
+    let open = || record_error(arguments, input_file::open(&arguments.record)).map(BufReader::new);
+    let notes = record_error(arguments, record_file::notes(open()?))?.unwrap_or_default();
+    // Records of earlier versions do not tell when they began.
+    let start_ns = notes
+        .get("start_unix_ns")
+        .and_then(|start| start.parse().ok());
+    let file = AtomicFile::create(path).map_err(output)?;
+    match ros2::to_bag(open()?, start_ns.unwrap_or_default(), file) {
+        Err(BagError::Write(source)) => Err(output(AtomicFileError::Write {
+            path: path.to_path_buf(),
+            source: std::io::Error::other(source),
+        })),
+        bag => record_error(arguments, bag),
+    }
+}
+
 /// Adds the name of the record to an error.
 fn record_error<T, E: Into<RecordFileError>>(
     arguments: &ExportArguments,
     result: Result<T, E>,
 ) -> Result<T, CommandError> {
-    result.map_err(|source| {
-        let path = arguments.record.clone();
-        let source = source.into();
-        InputError::Record { path, source }.into()
-    })
+    result.map_err(|source| InputError::record(&arguments.record, source).into())
 }
 
 #[cfg(feature = "parquet")]

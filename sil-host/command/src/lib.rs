@@ -1,15 +1,19 @@
 //! The `painleve` command: subcommands, options and errors.
 
+mod accept;
 mod bridge;
 mod commission;
+mod compare;
 mod completions;
 mod controller;
+mod diff;
 mod distinct_files;
 mod doctor;
 mod drive;
 mod export;
 mod fail_on;
 mod figures;
+mod given_scenario;
 mod identify;
 mod join;
 mod json;
@@ -29,6 +33,7 @@ mod study;
 mod sweep;
 mod system_path;
 mod timing;
+mod tune;
 
 use std::io::Write;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
@@ -41,6 +46,7 @@ use painleve_shared::status::Fault;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, Subcommand};
+use painleve_accept::AcceptError;
 use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
 use painleve_chart::picture;
@@ -80,6 +86,8 @@ enum Command {
     Run(run::RunArguments),
     #[command(flatten)]
     Process(Plan),
+    /// Test a bare board, without an arm: chip, clock, watchdogs, flash, line and pins; writes a report.
+    Accept(accept::AcceptArguments),
     /// Measure how the sensors and torque stages of an arm are mounted, and correct its scenario.
     Commission(commission::CommissionArguments),
     /// Measure the geometry of an arm by slides along its belt, and how well it is known.
@@ -93,6 +101,12 @@ enum Command {
     Doctor(doctor::DoctorArguments),
     /// Write the ticks of a record as a table.
     Export(export::ExportArguments),
+    /// Overlay runs in one page and one figure, and tell how much they differ.
+    Compare(compare::CompareArguments),
+    /// Search keys of a scenario for a smaller error, ripple and change of torque.
+    Tune(tune::TuneArguments),
+    /// List the keys in which two scenarios or records differ.
+    Diff(diff::DiffArguments),
     /// Print a completion script for a shell.
     Completions(completions::CompletionsArguments),
     /// Write a manual page for every command.
@@ -148,6 +162,12 @@ pub enum CommandError {
     /// A real arm cannot be commissioned: its torque stages do not come on or stay on.
     #[error(transparent)]
     Rig(BoardRigError),
+    /// A board cannot be tested.
+    #[error(transparent)]
+    Accept(AcceptError),
+    /// Steps of a board's acceptance have failed.
+    #[error("the board is not accepted: {}", .0.join(", "))]
+    NotAccepted(Vec<&'static str>),
     /// A file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -191,7 +211,10 @@ impl CommandError {
     /// 4: an output cannot be written; 5: deadlines missed; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Scenario(_) | Self::Input(_) | Self::Cyclictest(CyclictestError::OtherHost) => 2,
+            Self::Scenario(_)
+            | Self::Input(_)
+            | Self::Cyclictest(CyclictestError::OtherHost)
+            | Self::Accept(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
                 StudyError::Unwritable { .. } => 4,
@@ -211,7 +234,8 @@ impl CommandError {
             Self::Loop(LoopError::Plant(_))
             | Self::Faulted(_)
             | Self::Mounting(_)
-            | Self::Geometry(_) => 1,
+            | Self::Geometry(_)
+            | Self::NotAccepted(_) => 1,
             Self::Link(LinkError::Interrupted) => INTERRUPTED,
             Self::Loop(LoopError::Host(_) | LoopError::NotUnderstood { .. })
             | Self::Link(_)
@@ -398,8 +422,12 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Drive(_)
         | Command::Timing(_)
         | Command::Doctor(_) => {}
-        Command::Completions(_)
+        Command::Accept(_)
+        | Command::Completions(_)
         | Command::Man(_)
+        | Command::Compare(_)
+        | Command::Diff(_)
+        | Command::Tune(_)
         | Command::Export(_)
         | Command::Scenarios(_)
         | Command::Study(_)
@@ -413,9 +441,13 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Process(Plan::Plant(arguments)) => plant::run(&arguments),
         Command::Process(Plan::Controller(arguments)) => controller::run(&arguments),
         Command::Process(Plan::Bridge(arguments)) => bridge::run(&arguments),
+        Command::Accept(arguments) => accept::run(&arguments),
         Command::Commission(arguments) => commission::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Diff(arguments) => diff::run(&arguments),
+        Command::Tune(arguments) => tune::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),

@@ -6,8 +6,12 @@ use std::path::{Path, PathBuf};
 use painleve_chart::picture::PictureError;
 use painleve_commission::simulated::SimulatedError;
 use painleve_files::atomic_file::AtomicFileError;
+use painleve_record::comparison::NoEvent;
 use painleve_record::export::ExportError;
+use painleve_record::record_file::Damage;
 use painleve_record::recorder::RecordError;
+use painleve_record::ros2::BagError;
+use painleve_record::run_table::TableError;
 
 use super::CommandError;
 
@@ -55,6 +59,18 @@ pub enum RecordFileError {
     /// Its content cannot be used.
     #[error(transparent)]
     Content(#[from] ExportError),
+    /// It is damaged before its settings.
+    #[error("not a complete MCAP file: {0}")]
+    Damage(#[from] Damage),
+    /// No bag can be made of it.
+    #[error(transparent)]
+    Bag(#[from] BagError),
+    /// It has no settings.
+    #[error("it has no settings of a run: this is not a record of painleve")]
+    NoSettings,
+    /// It is no table of ticks.
+    #[error(transparent)]
+    Table(#[from] TableError),
     /// It is damaged, but not at its beginning.
     #[error(
         "it is damaged after {whole_bytes} bytes: {reason}; --recover exports the {rows} ticks before, up to {end_s} s"
@@ -103,6 +119,24 @@ pub enum InputError {
         /// The path of the input.
         input: PathBuf,
     },
+    /// The first run of a comparison has no settings.
+    #[error(
+        "the first run must be a record (.mcap), whose settings the page needs: {} has none",
+        path.display()
+    )]
+    FirstWithoutSettings {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A run of a comparison lacks the event.
+    #[error(transparent)]
+    NoEvent(NoEvent),
+    /// A table of trials is not of this search.
+    #[error("{} is not a table of this search: choose another --table, or delete it", path.display())]
+    OtherSearch {
+        /// The file.
+        path: PathBuf,
+    },
     /// An option is meant for other hosts.
     #[error("{option} has no effect with --host {host}, only with {hosts}: leave it out")]
     WithoutEffect {
@@ -142,6 +176,16 @@ pub enum InputError {
         /// The reason.
         source: io::Error,
     },
+}
+
+impl InputError {
+    /// A record, or a table of ticks, that cannot be used.
+    pub fn record(path: &Path, source: impl Into<RecordFileError>) -> Self {
+        Self::Record {
+            path: path.to_path_buf(),
+            source: source.into(),
+        }
+    }
 }
 
 /// Returns how an output's path leads to an input of another path.

@@ -20,6 +20,9 @@ pub struct ScenariosArguments {
     /// Print JSON: names and descriptions, or the whole scenario.
     #[arg(long, conflicts_with = "schema")]
     json: bool,
+    /// Print only the keys whose values are not the defaults.
+    #[arg(long, requires = "scenario", conflicts_with = "json")]
+    diff: bool,
     /// Override one key, for example belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "scenario")]
     overrides: Vec<String>,
@@ -35,7 +38,12 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
         if arguments.json {
             return say(serde_json::to_string(&scenario).map_err(output)?);
         }
-        return say(scenario.to_commented_toml().trim_end());
+        let text = if arguments.diff {
+            scenario.to_brief_toml()
+        } else {
+            scenario.to_commented_toml()
+        };
+        return say(text.trim_end());
     }
     if arguments.schema {
         return say(format!("{:#}", describe::json_schema()));

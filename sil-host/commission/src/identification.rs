@@ -9,6 +9,7 @@ use painleve_identify::{
     Identified, Limits, Parameter, Parameters, Prior, Reading, Refusal, Slide, identify,
 };
 use painleve_plant::decimal::as_written;
+use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, OutOfRange, Posture};
@@ -189,7 +190,7 @@ pub fn identify_arm<R: SlideRig>(
 ) -> Result<Found, IdentificationError<R::Error>> {
     let prior = prior(scenario, drawn);
     let limits = limits(scenario);
-    let first = posture(scenario);
+    let first = posture(scenario)?;
     let mut slides = Vec::new();
     let mut slide = |known: &Scenario, share: f64, postures: [Posture; 2]| {
         let program = slide_scenario(known, share)?;
@@ -217,12 +218,8 @@ pub fn identify_arm<R: SlideRig>(
 }
 
 /// Returns the posture of a scenario's start.
-fn posture(scenario: &Scenario) -> Posture {
-    let start = scenario.initial;
-    Posture::of(&painleve_shared::LinkMotion::new(
-        start.theta1_deg,
-        start.theta2_deg,
-    ))
+fn posture(scenario: &Scenario) -> Result<Posture, OutOfRange> {
+    Ok(Posture::of(&theta(&scenario.initial.state(&scenario.arm)?)))
 }
 
 /// Returns a deviation of the tip, m, as a setting.

@@ -31,6 +31,7 @@ pub mod stages;
 
 use painleve_firmware::configuration::Converters;
 use painleve_plant::decimal::as_written;
+use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::mounting::Mounting;
@@ -180,8 +181,7 @@ impl Expected {
                 .map_or(scenario.arm.height_m, |model| as_written(model.height_m)),
             ..configuration.arm.cast()
         };
-        let start = scenario.initial;
-        let start = LinkMotion::new(start.theta1_deg.to_radians(), start.theta2_deg.to_radians());
+        let start = theta(&scenario.initial.state(&scenario.arm)?);
         Ok(Self {
             arm: Arm::new(arm)?,
             belt_tilt_rad: f64::from(configuration.arm.belt_tilt_rad),

@@ -36,6 +36,7 @@ pub struct Simulation<P = BuiltInPlant> {
     enable_at_s: f64,
     arm: Arm<f64>,
     push: Push,
+    command_nm: JointTorque<f64>,
 }
 
 /// A force on the tip for a number of ticks.
@@ -91,6 +92,7 @@ impl<P: Plant> Simulation<P> {
             enable_at_s: scenario.run.enable_at_s,
             arm: Arm::new(scenario.arm)?,
             push: Push::default(),
+            command_nm: JointTorque::zeros(),
             plant,
         })
     }
@@ -110,6 +112,11 @@ impl<P: Plant> Simulation<P> {
         let pose = Pose::new(&self.plant.link_angles_rad());
         let torque_nm = self.arm.jacobian(&pose).transpose() * self.push.force_n;
         Some(GeneralisedTorque::from_vector(torque_nm).to_joints())
+    }
+
+    /// Returns the torques that the last tick has commanded, with those of a push, before the lag of the stages, N·m.
+    pub fn command_nm(&self) -> JointTorque<f64> {
+        self.command_nm
     }
 
     /// Returns the plant.
@@ -210,6 +217,7 @@ impl<P: Plant> Simulation<P> {
         if let Some(push_nm) = self.take_push_nm() {
             torque_nm += push_nm;
         }
+        self.command_nm = torque_nm;
         self.plant
             .command_torque(torque_nm, self.torque_stages.lag_s());
         if !captures_first {

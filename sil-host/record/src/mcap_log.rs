@@ -1,11 +1,12 @@
 //! A run as an MCAP log: JSON messages with their schemas, in zstd chunks.
 //!
 //! [`messages`](crate::messages) describes the topics; `log_time` is simulated time. One metadata
-//! record holds the scenario.
+//! record holds the scenario, and the time by the clock at which the record began.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter};
 use std::path::PathBuf;
+use std::time::SystemTime;
 
 use mcap::McapError;
 use mcap::records::{MessageHeader, Metadata};
@@ -18,6 +19,7 @@ use crate::fields::TOPICS;
 use crate::messages::{
     CHANNELS, EVENTS, SCENE, TRANSFORMS, TickMessage, channels, event_message, nanoseconds,
 };
+use crate::record_file::NOTES;
 use crate::recorder::{RecordError, RecordedTick, Sink};
 use crate::scene::Scene;
 
@@ -82,6 +84,7 @@ impl McapLog {
         source: Source,
     ) -> Result<Self, McapError> {
         let mut writer = mcap::WriteOptions::new()
+            .profile(NOTES)
             .library(concat!("painleve ", env!("CARGO_PKG_VERSION")))
             // The cores belong to the control loop; one thread is fast enough.
             .compression_threads(0)
@@ -90,12 +93,13 @@ impl McapLog {
             .create(BufWriter::new(file))?;
         let configuration = toml::to_string(scenario).map_err(io::Error::other)?;
         writer.write_metadata(&Metadata {
-            name: "painleve".to_owned(),
+            name: NOTES.to_owned(),
             metadata: BTreeMap::from([
                 ("scenario".into(), scenario.name.clone()),
                 ("configuration".into(), configuration),
                 ("version".into(), env!("CARGO_PKG_VERSION").into()),
                 ("source".into(), source.name().into()),
+                ("start_unix_ns".into(), unix_ns().to_string()),
             ]),
         })?;
         let mut numbers = [0; CHANNELS];
@@ -191,6 +195,16 @@ impl Sink for McapLog {
             .map_err(|error| RecordError::write(&self.path, reason(error)))?;
         Ok(Some(self.complete()?.commit_partial()?))
     }
+}
+
+/// Returns the time by the clock, ns since 1970; 0 if the clock is before.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "a note about the run, on which no result depends"
+)]
+fn unix_ns() -> u128 {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    now.map_or(0, |since| since.as_nanos())
 }
 
 fn reason(error: McapError) -> io::Error {

@@ -1,4 +1,4 @@
-//! One run over time, from the arm's postures to the contact coefficient p.
+//! One run over time, from the arm's postures to the distance from the paradox.
 //!
 //! Panels are stacked on one time axis as in the paper's simulation figures. Flight is shaded in
 //! every panel, so that cause and effect line up. Panels without content are left out.
@@ -21,8 +21,10 @@ use painleve_shared::frame::StatusFlags;
 use painleve_shared::status::SupervisorState;
 
 use crate::events::{EventKind, RunEvent};
+use crate::paradox::ParadoxDistance;
 use crate::recorder::{RecordError, RecordedTick, Sink};
 use panels::Panels;
+pub(crate) use panels::points;
 use verdict::Verdict;
 
 /// Signals of the figure, by their index in a bin.
@@ -43,8 +45,10 @@ mod signal {
     pub(super) const FRICTION_LOW: usize = 13;
     pub(super) const FRICTION_HIGH: usize = 14;
     pub(super) const B: usize = 15;
-    pub(super) const P: usize = 16;
-    pub(super) const COUNT: usize = 17;
+    /// log₁₀ of the distance to the edge in mm, and of p/Q22.
+    pub(super) const EDGE: usize = 16;
+    pub(super) const P_RATIO: usize = 17;
+    pub(super) const COUNT: usize = 18;
 }
 
 /// Flags of a bin: contact modes, then the controller's states, then the rest.
@@ -63,6 +67,7 @@ mod flag {
     pub(super) const RECOVERING: u16 = 1 << 10;
     pub(super) const IMPACT: u16 = 1 << 11;
     pub(super) const IMPACT_WITHOUT_COLLISION: u16 = 1 << 12;
+    pub(super) const PARADOX: u16 = 1 << 13;
 }
 
 type RunBin = Bin<{ signal::COUNT }>;
@@ -71,6 +76,7 @@ type RunBin = Bin<{ signal::COUNT }>;
 #[derive(Clone, Debug)]
 pub struct RunPlot {
     scenario: Scenario,
+    paradox: Option<ParadoxDistance>,
     samples: Decimator<{ signal::COUNT }>,
     verdict: Verdict,
     /// Flags of events since the last tick.
@@ -82,6 +88,7 @@ impl RunPlot {
     pub fn new(scenario: &Scenario) -> Self {
         Self {
             scenario: scenario.clone(),
+            paradox: ParadoxDistance::new(scenario).ok(),
             samples: Decimator::default(),
             verdict: Verdict::default(),
             pending: 0,
@@ -103,7 +110,6 @@ impl RunPlot {
         values[signal::GAP] = 1e3 * plant.gap_m;
         values[signal::NORMAL_FORCE] = plant.normal_force_n;
         values[signal::B] = plant.b_m_s2;
-        values[signal::P] = plant.p_per_kg;
         let follows = reference_m.is_finite();
         if let Some(now) = tick.estimates.filter(|_| follows) {
             let [lower, upper] = now.edges_m.map(f64::from);
@@ -117,6 +123,16 @@ impl RunPlot {
         }
         let mut flags = flag::mode(plant.mode) | self.pending;
         self.pending = 0;
+        if let Some(paradox) = &mut self.paradox {
+            let distance = paradox.measure(&plant.theta_rad, plant.p_per_kg);
+            if distance.p_ratio <= 0.0 {
+                flags |= flag::PARADOX;
+            } else {
+                // Less than a micrometre is less than any encoder of a board resolves.
+                values[signal::EDGE] = (1e3 * distance.edge_m).log10().clamp(-3.0, 6.0);
+                values[signal::P_RATIO] = distance.p_ratio.log10();
+            }
+        }
         if let Some(state) = answer.supervisor_state() {
             flags |= flag::state(state);
         }

@@ -5,7 +5,7 @@
 //! [`MOST_BYTES`] is loaded: memory does not grow with the file.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Read};
 
 use mcap::records::{ChunkHeader, Record, op};
@@ -16,6 +16,9 @@ use crate::fields::TOPICS;
 
 /// Longest record, and longest content of a chunk, bytes. Those of a run have 1 MB.
 pub const MOST_BYTES: usize = 8 << 20;
+
+/// Name of the metadata in which a run describes itself.
+pub const NOTES: &str = "painleve";
 
 /// What is wrong with a record.
 #[derive(Debug, thiserror::Error)]
@@ -81,9 +84,42 @@ pub struct Extent {
 /// # Errors
 /// [`Damage`], as its own type or that of `receive`.
 pub fn messages<E: From<Damage>>(
-    mut file: impl Read,
+    file: impl Read,
     extent: &mut Extent,
     mut receive: impl FnMut(RecordedMessage<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut channels = Channels::default();
+    records(file, extent, |opcode, data| {
+        channels.file_record(opcode, data, &mut receive)?;
+        Ok(true)
+    })
+}
+
+/// Returns what a run has noted about itself at the start of its record: `scenario`, `configuration` (TOML), `version`,
+/// `source` and more; `None` if there is no such note.
+///
+/// # Errors
+/// [`Damage`] before it.
+pub fn notes(file: impl Read) -> Result<Option<BTreeMap<String, String>>, Damage> {
+    let mut found = None;
+    records(file, &mut Extent::default(), |opcode, data| {
+        if opcode == op::METADATA
+            && let Record::Metadata(record) = parse_record(opcode, data)?
+            && record.name == NOTES
+        {
+            found = Some(record.metadata);
+        }
+        // The notes come before all messages.
+        Ok::<_, Damage>(found.is_none() && opcode != op::CHUNK)
+    })?;
+    Ok(found)
+}
+
+/// Passes every record before the end of the data on, until `take` wants no more.
+fn records<E: From<Damage>>(
+    mut file: impl Read,
+    extent: &mut Extent,
+    mut take: impl FnMut(u8, &[u8]) -> Result<bool, E>,
 ) -> Result<(), E> {
     let options = LinearReaderOptions::default()
         .with_emit_chunks(true)
@@ -92,7 +128,6 @@ pub fn messages<E: From<Damage>>(
         .with_check_finishes_after_end_magic(true)
         .with_record_length_limit(MOST_BYTES);
     let mut reader = LinearReader::new_with_options(options);
-    let mut channels = Channels::default();
     let (mut bytes_read, mut is_in_data) = (0, true);
     while let Some(event) = reader.next_event() {
         match event.map_err(Damage::from)? {
@@ -109,8 +144,8 @@ pub fn messages<E: From<Damage>>(
             LinearReadEvent::Record { opcode, data } => {
                 // Behind the data, the file repeats what it holds, for readers that seek.
                 is_in_data &= opcode != op::DATA_END;
-                if is_in_data {
-                    channels.file_record(opcode, data, &mut receive)?;
+                if is_in_data && !take(opcode, data)? {
+                    return Ok(());
                 }
                 // The reader never asks for more than the next record.
                 extent.whole_bytes = bytes_read;

@@ -31,7 +31,7 @@ use painleve_plant::mechanics::torque::TorqueSegment;
 use painleve_plant::mechanics::turned_pose::KnownPose;
 use painleve_plant::mechanics::{ArmOnBelt, InitialState, PlantParameters, SolverSettings};
 use painleve_plant::{ContactMode, Plant, State};
-use painleve_shared::{Arm, JointTorque};
+use painleve_shared::{Arm, ArmParameters, JointTorque};
 
 /// Simulated time, s.
 const DURATION_S: f64 = 1.0;
@@ -77,7 +77,10 @@ fn parameters(relative_tolerance: f64) -> PlantParameters {
 
 /// The state of rest to which the arm slides without torque.
 fn attractor() -> Outcome<State> {
-    let mut plant = ArmOnBelt::new(&parameters(1e-12), InitialState::default().state())?;
+    let mut plant = ArmOnBelt::new(
+        &parameters(1e-12),
+        InitialState::default().state(&ArmParameters::default())?,
+    )?;
     plant.advance(60.0, &mut ())?;
     Ok(*plant.state())
 }

@@ -13,11 +13,11 @@ use painleve_study_paper::{
     admissible, bifurcation, closed_loop_bifurcation, poincare, regions, sliding_range,
 };
 use painleve_study_quality::{
-    ablation, capture, effects, lift_off, ringing, robustness, stiffness,
+    ablation, capture, effects, lift_off, loop_margins, ringing, robustness, stiffness,
 };
 
 /// Every study, in the order of the command's help and of the page.
-pub static STUDIES: [CatalogueEntry; 13] = [
+pub static STUDIES: [CatalogueEntry; 14] = [
     CatalogueEntry::of::<admissible::Options>(),
     CatalogueEntry::of::<regions::Options>(),
     CatalogueEntry::of::<bifurcation::Options>(),
@@ -29,6 +29,7 @@ pub static STUDIES: [CatalogueEntry; 13] = [
     CatalogueEntry::of::<effects::Options>(),
     CatalogueEntry::of::<stiffness::Options>(),
     CatalogueEntry::of::<ringing::Options>(),
+    CatalogueEntry::of::<loop_margins::Options>(),
     CatalogueEntry::of::<capture::Options>(),
     CatalogueEntry::of::<lift_off::Options>(),
 ];

@@ -30,7 +30,8 @@ class Page {
       flag("at edge", "--red", FLAGS.edge),
       flag("recovering", "--orange", FLAGS.recovering),
     ].map(([label, kinds, kindOf]) => new Ribbon($("ribbons"), label, kinds, kindOf, this.columns, seek));
-    this.charts = new Charts($("charts"), this.columns, seek, () => this.drawRibbons());
+    this.charts = new Charts($("charts"), this.columns, seek, () => this.zoomed());
+    this.compare(run.comparison);
     this.controls();
     this.theme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     this.listEvents();
@@ -47,6 +48,10 @@ class Page {
     $("title").textContent = run.name;
     $("subtitle").textContent = `${run.description ? `${run.description.replace(/\.?$/, ".")} ` : ""}Law ${run.law} · ${run.tick_hz} Hz · μ = ${run.friction} · seed ${run.seed}`;
     $("settings").querySelector("pre").textContent = run.settings;
+    for (const [id, text, type] of [["save", run.settings, "toml"], ["save-changes", run.changes ?? "", "sh"]]) {
+      $(id).href = `data:text/plain;charset=utf-8,${encodeURIComponent(text)}`;
+      $(id).download = `${run.name}.${type}`;
+    }
   }
 
   verdict() {
@@ -57,6 +62,45 @@ class Page {
     if (fault) texts.push(fault[2]);
     $("verdict").textContent = texts.join(" · ");
     $("verdict").dataset.good = String(!lifts && !fault);
+  }
+
+  /** Shows other runs beside this one. */
+  compare(comparison) {
+    if (!comparison) { for (const only of document.querySelectorAll("[data-compare]")) only.remove(); return; }
+    const colours = ["--orange", "--blue", "--green", "--purple", "--sky", "--red"];
+    const others = comparison.others.map(({ label, shift_s, rows }, number) => {
+      const columns = new Columns(this.run.columns, this.run.byte_columns);
+      columns.append(bytesOfBase64(rows));
+      return { label, shift: shift_s, columns, colour: colours[number % colours.length] };
+    });
+    this.arm.others = this.charts.others = others;
+    document.title = `${[comparison.label, ...others.map(({ label }) => label)].join(" · ")} · painleve`;
+    $("title").textContent = "Comparison of runs";
+    $("subtitle").textContent = comparison.aligned;
+    $("verdict").textContent = "";
+    for (const { label, colour } of [{ label: comparison.label, colour: "--ink" }, ...others]) {
+      const name = document.createElement("span"), swatch = document.createElement("i");
+      swatch.className = "swatch";
+      swatch.style.background = `var(${colour})`;
+      name.append(swatch, label);
+      $("runs").append(name);
+    }
+    for (const { title, head, rows } of comparison.tables) {
+      const table = $("comparison").appendChild(document.createElement("table"));
+      table.createCaption().textContent = title;
+      const line = table.createTHead().insertRow();
+      for (const text of head) line.appendChild(document.createElement("th")).textContent = text;
+      const body = table.createTBody();
+      for (const cells of rows) { const row = body.insertRow(); for (const text of cells) row.insertCell().textContent = text; }
+    }
+  }
+
+  /** After a zoom: the time goes into the window. */
+  zoomed() {
+    const [from, to] = this.charts.shown;
+    if (!this.live && (this.time < from || this.time > to)) this.seek(from);
+    this.drawRibbons();
+    this.dirty = true;
   }
 
   controls() {
@@ -147,12 +191,14 @@ class Page {
     const c = this.columns;
     if (!c.length) return;
     const i = c.index(time), show = (name, digits, unit, scale = 1) => decimals(c[name][i] * scale, digits, unit);
+    const edge = c.p_ratio[i] <= 0 ? "inside" : show("edge_m", 2, "mm", 1e3);
     const cells = [
       ["tip", show("tip_m", 2, "mm", 1e3)], ["reference", show("reference_m", 2, "mm", 1e3)],
       ["gap", show("gap_m", 4, "mm", 1e3)], ["belt", show("belt_m_s", 3, "m/s")],
       ["normal force", show("fn_n", 2, "N")], ["tangential force", show("ft_n", 2, "N")],
       ["u1", show("u1_nm", 3, "N·m")], ["u2", show("u2_nm", 3, "N·m")],
       ["b", show("b_m_s2", 2, "m/s²")], ["p", show("p_per_kg", 3, "1/kg")],
+      ["edge at", edge], ["p/Q22", show("p_ratio", 3, "")],
       ["μ estimate", `${decimals(c.friction[i], 3, "")}± ${decimals(c.friction_deviation[i], 3, "")}`], ["contact confidence", show("confidence", 3, "")],
     ];
     const body = $("readout").tBodies[0];

@@ -49,6 +49,14 @@ class ArmView {
       g.fillStyle = k.orange;
       g.beginPath(); g.moveTo(x(reference), beltY + 3); g.lineTo(x(reference) - 6, beltY + 15); g.lineTo(x(reference) + 6, beltY + 15); g.fill();
     }
+    for (const { columns, shift, colour } of this.others ?? []) {
+      const at = Math.min(Math.max(time - shift, columns.start), columns.end);
+      const [b1, b2] = [columns.at("theta1_rad", at), columns.at("theta2_rad", at)];
+      const bend = [l1 * Math.sin(b1), arm.height_m - l1 * Math.cos(b1)];
+      g.strokeStyle = ink(colour); g.lineWidth = 3; g.setLineDash([7, 4]);
+      g.beginPath(); g.moveTo(x(0), y(arm.height_m)); g.lineTo(x(bend[0]), y(bend[1])); g.lineTo(x(bend[0] + l2 * Math.sin(b2)), y(bend[1] - l2 * Math.cos(b2))); g.stroke();
+      g.setLineDash([]);
+    }
     // Base.
     g.fillStyle = k.line; g.fillRect(x(0) - 26, y(arm.height_m) - 12, 52, 8);
     g.lineCap = "round"; g.lineJoin = "round";
@@ -102,7 +110,7 @@ class ArmView {
     const gap = 1e3 * c.at("gap_m", time);
     g.textAlign = "right"; g.font = "600 13px system-ui, 'DejaVu Sans', sans-serif";
     g.fillStyle = flies ? this.colours.red : this.colours.faint;
-    g.fillText(flies ? `gap ${gap.toFixed(gap < 0.1 ? 3 : 1)} mm` : MODES[c.mode[c.index(time)]][0], width - 10, 20);
+    g.fillText(flies ? `gap ${fixed(gap, gap < 0.1 ? 3 : 1)} mm` : MODES[c.mode[c.index(time)]][0], width - 10, 20);
   }
 }
 

@@ -3,18 +3,19 @@
 // playing does not redraw the curves.
 
 const CHARTS = [
-  { title: "Tip along the belt", unit: "mm", curves: [["reference_m", "reference", "--orange", 1e3, false, 5], ["tip_m", "tip", "--ink", 1e3], ["lower_edge_m", "edges", "--red", 1e3, true], ["upper_edge_m", "", "--red", 1e3, true]] },
+  { title: "Tip along the belt", unit: "mm", least: 0.01, measured: 2, compared: ["tip_m"], curves: [["reference_m", "reference", "--orange", 1e3, false, 5], ["tip_m", "tip", "--ink", 1e3], ["lower_edge_m", "edges", "--red", 1e3, true], ["upper_edge_m", "", "--red", 1e3, true]] },
+  { title: "Distance to the edge", unit: "mm", note: "along the belt, to p = 0", curves: [["edge_m", "", "--red", 1e3]], log: [1e-3, 1e3] },
+  { title: "p/Q22", unit: "", note: "paradox where p ≤ 0: no curve", curves: [["p_ratio", "", "--green", 1]], log: [1e-4, 10] },
   { title: "Gap", unit: "mm", curves: [["gap_m", "", "--red", 1e3]], zero: true, least: 0.01 },
   { title: "Contact force", unit: "N", curves: [["fn_n", "normal", "--blue", 1], ["ft_n", "tangential", "--orange", 1]], zero: true, most: 60 },
-  { title: "Joint torques", unit: "N·m", curves: [["u1_nm", "u1", "--ink", 1], ["u2_nm", "u2", "--orange", 1]], zero: true },
+  { title: "Joint torques", unit: "N·m", compared: ["u1_nm", "u2_nm"], curves: [["u1_nm", "u1", "--ink", 1], ["u2_nm", "u2", "--orange", 1]], zero: true },
   { title: "Friction coefficient", unit: "", curves: [["friction", "estimate", "--purple", 1], ["friction_low", "± one deviation", "--purple", 1, true], ["friction_high", "", "--purple", 1, true]], band: [3, 2] },
   { title: "Free normal acceleration b", unit: "m/s²", note: "lift-off where b ≥ 0", curves: [["b_m_s2", "", "--blue", 1]], zero: true },
-  { title: "Contact coefficient p", unit: "1/kg", note: "paradox where p ≤ 0", curves: [["p_per_kg", "", "--green", 1]], zero: true },
 ];
 
 class Charts {
   constructor(parent, columns, seek, zoomed) {
-    Object.assign(this, { parent, columns, seek, zoomed, plots: [], range: null });
+    Object.assign(this, { parent, columns, seek, zoomed, plots: [], range: null, others: [] });
   }
 
   /** Whether a curve has anything to show. A chart without such a curve is left out. */
@@ -27,8 +28,19 @@ class Charts {
   build(all = false) {
     for (const { plot } of this.plots) plot.destroy();
     this.parent.replaceChildren();
-    this.plots = CHARTS.filter((chart) => all || chart.curves.some(([name]) => this.has(name))).map((chart) => this.chart(chart, all));
+    this.plots = this.listed().filter((chart) => all || chart.curves.some(([name]) => this.has(name))).map((chart) => this.chart(chart, all));
     this.update();
+  }
+
+  /** The charts. Beside other runs, a chart has only what is compared, and a colour means a run. */
+  listed() {
+    if (!this.others.length) return CHARTS;
+    return CHARTS.map((chart) => {
+      const compared = chart.compared ?? [chart.curves[0][0]];
+      const curves = chart.curves.filter(([name]) => compared.includes(name));
+      const note = curves.length > 1 ? curves.map(([, label]) => label).join(" and ") : chart.note;
+      return { ...chart, note, band: undefined, measured: undefined, curves: curves.map(([name, , , scale]) => [name, "", "--ink", scale]) };
+    });
   }
 
   chart(chart, all) {
@@ -61,9 +73,9 @@ class Charts {
       height: 130,
       legend: { show: false },
       cursor: { sync: { key: "run" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 }, bind: { dblclick: () => () => this.zoom(0) } },
-      scales: { x: { time: false }, y: { range: (_, low, high) => span(low, high, chart) } },
-      axes: [{ ...axis, size: 30 }, { ...axis, size: 58 }],
-      series: [{}, ...chart.curves.map(([, , colour, , dashed, width]) => ({ stroke: ink(colour), width: width ?? (dashed ? 1 : 1.5), dash: dashed ? [5, 4] : undefined, spanGaps: false, points: { show: false } }))],
+      scales: { x: { time: false }, y: chart.log ? { distr: 3, log: 10, range: (_, low, high) => decades(low, high) } : { range: (u, low, high) => span(...(chart.measured ? near(u, chart) : [low, high]), chart) } },
+      axes: [{ ...axis, size: 30, values: ticks }, { ...axis, size: 70, space: 20, ...(chart.log ? { splits: (u) => between(u.scales.y), filter: (_, splits) => splits, values: (_, splits) => splits.map(String) } : { values: ticks }) }],
+      series: [{}, ...chart.curves.map(([, , colour, , dashed, width]) => ({ stroke: ink(colour), width: width ?? (dashed ? 1 : 1.5), dash: dashed ? [5, 4] : undefined, spanGaps: false, points: { show: false } })), ...this.overlaid(chart).map(({ other }) => ({ stroke: ink(other.colour), width: 1.5, dash: [7, 3], spanGaps: false, points: { show: false } }))],
       bands: chart.band ? [{ series: chart.band, fill: ink("--purple") + "33" }] : [],
       hooks: {
         drawClear: [(u) => this.shadeFlights(u)],
@@ -77,9 +89,16 @@ class Charts {
     return { chart, plot, playhead, holder };
   }
 
+  /** The curves of other runs in a chart. */
+  overlaid(chart) {
+    const compared = chart.compared ?? [chart.curves[0][0]];
+    return this.others.flatMap((other) => compared.map((name) => ({ other, name, scale: chart.curves.find((curve) => curve[0] === name)[3] })));
+  }
+
   data(chart) {
     const c = this.columns;
-    return [c.t.subarray(0, c.length), ...chart.curves.map(([name, , , scale]) => c.chart(name, scale))];
+    const curves = chart.curves.map(([name, , , scale]) => (chart.log ? c.positive(name, scale, chart.log) : c.chart(name, scale)));
+    return [c.t.subarray(0, c.length), ...curves, ...this.overlaid(chart).map(({ other, name, scale }) => other.columns.resampled(name, c, other.shift, scale, chart.log))];
   }
 
   /** Draws the present columns. */
@@ -145,6 +164,56 @@ class Charts {
   resize() {
     for (const { plot, holder } of this.plots) plot.setSize({ width: Math.max(holder.clientWidth, 200), height: 130 });
   }
+}
+
+/** The range of the first curves of a chart in the window, with those of the others that are not far from it. */
+function near(u, { measured, curves }) {
+  const [from, to] = u.series[0].idxs ?? [0, u.data[0].length - 1];
+  const range = (numbers) => {
+    let low = Infinity, high = -Infinity;
+    for (const number of numbers) {
+      for (let i = from; i <= to; i++) {
+        const value = u.data[number][i];
+        if (value != null) { low = Math.min(low, value); high = Math.max(high, value); }
+      }
+    }
+    return [low, high];
+  };
+  const numbers = u.data.map((_, number) => number).slice(1);
+  const first = numbers.filter((number) => number <= measured || number > curves.length);
+  let [low, high] = range(first);
+  if (!(low <= high)) return [null, null];
+  const room = Math.max(high - low, 2);
+  for (const number of numbers.filter((number) => !first.includes(number))) {
+    const [least, most] = range([number]);
+    if (most >= low - room && least <= high + room) { low = Math.min(low, Math.max(least, low - room)); high = Math.max(high, Math.min(most, high + room)); }
+  }
+  return [low, high];
+}
+
+/** Labels with as many decimals as distinguish them. */
+function ticks(_, splits, __, ___, step) {
+  let digits = 0;
+  while (digits < 9 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits++;
+  return splits.map((value) => (value == null ? "" : fixed(value, digits)));
+}
+
+/** The ends of a logarithmic axis. */
+function decades(low, high) {
+  if (low == null || !(low > 0)) return [0.1, 1];
+  return high < 2 * low ? [low / 1.5, high * 1.5] : [low / 1.15, high * 1.15];
+}
+
+/** Round places on a logarithmic axis: powers of ten, with 2 and 5 between them if there are few. */
+function between({ min, max }) {
+  const factors = max / min < 50 ? [1, 2, 5] : [1], places = [];
+  for (let power = Math.floor(Math.log10(min)); power <= Math.ceil(Math.log10(max)); power++) {
+    for (const factor of factors) {
+      const place = Number(`${factor}e${power}`);
+      if (place >= min && place <= max) places.push(place);
+    }
+  }
+  return places;
 }
 
 /** The range of values of a chart: never empty, with zero where it matters, without spikes beyond `most`. */

@@ -80,6 +80,22 @@ class Columns {
     return Number.isFinite(b) ? a + (b - a) * part : a;
   }
 
+  /** A column for a logarithmic axis between two limits, with a gap where a value is not positive. */
+  positive(name, scale, limits) {
+    return this.chart(name, scale).map((value) => onLogarithm(value, limits));
+  }
+
+  /** A column at the times of other columns, which are later by `shift`; with a gap where this run has no row. */
+  resampled(name, onto, shift, scale, limits) {
+    const values = new Array(onto.length);
+    for (let i = 0; i < onto.length; i++) {
+      const time = onto.t[i] - shift, value = this.at(name, time) * scale;
+      const known = time >= this.start - 1e-9 && time <= this.end + 1e-9 && Number.isFinite(value);
+      values[i] = known ? (limits ? onLogarithm(value, limits) : value) : null;
+    }
+    return values;
+  }
+
   /** A column for uPlot, with a gap where a value is not finite. */
   chart(name, scale = 1) {
     const values = new Array(this.length);
@@ -91,6 +107,11 @@ class Columns {
   }
 }
 
+/** A value on a logarithmic axis; null if it has none. */
+function onLogarithm(value, [least, most]) {
+  return !(value > 0) ? null : Math.min(Math.max(value, least), most);
+}
+
 function bytesOfBase64(text) {
   const raw = atob(text), bytes = new Uint8Array(raw.length);
   for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
@@ -98,7 +119,13 @@ function bytesOfBase64(text) {
 }
 
 function decimals(value, digits, unit) {
-  return Number.isFinite(value) ? `${value.toFixed(digits)} ${unit}`.replace("-", "−") : "–";
+  return Number.isFinite(value) ? `${fixed(value, digits)} ${unit}` : "–";
+}
+
+/** A number with a minus sign of its own, and none before zero. */
+function fixed(value, digits) {
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
 /** A colour of the present theme. */

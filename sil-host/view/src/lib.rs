@@ -2,6 +2,7 @@
 //!
 //! - [`row`]: the data of one tick for the page, as bytes
 //! - [`thinning`]: limits the number of rows and keeps the extremes of the contact force
+//! - [`comparison`]: the page of a run with others beside it
 //! - [`page`]: the page of a recorded run as one file that needs no network
 //! - [`server`]: the viewers of a live run on this machine: the same page, and Foxglove
 //! - [`access`]: who may be one; `connection`: a connection until it is
@@ -12,6 +13,7 @@
 //! `page/` contains the page itself; its scripts need no build step.
 
 pub mod access;
+pub mod comparison;
 mod connection;
 pub mod foxglove;
 pub mod hub;

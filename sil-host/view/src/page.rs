@@ -10,7 +10,7 @@ use painleve_record::events::RunEvent;
 use painleve_record::{RecordError, RecordedTick, Sink};
 use serde_json::{Value, json};
 
-use crate::row::{BYTE_COLUMNS, COLUMNS, ROW_BYTES, Row};
+use crate::row::{BYTE_COLUMNS, COLUMNS, Follower, ROW_BYTES, Row};
 use crate::thinning::Thinned;
 
 /// Number of events listed individually; further ones are counted.
@@ -62,32 +62,11 @@ pub fn description(scenario: &Scenario) -> Value {
     })
 }
 
-/// The distance that the belt has moved.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct BeltTravel {
-    travel_m: f64,
-    last_s: Option<f64>,
-}
-
-impl BeltTravel {
-    /// Advances to a tick and returns the distance since the first one, m.
-    pub fn advance(&mut self, tick: &RecordedTick<'_>) -> f64 {
-        let plant = &tick.sample.plant;
-        let elapsed_s = plant.time_s - self.last_s.unwrap_or(plant.time_s);
-        // Unknown on a real arm.
-        if plant.belt_speed_m_s.is_finite() {
-            self.travel_m += plant.belt_speed_m_s * elapsed_s;
-        }
-        self.last_s = Some(plant.time_s);
-        self.travel_m
-    }
-}
-
 /// Writes the page of a run to a file that appears once it is complete.
 pub struct PageFile {
     file: AtomicFile,
     description: Value,
-    travel: BeltTravel,
+    follower: Follower,
     rows: Thinned,
     events: Vec<Value>,
     /// Numbers of events that are not listed, by kind.
@@ -100,7 +79,7 @@ impl PageFile {
         Self {
             file,
             description: description(scenario),
-            travel: BeltTravel::default(),
+            follower: Follower::new(scenario),
             rows: Thinned::default(),
             events: Vec::new(),
             more_events: BTreeMap::new(),
@@ -110,8 +89,8 @@ impl PageFile {
 
 impl Sink for PageFile {
     fn tick(&mut self, tick: &RecordedTick<'_>) -> Result<(), RecordError> {
-        let travel_m = self.travel.advance(tick);
-        self.rows.push(&Row::new(tick, travel_m));
+        let followed = self.follower.tick(tick);
+        self.rows.push(&Row::new(tick, followed));
         Ok(())
     }
 

@@ -113,7 +113,7 @@ impl SerialBoard {
             .args(["-icount", "shift=6,sleep=on"])
             .args(["-chardev", "pty,id=line", "-serial", "chardev:line"])
             .arg("-kernel")
-            .arg(painleve_tests::serial_image())
+            .arg(painleve_tests::image())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

@@ -132,24 +132,15 @@ pub fn run(
             crowd.push(TrialProcess::start(&mut command(place, role, bus, ""))?);
         }
     }
+    let start_peer = || TrialProcess::start(&mut command(place, other(plan.victim), bus, record));
     let mut peer = None;
     if plan.victim != ChaosRole::Run && plan.peer_first {
-        peer = Some(TrialProcess::start(&mut command(
-            place,
-            other(plan.victim),
-            bus,
-            record,
-        ))?);
+        peer = Some(start_peer()?);
     }
     let mut victim = Victim::start(&mut command(place, plan.victim, bus, record))?;
     let victim_said = Said::of(&mut victim.child)?;
     if plan.victim != ChaosRole::Run && !plan.peer_first {
-        peer = Some(TrialProcess::start(&mut command(
-            place,
-            other(plan.victim),
-            bus,
-            record,
-        ))?);
+        peer = Some(start_peer()?);
     }
     let traced = victim.signal_at(plan.call, plan.disturbance.signal(), REACH)?;
     let disturbed = Instant::now();

@@ -8,8 +8,9 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox};
 
+use crate::bare::BareBench;
 use painleve_chips::machine::{Machine, MachineSnapshot, Reset};
-use painleve_chips::stm32::{Outside, Pin, PinMode, WiredChip};
+use painleve_chips::stm32::{Outside, Pin, PinLevel, PinMode, WiredChip};
 use painleve_chips::stm32f4::Stm32f4;
 use painleve_chips::stm32g4::Stm32g4;
 use painleve_chips::{MILLISECOND, Picoseconds, SECOND};
@@ -44,6 +45,8 @@ pub struct BoardWiring {
     selected: [bool; 6],
     /// Level at which the image drives the torque stages' pin; `None` while the pin floats.
     pub stages: Option<bool>,
+    /// What is on the pins in place of all these parts.
+    pub bare: Option<BareBench>,
 }
 
 impl BoardWiring {
@@ -67,7 +70,7 @@ impl BoardWiring {
 }
 
 impl Outside for BoardWiring {
-    fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds) {
+    fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds) -> Option<PinLevel> {
         if pin == STAGES {
             self.stages = level;
         }
@@ -83,9 +86,20 @@ impl Outside for BoardWiring {
                 }
             }
         }
+        self.bare.as_mut()?.carry(pin, level)
+    }
+
+    fn code_at_output(&mut self, channel: usize, code: u32) -> u32 {
+        match &mut self.bare {
+            None => code,
+            Some(bare) => bare.code_at_output(channel, code),
+        }
     }
 
     fn transfer(&mut self, bus: usize, transfer: Transfer, now: Picoseconds) -> u16 {
+        if let Some(bare) = &mut self.bare {
+            return bare.answer(bus, transfer.bits);
+        }
         let candidates = if bus == 0 { 0..4 } else { 4..6 };
         let mut answer = u16::MAX;
         for index in candidates {
@@ -121,6 +135,11 @@ impl Torque {
 pub trait BoardChip: WiredChip<Outside = BoardWiring> {
     /// Name of its image.
     const IMAGE: &'static str;
+
+    /// Bit of its option bytes without which configurations cannot be stored.
+    const SLOT_OPTION: u32;
+    /// Bit of its protection against reading.
+    const READ_OPTION: u32;
 }
 
 /// The STM32F405 of a wired board.
@@ -131,10 +150,14 @@ pub type G474 = Stm32g4<BoardWiring>;
 
 impl BoardChip for F405 {
     const IMAGE: &'static str = "painleve-f405";
+    const SLOT_OPTION: u32 = 1 << 26;
+    const READ_OPTION: u32 = 1 << 8;
 }
 
 impl BoardChip for G474 {
     const IMAGE: &'static str = "painleve-g474";
+    const SLOT_OPTION: u32 = 1 << 22;
+    const READ_OPTION: u32 = 1;
 }
 
 /// The board with the STM32F405.
@@ -212,6 +235,16 @@ impl<C: BoardChip> EmulatedBoard<C> {
             heard: 0,
             line_free: 0,
         }
+    }
+
+    /// Creates a powered board without an arm: wires and open lines in place of its parts. Nothing has been executed.
+    pub fn bare(watchdog_hz: u64, bare: BareBench) -> Self {
+        let mut board = Self::with_oscillator(watchdog_hz);
+        for (pin, level) in bare.at_rest() {
+            board.machine.chip_mut().drive_pin(pin, level);
+        }
+        board.wiring().bare = Some(bare);
+        board
     }
 
     /// Creates a powered board that has booted and is idle.

@@ -3,15 +3,15 @@
 
 use painleve_bound::image::Image;
 use painleve_bound::report::{Bound, CORE_HZ};
-use painleve_tests::flash_image;
+use painleve_tests::image;
 use painleve_tests::printed::{self, LastFigure, thousands};
 
 #[test]
 fn a_tick_has_bounds_within_the_budget() {
     let budget: serde_json::Value =
         serde_json::from_str(include_str!("../../budget.json")).unwrap();
-    let elf = std::fs::read(flash_image()).unwrap();
-    let image = Image::of(flash_image(), &elf).unwrap_or_else(|error| panic!("{error}"));
+    let elf = std::fs::read(image()).unwrap();
+    let image = Image::of(image(), &elf).unwrap_or_else(|error| panic!("{error}"));
     let bound = Bound::of(&image).unwrap_or_else(|error| panic!("{error}"));
     for (cycles, key) in [
         (bound.control.cycles, "bound_cycles_of_control_interrupt"),

@@ -45,6 +45,8 @@ fn contents(bench: &Bench) -> Vec<(String, Vec<u8>)> {
         .collect()
 }
 
+const TUNE: &str = "tune s.toml --key controller.law.hybrid.velocity_gain_per_s=20:300 --trials 8";
+
 /// A bench with a scenario, its files, a record and a finished sweep.
 #[allow(clippy::unwrap_used)]
 fn furnished(name: &str) -> Bench {
@@ -157,6 +159,14 @@ fn no_output_replaces_an_input_or_another_output() {
         (
             "drive s.toml --port /dev/null --record s.toml",
             ["--record", "s.toml"],
+        ),
+        ("export r.mcap --ros2 link", ["--ros2", "r.mcap"]),
+        ("compare r.mcap r.mcap --html link", ["--html", "r.mcap"]),
+        (&format!("{TUNE} --out s.toml"), ["--out", "s.toml"]),
+        (&format!("{TUNE} --table s.toml"), ["--table", "s.toml"]),
+        (
+            &format!("{TUNE} --out same --table same"),
+            ["--out", "--table"],
         ),
     ] {
         let output = run(&bench, line);

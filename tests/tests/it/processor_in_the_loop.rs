@@ -5,9 +5,14 @@
 // Helper functions of tests may panic as tests do.
 #![allow(clippy::unwrap_used)]
 
+use std::io::Write;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
+use object::elf::{FileHeader32, PT_LOAD};
+use object::read::elf::{FileHeader, ProgramHeader};
+use object::{Endianness, Object, ObjectSection};
 use painleve_board::timing::{TickTimes, TimingReport};
 use painleve_board::{ConnectedBoard, Emulator};
 use painleve_plant::closed_loop::ClosedLoop;
@@ -244,6 +249,59 @@ fn timing_gives_the_same_report_for_every_host() {
         let figure = std::fs::read_to_string(bench.path("t.svg")).unwrap();
         assert!(figure.contains("paper-gains, 10000 Hz"), "{host:?}");
     }
+}
+
+/// What the emulator has in its flash after a run is what is flashed: the emulator executes no other bytes.
+#[test]
+fn the_emulator_executes_the_bytes_that_are_flashed() {
+    const FLASH: u32 = 0x0800_0000;
+    const LENGTH: usize = 1 << 20;
+    let bench = Bench::new("flashed-bytes");
+    let copy = bench.path("flash.bin");
+    let mut emulator = Command::new("qemu-system-arm")
+        .args(["-machine", "netduinoplus2", "-display", "none"])
+        .args(["-nodefaults", "-monitor", "stdio"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .arg("-kernel")
+        .arg(image())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let save = format!("pmemsave {FLASH} {LENGTH} \"{}\"\nquit\n", copy.display());
+    emulator
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(save.as_bytes())
+        .unwrap();
+    assert!(emulator.wait().unwrap().success());
+    let executed = std::fs::read(copy).unwrap();
+    assert_eq!(executed.len(), LENGTH);
+
+    let file = std::fs::read(image()).unwrap();
+    let header = FileHeader32::<Endianness>::parse(&*file).unwrap();
+    let endian = header.endian().unwrap();
+    let mut flashed = vec![0; LENGTH];
+    for segment in header.program_headers(endian, &*file).unwrap() {
+        let bytes = segment.data(endian, &*file).unwrap();
+        if segment.p_type(endian) == PT_LOAD && !bytes.is_empty() {
+            let start = (segment.p_paddr(endian) - FLASH) as usize;
+            flashed[start..start + bytes.len()].copy_from_slice(bytes);
+        }
+    }
+    let differs = executed.iter().zip(&flashed).position(|(a, b)| a != b);
+    assert_eq!(differs, None, "bytes of flash that differ");
+    // The program is where the chip's remapped memory has it, too.
+    assert_eq!(flashed[0x400..0x800], program_section(&file)[..0x400]);
+}
+
+/// Returns the section that the chip copies to its memory, where it is executed.
+fn program_section(file: &[u8]) -> Vec<u8> {
+    let image = object::File::parse(file).unwrap();
+    let section = image.section_by_name(".program").unwrap();
+    assert_eq!(section.address(), 0x400);
+    section.data().unwrap().to_vec()
 }
 
 /// Whatever an emulator made there would stay if its bridge were killed.

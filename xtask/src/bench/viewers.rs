@@ -4,8 +4,7 @@ use std::fs;
 
 use super::{Row, criterion, pinned};
 use crate::bench::machine::Machine;
-use crate::command::{ChoreError, workspace};
-use crate::setup::starts;
+use crate::command::{ChoreError, starts, workspace};
 
 /// Page of a run of 60 s.
 const PAGE: &str = "target/bench/run-of-60-s.html";

@@ -18,10 +18,13 @@
 #![no_std]
 #![cfg(target_os = "none")]
 
+pub mod emulator;
 pub mod flash;
 pub mod program_memory;
 pub mod safety;
 pub mod uart_dma;
+
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use defmt_rtt as _;
 use painleve_drivers::encoders::EncoderDriver;
@@ -30,9 +33,10 @@ use painleve_drivers::front_end::InputLevels;
 use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
 use painleve_image::board::{Board, Parts, StartFault};
-use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
+use painleve_image::dma_serial::{self, BAUD, DmaBytes};
 use painleve_image::flash::{ConfigurationFlash, FlashRegisters};
 use painleve_image::memory::FlashMemory;
+use painleve_image::probe::{SYSTICK, SpareBits};
 use painleve_image::protection::{self, Access, Region};
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
@@ -44,10 +48,11 @@ use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PB0, PC0, PC1, PC2, PinState
 pub use stm32f4xx_hal::pac;
 use stm32f4xx_hal::pac::{SPI1, SPI2};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::{Config, Enable};
+use stm32f4xx_hal::rcc::{Config, Enable, Rcc};
 use stm32f4xx_hal::serial::{Serial, config};
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
 
+use crate::emulator::Link;
 use crate::safety::{Independent, Window};
 use crate::uart_dma::UartDma;
 
@@ -102,6 +107,36 @@ const REGIONS: [Region; 5] = [
     },
 ];
 
+/// Bits on which no torque depends while the stages are off (RM0090).
+const SPARE: [SpareBits; 13] = [
+    // Clock of the first analog-to-digital converter, and the converters.
+    SpareBits::of_word(0x4002_3844, 1 << 8),
+    SpareBits {
+        first: 0x4001_2000,
+        last: 0x4001_2308,
+        mask: u32::MAX,
+    },
+    // The codes of the torque stages, until the next answer.
+    SpareBits::of_word(0x4000_7420, 0x0fff_0fff),
+    // Mode and function of PA0; mode, pull and level of PC6 to PC11.
+    SpareBits::of_word(0x4002_0000, 3),
+    SpareBits::of_word(0x4002_0020, 15),
+    SpareBits::of_word(0x4002_0800, 0x00ff_f000),
+    SpareBits::of_word(0x4002_080c, 0x00ff_f000),
+    SpareBits::of_word(0x4002_0814, 0x0fc0),
+    // The control timer: on and off, and its captures.
+    SpareBits::of_word(0x4000_0000, 1),
+    SpareBits {
+        first: 0x4000_0018,
+        last: 0x4000_0020,
+        mask: u32::MAX,
+    },
+    // The window watchdog's counter, and the key that feeds the independent one.
+    SpareBits::of_word(0x4000_2c00, 0x7f),
+    SpareBits::of_word(0x4000_3000, 0xffff),
+    SYSTICK,
+];
+
 /// Declares the image for this board with these laws.
 #[macro_export]
 macro_rules! image {
@@ -121,7 +156,7 @@ impl Board for F405 {
     type Device = pac::Peripherals;
     type Drive = ArmDrive<F405Pins>;
     type Bytes = DmaBytes<UartDma>;
-    type Port = DmaPort<UartDma>;
+    type Port = Link;
     type Memory = FlashMemory<ConfigurationFlash<flash::Registers>>;
 
     const NAME: &'static str = "STM32F405";
@@ -133,10 +168,8 @@ impl Board for F405 {
         let watchdog = Independent(device.IWDG);
         watchdog.start(START_LIMIT_S, || ());
         protection::start(&core.MPU, &REGIONS);
-        start_crystal(&device.RCC)?;
-        let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(168.MHz());
-        let mut rcc = device.RCC.freeze(clocks);
-        safety::watch_crystal(&rcc);
+        let is_emulated = emulator::is_here();
+        let mut rcc = start_clocks(device.RCC, is_emulated)?;
         pac::PWR::enable(&mut rcc);
         let (power, lines) = (&device.PWR, &device.EXTI);
         safety::watch_supply(power, lines, &device.FLASH, &mut core.NVIC, &watchdog)?;
@@ -207,9 +240,12 @@ impl Board for F405 {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
         let slow_bus_hz = rcc.clocks.pclk1().raw();
+        let timer_hz = rcc.clocks.timclk1().raw();
+        let [timer_hz, stopwatch_hz] = emulator::clocks(is_emulated, [timer_hz, core_hz]);
         let pins = F405Pins {
-            timer_hz: rcc.clocks.timclk1().raw() as f32,
-            core_hz,
+            timer_hz: timer_hz as f32,
+            stopwatch_hz,
+            stopwatch: emulator::stopwatch(is_emulated, device.TIM5),
             timer: device.TIM2,
             watchdogs: Watchdogs::new(watchdog, Window(device.WWDG), slow_bus_hz),
             converter: device.DAC,
@@ -223,7 +259,7 @@ impl Board for F405 {
         Ok(Parts {
             drive,
             bytes,
-            port,
+            port: Link::new(port, is_emulated),
             memory,
         })
     }
@@ -239,6 +275,7 @@ impl Board for F405 {
     /// Waits until the watchdog resets the chip, which then waits for a configuration with the torque off.
     fn halt() -> ! {
         Self::take_torque_off();
+        emulator::end();
         loop {
             cortex_m::asm::nop();
         }
@@ -247,6 +284,21 @@ impl Board for F405 {
     fn idle() {
         cortex_m::asm::wfi();
     }
+}
+
+/// Starts the clocks, unless an emulator has none.
+// Out of line, and so is what else depends on the emulator: branches would make `start` take more of the stack, which
+// remains taken as long as the tasks run.
+#[inline(never)]
+fn start_clocks(rcc: pac::RCC, is_emulated: bool) -> Result<Rcc, StartFault> {
+    if is_emulated {
+        return Ok(rcc.constrain());
+    }
+    start_crystal(&rcc)?;
+    let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(168.MHz());
+    let rcc = rcc.freeze(clocks);
+    safety::watch_crystal(&rcc);
+    Ok(rcc)
 }
 
 /// Starts the crystal oscillator, or gives up after a bounded wait.
@@ -281,7 +333,9 @@ fn put_out(converter: &pac::DAC, [code_1, code_2]: [u16; 2]) {
 pub struct F405Pins {
     timer: pac::TIM2,
     timer_hz: f32,
-    core_hz: u32,
+    stopwatch_hz: u32,
+    /// The register of the cycle counter.
+    stopwatch: &'static AtomicU32,
     watchdogs: Watchdogs<Independent, Window>,
     converter: pac::DAC,
     enable: PB0<Output>,
@@ -295,6 +349,8 @@ impl ArmPins for F405Pins {
     type ForceSpi = SpiPort<SPI2>;
     type Select = ErasedPin<Output>;
 
+    const SPARE: &'static [SpareBits] = &SPARE;
+
     fn check_rate(&self, tick_hz: f32, drives: bool) -> Result<(), RefusedRate> {
         self.watchdogs.check_rate(tick_hz, drives)
     }
@@ -302,7 +358,6 @@ impl ArmPins for F405Pins {
     fn start_timer(&mut self, tick_hz: f32) {
         // First, as it takes longer than a period of a fast timer.
         self.watchdogs.set_period(1.0 / tick_hz);
-        timer::set_back(&self.timer);
         timer::start(&self.timer, self.timer_hz / tick_hz);
     }
 
@@ -333,7 +388,11 @@ impl ArmPins for F405Pins {
         put_out(&self.converter, [NO_TORQUE; 2]);
     }
 
-    fn core_hz(&self) -> u32 {
-        self.core_hz
+    fn stopwatch(&self) -> u32 {
+        self.stopwatch.load(Ordering::Relaxed)
+    }
+
+    fn stopwatch_hz(&self) -> u32 {
+        self.stopwatch_hz
     }
 }

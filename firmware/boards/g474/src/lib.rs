@@ -31,6 +31,7 @@ use painleve_image::board::{Board, Parts, StartFault};
 use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
 use painleve_image::flash::{ConfigurationFlash, FlashRegisters};
 use painleve_image::memory::FlashMemory;
+use painleve_image::probe::{SYSTICK, SpareBits};
 use painleve_image::protection::{self, Access, Region};
 use painleve_image::sensor_bus::{BusTiming, SensorBus};
 use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
@@ -88,6 +89,36 @@ const REGIONS: [Region; 4] = [
         without: 0,
         access: Access::ReadWrite,
     },
+];
+
+/// Bits on which no torque depends while the stages are off (RM0440).
+const SPARE: [SpareBits; 13] = [
+    // Clock of the analog-to-digital converters, and the first two of them.
+    SpareBits::of_word(0x4002_104c, 1 << 13),
+    SpareBits {
+        first: 0x5000_0000,
+        last: 0x5000_030c,
+        mask: u32::MAX,
+    },
+    // The codes of the torque stages, until the next answer.
+    SpareBits::of_word(0x5000_0820, 0x0fff_0fff),
+    // Mode and function of PA0; mode, pull and level of PC6 to PC11.
+    SpareBits::of_word(0x4800_0000, 3),
+    SpareBits::of_word(0x4800_0020, 15),
+    SpareBits::of_word(0x4800_0800, 0x00ff_f000),
+    SpareBits::of_word(0x4800_080c, 0x00ff_f000),
+    SpareBits::of_word(0x4800_0814, 0x0fc0),
+    // The control timer: on and off, and its captures.
+    SpareBits::of_word(0x4000_0000, 1),
+    SpareBits {
+        first: 0x4000_0018,
+        last: 0x4000_0020,
+        mask: u32::MAX,
+    },
+    // The window watchdog's counter, and the key that feeds the independent one.
+    SpareBits::of_word(0x4000_2c00, 0x7f),
+    SpareBits::of_word(0x4000_3000, 0xffff),
+    SYSTICK,
 ];
 
 /// Declares the image for this board with these laws.
@@ -259,6 +290,8 @@ impl ArmPins for G474Pins {
     type ForceSpi = SpiPort<pac::SPI2>;
     type Select = Output;
 
+    const SPARE: &'static [SpareBits] = &SPARE;
+
     fn check_rate(&self, tick_hz: f32, drives: bool) -> Result<(), RefusedRate> {
         self.watchdogs.check_rate(tick_hz, drives)
     }
@@ -296,7 +329,7 @@ impl ArmPins for G474Pins {
         put_out(&self.converter, [NO_TORQUE; 2]);
     }
 
-    fn core_hz(&self) -> u32 {
+    fn stopwatch_hz(&self) -> u32 {
         CORE_HZ
     }
 }

@@ -1,26 +1,23 @@
 //! TIM2, the control timer: the same registers on the chip and under QEMU.
 
-use stm32f4xx_hal::pac::TIM2;
+#![allow(unsafe_code)] // the reset of a peripheral
 
-/// Starts the timer's interrupt with a period of `counts` of its clock. If the present count is
-/// beyond `counts`, first reset it with [`set_back`].
+use stm32f4xx_hal::pac::TIM2;
+use stm32f4xx_hal::rcc::Reset;
+
+/// Starts the timer's interrupt with a period of `counts` of its clock.
 pub fn start(timer: &TIM2, counts: f32) {
-    // The prescaler stays 0, its value after a reset: writing it makes QEMU 7.2 add every 2^32 counts
-    // passed since the board's start, 4.3 s, to each period.
+    // The reset sets the count back, which may be beyond `counts`. An update event, UG, would raise the interrupt; under
+    // QEMU 7.2, whose timer reports the time since its start and has no reset, the amount set back would be
+    // added to every period. The prescaler stays 0, its value after a reset: writing it makes that QEMU
+    // add every 2^32 counts passed since the board's start, 4.3 s, to each period.
+    // SAFETY: the timer is borrowed, and its users do not change the reset's register meanwhile.
+    unsafe { TIM2::reset_unchecked() };
     timer.cr1().write(|w| w.cen().clear_bit());
     timer.arr().write(|w| w.arr().set(counts as u32 - 1));
     acknowledge(timer);
     timer.dier().write(|w| w.uie().set_bit());
     timer.cr1().write(|w| w.cen().set_bit());
-}
-
-/// Sets the count to zero and stops the interrupt until [`start`]. Do not call it under QEMU 7.2: its
-/// timer has no count of its own but reports the time since its start, and adds the amount set back
-/// to every period.
-pub fn set_back(timer: &TIM2) {
-    // Setting the count back raises the interrupt, too: the first tick would come at once.
-    timer.dier().write(|w| w.uie().clear_bit());
-    timer.egr().write(|w| w.ug().set_bit());
 }
 
 /// Clears the interrupt.

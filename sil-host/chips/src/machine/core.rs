@@ -2,11 +2,15 @@
 
 use std::sync::Arc;
 
+use super::Chip;
+use super::systick::SysTick;
 use super::trace::Trace;
-use super::{CYCLES_PER_INSTRUCTION, Chip};
 use crate::Picoseconds;
 use crate::system_control::{Exception, SystemControl};
 use crate::unicorn::{Processor, Register, Surroundings};
+
+/// Addresses of the SysTick timer.
+const SYSTICK: std::ops::Range<u32> = 0xe000_e010..0xe000_e020;
 
 /// Why [`Core::before_instruction`] stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +35,10 @@ pub(super) struct Core<C> {
     pub(super) cycles: u64,
     pub(super) instructions: u64,
     pub(super) instruction_ps: Picoseconds,
+    pub(super) cycles_per_instruction: u64,
+    pub(super) systick: SysTick,
+    /// Largest delay of the entry into an exception, by a defect, and the state of its random numbers.
+    pub(super) latency: (Picoseconds, u64),
     pub(super) next_event: Picoseconds,
     pub(super) limit: Picoseconds,
     pub(super) instruction_limit: u64,
@@ -51,16 +59,18 @@ impl<C: Chip> Core<C> {
     pub(super) fn refresh(&mut self) {
         self.system.set_lines(self.chip.interrupt_lines());
         self.system.nmi_pending |= self.chip.take_nmi();
+        self.system.systick_pending |= std::mem::take(&mut self.systick.is_pending);
         self.candidate = self.system.wakes();
         let hz = self.chip.core_hz();
-        let cycles = crate::SECOND * CYCLES_PER_INSTRUCTION;
+        let cycles = crate::SECOND * self.cycles_per_instruction;
         self.instruction_ps = cycles.checked_div(hz).unwrap_or(0);
-        self.next_event = self.chip.next_event();
+        self.next_event = self.chip.next_event().min(self.systick.next_event());
         self.is_dirty = false;
     }
 
     pub(super) fn advance(&mut self, memory: &Processor) {
         self.chip.advance(self.now, memory);
+        self.systick.advance(self.chip.core_hz(), self.now);
         self.refresh();
     }
 
@@ -131,7 +141,7 @@ impl<C: Chip> Surroundings for Core<C> {
             trace.step(address, &self.system.active);
         }
         self.instructions += 1;
-        self.cycles += CYCLES_PER_INSTRUCTION;
+        self.cycles += self.cycles_per_instruction;
         self.now += self.instruction_ps;
         if self.now >= self.next_event {
             self.advance(processor);
@@ -144,7 +154,9 @@ impl<C: Chip> Surroundings for Core<C> {
         if let Some(trace) = &mut self.trace {
             trace.access(address);
         }
-        if (0xe000_0000..0xe004_0000).contains(&address) {
+        if SYSTICK.contains(&address) {
+            self.systick.read(address)
+        } else if (0xe000_0000..0xe004_0000).contains(&address) {
             self.system.read(address, self.cycles)
         } else {
             self.chip.read(address, size, self.now)
@@ -156,7 +168,10 @@ impl<C: Chip> Surroundings for Core<C> {
         if let Some(trace) = &mut self.trace {
             trace.access(address);
         }
-        if (0xe000_0000..0xe004_0000).contains(&address) {
+        if SYSTICK.contains(&address) {
+            let hz = self.chip.core_hz();
+            self.systick.write(address, value, hz, self.now);
+        } else if (0xe000_0000..0xe004_0000).contains(&address) {
             self.system.write(address, size, value, self.cycles);
             self.is_reprotected |= address == 0xe000_ed94;
         } else {

@@ -1,6 +1,7 @@
 //! Disturbances: interrupts, faults and changes of the memory from outside.
 
 use super::{Chip, Machine};
+use crate::Picoseconds;
 use crate::system_control::{Exception, HARD_FAULT};
 use crate::unicorn::Register;
 
@@ -21,6 +22,33 @@ impl<C: Chip> Machine<C> {
         let primask = self.unicorn.get(Register::PRIMASK) & 1 != 0;
         let basepri = self.unicorn.get(Register::BASEPRI) as u8;
         core.conditional == 0 && system.next(primask, basepri, false) == Some(interrupt + 16)
+    }
+
+    /// Lets every instruction take this many cycles, as with a flash that is too slow.
+    pub fn set_cycles_per_instruction(&mut self, cycles: u64) {
+        let core = self.unicorn.surroundings_mut();
+        core.cycles_per_instruction = cycles;
+        core.is_dirty = true;
+    }
+
+    /// Delays every entry into an exception by a random time up to this one.
+    pub fn set_latency(&mut self, longest: Picoseconds) {
+        self.unicorn.surroundings_mut().latency.0 = longest;
+    }
+
+    /// Changes a bit of the flash wherever it holds this word; returns the number of places.
+    pub fn flip_in_flash(&mut self, word: u32, bit: u32) -> usize {
+        let flash = self.unicorn.surroundings().flash.clone();
+        let (words, _) = flash.as_chunks::<4>();
+        let places = words.iter().enumerate();
+        let places: Vec<u32> = places
+            .filter(|(_, it)| **it == word.to_le_bytes())
+            .map(|(at, _)| C::FLASH.0 + 4 * at as u32)
+            .collect();
+        for place in &places {
+            self.write_word(*place, word ^ 1 << bit);
+        }
+        places.len()
     }
 
     /// Raises a hard fault, as an invalid instruction would.

@@ -48,6 +48,17 @@ impl<C: Chip> Machine<C> {
             core.system.fault_status |= if is_permitted { 1 << 12 } else { 1 << 4 };
             HARD_FAULT.min(exception)
         };
+        // A delay by a defect: the same instructions take longer.
+        let (longest, random) = &mut core.latency;
+        if *longest > 0 {
+            *random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            let delay = (*random >> 33) % *longest;
+            core.now += delay;
+            let hz = u128::from(core.chip.core_hz());
+            core.cycles += (u128::from(delay) * hz / u128::from(crate::SECOND)) as u64;
+        }
         let nested = !core.system.active.is_empty();
         core.system.enter(exception);
         core.is_dirty = true;

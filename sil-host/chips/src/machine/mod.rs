@@ -7,6 +7,7 @@ mod exceptions;
 mod execution;
 mod program;
 mod snapshot;
+mod systick;
 mod trace;
 
 use std::collections::BTreeSet;
@@ -16,6 +17,7 @@ use self::core::Core;
 use self::program::Program;
 pub use self::snapshot::MachineSnapshot;
 use self::snapshot::registers;
+use self::systick::SysTick;
 use self::trace::Trace;
 use crate::Picoseconds;
 use crate::protection::EVERYTHING;
@@ -126,6 +128,9 @@ impl<C: Chip> Machine<C> {
             cycles: 0,
             instructions: 0,
             instruction_ps: 0,
+            cycles_per_instruction: CYCLES_PER_INSTRUCTION,
+            systick: SysTick::default(),
+            latency: (0, 1),
             next_event: 0,
             limit: 0,
             instruction_limit: u64::MAX,
@@ -248,6 +253,7 @@ impl<C: Chip> Machine<C> {
         let core = self.unicorn.surroundings_mut();
         core.chip.reset(reset, core.now);
         core.system = SystemControl::new();
+        core.systick = SysTick::default();
         core.conditional = 0;
         core.refresh();
         let now = core.now;

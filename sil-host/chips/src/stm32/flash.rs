@@ -6,6 +6,9 @@ use std::sync::Arc;
 
 use crate::{MILLISECOND, Picoseconds};
 
+/// Offset in a slot of a bit that cannot be erased.
+const STUCK: usize = 40;
+
 /// Content of the slots, and the operation under way.
 #[derive(Clone, Debug)]
 pub struct FlashSlots {
@@ -18,6 +21,12 @@ pub struct FlashSlots {
     operations_left: Option<u32>,
     /// Number of operations.
     pub operations: u32,
+    /// Range that is being erased.
+    erasing: Option<(usize, usize)>,
+    /// Whether one bit cannot be erased, by a defect.
+    pub has_stuck_bit: bool,
+    /// Whether an erasure takes both slots, by a defect.
+    pub erases_both: bool,
     /// Offsets of units that were written in part and cannot be corrected.
     uncorrectable: BTreeSet<u32>,
 }
@@ -42,6 +51,9 @@ impl FlashSlots {
             erasure: MILLISECOND,
             operations_left: None,
             operations: 0,
+            erasing: None,
+            has_stuck_bit: false,
+            erases_both: false,
             uncorrectable: BTreeSet::new(),
         }
     }
@@ -95,12 +107,19 @@ impl FlashSlots {
     /// Erases a range from now on; its second half stays if the power fails.
     pub fn erase(&mut self, start: usize, length: usize, now: Picoseconds) -> Power {
         let power = self.begin(now + self.erasure);
+        self.erasing = Some((start, length));
         let erased = if power == Power::On {
             length
         } else {
             length / 2
         };
         Arc::make_mut(&mut self.bytes)[start..start + erased].fill(0xff);
+        if self.erases_both {
+            Arc::make_mut(&mut self.bytes).fill(0xff);
+        }
+        if self.has_stuck_bit {
+            Arc::make_mut(&mut self.bytes)[start + STUCK] &= !1;
+        }
         self.uncorrectable
             .retain(|it| !(start..start + erased).contains(&(*it as usize)));
         power
@@ -109,6 +128,7 @@ impl FlashSlots {
     /// Clears the bits of a unit until `until`; half of it if the power fails.
     pub fn program(&mut self, start: usize, unit: &[u8], until: Picoseconds) -> Power {
         let power = self.begin(until);
+        self.erasing = None;
         let written = if power == Power::On {
             unit.len()
         } else {
@@ -122,8 +142,11 @@ impl FlashSlots {
         power
     }
 
-    /// Ends an operation that a reset has interrupted.
-    pub fn reset(&mut self) {
+    /// Ends an operation that a reset interrupts: what is being erased is neither erased nor what it was.
+    pub fn reset(&mut self, now: Picoseconds) {
+        if let Some((start, length)) = self.erasing.take().filter(|_| self.is_busy(now)) {
+            Arc::make_mut(&mut self.bytes)[start + length / 2..start + length].fill(0x55);
+        }
         self.busy_until = 0;
     }
 }

@@ -1,5 +1,6 @@
 //! What several families of microcontrollers have in common: pins, and peripherals with the same registers.
 
+mod adc;
 mod dac;
 mod flash;
 mod gpio;
@@ -7,6 +8,7 @@ mod timer;
 mod usart;
 mod watchdog;
 
+pub use adc::{Adc, AdcLayout};
 pub use dac::Dac;
 pub use flash::{FlashSlots, Power};
 pub use gpio::{Gpio, GpioReset};
@@ -35,10 +37,31 @@ pub enum PinMode {
     Analog,
 }
 
+/// A pin, and the level at which it is driven.
+pub type PinLevel = (Pin, Option<bool>);
+
+/// What distinguishes a chip from others of its kind.
+#[derive(Clone, Debug)]
+pub struct Individual {
+    /// Device number and revision.
+    pub identification: u32,
+    /// Size of the flash that the chip reports, KiB.
+    pub flash_kib: u32,
+    /// Unique number.
+    pub unique: [u32; 3],
+}
+
 /// The parts on the pins.
 pub trait Outside: Clone {
-    /// Called when the microcontroller starts or stops driving a pin.
-    fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds);
+    /// Called when the microcontroller starts or stops driving a pin. Returns the pin to which a wire leads from
+    /// there, and its level.
+    fn pin(&mut self, pin: Pin, level: Option<bool>, now: Picoseconds) -> Option<PinLevel>;
+
+    /// Returns the code that the analog-to-digital converter reads at an output of the other one, of this code.
+    fn code_at_output(&mut self, channel: usize, code: u32) -> u32 {
+        let _ = channel;
+        code
+    }
 
     /// Called at the end of a transfer on an SPI bus (0 for SPI1); returns the answer.
     fn transfer(&mut self, bus: usize, transfer: Transfer, now: Picoseconds) -> u16;
@@ -103,6 +126,18 @@ pub trait WiredChip: Chip {
     /// Sets the phases of the prescalers of both watchdogs, which run freely: any number.
     fn set_watchdog_phase(&mut self, phase: u64);
 
+    /// Returns what distinguishes the chip.
+    fn individual_mut(&mut self) -> &mut Individual;
+
+    /// Returns the watchdogs.
+    fn watchdogs_mut(&mut self) -> (&mut Watchdog, &mut WindowWatchdog);
+
+    /// Changes the frequency of the crystal by this many parts per million.
+    fn detune_crystal(&mut self, ppm: i32);
+
+    /// Changes bits of the option bytes, as a programmer would.
+    fn flip_options(&mut self, bits: u32);
+
     /// Returns the serial port to the host.
     fn usart(&self) -> &Usart;
 
@@ -113,24 +148,40 @@ pub trait WiredChip: Chip {
     fn next_tick(&self) -> Picoseconds;
 }
 
-/// Performs a store to a port and reports the pins that it changes.
+/// Performs a store to a port and reports the pins that it changes; returns those to which wires lead from them.
 pub fn store_port(
     gpio: &mut Gpio,
     port: usize,
     (offset, value): (u32, u32),
     outside: &mut impl Outside,
     now: Picoseconds,
-) {
+) -> Vec<PinLevel> {
     let level = |gpio: &Gpio, pin: usize| match gpio.pin(pin) {
         PinMode::Output(level) => Some(level),
         _ => None,
     };
     let before = gpio.clone();
     gpio.write(offset, value);
+    let mut wired = Vec::new();
     for pin in 0..16 {
         let now_is = level(gpio, pin);
         if now_is != level(&before, pin) {
-            outside.pin((port, pin), now_is, now);
+            wired.extend(outside.pin((port, pin), now_is, now));
+        }
+    }
+    wired
+}
+
+/// Carries levels to the pins to which wires lead. A falling edge at PA0 is captured by the control timer, of clock
+/// `hz`, if the pin belongs to it.
+pub fn carry(ports: &mut [Gpio], timer: &mut Timer, wired: &[PinLevel], hz: u64, now: Picoseconds) {
+    const CAPTURED: Pin = (0, 0);
+    for ((port, number), level) in wired {
+        let gpio = &mut ports[*port];
+        let falls = gpio.external[*number] != Some(false) && *level == Some(false);
+        gpio.external[*number] = *level;
+        if (*port, *number) == CAPTURED && falls && gpio.pin(0) == PinMode::Alternate(1) {
+            timer.capture(hz, now);
         }
     }
 }

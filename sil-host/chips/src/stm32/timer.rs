@@ -13,6 +13,11 @@ pub struct Timer {
     /// Count at `since`.
     count: u64,
     since: Picoseconds,
+    /// Modes and edges of the first channel, and its capture.
+    modes: u32,
+    edges: u32,
+    captured: u32,
+    edges_seen: u32,
     /// Number of updates.
     pub updates: u64,
 }
@@ -27,12 +32,24 @@ impl Default for Timer {
             reload: u32::MAX,
             count: 0,
             since: 0,
+            modes: 0,
+            edges: 0,
+            captured: 0,
+            edges_seen: 0,
             updates: 0,
         }
     }
 }
 
 impl Timer {
+    /// Resets the registers, as the clock control's reset of this peripheral does.
+    pub fn reset(&mut self) {
+        *self = Self {
+            updates: self.updates,
+            ..Self::default()
+        };
+    }
+
     fn runs(&self) -> bool {
         self.control & 1 != 0
     }
@@ -43,12 +60,35 @@ impl Timer {
         (counts * u128::from(SECOND) / u128::from(hz.max(1))) as u64
     }
 
+    /// Captures the count at a falling edge of the first channel, if it is to.
+    pub fn capture(&mut self, hz: u64, now: Picoseconds) {
+        const OF_INPUT: u32 = 1;
+        const FALLING_AND_ENABLED: u32 = 3;
+        if self.modes & 3 != OF_INPUT || self.edges & 3 != FALLING_AND_ENABLED {
+            return;
+        }
+        self.edges_seen += 1;
+        if self.edges_seen.is_multiple_of(1 << (self.modes >> 2 & 3)) {
+            self.captured = self.read(0x24, hz, now);
+            self.flags |= 2;
+        }
+    }
+
+    /// Returns the last capture; its flag is cleared.
+    pub fn take_capture(&mut self) -> u32 {
+        self.flags &= !2;
+        self.captured
+    }
+
     /// Handles a load.
     pub fn read(&self, offset: u32, hz: u64, now: Picoseconds) -> u32 {
         match offset {
             0x00 => self.control,
             0x0c => self.interrupts,
             0x10 => self.flags,
+            0x18 => self.modes,
+            0x20 => self.edges,
+            0x34 => self.captured,
             0x24 if self.runs() => {
                 let passed = u128::from(now - self.since) * u128::from(hz) / u128::from(SECOND);
                 (u128::from(self.count) + passed / u128::from(self.prescaler + 1)) as u32
@@ -78,6 +118,12 @@ impl Timer {
             0x24 => {
                 self.count = value.into();
                 self.since = now;
+            }
+            0x18 => self.modes = value,
+            0x20 => {
+                self.edges = value;
+                // Without the channel, its prescaler is at its start.
+                self.edges_seen *= value & 1;
             }
             0x28 => self.prescaler = value,
             0x2c => self.reload = value,

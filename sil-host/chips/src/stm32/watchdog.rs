@@ -60,6 +60,8 @@ pub struct Watchdog {
     expires: Picoseconds,
     /// Time of the last feeding.
     pub fed: Picoseconds,
+    /// Whether it never expires, by a defect.
+    pub is_dead: bool,
 }
 
 impl Watchdog {
@@ -73,6 +75,7 @@ impl Watchdog {
             is_open: false,
             expires: Picoseconds::MAX,
             fed: 0,
+            is_dead: false,
         }
     }
 
@@ -80,6 +83,7 @@ impl Watchdog {
     pub fn reset(&mut self) {
         *self = Self {
             phase: self.phase,
+            is_dead: self.is_dead,
             ..Self::new(self.oscillator_hz)
         };
     }
@@ -152,7 +156,11 @@ impl Watchdog {
 
     /// Returns when the watchdog resets the microcontroller.
     pub fn expires(&self) -> Picoseconds {
-        self.expires
+        if self.is_dead {
+            Picoseconds::MAX
+        } else {
+            self.expires
+        }
     }
 }
 
@@ -166,6 +174,8 @@ pub struct WindowWatchdog {
     prescaler: (u32, u32),
     /// Phase of the prescaler, cycles of its clock.
     pub phase: u64,
+    /// Factor by which it is slower than it should be, by a defect; 0 for one that never expires.
+    pub slowness: u64,
     control: u32,
     configuration: u32,
     expires: Option<Picoseconds>,
@@ -177,6 +187,7 @@ impl WindowWatchdog {
         Self {
             prescaler: (position, (1 << bits) - 1),
             phase: 0,
+            slowness: 1,
             control: 0,
             configuration: 0,
             expires: None,
@@ -222,7 +233,7 @@ impl WindowWatchdog {
         let (position, mask) = self.prescaler;
         let cycles_per_count = 1 << (12 + (self.configuration >> position & mask));
         let counts = u64::from(self.control & 0x3f) + 1;
-        let clock_hz = u128::from(clock_hz.max(1));
+        let clock_hz = u128::from((clock_hz / self.slowness.max(1)).max(1));
         let cycles = u128::from(now) * clock_hz / u128::from(SECOND);
         let phase = u128::from(self.phase % cycles_per_count);
         let counted = (cycles + phase) / u128::from(cycles_per_count);
@@ -232,6 +243,7 @@ impl WindowWatchdog {
 
     /// Returns when the watchdog resets the microcontroller.
     pub fn expires(&self) -> Picoseconds {
-        self.expires.unwrap_or(Picoseconds::MAX)
+        let expires = self.expires.filter(|_| self.slowness > 0);
+        expires.unwrap_or(Picoseconds::MAX)
     }
 }

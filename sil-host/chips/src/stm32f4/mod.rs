@@ -10,8 +10,9 @@ use self::rcc::Rcc;
 use self::spi::Spi;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
-    Crystal, Dac, FlashSlots, Gpio, GpioReset, Outside, Pin, PinMode, Power, Timer, Usart,
-    UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band, store_port,
+    Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
+    PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band,
+    carry, store_port,
 };
 use crate::unicorn::Processor;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
@@ -33,6 +34,9 @@ const START: u32 = 1 << 16;
 const SECTOR_ERASE: u32 = 2;
 const PROGRAM: u32 = 1;
 const WIDTH: u32 = 3 << 8;
+
+/// Error of an operation in a protected sector.
+const WRITE_PROTECTED: u32 = 1 << 4;
 
 /// Stores of four bytes.
 const WORDS: u32 = 2 << 8;
@@ -79,12 +83,16 @@ pub struct Stm32f4<O> {
     /// The window watchdog.
     pub window_watchdog: WindowWatchdog,
     dac: Dac,
+    adc: Adc,
+    individual: Individual,
     dma: [Dma; 2],
     power: [u32; 2],
     /// Supply voltage, mV.
     supply_mv: u32,
     flash_control: [u32; 8],
     slots: FlashSlots,
+    /// Errors in the flash's status register.
+    flash_errors: u32,
     /// Time until which the option bytes are programmed.
     options_busy_until: Picoseconds,
     /// Number of keys that have opened the flash's control register.
@@ -107,11 +115,18 @@ impl<O: Outside> Stm32f4<O> {
             watchdog: Watchdog::new(oscillator_hz),
             window_watchdog: WindowWatchdog::new(7, 2),
             dac: Dac::default(),
+            adc: Adc::new(AdcLayout::Plain),
+            individual: Individual {
+                identification: 0x1007_6413,
+                flash_kib: 1024,
+                unique: [0x0032_0021, 0x3431_510c, 0x3837_3830],
+            },
             dma: Default::default(),
             power: [0x4000, 0],
             supply_mv: 3300,
             flash_control: [0, 0, 0, 0, LOCK, USUAL_OPTIONS, 0, 0],
             slots: FlashSlots::new(Self::SLOTS.1),
+            flash_errors: 0,
             options_busy_until: 0,
             keys: 0,
             syscfg: [0; 16],
@@ -144,9 +159,10 @@ impl<O: Outside> Stm32f4<O> {
     fn load(&mut self, address: u32, now: Picoseconds) -> u32 {
         let offset = address & 0x3ff;
         match address & !0x3ff {
-            0x4000_0000 if self.rcc.is_on(0x40, 0) => {
-                self.timer.read(offset, self.rcc.slow_timer_hz(), now)
-            }
+            0x4000_0000 if self.rcc.is_on(0x40, 0) => match offset {
+                0x34 => self.timer.take_capture(),
+                _ => self.timer.read(offset, self.rcc.slow_timer_hz(), now),
+            },
             0x4000_2c00 if self.rcc.is_on(0x40, 11) => self.window_watchdog.read(offset),
             0x4000_3000 => self.watchdog.read(offset, now),
             0x4000_3800 if self.rcc.is_on(0x40, 14) => self.spis[1].read(offset),
@@ -157,6 +173,7 @@ impl<O: Outside> Stm32f4<O> {
             },
             0x4000_7400 if self.rcc.is_on(0x40, 29) => self.dac.read(offset),
             0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.read(offset),
+            0x4001_2000 if self.rcc.is_on(0x44, 8) => self.adc.read(offset, now),
             0x4001_3000 if self.rcc.is_on(0x44, 12) => self.spis[0].read(offset),
             0x4001_3800 => self.syscfg[((offset / 4) & 15) as usize],
             0x4001_3c00 => self.external_interrupts[((offset / 4) & 7) as usize],
@@ -169,15 +186,22 @@ impl<O: Outside> Stm32f4<O> {
                 }
             }
             0x4002_3800 => self.rcc.read(offset, now),
-            0x4002_3c00 if offset == 0x0c => u32::from(self.flash_is_busy(now)) << 16,
+            0x4002_3c00 if offset == 0x0c => {
+                u32::from(self.flash_is_busy(now)) << 16 | self.flash_errors
+            }
             0x4002_3c00 => self.flash_control[((offset / 4) & 7) as usize],
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].read(offset),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].read(offset),
             // A peripheral whose clock is off.
             0x4000_0000 | 0x4000_2c00 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000
-            | 0x4001_3000 | 0x4002_6000 | 0x4002_6400 => 0,
-            // Unique identifier and flash size.
-            0x1fff_7800 => 0x1234_5678,
+            | 0x4001_2000 | 0x4001_3000 | 0x4002_6000 | 0x4002_6400 => 0,
+            // Unique number and size of the flash.
+            0x1fff_7800 => match offset {
+                0x210 | 0x214 | 0x218 => self.individual.unique[((offset - 0x210) / 4) as usize],
+                0x220 => self.individual.flash_kib << 16,
+                _ => 0,
+            },
+            0xe004_2000 if offset == 0 => self.individual.identification,
             _ => panic!("load from {address:#010x}, which is not modelled"),
         }
     }
@@ -203,6 +227,14 @@ impl<O: Outside> Stm32f4<O> {
             },
             0x4000_7400 if self.rcc.is_on(0x40, 29) => self.dac.write(offset, value),
             0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.write(offset, value, fast, now),
+            0x4001_2000 if self.rcc.is_on(0x44, 8) => {
+                let (dac, outside) = (&self.dac, &mut self.outside);
+                let sample = |channel: u32| {
+                    let channel = (channel - 4) as usize;
+                    outside.code_at_output(channel, dac.codes[channel])
+                };
+                self.adc.write((offset, value), now, sample);
+            }
             0x4001_3000 if self.rcc.is_on(0x44, 12) => {
                 self.spis[0].write(offset, value, fast, now);
             }
@@ -215,15 +247,21 @@ impl<O: Outside> Stm32f4<O> {
                 let port = ((address - 0x4002_0000) / 0x400) as usize;
                 if self.rcc.is_on(0x30, port as u32) {
                     let gpio = &mut self.ports[port];
-                    store_port(gpio, port, (offset, value), &mut self.outside, now);
+                    let wired = store_port(gpio, port, (offset, value), &mut self.outside, now);
+                    self.carry(&wired, now);
                 }
             }
-            0x4002_3800 => self.rcc.write(offset, value, now),
+            0x4002_3800 => {
+                self.rcc.write(offset, value, now);
+                if self.rcc.is_on(0x20, 0) {
+                    self.timer.reset();
+                }
+            }
             0x4002_3c00 => self.store_flash(offset, value, now),
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].write(offset, value),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].write(offset, value),
             0x4000_0000 | 0x4000_2c00 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000
-            | 0x4001_3000 | 0x4002_6000 | 0x4002_6400 => {}
+            | 0x4001_2000 | 0x4001_3000 | 0x4002_6000 | 0x4002_6400 => {}
             // Debug control.
             0xe004_2000 => {}
             _ => panic!("store of {value:#x} to {address:#010x}, which is not modelled"),
@@ -237,7 +275,8 @@ impl<O: Outside> Stm32f4<O> {
         match (offset, value) {
             (0x04, 0x4567_0123) => self.keys = 1,
             (0x04, 0xcdef_89ab) if self.keys == 1 => self.flash_control[4] &= !LOCK,
-            (0x04 | 0x0c, _) => {}
+            (0x0c, _) => self.flash_errors &= !value,
+            (0x04, _) => {}
             (0x10, _) if !is_open => {}
             (0x10, _) => {
                 assert!(!self.flash_is_busy(now), "the flash is busy");
@@ -246,6 +285,9 @@ impl<O: Outside> Stm32f4<O> {
                 if value & START != 0 && value & SECTOR_ERASE != 0 {
                     assert_eq!(value & WIDTH, WORDS, "the width of an erasure");
                     let slot = (value >> 3 & 15) - FIRST_SECTOR;
+                    if self.is_write_protected(slot) {
+                        return;
+                    }
                     let power = self.slots.erase(slot as usize * SECTOR, SECTOR, now);
                     self.note_power(power);
                 }
@@ -271,6 +313,18 @@ impl<O> Stm32f4<O> {
         self.slots.is_busy(now) || now < self.options_busy_until
     }
 
+    fn carry(&mut self, wired: &[PinLevel], now: Picoseconds) {
+        let hz = self.rcc.slow_timer_hz();
+        carry(&mut self.ports, &mut self.timer, wired, hz, now);
+    }
+
+    /// Notes an error if the option bytes protect a slot.
+    fn is_write_protected(&mut self, slot: u32) -> bool {
+        let is_protected = self.flash_control[5] >> (16 + FIRST_SECTOR + slot) & 1 == 0;
+        self.flash_errors |= u32::from(is_protected) * WRITE_PROTECTED;
+        is_protected
+    }
+
     fn note_power(&mut self, power: Power) {
         if power == Power::Failed {
             self.reset = Some(Reset::Power);
@@ -282,6 +336,9 @@ impl<O> Stm32f4<O> {
         assert!(!self.flash_is_busy(now), "the flash is busy");
         assert_eq!(size, 4, "the width of a store");
         assert_eq!(control & (LOCK | WIDTH | PROGRAM), WORDS | PROGRAM);
+        if self.is_write_protected(offset / SECTOR as u32) {
+            return;
+        }
         let until = now + 16 * MICROSECOND;
         let power = self
             .slots
@@ -305,7 +362,8 @@ impl<O: Outside> Chip for Stm32f4<O> {
             port.reset(gpio_reset(number));
         }
         for pin in (0..8).flat_map(|port| (0..16).map(move |pin| (port, pin))) {
-            self.outside.pin(pin, None, now);
+            let wired = self.outside.pin(pin, None, now);
+            self.carry(wired.as_slice(), now);
         }
         self.rcc.reset(reset);
         self.spis = Default::default();
@@ -314,12 +372,14 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.watchdog.reset();
         self.window_watchdog.reset();
         self.dac.reset();
+        self.adc = Adc::new(AdcLayout::Plain);
         self.dma = Default::default();
         self.power = [0x4000, 0];
         self.flash_control[2] = 0;
         self.flash_control[4] = LOCK;
         self.keys = 0;
-        self.slots.reset();
+        self.flash_errors = 0;
+        self.slots.reset(now);
         self.flash_control[5] |= 1;
         self.syscfg = [0; 16];
         self.external_interrupts = [0; 8];
@@ -514,6 +574,22 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
 
     fn stop_control_timer(&mut self) {
         self.timer = Timer::default();
+    }
+
+    fn individual_mut(&mut self) -> &mut Individual {
+        &mut self.individual
+    }
+
+    fn watchdogs_mut(&mut self) -> (&mut Watchdog, &mut WindowWatchdog) {
+        (&mut self.watchdog, &mut self.window_watchdog)
+    }
+
+    fn detune_crystal(&mut self, ppm: i32) {
+        self.rcc.detune(ppm);
+    }
+
+    fn flip_options(&mut self, bits: u32) {
+        self.flash_control[5] ^= bits;
     }
 
     fn usart(&self) -> &Usart {

@@ -1,7 +1,7 @@
 //! Reset and clock control (RM0090, section 7).
 
 use crate::machine::Reset;
-use crate::{MILLISECOND, Picoseconds};
+use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 const HSE_ON: u32 = 1 << 16;
 const HSE_READY: u32 = 1 << 17;
@@ -18,6 +18,9 @@ const CRYSTAL_HZ: u64 = 8_000_000;
 /// Start-up time of the crystal.
 const CRYSTAL_START: Picoseconds = 2 * MILLISECOND;
 
+/// Longest time until the phase-locked loop has settled.
+const LOCK: Picoseconds = 300 * MICROSECOND;
+
 /// Registers of the clock control.
 #[derive(Clone, Debug)]
 pub struct Rcc {
@@ -28,6 +31,9 @@ pub struct Rcc {
     registers: [u32; 32],
     flags: u32,
     hse_ready_at: Picoseconds,
+    pll_ready_at: Picoseconds,
+    /// Frequency of the crystal, Hz.
+    crystal_hz: u64,
     /// Whether the crystal oscillates when switched on.
     pub crystal_works: bool,
     /// Set when the clock security system has detected a stopped crystal.
@@ -45,6 +51,8 @@ impl Rcc {
             registers: [0; 32],
             flags: 0,
             hse_ready_at: Picoseconds::MAX,
+            pll_ready_at: Picoseconds::MAX,
+            crystal_hz: CRYSTAL_HZ,
             crystal_works: true,
             nmi: false,
         }
@@ -61,6 +69,7 @@ impl Rcc {
         };
         *self = Self {
             crystal_works: self.crystal_works,
+            crystal_hz: self.crystal_hz,
             flags: self.flags | reason,
             ..Self::new()
         };
@@ -76,6 +85,10 @@ impl Rcc {
         self.crystal_works && self.control & HSE_ON != 0 && now >= self.hse_ready_at
     }
 
+    fn pll_is_ready(&self, now: Picoseconds) -> bool {
+        self.control & PLL_ON != 0 && now >= self.pll_ready_at
+    }
+
     /// Handles a load.
     pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
         match offset {
@@ -85,11 +98,7 @@ impl Rcc {
                 } else {
                     0
                 };
-                let locked = if self.control & PLL_ON != 0 {
-                    PLL_READY
-                } else {
-                    0
-                };
+                let locked = if self.pll_is_ready(now) { PLL_READY } else { 0 };
                 self.control & !(HSE_READY | PLL_READY) | ready | locked
             }
             0x04 => self.pll,
@@ -107,6 +116,9 @@ impl Rcc {
             0x00 => {
                 if value & !self.control & HSE_ON != 0 {
                     self.hse_ready_at = now + CRYSTAL_START;
+                }
+                if value & !self.control & PLL_ON != 0 {
+                    self.pll_ready_at = now + LOCK;
                 }
                 self.control = value;
             }
@@ -140,24 +152,30 @@ impl Rcc {
         }
     }
 
+    /// Changes the crystal's frequency by this many parts per million.
+    pub fn detune(&mut self, ppm: i32) {
+        let change = CRYSTAL_HZ as i64 * i64::from(ppm) / 1_000_000;
+        self.crystal_hz = CRYSTAL_HZ.saturating_add_signed(change);
+    }
+
     fn pll_hz(&self) -> u64 {
         let from_crystal = self.pll & 1 << 22 != 0;
         let input = match (from_crystal, self.crystal_works) {
             (false, _) => INTERNAL_HZ,
-            (true, true) => CRYSTAL_HZ,
+            (true, true) => self.crystal_hz,
             (true, false) => 0,
         };
         let divisor = u64::from(self.pll & 0x3f).max(1);
         let multiplier = u64::from(self.pll >> 6 & 0x1ff);
         let output = 2 * (u64::from(self.pll >> 16 & 3) + 1);
-        input / divisor * multiplier / output
+        input * multiplier / divisor / output
     }
 
     /// Returns the system clock before its dividers, Hz; 0 if it has stopped.
     fn system_hz(&self) -> u64 {
         match self.configuration & 3 {
             0 => INTERNAL_HZ,
-            1 if self.crystal_works => CRYSTAL_HZ,
+            1 if self.crystal_works => self.crystal_hz,
             1 => 0,
             _ => self.pll_hz(),
         }

@@ -12,6 +12,9 @@ const SECOND_BANK: u32 = 1 << 11;
 const PAGE_ERASE: u32 = 2;
 const PROGRAM: u32 = 1;
 
+/// Error of a double word that is not erased when it is written (PROGERR).
+const NOT_ERASED: u32 = 1 << 3;
+
 /// Option bytes of a new chip, and those with the highest brown-out level.
 const NEW_OPTIONS: u32 = 0xffef_f8aa;
 const USUAL_OPTIONS: u32 = 0xffef_fcaa;
@@ -42,6 +45,8 @@ pub(super) struct Flash {
     options_busy_until: Picoseconds,
     /// The first half of a double word that is written.
     half: Option<(u32, u32)>,
+    /// Errors in the status register.
+    errors: u32,
     /// Whether a word that cannot be corrected has been read, and its interrupt is pending.
     is_uncorrectable: bool,
     has_nmi: bool,
@@ -60,6 +65,7 @@ impl Flash {
             programmed_options: USUAL_OPTIONS,
             options_busy_until: 0,
             half: None,
+            errors: 0,
             is_uncorrectable: false,
             has_nmi: false,
         }
@@ -68,6 +74,12 @@ impl Flash {
     /// Gives the chip the option bytes of a new one.
     pub fn set_new_options(&mut self) {
         self.programmed_options = NEW_OPTIONS;
+        self.load_options();
+    }
+
+    /// Changes bits of the option bytes, as a programmer would.
+    pub fn flip_options(&mut self, bits: u32) {
+        self.programmed_options ^= bits;
         self.load_options();
     }
 
@@ -89,8 +101,9 @@ impl Flash {
         self.registers[0] = 0x600;
         self.registers[5] = 0xc000_0000;
         self.keys = [0; 2];
-        self.slots.reset();
+        self.slots.reset(now);
         self.half = None;
+        self.errors = 0;
         self.is_uncorrectable = false;
         self.has_nmi = false;
     }
@@ -113,7 +126,7 @@ impl Flash {
     /// Returns the value of a register.
     pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
         match offset {
-            0x10 => u32::from(self.is_busy(now)) << 16,
+            0x10 => u32::from(self.is_busy(now)) << 16 | self.errors,
             0x18 => u32::from(self.is_uncorrectable) << 31,
             _ => self.registers[((offset / 4) & 15) as usize],
         }
@@ -128,6 +141,7 @@ impl Flash {
             (0x0c, 0x4c5d_6e7f, [_, 1]) => self.registers[5] &= !OPTION_LOCK,
             (0x20, ..) if self.registers[5] & OPTION_LOCK == 0 => self.written_options = value,
             (0x00, ..) => self.registers[0] = value,
+            (0x10, ..) => self.errors &= !value,
             (0x14, ..) if self.registers[5] & LOCK == 0 => return self.control(value, now),
             (0x18, ..) if value & 1 << 31 != 0 => self.is_uncorrectable = false,
             _ => {}
@@ -175,7 +189,10 @@ impl Flash {
         };
         assert_eq!(offset, first + 4);
         let is_erased = [first, offset].map(|it| self.slots.word(it)) == [u32::MAX; 2];
-        assert!(is_erased, "a double word is written twice");
+        if !is_erased {
+            self.errors |= NOT_ERASED;
+            return Power::On;
+        }
         let unit = (u64::from(word) << 32 | u64::from(low)).to_le_bytes();
         let until = now + 82 * MICROSECOND;
         self.slots.program(first as usize, &unit, until)

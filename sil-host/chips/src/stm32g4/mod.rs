@@ -12,8 +12,9 @@ use self::spi::Spi;
 use crate::Picoseconds;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
-    Crystal, Dac, FlashSlots, Gpio, GpioReset, Outside, Pin, PinMode, Power, Timer, Usart,
-    UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band, store_port,
+    Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
+    PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band,
+    carry, store_port,
 };
 use crate::unicorn::Processor;
 
@@ -41,6 +42,9 @@ const WITHOUT_BOOST_HZ: u64 = 150_000_000;
 /// Highest clock per wait state of the flash, in boost mode, Hz.
 const PER_WAIT_STATE_HZ: u64 = 34_000_000;
 
+/// Largest part by which a crystal is too fast: 1 / 5000.
+const CRYSTAL: u64 = 5000;
+
 /// After a reset all pins are analogue, except the debugger's.
 fn gpio_reset(port: usize) -> GpioReset {
     match port {
@@ -65,6 +69,8 @@ pub struct Stm32g4<O> {
     watchdog: Watchdog,
     window_watchdog: WindowWatchdog,
     dac: Dac,
+    adc: Adc,
+    individual: Individual,
     dma: Dma,
     power: [u32; 33],
     /// Supply voltage, mV.
@@ -93,10 +99,13 @@ impl<O: Outside> Stm32g4<O> {
             0x4001_3000 => on(bus::APB2, 12),
             0x4002_0000 => on(bus::AHB1, 0),
             0x4002_0800 => on(bus::AHB1, 2),
+            0x5000_0000 => on(bus::AHB2, 13),
             0x5000_0800 => on(bus::AHB2, 16),
             0x4800_0000..0x4800_1c00 => on(bus::AHB2, address >> 10 & 7),
-            // Independent watchdog, interrupt lines, clock control, flash.
-            0x4000_3000 | 0x4001_0400 | 0x4002_1000 | 0x4002_2000 => true,
+            // Independent watchdog, interrupt lines, clock control, flash, numbers of the chip.
+            0x4000_3000 | 0x4001_0400 | 0x4002_1000 | 0x4002_2000 | 0x1fff_7400 | 0xe004_2000 => {
+                true
+            }
             _ => panic!("access to {address:#010x}, which is not modelled"),
         }
     }
@@ -107,6 +116,7 @@ impl<O: Outside> Stm32g4<O> {
             return 0;
         }
         match address & !0x3ff {
+            0x4000_0000 if offset == 0x34 => self.timer.take_capture(),
             0x4000_0000 => self.timer.read(offset, self.rcc.bus_hz(), now),
             0x4000_2c00 => self.window_watchdog.read(offset),
             0x4000_3000 => self.watchdog.read(offset, now),
@@ -122,7 +132,14 @@ impl<O: Outside> Stm32g4<O> {
             0x4002_0800 => self.dma.read_multiplexer(offset),
             0x4002_1000 => self.rcc.read(offset, now),
             0x4002_2000 => self.flash.read(offset, now),
+            0x5000_0000 => self.adc.read(offset, now),
             0x5000_0800 => self.dac.read(offset),
+            0x1fff_7400 => match offset {
+                0x190 | 0x194 | 0x198 => self.individual.unique[((offset - 0x190) / 4) as usize],
+                0x1e0 => 0xffff_0000 | self.individual.flash_kib,
+                _ => 0,
+            },
+            0xe004_2000 => self.individual.identification,
             _ => self.ports[(address >> 10 & 7) as usize].read(offset),
         }
     }
@@ -154,11 +171,20 @@ impl<O: Outside> Stm32g4<O> {
                 let power = self.flash.write(offset, value, now);
                 self.note_power(power);
             }
+            0x5000_0000 => {
+                let (dac, outside) = (&self.dac, &mut self.outside);
+                let sample = |channel: u32| {
+                    let channel = usize::from(channel != 17);
+                    outside.code_at_output(channel, dac.codes[channel])
+                };
+                self.adc.write((offset, value), now, sample);
+            }
             0x5000_0800 => self.dac.write(offset, value),
             _ => {
                 let port = (address >> 10 & 7) as usize;
                 let gpio = &mut self.ports[port];
-                store_port(gpio, port, (offset, value), &mut self.outside, now);
+                let wired = store_port(gpio, port, (offset, value), &mut self.outside, now);
+                self.carry(&wired, now);
             }
         }
     }
@@ -173,7 +199,7 @@ impl<O: Outside> Stm32g4<O> {
         );
         let wait_states = self.flash.wait_states();
         assert!(
-            core_hz <= (wait_states + 1) * PER_WAIT_STATE_HZ,
+            core_hz - core_hz / CRYSTAL <= (wait_states + 1) * PER_WAIT_STATE_HZ,
             "{core_hz} Hz with {wait_states} wait states"
         );
         assert!(
@@ -184,6 +210,11 @@ impl<O: Outside> Stm32g4<O> {
 }
 
 impl<O> Stm32g4<O> {
+    fn carry(&mut self, wired: &[PinLevel], now: Picoseconds) {
+        let hz = self.rcc.bus_hz();
+        carry(&mut self.ports, &mut self.timer, wired, hz, now);
+    }
+
     fn note_power(&mut self, power: Power) {
         if power == Power::Failed {
             self.reset = Some(Reset::Power);
@@ -202,7 +233,8 @@ impl<O: Outside> Chip for Stm32g4<O> {
             port.reset(gpio_reset(number));
         }
         for pin in (0..7).flat_map(|port| (0..16).map(move |pin| (port, pin))) {
-            self.outside.pin(pin, None, now);
+            let wired = self.outside.pin(pin, None, now);
+            self.carry(wired.as_slice(), now);
         }
         self.rcc.reset(reset);
         self.spis = Default::default();
@@ -211,6 +243,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.watchdog.reset();
         self.window_watchdog.reset();
         self.dac.reset();
+        self.adc = Adc::new(AdcLayout::Regulated);
         self.dma = Dma::default();
         self.power = [0; 33];
         // The regulator's range 1 without boost.
@@ -339,6 +372,12 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
             watchdog: Watchdog::new(oscillator_hz),
             window_watchdog: WindowWatchdog::new(11, 3),
             dac: Dac::default(),
+            adc: Adc::new(AdcLayout::Regulated),
+            individual: Individual {
+                identification: 0x2003_6469,
+                flash_kib: 512,
+                unique: [0x0032_0021, 0x3431_510c, 0x3837_3830],
+            },
             dma: Dma::default(),
             power: [0; 33],
             supply_mv: 3300,
@@ -409,6 +448,22 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
 
     fn stop_control_timer(&mut self) {
         self.timer = Timer::default();
+    }
+
+    fn individual_mut(&mut self) -> &mut Individual {
+        &mut self.individual
+    }
+
+    fn watchdogs_mut(&mut self) -> (&mut Watchdog, &mut WindowWatchdog) {
+        (&mut self.watchdog, &mut self.window_watchdog)
+    }
+
+    fn detune_crystal(&mut self, ppm: i32) {
+        self.rcc.detune(ppm);
+    }
+
+    fn flip_options(&mut self, bits: u32) {
+        self.flash.flip_options(bits);
     }
 
     fn usart(&self) -> &Usart {

@@ -1,7 +1,7 @@
 //! Reset and clock control (RM0440, chapter RCC).
 
 use crate::machine::Reset;
-use crate::{MILLISECOND, Picoseconds};
+use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 const HSE_ON: u32 = 1 << 16;
 const HSE_READY: u32 = 1 << 17;
@@ -30,6 +30,9 @@ pub mod bus {
     pub const APB2: u32 = 0x60;
 }
 
+/// Longest time until the phase-locked loop has settled.
+const LOCK: Picoseconds = 40 * MICROSECOND;
+
 /// Registers of the clock control.
 #[derive(Clone, Debug)]
 pub struct Rcc {
@@ -39,6 +42,9 @@ pub struct Rcc {
     registers: [u32; 40],
     flags: u32,
     hse_ready_at: Picoseconds,
+    pll_ready_at: Picoseconds,
+    /// Frequency of the crystal, Hz.
+    crystal_hz: u64,
     /// Whether the crystal oscillates when switched on.
     pub crystal_works: bool,
     /// Set when the clock security system has detected a stopped crystal.
@@ -58,6 +64,8 @@ impl Rcc {
             registers,
             flags: 0,
             hse_ready_at: Picoseconds::MAX,
+            pll_ready_at: Picoseconds::MAX,
+            crystal_hz: CRYSTAL_HZ,
             crystal_works: true,
             nmi: false,
         }
@@ -73,6 +81,7 @@ impl Rcc {
         };
         *self = Self {
             crystal_works: self.crystal_works,
+            crystal_hz: self.crystal_hz,
             flags: self.flags | reason,
             ..Self::new()
         };
@@ -87,6 +96,10 @@ impl Rcc {
         self.crystal_works && self.control & HSE_ON != 0 && now >= self.hse_ready_at
     }
 
+    fn pll_is_ready(&self, now: Picoseconds) -> bool {
+        self.control & PLL_ON != 0 && now >= self.pll_ready_at
+    }
+
     /// Handles a load.
     pub fn read(&self, offset: u32, now: Picoseconds) -> u32 {
         match offset {
@@ -94,7 +107,7 @@ impl Rcc {
                 let flag = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
                 self.control & !(HSE_READY | PLL_READY)
                     | flag(self.crystal_is_ready(now), HSE_READY)
-                    | flag(self.control & PLL_ON != 0, PLL_READY)
+                    | flag(self.pll_is_ready(now), PLL_READY)
             }
             0x08 => self.configuration & !0xc | (self.configuration & 3) << 2,
             0x0c => self.pll,
@@ -111,6 +124,9 @@ impl Rcc {
             0x00 => {
                 if value & !self.control & HSE_ON != 0 {
                     self.hse_ready_at = now + CRYSTAL_START;
+                }
+                if value & !self.control & PLL_ON != 0 {
+                    self.pll_ready_at = now + LOCK;
                 }
                 self.control = value;
             }
@@ -134,11 +150,17 @@ impl Rcc {
         }
     }
 
+    /// Changes the crystal's frequency by this many parts per million.
+    pub fn detune(&mut self, ppm: i32) {
+        let change = CRYSTAL_HZ as i64 * i64::from(ppm) / 1_000_000;
+        self.crystal_hz = CRYSTAL_HZ.saturating_add_signed(change);
+    }
+
     fn pll_hz(&self) -> u64 {
         const OUTPUT_ON: u32 = 1 << 24;
         let input = match (self.pll & 3, self.crystal_works) {
             (2, _) => INTERNAL_HZ,
-            (3, true) => CRYSTAL_HZ,
+            (3, true) => self.crystal_hz,
             _ => 0,
         };
         if self.pll & OUTPUT_ON == 0 {
@@ -147,14 +169,14 @@ impl Rcc {
         let divisor = u64::from(self.pll >> 4 & 15) + 1;
         let multiplier = u64::from(self.pll >> 8 & 0x7f);
         let output = 2 * (u64::from(self.pll >> 25 & 3) + 1);
-        input / divisor * multiplier / output
+        input * multiplier / divisor / output
     }
 
     /// Returns the system clock before its divider, Hz; 0 if it has stopped.
     pub fn system_hz(&self) -> u64 {
         match self.configuration & 3 {
             1 => INTERNAL_HZ,
-            2 if self.crystal_works => CRYSTAL_HZ,
+            2 if self.crystal_works => self.crystal_hz,
             3 => self.pll_hz(),
             _ => 0,
         }

@@ -1,6 +1,6 @@
 //! `painleve drive --store`, `--stored`, `--forget`: the configuration that the board keeps in its flash.
 
-use painleve_board::stored::StoringBoard;
+use painleve_board::Serial;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::stored::StoredState;
 
@@ -13,7 +13,8 @@ use crate::{CommandError, say};
 /// # Errors
 /// [`CommandError`] if the board does not answer, refuses the configuration or does not store it.
 pub fn run(arguments: &DriveArguments, scenario: &Scenario) -> Result<(), CommandError> {
-    let mut board = StoringBoard::open(&arguments.port)?;
+    let mut board = Serial::connect(&arguments.port)?;
+    board.identify()?;
     let stored = if arguments.store {
         super::warn_of_single_sensors(scenario);
         board.store(&scenario.controller_configuration())?

@@ -68,6 +68,8 @@ pub fn run(
 
 /// A run that can be steered.
 struct Live {
+    /// The scenario as it was given.
+    given: Scenario,
     /// The scenario with what was set.
     scenario: Scenario,
     /// The part of it that runs: without what waits for the next reset.
@@ -104,6 +106,7 @@ impl Live {
         let live = Self {
             closed_loop: start(&scenario, &viewers)?,
             running: scenario.clone(),
+            given: scenario.clone(),
             scenario,
             viewers,
             hub,
@@ -194,9 +197,12 @@ impl Live {
             .set_parameters(parameters(&self.scenario, self.paused, self.factor));
     }
 
-    /// Tells the pages what runs.
+    /// Tells the pages what runs, and what they save: the scenario with everything that was set, and the changes.
     fn describe(&self) {
-        self.hub.describe(&description(&self.running));
+        let mut run = description(&self.running);
+        run["settings"] = self.scenario.to_brief_toml().into();
+        run["changes"] = page_settings::changes(&self.given, &self.scenario).into();
+        self.hub.describe(&run);
     }
 
     /// Starts again, with everything that was set. A scenario that cannot start leaves the run as it is.

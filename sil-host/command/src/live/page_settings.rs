@@ -29,9 +29,35 @@ pub fn settings(scenario: &Scenario) -> Value {
     settings.into()
 }
 
+/// Returns the command that runs a scenario with what was set in a live run, one key on each line.
+pub fn changes(given: &Scenario, set: &Scenario) -> String {
+    // Nothing that is set makes another key absent, except the other way to give the start.
+    // Nothing that is set makes another key absent, except the other way to give the start.
+    let options = given.differences(set).into_iter().filter_map(|change| {
+        // A single quote ends the shell's quotation.
+        let value = change.second?.replace('\'', "'\\''");
+        Some(format!(" \\\n    --set '{}={value}'", change.key))
+    });
+    format!(
+        "painleve run {}{}\n",
+        given.name,
+        options.collect::<String>()
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn changes_are_a_command() {
+        let given = Scenario::load("edge", &[]).unwrap();
+        let set = ["belt.friction=0.35", "controller.law=pid"].map(str::to_owned);
+        let set = given.clone().with_overrides("edge", &set).unwrap();
+        let command = "painleve run edge \\\n    --set 'belt.friction=0.35' \\\n    --set 'controller.law={ pid = {} }'\n";
+        assert_eq!(changes(&given, &set), command);
+        assert_eq!(changes(&given, &given), "painleve run edge\n");
+    }
 
     #[test]
     fn the_values_are_those_of_the_scenario() {

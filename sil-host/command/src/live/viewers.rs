@@ -16,8 +16,8 @@ use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
 use painleve_shared::frame::SensorFrame;
 use painleve_view::foxglove::feed::Feed;
 use painleve_view::hub::Hub;
-use painleve_view::page::{BeltTravel, event_entry};
-use painleve_view::row::Row;
+use painleve_view::page::event_entry;
+use painleve_view::row::{Follower, Row};
 use serde_json::{Value, json};
 
 /// Most events that wait for the viewers; more are left out.
@@ -53,7 +53,7 @@ pub(super) struct Viewers {
     telemetry: Rc<Cell<Telemetry>>,
     /// Whether this tick is shown.
     is_watched: Rc<Cell<bool>>,
-    travel: BeltTravel,
+    follower: Follower,
     events: ControllerEvents,
     rows: Vec<u8>,
     messages: Vec<Value>,
@@ -66,7 +66,7 @@ impl Viewers {
         Self {
             telemetry: Rc::default(),
             is_watched: Rc::default(),
-            travel: BeltTravel::default(),
+            follower: Follower::new(scenario),
             events: ControllerEvents::default(),
             rows: Vec::new(),
             messages: Vec::new(),
@@ -118,9 +118,9 @@ impl Monitor for Viewers {
             sample,
             estimates: Some(&telemetry),
         };
-        let travel_m = self.travel.advance(&tick);
+        let followed = self.follower.tick(&tick);
         if self.hub.has_pages() {
-            Row::new(&tick, travel_m).write(&mut self.rows);
+            Row::new(&tick, followed).write(&mut self.rows);
         }
         if self.hub.has_subscribers() {
             self.feed.tick(&tick);

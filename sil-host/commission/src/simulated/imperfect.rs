@@ -2,9 +2,10 @@
 
 use core::f64::consts::PI;
 
+use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_shared::kinematics::Pose;
-use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Posture};
+use painleve_shared::{Arm, ArmParameters, OutOfRange, Posture};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -50,8 +51,7 @@ pub fn imperfect(scenario: &Scenario, seed: u64) -> Result<Scenario, OutOfRange>
 
 /// Sets the arm down where the tip of the scenario's arm is.
 fn set_down(scenario: &Scenario, actual: &mut Scenario) -> Result<(), OutOfRange> {
-    let start = scenario.initial;
-    let theta = LinkMotion::new(start.theta1_deg.to_radians(), start.theta2_deg.to_radians());
+    let theta = theta(&scenario.initial.state(&scenario.arm)?);
     let tip_t_m = Arm::new(scenario.arm)?.tip_m(&Pose::new(&theta)).x;
     let arm = Arm::new(actual.arm)?;
     if let Some(there) = arm.link_angles_on_belt_rad(tip_t_m, Posture::of(&theta)) {

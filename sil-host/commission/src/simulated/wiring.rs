@@ -6,10 +6,6 @@ use painleve_shared::counts::{
 };
 use painleve_shared::mounting::Mounting;
 
-/// Readings of parts that do not answer: out of every range, as the board's drivers report them.
-const NO_ENCODER: EncoderCounts = EncoderCounts(u32::MAX);
-const NO_FORCE: ForceCounts = ForceCounts(i32::MAX);
-
 /// Mounting and wiring of an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wiring {
@@ -84,7 +80,7 @@ impl Wiring {
                 raw[joint] = frozen;
             }
             if self.encoder_silent[joint] {
-                raw[joint] = NO_ENCODER;
+                raw[joint] = EncoderCounts::MISSING;
             }
         }
         if self.encoders_swapped {
@@ -100,7 +96,7 @@ impl Wiring {
         mut forces: [ForceCounts; 2],
     ) -> [ForceCounts; 2] {
         if self.force_silent {
-            return [NO_FORCE; 2];
+            return [ForceCounts::MISSING; 2];
         }
         if self.forces_swapped {
             forces.swap(0, 1);

@@ -40,5 +40,5 @@ pub use arm_on_belt::ArmOnBelt;
 pub use built_in::BuiltInPlant;
 pub(crate) use from_file::without_files;
 pub use motion_error::MotionError;
-pub use parameters::{InitialState, PlantParameters, SolverSettings};
+pub use parameters::{Elbow, InitialState, PlantParameters, SolverSettings};
 pub use probe::{ArmProbe, ArmStep};

@@ -1,7 +1,8 @@
 //! Parameters of the plant's equations, and the accuracy of their solution.
 
+use painleve_shared::kinematics::Posture;
 use painleve_shared::settings::Settings;
-use painleve_shared::{ArmParameters, OutOfRange, settings};
+use painleve_shared::{Arm, ArmParameters, OutOfRange, settings};
 
 use super::belt::{BeltProfile, BeltSettings};
 use super::impact::ImpactLaw;
@@ -73,13 +74,17 @@ settings! {
 }
 
 settings! {
-    /// Initial state of the arm; the default is the paper's x0,d.
+    /// Initial state of the arm: two angles, or the tip's place on the belt; the default is the paper's x0,d.
     #[derive(Copy)]
     pub struct InitialState {
-        /// θ1, measured from the belt's inward normal.
-        theta1_deg: f64 = -11.4, -180.0..=180.0, "°";
-        /// θ2, measured from the belt's inward normal.
-        theta2_deg: f64 = -35.1, -180.0..=180.0, "°";
+        /// θ1, measured from the belt's inward normal; −11.4° if absent.
+        theta1_deg: Option<f64> = None, -180.0..=180.0, "°";
+        /// θ2, measured from the belt's inward normal; −35.1° if absent.
+        theta2_deg: Option<f64> = None, -180.0..=180.0, "°";
+        /// Place z_t of a tip on the belt, instead of both angles.
+        tip_m: Option<f64> = None, -20.0..=20.0, "m";
+        /// Side of the elbow, with `tip_m`; down if absent.
+        elbow: Option<Elbow> = None;
         /// θ̇1.
         theta1_dot_rad_s: f64 = 0.0, -314.0..=314.0, "rad/s";
         /// θ̇2.
@@ -87,35 +92,84 @@ settings! {
     }
 }
 
+settings! {
+    /// The side to which the elbow bends.
+    #[derive(Copy, Eq)]
+    pub enum Elbow = Down {
+        /// θ2 < θ1.
+        "down" => Down,
+        /// θ2 > θ1.
+        "up" => Up,
+    }
+}
+
+impl From<Elbow> for Posture {
+    fn from(elbow: Elbow) -> Self {
+        match elbow {
+            Elbow::Down => Self::ElbowDown,
+            Elbow::Up => Self::ElbowUp,
+        }
+    }
+}
+
 impl InitialState {
+    /// θ1 and θ2 of the paper's x0,d, degrees.
+    pub const X0_D_DEG: [f64; 2] = [-11.4, -35.1];
+
     /// Returns an arm at rest with these angles from the belt's inward normal, degrees.
     pub fn at_rest(theta1_deg: f64, theta2_deg: f64) -> Self {
         Self {
-            theta1_deg,
-            theta2_deg,
-            theta1_dot_rad_s: 0.0,
-            theta2_dot_rad_s: 0.0,
+            theta1_deg: Some(theta1_deg),
+            theta2_deg: Some(theta2_deg),
+            ..Self::default()
         }
     }
 
-    /// Returns the plant's state.
-    pub fn state(&self) -> State {
-        State::new(
-            self.theta1_deg.to_radians(),
-            self.theta2_deg.to_radians(),
+    /// Returns the state of an arm with these parameters.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if the arm does not reach [`tip_m`](Self::tip_m), or cannot be built.
+    pub fn state(&self, arm: &ArmParameters<f64>) -> Result<State, OutOfRange> {
+        let [theta_1, theta_2] = match self.tip_m {
+            Some(tip_m) => {
+                let arm = Arm::new(*arm)?;
+                let reach_m = arm.reach_on_belt_m();
+                let unreachable = OutOfRange {
+                    value: tip_m,
+                    minimum: -reach_m,
+                    maximum: reach_m,
+                    ..OutOfRange::default()
+                };
+                let theta =
+                    arm.link_angles_on_belt_rad(tip_m, self.elbow.unwrap_or_default().into());
+                theta
+                    .ok_or_else(|| unreachable.inside("tip_m").inside("initial"))?
+                    .to_array()
+            }
+            None => {
+                let [theta_1, theta_2] = Self::X0_D_DEG;
+                let given = [
+                    self.theta1_deg.unwrap_or(theta_1),
+                    self.theta2_deg.unwrap_or(theta_2),
+                ];
+                given.map(f64::to_radians)
+            }
+        };
+        Ok(State::new(
+            theta_1,
+            theta_2,
             self.theta1_dot_rad_s,
             self.theta2_dot_rad_s,
-        )
+        ))
     }
 }
 
 impl From<&State> for InitialState {
     fn from(state: &State) -> Self {
         Self {
-            theta1_deg: state[0].to_degrees(),
-            theta2_deg: state[1].to_degrees(),
             theta1_dot_rad_s: state[2],
             theta2_dot_rad_s: state[3],
+            ..Self::at_rest(state[0].to_degrees(), state[1].to_degrees())
         }
     }
 }

@@ -108,6 +108,18 @@ pub enum KeyError {
         /// Number of items.
         count: usize,
     },
+    /// Another key says the same.
+    #[error("it excludes {other}; give one of the two")]
+    Excludes {
+        /// The other key.
+        other: String,
+    },
+    /// The key means nothing without another.
+    #[error("it needs {other}; give that first")]
+    Needs {
+        /// The other key.
+        other: String,
+    },
     /// A file named by the key cannot be used.
     #[error("{0}")]
     File(String),

@@ -6,6 +6,7 @@
 pub mod built_in;
 pub mod describe;
 mod error;
+mod initial_key;
 mod knowledge;
 mod load;
 mod override_key;
@@ -26,8 +27,8 @@ use crate::mechanics::effects::Effects;
 use crate::mechanics::impact::ImpactLaw;
 use crate::mechanics::{PlantParameters, SolverSettings};
 
-pub use crate::mechanics::InitialState;
 pub use crate::mechanics::belt::BeltSettings;
+pub use crate::mechanics::{Elbow, InitialState};
 pub use error::ScenarioError;
 pub use knowledge::Knowledge;
 pub use words::{TomlError, known_names};

@@ -4,11 +4,11 @@ use toml::{Table, Value};
 
 use super::error::{KeyError, MOST_LEVELS, ScenarioError};
 use super::table::from_table;
-use super::{Scenario, describe};
+use super::{Scenario, describe, initial_key};
 
 /// Returns the scenario with one key changed. The key must exist in the scenario or be optional,
 /// such as `controller.belt.given_m_s`.
-pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, ScenarioError> {
+pub(super) fn with_override(mut scenario: Scenario, text: &str) -> Result<Scenario, ScenarioError> {
     let wrong = || ScenarioError::Override { text: text.into() };
     let (key, value) = text.split_once('=').ok_or_else(wrong)?;
     let (key, value) = (key.trim(), value.trim());
@@ -31,6 +31,7 @@ pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, 
         key: key.into(),
         source,
     };
+    scenario.initial = initial_key::before_override(scenario.initial, key);
     let mut root = Value::try_from(&scenario).map_err(|error| wrong_key(error.into()))?;
     // Message on the first part of the key that is missing, unless an optional setting is absent.
     let mut missing = None;
@@ -52,7 +53,7 @@ pub(super) fn with_override(scenario: Scenario, text: &str) -> Result<Scenario, 
             Value::Table(table) => {
                 if !table.contains_key(part) && missing.is_none() {
                     let known = if variants.is_empty() {
-                        table.keys().cloned().collect()
+                        describe::keys(&parts[..index], table)
                     } else {
                         variants.iter().map(ToString::to_string).collect()
                     };

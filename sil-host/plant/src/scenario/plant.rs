@@ -14,7 +14,7 @@ impl BuiltInPlant {
     /// compliant contact.
     pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
         let parameters = scenario.plant_parameters();
-        let start = scenario.initial.state();
+        let start = scenario.initial.state(&parameters.arm)?;
         let (contact, effects) = (&scenario.contact, &scenario.effects);
         Ok(match contact.kind {
             ContactKind::Rigid => {

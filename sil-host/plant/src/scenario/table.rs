@@ -4,7 +4,7 @@ use toml::{Table, Value};
 
 use super::error::{KeyError, ScenarioError};
 use super::words::TomlError;
-use super::{Scenario, reference_file};
+use super::{Scenario, initial_key, reference_file};
 
 /// Reads a table from TOML text; messages name its origin.
 pub(super) fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
@@ -24,9 +24,18 @@ pub(super) fn from_table(
         key: "controller.reference".into(),
         source: KeyError::File(reason),
     })?;
-    serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| ScenarioError::Key {
+    let scenario: Scenario =
+        serde_path_to_error::deserialize(Value::Table(table)).map_err(|error| {
+            ScenarioError::Key {
+                origin: origin.map(str::to_owned),
+                key: error.path().to_string(),
+                source: KeyError::Value(error.into_inner()),
+            }
+        })?;
+    initial_key::check(&scenario.initial).map_err(|(key, source)| ScenarioError::Key {
         origin: origin.map(str::to_owned),
-        key: error.path().to_string(),
-        source: KeyError::Value(error.into_inner()),
-    })
+        key: key.into(),
+        source,
+    })?;
+    Ok(scenario)
 }

@@ -216,8 +216,7 @@ fn measured_table(entries: &[Entry]) -> String {
         columns.push("seed".into());
     }
     columns.push("measured at commit".into());
-    let mut text = format!("| | {} |\n|---|", columns.join(" | "));
-    writeln!(text, "{}", "---|".repeat(columns.len())).unwrap();
+    let mut rows = Vec::new();
     for Entry {
         label,
         command,
@@ -237,7 +236,30 @@ fn measured_table(entries: &[Entry]) -> String {
             cells.push(seed.split(' ').next().unwrap().into());
         }
         cells.push(result["commit"].as_str().unwrap().into());
+        rows.push((label, cells));
+    }
+    // What all rows share stands once, below.
+    let mut shared = Vec::new();
+    for name in ["runs", "seed", "measured at commit"] {
+        let Some(column) = columns.iter().position(|column| column == name) else {
+            continue;
+        };
+        let value = rows[0].1[column].clone();
+        if rows.len() >= 3 && rows.iter().all(|(_, cells)| cells[column] == value) {
+            columns.remove(column);
+            for (_, cells) in &mut rows {
+                cells.remove(column);
+            }
+            shared.push(format!("{name} {value}"));
+        }
+    }
+    let mut text = format!("| | {} |\n|---|", columns.join(" | "));
+    writeln!(text, "{}", "---|".repeat(columns.len())).unwrap();
+    for (label, cells) in rows {
         writeln!(text, "| {label} | {} |", cells.join(" | ")).unwrap();
+    }
+    if !shared.is_empty() {
+        writeln!(text, "\nAll: {}.", shared.join(", ")).unwrap();
     }
     text
 }

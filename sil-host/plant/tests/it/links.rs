@@ -236,6 +236,9 @@ fn the_pages_stay_short() {
         sum <= MOST_WORDS,
         "{sum} words in docs/, more than {MOST_WORDS}"
     );
+    // One screen.
+    let readme = words(&workspace().join("README.md"));
+    assert!(readme <= 700, "{readme} words in README.md");
     for name in ["studies.md", "beyond-the-paper.md"] {
         let words = words(&docs.join(name));
         assert!(words <= 3_500, "{words} words in docs/{name}");

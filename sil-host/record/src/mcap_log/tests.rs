@@ -1,3 +1,5 @@
+use std::time::{Duration, SystemTime};
+
 use super::*;
 use std::fs;
 use std::path::Path;
@@ -142,6 +144,9 @@ fn every_tick_is_recorded_with_its_values_and_the_csv_file_has_the_same() {
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     let metadata = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap();
     assert_eq!(metadata.metadata["scenario"], "hybrid-elbow-down");
+    let start_ns: u64 = metadata.metadata["start_unix_ns"].parse().unwrap();
+    let age = SystemTime::UNIX_EPOCH + Duration::from_nanos(start_ns);
+    assert!(age.elapsed().unwrap() < Duration::from_secs(600));
 }
 
 /// Returns every value of a key in a document.

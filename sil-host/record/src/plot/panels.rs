@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use painleve_chart::decimate::Bin;
 use painleve_chart::style::{
     BLACK_INK, BLUE_INK, Colour, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION,
 };
@@ -17,6 +18,8 @@ const HEIGHT: i32 = 170;
 const LANE: i32 = 42;
 /// A tip this high above the belt has left it, mm; on a compliant contact it rides on the belt.
 const LEFT_MM: f64 = 0.01;
+/// Largest exponents of ten on a logarithmic axis.
+const MOST_DECADES: f64 = 6.0;
 /// Largest number of shaded intervals; closer ones are drawn as one.
 const INTERVALS: f64 = 600.0;
 
@@ -86,13 +89,47 @@ impl Panels<'_> {
             minimum_span: 1.0,
             ..self.panel("Free normal acceleration b", "m/s²", &[b], true)
         });
-        let p = Curve(signal::P, "", GREEN, 4);
-        panels.push(Panel {
-            note: "paradox where p ≤ 0".into(),
-            minimum_span: 0.5,
-            ..self.panel("Contact coefficient p", "1/kg", &[p], true)
-        });
+        for (title, signal, colour) in [
+            ("Distance to the edge, p = 0 (mm)", signal::EDGE, VERMILLION),
+            ("p/Q₂₂", signal::P_RATIO, GREEN),
+        ] {
+            if self.has(signal) {
+                panels.push(self.decades(title, Curve(signal, "", colour, 4)));
+            }
+        }
         panels
+    }
+
+    /// Returns a panel of the logarithm of a curve, with the paradox shaded.
+    fn decades(&self, title: &str, curve: Curve) -> Panel {
+        let values = self.bins.iter().map(|bin| bin.extents[curve.0]);
+        let (low, high) = values
+            .flat_map(|extent| [extent.min, extent.max])
+            .filter(|value| value.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (value.min(low), value.max(high))
+            });
+        let (low, high) = if low <= high {
+            (low, high)
+        } else {
+            (-1.0, 0.0)
+        };
+        let (low, high) = (low.max(-MOST_DECADES), high.min(MOST_DECADES));
+        let range = low - 0.1..high.max(low + 0.3) + 0.1;
+        let mut panel = self.panel(title, "", &[curve], false);
+        panel.title = title.into();
+        panel.y_labels = Some(decade_labels(&range));
+        panel.y = Some(range);
+        let paradox = self.times_of(flag::PARADOX);
+        if !paradox.is_empty() {
+            panel.marks.push(Mark::Spans {
+                name: "paradox, p ≤ 0".into(),
+                colour: PURPLE,
+                opacity: 0.25,
+                x: paradox,
+            });
+        }
+        panel
     }
 
     fn has(&self, signal: usize) -> bool {
@@ -122,7 +159,7 @@ impl Panels<'_> {
             colour: *colour,
             width: *width,
             dashed: false,
-            points: self.points(*signal),
+            points: points(self.bins, *signal),
         }));
         Panel {
             title: format!("{title} ({unit})"),
@@ -148,7 +185,7 @@ impl Panels<'_> {
             colour,
             width: 5,
             dashed: true,
-            points: self.points(signal),
+            points: points(self.bins, signal),
         };
         // Only a request that the governor does not grant differs from the reference.
         let differs = self.bins.iter().any(|bin| {
@@ -321,26 +358,47 @@ impl Panels<'_> {
         }
         times
     }
+}
 
-    /// Returns the points of a curve; a bin shows its first, smallest, largest and last value.
-    fn points(&self, signal: usize) -> Vec<(f64, f64)> {
-        let mut points = Vec::with_capacity(4 * self.bins.len());
-        for bin in self.bins {
-            let extent = bin.extents[signal];
-            let middle_s = 0.5 * (bin.start_s + bin.end_s);
-            // Within a pixel or two, only rising and falling can be distinguished.
-            let (sooner, later) = if extent.first <= extent.last {
-                (extent.min, extent.max)
-            } else {
-                (extent.max, extent.min)
-            };
-            points.extend([
-                (bin.start_s, extent.first),
-                (middle_s, sooner),
-                (middle_s, later),
-                (bin.end_s, extent.last),
-            ]);
-        }
-        points
+/// Returns the labels of a logarithmic axis: powers of ten, with 2 and 5 between them if the axis is short.
+fn decade_labels(range: &Range<f64>) -> Vec<(f64, String)> {
+    let factors: &[f64] = if range.end - range.start < 1.5 {
+        &[1.0, 2.0, 5.0]
+    } else {
+        &[1.0]
+    };
+    let decades = range.start.floor() as i32..=range.end.ceil() as i32;
+    let values = decades.flat_map(|decade| {
+        let decimals = usize::try_from(-decade).unwrap_or_default();
+        factors.iter().map(move |factor| {
+            let value = factor * 10_f64.powi(decade);
+            (value.log10(), format!("{value:.decimals$}"))
+        })
+    });
+    values.filter(|(at, _)| range.contains(at)).collect()
+}
+
+/// Returns the points of a curve; a bin shows its first, smallest, largest and last value.
+pub(crate) fn points<const SIGNALS: usize>(
+    bins: &[Bin<SIGNALS>],
+    signal: usize,
+) -> Vec<(f64, f64)> {
+    let mut points = Vec::with_capacity(4 * bins.len());
+    for bin in bins {
+        let extent = bin.extents[signal];
+        let middle_s = 0.5 * (bin.start_s + bin.end_s);
+        // Within a pixel or two, only rising and falling can be distinguished.
+        let (sooner, later) = if extent.first <= extent.last {
+            (extent.min, extent.max)
+        } else {
+            (extent.max, extent.min)
+        };
+        points.extend([
+            (bin.start_s, extent.first),
+            (middle_s, sooner),
+            (middle_s, later),
+            (bin.end_s, extent.last),
+        ]);
     }
+    points
 }

@@ -5,12 +5,15 @@ use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::Snapshot;
 use painleve_plant::sample::Sample;
 use painleve_shared::frame::ActuatorFrame;
-use painleve_shared::{JointTorque, LinkMotion};
+use painleve_shared::{Arm, JointTorque, LinkMotion, Pose, Slip};
 use proptest::prelude::*;
 
 /// Creates a run whose tip follows its reference, then leaves the belt for one tick.
 fn sample(tick: u32) -> Sample {
     let time_s = f64::from(tick) * 1e-3;
+    let theta_rad = LinkMotion::new(-0.2, -0.6);
+    let arm = Arm::new(Scenario::default().arm).unwrap();
+    let p_per_kg = arm.p(&Pose::new(&theta_rad), 0.6, Slip::Positive);
     Sample {
         plant: Snapshot {
             time_s,
@@ -19,7 +22,8 @@ fn sample(tick: u32) -> Sample {
             normal_force_n: if tick == 500 { 480.0 } else { 10.0 },
             torque_nm: JointTorque::new(1.0, 2.0),
             b_m_s2: -5.0,
-            p_per_kg: 0.4,
+            theta_rad,
+            p_per_kg,
             mode: if tick == 501 {
                 ContactMode::Flight
             } else {
@@ -116,7 +120,8 @@ fn panels_are_titled_with_their_units() {
         "Controller",
         "tracking",
         "Free normal acceleration b (m/s²)",
-        "Contact coefficient p (1/kg)",
+        "Distance to the edge, p = 0 (mm)",
+        "p/Q₂₂",
         "Simulated time (s)",
         "2.0",
     ] {
@@ -157,8 +162,8 @@ fn panels_without_content_are_left_out() {
 fn a_flight_of_one_tick_is_visible_in_its_lane_and_shades_all_panels_of_a_long_run() {
     let shades = |plot: &RunPlot| plot.svg().matches("fill=\"#D55E00\" fill-opacity").count();
     let svg = plot(100_000).svg();
-    // Tip, error, gap, force, torques, friction, b and p.
-    assert_eq!(shades(&plot(100_000)), 8);
+    // Tip, error, gap, force, torques, friction, b, distance and p/Q22.
+    assert_eq!(shades(&plot(100_000)), 9);
     assert!(texts(&svg).contains(&"flight"));
     assert_eq!(shades(&plot(500)), 0);
 }

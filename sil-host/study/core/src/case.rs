@@ -198,10 +198,10 @@ pub fn start(arm: &ArmParameters<f64>, posture: Posture) -> Result<InitialState,
         let arm = Arm::new(*arm)?;
         return at_rest_on_belt(&arm, START * arm.reach_on_belt_m(), posture);
     }
-    let down = InitialState::default();
+    let [theta_1, theta_2] = InitialState::X0_D_DEG;
     Ok(match posture {
-        Posture::ElbowDown => down,
-        Posture::ElbowUp => InitialState::at_rest(down.theta2_deg, down.theta1_deg),
+        Posture::ElbowDown => InitialState::at_rest(theta_1, theta_2),
+        Posture::ElbowUp => InitialState::at_rest(theta_2, theta_1),
     })
 }
 
@@ -320,7 +320,9 @@ mod tests {
                         scenario.converters.encoder.bits,
                         if ideal { 24 } else { 14 }
                     );
-                    let theta = painleve_plant::mechanics::motion::theta(&scenario.initial.state());
+                    let theta = painleve_plant::mechanics::motion::theta(
+                        &scenario.initial.state(&scenario.arm).unwrap(),
+                    );
                     assert_eq!(Posture::of(&theta), posture);
                 }
             }
@@ -359,7 +361,7 @@ mod tests {
             assert_eq!(case.run.tick_hz, 2000);
             let plant = painleve_plant::mechanics::ArmOnBelt::new(
                 &case.plant_parameters(),
-                case.initial.state(),
+                case.initial.state(&case.arm).unwrap(),
             )
             .unwrap();
             let start_m = START * plant.arm().reach_on_belt_m();

@@ -43,52 +43,7 @@ pub trait LoopStudy: Study {
     fn row_on(&self, index: usize, plants: &impl MakePlant) -> Result<Self::Row, StudyError>;
 }
 
-/// A closed-loop study with a user-defined plant.
-///
-/// ```
-/// use painleve_plant::mechanics::BuiltInPlant;
-/// use painleve_plant::scenario::Scenario;
-/// use painleve_plant::{Plant, PlantError, Probe, Snapshot};
-/// use painleve_shared::JointTorque;
-/// use painleve_shared::range::OutOfRange;
-/// use painleve_study::loop_study::OnPlant;
-/// use painleve_study::robustness::{Arms, Criterion, Robustness};
-///
-/// /// The arm with motors that give 2 % less torque than commanded.
-/// struct WeakMotors(BuiltInPlant);
-///
-/// impl WeakMotors {
-///     fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
-///         BuiltInPlant::new(scenario).map(Self)
-///     }
-/// }
-///
-/// impl Plant for WeakMotors {
-///     fn snapshot(&self) -> Snapshot {
-///         self.0.snapshot()
-///     }
-///
-///     fn command_torque(&mut self, target_nm: JointTorque<f64>, lag_s: f64) {
-///         self.0.command_torque(target_nm * 0.98, lag_s);
-///     }
-///
-///     fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError> {
-///         self.0.advance(until_s, probe)
-///     }
-/// }
-///
-/// let campaign = Robustness {
-///     arms: Arms::Paper,
-///     seed: 1,
-///     criterion: Criterion::Kept,
-///     runs: 2,
-///     overrides: Vec::new(),
-/// };
-/// let study = OnPlant { study: campaign, plants: WeakMotors::new };
-/// let rows = painleve_study::rows(&study, || ())?;
-/// assert!(rows.iter().all(|row| row.ending.is_kept()));
-/// # Ok::<(), painleve_study::StudyError>(())
-/// ```
+/// A closed-loop study with a user-defined plant. The documentation of `painleve_study_quality` has an example.
 #[derive(Clone, Debug)]
 pub struct OnPlant<S, M> {
     /// The study.

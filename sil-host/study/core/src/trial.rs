@@ -13,6 +13,7 @@ use painleve_shared::settings::Settings;
 use painleve_shared::status::Fault;
 
 /// A closed loop that can be stopped as soon as its outcome is known.
+#[derive(Clone)]
 pub struct Trial<P = BuiltInPlant> {
     simulation: Simulation<P>,
     controller: Controller,
@@ -56,6 +57,16 @@ impl<P: Plant> Trial<P> {
         }
         let answer = arrives.then_some(&self.answer);
         self.simulation.advance(answer, probe)
+    }
+
+    /// Pushes the tip with a force (f_t, f_n), N, during the next tick.
+    pub fn push(&mut self, force_n: [f64; 2]) {
+        self.simulation.push(force_n, 1);
+    }
+
+    /// Returns the simulation.
+    pub fn simulation(&self) -> &Simulation<P> {
+        &self.simulation
     }
 
     /// Returns the simulated time, s.

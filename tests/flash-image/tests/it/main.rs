@@ -1,5 +1,6 @@
 //! Tests of the images that are flashed, executed on modelled boards.
 
+mod accept;
 mod boot;
 mod bound;
 mod closed_loop;
@@ -9,3 +10,4 @@ mod hazards;
 mod open_loop;
 mod random_faults;
 mod stored;
+mod tables;

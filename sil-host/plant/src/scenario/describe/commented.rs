@@ -143,7 +143,7 @@ mod tests {
         .map(String::from);
         let mut scenario = Scenario::load("edge", &overrides).unwrap();
         scenario.description = "[two]\n# \"lines\" = 'and quotes'\n".into();
-        scenario.initial.theta1_deg = 0.1 + 0.2;
+        scenario.initial.theta1_deg = Some(0.1 + 0.2);
         assert_eq!(read(&scenario.to_commented_toml()), scenario);
     }
 

@@ -1,10 +1,13 @@
 //! Descriptions of all settings, generated from their declarations.
 //!
 //! - [`Scenario::to_commented_toml`]: a scenario with every key, its meaning, unit and range
+//! - [`Scenario::to_brief_toml`]: a scenario without what has its default
+//! - [`Scenario::differences`]: the keys in which two scenarios differ
 //! - [`json_schema`]: the same for editors
 //! - [`settings_table`]: tables for the documentation
 
 mod commented;
+mod difference;
 mod markdown;
 mod schema;
 
@@ -16,6 +19,7 @@ use toml::{Table, Value};
 
 use super::Scenario;
 
+pub use difference::Difference;
 pub use markdown::settings_table;
 pub use schema::json_schema;
 
@@ -102,6 +106,14 @@ pub(super) fn is_optional(path: &[&str]) -> bool {
     shapes(path)
         .iter()
         .any(|shape| matches!(shape, Shape::Optional(_)))
+}
+
+/// Returns the keys of the group at `path`, with those that may be absent from its `table`.
+pub(super) fn keys(path: &[&str], table: &Table) -> Vec<String> {
+    match shapes(path).first().and_then(group) {
+        Some(fields) => fields.iter().map(|field| field.key.into()).collect(),
+        None => table.keys().cloned().collect(),
+    }
 }
 
 /// Returns the names of the variants of the choice at `path` whose settings are in a table under the

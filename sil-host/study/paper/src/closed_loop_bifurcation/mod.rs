@@ -137,12 +137,7 @@ impl ClosedLoopBifurcation {
             if start_posture != guess {
                 scenario = case::scenario(controller, start_posture, converters, &overrides)?;
             }
-            scenario.initial = InitialState {
-                theta1_deg: state[0].to_degrees(),
-                theta2_deg: state[1].to_degrees(),
-                theta1_dot_rad_s: state[2],
-                theta2_dot_rad_s: state[3],
-            };
+            scenario.initial = InitialState::from(&state);
         }
         let target_m = self
             .target_m

@@ -65,11 +65,11 @@ impl Map {
         if self.slip == Slip::Negative {
             return Vec::new();
         }
-        let down = InitialState::default();
+        let [theta_1, theta_2] = InitialState::X0_D_DEG;
         [
             ("x0,a", 32.0, 18.27),
-            ("x0,d", down.theta1_deg, down.theta2_deg),
-            ("x0,u", down.theta2_deg, down.theta1_deg),
+            ("x0,d", theta_1, theta_2),
+            ("x0,u", theta_2, theta_1),
         ]
         .into_iter()
         .filter(|(_, _, theta2)| theta2 * self.theta2.sign() > 0.0)

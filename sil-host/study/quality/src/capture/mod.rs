@@ -7,7 +7,7 @@ mod outcome;
 use std::collections::BTreeMap;
 
 use painleve_plant::mechanics::BuiltInPlant;
-use painleve_plant::scenario::Scenario;
+use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_study_core::loop_study::{LoopStudy, MakePlant};
 use painleve_study_core::tabular::Tabular;
 use painleve_study_core::trial::Trial;
@@ -78,8 +78,7 @@ impl Capture {
         let mut generator = ChaCha8Rng::seed_from_u64(self.seed);
         generator.set_stream(index as u64);
         let mut scenario = Scenario::load_unplaced("hybrid-elbow-down", &[])?;
-        scenario.initial.theta1_deg = 32.0;
-        scenario.initial.theta2_deg = 18.27;
+        scenario.initial = InitialState::at_rest(32.0, 18.27);
         scenario.converters.force.noise_n = 0.1;
         scenario.controller.reference.segments.clear();
         let enable_at_s = BOUNCES_S + generator.random_range(0.0..PHASES_S);

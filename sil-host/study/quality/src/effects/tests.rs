@@ -104,7 +104,7 @@ fn everything_together_has_targets_away_from_the_edge_of_the_arm_that_moves() {
             };
             let scenario = study.scenario(place, run).unwrap();
             let arm = Arm::new(scenario.moving_arm()).unwrap();
-            let posture = Posture::of(&theta(&scenario.initial.state()));
+            let posture = Posture::of(&theta(&scenario.initial.state(&scenario.arm).unwrap()));
             let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
             let friction = everything.largest_friction.unwrap()(share, scenario.belt.friction);
             let line = BeltLine::new(&arm, posture);

@@ -52,7 +52,7 @@ pub fn run<P: Plant>(
 ) -> Result<Row, StudyError> {
     let end_s = scenario.run.duration_s;
     let arm = Arm::new(scenario.moving_arm())?;
-    let posture = Posture::of(&theta(&scenario.initial.state()));
+    let posture = Posture::of(&theta(&scenario.initial.state(&scenario.arm)?));
     let v_belt_m_s = scenario.belt.profile.speed_m_s(0.0);
     let target_m = scenario.target_m().unwrap_or(f64::NAN);
     let enabled_s = scenario.run.enable_at_s;

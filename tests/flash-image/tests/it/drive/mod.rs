@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod commissioning;
-mod rig;
+pub mod rig;
 mod stored;
 
 use std::io::{Read, Write};

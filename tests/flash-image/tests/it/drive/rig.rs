@@ -147,7 +147,7 @@ fn emulate(mut line: File, observed: &Observed, acts: &Receiver<Act>) {
     }
 }
 
-fn is_readable(line: &File) -> bool {
+pub fn is_readable(line: &File) -> bool {
     let mut ends = [PollFd::new(line.as_fd(), PollFlags::POLLIN)];
     matches!(poll(&mut ends, PollTimeout::ZERO), Ok(1..))
 }

@@ -1,0 +1,141 @@
+"""Many runs, and what they show: sweeps, differences, figures, margins.
+
+`sweep` and `compare` need `pip install pandas`, `plot` needs `pip install matplotlib`.
+"""
+
+import itertools
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Callable, Iterable, Mapping, Sequence
+
+from ._painleve import run, study
+
+Run = Mapping[str, Sequence[Any]]
+
+#: What `compare` compares: the name, the column of the simulated arm, the factor to the unit of the name.
+QUANTITIES = (
+    ("tip_mm", "plant.tip_t_m", 1e3),
+    ("gap_mm", "plant.gap_m", 1e3),
+    ("normal_force_n", "plant.normal_force_n", 1.0),
+    ("u1_nm", "plant.u1_nm", 1.0),
+    ("u2_nm", "plant.u2_nm", 1.0),
+    ("friction", "estimates.friction", 1.0),
+)
+#: Columns of the panels of `plot`.
+PANELS = (
+    ("tip (m)", ("plant.tip_t_m", "plant.reference_tip_t_m")),
+    ("normal force (N)", ("plant.normal_force_n",)),
+    ("torques (N·m)", ("plant.u1_nm", "plant.u2_nm")),
+    ("friction", ("estimates.friction",)),
+)
+
+
+def outcome(columns: Run) -> dict[str, float]:
+    """Returns what became of a run: lift-offs, fault (0 for none), tip and tracking error at the end, RMS error, largest
+    torque."""
+    errors = [
+        tip - reference
+        for tip, reference in zip(columns["plant.tip_t_m"], columns["plant.reference_tip_t_m"])
+        if math.isfinite(tip - reference)
+    ]
+    modes = columns["plant.mode"]
+    torques = itertools.chain(columns["plant.u1_nm"], columns["plant.u2_nm"])
+    return {
+        "lift_offs": sum(now == "flight" != before for before, now in itertools.pairwise(modes)),
+        "fault": columns["actuator.fault_number"][-1],
+        "final_tip_m": columns["plant.tip_t_m"][-1],
+        "final_error_m": errors[-1] if errors else math.nan,
+        "rms_error_m": math.sqrt(sum(error * error for error in errors) / len(errors)) if errors else math.nan,
+        "peak_torque_nm": max(map(abs, torques)),
+    }
+
+
+def sweep(
+    scenario: str,
+    keys: Mapping[str, Iterable[Any]],
+    overrides: Mapping[str, Any] | None = None,
+    measure: Callable[[Run], Mapping[str, Any]] = outcome,
+):
+    """Runs a scenario with all combinations of values of its keys, and returns a DataFrame with a line for each: the
+    values, and what `measure` returns for the run. The last key varies fastest; runs share the cores."""
+    import pandas
+
+    names = list(keys)
+    settings = [dict(zip(names, values)) for values in itertools.product(*(list(keys[name]) for name in names))]
+
+    def line(values):
+        return {**values, **measure(run(scenario, {**(overrides or {}), **values}))}
+
+    # A run releases the interpreter.
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return pandas.DataFrame(list(pool.map(line, settings)))
+
+
+def _zero(columns: Run, align: str) -> float:
+    """Returns the time of an event of a run, s."""
+    flags = {"enable": ("sensor.inputs", 1), "contact": ("actuator.flags", 1)}
+    if align == "start":
+        return columns["time_s"][0]
+    if align not in flags:
+        raise ValueError(f"align = '{align}': enable, contact or start")
+    column, bit = flags[align]
+    for time_s, value in zip(columns["time_s"], columns[column]):
+        if int(value) & bit:
+            return time_s
+    raise ValueError(f"align = '{align}': this does not happen in a run")
+
+
+def compare(first: Run, *others: Run, align: str = "enable"):
+    """Returns how much runs differ from the first, as a DataFrame: mean, RMS and largest difference of each quantity, and
+    when it is largest. Time is counted from an event: `enable`, `contact` (the first found by the controller) or `start`."""
+    import numpy
+    import pandas
+
+    lines = []
+    zero = _zero(first, align)
+    times = numpy.asarray(first["time_s"]) - zero
+    for number, other in enumerate(others, 1):
+        other_times = numpy.asarray(other["time_s"]) - _zero(other, align)
+        for name, column, scale in QUANTITIES:
+            values = numpy.interp(times, other_times, other[column], numpy.nan, numpy.nan)
+            difference = scale * (values - numpy.asarray(first[column]))
+            known = numpy.isfinite(difference)
+            if known.any():
+                difference, at = difference[known], times[known]
+                largest = int(numpy.abs(difference).argmax())
+                lines.append({
+                    "run": number,
+                    "quantity": name,
+                    "mean": difference.mean(),
+                    "rms": math.sqrt((difference**2).mean()),
+                    "largest": difference[largest],
+                    "at_s": at[largest],
+                })  # fmt: skip
+    return pandas.DataFrame(lines)
+
+
+def plot(*runs: Run, labels: Sequence[str] = (), align: str = "start"):
+    """Draws runs over time, one above the other in each panel, and returns the Matplotlib figure."""
+    import matplotlib.pyplot as pyplot
+
+    figure, axes = pyplot.subplots(len(PANELS), sharex=True, figsize=(8, 9), layout="constrained")
+    for number, columns in enumerate(runs):
+        zero = _zero(columns, align)
+        times = [time_s - zero for time_s in columns["time_s"]]
+        label = labels[number] if number < len(labels) else None
+        for axis, (title, names) in zip(axes, PANELS):
+            axis.set_ylabel(title)
+            for which, name in enumerate(names):
+                style = "-" if which == 0 else "--"
+                axis.plot(times, columns[name], style, color=f"C{number}", label=label if which == 0 else None)
+    if labels:
+        axes[0].legend()
+    axes[-1].set_xlabel("time (s)")
+    return figure
+
+
+def linearise(controller: str = "hybrid", tip: float | Sequence[float] = 0.05, **options: Any) -> list[dict[str, Any]]:
+    """Returns the sampled loop in the frequency domain at places of the tip (m): the rows of `painleve study loop`, with
+    margins, frequency response and steps."""
+    return study("loop", controller=controller, tip=tip, **options)["rows"]

@@ -1,0 +1,69 @@
+"""Sweeps, comparisons, figures, margins, and the types that the package declares."""
+
+import ast
+import math
+from pathlib import Path
+
+import matplotlib
+import painleve
+import pytest
+
+matplotlib.use("svg")
+SHORT = {"run.duration_s": 0.5}
+
+
+def test_a_sweep_has_a_line_for_each_combination():
+    keys = {"belt.friction": [0.4, 0.6], "controller.law.hybrid.normal_force_n": [5, 10, 20]}
+    lines = painleve.sweep("hybrid-elbow-down", keys, SHORT)
+    assert len(lines) == 6
+    assert list(lines["belt.friction"]) == [0.4] * 3 + [0.6] * 3
+    assert list(lines["controller.law.hybrid.normal_force_n"]) == [5, 10, 20] * 2
+    assert (lines["lift_offs"] == 0).all() and (lines["fault"] == 0).all()
+    largest = painleve.sweep("edge", {"belt.friction": [0.5]}, SHORT, lambda run: {"largest": max(run["plant.tip_t_m"])})
+    assert list(largest.columns) == ["belt.friction", "largest"]
+    with pytest.raises(ValueError, match="belt.friction"):
+        painleve.sweep("edge", {"belt.friction": [-1]})
+
+
+def test_runs_are_compared_from_an_event_on():
+    first = painleve.run("edge", SHORT)
+    same = painleve.compare(first, first)
+    assert len(same) >= 5 and (same["largest"] == 0).all()
+    late = painleve.run("edge", {**SHORT, "run.enable_at_s": 0.1})
+    tip = painleve.compare(first, late).set_index("quantity").loc["tip_mm"]
+    unaligned = painleve.compare(first, late, align="start").set_index("quantity").loc["tip_mm"]
+    assert abs(tip["rms"]) < abs(unaligned["rms"])
+    with pytest.raises(ValueError, match="align"):
+        painleve.compare(first, late, align="end")
+
+
+def test_a_plot_has_a_panel_for_each_quantity():
+    runs = [painleve.run("edge", {**SHORT, "belt.friction": friction}) for friction in (0.4, 0.6)]
+    figure = painleve.plot(*runs, labels=["0.4", "0.6"])
+    assert len(figure.axes) == 4
+    assert all(len(axis.lines) >= 2 for axis in figure.axes)
+
+
+def test_the_loop_is_linearised():
+    (row,) = painleve.linearise("hybrid", 0.05, frequencies=3)
+    loops = {loop["name"]: loop for loop in row["loops"]}
+    assert loops["position"]["margins"]["phase_deg"] > 20
+    point = loops["position"]["points"][0]
+    assert math.isclose(point["gain_db"], point["measured_gain_db"], abs_tol=0.5)
+
+
+def declared(name):
+    stub = Path(painleve.__file__).parent / "_painleve.pyi"
+    tree = ast.parse(stub.read_text(encoding="utf-8"))
+    (found,) = [node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == name]
+    return {line.target.id for line in found.body if isinstance(line, ast.AnnAssign)}
+
+
+def test_declared_fields_are_those_that_are_returned():
+    run = painleve.run("edge", SHORT)
+    fields = {name: {column.removeprefix(f"{name}.") for column in run if column.startswith(f"{name}.")} for name in ("plant", "estimates")}
+    assert declared("State") == fields["plant"] | {"time_s"}
+    assert declared("Telemetry") == fields["estimates"]
+    assert set(painleve.Plant().state()) <= declared("State")
+    assert set(painleve.Controller().telemetry()) <= declared("Telemetry")
+    assert (Path(painleve.__file__).parent / "py.typed").exists()

@@ -1,0 +1,79 @@
+//! Release of the ticks: the control timer captures its own count at the select of encoder 1, PB6 wired to PA0. No
+//! program takes part in the measurement.
+//!
+//! With the encoders' line at ground, a tick selects the encoder three times, the second time after the control
+//! interrupt. The timer captures every eighth edge, so that the first one of a tick is among them again and again.
+
+use painleve_board::Port;
+use painleve_shared::message::{FrameSource, Probe};
+
+use crate::bench::{Bench, StepError};
+use crate::chip::{driver, port, timer};
+use crate::report::Check;
+
+/// Ticks after which the capture is read.
+const TICKS: usize = 300;
+
+/// Fewest first edges among them.
+const FEWEST: usize = 30;
+
+/// Later edges are those of further selects, µs: the control interrupt takes longer.
+const FIRST_US: f64 = 8.0;
+
+/// Largest spread, µs: at 1 kHz no sensor's interrupt is under way, and no code masks interrupts for longer.
+const SPREAD_US: f64 = 3.0;
+
+/// Captures the input of the first channel at every eighth edge.
+const EVERY_EIGHTH: u32 = 0b1101;
+
+/// Captures the starts of ticks.
+///
+/// # Errors
+/// [`StepError`] if the board does not answer.
+pub fn measure<P: Port>(bench: &mut Bench<P>) -> Result<Vec<Check>, StepError> {
+    let chip = bench.chip()?;
+    bench.drive(driver::ENCODERS, Some(false))?;
+    bench.configure(1000.0, FrameSource::DryRun)?;
+    let [a, ..] = chip.ports;
+    // PA0 belongs to the timer, whose first channel captures at falling edges.
+    bench.modify(a + port::FUNCTIONS, 15, 1)?;
+    bench.modify(a + port::MODES, 3, 2)?;
+    bench.store(timer::MODES, EVERY_EIGHTH)?;
+    bench.store(timer::EDGES, 3)?;
+    let mut first_us = Vec::new();
+    let mut captured = 0;
+    for _ in 0..TICKS {
+        // Reading the capture clears its flag.
+        let loads = [timer::FLAGS, timer::CAPTURE].map(|address| Probe::Load { address });
+        let answers = bench.probe_all(&loads)?;
+        if answers[0].value & 2 != 0 {
+            captured += 1;
+            let us = 1e6 * f64::from(answers[1].value) / chip.timer_hz;
+            first_us.extend(Some(us).filter(|it| *it < FIRST_US));
+        }
+        bench.ticks(1)?;
+    }
+    bench.drive(driver::ENCODERS, None)?;
+    first_us.sort_by(f64::total_cmp);
+    let mut checks = vec![Check::new(
+        "captures at PA0, and those of the first select of a tick",
+        format_args!("{captured}, {} in {TICKS} ticks", first_us.len()),
+        format_args!("at least {FEWEST} of the latter: the wire from PB6 is there"),
+        first_us.len() >= FEWEST,
+    )];
+    if let [earliest, .., latest] = first_us[..] {
+        let median = first_us[first_us.len() / 2];
+        let spread = latest - earliest;
+        checks.push(Check::note(
+            "first select after the timer's event",
+            format_args!("{earliest:.2} µs to {latest:.2} µs, median {median:.2} µs"),
+        ));
+        checks.push(Check::new(
+            "jitter: latest less earliest",
+            format_args!("{spread:.2} µs"),
+            format_args!("at most {SPREAD_US} µs"),
+            spread <= SPREAD_US,
+        ));
+    }
+    Ok(checks)
+}

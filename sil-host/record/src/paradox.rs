@@ -1,0 +1,152 @@
+//! How far a tip on the belt is from the paradox: p/Q22, and the distance to the place where p = 0.
+
+use painleve_plant::scenario::Scenario;
+use painleve_shared::{Arm, LinkMotion, OutOfRange, Pose, Posture};
+
+/// Intervals in which a change of sign of p along the belt is looked for.
+const INTERVALS: usize = 128;
+/// Usable fraction of the reach: at the full reach the arm is straight.
+const USED_REACH: f64 = 0.97;
+/// A change of the signed friction coefficient below which the places of p = 0 stay: they move by about 0.1 m per unit.
+const SAME_FRICTION: f64 = 1e-7;
+/// The signed friction coefficient follows from p only where Q12 is not small beside Q22.
+const LEAST_COUPLING: f64 = 1e-3;
+
+/// Distance to the paradox at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// p/Q22: 1 without friction, 0 at the edge of the paradox, negative inside; NaN if p is unknown.
+    pub p_ratio: f64,
+    /// Distance along the belt to the nearest place with p = 0, m; 0 inside the paradox, NaN if there is no such place.
+    pub edge_m: f64,
+}
+
+impl Distance {
+    const UNKNOWN: Self = Self {
+        p_ratio: f64::NAN,
+        edge_m: f64::NAN,
+    };
+}
+
+/// Measures the distance to the paradox during a run. The friction is the one that p contains, so that a friction that
+/// changes during the run needs no further care.
+#[derive(Clone, Debug)]
+pub struct ParadoxDistance {
+    arm: Arm<f64>,
+    /// The product of slip sign and friction coefficient, and the posture, of these places with p = 0.
+    edges: Option<(f64, Posture, Vec<f64>)>,
+}
+
+impl ParadoxDistance {
+    /// Creates the measurement for a scenario's arm.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if there is no such arm.
+    pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
+        Ok(Self {
+            arm: Arm::new(scenario.moving_arm())?,
+            edges: None,
+        })
+    }
+
+    /// Measures at link angles (rad), with p in 1/kg.
+    pub fn measure(&mut self, theta: &LinkMotion<f64>, p_per_kg: f64) -> Distance {
+        let pose = Pose::new(theta);
+        let q = self.arm.inverse_tip_inertia(&pose);
+        let p_ratio = p_per_kg / q.m22;
+        if !p_ratio.is_finite() {
+            return Distance::UNKNOWN;
+        }
+        let posture = Posture::of(theta);
+        if q.m12.abs() > LEAST_COUPLING * q.m22 {
+            let signed_friction = (q.m22 - p_per_kg) / q.m12;
+            let is_same = self.edges.as_ref().is_some_and(|(known, of_posture, _)| {
+                (known - signed_friction).abs() < SAME_FRICTION && *of_posture == posture
+            });
+            if !is_same {
+                let edges = self.edges_m(signed_friction, posture);
+                self.edges = Some((signed_friction, posture, edges));
+            }
+        }
+        let tip_m = self.arm.tip_m(&pose).x;
+        let edges = self.edges.iter().flat_map(|(_, _, edges)| edges);
+        let nearest_m = edges.map(|edge| (edge - tip_m).abs()).reduce(f64::min);
+        Distance {
+            p_ratio,
+            edge_m: match nearest_m {
+                _ if p_ratio <= 0.0 => 0.0,
+                Some(distance_m) => distance_m,
+                None => f64::NAN,
+            },
+        }
+    }
+
+    /// Returns the places on the belt with p = 0, m.
+    fn edges_m(&self, signed_friction: f64, posture: Posture) -> Vec<f64> {
+        let reach_m = USED_REACH * self.arm.reach_on_belt_m();
+        let p = |tip_m: f64| {
+            let row = self.arm.inverse_inertia_row_on_belt(tip_m, posture);
+            row.map_or(f64::NAN, |(coupling, normal)| {
+                normal - signed_friction * coupling
+            })
+        };
+        let at = |number: usize| reach_m * (2.0 * number as f64 / INTERVALS as f64 - 1.0);
+        let crossing = |number: usize| {
+            let (mut low, mut high) = (at(number), at(number + 1));
+            let sign = p(low).signum();
+            if sign * p(high) > 0.0 || p(high).is_nan() {
+                return None;
+            }
+            // 60 halvings of 3 mm are below rounding.
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if sign * p(middle) > 0.0 {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            Some(0.5 * (low + high))
+        };
+        (0..INTERVALS).filter_map(crossing).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_shared::Slip;
+
+    /// Measures with the tip on the belt.
+    fn at(tip_m: f64, friction: f64) -> Distance {
+        let mut distance = ParadoxDistance::new(&Scenario::default()).unwrap();
+        let theta = distance
+            .arm
+            .link_angles_on_belt_rad(tip_m, Posture::ElbowDown)
+            .unwrap();
+        let p = distance.arm.p(&Pose::new(&theta), friction, Slip::Positive);
+        distance.measure(&theta, p)
+    }
+
+    #[test]
+    fn the_edge_of_the_papers_arm_is_where_the_scenarios_say() {
+        // `edge.toml`: elbow down, p = 0 at 0.16471 m for μ = 0.6.
+        let held = at(0.163, 0.6);
+        assert!((held.edge_m - 0.00171).abs() < 1e-5, "{held:?}");
+        assert!(held.p_ratio > 0.0 && held.p_ratio < 0.12, "{held:?}");
+        let inside = at(0.17, 0.6);
+        assert!(inside.p_ratio < 0.0 && inside.edge_m == 0.0, "{inside:?}");
+        let without = at(0.1, 0.05);
+        assert!(
+            without.edge_m.is_nan() && without.p_ratio > 0.5,
+            "{without:?}"
+        );
+    }
+
+    #[test]
+    fn an_unknown_p_has_no_distance() {
+        let mut distance = ParadoxDistance::new(&Scenario::default()).unwrap();
+        let unknown = distance.measure(&LinkMotion::new(0.1, -0.5), f64::NAN);
+        assert!(unknown.p_ratio.is_nan() && unknown.edge_m.is_nan());
+    }
+}

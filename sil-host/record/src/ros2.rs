@@ -1,0 +1,313 @@
+//! A record as a ROS 2 bag: MCAP with messages in CDR, and their definitions in the file.
+//!
+//! - `/joint_states`: `sensor_msgs/JointState`, the joints as their encoders measure them, of the simulated arm or as
+//!   estimated from a real one
+//! - `/contact`: `geometry_msgs/WrenchStamped`, the force of the belt on the tip, x along the belt and z away from it
+//! - `/plant`, `/sensor`, `/actuator`, `/estimates`: `painleve_msgs/Plant` and so on, every field of a record
+//!
+//! A bag's times are those of the clock. ROS 2 needs no package of ours to read it: the definitions are in the file.
+
+use std::collections::BTreeMap;
+use std::io::{self, Read, Seek, Write};
+
+use mcap::McapError;
+use mcap::records::MessageHeader;
+use serde_json::{Map, Value};
+
+use crate::fields::{ESTIMATES, PLANT, Read as Kind, SENSOR, TOPICS, Topic};
+use crate::record_file::{Damage, Extent, RecordedMessage, messages};
+
+/// Definition of the header of every message, and of the time in it.
+const HEADER: &str = "builtin_interfaces/Time stamp\nstring frame_id\n";
+const TIME: &str = "int32 sec\nuint32 nanosec\n";
+const JOINT_STATE: &str = "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
+const WRENCH_STAMPED: &str = "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n";
+const WRENCH: &str = "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n";
+const VECTOR: &str = "float64 x\nfloat64 y\nfloat64 z\n";
+/// What separates definitions.
+const SEPARATOR: &str =
+    "================================================================================\n";
+
+/// Names of the joints.
+const JOINTS: [&str; 2] = ["shoulder", "elbow"];
+/// Frame of the force.
+const FRAME: &str = "belt";
+
+/// Why a bag cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum BagError {
+    /// The record is damaged.
+    #[error(transparent)]
+    Damage(#[from] Damage),
+    /// The record has no ticks.
+    #[error("no topic /plant, /sensor, /actuator or /estimates: this is not a record of painleve")]
+    NoTicks,
+    /// The bag cannot be written.
+    #[error(transparent)]
+    Write(#[from] McapError),
+}
+
+/// Writes the messages of a record as a bag and returns it with the number of ticks. `start_ns` is the time by the clock at
+/// the start, ns since 1970.
+///
+/// # Errors
+/// [`BagError`] if the record is damaged or empty, or the bag cannot be written.
+pub fn to_bag<W: Write + Seek>(
+    record: impl Read,
+    start_ns: u64,
+    output: W,
+) -> Result<(W, u64), BagError> {
+    let mut bag = Bag::new(start_ns, output)?;
+    messages(record, &mut Extent::default(), |message| {
+        bag.take_in(message)
+    })?;
+    if bag.ticks == 0 {
+        return Err(BagError::NoTicks);
+    }
+    bag.writer.finish()?;
+    Ok((bag.writer.into_inner(), bag.ticks))
+}
+
+struct Bag<W: Write + Seek> {
+    writer: mcap::Writer<W>,
+    start_ns: u64,
+    /// Channels of the topics, then of the joints and of the contact.
+    topics: [u16; TOPICS.len()],
+    joints: u16,
+    contact: u16,
+    /// Time of the last state of the joints.
+    joints_ns: Option<u64>,
+    /// Number of ticks.
+    ticks: u64,
+}
+
+impl<W: Write + Seek> Bag<W> {
+    fn new(start_ns: u64, output: W) -> Result<Self, BagError> {
+        let mut writer = mcap::WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("painleve ", env!("CARGO_PKG_VERSION")))
+            .create(output)?;
+        let mut channel = |topic: &str, schema: &str, definition: String| {
+            let id = writer.add_schema(schema, "ros2msg", definition.as_bytes())?;
+            writer.add_channel(id, topic, "cdr", &BTreeMap::new())
+        };
+        let with = |main: &str, parts: &[(&str, &str)]| {
+            let mut text = main.to_owned();
+            for (name, part) in [
+                ("std_msgs/Header", HEADER),
+                ("builtin_interfaces/Time", TIME),
+            ]
+            .iter()
+            .chain(parts)
+            {
+                text += &format!("{SEPARATOR}MSG: {name}\n{part}");
+            }
+            text
+        };
+        let mut topics = [0; TOPICS.len()];
+        for (id, topic) in topics.iter_mut().zip(TOPICS) {
+            let name = topic.schema.trim_start_matches("painleve.");
+            let schema = format!("painleve_msgs/msg/{name}");
+            *id = channel(
+                &format!("/{}", topic.name),
+                &schema,
+                with(&definition(topic), &[]),
+            )?;
+        }
+        let wrench = [
+            ("geometry_msgs/Wrench", WRENCH),
+            ("geometry_msgs/Vector3", VECTOR),
+        ];
+        let joints = channel(
+            "/joint_states",
+            "sensor_msgs/msg/JointState",
+            with(JOINT_STATE, &[]),
+        )?;
+        let contact = channel(
+            "/contact",
+            "geometry_msgs/msg/WrenchStamped",
+            with(WRENCH_STAMPED, &wrench),
+        )?;
+        Ok(Self {
+            writer,
+            start_ns,
+            topics,
+            joints,
+            contact,
+            joints_ns: None,
+            ticks: 0,
+        })
+    }
+
+    fn take_in(&mut self, message: RecordedMessage<'_>) -> Result<(), BagError> {
+        let topic = TOPICS[message.topic];
+        let fields: Map<String, Value> =
+            serde_json::from_slice(message.json).map_err(|source| Damage::Message {
+                topic: topic.name,
+                source,
+            })?;
+        let mut cdr = Cdr::stamped(self.start_ns + message.time_ns, "");
+        for field in topic.fields {
+            let value = fields.get(field.name);
+            match field.read {
+                Kind::Number(_) | Kind::Single(_) => {
+                    cdr.float(value.and_then(Value::as_f64).unwrap_or(f64::NAN))
+                }
+                Kind::Whole(_) => cdr.integer(value.and_then(Value::as_i64).unwrap_or_default()),
+                Kind::Text(_) => cdr.text(value.and_then(Value::as_str).unwrap_or_default()),
+                Kind::Truth(_) => cdr.0.push(u8::from(value == Some(&Value::Bool(true)))),
+            }
+        }
+        self.write(self.topics[message.topic], message.time_ns, &cdr.0)?;
+        self.ticks += u64::from(topic.name == SENSOR.name);
+        let is_plant = topic.name == PLANT.name;
+        // A real arm's angles are known as estimates only.
+        let is_state =
+            is_plant || topic.name == ESTIMATES.name && self.joints_ns != Some(message.time_ns);
+        if is_state && fields.contains_key("theta1_rad") {
+            self.joints_ns = Some(message.time_ns);
+            self.state(message.time_ns, &fields)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the joints and the contact.
+    fn state(&mut self, time_ns: u64, fields: &Map<String, Value>) -> Result<(), BagError> {
+        let value = |name: &str| fields.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        // The elbow's encoder measures θ2 − θ1.
+        let joints = |first: &str, second: &str| [value(first), value(second) - value(first)];
+        let stamp_ns = self.start_ns + time_ns;
+        let mut cdr = Cdr::stamped(stamp_ns, "");
+        cdr.count(JOINTS.len());
+        JOINTS.into_iter().for_each(|name| cdr.text(name));
+        for pair in [
+            joints("theta1_rad", "theta2_rad"),
+            joints("theta1_dot_rad_s", "theta2_dot_rad_s"),
+            [value("u1_nm"), value("u2_nm")],
+        ] {
+            cdr.count(pair.len());
+            pair.into_iter().for_each(|number| cdr.float(number));
+        }
+        self.write(self.joints, time_ns, &cdr.0)?;
+        let mut cdr = Cdr::stamped(stamp_ns, FRAME);
+        let force_n = [value("tangential_force_n"), 0.0, value("normal_force_n")];
+        for number in force_n.into_iter().chain([0.0; 3]) {
+            cdr.float(number);
+        }
+        self.write(self.contact, time_ns, &cdr.0)
+    }
+
+    fn write(&mut self, channel_id: u16, time_ns: u64, cdr: &[u8]) -> Result<(), BagError> {
+        let time_ns = self.start_ns + time_ns;
+        let header = MessageHeader {
+            channel_id,
+            sequence: 0,
+            log_time: time_ns,
+            publish_time: time_ns,
+        };
+        self.writer.write_to_known_channel(&header, cdr)?;
+        Ok(())
+    }
+}
+
+/// Returns the definition of a topic's messages.
+fn definition(topic: &Topic) -> String {
+    let mut text = format!("# {}\nstd_msgs/Header header\n", topic.description);
+    for field in topic.fields {
+        let kind = match field.read {
+            Kind::Number(_) | Kind::Single(_) => "float64",
+            Kind::Whole(_) => "int64",
+            Kind::Text(_) => "string",
+            Kind::Truth(_) => "bool",
+        };
+        text += &format!("# {}\n{kind} {}\n", field.description, field.name);
+    }
+    text
+}
+
+/// A message in CDR, little-endian; alignment counts from behind the first four bytes.
+struct Cdr(Vec<u8>);
+
+impl Cdr {
+    /// Starts a message with its header.
+    fn stamped(time_ns: u64, frame: &str) -> Self {
+        let mut cdr = Self(vec![0, 1, 0, 0]);
+        let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
+        cdr.0.extend((seconds as i32).to_le_bytes());
+        cdr.0.extend((rest as u32).to_le_bytes());
+        cdr.text(frame);
+        cdr
+    }
+
+    fn align(&mut self, to: usize) {
+        let length = 4 + (self.0.len() - 4).next_multiple_of(to);
+        self.0.resize(length, 0);
+    }
+
+    fn count(&mut self, count: usize) {
+        self.align(4);
+        self.0.extend((count as u32).to_le_bytes());
+    }
+
+    fn float(&mut self, value: f64) {
+        self.align(8);
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn integer(&mut self, value: i64) {
+        self.align(8);
+        self.0.extend(value.to_le_bytes());
+    }
+
+    /// Adds a text with its length and a zero at its end.
+    fn text(&mut self, text: &str) {
+        self.count(text.len() + 1);
+        self.0.extend(text.as_bytes());
+        self.0.push(0);
+    }
+}
+
+impl From<io::Error> for BagError {
+    fn from(error: io::Error) -> Self {
+        Self::Write(error.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_aligned_as_cdr_wants_it() {
+        let mut cdr = Cdr::stamped(1_500_000_007, "ab");
+        cdr.float(1.0);
+        cdr.0.push(1);
+        cdr.count(3);
+        let expected = [
+            &[0, 1, 0, 0][..],
+            &1_i32.to_le_bytes(),
+            &500_000_007_u32.to_le_bytes(),
+            &[3, 0, 0, 0, b'a', b'b', 0],
+            // From 15 to 16.
+            &[0],
+            &1.0_f64.to_le_bytes(),
+            // From 25 to 28.
+            &[1, 0, 0, 0],
+            &[3, 0, 0, 0],
+        ];
+        assert_eq!(cdr.0, expected.concat());
+    }
+
+    #[test]
+    fn a_definition_has_every_field_with_its_type() {
+        let text = definition(&PLANT);
+        for line in [
+            "std_msgs/Header header",
+            "float64 tip_t_m",
+            "string mode",
+            "int64 mode_number",
+        ] {
+            assert!(text.lines().any(|one| one == line), "{line}");
+        }
+    }
+}

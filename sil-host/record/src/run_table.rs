@@ -1,0 +1,200 @@
+//! The ticks of a run as columns of numbers, read from a record or from its table.
+
+use std::io::{self, BufReader, Read};
+use std::thread;
+
+use crate::export::{ExportError, ticks_to_csv};
+
+/// Name of the column of times.
+const TIME: &str = "time_s";
+/// Most ticks of a run that is held in memory: some hundred megabytes.
+const MOST_TICKS: usize = 2_000_000;
+
+/// Why a table cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The record cannot be read.
+    #[error(transparent)]
+    Record(#[from] ExportError),
+    /// The file cannot be read, or is no table.
+    #[error("line {}: {source}", .source.position().map_or(1, csv::Position::line))]
+    Csv {
+        /// The reason.
+        source: csv::Error,
+    },
+    /// The system refuses a pipe.
+    #[error(transparent)]
+    Pipe(#[from] io::Error),
+    /// A column is missing.
+    #[error(
+        "it has no column {0}: this is not a table of a run's ticks, as `painleve export --csv` writes"
+    )]
+    NoColumn(&'static str),
+    /// Times do not increase.
+    #[error("line {0}: the time is not later than the one before")]
+    Order(usize),
+    /// The run is too long.
+    #[error("it has more than {MOST_TICKS} ticks")]
+    TooLong,
+}
+
+/// The ticks of a run. A number that is unknown is NaN; so is a text.
+#[derive(Clone, Debug, Default)]
+pub struct RunTable {
+    /// Simulated or measured time, s, increasing.
+    pub time_s: Vec<f64>,
+    /// The columns that were asked for, in their order.
+    columns: Vec<Vec<f64>>,
+    names: Vec<&'static str>,
+}
+
+impl RunTable {
+    /// Reads the named columns of a record.
+    ///
+    /// # Errors
+    /// [`TableError`] if it is damaged or has no ticks.
+    pub fn of_record(record: impl Read + Send, names: &[&'static str]) -> Result<Self, TableError> {
+        let (reader, writer) = io::pipe()?;
+        thread::scope(|scope| {
+            let exported = scope.spawn(move || ticks_to_csv(record, io::BufWriter::new(writer)));
+            // Owned, so that a table that is refused closes the pipe.
+            let table = Self::of_csv(BufReader::new(reader), names);
+            match exported.join() {
+                Ok(Ok(exported)) => match exported.damage {
+                    Some(damage) => Err(ExportError::Nothing(damage).into()),
+                    None => table,
+                },
+                // Why it was refused says more than the broken pipe.
+                Ok(Err(ExportError::Write(_))) if table.is_err() => table,
+                Ok(Err(error)) => Err(error.into()),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        })
+    }
+
+    /// Reads the named columns of a table. One that the table lacks is unknown.
+    ///
+    /// # Errors
+    /// [`TableError`] if it is no table of a run's ticks.
+    pub fn of_csv(table: impl Read, names: &[&'static str]) -> Result<Self, TableError> {
+        let wrong = |source| TableError::Csv { source };
+        let mut reader = csv::Reader::from_reader(table);
+        let header = reader.headers().map_err(wrong)?.clone();
+        let place = |name: &str| header.iter().position(|column| column == name);
+        let time = place(TIME).ok_or(TableError::NoColumn(TIME))?;
+        let places: Vec<Option<usize>> = names.iter().map(|name| place(name)).collect();
+        if places.iter().all(Option::is_none) {
+            return Err(TableError::NoColumn("plant.tip_t_m"));
+        }
+        let mut read = Self {
+            time_s: Vec::new(),
+            columns: vec![Vec::new(); names.len()],
+            names: names.to_vec(),
+        };
+        let mut row = csv::StringRecord::new();
+        while reader.read_record(&mut row).map_err(wrong)? {
+            let time_s = number(row.get(time).unwrap_or_default());
+            let is_later = read.time_s.last().is_none_or(|last| time_s > *last);
+            if !is_later || !time_s.is_finite() {
+                return Err(TableError::Order(read.time_s.len() + 2));
+            }
+            if read.time_s.len() >= MOST_TICKS {
+                return Err(TableError::TooLong);
+            }
+            read.time_s.push(time_s);
+            for (column, place) in read.columns.iter_mut().zip(&places) {
+                let cell = place.and_then(|place| row.get(place));
+                column.push(number(cell.unwrap_or_default()));
+            }
+        }
+        if read.time_s.is_empty() {
+            return Err(ExportError::NoTicks.into());
+        }
+        Ok(read)
+    }
+
+    /// Returns a column; empty if it was not asked for.
+    pub fn column(&self, name: &str) -> &[f64] {
+        let place = self.names.iter().position(|column| *column == name);
+        place.map_or(&[], |place| &self.columns[place])
+    }
+
+    /// Returns the changes of a column: time, s, the value before and the value since.
+    pub fn changes(&self, name: &str) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+        let pairs = self.column(name).windows(2);
+        let times = self.time_s.iter().skip(1);
+        pairs.zip(times).filter_map(|(pair, time_s)| {
+            (pair[0] != pair[1]).then_some((*time_s, pair[0], pair[1]))
+        })
+    }
+
+    /// Whether any value of a column is known.
+    pub fn knows(&self, name: &str) -> bool {
+        self.column(name).iter().any(|value| value.is_finite())
+    }
+
+    /// Returns the value of a column at a time, s, interpolated between ticks; NaN outside the run.
+    pub fn at(&self, column: &[f64], time_s: f64) -> f64 {
+        let after = self.time_s.partition_point(|tick_s| *tick_s < time_s);
+        let known = |number: usize| Some((*self.time_s.get(number)?, *column.get(number)?));
+        match (after.checked_sub(1).and_then(known), known(after)) {
+            (_, Some((exact_s, value))) if exact_s == time_s => value,
+            (Some((from_s, from)), Some((to_s, to))) => {
+                from + (to - from) * (time_s - from_s) / (to_s - from_s)
+            }
+            _ => f64::NAN,
+        }
+    }
+}
+
+/// Reads a cell: a number, or true or false as 1 or 0; NaN for anything else.
+fn number(cell: &str) -> f64 {
+    match cell {
+        "true" => 1.0,
+        "false" => 0.0,
+        text => text.parse().unwrap_or(f64::NAN),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: [&str; 2] = ["plant.tip_t_m", "estimates.contact"];
+
+    fn read(text: &str) -> Result<RunTable, TableError> {
+        RunTable::of_csv(text.as_bytes(), &NAMES)
+    }
+
+    #[test]
+    fn cells_are_numbers_truths_or_unknown() {
+        let table = read(
+            "time_s,x,plant.tip_t_m,estimates.contact\n0,a,0.1,true\n0.5,b,,false\n1,c,0.3,\n",
+        );
+        let table = table.unwrap();
+        assert_eq!(table.time_s, [0.0, 0.5, 1.0]);
+        let contact = table.column("estimates.contact");
+        assert_eq!(contact[..2], [1.0, 0.0]);
+        assert!(contact[2].is_nan() && table.column("plant.tip_t_m")[1].is_nan());
+        assert!((table.at(contact, 0.25) - 0.5).abs() < 1e-12);
+        assert_eq!(table.at(contact, 0.5), 0.0);
+        assert!(table.at(contact, -0.1).is_nan() && table.at(contact, 1.1).is_nan());
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused() {
+        for (text, part) in [
+            ("a,b\n1,2\n", "no column time_s"),
+            ("time_s,b\n1,2\n", "no column plant.tip_t_m"),
+            ("time_s,plant.tip_t_m\n", "no topic"),
+            (
+                "time_s,plant.tip_t_m\n1,2\n1,3\n",
+                "line 3: the time is not later",
+            ),
+            ("time_s,plant.tip_t_m\n1,2,3\n", "line 2"),
+        ] {
+            let message = read(text).unwrap_err().to_string();
+            assert!(message.contains(part), "{part}: {message}");
+        }
+    }
+}

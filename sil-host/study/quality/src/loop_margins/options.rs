@@ -1,0 +1,69 @@
+//! Options of the study of loops.
+
+use clap::Args;
+
+use super::{LoopMargins, LoopOutcome, Row};
+use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
+use painleve_study_core::options::{ControllerOptions, Overrides, PostureOption};
+use painleve_study_core::{Grid, StudyError};
+
+/// The sampled loop in the frequency domain: Bode plots, margins and steps along the belt.
+#[derive(Debug, Args)]
+#[command(mut_arg("controller", |controller| controller.default_value("hybrid,pid")))]
+pub struct Options {
+    #[command(flatten)]
+    controllers: ControllerOptions,
+    /// The side to which the elbow bends.
+    #[arg(long, value_name = "POSTURE", value_enum, default_value = "elbow-down")]
+    posture: PostureOption,
+    /// Places of the tip, m, FROM:TO:STEP or a list.
+    #[arg(
+        long,
+        value_name = "GRID",
+        default_value = "-0.14,-0.08,-0.02,0.03,0.08,0.14",
+        allow_hyphen_values = true
+    )]
+    tip: Grid,
+    /// Number of frequencies, from 1 Hz to a fifth of the control rate.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 20,
+        value_parser = clap::value_parser!(u16).range(2..=200)
+    )]
+    frequencies: u16,
+    #[command(flatten)]
+    overrides: Overrides,
+}
+
+impl StudyOptions for Options {
+    const NAME: &'static str = "loop";
+    const IN_SHARDS: Option<InShards<Self::Study>> = Some(in_shards);
+    type Study = LoopMargins;
+    type Outcome = LoopOutcome;
+
+    fn study(&self) -> Result<LoopMargins, StudyError> {
+        self.overrides.refuse(&[
+            ("initial", "--tip"),
+            ("controller.reference", "--tip"),
+            ("controller.law", "--controller"),
+        ])?;
+        let study = LoopMargins {
+            controllers: self.controllers.controller.clone(),
+            posture: self.posture.into(),
+            tips_m: self.tip.values().to_vec(),
+            frequencies: self.frequencies.into(),
+            overrides: self.overrides.overrides.clone(),
+        };
+        study.check()?;
+        Ok(study)
+    }
+
+    fn scenarios(&self) -> Vec<String> {
+        self.controllers.scenarios()
+    }
+
+    fn outcome(_: &LoopMargins, rows: Vec<Row>) -> LoopOutcome {
+        LoopOutcome { rows }
+    }
+}

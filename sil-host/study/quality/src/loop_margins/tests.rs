@@ -1,0 +1,101 @@
+//! The linearised loop against sines, and both against what breaks the loop.
+
+use painleve_plant::simulation::Simulation;
+use painleve_plant::{Controller, Plant};
+
+use super::*;
+
+fn study(controller: &str, tips_m: &[f64], frequencies: usize) -> LoopMargins {
+    let Ok(controller) = controller.parse();
+    LoopMargins {
+        controllers: vec![controller],
+        posture: Posture::ElbowDown,
+        tips_m: tips_m.to_vec(),
+        frequencies,
+        overrides: Vec::new(),
+    }
+}
+
+/// Above this gain a disturbance hardly reaches the command, and v/d does not tell L.
+const MEASURABLE_DB: f64 = 30.0;
+
+/// The bar: 5 % and 3°.
+fn agree(controller: &str, tips_m: &[f64], frequencies: usize) {
+    let study = study(controller, tips_m, frequencies);
+    let rows = painleve_study_core::rows(&study, || ()).unwrap();
+    let mut compared = 0;
+    for row in &rows {
+        assert_eq!(row.not_held, None, "{controller} at {} m", row.tip_m);
+        let points = row.loops.iter().flat_map(|one| &one.points);
+        for point in points.filter(|point| point.gain_db < MEASURABLE_DB) {
+            compared += 1;
+            let ratio = 10_f64.powf((point.measured_gain_db - point.gain_db) / 20.0);
+            let degrees = point.measured_phase_deg - point.phase_deg;
+            assert!(
+                (ratio - 1.0).abs() < 0.05 && degrees.abs() < 3.0,
+                "{controller} at {} m: {point:?}",
+                row.tip_m
+            );
+        }
+    }
+    assert!(
+        2 * compared > tips_m.len() * frequencies,
+        "{compared} compared"
+    );
+}
+
+#[test]
+fn finite_differences_and_sines_agree() {
+    agree("hybrid", &[0.05], 5);
+    agree("pid", &[0.0], 5);
+}
+
+#[test]
+#[ignore = "takes more than a minute"]
+fn finite_differences_and_sines_agree_along_the_belt() {
+    agree("hybrid", &[-0.14, -0.08, -0.02, 0.03, 0.08, 0.14], 20);
+    agree("pid", &[-0.15, -0.12, -0.08, -0.04, 0.0, 0.03], 20);
+}
+
+/// Returns how far the tip moves in the last second of a run whose torque is later than the controller knows, m.
+fn motion_with_delay_m(scenario: &Scenario, more_ticks: f64) -> f64 {
+    let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
+    let mut late = scenario.clone();
+    late.converters.torque.delay_ticks += more_ticks;
+    let mut simulation = Simulation::new(&late).unwrap();
+    let (mut least_m, mut most_m) = (f64::INFINITY, f64::NEG_INFINITY);
+    for _ in 0..6000 {
+        let sensor = simulation.sample(&mut ()).unwrap();
+        let answer = controller.tick(&sensor);
+        simulation.advance(Some(&answer), &mut ()).unwrap();
+        if simulation.plant().time_s() > 5.0 {
+            let tip_m = simulation.plant().snapshot().tip_t_m;
+            (least_m, most_m) = (tip_m.min(least_m), tip_m.max(most_m));
+        }
+    }
+    most_m - least_m
+}
+
+/// The margin of delay is the delay from which on the tip does not come to rest.
+#[test]
+fn the_delay_margin_is_the_delay_that_the_loop_bears() {
+    let study = study("pid", &[-0.08], 2);
+    let row = study.row(0).unwrap();
+    let delays = row.loops.iter().filter_map(|one| one.margins.delay_ms);
+    let margin_ms = delays.fold(f64::INFINITY, f64::min);
+    let scenario = study.scenario(0, &[]).unwrap();
+    // A tick is a millisecond.
+    let [stable_m, unstable_m] =
+        [0.9, 1.1].map(|part| motion_with_delay_m(&scenario, part * margin_ms));
+    assert!(
+        stable_m < 1e-4 && unstable_m > 1e-3,
+        "{margin_ms} ms: {stable_m}, {unstable_m}"
+    );
+}
+
+#[test]
+fn a_place_beyond_the_edge_is_not_held() {
+    let row = study("pid", &[0.15], 2).row(0).unwrap();
+    assert!(row.not_held.is_some() && row.loops.is_empty());
+    assert_eq!(LoopMargins::lines(&row).into_iter().count(), 1);
+}

@@ -1,0 +1,95 @@
+//! The search finds what is known to be good, whatever the threads, and goes on where it ended.
+
+use super::*;
+
+fn tuning() -> Tuning {
+    let overrides = [
+        "run.duration_s=1.5",
+        "controller.law.hybrid.velocity_gain_per_s=40",
+        "controller.law.hybrid.position_gain_per_s2=1900",
+    ];
+    Tuning {
+        scenario: Scenario::load("hybrid-elbow-down", &overrides.map(str::to_owned)).unwrap(),
+        ranges: [
+            "controller.law.hybrid.velocity_gain_per_s=20:300",
+            "controller.law.hybrid.position_gain_per_s2=1000:15000",
+        ]
+        .map(|range| range.parse().unwrap())
+        .to_vec(),
+        cases: 2,
+        seed: 7,
+    }
+}
+
+fn search(tuning: &Tuning, all: usize, mut trials: Vec<Trial>) -> Vec<Trial> {
+    let given = tuning
+        .score(&tuning.scenario, tuning.cases, tuning.seed)
+        .unwrap();
+    assert_eq!(given.kept, 1.0);
+    while trials.len() < all {
+        trials.extend(tuning.next_trials(&trials, all, &given).unwrap());
+    }
+    trials
+}
+
+#[test]
+fn a_search_improves_gains_that_are_off_and_does_not_depend_on_threads_or_pauses() {
+    let tuning = tuning();
+    tuning.check().unwrap();
+    let pool = |threads| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap()
+    };
+    let trials = pool(2).install(|| search(&tuning, 32, Vec::new()));
+    let costs = || trials.iter().map(|trial| trial.cost);
+    assert!(costs().fold(f64::INFINITY, f64::min) < 0.98, "{trials:?}");
+    assert!(trials.iter().all(|trial| {
+        trial
+            .values
+            .iter()
+            .zip(&tuning.ranges)
+            .all(|(value, range)| (range.from..=range.to).contains(value))
+    }));
+    let resumed = pool(1).install(|| search(&tuning, 32, trials[..16].to_vec()));
+    assert_eq!(resumed, trials);
+}
+
+#[test]
+fn the_front_has_the_trials_that_no_other_beats() {
+    let trial = |kept, error_mm, torque_change_nm| Trial {
+        values: Vec::new(),
+        score: Score {
+            kept,
+            error_mm,
+            ripple_n: 0.0,
+            torque_change_nm,
+        },
+        cost: 1.0,
+    };
+    let trials = [
+        trial(1.0, 2.0, 1.0),
+        trial(1.0, 1.0, 3.0),
+        trial(1.0, 1.5, 3.5),
+        trial(0.5, 0.1, 0.1),
+    ];
+    let front = figure::front(&trials);
+    assert_eq!(front, [trials[1].score, trials[0].score]);
+}
+
+#[test]
+fn a_range_that_is_none_is_refused() {
+    for text in [
+        "", "a", "a=1", "a=1:", "a=2:1", "a=0:1", "a=-1:1", "=1:2", "a=1:inf", "a=x:2",
+    ] {
+        let error = text.parse::<Range>().unwrap_err().to_string();
+        assert!(error.contains(text) && error.contains("FROM:TO"), "{error}");
+    }
+    let unknown = Tuning {
+        ranges: vec!["belt.frction=0.1:1".parse().unwrap()],
+        ..tuning()
+    };
+    let error = unknown.check().unwrap_err().to_string();
+    assert!(error.contains("did you mean 'friction'?"), "{error}");
+}

@@ -1,0 +1,122 @@
+//! The page that plays a run with others beside it.
+
+use data_encoding::BASE64;
+use painleve_plant::scenario::Scenario;
+use painleve_record::comparison::{Comparison, Difference, Outcome, Run};
+use painleve_shared::LinkMotion;
+use serde_json::{Value, json};
+
+use crate::page::{description, html};
+use crate::row::{Follower, ROW_BYTES, Row};
+use crate::thinning::Thinned;
+
+/// Returns the page of a comparison with its outcomes and differences. `scenario` is that of the first run.
+pub fn comparison_html(
+    comparison: &Comparison<'_>,
+    outcomes: &[Outcome],
+    differences: &[Difference],
+    scenario: &Scenario,
+) -> String {
+    let runs = comparison.runs();
+    let mut page = description(scenario);
+    let mut encoded = runs
+        .iter()
+        .map(|run| BASE64.encode(&rows(run, run.scenario.as_ref().unwrap_or(scenario))));
+    page["rows"] = encoded.next().into();
+    page["events"] = runs.first().map(events).into();
+    let others = runs.iter().enumerate().skip(1).zip(encoded);
+    page["comparison"] = json!({
+        "label": runs.first().map(|run| &run.label),
+        "aligned": format!("Aligned at {}", comparison.alignment),
+        "others": others.map(|((number, run), rows)| json!({
+            "label": run.label, "shift_s": comparison.shift_s(number), "rows": rows,
+        })).collect::<Vec<_>>(),
+        "tables": tables(runs, outcomes, differences),
+    });
+    html(&page)
+}
+
+/// Returns the rows of a run.
+fn rows(run: &Run, scenario: &Scenario) -> Vec<u8> {
+    let mut follower = Follower::new(scenario);
+    let mut rows = Thinned::default();
+    for (tick, &time_s) in run.table.time_s.iter().enumerate() {
+        let known = |names: [&str; 2]| {
+            let value = |name: &str| run.table.column(name).get(tick).copied();
+            let mut values = names.into_iter().filter_map(value);
+            values.find(|value| value.is_finite()).unwrap_or(f64::NAN)
+        };
+        let [belt_m_s, p_per_kg] =
+            ["plant.belt_speed_m_s", "plant.p_per_kg"].map(|name| known([name; 2]));
+        let theta = LinkMotion::new(
+            known(["plant.theta1_rad", "estimates.theta1_rad"]),
+            known(["plant.theta2_rad", "estimates.theta2_rad"]),
+        );
+        let followed = follower.advance(time_s, belt_m_s, &theta, p_per_kg);
+        rows.push(&Row::of_columns(time_s, known, followed));
+    }
+    let rows = rows.finish();
+    let mut bytes = Vec::with_capacity(rows.len() * ROW_BYTES);
+    rows.iter().for_each(|row| row.write(&mut bytes));
+    bytes
+}
+
+/// Returns the lift-offs and faults of a run as the page lists them.
+fn events(run: &Run) -> Vec<Value> {
+    let lift_offs = run
+        .lift_offs_s()
+        .map(|time_s| (time_s, "lift-off", "lift-off".to_owned()));
+    let faults = run
+        .table
+        .changes("actuator.fault_number")
+        .filter(|(_, _, fault)| *fault != 0.0)
+        .map(|(time_s, _, fault)| (time_s, "fault", format!("fault {fault}")));
+    let mut events: Vec<_> = lift_offs.chain(faults).collect();
+    events.sort_by(|(one, ..), (other, ..)| one.total_cmp(other));
+    events
+        .into_iter()
+        .map(|(time_s, kind, text)| json!([time_s, kind, text]))
+        .collect()
+}
+
+/// Returns the tables under the charts.
+fn tables(runs: &[Run], outcomes: &[Outcome], differences: &[Difference]) -> Vec<Value> {
+    let first = runs.first().map_or("", |run| &run.label);
+    let mut tables = vec![
+        json!({
+            "title": "Outcome of each run",
+            "head": Outcome::HEAD,
+            "rows": outcomes.iter().map(Outcome::cells).collect::<Vec<_>>(),
+        }),
+        json!({
+            "title": format!("Difference from {first}"),
+            "head": Difference::HEAD,
+            "rows": differences.iter().map(Difference::cells).collect::<Vec<_>>(),
+        }),
+    ];
+    if let Some(settings) = settings(runs) {
+        tables.push(settings);
+    }
+    tables
+}
+
+/// Returns the settings in which the runs differ from the first; `None` if no other run has settings.
+fn settings(runs: &[Run]) -> Option<Value> {
+    let (first, others) = runs.split_first()?;
+    let scenario = first.scenario.as_ref()?;
+    let rows: Vec<_> = others
+        .iter()
+        .filter_map(|run| Some((run, scenario.differences(run.scenario.as_ref()?))))
+        .flat_map(|(run, differences)| {
+            differences.into_iter().map(|one| {
+                let [key, first, second] = one.cells();
+                [&run.label, key, first, second].map(str::to_owned)
+            })
+        })
+        .collect();
+    Some(json!({
+        "title": "Settings that differ",
+        "head": ["run", "key", first.label, "here"],
+        "rows": rows,
+    }))
+}

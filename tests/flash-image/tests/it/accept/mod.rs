@@ -1,0 +1,126 @@
+//! The acceptance of a bare board: every built-in defect is found by the step that looks for it, and nothing is found
+//! on healthy boards.
+
+#![allow(clippy::unwrap_used)]
+
+mod defect;
+mod port;
+mod program;
+
+use painleve_accept::{Acceptance, Verdict, accept};
+use painleve_board::Serial;
+use painleve_chips::{MICROSECOND, MILLISECOND};
+use painleve_flash_image::bare::{BareBench, Output};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405, G474};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use self::defect::Defect;
+use self::port::EmulatedPort;
+
+/// First seed of the random boards.
+const FIRST_SEED: u64 = 31_000;
+
+/// Number of healthy boards of each chip.
+const HEALTHY: u64 = 50;
+
+/// Returns a healthy board of this seed, with a defect built in: clocks, phases, converters, delays of the host and open
+/// lines are random within the data sheets' tolerances.
+fn board<C: BoardChip>(seed: u64, defect: Option<Defect>) -> EmulatedPort<C> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let [slowest, _, fastest] = C::OSCILLATOR_HZ;
+    let oscillator_hz = random.random_range(slowest..=fastest);
+    let output = |random: &mut Pcg64| Output {
+        gain: random.random_range(0.996..1.004),
+        offset: random.random_range(-10.0..10.0),
+        ..Output::default()
+    };
+    let mut bench = BareBench {
+        outputs: [output(&mut random), output(&mut random)],
+        noise: 4,
+        random: random.random(),
+        ..BareBench::default()
+    };
+    if let Some(defect) = defect {
+        defect.build_into_bench(&mut bench);
+    }
+    let mut board = EmulatedBoard::<C>::bare(oscillator_hz, bench);
+    let chip = board.machine.chip_mut();
+    chip.set_watchdog_phase(random.random());
+    chip.detune_crystal(random.random_range(-50..=50));
+    chip.slots_mut().erasure = random.random_range(1..5) * MILLISECOND;
+    let mut port = EmulatedPort::new(board, random.random());
+    port.delay = random.random_range(0..500) * MICROSECOND;
+    if let Some(defect) = defect {
+        defect.build_into(&mut port);
+    }
+    let start = random.random_range(20_000..40_000) * MICROSECOND;
+    port.board.machine.run_for(start);
+    port
+}
+
+fn acceptance<C: BoardChip>(seed: u64, defect: Option<Defect>) -> Acceptance {
+    let board = Serial::over(board::<C>(seed, defect)).unwrap();
+    accept(board, |_| ()).unwrap_or_else(|error| panic!("seed {seed}, {defect:?}: {error}"))
+}
+
+/// Returns what has failed, for messages.
+fn failures(acceptance: &Acceptance) -> Vec<String> {
+    let steps = acceptance.steps.iter();
+    let checks = steps.flat_map(|step| step.checks.iter().map(move |check| (step.name, check)));
+    checks
+        .filter(|(_, check)| check.verdict == Verdict::Failed)
+        .map(|(step, it)| format!("{step}: {}: {}, not {}", it.what, it.measured, it.expected))
+        .collect()
+}
+
+fn nothing_is_found<C: BoardChip>(boards: u64) {
+    for seed in FIRST_SEED..FIRST_SEED + boards {
+        let acceptance = acceptance::<C>(seed, None);
+        assert_eq!(failures(&acceptance), [""; 0], "{} {seed}", C::IMAGE);
+        assert_eq!(acceptance.verdict, Verdict::Passed);
+    }
+}
+
+#[test]
+fn a_healthy_board_is_accepted() {
+    nothing_is_found::<F405>(1);
+    nothing_is_found::<G474>(1);
+}
+
+fn every_defect_is_found<C: BoardChip>() {
+    let mut missed = Vec::new();
+    for (number, (defect, finders)) in (FIRST_SEED..).zip(Defect::ALL) {
+        let acceptance = acceptance::<C>(number, Some(*defect));
+        let failed = acceptance.failed();
+        let is_found = failed.first() == finders.first();
+        if !is_found || failed.iter().any(|it| !finders.contains(it)) {
+            missed.push(format!("{defect:?}: {:#?}", failures(&acceptance)));
+        }
+    }
+    assert!(missed.is_empty(), "{}: {}", C::IMAGE, missed.join("\n"));
+}
+
+#[test]
+#[ignore = "takes longer than 20 s"]
+fn every_defect_is_found_by_its_step_on_the_f405() {
+    every_defect_is_found::<F405>();
+}
+
+#[test]
+#[ignore = "takes longer than 20 s"]
+fn every_defect_is_found_by_its_step_on_the_g474() {
+    every_defect_is_found::<G474>();
+}
+
+#[test]
+#[ignore = "takes longer than 20 s"]
+fn nothing_is_found_on_fifty_healthy_boards_with_the_f405() {
+    nothing_is_found::<F405>(HEALTHY);
+}
+
+#[test]
+#[ignore = "takes longer than 20 s"]
+fn nothing_is_found_on_fifty_healthy_boards_with_the_g474() {
+    nothing_is_found::<G474>(HEALTHY);
+}

@@ -1,0 +1,62 @@
+//! `painleve accept` at one end of a pseudo-terminal, a bare board at the other.
+
+use std::io::{Read, Write};
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use painleve_chips::MILLISECOND;
+use painleve_flash_image::board::F405;
+use painleve_tests::Bench;
+use painleve_tests::line::terminal;
+
+use crate::accept::{FIRST_SEED, board};
+
+/// Longest time of the command, on a machine that is busy.
+const LIMIT: Duration = Duration::from_secs(300);
+
+/// On a busy machine the emulated board is slower than real time, which steps by the host's clock may find.
+#[test]
+#[ignore = "takes longer than 20 s"]
+fn the_command_writes_its_report() {
+    let (mut near, _far, port) = terminal();
+    let folder = Bench::new("accept");
+    let mut command = folder.command(&["accept", "--json", "--output", "report.html"]);
+    command.arg("--port").arg(&port);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut board = board::<F405>(FIRST_SEED, None).board;
+    board.take_sent();
+    let mut child = command.spawn().unwrap();
+    let start = Instant::now();
+    let mut due = start;
+    let mut bytes = [0; 1024];
+    while child.try_wait().unwrap().is_none() {
+        assert!(start.elapsed() < LIMIT, "the command does not end");
+        while crate::drive::rig::is_readable(&near) {
+            let length = near.read(&mut bytes).unwrap();
+            board.send_bytes(&bytes[..length]);
+        }
+        board.machine.run_for(MILLISECOND);
+        near.write_all(&board.take_sent()).unwrap();
+        due = (due + Duration::from_millis(1)).max(Instant::now());
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+    }
+    let output = child.wait_with_output().unwrap();
+    let text = painleve_tests::errors(&output);
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{text}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let passed = |name: &str| {
+        let steps = report["steps"].as_array().unwrap();
+        let step = steps.iter().find(|it| it["name"] == name).unwrap();
+        step["verdict"] == "passed"
+    };
+    for step in ["identity", "options", "ticks", "line", "enable"] {
+        assert!(passed(step), "{step}: {text}");
+    }
+    let written = std::fs::read_to_string(folder.path("report.json")).unwrap();
+    assert_eq!(
+        report,
+        serde_json::from_str::<serde_json::Value>(&written).unwrap()
+    );
+    let page = std::fs::read_to_string(folder.path("report.html")).unwrap();
+    assert!(page.contains("STM32F405") && page.contains("measured"));
+}
