@@ -1,9 +1,14 @@
 //! Identification of an arm's geometry by slides of its tip along the belt.
 //!
 //! The arm's own controller makes the slides: with a small force, slowly, to and fro, and with the governor's distance for an
-//! arm that is known badly. The operator sets the tip down in each posture. A first round, short of the edges, corrects the
-//! zeros; a second one goes nearer. The belt should run, so that its waves pass under the tip and average out.
+//! arm that is known badly. The operator sets the tip down in each posture, and lets the belt run in the direction in which
+//! friction does not press the tip into it. A first round, short of the edges, corrects the zeros; a second one goes nearer.
+//!
+//! The belt's waves and vibration, and whatever else the controller does not know, accelerate the tip by some a. The normal
+//! force ripples by a/p, as the slides show. In use, the governor keeps p so large that the ripple leaves most of the force.
 
+use painleve_firmware::law::LawSettings;
+use painleve_identify::geometry::joint_rad;
 use painleve_identify::parameters::Drawn;
 use painleve_identify::{
     Identified, Limits, Parameter, Parameters, Prior, Reading, Refusal, Slide, identify,
@@ -12,7 +17,7 @@ use painleve_plant::decimal::as_written;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError};
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::{Arm, OutOfRange, Posture};
+use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Pose, Posture};
 
 /// Normal force of a slide, N.
 const FORCE_N: f64 = 4.0;
@@ -26,16 +31,25 @@ const REST_S: f64 = 0.5;
 /// Ends of the slides of each round, as a part of the reach; the governor stops them earlier where it has to.
 const ROUNDS: [f64; 2] = [0.6, 0.93];
 
-/// Least p/Q22 of a slide: farther from the edge than in use.
-const LEAST_P_RATIO: f64 = 0.15;
+/// Least p of a slide, 1/kg: where a belt's vibration of 5 m/s² takes a third of the force.
+const LEAST_P_PER_KG: f64 = 4.0;
+
+/// Speed of the belt if the scenario's stands still, m/s.
+const BELT_M_S: f64 = 0.4;
+
+/// Multiple of the ripple's root mean square that the wanted normal force must exceed in use.
+const RIPPLES: f64 = 8.0;
+
+/// Rate at which the mean force follows, from which the ripple is taken, per tick.
+const MEAN_PER_TICK: f64 = 0.01;
 
 /// An arm whose controller slides its tip, and its operator.
 pub trait SlideRig {
     /// Failure of the rig.
     type Error: std::error::Error;
 
-    /// Has the tip set down in a posture, runs the controller with the scenario's settings and reference, and returns
-    /// the frames of the ticks in which it was tracking.
+    /// Has the tip set down in a posture and the belt run as the scenario says, runs the controller with its settings and
+    /// reference, and returns the frames of the ticks in which it was tracking.
     ///
     /// # Errors
     /// If the operator gives up, or the rig or its drive fails.
@@ -116,6 +130,7 @@ pub fn readings(
         scale_1.contains(frame.joints[0])
             && scale_2.contains(frame.joints[1])
             && scales.force.contains(frame.normal_force.0)
+            && scales.force.contains(frame.tangential_force.0)
     });
     frames
         .map(|frame| Reading {
@@ -124,16 +139,22 @@ pub fn readings(
                     f64::from(scale.counts_from_zero(reading)) * scale.rad_per_count::<f64>()
                 },
             ),
-            normal_force_n: f64::from(frame.normal_force.0) * per_count,
+            force_n: [frame.tangential_force, frame.normal_force]
+                .map(|force| f64::from(force.0) * per_count),
         })
         .collect()
 }
 
-/// Returns the scenario of a slide to both ends, a part of the reach from the middle.
+/// Returns the scenario of a slide in a posture to both ends, a part of the reach from the middle. The belt runs in the
+/// direction in which p is larger.
 ///
 /// # Errors
-/// [`ScenarioError`] if its law is not the hybrid one.
-pub fn slide_scenario(scenario: &Scenario, share: f64) -> Result<Scenario, ScenarioError> {
+/// [`ScenarioError`] if the arm does not reach the belt, or a value is out of range.
+pub fn slide_scenario(
+    scenario: &Scenario,
+    share: f64,
+    posture: Posture,
+) -> Result<Scenario, ScenarioError> {
     let arm = Arm::new(scenario.controller_configuration().arm).map_err(|source| {
         ScenarioError::Range {
             origin: scenario.name.clone(),
@@ -151,16 +172,20 @@ pub fn slide_scenario(scenario: &Scenario, share: f64) -> Result<Scenario, Scena
         from = -end_m,
         both_s = 2.0 * half_s,
     );
-    let mut overrides = vec![
+    let given_m_s = scenario.belt.profile.speed_m_s(0.0).abs();
+    let size_m_s = if given_m_s > 0.0 { given_m_s } else { BELT_M_S };
+    // p = Q22 − μ s Q12 with the slip's direction s, against that of the belt.
+    let coupling = arm.inverse_inertia_row_on_belt(0.0, posture);
+    let speed_m_s =
+        size_m_s.copysign(coupling.map_or(1.0, |(tangential, ..)| f64::from(tangential)));
+    let overrides = [
         format!("controller.law={{ hybrid = {{ normal_force_n = {FORCE_N:?} }} }}"),
         reference,
         format!("run.duration_s={duration_s}"),
         "run.enable_at_s=0.0".into(),
+        format!("controller.governor.p_per_kg={LEAST_P_PER_KG:?}"),
+        format!("belt.profile={{ kind = 'constant', speed_m_s = {speed_m_s:?} }}"),
     ];
-    let slower = scenario.controller.governor.p_ratio < LEAST_P_RATIO as f32;
-    if slower {
-        overrides.push(format!("controller.governor.p_ratio={LEAST_P_RATIO:?}"));
-    }
     scenario.clone().with_overrides(&scenario.name, &overrides)
 }
 
@@ -175,7 +200,7 @@ pub fn identify_slides(
 ) -> Result<Found, Refusal> {
     let prior = prior(scenario, drawn);
     let identified = identify(slides, &prior, &limits(scenario))?;
-    Ok(Found { identified, prior })
+    Ok(Found::new(identified, prior, slides))
 }
 
 /// Slides in both postures, and identifies the arm. The scenario's posture comes first, so that the operator turns the
@@ -193,8 +218,8 @@ pub fn identify_arm<R: SlideRig>(
     let first = posture(scenario)?;
     let mut slides = Vec::new();
     let mut slide = |known: &Scenario, share: f64, postures: [Posture; 2]| {
-        let program = slide_scenario(known, share)?;
         for posture in postures {
+            let program = slide_scenario(known, share, posture)?;
             let frames = rig
                 .slide(&program, posture)
                 .map_err(IdentificationError::Rig)?;
@@ -210,11 +235,11 @@ pub fn identify_arm<R: SlideRig>(
     known.controller.estimator.tip_deviation_m = setting(prior.tip_deviation_m());
     let slid = slide(&known, near, [first, first.mirrored()])?;
     let identified = identify(&slid, &prior, &limits.of_first_look())?;
-    let known = Found { identified, prior }.applied_to(scenario, "first look")?;
+    let known = Found::new(identified, prior, &slid).applied_to(scenario, "first look")?;
     // The elbow stays as it is.
     let slid = slide(&known, far, [first.mirrored(), first])?;
     let identified = identify(&slid, &prior, &limits)?;
-    Ok(Found { identified, prior })
+    Ok(Found::new(identified, prior, &slid))
 }
 
 /// Returns the posture of a scenario's start.
@@ -239,9 +264,48 @@ pub struct Found {
     pub identified: Identified,
     /// What was known before.
     pub prior: Prior,
+    slides: Vec<Slide>,
 }
 
 impl Found {
+    fn new(identified: Identified, prior: Prior, slides: &[Slide]) -> Self {
+        Self {
+            identified,
+            prior,
+            slides: slides.to_vec(),
+        }
+    }
+
+    /// Returns the acceleration of the tip off the belt by what the controller does not know, root mean square, m/s²: the
+    /// ripple of the normal force times p. Zero without a reading on the belt.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for an arm that cannot be built.
+    pub fn ripple_m_s2(&self, arm: ArmParameters<f32>) -> Result<f64, OutOfRange> {
+        let arm = Arm::new(arm)?;
+        let parameters = &self.identified.fit.parameters;
+        let (mut sum, mut count) = (0.0, 0_u32);
+        for slide in &self.slides {
+            let mut mean_n = FORCE_N;
+            for reading in &slide.readings {
+                let [tangential_n, normal_n] = reading.force_n;
+                if normal_n < 0.25 * FORCE_N {
+                    continue;
+                }
+                mean_n += MEAN_PER_TICK * (normal_n - mean_n);
+                let [first, elbow] =
+                    [0, 1].map(|joint| joint_rad(parameters, joint, reading.encoders_rad[joint]));
+                let theta = LinkMotion::new(first as f32, (first + elbow) as f32);
+                let q = arm.inverse_tip_inertia(&Pose::new(&theta));
+                let p = f64::from(q.m22) + f64::from(q.m12) * tangential_n / normal_n;
+                let off_m_s2 = p * (normal_n - mean_n);
+                sum += off_m_s2 * off_m_s2;
+                count += 1;
+            }
+        }
+        Ok(libm::sqrt(sum / f64::from(count.max(1))))
+    }
+
     /// Returns the scenario with the values and deviations. `source` says where they come from.
     ///
     /// # Errors
@@ -264,6 +328,11 @@ impl Found {
         estimator.encoders.second_sine_rad = both(Parameter::SecondSine);
         estimator.encoders.second_cosine_rad = both(Parameter::SecondCosine);
         estimator.tip_deviation_m = setting(self.identified.tip_deviation_m);
+        let ripple_m_s2 = self.ripple_m_s2(arm)?;
+        if let Some(LawSettings::Hybrid(law)) = corrected.controller.law.of_set() {
+            let least = RIPPLES * ripple_m_s2 / f64::from(law.normal_force_n).max(1e-3);
+            corrected.controller.governor.p_per_kg = rounded(least) as f32;
+        }
         let deviation = |parameter: Parameter| rounded(fit.deviation(parameter));
         let larger = |one: fn(usize) -> Parameter, other: fn(usize) -> Parameter| {
             [0, 1].map(|joint| deviation(one(joint)).max(deviation(other(joint))))
@@ -280,6 +349,7 @@ impl Found {
             height_m: deviation(Parameter::Height),
             tip_m: rounded(self.identified.place_deviation_m),
             off_line_m: rounded(self.identified.off_line_m[1]),
+            ripple_m_s2: rounded(ripple_m_s2),
         };
         painleve_shared::settings::Settings::validate(&corrected)?;
         Ok(corrected)

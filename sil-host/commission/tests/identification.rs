@@ -14,9 +14,9 @@ use painleve_study_core::case::ControllerChoice;
 use painleve_study_quality::distribution::Percentiles;
 use painleve_study_quality::effects::{Contact, EffectsStudy};
 use painleve_study_quality::proportion::Proportion;
-use painleve_study_quality::robustness::{self, Criterion, Row};
+use painleve_study_quality::robustness::{self, Criterion, Ending, Row};
 
-const FIRST_SEED: u64 = 7_002_000;
+const FIRST_SEED: u64 = 7_003_000;
 
 /// Closed loops of each arm.
 const LOOPS: usize = 3;
@@ -67,13 +67,22 @@ fn describe(name: &str, rows: &[Row]) -> (Proportion, Percentiles) {
     let kept: Vec<&Row> = rows.iter().filter(|row| row.ending.is_kept()).collect();
     let share = Proportion::new(kept.len(), rows.len());
     let error_m = Percentiles::of(kept.iter().map(|row| row.error_m).collect()).unwrap();
-    let faults = rows.iter().filter(|row| row.fault.is_some()).count();
     println!(
-        "{name}: kept {share}; {faults} faults; tip error {:.2} mm median, {:.2} mm 95 %, {:.2} mm 99 %",
+        "{name}: kept {share}; tip error {:.2} mm median, {:.2} mm 95 %, {:.2} mm 99 %",
         1e3 * error_m.median,
         1e3 * error_m.p95,
         1e3 * error_m.p99,
     );
+    let held = kept.iter().filter(|row| row.ending == Ending::AtEdge);
+    let to_edge_m = Percentiles::of(held.map(|row| row.to_edge_m).collect());
+    println!("  where the edge held it, m before it: {to_edge_m:?}");
+    let lost = rows.iter().filter(|row| !row.ending.is_kept());
+    for row in lost {
+        println!(
+            "  {}: {:?} at {:?} s, fault {:?}, μ {:.2}, {:?}",
+            row.index, row.ending, row.first_lift_off_s, row.fault, row.mu, row.posture
+        );
+    }
     (share, error_m)
 }
 
@@ -85,11 +94,11 @@ fn arms_as_bad_as_life_are_identified() {
         let identified = found.unwrap().identified;
         assert!(identified.off_line_m[1] < 0.1 * identified.off_line_m[0]);
         assert!(identified.place_deviation_m < 6e-4 && rig.time_s < 120.0);
+        assert!(rig.largest_force_n < 8.0, "{}", rig.largest_force_n);
     }
 }
 
-/// Measures; with all effects of a rig, some arms are still refused (the tip hops), and the tip's error is not yet half a
-/// millimetre.
+/// Measures with all effects of a rig.
 #[test]
 #[ignore = "takes minutes"]
 fn identified_arms_put_the_tip_where_they_say() {
@@ -125,7 +134,14 @@ fn identified_arms_put_the_tip_where_they_say() {
                 for (parameter, truth) in truths(&actual) {
                     let error = fit.parameters.get(parameter) - truth;
                     parameters += 1;
-                    inside += usize::from(error.abs() < 3.0 * fit.deviation(parameter));
+                    let deviation = fit.deviation(parameter);
+                    if error.abs() < 3.0 * deviation {
+                        inside += 1;
+                    } else {
+                        println!(
+                            "{seed}: {parameter} off by {error:.2e}, deviation {deviation:.2e}"
+                        );
+                    }
                 }
             }
         }

@@ -36,8 +36,8 @@ pub use verdict::{Missing, Refusal};
 pub struct Reading {
     /// Angles by the encoders of θ1 and of the elbow, from their configured zeros, without any correction, rad.
     pub encoders_rad: [f64; 2],
-    /// Normal force, N.
-    pub normal_force_n: f64,
+    /// Contact force along and off the belt, f_t and f_n, N.
+    pub force_n: [f64; 2],
 }
 
 /// A slide of the tip along the belt, to and fro, in one posture.

@@ -82,7 +82,8 @@ impl Points {
         limits: &Limits,
     ) -> Result<(), Refusal> {
         let is_finite = |it: &&crate::Reading| {
-            it.encoders_rad.iter().all(|angle| angle.is_finite()) && it.normal_force_n.is_finite()
+            it.encoders_rad.iter().all(|angle| angle.is_finite())
+                && it.force_n.iter().all(|force_n| force_n.is_finite())
         };
         if let Some(tick) = of.readings.iter().position(|it| !is_finite(&it)) {
             return Err(Refusal::NotFinite { slide, tick });
@@ -90,7 +91,7 @@ impl Points {
         let touching: Vec<_> = of
             .readings
             .iter()
-            .filter(|it| it.normal_force_n >= limits.contact_n)
+            .filter(|it| it.force_n[1] >= limits.contact_n)
             .collect();
         let share = touching.len() as f64 / of.readings.len().max(1) as f64;
         if share < ON_BELT {

@@ -179,6 +179,9 @@ pub enum Refusal {
     },
 }
 
+/// A change of both encoders' angles.
+type Change = fn([f64; 2]) -> [f64; 2];
+
 /// Checks that the arm is rigid and its tip on a line, `off_line_m` from it.
 pub(crate) fn check_line(
     points: &Points,
@@ -190,7 +193,7 @@ pub(crate) fn check_line(
     let is_off = off_line_m > limits.off_line_m;
     let other = other_posture(points, fit);
     if is_off || other.is_some() {
-        let others: [(fn([f64; 2]) -> [f64; 2], Refusal); 3] = [
+        let others: [(Change, Refusal); 3] = [
             (|[one, two]| [two, one], Refusal::EncodersSwapped),
             (
                 |[one, two]| [-one, two],

@@ -10,6 +10,9 @@ settings! {
         enabled: bool = true;
         /// Least p/Q22.
         p_ratio: f32 = 0.08, 0.0..=0.9;
+        /// Least p. A belt that accelerates by a changes the normal force by a/p, which must not take it all: p falls
+        /// towards the straight arm, whatever p/Q22 is.
+        p_per_kg: f32 = 0.0, 0.0..=1e3, "1/kg";
         /// Number of standard deviations added to the friction estimate.
         friction_deviations: f32 = 1.5, 0.0..=10.0;
         /// Distance kept from the point where p/Q22 has its least value, at 1 kHz; it grows with the square of the control

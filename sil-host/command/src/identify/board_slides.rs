@@ -91,7 +91,12 @@ impl SlideRig for BoardSlides {
         let configuration = scenario.controller_configuration();
         let mut arm = ConnectedArm::open(&self.port, &configuration, FrameSource::Sensors)?;
         let set_down = OperatorTask::SetDown { posture };
-        warn(format_args!("operator: {set_down}; then press Return"));
+        let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
+        warn(format_args!(
+            "operator: let the belt run towards {}t, at about {:.1} m/s; {set_down}; then press Return",
+            if speed_m_s < 0.0 { '−' } else { '+' },
+            speed_m_s.abs()
+        ));
         while !self.check()? {
             arm.next_event(PATIENCE)?;
         }

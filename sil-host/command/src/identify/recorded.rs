@@ -18,9 +18,10 @@ use super::super::CommandError;
 use super::super::output_error::InputError;
 
 /// Columns of the table that a slide needs.
-const COLUMNS: [&str; 3] = [
+const COLUMNS: [&str; 4] = [
     "sensor.joint1_counts",
     "sensor.joint2_counts",
+    "sensor.tangential_force_counts",
     "sensor.normal_force_counts",
 ];
 
@@ -84,7 +85,7 @@ fn of_table(table: impl Read) -> Result<Vec<SensorFrame>, String> {
     let mut reader = csv::Reader::from_reader(table);
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
     let place = |name: &str| header.iter().position(|column| column == name);
-    let mut places = [0; 3];
+    let mut places = [0; 4];
     for (at, name) in places.iter_mut().zip(COLUMNS) {
         *at = place(name).ok_or_else(|| format!("it has no column {name}"))?;
     }
@@ -96,19 +97,21 @@ fn of_table(table: impl Read) -> Result<Vec<SensorFrame>, String> {
         if state.is_some_and(|at| row.get(at) != Some(tracking)) {
             continue;
         }
-        let mut counts = [0_i64; 3];
+        let mut counts = [0_i64; 4];
         for (value, (at, name)) in counts.iter_mut().zip(places.into_iter().zip(COLUMNS)) {
             let text = row.get(at).unwrap_or_default();
             *value = text
                 .parse()
                 .map_err(|_| format!("{name} = {text:?} is not a whole number"))?;
         }
-        let [joint_1, joint_2, force] = counts;
+        let [joint_1, joint_2, tangential, normal] = counts;
         // Whatever does not fit is out of every encoder's range, too.
         let joint = |counts| EncoderCounts(u32::try_from(counts).unwrap_or(u32::MAX));
+        let force = |counts| ForceCounts(i32::try_from(counts).unwrap_or(i32::MAX));
         frames.push(SensorFrame {
             joints: [joint(joint_1), joint(joint_2)],
-            normal_force: ForceCounts(i32::try_from(force).unwrap_or(i32::MAX)),
+            tangential_force: force(tangential),
+            normal_force: force(normal),
             ..SensorFrame::default()
         });
     }
@@ -121,11 +124,12 @@ mod tests {
 
     #[test]
     fn a_table_gives_the_frames_of_the_ticks_that_track() {
-        let table = "time_s,sensor.joint1_counts,sensor.joint2_counts,sensor.normal_force_counts,actuator.state\n\
-                     0,1,2,3,armed\n0.001,4,5,-6,tracking\n";
+        let table = "time_s,sensor.joint1_counts,sensor.joint2_counts,sensor.tangential_force_counts,sensor.normal_force_counts,actuator.state\n\
+                     0,1,2,3,7,armed\n0.001,4,5,8,-6,tracking\n";
         let frames = of_table(table.as_bytes()).unwrap();
         assert_eq!(frames.len(), 1);
         assert_eq!(frames[0].joints, [EncoderCounts(4), EncoderCounts(5)]);
+        assert_eq!(frames[0].tangential_force, ForceCounts(8));
         assert_eq!(frames[0].normal_force, ForceCounts(-6));
     }
 

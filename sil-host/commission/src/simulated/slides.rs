@@ -1,6 +1,6 @@
 //! The slides of a simulated arm: its controller runs on the arm as it is.
 
-use painleve_plant::scenario::{InitialState, RunSettings, Scenario};
+use painleve_plant::scenario::{BeltSettings, InitialState, RunSettings, Scenario};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Controller, Plant};
 use painleve_shared::counts::EncoderCounts;
@@ -106,6 +106,10 @@ impl SlideRig for SimulatedSlides {
             initial: InitialState::at_rest(theta_1, theta_2),
             controller: scenario.controller.clone(),
             arm_model: scenario.arm_model.or(self.actual.arm_model),
+            belt: BeltSettings {
+                profile: scenario.belt.profile.clone(),
+                ..self.actual.belt
+            },
             run: RunSettings {
                 seed: scenario.run.seed.wrapping_add(u64::from(self.slides)),
                 ..scenario.run

@@ -84,7 +84,7 @@ impl Rig {
         });
         Reading {
             encoders_rad: rounded,
-            normal_force_n: 4.0 + self.generator.random_range(-0.3..0.3),
+            force_n: [0.0, 4.0 + self.generator.random_range(-0.3..0.3)],
         }
     }
 

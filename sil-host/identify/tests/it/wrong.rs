@@ -95,7 +95,7 @@ fn a_tip_that_is_not_on_the_belt_is_refused() {
     let missed = self::missed(
         |_, slides| {
             for reading in &mut slides[0].readings {
-                reading.normal_force_n = 0.1;
+                reading.force_n[1] = 0.1;
             }
         },
         |refusal| matches!(refusal, Refusal::NotOnBelt { slide: 0, .. }),

@@ -23,5 +23,8 @@ settings! {
         tip_m: f64 = 0.0, 0.0..=1.0, "m";
         /// Distance of the tip from a straight line in the slides, root mean square.
         off_line_m: f64 = 0.0, 0.0..=1.0, "m";
+        /// Acceleration of the tip off the belt by waves, vibration and torques that the controller does not know, root mean
+        /// square in the slides. `controller.governor.p_per_kg` follows from it.
+        ripple_m_s2: f64 = 0.0, 0.0..=1e6, "m/s²";
     }
 }
