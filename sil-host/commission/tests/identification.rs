@@ -192,7 +192,7 @@ fn mistakes_are_refused_with_their_reason() {
             GeometryMistake::BentLink | GeometryMistake::WrongLength => "is known beforehand",
             GeometryMistake::SamePosture => "not as told",
         };
-        // Of 7003000 and 7003001, one mistake is told otherwise: see the lab book.
+        // With seed 7003000 the bent link is refused as a tip that is not on the belt.
         for seed in 7_002_000..7_002_002 {
             let (found, _) = identified(&Scenario::default(), seed, Some(*mistake));
             let refusal = found.map(|_| ()).unwrap_err();
