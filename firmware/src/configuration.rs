@@ -167,6 +167,7 @@ impl<L: Law> Configuration<L> {
             count_m: self.arm.height_m * count_rad,
             friction_nm: friction_1_nm.at_least(friction_2_nm),
             play_rad: self.settings.estimator.gear_play_rad,
+            tip_deviation_m: self.settings.estimator.tip_deviation_m,
         }
     }
 

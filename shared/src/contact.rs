@@ -153,9 +153,9 @@ impl<T: Real> Arm<T> {
         p_of(&self.inverse_tip_inertia(pose), friction, slip)
     }
 
-    /// Returns Q12 and Q22 with the tip on the belt at `tip_t_m`, both scaled by the same positive
-    /// factor. They determine the sign of p = Q22 − μ s Q12. `None` out of reach or for a straight
-    /// arm.
+    /// Returns Q12 and Q22 (1/kg) with the tip on the belt at `tip_t_m`, both multiplied by a positive
+    /// factor, and that factor. The sign of p = Q22 − μ s Q12 does not need it. `None` out of reach or for a
+    /// straight arm.
     ///
     /// On the belt the columns (x1, y1) and (x2, y2) of J follow from z_t without trigonometry.
     /// With d² = z_t² + H², and W four times the area of the triangle formed by the links,
@@ -166,7 +166,7 @@ impl<T: Real> Arm<T> {
     /// 2d² x2 = H h2 − z_t W,    2d² y2 = z_t h2 + H W,
     /// 4 l1 l2 cos δ = (d² − (l1 − l2)²) − ((l1 + l2)² − d²),    2 l1 l2 sin δ = W
     /// ```
-    pub fn inverse_inertia_row_on_belt(&self, tip_t_m: T, posture: Posture) -> Option<(T, T)> {
+    pub fn inverse_inertia_row_on_belt(&self, tip_t_m: T, posture: Posture) -> Option<(T, T, T)> {
         let (height, reach) = (self.height_m, self.reach_m());
         let difference = self.length_1_m - self.length_2_m;
         let square = tip_t_m * tip_t_m + height * height;
@@ -197,7 +197,9 @@ impl<T: Real> Arm<T> {
             self.inertia_2 * y_1 - coupling * y_2,
             self.inertia_1 * y_2 - coupling * y_1,
         );
-        Some((x_1 * row_1 + x_2 * row_2, y_1 * row_1 + y_2 * row_2))
+        let determinant = self.inertia_1 * self.inertia_2 - coupling * coupling;
+        let scale = T::literal(4.0) * square * square * determinant;
+        Some((x_1 * row_1 + x_2 * row_2, y_1 * row_1 + y_2 * row_2, scale))
     }
 
     /// Evaluates all contact terms at link angles `theta` (rad), rates `theta_dot` (rad/s) and
@@ -282,7 +284,8 @@ mod tests {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
             let theta = arm().link_angles_on_belt_rad(tip, posture).unwrap();
             let q = arm().inverse_tip_inertia(&Pose::new(&theta));
-            let (tangential, normal) = arm().inverse_inertia_row_on_belt(tip, posture).unwrap();
+            let (tangential, normal, factor) = arm().inverse_inertia_row_on_belt(tip, posture).unwrap();
+            prop_assert!((normal / factor - q.m22).abs() < 1e-9 * q.m22);
             prop_assert!(normal > 0.0);
             prop_assert!((tangential / normal - q.m12 / q.m22).abs() < 1e-9);
         }

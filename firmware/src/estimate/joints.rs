@@ -8,11 +8,15 @@
 //!
 //! Both poles are at z = exp(−ω T), with gains 1 − z² and (1 − z)²/T.
 //!
+//! Errors of the encoders that are known are [corrected](super::encoder_correction) beforehand.
+//!
 //! An encoder on the motor side of an elastic gear leads the link by the gear's twist under the torque.
 
 use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
-use painleve_shared::{JointMotion, JointTorque, LinkMotion, Real, settings};
+use painleve_shared::{JointMotion, JointTorque, LinkMotion, Pose, Real, settings};
+
+use super::encoder_correction::{EncoderCorrection, EncoderCorrector};
 
 settings! {
     /// Settings of the tracking loops.
@@ -33,6 +37,11 @@ settings! {
         /// are on the links. Tracking loops and hybrid law are slower where the arm's natural frequency on
         /// these gears is below ω.
         gear_compliance_rad_nm: [f32; 2] = [0.0; 2], 0.0..=0.1, "rad/(N·m)";
+        /// Correction of the encoders' readings.
+        encoders: EncoderCorrection = EncoderCorrection::default();
+        /// Standard deviation of the tip's distance from the edges by what is not known of encoders, links and belt; 0
+        /// for an arm that is known exactly. The governor keeps a distance for it.
+        tip_deviation_m: f32 = 0.0, 0.0..=0.1, "m";
         /// Largest play of the gears, from which the governor keeps its distance from the edges.
         gear_play_rad: f32 = 0.0, 0.0..=0.1, "rad";
     }
@@ -56,6 +65,8 @@ struct TrackingLoop {
     reading: EncoderCounts,
     /// Unwrapped angle, counts from angle zero.
     counts: i32,
+    /// What is added to it, rad.
+    correction_rad: f32,
     angle_rad: f32,
     rate_rad_s: f32,
     /// Measured less expected angle at the last tick, rad.
@@ -88,6 +99,7 @@ pub struct JointEstimator {
     /// Whether the gears twist, and by how much.
     twists: bool,
     compliance_rad_nm: [f32; 2],
+    corrector: EncoderCorrector,
 }
 
 /// Angles and rates of both joints, for a [`JointEstimator`].
@@ -123,6 +135,7 @@ impl JointEstimator {
             rate_gain_per_s,
             twists: settings.gear_compliance_rad_nm != [0.0; 2],
             compliance_rad_nm: settings.gear_compliance_rad_nm,
+            corrector: EncoderCorrector::new(&settings.encoders),
         }
     }
 
@@ -168,7 +181,8 @@ impl JointEstimator {
         let follow = |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32| {
             joint.reading = reading;
             joint.counts = joint.counts.wrapping_add(moved);
-            let innovation = joint.counts as f32 * lsb - joint.angle_rad;
+            let measured_rad = joint.counts as f32 * lsb + joint.correction_rad;
+            let innovation = measured_rad - joint.angle_rad;
             joint.angle_rad += self.angle_gain * innovation;
             joint.rate_rad_s += self.rate_gain_per_s * innovation;
             joint.innovation_rad = innovation;
@@ -237,20 +251,34 @@ impl JointEstimator {
         take_off(joint_2, soft_2 * torque_nm.second());
     }
 
+    /// Corrects the next readings, which are expected near this pose.
+    #[inline]
+    pub fn expect_pose(&self, state: &mut JointState, pose: &Pose<f32>) {
+        if let Some(corrections_rad) = self.corrector.in_pose(pose) {
+            let [joint_1, joint_2] = &mut state.joints;
+            joint_1.correction_rad = corrections_rad.first();
+            joint_2.correction_rad = corrections_rad.second();
+        }
+    }
+
     /// Restarts both loops from these readings, at rest.
     fn start(&self, state: &mut JointState, readings: &[EncoderCounts; 2]) {
         state.started = true;
         state.moved = true;
-        for (joint, ((scale, lsb), reading)) in state
-            .joints
-            .iter_mut()
-            .zip(self.scales.iter().zip(self.rad_per_count).zip(*readings))
-        {
-            let counts = scale.counts_from_zero(reading);
-            *joint = TrackingLoop {
-                reading,
-                counts,
-                angle_rad: counts as f32 * lsb,
+        let [scale_1, scale_2] = &self.scales;
+        let [reading_1, reading_2] = *readings;
+        let counts = [
+            scale_1.counts_from_zero(reading_1),
+            scale_2.counts_from_zero(reading_2),
+        ];
+        let angles_rad = [0, 1].map(|joint| counts[joint] as f32 * self.rad_per_count[joint]);
+        let corrections_rad = self.corrector.at(angles_rad);
+        for (joint, tracking) in state.joints.iter_mut().enumerate() {
+            *tracking = TrackingLoop {
+                reading: readings[joint],
+                counts: counts[joint],
+                correction_rad: corrections_rad[joint],
+                angle_rad: angles_rad[joint] + corrections_rad[joint],
                 ..Default::default()
             };
         }

@@ -1,6 +1,6 @@
 //! Estimates the state of arm, contact and belt from the sensors.
 //!
-//! - [`joints`]: angles and rates from encoder counts
+//! - [`joints`]: angles and rates from encoder counts; [`encoder_correction`]: known errors of the encoders
 //! - [`model`]: the equations of motion at those angles and rates
 //! - [`contact`]: contact decision
 //! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
@@ -13,6 +13,7 @@ pub mod belt;
 pub mod calibration;
 pub mod contact;
 pub mod disturbance;
+pub mod encoder_correction;
 pub mod friction;
 pub mod joint_friction;
 pub mod joints;
@@ -22,7 +23,7 @@ pub mod response;
 use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderScale, LinearConverter, LinearScale};
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::{Arm, Slip};
+use painleve_shared::{Arm, Pose, Slip};
 
 use self::belt::{BeltEstimator, BeltSpeedSettings, BeltState};
 use self::calibration::{CalibrationSettings, CalibrationState, LengthCalibrator};
@@ -414,10 +415,15 @@ impl Estimators {
     fn evaluate(&self, state: &mut EstimatesState, friction: &JointFrictionState) {
         // Friction of the joints enters as an unknown torque does.
         let disturbance_nm = state.disturbance.torque_nm - friction.torque_nm();
-        state.model = Model::new(
+        let (theta_rad, theta_dot_rad_s) =
+            (state.joints.theta_rad(), state.joints.theta_dot_rad_s());
+        let pose = Pose::new(&theta_rad);
+        self.joints.expect_pose(&mut state.joints, &pose);
+        state.model = Model::in_pose(
             &state.arm,
-            state.joints.theta_rad(),
-            state.joints.theta_dot_rad_s(),
+            &pose,
+            theta_rad,
+            theta_dot_rad_s,
             &disturbance_nm,
         );
         let (model, contact) = (&state.model, &mut state.contact);

@@ -50,7 +50,6 @@ pub struct Model {
 impl Model {
     /// Evaluates the terms at link angles θ (rad) and rates θ̇ (rad/s), with an additional
     /// generalised torque d (N·m) on the arm.
-    #[inline]
     pub fn new(
         arm: &Arm<f32>,
         theta_rad: LinkMotion<f32>,
@@ -58,8 +57,20 @@ impl Model {
         disturbance_nm: &GeneralisedTorque<f32>,
     ) -> Self {
         let pose = Pose::new(&theta_rad);
-        let jacobian = arm.jacobian(&pose);
-        let mobility = arm.inverse_mass_matrix(&pose);
+        Self::in_pose(arm, &pose, theta_rad, theta_dot_rad_s, disturbance_nm)
+    }
+
+    /// The same with the pose of these link angles.
+    #[inline]
+    pub fn in_pose(
+        arm: &Arm<f32>,
+        pose: &Pose<f32>,
+        theta_rad: LinkMotion<f32>,
+        theta_dot_rad_s: LinkMotion<f32>,
+        disturbance_nm: &GeneralisedTorque<f32>,
+    ) -> Self {
+        let jacobian = arm.jacobian(pose);
+        let mobility = arm.inverse_mass_matrix(pose);
         let sine_elbow = pose.sine_elbow();
         let bounded = if sine_elbow < 0.0 {
             sine_elbow.at_most(-STRAIGHT_ARM_SINE)
@@ -71,11 +82,11 @@ impl Model {
         let normal_mobility = mobility * normal;
         let tangential = Vector2::new(jacobian.m11, jacobian.m12);
         let tangential_mobility = mobility * tangential;
-        let tip_m = arm.tip_m(&pose);
-        let bias_nm = arm.passive_torque_nm(&theta_rad, &theta_dot_rad_s, &pose)
-            + arm.centrifugal_torque_nm(&theta_dot_rad_s, &pose)
+        let tip_m = arm.tip_m(pose);
+        let bias_nm = arm.passive_torque_nm(&theta_rad, &theta_dot_rad_s, pose)
+            + arm.centrifugal_torque_nm(&theta_dot_rad_s, pose)
             - *disturbance_nm;
-        let centripetal_m_s2 = arm.centripetal_m_s2(&pose, &theta_dot_rad_s);
+        let centripetal_m_s2 = arm.centripetal_m_s2(pose, &theta_dot_rad_s);
         Self {
             theta_rad,
             theta_dot_rad_s,
@@ -83,11 +94,11 @@ impl Model {
             gap_m: arm.height_m() + tip_m.y,
             tip_velocity_m_s: jacobian * theta_dot_rad_s.vector(),
             jacobian,
-            mass: arm.mass_matrix(&pose),
+            mass: arm.mass_matrix(pose),
             mobility,
-            stiffness_nm_rad: arm.passive_stiffness_nm_rad(&pose),
+            stiffness_nm_rad: arm.passive_stiffness_nm_rad(pose),
             bias_nm,
-            centrifugal_nms2: arm.centrifugal_nms2(&pose),
+            centrifugal_nms2: arm.centrifugal_nms2(pose),
             centripetal_m_s2,
             // det J = l1 l2 sin(θ2 − θ1).
             inverse_determinant_per_m2: 1.0 / (length_1 * length_2 * bounded),

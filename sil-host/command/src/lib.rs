@@ -14,6 +14,7 @@ mod export;
 mod fail_on;
 mod figures;
 mod given_scenario;
+mod identify;
 mod join;
 mod json;
 mod live;
@@ -50,6 +51,7 @@ use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
 use painleve_chart::picture;
 use painleve_commission::Mistake;
+use painleve_identify::Refusal;
 use painleve_link::LinkError;
 use painleve_plant::closed_loop::LoopError;
 use painleve_plant::law_choice::{self, ScenarioLaws};
@@ -88,6 +90,8 @@ enum Command {
     Accept(accept::AcceptArguments),
     /// Measure how the sensors and torque stages of an arm are mounted, and correct its scenario.
     Commission(commission::CommissionArguments),
+    /// Measure the geometry of an arm by slides along its belt, and how well it is known.
+    Identify(identify::IdentifyArguments),
     /// Drive a real arm through its board: watch, permit arming, record, stop.
     Drive(drive::DriveArguments),
     /// Report the cost of control ticks: instructions, cycles or wake-up latency, and the worst
@@ -152,6 +156,9 @@ pub enum CommandError {
     /// The arm has a mistake that no setting can describe.
     #[error("{0}")]
     Mounting(Mistake),
+    /// The slides of an arm do not give its geometry.
+    #[error("{0}")]
+    Geometry(Refusal),
     /// A real arm cannot be commissioned: its torque stages do not come on or stay on.
     #[error(transparent)]
     Rig(BoardRigError),
@@ -227,6 +234,7 @@ impl CommandError {
             Self::Loop(LoopError::Plant(_))
             | Self::Faulted(_)
             | Self::Mounting(_)
+            | Self::Geometry(_)
             | Self::NotAccepted(_) => 1,
             Self::Link(LinkError::Interrupted) => INTERRUPTED,
             Self::Loop(LoopError::Host(_) | LoopError::NotUnderstood { .. })
@@ -410,6 +418,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         }
         Command::Run(_)
         | Command::Commission(_)
+        | Command::Identify(_)
         | Command::Drive(_)
         | Command::Timing(_)
         | Command::Doctor(_) => {}
@@ -434,6 +443,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Process(Plan::Bridge(arguments)) => bridge::run(&arguments),
         Command::Accept(arguments) => accept::run(&arguments),
         Command::Commission(arguments) => commission::run(&arguments),
+        Command::Identify(arguments) => identify::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),

@@ -90,6 +90,14 @@ pub enum RecordFileError {
 /// A file or option cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
+    /// A recorded slide cannot be used.
+    #[error("--slide {}: {reason}", path.display())]
+    Slide {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        reason: String,
+    },
     /// Two outputs would replace each other.
     #[error("{} and {} both name `{}`: choose different files", options[0], options[1], path.display())]
     SameFile {

@@ -13,10 +13,14 @@
 //!
 //! [`second_sensors`] repeats it with the second sensors of an arm that has two on each channel.
 //!
-//! The belt stands still throughout. A deviation that a setting can describe is corrected and reported; any
+//! [`identification`] goes on from there: the controller itself slides the tip along the belt, which determines zeros
+//! and errors of the encoders, the links' lengths and the belt's height much more closely.
+//!
+//! The belt stands still while an arm is commissioned. A deviation that a setting can describe is corrected and reported; any
 //! other ends the procedure with one [`Mistake`].
 
 pub mod encoders;
+pub mod identification;
 mod mistake;
 mod readings;
 pub mod rest;
@@ -223,6 +227,7 @@ impl Commissioned {
             corrected.belt.friction = friction;
             corrected.controller.friction.first_guess = friction.min(2.0) as f32;
         }
+        identification::suppose_drawn(&mut corrected);
         // The file's start must lie on the belt at its new height.
         let arm = Arm::new(corrected.arm)?;
         let tip = arm.tip_m(&painleve_shared::kinematics::Pose::new(&self.rest_rad));

@@ -2,6 +2,9 @@
 
 use crate::plant::{ContactMode, Event, Probe, Snapshot, State, Step};
 
+/// Shortest contact that counts as a capture, s.
+const CAPTURE_S: f64 = 0.1;
+
 /// Counts and extremes of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
@@ -9,6 +12,11 @@ pub struct Statistics {
     pub lift_offs: u64,
     /// Time of the first lift-off, s.
     pub first_lift_off_s: Option<f64>,
+    /// Whether the tip has been captured: by a contact of 0.1 s.
+    pub captured: bool,
+    /// Number of lift-offs after the capture.
+    pub lift_offs_after_capture: u64,
+    contact_since_s: Option<f64>,
     /// Collisions with the belt.
     pub impacts: u64,
     /// Impacts without collision.
@@ -34,6 +42,9 @@ impl Statistics {
         Self {
             lift_offs: 0,
             first_lift_off_s: None,
+            captured: false,
+            lift_offs_after_capture: 0,
+            contact_since_s: None,
             impacts: 0,
             impacts_without_collision: 0,
             max_tip_t_m: f64::NEG_INFINITY,
@@ -89,6 +100,10 @@ impl Probe for Statistics {
         self.total_s += duration;
         if step.mode().is_contact() {
             self.contact_s += duration;
+            let since_s = *self.contact_since_s.get_or_insert(step.start_s());
+            self.captured |= step.end_s() - since_s >= CAPTURE_S;
+        } else if self.contact_since_s.take().is_some() && self.captured {
+            self.lift_offs_after_capture += 1;
         }
         self.observe(&step.start());
         self.observe(&step.end());

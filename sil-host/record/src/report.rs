@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use comfy_table::CellAlignment;
 use hdrhistogram::Histogram;
+use painleve_firmware::refer::governor::{EdgeGovernor, JointErrors};
 use painleve_plant::closed_loop::LoopResult;
 use painleve_plant::scenario::Scenario;
 use painleve_process::terminal;
@@ -58,6 +59,9 @@ pub struct RunReport {
     pub lift_offs: u64,
     /// Time of the first lift-off, s.
     pub first_lift_off_s: Option<f64>,
+    /// Whether the tip was captured, by a contact of 0.1 s, and never lifted off again, without a fault.
+    #[serde(default)]
+    pub kept: bool,
     /// Number of collisions of the tip with the belt.
     pub impacts: u64,
     /// Number of impacts without collision.
@@ -72,6 +76,12 @@ pub struct RunReport {
     /// requests none.
     #[serde(default)]
     pub requested_target_m: Option<f64>,
+    /// Distance of the tip from the governed reference at the end, m.
+    #[serde(default)]
+    pub error_m: f64,
+    /// Part of the governor's distance from the edges that is kept for what is not known of the arm, m.
+    #[serde(default)]
+    pub distance_for_knowledge_m: f64,
     /// Smallest normal force after the first 50 ms, N; null for shorter runs.
     pub min_normal_force_n: Option<f64>,
     /// Largest joint torque, N·m.
@@ -145,6 +155,9 @@ impl RunReport {
             realtime_factor: sim_s / wall_s.max(1e-9),
             lift_offs: statistics.lift_offs,
             first_lift_off_s: statistics.first_lift_off_s,
+            kept: statistics.captured
+                && statistics.lift_offs_after_capture == 0
+                && result.fault.is_none(),
             impacts: statistics.impacts,
             impacts_without_collision: statistics.impacts_without_collision,
             max_tip_t_m: statistics.max_tip_t_m,
@@ -153,6 +166,8 @@ impl RunReport {
             requested_target_m: scenario
                 .target_m()
                 .filter(|_| scenario.controller.law.name() != "off"),
+            error_m: (result.final_tip_t_m - result.final_reference_m).abs(),
+            distance_for_knowledge_m: distance_for_knowledge_m(scenario),
             min_normal_force_n: force.is_finite().then_some(force),
             peak_torque_nm: statistics.peak_torque_nm,
             torque_change_moving_nm: smoothness.moving.torque_change_nm(converters),
@@ -195,6 +210,7 @@ impl RunReport {
             None => self.lift_offs.to_string(),
         };
         row("lift-offs", lift_offs);
+        row("kept", if self.kept { "yes" } else { "no" }.into());
         row(
             "impacts",
             format!(
@@ -217,7 +233,16 @@ impl RunReport {
         // Held back by an edge, or not yet reached.
         let is_short = |target_m: &f64| (target_m - self.final_reference_m).abs() > 5e-5;
         if let Some(target_m) = self.requested_target_m.filter(is_short) {
-            row("requested", format!("{:+.2} mm", 1e3 * target_m));
+            let short_mm = 1e3 * (target_m - self.final_reference_m).abs();
+            let known_mm = 1e3 * self.distance_for_knowledge_m;
+            let why = if known_mm < 0.05 {
+                String::new()
+            } else {
+                format!(
+                    "; held {short_mm:.1} mm short, {known_mm:.1} mm of it for what is not known of the arm (knowledge)"
+                )
+            };
+            row("requested", format!("{:+.2} mm{why}", 1e3 * target_m));
         }
         row("farthest tip", format!("{:+.2} mm", 1e3 * self.max_tip_t_m));
         let force = self
@@ -285,6 +310,21 @@ impl RunReport {
         }
         table.to_string()
     }
+}
+
+/// Returns by how much the governor's distance is larger because the arm is not known exactly, m.
+fn distance_for_knowledge_m(scenario: &Scenario) -> f64 {
+    let configuration = scenario.controller_configuration();
+    let distance_m = |joints: &JointErrors| {
+        let governor = &configuration.settings.governor;
+        f64::from(EdgeGovernor::new(governor, configuration.tick_s(), joints).distance_m())
+    };
+    let joints = configuration.joint_errors();
+    let known = JointErrors {
+        tip_deviation_m: 0.0,
+        ..joints
+    };
+    distance_m(&joints) - distance_m(&known)
 }
 
 fn microseconds(percentiles: &DurationPercentiles) -> String {

@@ -46,6 +46,8 @@ pub struct JointErrors {
     pub friction_nm: f32,
     /// Play of the gears, rad.
     pub play_rad: f32,
+    /// Standard deviation of the tip's distance from the edges, m.
+    pub tip_deviation_m: f32,
 }
 
 /// The governor's settings for one arm and rate.
@@ -58,6 +60,8 @@ pub struct EdgeGovernor {
     tick_s: f32,
     /// Least p as a fraction of Q22.
     least_p_ratio: f32,
+    /// Least p, 1/kg.
+    least_p_per_kg: f32,
     /// Distance kept from the point where p has that value, with these joints and this control rate, m.
     distance_m: f32,
 }
@@ -128,7 +132,8 @@ impl EdgeGovernor {
         let distance_m2 = square(settings.distance_m * square(tick_s / PERIOD_S))
             + square(settings.distance_counts * joints.count_m)
             + square(settings.distance_m_nm * joints.friction_nm)
-            + square(settings.distance_m_rad * joints.play_rad);
+            + square(settings.distance_m_rad * joints.play_rad)
+            + square(settings.distance_deviations * joints.tip_deviation_m);
         Self {
             enabled: settings.enabled,
             friction_deviations: settings.friction_deviations,
@@ -136,8 +141,14 @@ impl EdgeGovernor {
             catch_up_m_s: settings.catch_up_m_s,
             tick_s,
             least_p_ratio: settings.p_ratio,
+            least_p_per_kg: settings.p_per_kg,
             distance_m: distance_m2.square_root(),
         }
+    }
+
+    /// Returns the distance kept from the point where p/Q22 has its least value, m.
+    pub fn distance_m(&self) -> f32 {
+        self.distance_m
     }
 
     /// Continues the search for the edges around a tip at `tip_t_m` (m). Where a thrown tip may land,
@@ -164,6 +175,7 @@ impl EdgeGovernor {
             friction: friction.coefficient + self.friction_deviations * friction.deviation,
             slip: friction.slip_seen.then_some(friction.slip),
             least_p_ratio: self.least_p_ratio.at_least(landing_p_ratio),
+            least_p_per_kg: self.least_p_per_kg,
             distance_m: direction * self.distance_m,
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
@@ -247,7 +259,7 @@ impl EdgeGovernor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_shared::{ArmParameters, Slip};
+    use painleve_shared::{ArmParameters, Pose, Slip};
     use proptest::prelude::*;
 
     const TICK_S: f32 = 1e-3;
@@ -319,16 +331,34 @@ mod tests {
             count_m: 1e-3,
             friction_nm: 0.05,
             play_rad: 1e-3,
+            tip_deviation_m: 2e-3,
         };
         let settings = GovernorSettings {
             p_ratio: 0.0,
             ..Default::default()
         };
         let distance = distance_m(&settings, &joints, TICK_S, 0.0);
-        // 0.5, 3, 3 and 2 mm.
-        assert!((distance - 4.72e-3).abs() < 3e-5, "{distance}");
+        // 0.5, 3, 3, 2 and 4 mm.
+        assert!((distance - 6.18e-3).abs() < 3e-5, "{distance}");
         let more = distance_m(&GovernorSettings::default(), &joints, TICK_S, 0.0);
         assert!(more > distance + 0.5e-3, "{more}");
+    }
+
+    #[test]
+    fn the_stretch_ends_where_p_has_its_least_value_in_kilograms() {
+        let settings = GovernorSettings {
+            p_ratio: 0.0,
+            p_per_kg: 2.0,
+            distance_m: 0.0,
+            ..Default::default()
+        };
+        let back_m = distance_m(&settings, &JointErrors::default(), TICK_S, 0.0);
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let theta = arm
+            .link_angles_on_belt_rad(0.164_71 - back_m, Posture::ElbowDown)
+            .unwrap();
+        let p = arm.p(&Pose::new(&theta), 0.6, Slip::Positive);
+        assert!((p - 2.0).abs() < 0.02, "{p} 1/kg, {back_m} m back");
     }
 
     #[test]

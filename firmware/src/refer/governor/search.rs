@@ -19,6 +19,8 @@ pub(super) struct Admissibility<'a> {
     pub(super) slip: Option<Slip>,
     /// Least p/Q22.
     pub(super) least_p_ratio: f32,
+    /// Least p, 1/kg.
+    pub(super) least_p_per_kg: f32,
     /// How far from a point along the belt it must still hold, m, with its sign.
     pub(super) distance_m: f32,
 }
@@ -28,13 +30,14 @@ impl Admissibility<'_> {
     pub(super) fn at(&self, tip_t_m: f32) -> bool {
         let there_m = tip_t_m + self.distance_m;
         let row = self.arm.inverse_inertia_row_on_belt(there_m, self.posture);
-        row.is_some_and(|(tangential, normal)| {
+        row.is_some_and(|(tangential, normal, factor)| {
             let against = match self.slip {
                 Some(slip) => slip.sign::<f32>() * tangential,
                 // Both directions must be admissible.
                 None => tangential.abs(),
             };
-            normal - self.friction * against >= self.least_p_ratio * normal
+            let least = (self.least_p_ratio * normal).at_least(self.least_p_per_kg * factor);
+            normal - self.friction * against >= least
         })
     }
 }

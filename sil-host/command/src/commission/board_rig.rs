@@ -30,6 +30,9 @@ pub enum BoardRigError {
     /// The board or its line failed.
     #[error(transparent)]
     Board(#[from] BoardError),
+    /// The operator cannot be heard.
+    #[error(transparent)]
+    System(#[from] std::io::Error),
     /// The operator or a signal has ended the procedure.
     #[error("interrupted")]
     Interrupted,
@@ -53,6 +56,7 @@ impl From<BoardRigError> for CommandError {
     fn from(error: BoardRigError) -> Self {
         match error {
             BoardRigError::Board(error) => Self::Board(error),
+            BoardRigError::System(error) => error.into(),
             BoardRigError::Interrupted => Self::Interrupted,
             BoardRigError::Faulted(fault) => Self::Faulted(fault),
             other => Self::Rig(other),

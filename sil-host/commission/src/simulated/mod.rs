@@ -1,7 +1,9 @@
 //! A simulated arm to commission, and an operator who follows the instructions, to within half a degree.
 
 mod built_in_mistake;
+mod imperfect;
 mod random_arm;
+mod slides;
 mod wiring;
 
 use painleve_plant::mechanics::belt::BeltProfile;
@@ -14,7 +16,9 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 pub use built_in_mistake::BuiltInMistake;
+pub use imperfect::imperfect;
 pub use random_arm::random_arm;
+pub use slides::{GeometryMistake, SimulatedSlides};
 pub use wiring::Wiring;
 
 use crate::{OperatorTask, RawReadings, Rig};

@@ -32,6 +32,10 @@ settings! {
         eccentricity_rad: [f64; 2] = [0.0; 2], 0.0..=0.1, "rad";
         /// Phase of this error: the sine's argument at joint angle zero.
         eccentricity_phase_rad: [f64; 2] = [0.0; 2], -PI..=PI, "rad";
+        /// Amplitude of the error twice around in a turn, as of a magnet at an angle.
+        second_harmonic_rad: [f64; 2] = [0.0; 2], 0.0..=0.1, "rad";
+        /// Phase of this error: the sine's argument at joint angle zero.
+        second_harmonic_phase_rad: [f64; 2] = [0.0; 2], -PI..=PI, "rad";
     }
     check Self::relations;
 }
@@ -45,12 +49,20 @@ impl EncoderSettings {
     /// Returns the error of the encoder of joint 0 or 1 at a joint angle, rad.
     #[inline]
     fn error_rad(&self, joint: usize, angle_rad: f64) -> f64 {
-        let amplitude_rad = self.eccentricity_rad[joint];
-        if amplitude_rad == 0.0 {
-            return self.mounting_error_rad[joint];
+        let mut error_rad = self.mounting_error_rad[joint];
+        for (times, amplitude_rad, phase_rad) in [
+            (1.0, self.eccentricity_rad, self.eccentricity_phase_rad),
+            (
+                2.0,
+                self.second_harmonic_rad,
+                self.second_harmonic_phase_rad,
+            ),
+        ] {
+            if amplitude_rad[joint] != 0.0 {
+                error_rad += amplitude_rad[joint] * libm::sin(times * angle_rad + phase_rad[joint]);
+            }
         }
-        let phase_rad = self.eccentricity_phase_rad[joint];
-        self.mounting_error_rad[joint] + amplitude_rad * libm::sin(angle_rad + phase_rad)
+        error_rad
     }
 }
 
@@ -143,20 +155,23 @@ mod tests {
 
     proptest! {
         #[test]
-        fn errors_are_a_constant_and_a_sine_of_the_joint_angle(
+        fn errors_are_a_constant_and_sines_of_the_joint_angle_once_and_twice_around(
             mounting in -0.1_f64..0.1, eccentricity in 0.0_f64..0.01, phase in -3.0_f64..3.0,
-            first in -1.0_f64..1.0, elbow in -1.0_f64..1.0,
+            second in 0.0_f64..0.01, first in -1.0_f64..1.0, elbow in -1.0_f64..1.0,
         ) {
             let errors = EncoderSettings {
                 bits: 24,
                 mounting_error_rad: [mounting, 0.0],
                 eccentricity_rad: [0.0, eccentricity],
                 eccentricity_phase_rad: [0.0, phase],
+                second_harmonic_rad: [second, 0.0],
+                second_harmonic_phase_rad: [phase, 0.0],
                 ..Default::default()
             };
             let mut encoders = encoders(&errors, &LinkMotion::new(first, first + elbow));
             let readings = encoders.readings(0.0);
-            let expected = [first + mounting, elbow + eccentricity * libm::sin(elbow + phase)];
+            let twice = second * libm::sin(2.0 * first + phase);
+            let expected = [first + mounting + twice, elbow + eccentricity * libm::sin(elbow + phase)];
             for ((scale, reading), angle) in
                 encoders.scales.iter().zip(readings).zip(expected)
             {

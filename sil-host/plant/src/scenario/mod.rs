@@ -7,6 +7,7 @@ pub mod built_in;
 pub mod describe;
 mod error;
 mod initial_key;
+mod knowledge;
 mod load;
 mod override_key;
 mod plant;
@@ -29,6 +30,7 @@ use crate::mechanics::{PlantParameters, SolverSettings};
 pub use crate::mechanics::belt::BeltSettings;
 pub use crate::mechanics::{Elbow, InitialState};
 pub use error::ScenarioError;
+pub use knowledge::Knowledge;
 pub use words::{TomlError, known_names};
 
 settings! {
@@ -45,6 +47,8 @@ settings! {
         arm: ArmParameters<f64> = ArmParameters::default();
         /// The arm in the controller's model; the plant's if absent.
         arm_model: Option<ArmParameters<f32>> = None;
+        /// How well the geometry of a real arm is known.
+        knowledge: Knowledge = Knowledge::default();
         /// Friction and speed of the belt.
         belt: BeltSettings = BeltSettings::default();
         /// Restitution of impacts.

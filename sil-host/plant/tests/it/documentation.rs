@@ -20,10 +20,11 @@ use painleve_shared::status::Fault;
 use toml::{Table, Value};
 
 /// The sections of a scenario that do not belong to the controller.
-const SECTIONS: [&str; 10] = [
+const SECTIONS: [&str; 11] = [
     "run",
     "arm",
     "arm_model",
+    "knowledge",
     "belt",
     "impact",
     "contact",

@@ -1,0 +1,113 @@
+//! Slides of a real arm: its board runs the controller, its operator sets the tip down.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use painleve_board::arm::{ArmEvent, ConnectedArm};
+use painleve_commission::OperatorTask;
+use painleve_commission::identification::SlideRig;
+use painleve_plant::scenario::Scenario;
+use painleve_process::interrupt::Interrupt;
+use painleve_process::terminal::warn;
+use painleve_shared::Posture;
+use painleve_shared::frame::{SensorFrame, StatusFlags};
+use painleve_shared::message::FrameSource;
+use painleve_shared::status::SupervisorState;
+
+use crate::commission::BoardRigError;
+use crate::drive::{Operator, OperatorCommand};
+
+/// Longest wait for the board before checking for the operator and signals.
+const PATIENCE: Duration = Duration::from_millis(20);
+
+/// Longest time from the operator's task to the end of a slide, beyond its duration.
+const LIMIT: Duration = Duration::from_secs(120);
+
+/// A real arm.
+pub struct BoardSlides {
+    port: PathBuf,
+    operator: Operator,
+    interrupt: Interrupt,
+}
+
+impl BoardSlides {
+    /// Prepares for the slides of the arm behind a port.
+    ///
+    /// # Errors
+    /// [`BoardRigError`] if the standard input cannot be read.
+    pub fn new(port: &Path) -> Result<Self, BoardRigError> {
+        Ok(Self {
+            port: port.to_owned(),
+            operator: Operator::listen()?,
+            interrupt: Interrupt::catch()?,
+        })
+    }
+
+    fn check(&self) -> Result<bool, BoardRigError> {
+        let order = self.operator.order();
+        if self.interrupt.is_requested() || order == Some(OperatorCommand::Stop) {
+            return Err(BoardRigError::Interrupted);
+        }
+        Ok(order == Some(OperatorCommand::Confirm))
+    }
+
+    /// Collects the frames of one slide.
+    fn frames(
+        &self,
+        arm: &mut ConnectedArm,
+        duration: Duration,
+    ) -> Result<Vec<SensorFrame>, BoardRigError> {
+        let start = Instant::now();
+        let mut frames = Vec::new();
+        while start.elapsed() < duration + LIMIT {
+            self.check()?;
+            let Some(ArmEvent::Tick { sensor, answer }) = arm.next_event(PATIENCE)? else {
+                continue;
+            };
+            if let Some(fault) = answer.latched_fault() {
+                return Err(BoardRigError::Faulted(fault));
+            }
+            let is_tracking = answer.supervisor_state() == Some(SupervisorState::Tracking);
+            frames.extend(sensor.filter(|_| is_tracking));
+            if is_tracking && answer.flags.contains(StatusFlags::REFERENCE_DONE) {
+                return Ok(frames);
+            }
+            if !frames.is_empty() && answer.supervisor_state() == Some(SupervisorState::Idle) {
+                return Err(BoardRigError::Off);
+            }
+        }
+        Err(BoardRigError::NotEnabled)
+    }
+}
+
+impl SlideRig for BoardSlides {
+    type Error = BoardRigError;
+
+    fn slide(
+        &mut self,
+        scenario: &Scenario,
+        posture: Posture,
+    ) -> Result<Vec<SensorFrame>, BoardRigError> {
+        let configuration = scenario.controller_configuration();
+        let mut arm = ConnectedArm::open(&self.port, &configuration, FrameSource::Sensors)?;
+        let set_down = OperatorTask::SetDown { posture };
+        let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
+        warn(format_args!(
+            "operator: let the belt run towards {}t, at about {:.1} m/s; {set_down}; then press Return",
+            if speed_m_s < 0.0 { '−' } else { '+' },
+            speed_m_s.abs()
+        ));
+        while !self.check()? {
+            arm.next_event(PATIENCE)?;
+        }
+        arm.permit_arming(true)?;
+        warn(format_args!("operator: {}", OperatorTask::Enable));
+        let duration = Duration::from_secs_f64(scenario.run.duration_s);
+        let frames = self.frames(&mut arm, duration);
+        // Whatever ended the slide, the torque is off.
+        let stopped = arm.stop();
+        let frames = frames?;
+        stopped?;
+        Ok(frames)
+    }
+}

@@ -1,0 +1,256 @@
+//! `painleve identify`: measures an arm's geometry by slides of its tip along the belt, and writes its scenario with the
+//! values and how well they are known.
+
+mod board_slides;
+mod recorded;
+mod residuals;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use painleve_chart::picture;
+use painleve_commission::identification::{
+    Found, IdentificationError, identify_arm, identify_slides,
+};
+use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
+use painleve_files::atomic_file::{commit_all, prepare};
+use painleve_identify::parameters::Drawn;
+use painleve_identify::{Parameter, Prior, Slide};
+use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
+use painleve_process::terminal::{self, warn};
+use serde_json::json;
+
+use self::board_slides::BoardSlides;
+use self::recorded::Recorded;
+use super::output_error::output;
+use super::{CommandError, distinct_files, figure_path, say};
+
+/// Standard deviation of a length that has been measured with a calliper, m.
+const MEASURED_M: f64 = 1e-4;
+
+/// A later distance from the line beyond this multiple of the one written down shows that the arm has changed.
+const CHANGED: f64 = 2.0;
+
+/// Options of `painleve identify`.
+#[derive(Debug, Args)]
+pub struct IdentifyArguments {
+    /// Built-in scenario or TOML file with the arm's configuration.
+    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
+    scenario: String,
+    /// Override one key, for example converters.force.bits=13; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Serial port of the board, for example /dev/ttyUSB0.
+    #[arg(long, value_name = "PATH")]
+    #[arg(required_unless_present_any = ["rehearse", "slide"])]
+    port: Option<PathBuf>,
+    /// Rehearse on a simulated arm with random errors that the scenario does not know.
+    #[arg(long, conflicts_with_all = ["port", "slide"])]
+    rehearse: bool,
+    /// A recorded slide: its posture and an MCAP or CSV file, for example elbow-up=slide.mcap; may be repeated.
+    #[arg(long, value_name = "POSTURE=PATH", conflicts_with = "port")]
+    slide: Vec<Recorded>,
+    /// Mistake of the simulated arm.
+    #[arg(long, value_name = "MISTAKE", value_parser = mistakes(), requires = "rehearse")]
+    mistake: Option<String>,
+    /// Seed of the simulated arm's errors.
+    #[arg(long, default_value_t = 1, requires = "rehearse")]
+    seed: u64,
+    /// Length of link 1 from joint to joint, measured to a tenth of a millimetre, m; by default that of the scenario, to
+    /// 0.6 %. A line has no scale: positions are as exact as this length.
+    #[arg(long, value_name = "M", value_parser = painleve_study_core::options::metres)]
+    link_1_m: Option<f64>,
+    /// File for the scenario with the measured values.
+    #[arg(long, value_name = "PATH", default_value = "out/identified.toml")]
+    output: PathBuf,
+    /// Figure of the distances from the line, before and after: SVG or PNG.
+    #[arg(long, value_name = "PATH", value_parser = figure_path())]
+    svg: Option<PathBuf>,
+    /// Print one JSON object on stdout instead of the text.
+    #[arg(long)]
+    json: bool,
+}
+
+fn mistakes() -> clap::builder::PossibleValuesParser {
+    let names = GeometryMistake::ALL.iter().map(|it| it.name());
+    names.collect::<Vec<_>>().into()
+}
+
+/// Identifies the arm and writes its scenario; after a refusal, nothing is written.
+///
+/// # Errors
+/// [`CommandError`] if the slides give no result, the board or a file fails, or the user interrupts.
+pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
+    let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
+    let recorded: Result<Vec<_>, _> = arguments
+        .slide
+        .iter()
+        .map(|it| it.read(&scenario))
+        .collect();
+    let slides = recorded?;
+    let mut files = vec![("--output", arguments.output.as_path())];
+    files.extend(arguments.svg.iter().map(|path| ("--svg", path.as_path())));
+    distinct_files::check(&files)?;
+    let mut drawn = Drawn::default();
+    if let Some(length_m) = arguments.link_1_m {
+        let mut arm = scenario.controller_configuration().arm;
+        arm.link_length_m[0] = length_m as f32;
+        scenario.arm_model = Some(arm);
+        drawn.length = MEASURED_M / length_m;
+    }
+    let (found, source) = found(arguments, &slides, &scenario, &drawn)?;
+    warn_of_change(&scenario, &found);
+    let identified = found
+        .applied_to(&scenario, &source)
+        .map_err(|error| range(&arguments.scenario, error))?;
+    let text = identified.to_commented_toml();
+    let mut files = vec![prepare(&arguments.output, text.as_bytes()).map_err(output)?];
+    if let Some(path) = &arguments.svg {
+        let figure = picture::encoded(path, residuals::svg(&found)).map_err(output)?;
+        files.push(prepare(path, &figure).map_err(output)?);
+    }
+    commit_all(files).map_err(output)?;
+    report(arguments, &found)
+}
+
+/// Returns the result and where it comes from.
+fn found(
+    arguments: &IdentifyArguments,
+    slides: &[Slide],
+    scenario: &Scenario,
+    drawn: &Drawn,
+) -> Result<(Found, String), CommandError> {
+    let name = &arguments.scenario;
+    if !slides.is_empty() {
+        let found = identify_slides(slides, scenario, drawn);
+        let found = found.map_err(CommandError::Geometry)?;
+        return Ok((found, format!("{} recorded slides", slides.len())));
+    }
+    if let Some(port) = &arguments.port {
+        let found = on_board(port, scenario, drawn);
+        let found = found.map_err(|error| failed(name, error, CommandError::from))?;
+        return Ok((found, format!("slides of the arm at {}", port.display())));
+    }
+    let mistake = arguments.mistake.as_deref();
+    let mistake = mistake.and_then(|name| GeometryMistake::ALL.iter().find(|it| it.name() == name));
+    let actual = imperfect(scenario, arguments.seed).map_err(|error| range(name, error))?;
+    let mut rig = SimulatedSlides::new(actual, mistake.copied());
+    let found = identify_arm(&mut rig, scenario, drawn)
+        .map_err(|error| failed(name, error, |error| CommandError::Input(error.into())))?;
+    Ok((found, format!("rehearsal with seed {}", arguments.seed)))
+}
+
+/// Identifies the arm behind a board; whatever ends it, the torque is off.
+fn on_board(
+    port: &Path,
+    scenario: &Scenario,
+    drawn: &Drawn,
+) -> Result<Found, IdentificationError<crate::commission::BoardRigError>> {
+    let mut rig = BoardSlides::new(port).map_err(IdentificationError::Rig)?;
+    identify_arm(&mut rig, scenario, drawn)
+}
+
+fn range(name: &str, source: painleve_shared::OutOfRange) -> CommandError {
+    CommandError::Scenario(ScenarioError::Range {
+        origin: name.to_owned(),
+        source,
+    })
+}
+
+/// Returns the command's error for one of the identification.
+fn failed<E: std::error::Error>(
+    name: &str,
+    error: IdentificationError<E>,
+    of_rig: impl FnOnce(E) -> CommandError,
+) -> CommandError {
+    match error {
+        IdentificationError::Rig(error) => of_rig(error),
+        IdentificationError::Refused(refusal) => CommandError::Geometry(refusal),
+        IdentificationError::Scenario(error) => CommandError::Scenario(error),
+        IdentificationError::Range(error) => range(name, error),
+    }
+}
+
+/// Warns if an arm that has been identified before is no longer as it was.
+fn warn_of_change(scenario: &Scenario, found: &Found) {
+    let written_m = scenario.knowledge.off_line_m;
+    let [now_m, _] = found.identified.off_line_m;
+    if written_m > 0.0 && now_m > CHANGED * written_m {
+        warn(format_args!(
+            "the arm has changed: by the scenario's values the tip is {:.2} mm off the line, where {:.2} mm were left when \
+             they were measured ({})",
+            1e3 * now_m,
+            1e3 * written_m,
+            scenario.knowledge.source
+        ));
+    }
+}
+
+/// Prints what was found and where the scenario is.
+fn report(arguments: &IdentifyArguments, found: &Found) -> Result<(), CommandError> {
+    let identified = &found.identified;
+    let fit = &identified.fit;
+    let before_m = found.prior.tip_deviation_m();
+    if arguments.json {
+        let parameters = Parameter::ALL.map(|parameter| {
+            json!({
+                "parameter": parameter.to_string(),
+                "unit": parameter.unit(),
+                "value": fit.parameters.get(parameter),
+                "deviation": fit.deviation(parameter),
+                "before": found.prior.parameters.get(parameter),
+                "deviation_before": found.prior.deviations[parameter.index()],
+            })
+        });
+        return say(json!({
+            "parameters": parameters,
+            "tip_deviation_m": identified.tip_deviation_m,
+            "tip_deviation_before_m": before_m,
+            "place_deviation_m": identified.place_deviation_m,
+            "off_line_m": identified.off_line_m,
+            "readings": identified.readings,
+            "output": arguments.output.display().to_string(),
+        }));
+    }
+    say(terminal::readable(table(&found.prior, found)))?;
+    let [off_before_m, off_after_m] = identified.off_line_m;
+    say(format_args!(
+        "the tip stays on a line to {:.3} mm (by the values before: {:.2} mm), in {} readings",
+        1e3 * off_after_m,
+        1e3 * off_before_m,
+        identified.readings
+    ))?;
+    say(format_args!(
+        "its position is known to {:.2} mm, its distance from the edges to {:.2} mm (before: {:.1} mm)",
+        1e3 * identified.place_deviation_m,
+        1e3 * identified.tip_deviation_m,
+        1e3 * before_m
+    ))?;
+    say(format_args!("written: {}", arguments.output.display()))
+}
+
+fn table(before: &Prior, found: &Found) -> comfy_table::Table {
+    let fit = &found.identified.fit;
+    let mut table = terminal::table(["", "before", "now", "unit"]);
+    for parameter in Parameter::ALL {
+        // Angles in milliradians, lengths in millimetres.
+        let scale = if parameter.unit().is_empty() {
+            1.0
+        } else {
+            1e3
+        };
+        let of =
+            |value: f64, deviation: f64| format!("{:.3} ± {:.3}", scale * value, scale * deviation);
+        let known = before.deviations[parameter.index()];
+        table.add_row([
+            parameter.to_string(),
+            of(before.parameters.get(parameter), known),
+            of(fit.parameters.get(parameter), fit.deviation(parameter)),
+            match parameter.unit() {
+                "" => String::new(),
+                unit => format!("m{unit}"),
+            },
+        ]);
+    }
+    table
+}

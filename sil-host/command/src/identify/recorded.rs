@@ -1,0 +1,158 @@
+//! Slides from files: records of drives and runs, or their tables.
+
+use std::io::{BufReader, Read};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::ValueEnum;
+use painleve_commission::identification::readings;
+use painleve_files::input_file;
+use painleve_identify::Slide;
+use painleve_plant::scenario::Scenario;
+use painleve_record::export::ticks_to_csv;
+use painleve_shared::counts::{EncoderCounts, ForceCounts};
+use painleve_shared::frame::SensorFrame;
+use painleve_study_core::options::PostureOption;
+
+use super::super::CommandError;
+use super::super::output_error::InputError;
+
+/// Columns of the table that a slide needs.
+const COLUMNS: [&str; 4] = [
+    "sensor.joint1_counts",
+    "sensor.joint2_counts",
+    "sensor.tangential_force_counts",
+    "sensor.normal_force_counts",
+];
+
+/// Column with the supervisor's state, and the state in which a slide counts. A table without it counts as a whole.
+const STATE: (&str, &str) = ("actuator.state", "tracking");
+
+/// A recorded slide.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    posture: PostureOption,
+    path: PathBuf,
+}
+
+impl FromStr for Recorded {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (posture, path) = text.split_once('=').ok_or(
+            "expected a posture and a file, for example elbow-up=slide.mcap or elbow-down=slide.csv",
+        )?;
+        Ok(Self {
+            posture: PostureOption::from_str(posture, false)
+                .map_err(|_| format!("{posture}: a posture is elbow-up or elbow-down"))?,
+            path: path.into(),
+        })
+    }
+}
+
+impl Recorded {
+    /// Reads the slide.
+    ///
+    /// # Errors
+    /// [`InputError`] if the file cannot be read or has no such columns.
+    pub fn read(&self, scenario: &Scenario) -> Result<Slide, CommandError> {
+        let frames = self.frames().map_err(|reason| InputError::Slide {
+            path: self.path.clone(),
+            reason,
+        })?;
+        Ok(Slide {
+            posture: self.posture.into(),
+            readings: readings(scenario, frames),
+        })
+    }
+
+    fn frames(&self) -> Result<Vec<SensorFrame>, String> {
+        let file = input_file::open(&self.path).map_err(|error| error.to_string())?;
+        if self.path.extension().is_some_and(|it| it == "csv") {
+            return of_table(BufReader::new(file));
+        }
+        let mut table = Vec::new();
+        let exported = ticks_to_csv(BufReader::new(file), &mut table);
+        if let Some(damage) = exported.map_err(|error| error.to_string())?.damage {
+            return Err(damage.to_string());
+        }
+        of_table(table.as_slice())
+    }
+}
+
+/// Reads the frames of a table.
+fn of_table(table: impl Read) -> Result<Vec<SensorFrame>, String> {
+    let mut reader = csv::Reader::from_reader(table);
+    let header = reader.headers().map_err(|error| error.to_string())?.clone();
+    let place = |name: &str| header.iter().position(|column| column == name);
+    let mut places = [0; 4];
+    for (at, name) in places.iter_mut().zip(COLUMNS) {
+        *at = place(name).ok_or_else(|| format!("it has no column {name}"))?;
+    }
+    let (state, tracking) = STATE;
+    let state = place(state);
+    let mut frames = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(|error| error.to_string())?;
+        if state.is_some_and(|at| row.get(at) != Some(tracking)) {
+            continue;
+        }
+        let mut counts = [0_i64; 4];
+        for (value, (at, name)) in counts.iter_mut().zip(places.into_iter().zip(COLUMNS)) {
+            let text = row.get(at).unwrap_or_default();
+            *value = text
+                .parse()
+                .map_err(|_| format!("{name} = {text:?} is not a whole number"))?;
+        }
+        let [joint_1, joint_2, tangential, normal] = counts;
+        // Whatever does not fit is out of every encoder's range, too.
+        let joint = |counts| EncoderCounts(u32::try_from(counts).unwrap_or(u32::MAX));
+        let force = |counts| ForceCounts(i32::try_from(counts).unwrap_or(i32::MAX));
+        frames.push(SensorFrame {
+            joints: [joint(joint_1), joint(joint_2)],
+            tangential_force: force(tangential),
+            normal_force: force(normal),
+            ..SensorFrame::default()
+        });
+    }
+    Ok(frames)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_gives_the_frames_of_the_ticks_that_track() {
+        let table = "time_s,sensor.joint1_counts,sensor.joint2_counts,sensor.tangential_force_counts,sensor.normal_force_counts,actuator.state\n\
+                     0,1,2,3,7,armed\n0.001,4,5,8,-6,tracking\n";
+        let frames = of_table(table.as_bytes()).unwrap();
+        assert_eq!(frames.len(), 1);
+        assert_eq!(frames[0].joints, [EncoderCounts(4), EncoderCounts(5)]);
+        assert_eq!(frames[0].tangential_force, ForceCounts(8));
+        assert_eq!(frames[0].normal_force, ForceCounts(-6));
+    }
+
+    #[test]
+    fn what_is_missing_or_no_number_is_named() {
+        let missing = of_table("time_s,sensor.joint1_counts\n0,1\n".as_bytes());
+        assert_eq!(
+            missing.unwrap_err(),
+            "it has no column sensor.joint2_counts"
+        );
+        let header = COLUMNS.join(",");
+        let wrong = of_table(format!("{header}\n1,x,3\n").as_bytes());
+        assert_eq!(
+            wrong.unwrap_err(),
+            "sensor.joint2_counts = \"x\" is not a whole number"
+        );
+    }
+
+    #[test]
+    fn a_slide_is_a_posture_and_a_file() {
+        assert!("elbow-up=a.mcap".parse::<Recorded>().is_ok());
+        assert!("a.mcap".parse::<Recorded>().is_err());
+        let wrong = "elbow-left=a.mcap".parse::<Recorded>().unwrap_err();
+        assert_eq!(wrong, "elbow-left: a posture is elbow-up or elbow-down");
+    }
+}

@@ -1,0 +1,132 @@
+//! Identifies an arm's geometry from slides of its tip along the belt.
+//!
+//! The tip stays on a straight line, whatever the joints do: l1 cos θ1 + l2 cos θ2 = H. Each reading of both encoders
+//! is one such equation. Slides in both postures determine the encoders' zeros, their errors once and twice around, the
+//! ratio of the links' lengths, and the height of the belt (planar-constraint calibration: Zhuang, Motaghedi and Roth,
+//! "Robot calibration with planar constraints", ICRA 1999). The line has no scale: one length has to be measured. Nor
+//! does it have a direction: the first zero is that to the belt's normal, and the belt's tilt against the vertical has to
+//! come from elsewhere.
+//!
+//! - [`parameters`]: what is identified, and how well it is known beforehand
+//! - [`geometry`]: line and tip as functions of the parameters, with their derivatives
+//! - [`passes`]: slides as means over short stretches
+//! - [`fit`]: nonlinear least squares with that prior knowledge, and the covariance
+//! - [`verdict`]: reasons to refuse a result, and the motion that is missing
+//!
+//! Parameters are strongly correlated: a zero and the cosine of its encoder's error differ little over a part of a
+//! turn. What counts is the tip, so a result is judged by the standard deviation of the tip's position
+//! ([`Identified::tip_deviation_m`]).
+
+pub mod fit;
+pub mod geometry;
+pub mod parameters;
+pub mod passes;
+pub mod verdict;
+
+use painleve_shared::Posture;
+
+use fit::Fit;
+use geometry::Range;
+pub use parameters::{Parameter, Parameters, Prior};
+use passes::Points;
+pub use verdict::{Missing, Refusal};
+
+/// Readings of one tick of a slide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Angles by the encoders of θ1 and of the elbow, from their configured zeros, without any correction, rad.
+    pub encoders_rad: [f64; 2],
+    /// Contact force along and off the belt, f_t and f_n, N.
+    pub force_n: [f64; 2],
+}
+
+/// A slide of the tip along the belt, to and fro, in one posture.
+#[derive(Clone, Debug)]
+pub struct Slide {
+    /// The posture, as the operator says.
+    pub posture: Posture,
+    /// Readings in order of time.
+    pub readings: Vec<Reading>,
+}
+
+/// Limits of an identification.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// One count of the coarser encoder, rad.
+    pub count_rad: f64,
+    /// Least normal force of a tip on the belt, N.
+    pub contact_n: f64,
+    /// Largest standard deviation of the tip's position, m, apart from that by the measured length.
+    pub tip_deviation_m: f64,
+    /// Largest distance of the tip from a line, root mean square, m.
+    pub off_line_m: f64,
+}
+
+impl Limits {
+    /// Returns the limits of a first look, whose slides need not determine anything yet.
+    pub fn of_first_look(&self) -> Self {
+        Self {
+            tip_deviation_m: f64::INFINITY,
+            ..*self
+        }
+    }
+}
+
+impl Default for Limits {
+    /// For encoders of 14 bits.
+    fn default() -> Self {
+        Self {
+            count_rad: core::f64::consts::TAU / 16384.0,
+            contact_n: 0.5,
+            tip_deviation_m: 0.6e-3,
+            off_line_m: 0.15e-3,
+        }
+    }
+}
+
+/// An identified arm.
+#[derive(Clone, Debug)]
+pub struct Identified {
+    /// The parameters with their covariance.
+    pub fit: Fit,
+    /// Standard deviation of the tip's position relative to the edges, m: the largest in the postures that have been
+    /// slid in.
+    pub tip_deviation_m: f64,
+    /// Standard deviation of the tip's position along the belt, m, if link 1 has its length: the largest in these
+    /// postures.
+    pub place_deviation_m: f64,
+    /// Distance of the tip from the line, root mean square, m: with the parameters known before, and with these.
+    pub off_line_m: [f64; 2],
+    /// The readings as means over short stretches.
+    pub points: Points,
+    /// Number of readings on the belt.
+    pub readings: usize,
+    /// The stretch that was slid along in each slide.
+    pub ranges: Vec<Range>,
+}
+
+/// Identifies an arm.
+///
+/// # Errors
+/// [`Refusal`] with the reason, if the readings do not determine the tip's position to the limit, or are not those of
+/// a rigid arm with its tip on a straight line, or contradict what is known beforehand.
+pub fn identify(slides: &[Slide], prior: &Prior, limits: &Limits) -> Result<Identified, Refusal> {
+    let points = Points::of(slides, prior, limits)?;
+    let fit = Fit::new(&points, prior);
+    let before = points.off_line_m(&prior.parameters);
+    let after = points.off_line_m(&fit.parameters);
+    verdict::check_line(&points, prior, limits, &fit, after)?;
+    verdict::check_prior(&fit, prior)?;
+    let ranges = points.ranges(&fit.parameters);
+    verdict::check_observed(&points, &ranges, &fit, prior, limits, after)?;
+    let postures = || ranges.iter().map(|range| range.posture);
+    Ok(Identified {
+        tip_deviation_m: fit.tip_deviation_m(postures(), &fit.covariance),
+        place_deviation_m: fit.place_deviation_m(postures(), &fit.covariance),
+        off_line_m: [before, after],
+        readings: points.readings,
+        points,
+        ranges,
+        fit,
+    })
+}

@@ -1,0 +1,195 @@
+//! Slides as means over short stretches, in order of time.
+//!
+//! Neighbouring readings of a slow slide share their rounding errors. The mean over a millimetre, which is some counts,
+//! rounds much less, and its error is nearly independent of its neighbours'.
+
+use painleve_shared::Posture;
+
+use crate::geometry::{Place, Range};
+use crate::parameters::{Parameters, Prior};
+use crate::{Limits, Refusal, Slide};
+
+/// Length of the stretches, m.
+const STRETCH_M: f64 = 1e-3;
+
+/// Unevenness of belt and tip that is always assumed, m.
+const UNEVEN_M: f64 = 20e-6;
+
+/// Least share of readings with the tip on the belt.
+const ON_BELT: f64 = 0.8;
+
+/// Least number of stretches of all slides.
+const LEAST_POINTS: usize = 60;
+
+/// Mean angles of both encoders over a short stretch, rad.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// Index of the slide.
+    pub slide: usize,
+    /// The angles.
+    pub encoders_rad: [f64; 2],
+}
+
+/// Where a point is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// The posture of its slide.
+    pub posture: Posture,
+    /// Position along the belt, m.
+    pub tip_t_m: f64,
+    /// Depth in the belt, m.
+    pub depth_m: f64,
+}
+
+/// All slides.
+#[derive(Clone, Debug)]
+pub struct Points {
+    /// The means, in order of time.
+    pub points: Vec<Point>,
+    /// The postures, as told.
+    pub postures: Vec<Posture>,
+    /// Number of readings on the belt.
+    pub readings: usize,
+    count_rad: f64,
+}
+
+impl Points {
+    /// Collects the readings on the belt.
+    pub(crate) fn of(slides: &[Slide], prior: &Prior, limits: &Limits) -> Result<Self, Refusal> {
+        let mut points = Self {
+            points: Vec::new(),
+            postures: slides.iter().map(|slide| slide.posture).collect(),
+            readings: 0,
+            count_rad: limits.count_rad,
+        };
+        for (index, slide) in slides.iter().enumerate() {
+            points.add(index, slide, &prior.parameters, limits)?;
+        }
+        if points.points.len() < LEAST_POINTS {
+            return Err(Refusal::TooShort {
+                slid_mm: 1e3 * STRETCH_M * points.points.len() as f64,
+                least_mm: 1e3 * STRETCH_M * LEAST_POINTS as f64,
+            });
+        }
+        Ok(points)
+    }
+
+    fn add(
+        &mut self,
+        slide: usize,
+        of: &Slide,
+        parameters: &Parameters,
+        limits: &Limits,
+    ) -> Result<(), Refusal> {
+        let is_finite = |it: &&crate::Reading| {
+            it.encoders_rad.iter().all(|angle| angle.is_finite())
+                && it.force_n.iter().all(|force_n| force_n.is_finite())
+        };
+        if let Some(tick) = of.readings.iter().position(|it| !is_finite(&it)) {
+            return Err(Refusal::NotFinite { slide, tick });
+        }
+        let touching: Vec<_> = of
+            .readings
+            .iter()
+            .filter(|it| it.force_n[1] >= limits.contact_n)
+            .collect();
+        let share = touching.len() as f64 / of.readings.len().max(1) as f64;
+        if share < ON_BELT {
+            return Err(Refusal::NotOnBelt {
+                slide,
+                percent: 100.0 * share,
+                contact_n: limits.contact_n,
+            });
+        }
+        let tip_t_m = |encoders_rad| Place::at(parameters, encoders_rad).tip_t_m;
+        let mut rest = touching.as_slice();
+        while let Some(first) = rest.first() {
+            let start_m = tip_t_m(first.encoders_rad);
+            let is_near =
+                |it: &&crate::Reading| (tip_t_m(it.encoders_rad) - start_m).abs() < STRETCH_M;
+            let count = rest.iter().take_while(|it| is_near(it)).count().max(1);
+            let (these, others) = rest.split_at(count);
+            rest = others;
+            let mean = |joint: usize| {
+                let angles = these.iter().map(|it| it.encoders_rad[joint]);
+                angles.sum::<f64>() / count as f64
+            };
+            self.points.push(Point {
+                slide,
+                encoders_rad: [mean(0), mean(1)],
+            });
+        }
+        self.readings += touching.len();
+        Ok(())
+    }
+
+    /// Returns the standard deviation of the depth at a point by rounding and unevenness, m.
+    pub fn deviation_m(&self, place: &Place) -> f64 {
+        let [by_1, by_2] = place.depth_by_joint;
+        let rounding_m = self.count_rad / libm::sqrt(12.0) * libm::hypot(by_1, by_2);
+        libm::hypot(rounding_m, UNEVEN_M)
+    }
+
+    /// Returns how far the tip is from the line by these parameters, root mean square, m.
+    pub fn off_line_m(&self, parameters: &Parameters) -> f64 {
+        let depths_m = self.depths_m(parameters);
+        libm::sqrt(
+            depths_m.map(|depth_m| depth_m * depth_m).sum::<f64>() / self.points.len() as f64,
+        )
+    }
+
+    /// Returns the depth of the tip in the belt at each point, m.
+    pub fn depths_m(&self, parameters: &Parameters) -> impl Iterator<Item = f64> {
+        let at = |point: &Point| Place::at(parameters, point.encoders_rad).depth_m;
+        self.points.iter().map(at)
+    }
+
+    /// Returns where each point is by these parameters.
+    pub fn residuals(&self, parameters: &Parameters) -> impl Iterator<Item = Residual> {
+        self.points.iter().map(|point| {
+            let place = Place::at(parameters, point.encoders_rad);
+            Residual {
+                posture: self.postures[point.slide],
+                tip_t_m: place.tip_t_m,
+                depth_m: place.depth_m,
+            }
+        })
+    }
+
+    /// Returns the stretch of each slide, with its posture by the elbow.
+    pub fn ranges(&self, parameters: &Parameters) -> Vec<Range> {
+        let slides = 0..self.postures.len();
+        let range = |slide| {
+            let of = self.points.iter().filter(|point| point.slide == slide);
+            let mut range: Option<Range> = None;
+            let mut elbow = 0.0;
+            for point in of {
+                let tip_t_m = Place::at(parameters, point.encoders_rad).tip_t_m;
+                let found = range.get_or_insert(Range {
+                    posture: Posture::ElbowDown,
+                    from_m: tip_t_m,
+                    to_m: tip_t_m,
+                });
+                found.from_m = found.from_m.min(tip_t_m);
+                found.to_m = found.to_m.max(tip_t_m);
+                elbow += crate::geometry::joint_rad(parameters, 1, point.encoders_rad[1]);
+                if elbow > 0.0 {
+                    found.posture = Posture::ElbowUp;
+                } else {
+                    found.posture = Posture::ElbowDown;
+                }
+            }
+            range
+        };
+        slides.filter_map(range).collect()
+    }
+
+    /// Returns the same with other angles.
+    pub(crate) fn with(&self, change: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+        let mut changed = self.clone();
+        for point in &mut changed.points {
+            point.encoders_rad = change(point.encoders_rad);
+        }
+        changed
+    }
+}

@@ -1,0 +1,367 @@
+//! Reasons to refuse a result, each in one sentence, and the motion that is missing.
+
+use painleve_shared::Posture;
+
+use crate::Limits;
+use crate::fit::{Fit, Row, Square};
+use crate::geometry::{Range, reach_m};
+use crate::parameters::{Parameter, Prior, Values};
+use crate::passes::Points;
+
+/// A model explains readings that another does not if it leaves less than this part over.
+const EXPLAINS: f64 = 0.7;
+
+/// Noise of a healthy arm on an even belt: beyond it, further slides are not what is missing.
+const USUAL_NOISE: f64 = 3.0;
+
+/// Part of what is left over that a slip has to explain.
+const SLIPPED: f64 = 0.7;
+
+/// Least part of a slip's effect that no parameter explains.
+const OWN: f64 = 1e-3;
+
+/// Least slip of an encoder on its shaft that is told, counts.
+const SLIP_COUNTS: f64 = 4.0;
+
+/// Largest deviation from what is known beforehand, standard deviations.
+const BELIEVED: f64 = 4.0;
+
+/// Where a further slide should go, as a part of the reach.
+const FAR: f64 = 0.85;
+
+/// Least distance of the stretch to slide along from that slid along, as a part of the reach, to be told.
+const FARTHER: f64 = 0.02;
+
+/// A motion that is missing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Missing {
+    /// The slide that is missing.
+    pub range: Range,
+    /// Whether there has been none in this posture.
+    pub is_new: bool,
+}
+
+impl core::fmt::Display for Missing {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Range {
+            posture,
+            from_m,
+            to_m,
+        } = self.range;
+        let posture = name(posture);
+        let verb = if self.is_new {
+            "slide"
+        } else {
+            "slide farther"
+        };
+        write!(
+            f,
+            "{verb} with the {posture}, from {:.0} to {:.0} mm",
+            1e3 * from_m,
+            1e3 * to_m
+        )
+    }
+}
+
+fn name(posture: Posture) -> &'static str {
+    match posture {
+        Posture::ElbowUp => "elbow up",
+        Posture::ElbowDown => "elbow down",
+    }
+}
+
+/// Reason to refuse a result.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// A reading is not a number.
+    #[error("slide {}: the reading of tick {tick} is not a number", .slide + 1)]
+    NotFinite {
+        /// Index of the slide.
+        slide: usize,
+        /// Index of the reading.
+        tick: usize,
+    },
+    /// The tip was in the air.
+    #[error(
+        "slide {}: the tip was on the belt in {percent:.0} % of the readings only (f_n of {contact_n} N or more); press it down, and check the force cell",
+        .slide + 1
+    )]
+    NotOnBelt {
+        /// Index of the slide.
+        slide: usize,
+        /// Share of readings with the tip on the belt, %.
+        percent: f64,
+        /// Least normal force on the belt, N.
+        contact_n: f64,
+    },
+    /// Too little motion.
+    #[error("the tip slid by {slid_mm:.0} mm, less than {least_mm:.0} mm")]
+    TooShort {
+        /// Distance, mm.
+        slid_mm: f64,
+        /// Least distance, mm.
+        least_mm: f64,
+    },
+    /// The arm was in the other posture.
+    #[error(
+        "slide {}: the arm was in the posture {}, not as told; tell its posture, or turn the elbow",
+        .slide + 1,
+        name(*.found)
+    )]
+    OtherPosture {
+        /// Index of the slide.
+        slide: usize,
+        /// The posture by the elbow's encoder.
+        found: Posture,
+    },
+    /// The encoders are exchanged.
+    #[error("encoders: exchanged with each other; swap their select lines, or their magnets")]
+    EncodersSwapped,
+    /// An encoder counts backwards.
+    #[error(
+        "encoder of {}: counts in the other direction than the scenario says (converters.mounting.encoder_reversed)",
+        ["joint 1", "the elbow"][*.joint]
+    )]
+    EncoderReversed {
+        /// Index of the joint.
+        joint: usize,
+    },
+    /// An encoder slipped on its shaft.
+    #[error(
+        "encoder of {}: slipped on its shaft by {slipped_deg:.2}° in slide {}; fasten its magnet, and slide again",
+        ["joint 1", "the elbow"][*.joint],
+        .slide + 1
+    )]
+    Slipped {
+        /// Index of the joint.
+        joint: usize,
+        /// Index of the slide.
+        slide: usize,
+        /// Angle, degrees.
+        slipped_deg: f64,
+    },
+    /// The tip is not on a line.
+    #[error(
+        "the tip does not stay on a straight line: {off_mm:.2} mm off, root mean square, where {most_mm:.2} mm are allowed; check for play in the joints, a loose magnet, an uneven belt, and a tip that is not on it"
+    )]
+    NotALine {
+        /// Distance, mm.
+        off_mm: f64,
+        /// Largest distance, mm.
+        most_mm: f64,
+    },
+    /// A result contradicts what is known.
+    #[error(
+        "{parameter}: {found:.4} {} by the slides, but {known:.4} ± {deviation:.4} is known beforehand: a link is bent or has another length than told, the belt is elsewhere, or a zero has been taken wrongly",
+        .parameter.unit()
+    )]
+    Contradicts {
+        /// The parameter.
+        parameter: Parameter,
+        /// Its value by the slides.
+        found: f64,
+        /// Its value as known.
+        known: f64,
+        /// The standard deviation of that.
+        deviation: f64,
+    },
+    /// The slides do not determine the tip's position.
+    #[error(
+        "the slides determine the tip's position to {deviation_mm:.2} mm only, where {limit_mm:.2} mm are needed: {missing}"
+    )]
+    NotObserved {
+        /// Standard deviation, mm.
+        deviation_mm: f64,
+        /// Largest one, mm.
+        limit_mm: f64,
+        /// What would determine it.
+        missing: Missing,
+    },
+}
+
+/// A change of both encoders' angles.
+type Change = fn([f64; 2]) -> [f64; 2];
+
+/// Checks that the arm is rigid and its tip on a line, `off_line_m` from it.
+pub(crate) fn check_line(
+    points: &Points,
+    prior: &Prior,
+    limits: &Limits,
+    fit: &Fit,
+    off_line_m: f64,
+) -> Result<(), Refusal> {
+    let is_off = off_line_m > limits.off_line_m;
+    let other = other_posture(points, fit);
+    if is_off || other.is_some() {
+        let others: [(Change, Refusal); 3] = [
+            (|[one, two]| [two, one], Refusal::EncodersSwapped),
+            (
+                |[one, two]| [-one, two],
+                Refusal::EncoderReversed { joint: 0 },
+            ),
+            (
+                |[one, two]| [one, -two],
+                Refusal::EncoderReversed { joint: 1 },
+            ),
+        ];
+        for (change, refusal) in others {
+            let changed = points.with(change);
+            let fit = Fit::new(&changed, prior);
+            let left_m = changed.off_line_m(&fit.parameters);
+            let is_whole = left_m <= limits.off_line_m && other_posture(&changed, &fit).is_none();
+            if left_m < EXPLAINS * off_line_m || is_whole {
+                return Err(refusal);
+            }
+        }
+    }
+    if let Some(refusal) = slip(points, prior, limits, fit).or(other) {
+        return Err(refusal);
+    }
+    if is_off {
+        return Err(Refusal::NotALine {
+            off_mm: 1e3 * off_line_m,
+            most_mm: 1e3 * limits.off_line_m,
+        });
+    }
+    Ok(())
+}
+
+/// Finds a slide in another posture than told.
+fn other_posture(points: &Points, fit: &Fit) -> Option<Refusal> {
+    let ranges = points.ranges(&fit.parameters);
+    let mut pairs = ranges.iter().zip(&points.postures).enumerate();
+    pairs.find_map(|(slide, (range, told))| {
+        let found = range.posture;
+        (found != *told).then_some(Refusal::OtherPosture { slide, found })
+    })
+}
+
+/// Finds the instant from which another zero of one encoder explains what the fit leaves over.
+///
+/// A change δ of a zero from a point on adds a column v to the equations. Of it, the parameters explain the part c = Jᵀ v
+/// already: with the information matrix A of the fit, whose gradient is zero, δ = vᵀ r/(vᵀ v − cᵀ A⁻¹ c), and the sum of
+/// squares falls by δ vᵀ r.
+fn slip(points: &Points, prior: &Prior, limits: &Limits, fit: &Fit) -> Option<Refusal> {
+    let rows: Vec<Row> = fit.rows(points, prior).collect();
+    let total: f64 = rows.iter().map(|row| row.weight * row.off * row.off).sum();
+    let decomposed = fit.information.cholesky()?;
+    let mut best: Option<(f64, Refusal)> = None;
+    for joint in 0..2 {
+        let mut common = Values::zeros();
+        let (mut square, mut product) = (0.0, 0.0);
+        for (row, point) in rows.iter().zip(&points.points).rev() {
+            let by = row.by_joint[joint];
+            common += row.by * (row.weight * by);
+            square += row.weight * by * by;
+            product += row.weight * by * row.off;
+            let own = square - common.dot(&decomposed.solve(&common));
+            if own < OWN * square {
+                continue;
+            }
+            let slipped_rad = (product / own).abs();
+            let falls = product * product / own;
+            let is_clear = falls > SLIPPED * total && slipped_rad > SLIP_COUNTS * limits.count_rad;
+            if is_clear && best.as_ref().is_none_or(|(most, _)| falls > *most) {
+                let refusal = Refusal::Slipped {
+                    joint,
+                    slide: point.slide,
+                    slipped_deg: slipped_rad.to_degrees(),
+                };
+                best = Some((falls, refusal));
+            }
+        }
+    }
+    best.map(|(_, refusal)| refusal)
+}
+
+/// Checks that the result agrees with what is known beforehand.
+pub(crate) fn check_prior(fit: &Fit, prior: &Prior) -> Result<(), Refusal> {
+    let off = |parameter: Parameter| {
+        let index = parameter.index();
+        let distance = fit.parameters.0[index] - prior.parameters.0[index];
+        distance.abs() / prior.deviations[index]
+    };
+    let mut worst = Parameter::ALL[0];
+    for parameter in Parameter::ALL {
+        if off(parameter) > off(worst) {
+            worst = parameter;
+        }
+    }
+    if off(worst) <= BELIEVED {
+        return Ok(());
+    }
+    Err(Refusal::Contradicts {
+        parameter: worst,
+        found: fit.parameters.get(worst),
+        known: prior.parameters.get(worst),
+        deviation: prior.deviations[worst.index()],
+    })
+}
+
+/// Checks that the slides determine the tip's position; names the motion that is missing otherwise.
+pub(crate) fn check_observed(
+    points: &Points,
+    ranges: &[Range],
+    fit: &Fit,
+    prior: &Prior,
+    limits: &Limits,
+    off_line_m: f64,
+) -> Result<(), Refusal> {
+    let postures = || ranges.iter().map(|range| range.posture);
+    let deviation_m = |covariance: &Square| fit.place_deviation_m(postures(), covariance);
+    let now_m = deviation_m(&fit.covariance);
+    if now_m <= limits.tip_deviation_m {
+        return Ok(());
+    }
+    if deviation_m(&fit.covariance_at_noise(prior, USUAL_NOISE)) <= limits.tip_deviation_m {
+        return Err(Refusal::NotALine {
+            off_mm: 1e3 * off_line_m,
+            most_mm: 1e3 * off_line_m * USUAL_NOISE / fit.noise,
+        });
+    }
+    let (reach, _) = reach_m(&fit.parameters);
+    let mut candidates = Vec::new();
+    for posture in [Posture::ElbowDown, Posture::ElbowUp] {
+        let is_new = postures().all(|it| it != posture);
+        let full = Range {
+            posture,
+            from_m: -FAR * reach,
+            to_m: FAR * reach,
+        };
+        let is_farther = ranges.iter().all(|range| {
+            range.posture != posture
+                || range.from_m > full.from_m + FARTHER * reach
+                || range.to_m < full.to_m - FARTHER * reach
+        });
+        if is_new || is_farther {
+            candidates.push(Missing {
+                range: full,
+                is_new,
+            });
+        }
+    }
+    let mut least: Option<(f64, Missing)> = None;
+    for missing in candidates {
+        let covariance = fit.covariance_with(points, prior, &[missing.range]);
+        let then_m = deviation_m(&covariance);
+        if least.as_ref().is_none_or(|(least_m, _)| then_m < *least_m) {
+            least = Some((then_m, missing));
+        }
+    }
+    let missing = least.map_or(
+        Missing {
+            range: Range {
+                posture: ranges.first().map_or(Posture::ElbowDown, |it| it.posture),
+                from_m: -FAR * reach,
+                to_m: FAR * reach,
+            },
+            is_new: false,
+        },
+        |(_, missing)| missing,
+    );
+    Err(Refusal::NotObserved {
+        deviation_mm: 1e3 * now_m,
+        limit_mm: 1e3 * limits.tip_deviation_m,
+        missing,
+    })
+}

@@ -1,0 +1,67 @@
+//! Healthy arms are identified, and their errors are as large as told.
+
+use painleve_identify::{Parameter, Refusal, identify};
+use painleve_shared::Posture;
+
+use crate::arms::{Rig, limits};
+
+const FIRST_SEED: u64 = 34_000;
+const ARMS: u64 = 100;
+
+#[test]
+fn healthy_arms_are_identified_to_half_a_millimetre_and_errors_are_within_three_deviations() {
+    let (mut within, mut parameters) = (0, 0);
+    let mut errors_mm = Vec::new();
+    let mut before_mm = Vec::new();
+    for seed in FIRST_SEED..FIRST_SEED + ARMS {
+        let mut rig = Rig::new(seed);
+        let slides = rig.slides();
+        let found = identify(&slides, &rig.prior, &limits());
+        let found = found.unwrap_or_else(|refusal| panic!("seed {seed}: {refusal}"));
+        errors_mm.push(1e3 * rig.tip_error_m(&found.fit.parameters));
+        before_mm.push(1e3 * rig.tip_error_m(&rig.prior.parameters));
+        for parameter in Parameter::ALL {
+            let index = parameter.index();
+            let error = found.fit.parameters.0[index] - rig.actual.0[index];
+            let deviation = found.fit.covariance[(index, index)].sqrt();
+            parameters += 1;
+            within += usize::from(error.abs() < 3.0 * deviation);
+        }
+    }
+    errors_mm.sort_by(f64::total_cmp);
+    before_mm.sort_by(f64::total_cmp);
+    let at = |values: &[f64], share: f64| values[(share * values.len() as f64) as usize];
+    println!(
+        "tip error, mm: before {:.2} ({:.2}), after {:.3} ({:.3}); within 3 deviations: {within} of {parameters}",
+        at(&before_mm, 0.5),
+        at(&before_mm, 0.95),
+        at(&errors_mm, 0.5),
+        at(&errors_mm, 0.95),
+    );
+    assert!(at(&errors_mm, 0.95) < 0.5, "{:?}", at(&errors_mm, 0.95));
+    assert!(
+        within as f64 > 0.99 * f64::from(parameters),
+        "{within} of {parameters}"
+    );
+}
+
+#[test]
+fn a_short_slide_or_one_posture_is_refused_with_the_motion_that_is_missing() {
+    let mut rig = Rig::new(FIRST_SEED);
+    let refused = |slides: &[_], rig: &Rig| match identify(slides, &rig.prior, &limits()) {
+        Err(Refusal::NotObserved { missing, .. }) => missing,
+        other => panic!("{other:?}"),
+    };
+    let one = [rig.slide(Posture::ElbowDown, -0.8, 0.75)];
+    let missing = refused(&one, &rig);
+    assert!(
+        missing.is_new && missing.range.posture == Posture::ElbowUp,
+        "{missing}"
+    );
+    let short = [
+        rig.slide(Posture::ElbowDown, -0.27, 0.27),
+        rig.slide(Posture::ElbowUp, -0.27, 0.27),
+    ];
+    let missing = refused(&short, &rig);
+    assert!(!missing.is_new, "{missing}");
+}

@@ -1,0 +1,7 @@
+//! Tests of the crate, in one binary.
+
+#![allow(clippy::unwrap_used)]
+
+mod arms;
+mod healthy;
+mod wrong;

@@ -1,0 +1,134 @@
+//! Wrong models are refused, each with its reason.
+
+use painleve_identify::{Parameter, Refusal, Slide, identify};
+use painleve_shared::Posture;
+
+use crate::arms::{Rig, limits};
+
+const SEEDS: core::ops::Range<u64> = 35_000..35_040;
+
+/// Changes the slides of some arms and returns what is not refused as it should be.
+fn missed(
+    change: impl Fn(&mut Rig, &mut Vec<Slide>),
+    is_named: impl Fn(&Refusal) -> bool,
+) -> Vec<String> {
+    SEEDS
+        .filter_map(|seed| {
+            let mut rig = Rig::new(seed);
+            let mut slides = rig.slides();
+            change(&mut rig, &mut slides);
+            match identify(&slides, &rig.prior, &limits()) {
+                Err(refusal) if is_named(&refusal) => None,
+                Err(refusal) => Some(format!("{seed}: {refusal}")),
+                Ok(found) => Some(format!("{seed}: {:?}", found.fit.parameters)),
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn exchanged_encoders_are_named() {
+    let missed = missed(
+        |_, slides| {
+            for reading in slides.iter_mut().flat_map(|slide| &mut slide.readings) {
+                reading.encoders_rad.swap(0, 1);
+            }
+        },
+        |refusal| *refusal == Refusal::EncodersSwapped,
+    );
+    assert!(missed.is_empty(), "{missed:#?}");
+}
+
+#[test]
+fn a_slipping_coupling_is_named() {
+    for joint in 0..2 {
+        let missed = missed(
+            |_, slides| {
+                let readings = &mut slides[1].readings;
+                let from = readings.len() / 3;
+                for reading in &mut readings[from..] {
+                    reading.encoders_rad[joint] += 0.01;
+                }
+            },
+            |refusal| matches!(refusal, Refusal::Slipped { .. }),
+        );
+        assert!(missed.is_empty(), "{joint}: {missed:#?}");
+    }
+}
+
+#[test]
+fn a_bent_link_and_a_wrong_length_contradict_the_drawing() {
+    // Bent by 50°, the line from joint to joint is 9 % shorter, and turned.
+    let missed = missed(
+        |rig, slides| {
+            let ratio = rig.actual.get(Parameter::Ratio);
+            rig.actual.set(Parameter::Ratio, 0.91 * ratio);
+            let zero = rig.actual.get(Parameter::Zero(1));
+            rig.actual.set(Parameter::Zero(1), zero + 0.1);
+            let height = rig.actual.get(Parameter::Height);
+            let [one, two] = rig.actual.link_length_m();
+            rig.actual
+                .set(Parameter::Height, height.min(0.93 * (one + two)));
+            *slides = rig.slides();
+        },
+        |refusal| matches!(refusal, Refusal::Contradicts { .. }),
+    );
+    assert!(missed.is_empty(), "{missed:#?}");
+}
+
+#[test]
+fn a_tip_that_is_not_on_the_belt_is_refused() {
+    let missed = missed(
+        |rig, slides| {
+            // Held above the belt, which a force cell with the wrong tare does not notice.
+            let readings = &mut slides[0].readings;
+            let count = readings.len();
+            for (index, reading) in readings.iter_mut().enumerate() {
+                let raised = 0.003 * (3.1 * index as f64 / count as f64).sin();
+                let share = (index as f64 / count as f64 - 0.5).abs();
+                *reading = rig.reading(Posture::ElbowDown, 0.1 - 0.4 * (0.5 - share), raised);
+            }
+        },
+        |refusal| matches!(refusal, Refusal::NotALine { .. } | Refusal::Slipped { .. }),
+    );
+    assert!(missed.is_empty(), "{missed:#?}");
+    let missed = self::missed(
+        |_, slides| {
+            for reading in &mut slides[0].readings {
+                reading.force_n[1] = 0.1;
+            }
+        },
+        |refusal| matches!(refusal, Refusal::NotOnBelt { slide: 0, .. }),
+    );
+    assert!(missed.is_empty(), "{missed:#?}");
+}
+
+#[test]
+fn a_posture_that_is_not_as_told_is_named() {
+    let missed = missed(
+        |_, slides| slides[0].posture = Posture::ElbowUp,
+        |refusal| {
+            matches!(
+                refusal,
+                Refusal::OtherPosture {
+                    slide: 0,
+                    found: Posture::ElbowDown
+                }
+            )
+        },
+    );
+    assert!(missed.is_empty(), "{missed:#?}");
+}
+
+#[test]
+fn a_length_that_is_not_as_told_contradicts_the_height() {
+    let missed = missed(
+        |rig, _| {
+            let length = rig.prior.parameters.get(Parameter::Length);
+            rig.prior.parameters.set(Parameter::Length, 1.1 * length);
+            rig.prior.deviations[Parameter::Length.index()] *= 1.1;
+        },
+        |refusal| matches!(refusal, Refusal::Contradicts { .. }),
+    );
+    assert!(missed.is_empty(), "{missed:#?}");
+}

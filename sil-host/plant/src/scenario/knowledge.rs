@@ -1,0 +1,30 @@
+//! How well the geometry of an arm is known.
+
+use painleve_shared::settings;
+
+settings! {
+    /// Standard deviations of an arm's geometry, as `painleve identify` has written them: a record of how the arm is
+    /// known. The values are in `arm_model` and `controller.estimator.encoders`. The controller needs what follows from
+    /// them for the tip, `controller.estimator.tip_deviation_m`.
+    pub struct Knowledge {
+        /// Where values and deviations come from.
+        source: String = "exactly known".into();
+        /// Zero of each encoder. It is strongly correlated with the encoder's error once around.
+        encoder_zero_rad: [f64; 2] = [0.0; 2], 0.0..=1.0, "rad";
+        /// Error of each encoder once around in a turn: the larger of sine and cosine.
+        encoder_once_rad: [f64; 2] = [0.0; 2], 0.0..=1.0, "rad";
+        /// The same twice around.
+        encoder_twice_rad: [f64; 2] = [0.0; 2], 0.0..=1.0, "rad";
+        /// Length of each link.
+        link_length_m: [f64; 2] = [0.0; 2], 0.0..=10.0, "m";
+        /// Height of the first joint over the belt.
+        height_m: f64 = 0.0, 0.0..=20.0, "m";
+        /// Position of the tip along the belt, if link 1 has its length.
+        tip_m: f64 = 0.0, 0.0..=1.0, "m";
+        /// Distance of the tip from a straight line in the slides, root mean square.
+        off_line_m: f64 = 0.0, 0.0..=1.0, "m";
+        /// Acceleration of the tip off the belt by waves, vibration and torques that the controller does not know, root mean
+        /// square in the slides. `controller.governor.p_per_kg` follows from it.
+        ripple_m_s2: f64 = 0.0, 0.0..=1e6, "m/s²";
+    }
+}
