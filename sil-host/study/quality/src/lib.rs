@@ -73,5 +73,5 @@ pub mod tuning;
 /// The table as it is without a terminal, for snapshots.
 #[cfg(test)]
 fn plain(outcome: &impl painleve_study_core::Outcome) -> String {
-    outcome.table().force_no_tty().to_string()
+    outcome.table().to_string()
 }
