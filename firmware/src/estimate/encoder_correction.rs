@@ -87,11 +87,12 @@ impl EncoderCorrector {
         if self.is_active {
             for (joint, correction_rad) in corrections_rad.iter_mut().enumerate() {
                 let polynomial = &self.polynomials[joint];
+                let at = |angle_rad: f32| {
+                    let (sine, cosine) = angle_rad.sine_cosine();
+                    polynomial.at(sine, cosine)
+                };
                 // Once more with the first correction: a zero may be off by some degrees.
-                for _ in 0..2 {
-                    let (sine, cosine) = (angles_rad[joint] + *correction_rad).sine_cosine();
-                    *correction_rad = polynomial.at(sine, cosine);
-                }
+                *correction_rad = at(angles_rad[joint] + at(angles_rad[joint]));
             }
         }
         corrections_rad

@@ -18,6 +18,7 @@
 //! that the image has configured. It does not measure the time on silicon.
 
 mod as5048a;
+mod bit_band;
 mod bit_errors;
 mod bridge_amplifier;
 pub mod machine;

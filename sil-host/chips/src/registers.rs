@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::stm32::bit_band;
+use crate::bit_band::bit_band;
 
 /// The registers of the peripherals in use: bits by address.
 #[derive(Clone, Debug)]

@@ -21,6 +21,7 @@ pub mod fit;
 pub mod geometry;
 pub mod parameters;
 pub mod passes;
+pub mod refusal;
 pub mod verdict;
 
 use painleve_shared::Posture;
@@ -29,7 +30,7 @@ use fit::Fit;
 use geometry::Range;
 pub use parameters::{Parameter, Parameters, Prior};
 use passes::Points;
-pub use verdict::{Missing, Refusal};
+pub use refusal::{Missing, Refusal};
 
 /// Readings of one tick of a slide.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -32,6 +32,10 @@ const CALMER_OBSERVER: f32 = 0.7;
 /// Slowing of the rate at which the law learns the acceleration by other contact forces, for each unit of p, kg.
 const SLOWER_KG: f32 = 1.0;
 
+/// Rate limit of the friction feed-forward, as a fraction of f_n, 1/s: at a reversal of slip it
+/// passes through stick without a jerk.
+const FRICTION_SLEW_PER_S: f32 = 1000.0;
+
 /// Fraction of the torque limit available for pressing the tip on the belt; the rest is for motion.
 const TORQUE_USED: f32 = 0.95;
 /// Least desired force by which the present one is divided, N.
@@ -71,6 +75,9 @@ fn affordable_part(
         .limited(LEAST_PRESSING, 1.0)
 }
 
+/// Wanted acceleration above which the law makes a sticking tip break away, m/s².
+const BREAKING_AWAY_M_S2: f32 = 1.0;
+
 /// The hybrid law's state.
 #[derive(Clone, Copy, Debug)]
 pub struct HybridState {
@@ -82,6 +89,8 @@ pub struct HybridState {
     filtered_friction_n: f32,
     /// Slip direction of the last friction feed-forward.
     slip: Option<Slip>,
+    /// Last friction feed-forward as a ratio f_t/f_n.
+    fed_ratio: f32,
     /// Fraction of the wanted contact force for which torque is available.
     pressing: f32,
     /// Low-passed normal force, N.
@@ -99,6 +108,7 @@ impl Default for HybridState {
             position_integral_m_s2: 0.0,
             filtered_friction_n: 0.0,
             slip: None,
+            fed_ratio: 0.0,
             pressing: 1.0,
             slow_force_n: 0.0,
             fed_force_n: Vector2::zeros(),
@@ -128,7 +138,8 @@ impl Law for HybridSettings {
         // Limit to the friction cone: a saturated force cell gives any ratio.
         let cone_n = input.friction.coefficient * force_n;
         *state = HybridState {
-            pressing: force_n / self.normal_force_n.at_least(LEAST_FORCE_N),
+            pressing: (force_n / self.normal_force_n.at_least(LEAST_FORCE_N))
+                .at_least(LEAST_PRESSING),
             filtered_friction_n: input.force_n.x.within(cone_n),
             slow_force_n: input.force_n.y,
             fed_force_n: input.force_n,
@@ -140,7 +151,8 @@ impl Law for HybridSettings {
     fn tick(&self, state: &mut HybridState, input: &LawInput<'_>) -> LawOutput {
         let tangential_acceleration = self.commanded_acceleration_m_s2(state, input);
         let normal_force = self.commanded_force_n(state, input);
-        let friction_force = self.compensated_friction_n(state, input, normal_force);
+        let friction_force =
+            self.compensated_friction_n(state, input, normal_force, tangential_acceleration);
         let force_drift = self.force_drift_m_s2(state, input);
         let acceleration = input
             .model
@@ -235,12 +247,13 @@ impl HybridSettings {
         wanted_n + state.force_integral_n - damping_n + response.probe_n
     }
 
-    /// Returns the f_t to feed forward, N, for α_f (N).
+    /// Returns the f_t to feed forward, N, for α_f (N) and α_v (m/s²).
     fn compensated_friction_n(
         &self,
         state: &mut HybridState,
         input: &LawInput<'_>,
         normal_force_n: f32,
+        tangential_acceleration_m_s2: f32,
     ) -> f32 {
         match self.friction {
             FrictionFeedForward::Measured => input.force_n.x,
@@ -251,14 +264,31 @@ impl HybridSettings {
             }
             FrictionFeedForward::Observed { time_constant_s } => {
                 let friction = input.friction;
-                let slip = friction.slip_seen.then_some(friction.slip);
-                let coefficient = (friction.next_coefficient + friction.catch_up).at_least(0.0);
+                // In stick the friction force follows the feed-forward. Feeding forward the friction
+                // of the wanted slip brings it to the edge of its cone, where the tip breaks away
+                // without a jerk.
+                let wants_slip = tangential_acceleration_m_s2.abs() > BREAKING_AWAY_M_S2;
+                let slip = if friction.sticks && wants_slip {
+                    Slip::of(tangential_acceleration_m_s2)
+                } else {
+                    friction.slip
+                };
+                let slip = friction.slip_seen.then_some(slip);
+                // A rigid contact would follow the excess at once.
+                let lags = input.response.lags > 0.0;
+                let catch_up = if lags { friction.catch_up } else { 0.0 };
+                let coefficient = (friction.next_coefficient + catch_up).at_least(0.0);
                 let ratio = slip.map_or(0.0, |slip| -coefficient * slip.sign::<f32>());
                 if slip != state.slip {
                     state.filtered_friction_n = 0.0;
+                    if state.slip.is_none() {
+                        state.fed_ratio = ratio;
+                    }
                     state.slip = slip;
                 }
-                let expected = ratio * normal_force_n;
+                let step = FRICTION_SLEW_PER_S * input.tick_s;
+                state.fed_ratio += (ratio - state.fed_ratio).within(step);
+                let expected = state.fed_ratio * normal_force_n;
                 // Where the contact gives, the difference is mostly noise of the force cell.
                 let calm = 1.0 - CALMER_OBSERVER * input.response.lags;
                 let weight = (calm * input.tick_s / (time_constant_s + input.tick_s))
@@ -478,7 +508,7 @@ mod tests {
     #[test]
     fn the_force_begins_with_the_present_one_but_with_no_more_than_desired() {
         while_sliding(|settings, input, state| {
-            for (force_n, share) in [(20.0, 1.0), (4.0, 0.4), (-0.2, 0.0)] {
+            for (force_n, share) in [(20.0, 1.0), (4.0, 0.4), (-0.2, LEAST_PRESSING)] {
                 input.force_n.y = force_n;
                 settings.reset(state, input);
                 assert_eq!(state.pressing, share);

@@ -8,11 +8,12 @@ mod spi;
 use self::dma::Dma;
 use self::rcc::Rcc;
 use self::spi::Spi;
+use crate::bit_band::bit_band;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
-    PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band,
-    carry, store_port,
+    PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
+    store_port,
 };
 use crate::unicorn::Processor;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};

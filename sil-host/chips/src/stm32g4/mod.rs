@@ -10,11 +10,12 @@ use self::flash::{Flash, SLOTS};
 use self::rcc::{Rcc, bus};
 use self::spi::Spi;
 use crate::Picoseconds;
+use crate::bit_band::bit_band;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
-    PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, bit_band,
-    carry, store_port,
+    PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
+    store_port,
 };
 use crate::unicorn::Processor;
 

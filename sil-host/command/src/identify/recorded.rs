@@ -141,7 +141,7 @@ mod tests {
             "it has no column sensor.joint2_counts"
         );
         let header = COLUMNS.join(",");
-        let wrong = of_table(format!("{header}\n1,x,3\n").as_bytes());
+        let wrong = of_table(format!("{header}\n1,x,3,4\n").as_bytes());
         assert_eq!(
             wrong.unwrap_err(),
             "sensor.joint2_counts = \"x\" is not a whole number"

@@ -1,0 +1,153 @@
+//! Reasons to refuse a result, each in one sentence, and the motion that is missing.
+
+use painleve_shared::Posture;
+
+use crate::geometry::Range;
+use crate::parameters::Parameter;
+
+/// A motion that is missing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Missing {
+    /// The slide that is missing.
+    pub range: Range,
+    /// Whether there has been none in this posture.
+    pub is_new: bool,
+}
+
+impl core::fmt::Display for Missing {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Range {
+            posture,
+            from_m,
+            to_m,
+        } = self.range;
+        let posture = name(posture);
+        let verb = if self.is_new {
+            "slide"
+        } else {
+            "slide farther"
+        };
+        write!(
+            f,
+            "{verb} with the {posture}, from {:.0} to {:.0} mm",
+            1e3 * from_m,
+            1e3 * to_m
+        )
+    }
+}
+
+fn name(posture: Posture) -> &'static str {
+    match posture {
+        Posture::ElbowUp => "elbow up",
+        Posture::ElbowDown => "elbow down",
+    }
+}
+
+/// Reason to refuse a result.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// A reading is not a number.
+    #[error("slide {}: the reading of tick {tick} is not a number", .slide + 1)]
+    NotFinite {
+        /// Index of the slide.
+        slide: usize,
+        /// Index of the reading.
+        tick: usize,
+    },
+    /// The tip was in the air.
+    #[error(
+        "slide {}: the tip was on the belt in {percent:.0} % of the readings only (f_n of {contact_n} N or more); press it down, and check the force cell",
+        .slide + 1
+    )]
+    NotOnBelt {
+        /// Index of the slide.
+        slide: usize,
+        /// Share of readings with the tip on the belt, %.
+        percent: f64,
+        /// Least normal force on the belt, N.
+        contact_n: f64,
+    },
+    /// Too little motion.
+    #[error("the tip slid by {slid_mm:.0} mm, less than {least_mm:.0} mm")]
+    TooShort {
+        /// Distance, mm.
+        slid_mm: f64,
+        /// Least distance, mm.
+        least_mm: f64,
+    },
+    /// The arm was in the other posture.
+    #[error(
+        "slide {}: the arm was in the posture {}, not as told; tell its posture, or turn the elbow",
+        .slide + 1,
+        name(*.found)
+    )]
+    OtherPosture {
+        /// Index of the slide.
+        slide: usize,
+        /// The posture by the elbow's encoder.
+        found: Posture,
+    },
+    /// The encoders are exchanged.
+    #[error("encoders: exchanged with each other; swap their select lines, or their magnets")]
+    EncodersSwapped,
+    /// An encoder counts backwards.
+    #[error(
+        "encoder of {}: counts in the other direction than the scenario says (converters.mounting.encoder_reversed)",
+        ["joint 1", "the elbow"][*.joint]
+    )]
+    EncoderReversed {
+        /// Index of the joint.
+        joint: usize,
+    },
+    /// An encoder slipped on its shaft.
+    #[error(
+        "encoder of {}: slipped on its shaft by {slipped_deg:.2}° in slide {}; fasten its magnet, and slide again",
+        ["joint 1", "the elbow"][*.joint],
+        .slide + 1
+    )]
+    Slipped {
+        /// Index of the joint.
+        joint: usize,
+        /// Index of the slide.
+        slide: usize,
+        /// Angle, degrees.
+        slipped_deg: f64,
+    },
+    /// The tip is not on a line.
+    #[error(
+        "the tip does not stay on a straight line: {off_mm:.2} mm off, root mean square, where {most_mm:.2} mm are allowed; check for play in the joints, a loose magnet, an uneven belt, and a tip that is not on it"
+    )]
+    NotALine {
+        /// Distance, mm.
+        off_mm: f64,
+        /// Largest distance, mm.
+        most_mm: f64,
+    },
+    /// A result contradicts what is known.
+    #[error(
+        "{parameter}: {found:.4} {} by the slides, but {known:.4} ± {deviation:.4} is known beforehand: a link is bent or has another length than told, the belt is elsewhere, or a zero has been taken wrongly",
+        .parameter.unit()
+    )]
+    Contradicts {
+        /// The parameter.
+        parameter: Parameter,
+        /// Its value by the slides.
+        found: f64,
+        /// Its value as known.
+        known: f64,
+        /// The standard deviation of that.
+        deviation: f64,
+    },
+    /// The slides do not determine the tip's position.
+    #[error(
+        "the slides determine the tip's position to {deviation_mm:.2} mm only, where {limit_mm:.2} mm are needed: {missing}"
+    )]
+    NotObserved {
+        /// Standard deviation, mm.
+        deviation_mm: f64,
+        /// Largest one, mm.
+        limit_mm: f64,
+        /// What would determine it.
+        missing: Missing,
+    },
+}
