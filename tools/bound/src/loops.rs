@@ -104,6 +104,7 @@ impl Limits {
                 "the longer set-up time of the two buses, which are started together",
             ),
             declare("plausibility::", Limit::Times(2), "two joints"),
+            declare("EncoderCorrector::at", Limit::Times(2), "two joints"),
             declare(
                 "div_rem",
                 Limit::Times(64),
