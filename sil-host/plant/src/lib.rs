@@ -14,6 +14,7 @@
 //! - [`statistics`]: counts and extremes of a run
 
 pub mod closed_loop;
+pub mod contact_probe;
 pub mod controller_host;
 pub mod converters;
 pub mod decimal;

@@ -1,9 +1,7 @@
 //! Statistics of a run.
 
+use crate::contact_probe::{CAPTURE_S, ContactProbe};
 use crate::plant::{ContactMode, Event, Probe, Snapshot, State, Step};
-
-/// Shortest contact that counts as a capture, s.
-const CAPTURE_S: f64 = 0.1;
 
 /// Counts and extremes of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,11 +10,8 @@ pub struct Statistics {
     pub lift_offs: u64,
     /// Time of the first lift-off, s.
     pub first_lift_off_s: Option<f64>,
-    /// Whether the tip has been captured: by a contact of 0.1 s.
-    pub captured: bool,
-    /// Number of lift-offs after the capture.
-    pub lift_offs_after_capture: u64,
-    contact_since_s: Option<f64>,
+    /// Capture of the tip, and the lift-offs after it.
+    pub contact: ContactProbe,
     /// Collisions with the belt.
     pub impacts: u64,
     /// Impacts without collision.
@@ -42,9 +37,7 @@ impl Statistics {
         Self {
             lift_offs: 0,
             first_lift_off_s: None,
-            captured: false,
-            lift_offs_after_capture: 0,
-            contact_since_s: None,
+            contact: ContactProbe::new(f64::NEG_INFINITY, CAPTURE_S),
             impacts: 0,
             impacts_without_collision: 0,
             max_tip_t_m: f64::NEG_INFINITY,
@@ -100,11 +93,8 @@ impl Probe for Statistics {
         self.total_s += duration;
         if step.mode().is_contact() {
             self.contact_s += duration;
-            let since_s = *self.contact_since_s.get_or_insert(step.start_s());
-            self.captured |= step.end_s() - since_s >= CAPTURE_S;
-        } else if self.contact_since_s.take().is_some() && self.captured {
-            self.lift_offs_after_capture += 1;
         }
+        self.contact.step(step);
         self.observe(&step.start());
         self.observe(&step.end());
     }

@@ -155,8 +155,8 @@ impl RunReport {
             realtime_factor: sim_s / wall_s.max(1e-9),
             lift_offs: statistics.lift_offs,
             first_lift_off_s: statistics.first_lift_off_s,
-            kept: statistics.captured
-                && statistics.lift_offs_after_capture == 0
+            kept: statistics.contact.captured_s.is_some()
+                && statistics.contact.lift_offs == 0
                 && result.fault.is_none(),
             impacts: statistics.impacts,
             impacts_without_collision: statistics.impacts_without_collision,

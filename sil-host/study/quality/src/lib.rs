@@ -7,7 +7,7 @@
 //! - [`loop_margins`]: the sampled loop in the frequency domain, from finite differences and from injected sines
 //! - [`capture`]: capture of a bouncing arm; [`lift_off`]: detection time of a lift-off
 //! - [`tuning`]: a search for settings of a scenario
-//! - [`contact_probe`], [`distribution`], [`proportion`], [`paired_difference`]: contact, distributions and success rates
+//! - [`distribution`], [`proportion`], [`paired_difference`]: distributions and success rates
 //!
 //! Every closed-loop study also runs with a plant of your own:
 //!
@@ -58,7 +58,6 @@
 
 pub mod ablation;
 pub mod capture;
-pub mod contact_probe;
 pub mod distribution;
 pub mod effects;
 pub mod lift_off;

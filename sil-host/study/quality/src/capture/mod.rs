@@ -6,6 +6,7 @@ mod outcome;
 
 use std::collections::BTreeMap;
 
+use painleve_plant::contact_probe::ContactProbe;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_study_core::loop_study::{LoopStudy, MakePlant};
@@ -15,8 +16,6 @@ use painleve_study_core::{Study, StudyError};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
-
-use crate::contact_probe::ContactProbe;
 
 pub use options::Options;
 pub use outcome::Captures;

@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use first_flight::FirstFlight;
 use painleve_firmware::estimate::contact::Evidence;
 use painleve_firmware::refer::reference::Segment;
+use painleve_plant::contact_probe::ContactProbe;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::scenario::Scenario;
@@ -29,7 +30,6 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
-use crate::contact_probe::ContactProbe;
 use crate::robustness::FalseAlarms;
 
 pub use options::Options;

@@ -1,10 +1,9 @@
 //! False alarms: contact that the controller takes for flight.
 
 use painleve_plant::Plant;
+use painleve_plant::contact_probe::ContactProbe;
 use painleve_shared::frame::StatusFlags;
 use painleve_study_core::trial::Trial;
-
-use crate::contact_probe::ContactProbe;
 
 /// Counts how often the controller reports flight during a lasting contact.
 #[derive(Clone, Copy, Debug, Default)]

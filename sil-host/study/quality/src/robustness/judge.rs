@@ -3,6 +3,7 @@
 use core::ops::Range;
 
 use painleve_plant::Plant;
+use painleve_plant::contact_probe::{CAPTURE_S, ContactProbe};
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::smoothness::Smoothness;
@@ -13,10 +14,7 @@ use painleve_study_core::belt_line::{admissible_m, p_ratio};
 use painleve_study_core::trial::Trial;
 
 use super::{Ending, FalseAlarms, Row};
-use crate::contact_probe::ContactProbe;
 
-/// Shortest contact that counts as a capture, s.
-pub const CAPTURE_S: f64 = 0.1;
 /// Latest completion of the capture, s after enabling.
 pub const CAPTURE_LIMIT_S: f64 = 0.5;
 /// Final interval of a run in which the tip must be at its target or governed edge, s.

@@ -1,6 +1,9 @@
 //! Contact and flight from a given instant, at the plant's own resolution.
 
-use painleve_plant::{Event, Probe, State, Step};
+use crate::plant::{Event, Probe, State, Step};
+
+/// Shortest contact that counts as a capture, s.
+pub const CAPTURE_S: f64 = 0.1;
 
 /// Observes when the tip is captured, and whether it leaves the belt again.
 #[derive(Clone, Copy, Debug, PartialEq)]
