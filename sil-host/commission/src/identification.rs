@@ -7,6 +7,7 @@
 //! The belt's waves and vibration, and whatever else the controller does not know, accelerate the tip by some a. The normal
 //! force ripples by a/p, as the slides show. In use, the governor keeps p so large that the ripple leaves most of the force.
 
+use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_firmware::law::LawSettings;
 use painleve_identify::geometry::joint_rad;
 use painleve_identify::parameters::Drawn;
@@ -21,6 +22,9 @@ use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Pose, Posture}
 
 /// Normal force of a slide, N.
 const FORCE_N: f64 = 4.0;
+
+/// Least normal force of a tip on the belt in a slide, N.
+const CONTACT_N: f64 = 0.25 * FORCE_N;
 
 /// Speed of a slide, m/s.
 const SPEED_M_S: f64 = 0.06;
@@ -81,21 +85,29 @@ pub enum IdentificationError<E: std::error::Error> {
 pub fn prior(scenario: &Scenario, drawn: &Drawn) -> Prior {
     let configuration = scenario.controller_configuration();
     let arm = configuration.arm;
-    let correction = configuration.settings.estimator.encoders;
+    let mut correction = configuration.settings.estimator.encoders;
     let mut parameters =
         Parameters::of_arm(arm.link_length_m.map(as_written), as_written(arm.height_m));
-    for joint in 0..2 {
-        for (parameter, values) in [
-            (Parameter::Zero(joint), correction.zero_rad),
-            (Parameter::Sine(joint), correction.sine_rad),
-            (Parameter::Cosine(joint), correction.cosine_rad),
-            (Parameter::SecondSine(joint), correction.second_sine_rad),
-            (Parameter::SecondCosine(joint), correction.second_cosine_rad),
-        ] {
-            parameters.set(parameter, as_written(values[joint]));
+    for (parameter, values_rad) in terms(&mut correction) {
+        for (joint, value_rad) in values_rad.iter().enumerate() {
+            parameters.set(parameter(joint), as_written(*value_rad));
         }
     }
     drawn.prior(parameters)
+}
+
+/// A parameter of each joint's encoder.
+type OfJoint = fn(usize) -> Parameter;
+
+/// Returns the parameters of the encoders, each with its setting.
+fn terms(correction: &mut EncoderCorrection) -> [(OfJoint, &mut [f32; 2]); 5] {
+    [
+        (Parameter::Zero, &mut correction.zero_rad),
+        (Parameter::Sine, &mut correction.sine_rad),
+        (Parameter::Cosine, &mut correction.cosine_rad),
+        (Parameter::SecondSine, &mut correction.second_sine_rad),
+        (Parameter::SecondCosine, &mut correction.second_cosine_rad),
+    ]
 }
 
 /// Lets the governor of an arm that has never been identified keep a distance for what a drawing, a plumb line and a
@@ -113,7 +125,7 @@ pub fn limits(scenario: &Scenario) -> Limits {
     let counts = f64::from(1_u32 << scenario.converters.encoder.bits);
     Limits {
         count_rad: core::f64::consts::TAU / counts,
-        contact_n: 0.25 * FORCE_N,
+        contact_n: CONTACT_N,
         ..Limits::default()
     }
 }
@@ -289,7 +301,7 @@ impl Found {
             let mut mean_n = FORCE_N;
             for reading in &slide.readings {
                 let [tangential_n, normal_n] = reading.force_n;
-                if normal_n < 0.25 * FORCE_N {
+                if normal_n < CONTACT_N {
                     continue;
                 }
                 mean_n += MEAN_PER_TICK * (normal_n - mean_n);
@@ -318,15 +330,10 @@ impl Found {
         arm.link_length_m = parameters.link_length_m().map(|it| rounded(it) as f32);
         arm.height_m = rounded(parameters.get(Parameter::Height)) as f32;
         corrected.arm_model = Some(arm);
-        let both = |of: fn(usize) -> Parameter| {
-            [0, 1].map(|joint| rounded(parameters.get(of(joint))) as f32)
-        };
         let estimator = &mut corrected.controller.estimator;
-        estimator.encoders.zero_rad = both(Parameter::Zero);
-        estimator.encoders.sine_rad = both(Parameter::Sine);
-        estimator.encoders.cosine_rad = both(Parameter::Cosine);
-        estimator.encoders.second_sine_rad = both(Parameter::SecondSine);
-        estimator.encoders.second_cosine_rad = both(Parameter::SecondCosine);
+        for (parameter, values_rad) in terms(&mut estimator.encoders) {
+            *values_rad = [0, 1].map(|joint| rounded(parameters.get(parameter(joint))) as f32);
+        }
         estimator.tip_deviation_m = setting(self.identified.tip_deviation_m);
         let ripple_m_s2 = self.ripple_m_s2(arm)?;
         if let Some(LawSettings::Hybrid(law)) = corrected.controller.law.of_set() {
@@ -334,7 +341,7 @@ impl Found {
             corrected.controller.governor.p_per_kg = rounded(least) as f32;
         }
         let deviation = |parameter: Parameter| rounded(fit.deviation(parameter));
-        let larger = |one: fn(usize) -> Parameter, other: fn(usize) -> Parameter| {
+        let larger = |one: OfJoint, other: OfJoint| {
             [0, 1].map(|joint| deviation(one(joint)).max(deviation(other(joint))))
         };
         let [length_1, _] = parameters.link_length_m();
