@@ -51,6 +51,7 @@ const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
 const LEAST_REST: f32 = 0.05;
 /// Time in contact before the correlation starts, s.
 const SETTLING_S: f32 = 0.05;
+
 /// Inputs of one tick in which the tip slides in contact.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceReading {

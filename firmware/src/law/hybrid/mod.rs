@@ -42,6 +42,7 @@ const TORQUE_USED: f32 = 0.95;
 const LEAST_FORCE_N: f32 = 1e-3;
 /// Least fraction of the wanted contact force.
 const LEAST_PRESSING: f32 = 0.1;
+
 /// Returns the fraction of `pressing_nm` that keeps both joints within ±`limit_nm` together with
 /// `motion_nm`.
 #[inline]
@@ -91,7 +92,7 @@ pub struct HybridState {
     slip: Option<Slip>,
     /// Last friction feed-forward as a ratio f_t/f_n.
     fed_ratio: f32,
-    /// Fraction of the wanted contact force for which torque is available.
+    /// Present fraction of the wanted contact force: at most that for which torque is available.
     pressing: f32,
     /// Low-passed normal force, N.
     slow_force_n: f32,
@@ -496,9 +497,9 @@ mod tests {
             let reduced = state.pressing;
             assert!(reduced < 0.9, "{reduced}");
             input.torque_limit_nm = 50.0;
-            (0..10).for_each(|_| {
+            for _ in 0..10 {
                 settings.tick(state, input);
-            });
+            }
             let share = (state.pressing - reduced) / (1.0 - reduced);
             let expected = 1.0 - (1.0 + settings.pressing_rate_per_s * input.tick_s).powi(-10);
             assert!((share - expected).abs() < 1e-3, "{share} {expected}");
