@@ -130,11 +130,12 @@ mod tests {
                     + second_sine_rad[joint] * twice.sin() + second_cosine_rad[joint] * twice.cos();
                 prop_assert!((found[joint] - expected).abs() < 1e-6, "{} {}", found[joint], expected);
             }
-            // From the readings of these joints, the same to second order.
+            // From the readings of these joints, the same to second order: a correction changes by 0.057 of the angle's
+            // error at most, twice, and is 0.14 at most.
             let readings = [first - found[0], elbow - found[1]];
             let again = corrector.at(readings);
             for (one, other) in again.into_iter().zip(found) {
-                prop_assert!((one - other).abs() < 2e-4, "{} {}", one, other);
+                prop_assert!((one - other).abs() < 5e-4, "{} {}", one, other);
             }
         }
     }

@@ -56,7 +56,8 @@ struct Board {
     arm: Arc<Mutex<SimulatedRig>>,
     state: Arc<BoardState>,
     thread: Option<JoinHandle<()>>,
-    _far_end: OwnedFd,
+    /// Keeps the line from hanging up between programs.
+    far_end: Option<OwnedFd>,
 }
 
 #[derive(Default)]
@@ -88,7 +89,7 @@ impl Board {
             arm,
             state,
             thread: Some(thread),
-            _far_end: far_end,
+            far_end: Some(far_end),
         }
     }
 
@@ -120,6 +121,8 @@ impl Board {
 impl Drop for Board {
     fn drop(&mut self) {
         self.state.is_over.store(true, Ordering::SeqCst);
+        // Ends a write to a full line that no program reads any more.
+        self.far_end = None;
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -204,7 +207,7 @@ impl BoardEnd {
         while !self.state.is_over.load(Ordering::SeqCst) {
             self.received();
             if break_ == Break::Garbage {
-                self.line.write_all(&random.random::<[u8; 8]>()).unwrap();
+                self.write(&random.random::<[u8; 8]>());
             }
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -216,9 +219,24 @@ impl BoardEnd {
             return Vec::new();
         }
         let mut bytes = vec![0; 4096];
-        let length = self.line.read(&mut bytes).unwrap();
+        let read = self.line.read(&mut bytes);
+        let length = self.unless_over(read).unwrap_or(0);
         bytes.truncate(length);
         bytes
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        let written = self.line.write_all(bytes);
+        self.unless_over(written);
+    }
+
+    /// Unwraps a result of the line, which fails at the end of the test.
+    fn unless_over<T>(&self, result: std::io::Result<T>) -> Option<T> {
+        if self.state.is_over.load(Ordering::SeqCst) {
+            result.ok()
+        } else {
+            Some(result.unwrap())
+        }
     }
 
     /// Sends a response, or what the line still carries of it; returns whether it was whole.
@@ -226,7 +244,7 @@ impl BoardEnd {
         let mut buffer = [0; 192];
         let bytes = wire::encode(response, &mut buffer).unwrap();
         let carried = bytes.len().min(self.intact);
-        self.line.write_all(&bytes[..carried]).unwrap();
+        self.write(&bytes[..carried]);
         self.intact -= carried;
         self.state.sent_bytes.fetch_add(carried, Ordering::SeqCst);
         carried == bytes.len()
