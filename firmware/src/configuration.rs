@@ -27,14 +27,6 @@ use crate::refer::reference::Program;
 use crate::supervise::lapses::LapseLimits;
 use crate::supervise::supervisor::SupervisorSettings;
 
-/// Largest factor by which tracking loops and law may be faster, for each Hz of the control rate: the settings
-/// are meant for 1 kHz.
-const SPEED_UP_S: f32 = 2e-3;
-
-/// Coulomb friction of the joints from which tracking loops and law have their full speed-up, N·m; with less they have
-/// less of it in proportion. Measured with the speed-ups of docs/beyond-the-paper.md.
-const FULL_SPEED_UP_NM: f32 = 0.05;
-
 settings! {
     /// Scalings of the converters, as configured in the controller.
     #[derive(Copy)]
@@ -111,15 +103,6 @@ pub struct Configuration<L: Law = LawSettings> {
     pub settings: ControllerSettings<L>,
 }
 
-/// Speeds of the motion loops, as factors on what their settings say.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LoopSpeeds {
-    /// Factor of the tracking loops of the joints.
-    pub tracking: f32,
-    /// Factor of the law.
-    pub law: f32,
-}
-
 /// Returns the lower natural frequency of the arm on elastic gears of these compliances (rad/(N·m)) behind motors at
 /// rest: 1/√(c J), with the stretched arm's inertia J about each joint. It is infinite for stiff gears.
 fn natural_frequency_rad_s(arm: &Arm<f32>, compliance_rad_nm: [f32; 2]) -> f32 {
@@ -166,26 +149,18 @@ impl<L: Law> Configuration<L> {
         JointErrors {
             count_m: self.arm.height_m * count_rad,
             friction_nm: friction_1_nm.at_least(friction_2_nm),
-            play_rad: self.settings.estimator.gear_play_rad,
             tip_deviation_m: self.settings.estimator.tip_deviation_m,
         }
     }
 
-    /// Returns how fast the motion loops are on this arm, of the validated configuration.
+    /// Returns the speed of tracking loops and law on this arm, at most 1, as a factor on what their settings say.
     ///
-    /// They are faster on joints with known friction. They are slower behind known elastic gears, where the tracking
-    /// loops stay below the arm's natural frequency, because the torque moves the encoders.
-    pub fn loop_speeds(&self, arm: &Arm<f32>) -> LoopSpeeds {
+    /// Behind known elastic gears the tracking loops stay below the arm's natural frequency, because the torque moves
+    /// the encoders.
+    pub fn loop_speed(&self, arm: &Arm<f32>) -> f32 {
         let estimator = &self.settings.estimator;
-        let share = (self.joint_errors().friction_nm / FULL_SPEED_UP_NM).at_most(1.0);
-        let fastest = (SPEED_UP_S * self.tick_hz).at_least(1.0);
-        let wanted = (1.0 + share * (estimator.friction_speed_up - 1.0)).at_most(fastest);
         let natural_rad_s = natural_frequency_rad_s(arm, estimator.gear_compliance_rad_nm);
-        let tracking = wanted.at_most(natural_rad_s / estimator.bandwidth_rad_s);
-        LoopSpeeds {
-            tracking,
-            law: tracking * self.settings.contact.law_speed(),
-        }
+        (natural_rad_s / estimator.bandwidth_rad_s).at_most(1.0)
     }
 
     /// Checks every number, including those of the law, and builds the arm's model.
@@ -234,12 +209,7 @@ fn within(group: &'static str, result: Result<(), OutOfRange>) -> Result<(), Out
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::contact::Evidence;
     use crate::law::pid::PidSettings;
-
-    fn speeds(configuration: &Configuration) -> LoopSpeeds {
-        configuration.loop_speeds(&Arm::new(configuration.arm).unwrap())
-    }
 
     #[test]
     fn the_build_covers_every_part_of_the_configuration_and_the_laws() {
@@ -253,41 +223,8 @@ mod tests {
     }
 
     #[test]
-    fn known_friction_of_the_joints_speeds_the_loops_up_where_the_rate_allows() {
-        let mut configuration = Configuration::default();
-        let settings = LoopSpeeds {
-            tracking: 1.0,
-            law: 1.0,
-        };
-        assert_eq!(speeds(&configuration), settings);
-        configuration.arm.coulomb_friction_nm = [0.0, 0.05];
-        for (tick_hz, speed_up) in [(250.0, 1.0), (750.0, 1.5), (1000.0, 1.6), (4000.0, 1.6)] {
-            configuration.tick_hz = tick_hz;
-            assert!((speeds(&configuration).tracking - speed_up).abs() < 1e-6);
-        }
-    }
-
-    /// A billionth of a newton metre used to multiply K'_P by 2.56.
-    #[test]
-    fn a_little_more_friction_of_the_joints_makes_the_loops_a_little_faster() {
-        let mut configuration = Configuration::default();
-        let mut before = 1.0;
-        for step in 0..100_u8 {
-            configuration.arm.coulomb_friction_nm = [1e-9 + 1e-3 * f32::from(step), 0.0];
-            let LoopSpeeds { tracking, .. } = speeds(&configuration);
-            assert!(
-                (0.0..0.013).contains(&(tracking - before)),
-                "{step} {tracking}"
-            );
-            before = tracking;
-        }
-        assert_eq!(before, 1.6);
-    }
-
-    #[test]
     fn the_loops_stay_below_the_natural_frequency_of_the_arm_on_its_gears() {
-        let mut configuration = Configuration::default();
-        configuration.settings.contact.evidence = Evidence::Encoders;
+        let mut configuration = <Configuration>::default();
         // Both links of 0.12 kg and 0.21 m turn with joint 1: 0.01411 kg·m². Joint 2 turns the second alone, 0.00176.
         for (stiffness_nm_rad, natural_rad_s) in [
             ([2000.0, 2000.0], 376.5_f32),
@@ -298,9 +235,8 @@ mod tests {
             let compliance_rad_nm = stiffness_nm_rad.map(|k: f32| 1.0 / k);
             configuration.settings.estimator.gear_compliance_rad_nm = compliance_rad_nm;
             let expected = (natural_rad_s / 500.0).min(1.0);
-            let LoopSpeeds { tracking, law } = speeds(&configuration);
-            assert!((tracking - expected).abs() < 1e-3, "{tracking} {expected}");
-            assert!((law - 0.69 * expected).abs() < 1e-3, "{law}");
+            let speed = configuration.loop_speed(&Arm::new(configuration.arm).unwrap());
+            assert!((speed - expected).abs() < 1e-3, "{speed} {expected}");
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::refer::reference::Program;
 use crate::supervise::lapses::{Lapse, LapseLimits};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::DigitalInputs;
-use painleve_shared::status::SupervisorState;
+use painleve_shared::status::{Fault, SupervisorState};
 
 fn configuration() -> Configuration {
     Configuration {

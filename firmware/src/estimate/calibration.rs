@@ -13,9 +13,7 @@ settings! {
     /// Settings of the calibration.
     #[derive(Copy)]
     pub struct CalibrationSettings {
-        /// Whether the links' length is calibrated.
-        enabled: bool = true;
-        /// Largest deviation from the nominal length, as a fraction of it.
+        /// Largest deviation from the nominal length, as a fraction of it; 0 for no calibration.
         tolerance: f32 = 0.08, 0.0..=0.5;
         /// Longest averaging time.
         averaging_s: f32 = 2.0, 1e-3..=1e4, "s";
@@ -25,7 +23,6 @@ settings! {
 /// Calibrates the links' length from the gaps measured while the tip is on the belt.
 #[derive(Clone, Copy, Debug)]
 pub struct LengthCalibrator {
-    enabled: bool,
     nominal_m: f32,
     /// Largest deviation from the nominal length, m.
     deviation_m: f32,
@@ -58,7 +55,6 @@ impl LengthCalibrator {
     /// Makes a calibrator of arms whose link 1 has the nominal length `nominal_m`, called every `tick_s`.
     pub fn new(settings: &CalibrationSettings, nominal_m: f32, tick_s: f32) -> Self {
         Self {
-            enabled: settings.enabled,
             nominal_m,
             deviation_m: settings.tolerance * nominal_m,
             most_readings: (settings.averaging_s / tick_s).at_least(1.0),
@@ -82,9 +78,9 @@ impl LengthCalibrator {
         self.update(state, arm, measured_gap_m);
     }
 
-    /// Returns whether the calibration is enabled but has no reading yet.
+    /// Returns whether the length is calibrated but has no reading yet.
     pub fn is_open(&self, state: &CalibrationState) -> bool {
-        self.enabled && state.readings == 0.0
+        self.deviation_m > 0.0 && state.readings == 0.0
     }
 
     /// Returns the length of link 1 after one more reading, m.
@@ -95,7 +91,7 @@ impl LengthCalibrator {
         height_m: f32,
         measured_gap_m: f32,
     ) -> f32 {
-        if !self.enabled {
+        if self.deviation_m == 0.0 {
             return present_m;
         }
         let sum = (height_m - measured_gap_m) / present_m;

@@ -51,19 +51,6 @@ settings! {
         force_noise_n: f32 = 0.1, 1e-4..=1e6, "N";
         /// Uncertainty of the gap beyond the encoders' resolution.
         gap_uncertainty_m: f32 = 15e-6, 0.0..=0.01, "m";
-        /// Factor by which the law is slower if contact is detected from the encoders: with a stiff motion loop the
-        /// tip follows their noise, which looks like a lift-off.
-        encoder_law_speed: f32 = 0.69, 0.1..=1.0;
-    }
-}
-
-impl ContactSettings {
-    /// Returns the speed of the law with this evidence, relative to its settings.
-    pub fn law_speed(&self) -> f32 {
-        match self.evidence {
-            Evidence::ForceCell => 1.0,
-            Evidence::Encoders => self.encoder_law_speed,
-        }
     }
 }
 

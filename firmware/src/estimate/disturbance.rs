@@ -23,9 +23,7 @@ settings! {
     /// Settings of the disturbance observer.
     #[derive(Copy)]
     pub struct DisturbanceSettings {
-        /// Whether unknown torques are estimated.
-        enabled: bool = true;
-        /// Bandwidth far from the edge.
+        /// Bandwidth far from the edge; 0 for no estimate.
         bandwidth_rad_s: f32 = 20.0, 0.0..=1e3, "rad/s";
         /// Largest disturbance of either link.
         limit_nm: f32 = 1.0, 0.0..=1e3, "N·m";
@@ -93,9 +91,6 @@ impl DisturbanceEstimator {
         };
         let change = rate_rad_s - *before;
         *before = rate_rad_s;
-        if !self.settings.enabled {
-            return;
-        }
         let acceleration = change / acted.elapsed_s;
         let needed_nm = model.inverse_dynamics_nm(&acceleration, &force_n);
         let residual_nm = (needed_nm - torque_nm).to_links();

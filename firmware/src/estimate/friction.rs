@@ -17,6 +17,8 @@
 use nalgebra::Vector2;
 use painleve_shared::{Real, Slip, settings};
 
+use super::contact::ContactSettings;
+
 /// Square of the number of standard deviations below the estimate at which the tip may stick.
 const STICK_DEVIATIONS_SQUARE: f32 = 25.0;
 /// Fraction of the estimate that is added to these deviations.
@@ -54,6 +56,8 @@ const RESTART_GAIN: f32 = 0.5;
 /// Largest square of a change of the innovation that counts as noise, as a multiple of the noise's. A sudden
 /// change of μ is not noise: counted as such, it would hide the next one.
 const NOISE_JUMP: f32 = 16.0;
+/// Least normal force at which friction is observed, as a multiple of the smallest force of a contact.
+const OBSERVABLE: f32 = 2.0;
 /// Ticks for which the torque misses a sudden change of μ: on average half a tick until a reading shows it,
 /// and one until the torque that it causes acts.
 const MISSED_TICKS: f32 = 1.5;
@@ -64,16 +68,13 @@ settings! {
     /// Settings of the friction estimator.
     #[derive(Copy)]
     pub struct FrictionSettings {
-        /// Whether μ is estimated; if not, it is taken to be the first guess exactly.
-        enabled: bool = true;
         /// Initial estimate of μ.
         first_guess: f32 = 0.6, 0.0..=2.0;
-        /// Standard deviation of the initial estimate, and of μ whenever the filter restarts.
-        first_deviation: f32 = 0.2, 1e-3..=2.0;
+        /// Standard deviation of the initial estimate, and of μ whenever the filter restarts; 0 if μ is known exactly,
+        /// and not estimated.
+        first_deviation: f32 = 0.2, 0.0..=2.0;
         /// Random walk of μ.
         drift_per_sqrt_s: f32 = 0.0005, 1e-4..=1.0, "1/√s";
-        /// Normal force below which friction is not observed.
-        observable_n: f32 = 1.0, 0.01..=1e3, "N";
     }
 }
 
@@ -100,7 +101,9 @@ pub struct FrictionEstimate {
 /// The filter's settings.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionEstimator {
-    settings: FrictionSettings,
+    first_guess: f32,
+    /// Normal force below which friction is not observed, N.
+    observable_n: f32,
     force_variance_n2: f32,
     /// Variance of μ at the start and whenever the filter restarts, and its growth in one tick.
     first_variance: f32,
@@ -156,18 +159,17 @@ struct Correction {
 }
 
 impl FrictionEstimator {
-    /// Makes an estimator that is called every `tick_s`; `force_noise_n` is the standard deviation
-    /// of one reading of the force cell, N.
-    pub fn new(settings: &FrictionSettings, force_noise_n: f32, tick_s: f32) -> Self {
-        // A friction that is known has no variance, at the start or later.
-        let unknown = if settings.enabled { 1.0 } else { 0.0 };
-        let square = |deviation: f32| unknown * (deviation * deviation);
+    /// Makes an estimator that is called every `tick_s`, for the readings of a force cell with these settings.
+    pub fn new(settings: &FrictionSettings, cell: &ContactSettings, tick_s: f32) -> Self {
+        let square = |deviation: f32| deviation * deviation;
+        let force_variance_n2 = square(cell.force_noise_n);
         Self {
-            settings: *settings,
-            force_variance_n2: force_noise_n * force_noise_n,
+            first_guess: settings.first_guess,
+            observable_n: OBSERVABLE * cell.contact_n,
+            force_variance_n2,
             first_variance: square(settings.first_deviation),
             drift_variance: square(settings.drift_per_sqrt_s) * tick_s,
-            clear_force_n2: 9.0 * (force_noise_n * force_noise_n),
+            clear_force_n2: 9.0 * force_variance_n2,
             mean_weight: tick_s / (MEAN_S + tick_s),
             changing_weight: tick_s / (CHANGING_S + tick_s),
         }
@@ -176,7 +178,7 @@ impl FrictionEstimator {
     /// Starts with the initial estimate.
     pub fn start(&self) -> FrictionState {
         FrictionState {
-            coefficient: self.settings.first_guess,
+            coefficient: self.first_guess,
             catch_up: 0.0,
             rate_per_tick: 0.0,
             changing: 0.0,
@@ -208,7 +210,7 @@ impl FrictionEstimator {
             self.observe_slip(state, force_n);
         }
         let normal_n = force_n.y;
-        if normal_n < self.settings.observable_n {
+        if normal_n < self.observable_n {
             state.stick_ticks = 0;
             return;
         }
@@ -230,7 +232,7 @@ impl FrictionEstimator {
             state.stick_ticks = STICK_TICKS;
             return;
         }
-        if !self.settings.enabled {
+        if self.is_known() {
             state.stick_ticks = state.stick_ticks.saturating_sub(1);
             return;
         }
@@ -307,6 +309,11 @@ impl FrictionEstimator {
         state.variance = state.variance.at_least(floor * ratio_variance);
     }
 
+    /// Returns whether μ is known exactly. It then has no variance, at the start or later.
+    fn is_known(&self) -> bool {
+        self.first_variance == 0.0
+    }
+
     /// Restarts the filter after a sudden change of μ.
     fn restart(&self, state: &mut FrictionState) {
         state.stick_ticks = 0;
@@ -369,231 +376,4 @@ impl FrictionState {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    const NOISE_N: f32 = 0.1;
-
-    /// Returns uniform noise with the given deviation from a fixed stream.
-    fn noise(step: u32) -> f32 {
-        let bits = step
-            .wrapping_mul(2_654_435_761)
-            .rotate_left(13)
-            .wrapping_mul(2_246_822_519);
-        ((bits >> 8) as f32 / (1 << 24) as f32 - 0.5) * 12.0_f32.sqrt() * NOISE_N
-    }
-
-    fn slide(tested: &mut Tested, friction: f32, slip: Slip, ticks: u32) {
-        for tick in 0..ticks {
-            let force = Vector2::new(-friction * slip.sign::<f32>() * 10.0, 10.0);
-            tested.update(&(force + Vector2::new(noise(2 * tick), noise(2 * tick + 1))));
-        }
-    }
-
-    /// An estimator with its state, and whether the tip is dragged along by the belt.
-    struct Tested(FrictionEstimator, FrictionState, bool);
-
-    impl Tested {
-        fn new(first_guess: f32) -> Self {
-            let settings = FrictionSettings {
-                first_guess,
-                ..Default::default()
-            };
-            let estimator = FrictionEstimator::new(&settings, NOISE_N, 1e-3);
-            Self(estimator, estimator.start(), false)
-        }
-
-        fn update(&mut self, force_n: &Vector2<f32>) {
-            self.0.correct(&mut self.1, force_n, |_| self.2);
-            self.0.update(&mut self.1, force_n);
-        }
-
-        fn estimate(&self) -> FrictionEstimate {
-            self.1.estimate()
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn friction_and_slip_are_found_from_a_wrong_guess(
-            friction in 0.1_f32..1.2, wrong in 0.7_f32..1.3, positive: bool,
-        ) {
-            let slip = if positive { Slip::Positive } else { Slip::Negative };
-            let mut tested = Tested::new(friction * wrong);
-            slide(&mut tested, friction, slip, 100);
-            let found = tested.estimate();
-            prop_assert_eq!(found.slip, slip);
-            prop_assert!((found.coefficient - friction).abs() < 0.01, "{:?}", found);
-            prop_assert!((found.coefficient - friction).abs() < 5.0 * found.deviation);
-        }
-    }
-
-    #[test]
-    fn nothing_is_learnt_in_the_air() {
-        let mut tested = Tested::new(0.4);
-        for tick in 0..1000 {
-            tested.update(&Vector2::new(noise(tick), 0.1));
-        }
-        let found = tested.estimate();
-        assert_eq!(found.coefficient, 0.4);
-        assert!((found.deviation - FrictionSettings::default().first_deviation).abs() < 1e-3);
-    }
-
-    #[test]
-    fn stick_does_not_lower_the_friction_estimate() {
-        let mut tested = Tested::new(0.6);
-        slide(&mut tested, 0.6, Slip::Positive, 200);
-        tested.2 = true;
-        slide(&mut tested, 0.1, Slip::Positive, 4000);
-        assert!(tested.estimate().sticks);
-        assert!((tested.estimate().coefficient - 0.6).abs() < 0.01);
-    }
-
-    #[test]
-    fn only_friction_near_the_other_side_of_the_cone_reverses_the_slip() {
-        let mut tested = Tested::new(0.6);
-        slide(&mut tested, 0.6, Slip::Positive, 200);
-        tested.2 = true;
-        slide(&mut tested, 0.4, Slip::Negative, 100);
-        let found = tested.estimate();
-        assert!(found.slip == Slip::Positive && found.sticks);
-        slide(&mut tested, 0.6, Slip::Negative, 4);
-        let found = tested.estimate();
-        assert!(found.slip == Slip::Negative && !found.sticks);
-    }
-
-    #[test]
-    fn less_friction_is_learnt_at_once_unless_the_belt_drags_the_tip() {
-        let mut tested = Tested::new(0.6);
-        slide(&mut tested, 0.6, Slip::Positive, 2000);
-        slide(&mut tested, 0.4, Slip::Positive, 5);
-        assert!(!tested.estimate().sticks);
-        assert!((tested.estimate().coefficient - 0.4).abs() < 0.02);
-    }
-
-    #[test]
-    fn less_friction_is_learnt_as_soon_as_the_belt_no_longer_drags_the_tip() {
-        let mut tested = Tested::new(0.6);
-        slide(&mut tested, 0.6, Slip::Positive, 2000);
-        tested.2 = true;
-        slide(&mut tested, 0.4, Slip::Positive, 1);
-        assert!(tested.estimate().sticks);
-        tested.2 = false;
-        slide(&mut tested, 0.4, Slip::Positive, 3);
-        assert!(!tested.estimate().sticks);
-        assert!((tested.estimate().coefficient - 0.4).abs() < 0.02);
-    }
-
-    #[test]
-    fn friction_that_drifts_is_followed() {
-        let mut tested = Tested::new(0.6);
-        slide(&mut tested, 0.6, Slip::Positive, 2000);
-        for tick in 0..500 {
-            let friction = 0.6 + 0.1 * tick as f32 / 500.0;
-            slide(&mut tested, friction, Slip::Positive, 1);
-        }
-        let found = tested.estimate();
-        assert!((found.coefficient - 0.7).abs() < 0.03, "{found:?}");
-    }
-
-    #[test]
-    fn friction_that_varies_like_a_sine_is_predicted_for_the_torque() {
-        let mut tested = Tested::new(0.6);
-        let at = |tick: f32| 0.6 + 0.12 * (core::f32::consts::TAU * 4.0 * 1e-3 * tick).sin();
-        let mut square_sum = 0.0;
-        for tick in 0..1000_u16 {
-            let tick = f32::from(tick);
-            tested.update(&Vector2::new(-10.0 * at(tick), 10.0));
-            if tick >= 500.0 {
-                let error = tested.estimate().next_coefficient - at(tick + LEAD_TICKS);
-                square_sum += error * error;
-            }
-        }
-        // Without a rate the estimate is late by half of this at the least.
-        assert!((square_sum / 500.0).sqrt() < 0.0085, "{square_sum}");
-    }
-
-    #[test]
-    fn the_rate_of_friction_vanishes_when_friction_stays() {
-        let mut tested = Tested::new(0.6);
-        for tick in 0..200_u16 {
-            slide(&mut tested, 0.6 + 1e-3 * f32::from(tick), Slip::Positive, 1);
-        }
-        assert!(tested.1.rate_per_tick > 5e-4, "{:?}", tested.1);
-        slide(&mut tested, 0.8, Slip::Positive, 5000);
-        assert_eq!(tested.1.rate_per_tick, 0.0);
-        assert!((tested.estimate().coefficient - 0.8).abs() < 0.005);
-    }
-
-    #[test]
-    fn a_small_rise_of_friction_is_learnt_in_one_tick() {
-        let mut tested = Tested::new(0.6);
-        let quiet = Vector2::new(-6.0, 10.0);
-        (0..2000).for_each(|_| tested.update(&quiet));
-        tested.update(&Vector2::new(-6.8, 10.0));
-        let found = tested.estimate();
-        assert!((found.coefficient - 0.68).abs() < 0.002, "{found:?}");
-    }
-
-    #[test]
-    fn the_impulse_that_a_sudden_change_has_cost_is_given_back_in_one_tick() {
-        let mut tested = Tested::new(0.6);
-        let ratio = |ratio: f32| Vector2::new(-10.0 * ratio, 10.0);
-        (0..2000).for_each(|_| tested.update(&ratio(0.6)));
-        assert_eq!(tested.estimate().catch_up, 0.0);
-        for (before, after) in [(0.6, 0.8), (0.8, 0.6)] {
-            tested.update(&ratio(after));
-            let missed = MISSED_TICKS * (after - before);
-            let found = tested.estimate().catch_up;
-            assert!((found - missed).abs() < 0.02 * missed.abs(), "{found}");
-            tested.update(&ratio(after));
-            assert!(tested.estimate().catch_up.abs() < 0.01);
-            (0..20).for_each(|_| tested.update(&ratio(after)));
-        }
-    }
-
-    #[test]
-    fn a_change_of_friction_does_not_hide_the_next_one() {
-        let mut tested = Tested::new(0.6);
-        (0..2000).for_each(|_| tested.update(&Vector2::new(-6.0, 10.0)));
-        for step in 0..20_u8 {
-            let friction = if step % 2 == 0 { 0.68 } else { 0.6 };
-            (0..50).for_each(|_| tested.update(&Vector2::new(-10.0 * friction, 10.0)));
-            if step % 2 == 1 {
-                tested.update(&Vector2::new(-6.8, 10.0));
-                let found = tested.estimate();
-                assert!((found.coefficient - 0.68).abs() < 0.005, "{found:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn more_friction_is_learnt_at_once() {
-        let mut tested = Tested::new(0.3);
-        slide(&mut tested, 0.3, Slip::Positive, 2000);
-        slide(&mut tested, 0.7, Slip::Positive, 5);
-        let found = tested.estimate();
-        assert!((found.coefficient - 0.7).abs() < 0.02, "{found:?}");
-    }
-
-    #[test]
-    fn a_friction_that_is_not_estimated_stays_the_first_guess() {
-        let settings = FrictionSettings {
-            enabled: false,
-            ..Default::default()
-        };
-        let estimator = FrictionEstimator::new(&settings, NOISE_N, 1e-3);
-        for (friction, drags) in [(0.3, false), (0.3, true), (0.8, false), (0.6, false)] {
-            let mut tested = Tested(estimator, estimator.start(), drags);
-            for slip in [Slip::Negative, Slip::Positive] {
-                slide(&mut tested, friction, slip, 2000);
-                let found = tested.estimate();
-                assert_eq!((found.coefficient, found.deviation), (0.6, 0.0));
-                assert_eq!((found.next_coefficient, found.catch_up), (0.6, 0.0));
-                // The direction of slip still follows the force, near the other side of the cone.
-                assert!(found.slip == slip || friction < 0.5, "{found:?}");
-            }
-        }
-    }
-}
+mod tests;

@@ -30,9 +30,6 @@ settings! {
         friction_travel_rad: f32 = 1e-3, 1e-6..=1.0, "rad";
         /// Fraction of the arm's Coulomb friction that is compensated.
         friction_compensation: f32 = 0.85, 0.0..=1.0;
-        /// Factor by which tracking loops and hybrid law are faster on an arm with 0.05 N·m of Coulomb friction or more,
-        /// in proportion with less; no more than 2 for each kHz of the control rate.
-        friction_speed_up: f32 = 1.6, 1.0..=5.0;
         /// Twist of each gear for each N·m of commanded torque, if the encoders are on the motors; 0 if they
         /// are on the links. Tracking loops and hybrid law are slower where the arm's natural frequency on
         /// these gears is below ω.
@@ -40,10 +37,8 @@ settings! {
         /// Correction of the encoders' readings.
         encoders: EncoderCorrection = EncoderCorrection::default();
         /// Standard deviation of the tip's distance from the edges by what is not known of encoders, links and belt; 0
-        /// for an arm that is known exactly. The governor keeps a distance for it.
+        /// for an arm that is known exactly. The governor keeps a distance for it. Play of the gears counts 1 m a radian.
         tip_deviation_m: f32 = 0.0, 0.0..=0.1, "m";
-        /// Largest play of the gears, from which the governor keeps its distance from the edges.
-        gear_play_rad: f32 = 0.0, 0.0..=0.1, "rad";
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! - [`joints`]: angles and rates from encoder counts; [`encoder_correction`]: known errors of the encoders
 //! - [`model`]: the equations of motion at those angles and rates
-//! - [`contact`]: contact decision
+//! - [`contact`]: contact decision; [`ContactEstimate`]: what is known of the contact
 //! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
 //! - [`calibration`]: length of the links
 //! - [`response`]: how much the contact gives
@@ -12,9 +12,11 @@
 pub mod belt;
 pub mod calibration;
 pub mod contact;
+mod contact_estimate;
 pub mod disturbance;
 pub mod encoder_correction;
 pub mod friction;
+mod gap;
 pub mod joint_friction;
 pub mod joints;
 pub mod model;
@@ -27,44 +29,19 @@ use painleve_shared::{Arm, Pose, Slip};
 
 use self::belt::{BeltEstimator, BeltSpeedSettings, BeltState};
 use self::calibration::{CalibrationSettings, CalibrationState, LengthCalibrator};
-use self::contact::{ContactDetector, ContactSettings, ContactState, EncoderReading, Evidence};
+use self::contact::{ContactDetector, ContactSettings, ContactState, Evidence};
+pub use self::contact_estimate::ContactEstimate;
 use self::disturbance::{DisturbanceEstimator, DisturbanceSettings, DisturbanceState, LoopLimit};
-use self::friction::{FrictionEstimate, FrictionEstimator, FrictionSettings, FrictionState};
+use self::friction::{FrictionEstimator, FrictionSettings, FrictionState};
 use self::joint_friction::{JointFriction, JointFrictionState};
 use self::joints::{JointEstimator, JointEstimatorSettings, JointState, Restart};
 use self::model::Model;
-use self::response::{
-    ContactResponse, ForceReading, ResponseEstimator, ResponseSettings, ResponseState,
-};
+use self::response::{ForceReading, ResponseEstimator, ResponseSettings, ResponseState};
 use crate::last_command::LastCommand;
 use crate::schedule::Turn;
 
 /// Least velocity by which a sticking tip falls behind its reference, m/s.
 const DRAGGED_M_S: f32 = 0.02;
-
-/// The contact estimate at a tick: contact and force from its readings, the rest from those before, evaluated
-/// for the posture predicted for the tick.
-#[derive(Clone, Copy, Debug)]
-pub struct ContactEstimate {
-    /// Whether the tip touches.
-    pub touches: bool,
-    /// Whether the tip touches now but did not at the previous tick.
-    pub lands: bool,
-    /// Whether the tip touched at the previous tick but does not now.
-    pub leaves: bool,
-    /// Whether flight is certain.
-    pub in_flight: bool,
-    /// Measured contact force (f_t, f_n), N.
-    pub force_n: Vector2<f32>,
-    /// Estimated friction.
-    pub friction: FrictionEstimate,
-    /// p with that friction, 1/kg.
-    pub p_per_kg: f32,
-    /// p/Q22.
-    pub p_ratio: f32,
-    /// What the contact's response to torque allows.
-    pub response: ContactResponse,
-}
 
 /// What a tick in contact offers to the slow estimates.
 #[derive(Clone, Copy, Debug)]
@@ -185,11 +162,7 @@ impl Estimators {
                 settings.tick_hz,
             ),
             contact: ContactDetector::new(settings.contact),
-            friction: FrictionEstimator::new(
-                settings.friction,
-                settings.contact.force_noise_n,
-                tick_s,
-            ),
+            friction: FrictionEstimator::new(settings.friction, settings.contact, tick_s),
             belt: BeltEstimator::new(settings.belt, tick_s),
             response: ResponseEstimator::new(settings.response, tick_s),
             disturbance: DisturbanceEstimator::new(settings.disturbance, slow_period_s),
@@ -204,17 +177,10 @@ impl Estimators {
     /// Starts without readings of this arm.
     pub fn start(&self, arm: Arm<f32>) -> EstimatesState {
         let (friction, response) = (self.friction.start(), self.response.start());
-        let contact = ContactEstimate {
-            touches: false,
-            lands: false,
-            leaves: false,
-            in_flight: false,
-            force_n: Vector2::zeros(),
-            friction: friction.estimate(),
-            p_per_kg: 0.0,
-            p_ratio: 0.0,
-            response: self.response.response(&response, 0.0, 0.0),
-        };
+        let contact = ContactEstimate::without_readings(
+            friction.estimate(),
+            self.response.response(&response, 0.0, 0.0),
+        );
         EstimatesState {
             contact,
             model: Model::default(),
@@ -468,46 +434,5 @@ impl Estimators {
         };
         self.disturbance
             .update(&mut state.disturbance, &state.model, &limit);
-    }
-
-    /// Returns the measured height of the tip above the belt, m.
-    #[inline]
-    fn gap_m(&self, state: &EstimatesState) -> f32 {
-        let residual = state.joints.innovation_rad() * self.joints.residual_share();
-        let model = &state.model;
-        let jacobian = &model.jacobian;
-        model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
-    }
-
-    /// Returns the contact evidence from the encoders.
-    fn encoder_reading(&self, state: &EstimatesState, last: &LastCommand) -> EncoderReading {
-        let model = &state.model;
-        let count = self.joints.count_rad();
-        // Half a count of each encoder; the second encoder affects θ2 alone.
-        let rounding_m = 0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
-        // Steady innovation after the contact force has vanished.
-        let release = -self.joints.lag_counts(&last.contact_acceleration_rad_s2);
-        EncoderReading {
-            gap_m: self.gap_m(state),
-            gap_error_m: self.contact.gap_uncertainty_m()
-                + state.calibration.gap_error_m(rounding_m),
-            moved: state.joints.has_moved(),
-            release: release.dot(&self.joints.innovation_counts(&state.joints)),
-            full_release: release.norm_squared(),
-        }
-    }
-
-    /// With contact from the encoders, the belt is assumed at the lowest tip position so far: initially
-    /// the start position, then every lower one.
-    fn find_belt(&self, state: &mut EstimatesState, encoders: &mut EncoderReading) {
-        let starts = self.calibrator.is_open(&state.calibration);
-        if starts || encoders.is_below_belt() {
-            let gap_m = encoders.gap_m;
-            self.calibrator
-                .restart(&mut state.calibration, &mut state.arm, gap_m);
-        }
-        if starts {
-            encoders.gap_m = 0.0;
-        }
     }
 }

@@ -26,6 +26,8 @@ use super::{Law, LawInput, LawOutput};
 const OBSERVER_SHARE: f32 = 0.5;
 /// The same for the integral of the force.
 const FORCE_INTEGRAL_SHARE: f32 = 0.165;
+/// Largest correction by that integral, as a part of f_n*.
+const FORCE_INTEGRAL_PART: f32 = 0.5;
 /// Part of the friction observer's rate that a contact that gives takes away.
 const CALMER_OBSERVER: f32 = 0.7;
 
@@ -40,17 +42,20 @@ const FRICTION_SLEW_PER_S: f32 = 1000.0;
 const TORQUE_USED: f32 = 0.95;
 /// Least desired force by which the present one is divided, N.
 const LEAST_FORCE_N: f32 = 1e-3;
-/// Least fraction of the wanted contact force.
-const LEAST_PRESSING: f32 = 0.1;
 
-/// Returns the fraction of `pressing_nm` that keeps both joints within ±`limit_nm` together with
+/// Returns the fraction of `pressing_nm`, at least `least`, that keeps both joints within ±`limit_nm` together with
 /// `motion_nm`.
 #[inline]
-fn affordable(motion_nm: &JointTorque<f32>, pressing_nm: &JointTorque<f32>, limit_nm: f32) -> f32 {
+fn affordable(
+    motion_nm: &JointTorque<f32>,
+    pressing_nm: &JointTorque<f32>,
+    limit_nm: f32,
+    least: f32,
+) -> f32 {
     if (*motion_nm + *pressing_nm).amax() <= limit_nm {
         1.0
     } else {
-        affordable_part(motion_nm, pressing_nm, limit_nm)
+        affordable_part(motion_nm, pressing_nm, limit_nm).at_least(least)
     }
 }
 
@@ -73,7 +78,7 @@ fn affordable_part(
     };
     of_joint(motion_nm.first(), pressing_nm.first())
         .at_most(of_joint(motion_nm.second(), pressing_nm.second()))
-        .limited(LEAST_PRESSING, 1.0)
+        .limited(0.0, 1.0)
 }
 
 /// Wanted acceleration above which the law makes a sticking tip break away, m/s².
@@ -140,7 +145,7 @@ impl Law for HybridSettings {
         let cone_n = input.friction.coefficient * force_n;
         *state = HybridState {
             pressing: (force_n / self.normal_force_n.at_least(LEAST_FORCE_N))
-                .at_least(LEAST_PRESSING),
+                .at_least(self.least_pressing),
             filtered_friction_n: input.force_n.x.within(cone_n),
             slow_force_n: input.force_n.y,
             fed_force_n: input.force_n,
@@ -161,15 +166,12 @@ impl Law for HybridSettings {
         let wanted = Vector2::new(friction_force, normal_force);
         let motion_nm = input.model.inverse_dynamics_in_air_nm(&acceleration);
         let pressing_nm = input.model.torque_against_nm(&wanted);
-        let share = if self.reduce_force_when_torque_limited {
-            affordable(
-                &motion_nm,
-                &pressing_nm,
-                TORQUE_USED * input.torque_limit_nm,
-            )
-        } else {
-            1.0
-        };
+        let share = affordable(
+            &motion_nm,
+            &pressing_nm,
+            TORQUE_USED * input.torque_limit_nm,
+            self.least_pressing,
+        );
         // A force that rose at once would make a contact with little damping ring: after landing, and where it
         // followed the torque that the motion leaves.
         let rise = self.pressing_rate_per_s * input.tick_s;
@@ -188,10 +190,10 @@ impl HybridSettings {
     fn commanded_acceleration_m_s2(&self, state: &mut HybridState, input: &LawInput<'_>) -> f32 {
         let error = input.reference.position_m - input.model.tip_m.x;
         let error_rate = input.reference.velocity_m_s - input.model.tip_velocity_m_s.x;
+        // Held in the air and while the torque is limited, it needs no limit of its own.
         if input.contact && !input.saturated {
-            let limit = self.position_integral_limit_m_s2;
-            let step = self.position_integral_gain_per_s3 * error * input.tick_s;
-            state.position_integral_m_s2 = (state.position_integral_m_s2 + step).within(limit);
+            state.position_integral_m_s2 +=
+                self.position_integral_gain_per_s3 * error * input.tick_s;
         }
         input.reference.acceleration_m_s2
             + self.position_gain_per_s2 * error
@@ -218,9 +220,7 @@ impl HybridSettings {
             let drift = input.response.lags * drift;
             state.force_drift_m_s2 += weight * (drift - state.force_drift_m_s2);
         }
-        state
-            .force_drift_m_s2
-            .within(self.position_integral_limit_m_s2)
+        state.force_drift_m_s2
     }
 
     /// α_f, N.
@@ -232,7 +232,7 @@ impl HybridSettings {
             let weight = (self.force_integral_gain_per_s * input.tick_s)
                 .at_most(FORCE_INTEGRAL_SHARE * input.response.loop_share);
             let step = weight * (state.pressing * wanted_n - input.force_n.y);
-            let limit = self.force_integral_limit_n;
+            let limit = FORCE_INTEGRAL_PART * wanted_n;
             state.force_integral_n = (state.force_integral_n + step).within(limit);
         }
         let response = input.response;
@@ -310,210 +310,4 @@ impl HybridSettings {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::estimate::friction::FrictionEstimate;
-    use crate::estimate::model::Model;
-    use crate::estimate::response::ContactResponse;
-    use crate::refer::reference::TipReference;
-    use painleve_shared::{Arm, ArmParameters, GeneralisedTorque, Pose, Posture};
-    use proptest::prelude::*;
-
-    proptest! {
-        /// With the true friction fed forward, the law gives the tip exactly the acceleration α_v
-        /// along the belt and the force f_n* on it.
-        #[test]
-        fn the_law_linearises_the_arm_on_the_belt(
-            tip in -0.16_f32..0.16, speed in -0.5_f32..0.5, friction in 0.0_f32..0.3, up: bool,
-        ) {
-            let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-            let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
-            let theta_rad = arm.link_angles_on_belt_rad(tip, posture).unwrap();
-            let theta_dot_rad_s = arm.link_rates_on_belt_rad_s(tip, speed, posture);
-            let pose = Pose::new(&theta_rad);
-            let model = Model::new(&arm, theta_rad, theta_dot_rad_s, &GeneralisedTorque::zeros());
-            let settings = HybridSettings {
-                force_integral_gain_per_s: 0.0,
-                pressing_rate_per_s: 1e6,
-                position_integral_gain_per_s3: 0.0,
-                friction: FrictionFeedForward::Model { friction, belt_speed_m_s: -1.0 },
-                ..Default::default()
-            };
-            let reference = TipReference { position_m: tip + 0.001, velocity_m_s: speed, acceleration_m_s2: 0.7 };
-            let input = LawInput {
-                arm: &arm, model: &model, posture,
-                friction: &FrictionEstimate {
-                    coefficient: friction, next_coefficient: friction, catch_up: 0.0, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
-                },
-                p_per_kg: model.p_per_kg(friction, Slip::Positive), response: &ContactResponse::rigid(1.0),
-                force_n: Vector2::zeros(), contact: true, saturated: false,
-                reference, torque_limit_nm: 50.0, tick_s: 1e-3,
-            };
-            let mut state = HybridState::default();
-            settings.reset(&mut state, &input);
-            let output = settings.tick(&mut state, &input);
-            let terms = arm.contact_terms(
-                &theta_rad, &theta_dot_rad_s, &pose, &output.torque_nm.to_links());
-            let normal = terms.sliding_normal_force_n(friction, Slip::Positive);
-            let force = Vector2::new(-friction * normal, normal);
-            let acceleration = terms.free_acceleration_m_s2 + terms.q * force;
-            prop_assert!((normal - 10.0).abs() < 0.02, "f_n = {}", normal);
-            prop_assert!((acceleration.x - (0.7 + settings.position_gain_per_s2 * 0.001)).abs() < 0.05, "{}", acceleration);
-        }
-    }
-
-    #[test]
-    fn a_law_twice_as_fast_has_poles_twice_as_far_out() {
-        let law = HybridSettings::default();
-        let faster = law.sped_up(2.0);
-        // x³ + K'_D x² + K'_P x + K_I at −s, and at −2 s.
-        let polynomial = |law: &HybridSettings, rate: f32| {
-            ((law.velocity_gain_per_s - rate) * rate - law.position_gain_per_s2) * rate
-                + law.position_integral_gain_per_s3
-        };
-        for rate in [8.0, 20.0, 55.0] {
-            assert_eq!(
-                polynomial(&faster, 2.0 * rate),
-                8.0 * polynomial(&law, rate)
-            );
-        }
-        assert_eq!(law.sped_up(1.0), law);
-    }
-
-    const FRICTION: f32 = 0.6;
-
-    fn at_rest(arm: &Arm<f32>) -> Model {
-        let theta_rad = arm
-            .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
-            .unwrap();
-        Model::new(
-            arm,
-            theta_rad,
-            painleve_shared::LinkMotion::zeros(),
-            &GeneralisedTorque::zeros(),
-        )
-    }
-
-    const SLIDES: FrictionEstimate = FrictionEstimate {
-        coefficient: FRICTION,
-        next_coefficient: FRICTION,
-        catch_up: 0.0,
-        deviation: 0.0,
-        slip: Slip::Positive,
-        slip_seen: true,
-        sticks: false,
-    };
-
-    fn gives() -> ContactResponse {
-        ContactResponse {
-            lags: 1.0,
-            ..ContactResponse::rigid(1.0)
-        }
-    }
-
-    /// Returns the input of a tip that slides at its reference on a contact that gives.
-    fn sliding<'a>(
-        arm: &'a Arm<f32>,
-        model: &'a Model,
-        response: &'a ContactResponse,
-    ) -> LawInput<'a> {
-        LawInput {
-            arm,
-            model,
-            posture: Posture::ElbowDown,
-            friction: &SLIDES,
-            p_per_kg: model.p_per_kg(FRICTION, Slip::Positive),
-            response,
-            force_n: Vector2::new(-FRICTION * 10.0, 10.0),
-            contact: true,
-            saturated: false,
-            reference: TipReference::at_rest(model.tip_m.x),
-            torque_limit_nm: 50.0,
-            tick_s: 1e-3,
-        }
-    }
-
-    /// Runs `test` with the default settings, the input of a tip that slides on a contact that gives, and a new state.
-    fn while_sliding(test: impl FnOnce(&HybridSettings, &mut LawInput<'_>, &mut HybridState)) {
-        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let model = at_rest(&arm);
-        test(
-            &HybridSettings::default(),
-            &mut sliding(&arm, &model, &gives()),
-            &mut HybridState::default(),
-        );
-    }
-
-    #[test]
-    fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
-        while_sliding(|settings, input, state| {
-            settings.reset(state, input);
-            let rest_n = Vector2::new(-0.3, 0.5);
-            let model = input.model;
-            let expected = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
-            for _ in 0..200 {
-                input.force_n = state.fed_force_n + rest_n;
-                settings.force_drift_m_s2(state, input);
-            }
-            let learnt = settings.force_drift_m_s2(state, input);
-            assert!(
-                (learnt - expected).abs() < 1e-3 * expected.abs(),
-                "{learnt} {expected}"
-            );
-            // Nothing is learnt from a torque that was limited.
-            input.saturated = true;
-            input.force_n = Vector2::zeros();
-            assert_eq!(settings.force_drift_m_s2(state, input), learnt);
-        });
-    }
-
-    #[test]
-    fn a_reduced_force_is_no_error_of_the_friction() {
-        while_sliding(|settings, input, state| {
-            settings.reset(state, input);
-            state.filtered_friction_n = 0.0;
-            input.torque_limit_nm = 1.0;
-            for _ in 0..100 {
-                settings.tick(state, input);
-                // The contact follows the reduced force exactly.
-                let normal_n = state.fed_force_n.y;
-                input.force_n = Vector2::new(-FRICTION * normal_n, normal_n);
-            }
-            assert!(state.pressing < 0.9, "{state:?}");
-            let fed = -state.fed_force_n.x / state.fed_force_n.y;
-            assert!((fed - FRICTION).abs() < 1e-4, "{state:?}");
-            assert!(state.force_drift_m_s2.abs() < 1e-2, "{state:?}");
-        });
-    }
-
-    #[test]
-    fn the_force_falls_at_once_but_rises_slowly() {
-        while_sliding(|settings, input, state| {
-            settings.reset(state, input);
-            settings.tick(state, input);
-            assert_eq!(state.pressing, 1.0);
-            input.torque_limit_nm = 1.0;
-            settings.tick(state, input);
-            let reduced = state.pressing;
-            assert!(reduced < 0.9, "{reduced}");
-            input.torque_limit_nm = 50.0;
-            for _ in 0..10 {
-                settings.tick(state, input);
-            }
-            let share = (state.pressing - reduced) / (1.0 - reduced);
-            let expected = 1.0 - (1.0 + settings.pressing_rate_per_s * input.tick_s).powi(-10);
-            assert!((share - expected).abs() < 1e-3, "{share} {expected}");
-        });
-    }
-
-    #[test]
-    fn the_force_begins_with_the_present_one_but_with_no_more_than_desired() {
-        while_sliding(|settings, input, state| {
-            for (force_n, share) in [(20.0, 1.0), (4.0, 0.4), (-0.2, LEAST_PRESSING)] {
-                input.force_n.y = force_n;
-                settings.reset(state, input);
-                assert_eq!(state.pressing, share);
-            }
-        });
-    }
-}
+mod tests;

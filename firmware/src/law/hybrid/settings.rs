@@ -43,21 +43,18 @@ settings! {
         velocity_gain_per_s: f32 = 128.0, 0.0..=1e4, "1/s";
         /// Gain of ∫ (z_t* − z_t) dt, added to α_v; not in the paper.
         position_integral_gain_per_s3: f32 = 10_000.0, 0.0..=1e9, "1/s³";
-        /// Largest acceleration due to that integral, and largest one by contact forces that the law cancels.
-        position_integral_limit_m_s2: f32 = 200.0, 0.0..=1e6, "m/s²";
         /// Rate at which the law learns the acceleration of the tip along the belt by contact forces other
         /// than those fed forward, which it cancels; 0 for never. Not in the paper.
         force_drift_rad_s: f32 = 1500.0, 0.0..=1e4, "rad/s";
         /// Rate at which the normal force rises to f_n*, as a fraction of it: after landing, and after a motion that left
-        /// too little torque for it. The paper's law presses at once.
+        /// too little torque for it.
         pressing_rate_per_s: f32 = 20.0, 0.1..=1e6, "1/s";
-        /// Whether the pressing force is reduced where the torque limits do not allow f_n*; not in
-        /// the paper.
-        reduce_force_when_torque_limited: bool = true;
-        /// Integral gain K'_I of the force; 0 for none. The paper's is 650 1/s elbow down and 0 elbow up.
+        /// Least fraction of f_n* to which the normal force is reduced where the torque limits do not allow f_n*, and from
+        /// which it rises; 1 for always f_n*, as in the paper.
+        least_pressing: f32 = 0.1, 0.0..=1.0;
+        /// Integral gain K'_I of the force; 0 for none. The paper's is 650 1/s elbow down and 0 elbow up. The integral
+        /// corrects by half of f_n* at most.
         force_integral_gain_per_s: f32 = 0.0, 0.0..=1e4, "1/s";
-        /// Largest correction by the force integral.
-        force_integral_limit_n: f32 = 5.0, 0.0..=1e3, "N";
         /// Damping of a compliant contact, as a fraction of the change of force.
         contact_damping: f32 = 4.0, 0.0..=10.0;
         /// Rate of change above which it damps.

@@ -16,15 +16,13 @@ settings! {
         /// Number of standard deviations added to the friction estimate.
         friction_deviations: f32 = 1.5, 0.0..=10.0;
         /// Distance kept from the point where p/Q22 has its least value, at 1 kHz; it grows with the square of the control
-        /// period, in which a disturbance moves the tip before the controller reacts. It and the next four are added in
+        /// period, in which a disturbance moves the tip before the controller reacts. It and the next three are added in
         /// squares.
         distance_m: f32 = 0.5e-3, 0.0..=0.1, "m";
         /// The same in encoder counts, as seen at the tip: rounding moves the tip by as much.
         distance_counts: f32 = 3.0, 0.0..=1e3, "counts";
         /// The same for each N·m of the joints' known friction.
         distance_m_nm: f32 = 0.06, 0.0..=10.0, "m/(N·m)";
-        /// The same for each rad of the gears' known play.
-        distance_m_rad: f32 = 2.0, 0.0..=100.0, "m/rad";
         /// The same for each standard deviation of the tip's distance from the edges, `estimator.tip_deviation_m`.
         distance_deviations: f32 = 2.0, 0.0..=10.0;
         /// Deceleration at which the reference stops before an edge.

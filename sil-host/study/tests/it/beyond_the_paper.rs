@@ -227,7 +227,7 @@ fn links_longer_than_the_data_sheet_says_do_not_move_the_tip() {
         "{}",
         with.final_tip_t_m
     );
-    scenario.controller.calibration.enabled = false;
+    scenario.controller.calibration.tolerance = 0.0;
     let (without, _) = run_scenario(&scenario);
     assert!(
         (without.final_tip_t_m - 0.1).abs() > 1e-3,
@@ -254,7 +254,7 @@ fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
     const ENCODERS: &str = "controller.contact.evidence=encoders";
     let with = successes(&[ENCODERS]);
     assert!(with >= 58, "{with}");
-    let without = successes(&[ENCODERS, "controller.calibration.enabled=false"]);
+    let without = successes(&[ENCODERS, "controller.calibration.tolerance=0"]);
     assert!(without < 30, "{without}");
 }
 
@@ -262,7 +262,7 @@ fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
 const NO_FORCE_CELL: [&str; 7] = [
     "controller.contact.evidence=encoders",
     "controller.law.hybrid.friction={ model = { friction = 0.6, belt_speed_m_s = -0.4 } }",
-    "controller.disturbance.enabled=false",
+    "controller.disturbance.bandwidth_rad_s=0",
     "converters.force={ range_n = 0.01, noise_n = 0.0 }",
     "controller.contact.contact_n=0.005",
     "controller.contact.force_noise_n=0.001",
@@ -321,7 +321,7 @@ fn a_wrong_spring_does_not_stop_the_tip_where_p_is_small() {
             course.tip_error_m
         );
         let (_, without) =
-            with_a_wrong_spring(stiffness, &["controller.disturbance.enabled=false"]);
+            with_a_wrong_spring(stiffness, &["controller.disturbance.bandwidth_rad_s=0"]);
         assert!(
             without.tip_error_m > 1.2 * course.tip_error_m
                 && without.force_error_n > 2.0 * course.force_error_n,

@@ -19,7 +19,7 @@ pub enum Part {
     /// Integral of the position error.
     PositionIntegral,
     /// Reduction of the normal force where the torque is limited.
-    ReduceForceWhenTorqueLimited,
+    ForceReduction,
     /// Gradual rise of the normal force: after landing, and where the torque was limited.
     ForceRamp,
     /// Estimate of unknown torques.
@@ -32,27 +32,24 @@ pub enum Part {
     ForceDrift,
     /// Damping of a contact that gives.
     ContactDamping,
-    /// Faster loops on an arm with known friction of the joints.
-    FrictionSpeedUp,
 }
 
 impl Part {
     /// All parts.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 13] = [
         Self::Governor,
         Self::Recovery,
         Self::Calibration,
         Self::FrictionEstimate,
         Self::FrictionFeedForward,
         Self::PositionIntegral,
-        Self::ReduceForceWhenTorqueLimited,
+        Self::ForceReduction,
         Self::ForceRamp,
         Self::Disturbance,
         Self::Response,
         Self::Probe,
         Self::ForceDrift,
         Self::ContactDamping,
-        Self::FrictionSpeedUp,
     ];
 
     /// Returns the overrides that switch the part off.
@@ -60,20 +57,17 @@ impl Part {
         match self {
             Self::Governor => &["controller.governor.enabled=false"],
             Self::Recovery => &["controller.supervisor.on_lift_off=continue"],
-            Self::Calibration => &["controller.calibration.enabled=false"],
-            Self::FrictionEstimate => &["controller.friction.enabled=false"],
+            Self::Calibration => &["controller.calibration.tolerance=0"],
+            Self::FrictionEstimate => &["controller.friction.first_deviation=0"],
             Self::FrictionFeedForward => &["controller.law.hybrid.friction=measured"],
             Self::PositionIntegral => &["controller.law.hybrid.position_integral_gain_per_s3=0"],
-            Self::ReduceForceWhenTorqueLimited => {
-                &["controller.law.hybrid.reduce_force_when_torque_limited=false"]
-            }
+            Self::ForceReduction => &["controller.law.hybrid.least_pressing=1"],
             Self::ForceRamp => &["controller.law.hybrid.pressing_rate_per_s=1e6"],
-            Self::Disturbance => &["controller.disturbance.enabled=false"],
+            Self::Disturbance => &["controller.disturbance.bandwidth_rad_s=0"],
             Self::Response => &["controller.response.enabled=false"],
             Self::Probe => &["controller.response.probe_n=0"],
             Self::ForceDrift => &["controller.law.hybrid.force_drift_rad_s=0"],
             Self::ContactDamping => &["controller.law.hybrid.contact_damping=0"],
-            Self::FrictionSpeedUp => &["controller.estimator.friction_speed_up=1"],
         }
     }
 }

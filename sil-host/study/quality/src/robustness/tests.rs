@@ -187,18 +187,9 @@ fn other_settings(part: Part) -> &'static [&'static str] {
             "controller.recovery.bandwidth_rad_s=20",
             "controller.recovery.landing_speed_m_s=0.2",
         ],
-        Part::Calibration => &[
-            "controller.calibration.averaging_s=0.01",
-            "controller.calibration.tolerance=0",
-        ],
-        Part::FrictionEstimate => &[
-            "controller.friction.first_deviation=1",
-            "controller.friction.drift_per_sqrt_s=0.1",
-        ],
-        Part::Disturbance => &[
-            "controller.disturbance.bandwidth_rad_s=200",
-            "controller.disturbance.limit_nm=0.01",
-        ],
+        Part::Calibration => &["controller.calibration.averaging_s=0.01"],
+        Part::FrictionEstimate => &["controller.friction.drift_per_sqrt_s=0.1"],
+        Part::Disturbance => &["controller.disturbance.limit_nm=0.01"],
         Part::Response => &[
             "controller.response.averaging_s=1",
             "controller.response.probe_n=1",
@@ -206,11 +197,10 @@ fn other_settings(part: Part) -> &'static [&'static str] {
         Part::ContactDamping => &["controller.law.hybrid.contact_damping_rad_s=50"],
         Part::FrictionFeedForward
         | Part::PositionIntegral
-        | Part::ReduceForceWhenTorqueLimited
+        | Part::ForceReduction
         | Part::ForceRamp
         | Part::Probe
-        | Part::ForceDrift
-        | Part::FrictionSpeedUp => &[],
+        | Part::ForceDrift => &[],
     }
 }
 

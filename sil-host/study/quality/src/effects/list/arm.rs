@@ -47,9 +47,10 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
     "backlash-known": "effects.gear.backlash_deg", "° at 500 N·m/rad, encoder on the link, known",
         [0.05, 0.1, 0.2, 0.5], typical 0.1,
         overrides: Computed(|level, _| {
-            let play_rad = level.to_radians();
+            // A radian of play counts as 1 m.
+            let deviation_m = level.to_radians();
             let mut overrides = gear(500.0, level, "link");
-            overrides.extend(set!["controller.estimator.gear_play_rad={play_rad:?}"]);
+            overrides.extend(set!["controller.estimator.tip_deviation_m={deviation_m:?}"]);
             overrides
         });
 

@@ -1,0 +1,47 @@
+//! What is known of the contact between tip and belt at a tick.
+
+use nalgebra::Vector2;
+
+use super::friction::FrictionEstimate;
+use super::response::ContactResponse;
+
+/// The contact estimate at a tick: contact and force from its readings, the rest from those before, evaluated
+/// for the posture predicted for the tick.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactEstimate {
+    /// Whether the tip touches.
+    pub touches: bool,
+    /// Whether the tip touches now but did not at the previous tick.
+    pub lands: bool,
+    /// Whether the tip touched at the previous tick but does not now.
+    pub leaves: bool,
+    /// Whether flight is certain.
+    pub in_flight: bool,
+    /// Measured contact force (f_t, f_n), N.
+    pub force_n: Vector2<f32>,
+    /// Estimated friction.
+    pub friction: FrictionEstimate,
+    /// p with that friction, 1/kg.
+    pub p_per_kg: f32,
+    /// p/Q22.
+    pub p_ratio: f32,
+    /// What the contact's response to torque allows.
+    pub response: ContactResponse,
+}
+
+impl ContactEstimate {
+    /// Returns the estimate before the first readings, with friction and response as they start.
+    pub fn without_readings(friction: FrictionEstimate, response: ContactResponse) -> Self {
+        Self {
+            touches: false,
+            lands: false,
+            leaves: false,
+            in_flight: false,
+            force_n: Vector2::zeros(),
+            friction,
+            p_per_kg: 0.0,
+            p_ratio: 0.0,
+            response,
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Tests of the response of the contact on simulated contacts.
+
+use super::*;
+
+const TICK_S: f32 = 1e-3;
+const P_PER_KG: f32 = 2.4;
+const P_RATIO: f32 = 0.09;
+
+/// Returns uniform noise in −1 … 1 from a fixed stream.
+fn noise(step: u32) -> f32 {
+    let bits = step
+        .wrapping_mul(2_654_435_761)
+        .rotate_left(13)
+        .wrapping_mul(2_246_822_519);
+    (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
+}
+
+/// Returns the response after `ticks` of a contact that gives the force (N) in
+/// answer to the force commanded at the previous tick.
+fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
+    let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
+    let mut state = estimator.start();
+    // The probe of a tick is drawn after the tick before.
+    let (mut withheld, mut probe_n, mut commanded) = (0.0, 0.0, 10.0);
+    for tick in 0..ticks {
+        let reading = ForceReading {
+            normal_force_n: contact(commanded) + 0.03 * noise(3 * tick),
+            withheld_n: withheld,
+        };
+        if estimator.update(&mut state, &reading) && tick % 2 == 0 {
+            estimator.evaluate(&mut state);
+        }
+        let next = 0.05 * noise(3 * tick + 1);
+        commanded = 10.0 + next - withheld + probe_n;
+        (withheld, probe_n) = (next, state.probe_n);
+    }
+    estimator.response(&state, P_PER_KG, P_RATIO)
+}
+
+/// A spring and damper under an arm of mobility p, in small steps.
+fn compliant(stiffness_n_m: f32, damping_ns_m: f32) -> impl FnMut(f32) -> f32 {
+    let (mut depth, mut rate) = (10.0 / stiffness_n_m, 0.0);
+    move |commanded| {
+        let force = |depth: f32, rate: f32| stiffness_n_m * depth + damping_ns_m * rate;
+        for _ in 0..100 {
+            rate += P_PER_KG * (commanded - force(depth, rate)) * TICK_S / 100.0;
+            depth += rate * TICK_S / 100.0;
+        }
+        force(depth, rate)
+    }
+}
+
+#[test]
+fn a_rigid_contact_is_found_and_costs_nothing() {
+    let found = observed(1500, |commanded| commanded);
+    assert_eq!(found, ContactResponse::rigid(P_RATIO));
+}
+
+#[test]
+fn a_rigid_contact_behind_a_slow_torque_stage_is_rigid() {
+    let mut force = 10.0;
+    let share = 1.0 - libm::expf(-TICK_S / 0.5e-3);
+    let found = observed(1500, |commanded| {
+        force += share * (commanded - force);
+        force
+    });
+    assert_eq!(found.give, 0.0, "{found:?}");
+}
+
+#[test]
+fn the_share_of_a_compliant_contact_falls_with_its_damping() {
+    let of = |damping| observed(1500, compliant(1e5, damping));
+    let (firm, soft) = (of(90.0), of(20.0));
+    assert!(soft.loop_share < firm.loop_share && firm.loop_share < P_RATIO);
+    assert!(soft.loop_share < 0.5 * P_RATIO, "{soft:?}");
+    let softest = observed(1500, compliant(1e4, 5.0));
+    assert!(softest.give > 0.0, "{softest:?}");
+}
+
+/// Returns the response after `ticks` of a contact whose force swings by `amplitude_n` at 50 Hz during the first second.
+fn swinging(ticks: u32, amplitude_n: f32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
+    let mut tick = 0;
+    observed(ticks, |commanded| {
+        tick += 1;
+        let amplitude_n = if tick <= 1000 { amplitude_n } else { 0.0 };
+        let phase = core::f32::consts::TAU * 0.05 * tick as f32;
+        contact(commanded) + amplitude_n * libm::sinf(phase)
+    })
+}
+
+#[test]
+fn a_contact_certainly_lags_even_if_its_force_swings() {
+    let gives = swinging(1000, 3.0, compliant(1e5, 60.0));
+    assert!(gives.lags > 0.0, "{gives:?}");
+    assert_eq!(swinging(1000, 3.0, |commanded| commanded).lags, 0.0);
+}
+
+#[test]
+fn all_is_allowed_if_it_is_off() {
+    let settings = ResponseSettings {
+        enabled: false,
+        ..Default::default()
+    };
+    let estimator = ResponseEstimator::new(&settings, TICK_S);
+    let found = estimator.response(&estimator.start(), P_PER_KG, P_RATIO);
+    assert_eq!(found, ContactResponse::rigid(P_RATIO));
+}

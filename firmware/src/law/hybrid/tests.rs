@@ -1,0 +1,203 @@
+//! Tests of the hybrid law against the equations of motion, and of its force.
+
+use super::*;
+use crate::estimate::friction::FrictionEstimate;
+use crate::estimate::model::Model;
+use crate::estimate::response::ContactResponse;
+use crate::refer::reference::TipReference;
+use painleve_shared::{Arm, ArmParameters, GeneralisedTorque, Pose, Posture};
+use proptest::prelude::*;
+
+proptest! {
+    /// With the true friction fed forward, the law gives the tip exactly the acceleration α_v
+    /// along the belt and the force f_n* on it.
+    #[test]
+    fn the_law_linearises_the_arm_on_the_belt(
+        tip in -0.16_f32..0.16, speed in -0.5_f32..0.5, friction in 0.0_f32..0.3, up: bool,
+    ) {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
+        let theta_rad = arm.link_angles_on_belt_rad(tip, posture).unwrap();
+        let theta_dot_rad_s = arm.link_rates_on_belt_rad_s(tip, speed, posture);
+        let pose = Pose::new(&theta_rad);
+        let model = Model::new(&arm, theta_rad, theta_dot_rad_s, &GeneralisedTorque::zeros());
+        let settings = HybridSettings {
+            force_integral_gain_per_s: 0.0,
+            least_pressing: 1.0,
+            position_integral_gain_per_s3: 0.0,
+            friction: FrictionFeedForward::Model { friction, belt_speed_m_s: -1.0 },
+            ..Default::default()
+        };
+        let reference = TipReference { position_m: tip + 0.001, velocity_m_s: speed, acceleration_m_s2: 0.7 };
+        let input = LawInput {
+            arm: &arm, model: &model, posture,
+            friction: &FrictionEstimate {
+                coefficient: friction, next_coefficient: friction, catch_up: 0.0, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
+            },
+            p_per_kg: model.p_per_kg(friction, Slip::Positive), response: &ContactResponse::rigid(1.0),
+            force_n: Vector2::zeros(), contact: true, saturated: false,
+            reference, torque_limit_nm: 50.0, tick_s: 1e-3,
+        };
+        let mut state = HybridState::default();
+        settings.reset(&mut state, &input);
+        let output = settings.tick(&mut state, &input);
+        let terms = arm.contact_terms(
+            &theta_rad, &theta_dot_rad_s, &pose, &output.torque_nm.to_links());
+        let normal = terms.sliding_normal_force_n(friction, Slip::Positive);
+        let force = Vector2::new(-friction * normal, normal);
+        let acceleration = terms.free_acceleration_m_s2 + terms.q * force;
+        prop_assert!((normal - 10.0).abs() < 0.02, "f_n = {}", normal);
+        prop_assert!((acceleration.x - (0.7 + settings.position_gain_per_s2 * 0.001)).abs() < 0.05, "{}", acceleration);
+    }
+}
+
+#[test]
+fn a_law_twice_as_fast_has_poles_twice_as_far_out() {
+    let law = HybridSettings::default();
+    let faster = law.sped_up(2.0);
+    // x³ + K'_D x² + K'_P x + K_I at −s, and at −2 s.
+    let polynomial = |law: &HybridSettings, rate: f32| {
+        ((law.velocity_gain_per_s - rate) * rate - law.position_gain_per_s2) * rate
+            + law.position_integral_gain_per_s3
+    };
+    for rate in [8.0, 20.0, 55.0] {
+        assert_eq!(
+            polynomial(&faster, 2.0 * rate),
+            8.0 * polynomial(&law, rate)
+        );
+    }
+    assert_eq!(law.sped_up(1.0), law);
+}
+
+const FRICTION: f32 = 0.6;
+
+fn at_rest(arm: &Arm<f32>) -> Model {
+    let theta_rad = arm
+        .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
+        .unwrap();
+    Model::new(
+        arm,
+        theta_rad,
+        painleve_shared::LinkMotion::zeros(),
+        &GeneralisedTorque::zeros(),
+    )
+}
+
+const SLIDES: FrictionEstimate = FrictionEstimate {
+    coefficient: FRICTION,
+    next_coefficient: FRICTION,
+    catch_up: 0.0,
+    deviation: 0.0,
+    slip: Slip::Positive,
+    slip_seen: true,
+    sticks: false,
+};
+
+fn gives() -> ContactResponse {
+    ContactResponse {
+        lags: 1.0,
+        ..ContactResponse::rigid(1.0)
+    }
+}
+
+/// Returns the input of a tip that slides at its reference on a contact that gives.
+fn sliding<'a>(arm: &'a Arm<f32>, model: &'a Model, response: &'a ContactResponse) -> LawInput<'a> {
+    LawInput {
+        arm,
+        model,
+        posture: Posture::ElbowDown,
+        friction: &SLIDES,
+        p_per_kg: model.p_per_kg(FRICTION, Slip::Positive),
+        response,
+        force_n: Vector2::new(-FRICTION * 10.0, 10.0),
+        contact: true,
+        saturated: false,
+        reference: TipReference::at_rest(model.tip_m.x),
+        torque_limit_nm: 50.0,
+        tick_s: 1e-3,
+    }
+}
+
+/// Runs `test` with the default settings, the input of a tip that slides on a contact that gives, and a new state.
+fn while_sliding(test: impl FnOnce(&HybridSettings, &mut LawInput<'_>, &mut HybridState)) {
+    let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+    let model = at_rest(&arm);
+    test(
+        &HybridSettings::default(),
+        &mut sliding(&arm, &model, &gives()),
+        &mut HybridState::default(),
+    );
+}
+
+#[test]
+fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
+    while_sliding(|settings, input, state| {
+        settings.reset(state, input);
+        let rest_n = Vector2::new(-0.3, 0.5);
+        let model = input.model;
+        let expected = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
+        for _ in 0..200 {
+            input.force_n = state.fed_force_n + rest_n;
+            settings.force_drift_m_s2(state, input);
+        }
+        let learnt = settings.force_drift_m_s2(state, input);
+        assert!(
+            (learnt - expected).abs() < 1e-3 * expected.abs(),
+            "{learnt} {expected}"
+        );
+        // Nothing is learnt from a torque that was limited.
+        input.saturated = true;
+        input.force_n = Vector2::zeros();
+        assert_eq!(settings.force_drift_m_s2(state, input), learnt);
+    });
+}
+
+#[test]
+fn a_reduced_force_is_no_error_of_the_friction() {
+    while_sliding(|settings, input, state| {
+        settings.reset(state, input);
+        state.filtered_friction_n = 0.0;
+        input.torque_limit_nm = 1.0;
+        for _ in 0..100 {
+            settings.tick(state, input);
+            // The contact follows the reduced force exactly.
+            let normal_n = state.fed_force_n.y;
+            input.force_n = Vector2::new(-FRICTION * normal_n, normal_n);
+        }
+        assert!(state.pressing < 0.9, "{state:?}");
+        let fed = -state.fed_force_n.x / state.fed_force_n.y;
+        assert!((fed - FRICTION).abs() < 1e-4, "{state:?}");
+        assert!(state.force_drift_m_s2.abs() < 1e-2, "{state:?}");
+    });
+}
+
+#[test]
+fn the_force_falls_at_once_but_rises_slowly() {
+    while_sliding(|settings, input, state| {
+        settings.reset(state, input);
+        settings.tick(state, input);
+        assert_eq!(state.pressing, 1.0);
+        input.torque_limit_nm = 1.0;
+        settings.tick(state, input);
+        let reduced = state.pressing;
+        assert!(reduced < 0.9, "{reduced}");
+        input.torque_limit_nm = 50.0;
+        for _ in 0..10 {
+            settings.tick(state, input);
+        }
+        let share = (state.pressing - reduced) / (1.0 - reduced);
+        let expected = 1.0 - (1.0 + settings.pressing_rate_per_s * input.tick_s).powi(-10);
+        assert!((share - expected).abs() < 1e-3, "{share} {expected}");
+    });
+}
+
+#[test]
+fn the_force_begins_with_the_present_one_but_with_no_more_than_desired() {
+    while_sliding(|settings, input, state| {
+        for (force_n, share) in [(20.0, 1.0), (4.0, 0.4), (-0.2, settings.least_pressing)] {
+            input.force_n.y = force_n;
+            settings.reset(state, input);
+            assert_eq!(state.pressing, share);
+        }
+    });
+}

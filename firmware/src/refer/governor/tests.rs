@@ -1,0 +1,189 @@
+//! Tests of the edges against Table II of the paper, and of the governed reference.
+
+use super::*;
+use painleve_shared::{ArmParameters, Pose, Slip};
+use proptest::prelude::*;
+
+const TICK_S: f32 = 1e-3;
+
+fn arm() -> Arm<f32> {
+    Arm::new(ArmParameters::default()).unwrap()
+}
+
+fn known(coefficient: f32, slip: Slip) -> FrictionEstimate {
+    FrictionEstimate {
+        coefficient,
+        next_coefficient: coefficient,
+        catch_up: 0.0,
+        deviation: 0.0,
+        slip,
+        slip_seen: true,
+        sticks: false,
+    }
+}
+
+fn governor() -> EdgeGovernor {
+    let settings = GovernorSettings {
+        p_ratio: 0.0,
+        distance_m: 0.0,
+        distance_counts: 0.0,
+        ..Default::default()
+    };
+    EdgeGovernor::new(&settings, TICK_S, &JointErrors::default())
+}
+
+fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> GovernorState {
+    let mut state = GovernorState::new(arm().reach_on_belt_m());
+    for _ in 0..300 {
+        governor().search(&mut state, &arm(), posture, tip_t_m, friction, 0.0);
+    }
+    state
+}
+
+#[test]
+fn the_edges_are_those_of_table_ii() {
+    let friction = known(0.6, Slip::Positive);
+    for (posture, edge) in [(Posture::ElbowUp, 0.182_68), (Posture::ElbowDown, 0.164_71)] {
+        let (lower, upper) = searched(-0.1, posture, &friction).edges_m();
+        assert!((upper - edge).abs() < 2e-5, "{posture:?}: {upper}");
+        assert!(lower < -0.183, "{posture:?}: {lower}");
+    }
+}
+
+/// Returns the distance, m, from the upper edge with the friction 0.6 to where p is zero, 0.16471 m.
+fn distance_m(settings: &GovernorSettings, joints: &JointErrors, tick_s: f32, landing: f32) -> f32 {
+    let governor = EdgeGovernor::new(settings, tick_s, joints);
+    let mut state = GovernorState::new(arm().reach_on_belt_m());
+    let friction = known(0.6, Slip::Positive);
+    for _ in 0..300 {
+        let posture = Posture::ElbowDown;
+        governor.search(&mut state, &arm(), posture, -0.1, &friction, landing);
+    }
+    0.164_71 - state.edges_m().1
+}
+
+#[test]
+fn what_moves_the_tip_adds_to_the_distance_in_squares() {
+    let joints = JointErrors {
+        count_m: 1e-3,
+        friction_nm: 0.05,
+        tip_deviation_m: 2e-3,
+    };
+    let settings = GovernorSettings {
+        p_ratio: 0.0,
+        ..Default::default()
+    };
+    let distance = distance_m(&settings, &joints, TICK_S, 0.0);
+    // 0.5, 3, 3 and 4 mm.
+    assert!((distance - 5.85e-3).abs() < 3e-5, "{distance}");
+    let more = distance_m(&GovernorSettings::default(), &joints, TICK_S, 0.0);
+    assert!(more > distance + 0.5e-3, "{more}");
+}
+
+#[test]
+fn the_stretch_ends_where_p_has_its_least_value_in_kilograms() {
+    let settings = GovernorSettings {
+        p_ratio: 0.0,
+        p_per_kg: 2.0,
+        distance_m: 0.0,
+        ..Default::default()
+    };
+    let back_m = distance_m(&settings, &JointErrors::default(), TICK_S, 0.0);
+    let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+    let theta = arm
+        .link_angles_on_belt_rad(0.164_71 - back_m, Posture::ElbowDown)
+        .unwrap();
+    let p = arm.p(&Pose::new(&theta), 0.6, Slip::Positive);
+    assert!((p - 2.0).abs() < 0.02, "{p} 1/kg, {back_m} m back");
+}
+
+#[test]
+fn a_tip_that_may_land_asks_for_more() {
+    let (settings, joints) = (GovernorSettings::default(), JointErrors::default());
+    let of = |landing| distance_m(&settings, &joints, TICK_S, landing);
+    assert_eq!(of(0.05), of(0.0));
+    assert!(of(0.3) > 2.0 * of(0.0));
+}
+
+#[test]
+fn the_distance_grows_with_the_square_of_the_period() {
+    for (tick_hz, expected_m) in [(2000.0, 0.125e-3), (1000.0, 0.5e-3), (500.0, 2e-3)] {
+        let settings = GovernorSettings {
+            p_ratio: 0.0,
+            ..Default::default()
+        };
+        let distance = distance_m(&settings, &JointErrors::default(), 1.0 / tick_hz, 0.0);
+        assert!((distance - expected_m).abs() < 3e-5, "{distance}");
+    }
+}
+
+#[test]
+fn a_tip_beyond_the_edge_is_led_back_to_the_stretch_next_to_it() {
+    let friction = known(0.6, Slip::Positive);
+    let (_, upper) = searched(0.18, Posture::ElbowDown, &friction).edges_m();
+    assert!((upper - 0.164_71).abs() < 2e-5, "{upper}");
+}
+
+/// Follows the reference `wanted` until it stands still; returns the final and the largest
+/// position.
+fn follow(state: &mut GovernorState, wanted: impl Fn(f32) -> TipReference) -> (TipReference, f32) {
+    let mut largest = f32::MIN;
+    let mut last = TipReference::default();
+    for tick in 0..8000 {
+        last = governor().govern(state, &wanted(tick as f32 * TICK_S));
+        largest = largest.max(last.position_m);
+    }
+    (last, largest)
+}
+
+fn ramp(from: f32, speed: f32, end: f32) -> impl Fn(f32) -> TipReference {
+    move |time: f32| {
+        let position_m = from + speed * time;
+        if position_m < end {
+            TipReference {
+                position_m,
+                velocity_m_s: speed,
+                acceleration_m_s2: 0.0,
+            }
+        } else {
+            TipReference {
+                position_m: end,
+                ..Default::default()
+            }
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn edges_mirror_with_posture_and_slip(friction in 0.4_f32..1.0, tip in -0.1_f32..0.0) {
+        let here = searched(tip, Posture::ElbowDown, &known(friction, Slip::Positive)).edges_m();
+        let there = searched(-tip, Posture::ElbowUp, &known(friction, Slip::Negative)).edges_m();
+        prop_assert!((here.1 + there.0).abs() < 3e-5 && (here.0 + there.1).abs() < 3e-5);
+    }
+
+    #[test]
+    fn a_reference_beyond_the_edge_ends_at_it_and_never_passes_it(
+        speed in 0.03_f32..0.5, end in 0.166_f32..0.3,
+    ) {
+        let mut state = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
+        state.restart(0.0);
+        let edge = state.edges_m().1;
+        let (last, largest) = follow(&mut state, ramp(0.0, speed, end));
+        prop_assert!(state.is_at_edge());
+        prop_assert!(largest < edge + 1e-4, "{} {}", largest, edge);
+        prop_assert!((last.position_m - edge).abs() < 1e-4 && last.velocity_m_s.abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_reference_inside_is_reached_and_then_followed_exactly(
+        speed in 0.01_f32..0.3, end in -0.1_f32..0.16, start in -0.15_f32..0.15,
+    ) {
+        let mut state = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
+        state.restart(start);
+        let (last, _) = follow(&mut state, ramp(-0.15, speed, end));
+        let wanted = ramp(-0.15, speed, end)(7.999);
+        prop_assert!((last.position_m - wanted.position_m).abs() < 1e-4, "{:?} {:?}", last, wanted);
+        prop_assert!(!state.is_at_edge());
+    }
+}
