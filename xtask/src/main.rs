@@ -12,6 +12,7 @@ mod flash;
 mod fmu;
 mod fuzz;
 mod measure;
+mod newcomer;
 mod policy;
 mod python;
 mod setup;
@@ -47,6 +48,8 @@ enum Chore {
     Examples,
     /// Build the Python package, install its wheel in a virtual environment, and test it.
     Python,
+    /// Perform ten tasks of a new user, each one command, with the wheel of `python` and without a compiler.
+    Newcomer,
     /// Build the plant as an FMU (FMI 3.0) and check it with FMPy.
     Fmu,
     /// Disturb plant and controller at every system call and count the flaws.
@@ -72,6 +75,7 @@ fn main() -> ExitCode {
         Chore::Flash(arguments) => flash::run(&arguments),
         Chore::Examples => examples::run(),
         Chore::Python => python::run_chore(),
+        Chore::Newcomer => newcomer::run_chore(),
         Chore::Fmu => fmu::run_chore(),
         Chore::Fuzz(arguments) => fuzz::run(&arguments),
         Chore::Soak(arguments) => soak::run(&arguments),
