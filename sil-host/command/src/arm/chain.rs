@@ -138,3 +138,8 @@ pub fn direction(what: &str, vector: [f64; 3]) -> Result<Vector3<f64>, String> {
         .try_normalize(1e-9)
         .ok_or_else(|| format!("{what} has no direction"))
 }
+
+/// Returns a symmetric matrix from its elements xx, yy, zz, xy, xz, yz.
+pub fn symmetric([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Matrix3<f64> {
+    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+}

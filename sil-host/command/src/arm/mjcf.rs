@@ -3,9 +3,8 @@
 use nalgebra::{Isometry3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use roxmltree::Node;
 
-use super::chain::{Body, Chain, Hinge, Mass, direction, list, numbers};
+use super::chain::{Body, Chain, Hinge, Mass, direction, list, numbers, symmetric};
 use super::shape::Shape;
-use super::urdf::symmetric;
 
 /// MuJoCo's gravity, m/s².
 const GRAVITY_M_S2: [f64; 3] = [0.0, 0.0, -9.81];

@@ -9,10 +9,8 @@ mod tests;
 mod urdf;
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use clap::Args;
-use nalgebra::Vector3;
 use painleve_files::input_file;
 use painleve_plant::mechanics::compliant::{ContactKind, TipContact};
 use painleve_plant::scenario::{InitialState, Scenario};
@@ -21,6 +19,7 @@ use painleve_shared::ArmParameters;
 
 use super::output_error::InputError;
 use super::{CommandError, say};
+use planar::{Imported, Tip};
 
 /// Options of `painleve arm`.
 #[derive(Debug, Args)]
@@ -34,35 +33,6 @@ pub struct ArmArguments {
     /// Distance of the first joint from the belt, m; 0.9 of the arm's reach if absent.
     #[arg(long, value_name = "M")]
     height_m: Option<f64>,
-}
-
-/// The point of link 2 that touches the belt.
-#[derive(Clone, Debug, PartialEq)]
-enum Tip {
-    /// A frame of the file.
-    Frame(String),
-    /// A point in the frame of the link that the second joint turns, m.
-    Point(Vector3<f64>),
-}
-
-impl FromStr for Tip {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if !text.contains(',') {
-            return Ok(Self::Frame(text.into()));
-        }
-        let numbers = chain::numbers::<3>("a point", &text.replace(',', " "))?;
-        Ok(Self::Point(numbers.into()))
-    }
-}
-
-/// An arm of a file.
-#[derive(Debug)]
-struct Imported {
-    arm: ArmParameters<f64>,
-    /// What the file says and the arm cannot have, a part each.
-    ignored: Vec<String>,
 }
 
 /// Share of the arm's reach that is its height above the belt if none is given: the paper's.
@@ -141,5 +111,5 @@ fn read(text: &str, tip: Option<&Tip>) -> Result<Imported, String> {
             ));
         }
     };
-    planar::arm(chain, tip)
+    planar::arm(&chain, tip)
 }

@@ -4,12 +4,12 @@
 //! the tip. Angles are measured as in [`painleve_shared::Arm`], with the belt's inward normal along gravity in that plane.
 
 use std::f64::consts::TAU;
+use std::str::FromStr;
 
 use nalgebra::Vector3;
 use painleve_shared::ArmParameters;
 
-use super::chain::{Chain, Hinge, Mass};
-use super::{Imported, Tip};
+use super::chain::{Chain, Hinge, Mass, numbers};
 
 /// Largest angle between parallel axes, rad: files round right angles.
 const PARALLEL_RAD: f64 = 1e-3;
@@ -17,13 +17,43 @@ const PARALLEL_RAD: f64 = 1e-3;
 /// Largest distance of a centre of mass from its link's line that is not worth a note, relative to the link's length.
 const ON_LINE: f64 = 1e-4;
 
-/// Returns the arm; its height is the default.
+/// The point of link 2 that touches the belt.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Tip {
+    /// A frame of the file.
+    Frame(String),
+    /// A point in the frame of the link that the second joint turns, m.
+    Point(Vector3<f64>),
+}
+
+impl FromStr for Tip {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if !text.contains(',') {
+            return Ok(Self::Frame(text.into()));
+        }
+        let numbers = numbers::<3>("a point", &text.replace(',', " "))?;
+        Ok(Self::Point(numbers.into()))
+    }
+}
+
+/// An arm of a file.
+#[derive(Debug)]
+pub struct Imported {
+    /// The arm; its height is the default.
+    pub arm: ArmParameters<f64>,
+    /// What the file says and the arm cannot have, a part each.
+    pub ignored: Vec<String>,
+}
+
+/// Returns the arm.
 ///
 /// # Errors
 /// The reason in one sentence.
-pub fn arm(chain: Chain, tip: Option<&Tip>) -> Result<Imported, String> {
-    let [first, second] = hinges(&chain)?;
-    let links = links(&chain, first.0, second.0);
+pub fn arm(chain: &Chain, tip: Option<&Tip>) -> Result<Imported, String> {
+    let [first, second] = hinges(chain)?;
+    let links = links(chain, first.0, second.0);
     let (from, to) = (first.1, second.1);
     let across = from.axis.cross(&to.axis).norm();
     if across > PARALLEL_RAD {
@@ -35,7 +65,7 @@ pub fn arm(chain: Chain, tip: Option<&Tip>) -> Result<Imported, String> {
     }
     let axis = from.axis;
     let in_plane = |vector: Vector3<f64>| vector - axis * axis.dot(&vector);
-    let tip_m = tip_place(&chain, &links, second.0, tip)?;
+    let tip_m = tip_place(chain, &links, second.0, tip)?;
     let lines = [
         in_plane(to.anchor - from.anchor),
         in_plane(tip_m - to.anchor),
@@ -51,16 +81,14 @@ pub fn arm(chain: Chain, tip: Option<&Tip>) -> Result<Imported, String> {
     let down = gravity.try_normalize(1e-9).unwrap_or(along_1);
     let angle =
         |from: &Vector3<f64>, to: &Vector3<f64>| axis.dot(&from.cross(to)).atan2(from.dot(to));
-    let mut unused = chain.unused.iter();
-    let mut ignored: Vec<String> = unused
-        .by_ref()
-        .map(|(what, number)| format!("{number} × {what}"))
-        .collect();
+    let unused = chain.unused.iter();
+    let unused = unused.map(|(what, number)| format!("{number} × {what}"));
+    let mut ignored: Vec<String> = unused.collect();
     let mut centres = [0.0; 2];
     let mut inertias = [0.0; 2];
     let mut masses = [0.0; 2];
     for (k, (along, hinge)) in [(along_1, from), (along_2, to)].into_iter().enumerate() {
-        let mass = mass(&chain, &links, k + 1);
+        let mass = mass(chain, &links, k + 1);
         if mass.kg <= 0.0 {
             return Err(format!(
                 "link {} (behind joint '{}') has no mass",

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use painleve_shared::ArmParameters;
 
-use super::{Tip, read};
+use super::planar::Tip;
+use super::read;
 
 const URDF: &str = include_str!("../../../../examples/two-link.urdf");
 

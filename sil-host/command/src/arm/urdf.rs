@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::Node;
 
-use super::chain::{Body, Chain, Hinge, Mass, direction, numbers};
+use super::chain::{Body, Chain, Hinge, Mass, direction, numbers, symmetric};
 
 /// The gravity that programs assume where URDF has none, m/s².
 const GRAVITY_M_S2: f64 = 9.81;
@@ -135,11 +135,6 @@ fn mass(link: Node<'_, '_>) -> Result<Mass, String> {
         inertia: symmetric(moments),
     };
     Ok(mass.placed(&origin(inertial)?))
-}
-
-/// Returns a symmetric matrix from its elements xx, yy, zz, xy, xz, yz.
-pub fn symmetric([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Matrix3<f64> {
-    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
 /// Returns the hinge of a joint in its pose, none if it is fixed.
