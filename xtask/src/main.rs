@@ -7,6 +7,7 @@ mod campaign;
 mod chaos;
 mod ci;
 mod command;
+mod dist;
 mod examples;
 mod flash;
 mod fmu;
@@ -58,6 +59,8 @@ enum Chore {
     Fuzz(fuzz::FuzzArguments),
     /// Simulate a day with a fault in every minute, after which every counter must be exact.
     Soak(soak::SoakArguments),
+    /// Make what a maintainer publishes, in target/dist: commands, wheels, images, FMU, list of dependencies, checksums.
+    Dist(dist::DistArguments),
     /// Measure the figures of docs/benchmarks.md on this machine, pinned, and write its table.
     Bench(bench::BenchArguments),
     /// Measure the figures that the documentation prints, and write them to docs/measured/*.toml.
@@ -80,6 +83,7 @@ fn main() -> ExitCode {
         Chore::Fuzz(arguments) => fuzz::run(&arguments),
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),
+        Chore::Dist(arguments) => dist::run_chore(&arguments),
         Chore::Bench(arguments) => bench::run(&arguments),
         Chore::Measure(arguments) => measure::run(&arguments),
         Chore::Ci => ci::run(),
