@@ -279,7 +279,7 @@ impl Dist {
                 &cargo(),
                 &[
                     "install",
-                    "cargo-sbom",
+                    "cargo-sbom@0.10.0",
                     "--locked",
                     "--root",
                     "target/tools",
