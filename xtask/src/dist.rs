@@ -78,7 +78,12 @@ pub fn run_chore(arguments: &DistArguments) -> Result<(), ChoreError> {
         [] => &ALL[..],
         parts => parts,
     };
-    let dist = Dist::new()?;
+    let folder = workspace().join(FOLDER);
+    if arguments.parts.is_empty() && folder.exists() {
+        // Files of another version would be published too.
+        fs::remove_dir_all(&folder).map_err(|cause| unwritable(&folder, &cause))?;
+    }
+    let dist = Dist::new(folder)?;
     for part in parts {
         match part {
             Part::Command => dist.command()?,
@@ -102,8 +107,7 @@ struct Dist {
 
 impl Dist {
     /// Installs the tools.
-    fn new() -> Result<Self, ChoreError> {
-        let folder = workspace().join(FOLDER);
+    fn new(folder: PathBuf) -> Result<Self, ChoreError> {
         fs::create_dir_all(&folder).map_err(|cause| unwritable(&folder, &cause))?;
         run("python3", &["-m", "venv", ENVIRONMENT])?;
         let python = format!("{ENVIRONMENT}/bin/python");
