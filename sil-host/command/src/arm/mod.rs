@@ -35,6 +35,9 @@ pub struct ArmArguments {
     height_m: Option<f64>,
 }
 
+/// Largest number of elements and texts of a file: each element is looked up among all. Real arms have hundreds.
+const MOST_NODES: u32 = 10_000;
+
 /// Share of the arm's reach that is its height above the belt if none is given: the paper's.
 const HEIGHT_SHARE: f64 = 0.9;
 
@@ -100,7 +103,12 @@ fn scenario(path: &Path, arm: ArmParameters<f64>) -> Result<Scenario, CommandErr
 
 /// Reads an arm from the text of a file; its height is the default.
 fn read(text: &str, tip: Option<&Tip>) -> Result<Imported, String> {
-    let document = roxmltree::Document::parse(text).map_err(|error| error.to_string())?;
+    let limited = roxmltree::ParsingOptions {
+        nodes_limit: MOST_NODES,
+        ..roxmltree::ParsingOptions::default()
+    };
+    let document = roxmltree::Document::parse_with_options(text, limited);
+    let document = document.map_err(|error| error.to_string())?;
     let root = document.root_element();
     let chain = match root.tag_name().name() {
         "robot" => urdf::chain(root)?,
