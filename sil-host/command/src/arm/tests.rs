@@ -283,3 +283,10 @@ fn what_is_no_planar_two_link_arm_is_refused_with_the_reason() {
         assert!(message.contains(expected), "{message}\n{expected}");
     }
 }
+
+#[test]
+fn a_file_with_very_many_elements_is_refused() {
+    let bodies = "<body>".repeat(20_000) + &"</body>".repeat(20_000);
+    let message = refusal(&format!("<mujoco><worldbody>{bodies}</worldbody></mujoco>"));
+    assert!(message.contains("nodes limit"), "{message}");
+}
