@@ -1,6 +1,6 @@
 """Many runs, and what they show: sweeps, differences, figures, margins.
 
-`sweep` and `compare` need `pip install pandas`, `plot` needs `pip install matplotlib`.
+`sweep`, `compare` and `plot` need what `pip install painleve[plot]` installs: pandas and Matplotlib.
 """
 
 import itertools

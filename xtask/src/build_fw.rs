@@ -10,7 +10,7 @@ use crate::command::{ChoreError, cargo, run_with, workspace};
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The profile of the images.
-const PROFILE: &str = "firmware";
+pub const PROFILE: &str = "firmware";
 
 /// Debian's own compiler, from the packages `rustc-web` and `rust-web-src`.
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";

@@ -1,8 +1,9 @@
 //! `cargo xtask fmu`: builds the plant as an FMU and checks it with FMPy.
 
+use std::path::PathBuf;
+
 use crate::command::{ChoreError, cargo, run, run_with, workspace};
 
-const FMU: &str = "target/fmu/painleve.fmu";
 const ENVIRONMENT: &str = "target/python/fmu";
 const FMPY: &str = "fmpy==0.3.*";
 
@@ -12,13 +13,23 @@ const FMPY: &str = "fmpy==0.3.*";
 /// # Errors
 /// If a step fails.
 pub fn run_chore() -> Result<(), ChoreError> {
-    // The crate is a workspace of its own; its bundler takes the target folder from the environment.
-    let bundle = ["run", "--release", "--manifest-path", "fmu/Cargo.toml"];
-    let target = workspace().join("target");
-    let target = target.to_string_lossy();
-    run_with(&cargo(), &bundle, &[("CARGO_TARGET_DIR", &target)])?;
+    let fmu = build("target", &[])?;
     run("python3", &["-m", "venv", ENVIRONMENT])?;
     let python = format!("{ENVIRONMENT}/bin/python");
     run(&python, &["-m", "pip", "install", "--quiet", FMPY])?;
-    run(&python, &["fmu/check.py", FMU])
+    run(&python, &["fmu/check.py", &fmu.to_string_lossy()])
+}
+
+/// Builds the FMU for this computer into a target folder, and returns its path.
+///
+/// # Errors
+/// If the build fails.
+pub fn build(target: &str, environment: &[(&str, &str)]) -> Result<PathBuf, ChoreError> {
+    // The crate is a workspace of its own; its bundler takes the target folder from the environment.
+    let bundle = ["run", "--release", "--manifest-path", "fmu/Cargo.toml"];
+    let target = workspace().join(target);
+    let folder = target.to_string_lossy();
+    let folder = [("CARGO_TARGET_DIR", folder.as_ref())];
+    run_with(&cargo(), &bundle, &[&folder, environment].concat())?;
+    Ok(target.join("fmu/painleve.fmu"))
 }

@@ -7,11 +7,13 @@ mod campaign;
 mod chaos;
 mod ci;
 mod command;
+mod dist;
 mod examples;
 mod flash;
 mod fmu;
 mod fuzz;
 mod measure;
+mod newcomer;
 mod policy;
 mod python;
 mod setup;
@@ -47,6 +49,8 @@ enum Chore {
     Examples,
     /// Build the Python package, install its wheel in a virtual environment, and test it.
     Python,
+    /// Perform ten tasks of a new user, each one command, with the wheel of `python` and without a compiler.
+    Newcomer,
     /// Build the plant as an FMU (FMI 3.0) and check it with FMPy.
     Fmu,
     /// Disturb plant and controller at every system call and count the flaws.
@@ -55,6 +59,8 @@ enum Chore {
     Fuzz(fuzz::FuzzArguments),
     /// Simulate a day with a fault in every minute, after which every counter must be exact.
     Soak(soak::SoakArguments),
+    /// Make what a maintainer publishes, in target/dist: commands, wheels, images, FMU, list of dependencies, checksums.
+    Dist(dist::DistArguments),
     /// Measure the figures of docs/benchmarks.md on this machine, pinned, and write its table.
     Bench(bench::BenchArguments),
     /// Measure the figures that the documentation prints, and write them to docs/measured/*.toml.
@@ -72,10 +78,12 @@ fn main() -> ExitCode {
         Chore::Flash(arguments) => flash::run(&arguments),
         Chore::Examples => examples::run(),
         Chore::Python => python::run_chore(),
+        Chore::Newcomer => newcomer::run_chore(),
         Chore::Fmu => fmu::run_chore(),
         Chore::Fuzz(arguments) => fuzz::run(&arguments),
         Chore::Soak(arguments) => soak::run(&arguments),
         Chore::Chaos(arguments) => chaos::run(&arguments),
+        Chore::Dist(arguments) => dist::run_chore(&arguments),
         Chore::Bench(arguments) => bench::run(&arguments),
         Chore::Measure(arguments) => measure::run(&arguments),
         Chore::Ci => ci::run(),

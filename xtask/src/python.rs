@@ -1,26 +1,23 @@
-//! `cargo xtask python`: builds the Python package, installs its wheel in a virtual environment, tests it,
-//! and executes its notebook.
+//! `cargo xtask python`: builds the Python package, installs its wheel in a virtual environment, and tests it.
 
-use crate::command::{ChoreError, run};
+use std::path::PathBuf;
+
+use crate::command::{ChoreError, run, workspace};
 
 const MANIFEST: &str = "python/Cargo.toml";
 const FOLDER: &str = "target/python/package";
 const WHEELS: &str = "target/python/wheels";
 /// The test's own requirements.
-const TOOLS: [&str; 8] = [
+const TOOLS: [&str; 6] = [
     "maturin>=1.9,<2",
     "pytest",
     "gymnasium",
     "numpy",
     "pandas",
     "matplotlib",
-    "nbconvert",
-    "ipykernel",
 ];
-const NOTEBOOK_PAGE_FOLDER: &str = "target/python";
-const NOTEBOOK: &str = "python/notebooks/bounce_and_edge.ipynb";
 
-/// Builds, installs and tests the package, and executes its notebook to `target/python`; needs Python 3.10 with `venv`, and the package index.
+/// Builds, installs and tests the package; needs Python 3.10 with `venv`, and the package index.
 ///
 /// # Errors
 /// If a step fails.
@@ -51,8 +48,18 @@ pub fn run_chore() -> Result<(), ChoreError> {
         "painleve",
     ];
     run(&python, &[&pip[..], &install].concat())?;
-    run(&python, &["-m", "pytest", "-q", "python/tests"])?;
-    let execute = ["-m", "nbconvert", "--to", "html", "--execute"];
-    let to = ["--output-dir", NOTEBOOK_PAGE_FOLDER, NOTEBOOK];
-    run(&python, &[&execute[..], &to].concat())
+    run(&python, &["-m", "pytest", "-q", "python/tests"])
+}
+
+/// Returns the newest wheel that this chore has built.
+///
+/// # Errors
+/// If there is none.
+pub fn wheel() -> Result<PathBuf, ChoreError> {
+    let files = std::fs::read_dir(workspace().join(WHEELS));
+    let files = files.into_iter().flatten().flatten();
+    let wheels = files.filter(|file| file.path().extension().is_some_and(|end| end == "whl"));
+    let built = |file: &std::fs::DirEntry| file.metadata().and_then(|data| data.modified()).ok();
+    let newest = wheels.max_by_key(built).map(|file| file.path());
+    newest.ok_or_else(|| ChoreError(format!("no wheel in {WHEELS}: run `cargo xtask python`")))
 }

@@ -2,6 +2,7 @@
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
 
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::{fs, io};
 
@@ -45,41 +46,19 @@ pub fn run() -> Result<(), ChoreError> {
 /// If the measurement fails, or an image exceeds a limit.
 pub fn check_images() -> Result<(), ChoreError> {
     let mut over = Vec::new();
-    let budget = Budget::read()?;
     let boards = boards::all()?;
     for name in boards.iter().flat_map(|board| &board.images) {
         let path = build_fw::image(name);
-        let error = |reason: String| ChoreError(format!("{}: {reason}", path.display()));
-        let bytes = std::fs::read(&path).map_err(|cause| error(cause.to_string()))?;
-        let image = object::File::parse(&*bytes).map_err(|cause| error(cause.to_string()))?;
-        say(name)?;
-        for (what, size, limit) in [
-            (
-                "flash",
-                flash_bytes(&image),
-                budget.image(name, "flash_bytes")?,
-            ),
-            (
-                "static RAM",
-                ram_bytes(&image),
-                budget.image(name, "ram_bytes")?,
-            ),
-        ] {
+        for Section { what, size, limit } in sections(name, &path)? {
             over.extend(check(name, what, size, limit)?);
             for (_, chip) in PRINTED_IMAGES.iter().filter(|(image, _)| name == image) {
                 over.extend(misprinted(what, chip, size, limit));
             }
         }
-        say("  largest symbols")?;
-        let mut symbols: Vec<_> = image.symbols().collect();
-        symbols.sort_by_key(|symbol| std::cmp::Reverse(symbol.size()));
-        for symbol in symbols.iter().take(LARGEST) {
-            let name = rustc_demangle::demangle(symbol.name().unwrap_or("?"));
-            say(&format!("  {:>7}  {name:#}", symbol.size()))?;
-        }
+        print_largest_symbols(&path)?;
     }
     say("painleve-f405 under QEMU, maximum over all built-in scenarios")?;
-    let stack_limit = budget.limit(&["stack_bytes"])?;
+    let stack_limit = Budget::read()?.limit(&["stack_bytes"])?;
     let stack = stack_bytes()?;
     over.extend(check("painleve-f405", "stack", stack, stack_limit)?);
     over.extend(misprinted("stack", "", stack, stack_limit));
@@ -88,6 +67,71 @@ pub fn check_images() -> Result<(), ChoreError> {
     } else {
         Err(ChoreError(over.join("; ")))
     }
+}
+
+/// Prints flash and RAM of an image in a file, and checks them.
+///
+/// # Errors
+/// If the file is no image, or the image exceeds a limit.
+pub fn check_image(name: &str, path: &Path) -> Result<(), ChoreError> {
+    let mut over = Vec::new();
+    for Section { what, size, limit } in sections(name, path)? {
+        over.extend(check(name, what, size, limit)?);
+    }
+    if over.is_empty() {
+        Ok(())
+    } else {
+        Err(ChoreError(over.join("; ")))
+    }
+}
+
+/// A part of a chip's memory, bytes.
+struct Section {
+    what: &'static str,
+    size: u64,
+    limit: u64,
+}
+
+/// Returns flash and RAM of an image.
+fn sections(name: &str, path: &Path) -> Result<[Section; 2], ChoreError> {
+    say(name)?;
+    let budget = Budget::read()?;
+    let bytes = read(path)?;
+    let image = parse(path, &bytes)?;
+    Ok([
+        Section {
+            what: "flash",
+            size: flash_bytes(&image),
+            limit: budget.image(name, "flash_bytes")?,
+        },
+        Section {
+            what: "static RAM",
+            size: ram_bytes(&image),
+            limit: budget.image(name, "ram_bytes")?,
+        },
+    ])
+}
+
+fn print_largest_symbols(path: &Path) -> Result<(), ChoreError> {
+    say("  largest symbols")?;
+    let bytes = read(path)?;
+    let image = parse(path, &bytes)?;
+    let mut symbols: Vec<_> = image.symbols().collect();
+    symbols.sort_by_key(|symbol| std::cmp::Reverse(symbol.size()));
+    for symbol in symbols.iter().take(LARGEST) {
+        let name = rustc_demangle::demangle(symbol.name().unwrap_or("?"));
+        say(&format!("  {:>7}  {name:#}", symbol.size()))?;
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, ChoreError> {
+    fs::read(path).map_err(|cause| ChoreError(format!("{}: {cause}", path.display())))
+}
+
+fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<object::File<'a>, ChoreError> {
+    let image = object::File::parse(bytes);
+    image.map_err(|cause| ChoreError(format!("{}: {cause}", path.display())))
 }
 
 /// The limits of `tests/budget.json`.

@@ -15,13 +15,13 @@ use crate::command::{
     ChoreError, PROFILE, build_program, cargo, program, run_cargo, say, workspace,
 };
 use crate::setup::{self, Tools};
-use crate::{campaign, chaos, examples, fmu, fuzz, policy, python, size, soak};
+use crate::{campaign, chaos, examples, fmu, fuzz, newcomer, policy, python, size, soak};
 
 /// Options of `cargo xtask test`.
 #[derive(Debug, Default, Args)]
 pub struct TestArguments {
-    /// Also run what takes long or requires further tools: the least Rust version, licences, campaigns, examples, Python,
-    /// FMU, malformed input, soak, chaos; and install the browser.
+    /// Also run what takes long or requires further tools: the least Rust version, licences, campaigns, examples, Python, ten
+    /// tasks of a new user, FMU, malformed input, soak, chaos; and install the browser.
     #[arg(long)]
     all: bool,
     /// List the slowest tests; requires cargo-nextest.
@@ -36,12 +36,13 @@ const LISTED: usize = 25;
 const LONGEST_TEST_S: f64 = 20.0;
 
 /// What `--all` runs after the tests of the workspace, in this order.
-const FURTHER_STEPS: [(&str, Step); 9] = [
+const FURTHER_STEPS: [(&str, Step); 10] = [
     ("least Rust version", policy::least_rust),
     ("licences and sources of dependencies", policy::dependencies),
     ("campaigns with a fresh seed", campaign::run),
     ("examples", examples::run),
     ("Python package", python::run_chore),
+    ("ten tasks of a new user", newcomer::run_chore),
     ("FMU", fmu::run_chore),
     ("malformed input, 2,000 cases each", fuzz::nightly),
     ("soak", soak::nightly),

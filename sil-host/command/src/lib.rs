@@ -1,6 +1,7 @@
 //! The `painleve` command: subcommands, options and errors.
 
 mod accept;
+mod arm;
 mod bridge;
 mod commission;
 mod compare;
@@ -111,6 +112,8 @@ enum Command {
     Completions(completions::CompletionsArguments),
     /// Write a manual page for every command.
     Man(completions::ManArguments),
+    /// Read a planar two-link arm from a URDF or an MJCF file, and print it as a scenario.
+    Arm(arm::ArmArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
     /// Compute one of the paper's studies as numbers, data files and figures.
@@ -426,6 +429,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Completions(_)
         | Command::Man(_)
         | Command::Compare(_)
+        | Command::Arm(_)
         | Command::Diff(_)
         | Command::Tune(_)
         | Command::Export(_)
@@ -446,6 +450,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Drive(arguments) => drive::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Arm(arguments) => arm::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Timing(arguments) => timing::run(&arguments),

@@ -90,6 +90,14 @@ pub enum RecordFileError {
 /// A file or option cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
+    /// A file has no planar two-link arm.
+    #[error("{}: {reason}", path.display())]
+    Arm {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        reason: String,
+    },
     /// A recorded slide cannot be used.
     #[error("--slide {}: {reason}", path.display())]
     Slide {

@@ -1,5 +1,6 @@
 //! End-to-end tests: real processes, real shared memory, real QEMU.
 
+mod arm;
 mod bound;
 mod broken_lines;
 mod browser;
