@@ -46,9 +46,9 @@ settings! {
         /// Readings that decide about contact.
         evidence: Evidence = Evidence::ForceCell;
         /// Smallest normal force of a contact, f_c; at most the force cell's range.
-        contact_n: f32 = 0.5, 1e-3..=1e6, "N";
+        contact_n: f32 = 0.3, 1e-3..=1e6, "N";
         /// Standard deviation of one reading of the force cell, σ; at most the force cell's range.
-        force_noise_n: f32 = 0.1, 1e-4..=1e6, "N";
+        force_noise_n: f32 = 0.08, 1e-4..=1e6, "N";
         /// Uncertainty of the gap beyond the encoders' resolution.
         gap_uncertainty_m: f32 = 15e-6, 0.0..=0.01, "m";
     }
