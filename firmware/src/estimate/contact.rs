@@ -46,7 +46,7 @@ settings! {
         /// Readings that decide about contact.
         evidence: Evidence = Evidence::ForceCell;
         /// Smallest normal force of a contact, f_c; at most the force cell's range.
-        contact_n: f32 = 0.3, 1e-3..=1e6, "N";
+        contact_n: f32 = 0.35, 1e-3..=1e6, "N";
         /// Standard deviation of one reading of the force cell, σ; at most the force cell's range.
         force_noise_n: f32 = 0.08, 1e-4..=1e6, "N";
         /// Uncertainty of the gap beyond the encoders' resolution.
