@@ -34,8 +34,15 @@ impl JsonOption {
 mod tests {
     use clap::{Command, CommandFactory};
 
-    /// Commands without a result on standard output, and one that prints a script for the shell.
-    const WITHOUT_RESULT: [&str; 5] = ["controller", "qemu", "drivers", "serial", "completions"];
+    /// Commands without a result on standard output, and two that print a file: a script for the shell, a scenario.
+    const WITHOUT_RESULT: [&str; 6] = [
+        "controller",
+        "qemu",
+        "drivers",
+        "serial",
+        "completions",
+        "arm",
+    ];
 
     /// Returns the names of commands without `--json`.
     fn without_json(command: &Command) -> Vec<String> {

@@ -1,5 +1,7 @@
 //! `painleve arm`: arms of URDF and MJCF files, and MuJoCo as the witness of their equations of motion.
 
+#![allow(clippy::unwrap_used)]
+
 use std::process::Command;
 
 use painleve_plant::scenario::Scenario;

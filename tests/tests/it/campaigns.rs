@@ -34,8 +34,8 @@ fn wrong_keys_and_values_are_named_and_nothing_is_written() {
     for study in ["robustness", "ablation", "effects", "capture", "lift-off"] {
         for (wrong, expected) in [
             (
-                "controller.disturbance.enabld=true",
-                &["controller.disturbance.enabld", "did you mean 'enabled'"][..],
+                "controller.response.enabld=true",
+                &["controller.response.enabld", "did you mean 'enabled'"][..],
             ),
             (
                 "converters.link.frame_loss=2",

@@ -168,7 +168,7 @@ mod tests {
         let schema = json_schema();
         let contact = &schema["properties"]["controller"]["properties"]["contact"];
         let force = &contact["properties"]["contact_n"];
-        assert_eq!(force["default"], 0.5);
+        assert_eq!(force["default"], 0.35);
         let description = force["description"].as_str().unwrap();
         assert!(description.starts_with("Smallest normal force of a contact"));
     }
