@@ -30,6 +30,8 @@ pub mod refer;
 pub mod schedule;
 pub mod supervise;
 pub mod telemetry;
+#[cfg(test)]
+mod test_readings;
 pub mod torque_output;
 
 /// Hash of the sources of the controller and of what it shares with the plant. It is displayed, and tells an image of

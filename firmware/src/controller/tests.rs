@@ -5,6 +5,7 @@ use crate::configuration::ControllerSettings;
 use crate::estimate::contact::Evidence;
 use crate::refer::reference::Program;
 use crate::supervise::lapses::{Lapse, LapseLimits};
+use crate::test_readings::pressing as frame;
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::DigitalInputs;
 use painleve_shared::status::{Fault, SupervisorState};
@@ -16,26 +17,6 @@ fn configuration() -> Configuration {
             ..Default::default()
         },
         ..Default::default()
-    }
-}
-
-/// The arm at rest at x0,d, pressing with 10 N.
-fn frame(tick: u32) -> SensorFrame {
-    let encoder = configuration().converters.encoders[0];
-    let pressing = SensorFrame {
-        tick,
-        sequence: tick,
-        joints: [
-            encoder.reading((-11.4_f64).to_radians()),
-            encoder.reading((-35.1_f64 + 11.4).to_radians()),
-        ],
-        normal_force: ForceCounts(1024),
-        tangential_force: ForceCounts(-614),
-        ..Default::default()
-    };
-    SensorFrame {
-        inputs: DigitalInputs::ENABLE,
-        ..pressing
     }
 }
 

@@ -1,8 +1,8 @@
 //! Tests of the control task on a drive of plain values.
 
 use super::*;
-use painleve_shared::counts::{ForceCounts, TorqueCounts};
-use painleve_shared::frame::DigitalInputs;
+use crate::test_readings::pressing as frame;
+use painleve_shared::counts::TorqueCounts;
 use painleve_shared::status::{Fault, SupervisorState};
 use std::cell::Cell;
 use std::vec::Vec;
@@ -51,22 +51,6 @@ impl Drive for Mock {
 impl Mock {
     fn calls(&mut self) -> Vec<Call> {
         core::mem::take(&mut self.calls)
-    }
-}
-
-/// The arm at rest at x0,d, pressing with 10 N.
-fn frame(tick: u32) -> SensorFrame {
-    let [encoder, _] = Configuration::<LawSettings>::default().converters.encoders;
-    SensorFrame {
-        tick,
-        sequence: tick,
-        joints: [
-            encoder.reading((-11.4_f64).to_radians()),
-            encoder.reading((-35.1_f64 + 11.4).to_radians()),
-        ],
-        normal_force: ForceCounts(1024),
-        tangential_force: ForceCounts(-614),
-        inputs: DigitalInputs::ENABLE,
     }
 }
 

@@ -1,17 +1,22 @@
 //! Tests of the friction estimate on simulated readings.
 
 use super::*;
+use crate::test_readings;
 use proptest::prelude::*;
 
 const NOISE_N: f32 = 0.1;
 
-/// Returns uniform noise with the given deviation from a fixed stream.
+/// Returns uniform noise with that deviation.
 fn noise(step: u32) -> f32 {
-    let bits = step
-        .wrapping_mul(2_654_435_761)
-        .rotate_left(13)
-        .wrapping_mul(2_246_822_519);
-    ((bits >> 8) as f32 / (1 << 24) as f32 - 0.5) * 12.0_f32.sqrt() * NOISE_N
+    3.0_f32.sqrt() * NOISE_N * test_readings::noise(step)
+}
+
+/// The settings of a force cell with that noise.
+fn cell() -> ContactSettings {
+    ContactSettings {
+        force_noise_n: NOISE_N,
+        ..ContactSettings::default()
+    }
 }
 
 fn slide(tested: &mut Tested, friction: f32, slip: Slip, ticks: u32) {
@@ -30,7 +35,7 @@ impl Tested {
             first_guess,
             ..Default::default()
         };
-        let estimator = FrictionEstimator::new(&settings, &ContactSettings::default(), 1e-3);
+        let estimator = FrictionEstimator::new(&settings, &cell(), 1e-3);
         Self(estimator, estimator.start(), false)
     }
 
@@ -213,7 +218,7 @@ fn a_friction_that_is_not_estimated_stays_the_first_guess() {
         first_deviation: 0.0,
         ..Default::default()
     };
-    let estimator = FrictionEstimator::new(&settings, &ContactSettings::default(), 1e-3);
+    let estimator = FrictionEstimator::new(&settings, &cell(), 1e-3);
     for (friction, drags) in [(0.3, false), (0.3, true), (0.8, false), (0.6, false)] {
         let mut tested = Tested(estimator, estimator.start(), drags);
         for slip in [Slip::Negative, Slip::Positive] {

@@ -1,19 +1,11 @@
 //! Tests of the response of the contact on simulated contacts.
 
 use super::*;
+use crate::test_readings::noise;
 
 const TICK_S: f32 = 1e-3;
 const P_PER_KG: f32 = 2.4;
 const P_RATIO: f32 = 0.09;
-
-/// Returns uniform noise in −1 … 1 from a fixed stream.
-fn noise(step: u32) -> f32 {
-    let bits = step
-        .wrapping_mul(2_654_435_761)
-        .rotate_left(13)
-        .wrapping_mul(2_246_822_519);
-    (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
-}
 
 /// Returns the response after `ticks` of a contact that gives the force (N) in
 /// answer to the force commanded at the previous tick.
