@@ -113,6 +113,19 @@ impl Chain {
     }
 }
 
+/// Returns the elements inside another one that have this tag.
+pub fn elements<'a>(
+    node: Node<'a, 'a>,
+    tag: &'static str,
+) -> impl DoubleEndedIterator<Item = Node<'a, 'a>> {
+    node.children().filter(move |child| child.has_tag_name(tag))
+}
+
+/// Returns how an element is called in messages.
+pub fn label<'a>(node: Node<'a, '_>) -> &'a str {
+    node.attribute("name").unwrap_or("without name")
+}
+
 /// Reads the numbers of an attribute; `what` names it.
 pub fn list(what: &str, text: &str) -> Result<Vec<f64>, String> {
     let number = |part: &str| part.parse().ok().filter(|number: &f64| number.is_finite());

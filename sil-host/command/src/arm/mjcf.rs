@@ -3,7 +3,9 @@
 use nalgebra::{Isometry3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use roxmltree::Node;
 
-use super::chain::{Body, Chain, Hinge, Mass, direction, list, numbers, symmetric};
+use super::chain::{
+    Body, Chain, Hinge, Mass, direction, elements, label, list, numbers, symmetric,
+};
 use super::shape::Shape;
 
 /// MuJoCo's gravity, m/s².
@@ -80,16 +82,8 @@ pub fn chain<'a>(root: Node<'a, 'a>) -> Result<Chain, String> {
     Ok(chain)
 }
 
-fn elements<'a>(
-    node: Node<'a, 'a>,
-    tag: &'static str,
-) -> impl DoubleEndedIterator<Item = Node<'a, 'a>> {
-    node.children().filter(move |child| child.has_tag_name(tag))
-}
-
-fn label(node: Node<'_, '_>) -> String {
-    let name = node.attribute("name").unwrap_or("without name");
-    format!("{} '{name}'", node.tag_name().name())
+fn described(node: Node<'_, '_>) -> String {
+    format!("{} '{}'", node.tag_name().name(), label(node))
 }
 
 impl<'a> Reader<'a> {
@@ -125,8 +119,7 @@ impl<'a> Reader<'a> {
                         let has_inertial = elements(part, "inertial").next().is_some();
                         let counts_geoms = self.counts_geoms[usize::from(!has_inertial)];
                         ahead.push((part, pose, chain.bodies.len(), counts_geoms));
-                        let name = part.attribute("name").unwrap_or("without name");
-                        chain.bodies.push(body(name, pose, Some(index)));
+                        chain.bodies.push(body(label(part), pose, Some(index)));
                     }
                     // It belongs to the body around it.
                     "frame" => ahead.push((part, pose * self.pose(part)?, index, counts_geoms)),
@@ -135,7 +128,10 @@ impl<'a> Reader<'a> {
                         chain.bodies[index].hinges.push(hinge);
                     }
                     "freejoint" => {
-                        return Err(format!("{} floats: an arm stands on a base", label(node)));
+                        return Err(format!(
+                            "{} floats: an arm stands on a base",
+                            described(node)
+                        ));
                     }
                     "inertial" if !counts_geoms => {
                         chain.note_unused(
@@ -152,10 +148,9 @@ impl<'a> Reader<'a> {
                     }
                     "site" => {
                         let at = pose * self.pose(part)?;
-                        let name = part.attribute("name").unwrap_or("without name").into();
                         chain.bodies[index]
                             .frames
-                            .push((name, at.translation.vector));
+                            .push((label(part).into(), at.translation.vector));
                     }
                     _ => {}
                 }
@@ -206,7 +201,7 @@ impl<'a> Reader<'a> {
         node: Node<'a, 'a>,
         name: &str,
     ) -> Result<Option<[f64; N]>, String> {
-        let what = || format!("{}: {name}", label(node));
+        let what = || format!("{}: {name}", described(node));
         self.attribute(node, name)
             .map(|text| numbers(&what(), text))
             .transpose()
@@ -228,7 +223,7 @@ impl<'a> Reader<'a> {
     }
 
     fn turn(&self, node: Node<'a, 'a>) -> Result<UnitQuaternion<f64>, String> {
-        let what = label(node);
+        let what = described(node);
         if let Some([w, x, y, z]) = self.numbers(node, "quat")? {
             let quaternion = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9);
             return quaternion.ok_or_else(|| format!("{what}: quat has no direction"));
@@ -284,7 +279,7 @@ impl<'a> Reader<'a> {
         ) {
             (Some(full), _) => moments = full,
             (None, Some(diagonal)) => moments[..3].copy_from_slice(&diagonal),
-            (None, None) => return Err(format!("{}: <inertial> has no inertia", label(body))),
+            (None, None) => return Err(format!("{}: <inertial> has no inertia", described(body))),
         }
         let mass = Mass {
             kg: self.number(node, "mass")?,
@@ -296,7 +291,7 @@ impl<'a> Reader<'a> {
 
     /// Returns the mass of a geom in the body around it.
     fn geom(&self, node: Node<'a, 'a>) -> Result<Mass, String> {
-        let what = label(node);
+        let what = described(node);
         let size = self.attribute(node, "size");
         let mut size = list(&format!("{what}: size"), size.unwrap_or_default())?;
         let ends = self.numbers::<6>(node, "fromto")?;
@@ -341,7 +336,7 @@ impl<'a> Reader<'a> {
         node: Node<'a, 'a>,
         pose: &Isometry3<f64>,
     ) -> Result<Hinge, String> {
-        let of = label(node);
+        let of = described(node);
         let used = [
             "name",
             "class",
@@ -363,7 +358,7 @@ impl<'a> Reader<'a> {
         let axis = self.numbers(node, "axis")?.unwrap_or([0.0, 0.0, 1.0]);
         let at = Vector3::from(self.numbers(node, "pos")?.unwrap_or_default());
         Ok(Hinge {
-            name: node.attribute("name").unwrap_or("without name").into(),
+            name: label(node).into(),
             anchor: pose.rotation * at + pose.translation.vector,
             axis: pose.rotation * direction(&of, axis)?,
             damping: self.number(node, "damping")?,

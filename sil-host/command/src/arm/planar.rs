@@ -147,12 +147,7 @@ fn hinges(chain: &Chain) -> Result<[(usize, &Hinge); 2], String> {
     let bodies = chain.bodies.iter().enumerate();
     let all = bodies.flat_map(|(index, body)| body.hinges.iter().map(move |hinge| (index, hinge)));
     let all: Vec<(usize, &Hinge)> = all.collect();
-    let names = || {
-        all.iter()
-            .map(|(_, hinge)| format!("'{}'", hinge.name))
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
+    let names = || quoted(all.iter().map(|(_, hinge)| &hinge.name));
     match all[..] {
         [first, second] if is_behind(chain, second.0, first.0) => Ok([first, second]),
         [first, second] if is_behind(chain, first.0, second.0) => Ok([second, first]),
@@ -171,6 +166,12 @@ fn hinges(chain: &Chain) -> Result<[(usize, &Hinge); 2], String> {
             names()
         )),
     }
+}
+
+/// Returns names for a message.
+fn quoted<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let quoted: Vec<String> = names.map(|name| format!("'{name}'")).collect();
+    quoted.join(", ")
 }
 
 /// Whether a body is carried by another one.
@@ -219,13 +220,6 @@ fn tip_place(
                 .map(move |(k, frame)| (body, k, frame))
         })
     };
-    let names = |names: Vec<&str>| {
-        names
-            .iter()
-            .map(|name| format!("'{name}'"))
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
     match tip {
         Some(Tip::Point(point)) => Ok(chain.bodies[second]
             .pose
@@ -233,7 +227,7 @@ fn tip_place(
             .coords),
         Some(Tip::Frame(name)) => {
             let found = frames().find(|(_, _, (frame, _))| frame == name);
-            let all = || names(frames().map(|(_, _, (frame, _))| frame.as_str()).collect());
+            let all = || quoted(frames().map(|(_, _, (frame, _))| frame));
             found
                 .map(|(_, _, (_, place))| *place)
                 .ok_or_else(|| format!("--tip {name}: link 2 has no such frame, only {}", all()))
@@ -252,7 +246,7 @@ fn tip_place(
                 ),
                 _ => Err(format!(
                     "link 2 has several frames at its end: choose one with --tip NAME: {}",
-                    names(ends.iter().map(|(name, _)| name.as_str()).collect())
+                    quoted(ends.iter().map(|(name, _)| name))
                 )),
             }
         }

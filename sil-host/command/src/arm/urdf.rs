@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::Node;
 
-use super::chain::{Body, Chain, Hinge, Mass, direction, numbers, symmetric};
+use super::chain::{Body, Chain, Hinge, Mass, direction, elements, label, numbers, symmetric};
 
 /// The gravity that programs assume where URDF has none, m/s².
 const GRAVITY_M_S2: f64 = 9.81;
@@ -71,14 +71,6 @@ pub fn chain(robot: Node<'_, '_>) -> Result<Chain, String> {
         }
     }
     Ok(chain)
-}
-
-fn elements<'a>(node: Node<'a, 'a>, tag: &'static str) -> impl Iterator<Item = Node<'a, 'a>> {
-    node.children().filter(move |child| child.has_tag_name(tag))
-}
-
-fn label<'a>(node: Node<'a, '_>) -> &'a str {
-    node.attribute("name").unwrap_or("without name")
 }
 
 fn name<'a>(node: Node<'a, '_>) -> Result<&'a str, String> {
