@@ -5,6 +5,7 @@ use std::process::Command;
 
 use crate::boards;
 use crate::command::{ChoreError, cargo, run_with, workspace};
+use crate::files::copy;
 
 /// The boards' target.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -131,13 +132,4 @@ fn toolchain(chip: &str) -> Result<Toolchain, ChoreError> {
             "the Rust target {chip} is not installed: run `cargo xtask setup`"
         )))
     }
-}
-
-fn copy(from: &Path, to: &Path) -> Result<(), ChoreError> {
-    let error =
-        |cause: std::io::Error| ChoreError(format!("cannot write {}: {cause}", to.display()));
-    if let Some(folder) = to.parent() {
-        std::fs::create_dir_all(folder).map_err(error)?;
-    }
-    std::fs::copy(from, to).map(|_| ()).map_err(error)
 }

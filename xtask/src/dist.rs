@@ -5,13 +5,14 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 use std::time::Instant;
 
 use clap::Args;
 
 use crate::command::{ChoreError, cargo, run, run_with, say, workspace};
-use crate::{boards, build_fw, fmu, size};
+use crate::files::{copy, unwritable};
+use crate::{boards, build_fw, fmu, python, size};
 
 /// Options of `cargo xtask dist`.
 #[derive(Debug, Args)]
@@ -109,10 +110,7 @@ impl Dist {
     /// Installs the tools.
     fn new(folder: PathBuf) -> Result<Self, ChoreError> {
         fs::create_dir_all(&folder).map_err(|cause| unwritable(&folder, &cause))?;
-        run("python3", &["-m", "venv", ENVIRONMENT])?;
-        let python = format!("{ENVIRONMENT}/bin/python");
-        let pip = ["-m", "pip", "install", "--quiet"];
-        run(&python, &[&pip[..], &TOOLS].concat())?;
+        python::environment(ENVIRONMENT, &TOOLS)?;
         for target in PROCESSORS.map(target) {
             if !build_fw::target_is_installed(&target) {
                 run("rustup", &["target", "add", &target])?;
@@ -198,11 +196,8 @@ impl Dist {
             ];
             run_with("maturin", &[&build[..], &of, &to].concat(), &environment)?;
             let wheel = self.wheel_for(processor)?;
-            let audit = Command::new(workspace().join(ENVIRONMENT).join("bin/auditwheel"))
-                .arg("show")
-                .arg(&wheel)
-                .output()
-                .map_err(|cause| ChoreError(format!("cannot start auditwheel: {cause}")))?;
+            let auditwheel = workspace().join(ENVIRONMENT).join("bin/auditwheel");
+            let audit = output(Command::new(auditwheel).arg("show").arg(&wheel))?;
             let report = String::from_utf8_lossy(&audit.stdout);
             let tag = format!("\"{WHEEL_TAG}_{processor}\"");
             if !report.replace('\n', " ").contains(&format!("tag: {tag}")) {
@@ -290,17 +285,13 @@ impl Dist {
                 ],
             )?;
         }
-        let sbom = Command::new(&tool)
-            .args([
-                "sbom",
-                "--cargo-package",
-                "painleve-command",
-                "--output-format",
-                "cyclone_dx_json_1_4",
-            ])
-            .current_dir(workspace())
-            .output()
-            .map_err(|cause| ChoreError(format!("cannot start cargo-sbom: {cause}")))?;
+        let sbom = output(Command::new(&tool).current_dir(workspace()).args([
+            "sbom",
+            "--cargo-package",
+            "painleve-command",
+            "--output-format",
+            "cyclone_dx_json_1_4",
+        ]))?;
         if !sbom.status.success() {
             let reason = String::from_utf8_lossy(&sbom.stderr);
             return Err(ChoreError(format!("cargo-sbom fails: {}", reason.trim())));
@@ -316,15 +307,21 @@ impl Dist {
         let mut names: Vec<_> = files.map(|file| file.file_name()).collect();
         names.retain(|name| name != "SHA256SUMS");
         names.sort();
-        let sums = Command::new("sha256sum")
-            .args(names)
-            .current_dir(&self.folder)
-            .output()
-            .map_err(|cause| ChoreError(format!("cannot start sha256sum: {cause}")))?;
+        let mut sha256sum = Command::new("sha256sum");
+        let sums = output(sha256sum.args(names).current_dir(&self.folder))?;
         let path = self.folder.join("SHA256SUMS");
         fs::write(&path, &sums.stdout).map_err(|cause| unwritable(&path, &cause))?;
         say(String::from_utf8_lossy(&sums.stdout).trim_end())
     }
+}
+
+/// Runs a program and returns what it prints.
+fn output(command: &mut Command) -> Result<Output, ChoreError> {
+    command.output().map_err(|cause| {
+        let program = Path::new(command.get_program());
+        let name = program.file_name().unwrap_or(program.as_os_str());
+        ChoreError(format!("cannot start {}: {cause}", name.display()))
+    })
 }
 
 fn target(processor: &str) -> String {
@@ -345,21 +342,18 @@ fn remapping() -> Vec<String> {
 
 /// Returns the time of the commit that is built, s since 1970.
 fn commit_time() -> Result<String, ChoreError> {
-    let time = Command::new("git")
-        .args(["log", "-1", "--format=%ct"])
-        .current_dir(workspace())
-        .output()
-        .map_err(|cause| ChoreError(format!("cannot start git: {cause}")))?;
+    let mut git = Command::new("git");
+    let time = output(
+        git.args(["log", "-1", "--format=%ct"])
+            .current_dir(workspace()),
+    )?;
     Ok(String::from_utf8_lossy(&time.stdout).trim().to_owned())
 }
 
 /// Converts a program with the `objcopy` of the Rust toolchain.
 fn convert(options: &[&str], from: &str, to: &str) -> Result<(), ChoreError> {
-    let output = Command::new("rustc")
-        .args(["--print", "sysroot"])
-        .output()
-        .map_err(|cause| ChoreError(format!("cannot start rustc: {cause}")))?;
-    let sysroot = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
+    let sysroot = output(Command::new("rustc").args(["--print", "sysroot"]))?;
+    let sysroot = PathBuf::from(String::from_utf8_lossy(&sysroot.stdout).trim());
     let host = target(std::env::consts::ARCH);
     let objcopy = sysroot
         .join("lib/rustlib")
@@ -382,10 +376,7 @@ fn check_command(command: &Path) -> Result<(), ChoreError> {
         fs::create_dir(root.join(folder)).map_err(|cause| unwritable(root, &cause))?;
     }
     copy(command, &root.join("painleve"))?;
-    let libraries = Command::new("ldd")
-        .arg(command)
-        .output()
-        .map_err(|cause| ChoreError(format!("cannot start ldd: {cause}")))?;
+    let libraries = output(Command::new("ldd").arg(command))?;
     let libraries = String::from_utf8_lossy(&libraries.stdout).into_owned();
     for library in libraries
         .split_whitespace()
@@ -450,17 +441,4 @@ fn check_wheel(wheel: &Path) -> Result<(), ChoreError> {
         return Err(ChoreError(format!("that is more than {WHEEL_S} s")));
     }
     Ok(())
-}
-
-fn copy(from: &Path, to: &Path) -> Result<(), ChoreError> {
-    if let Some(folder) = to.parent() {
-        fs::create_dir_all(folder).map_err(|cause| unwritable(folder, &cause))?;
-    }
-    fs::copy(from, to)
-        .map(|_| ())
-        .map_err(|cause| unwritable(to, &cause))
-}
-
-fn unwritable(path: &Path, cause: &std::io::Error) -> ChoreError {
-    ChoreError(format!("cannot write {}: {cause}", path.display()))
 }

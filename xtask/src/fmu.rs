@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::command::{ChoreError, cargo, run, run_with, workspace};
+use crate::python;
 
 const ENVIRONMENT: &str = "target/python/fmu";
 const FMPY: &str = "fmpy==0.3.*";
@@ -14,9 +15,7 @@ const FMPY: &str = "fmpy==0.3.*";
 /// If a step fails.
 pub fn run_chore() -> Result<(), ChoreError> {
     let fmu = build("target", &[])?;
-    run("python3", &["-m", "venv", ENVIRONMENT])?;
-    let python = format!("{ENVIRONMENT}/bin/python");
-    run(&python, &["-m", "pip", "install", "--quiet", FMPY])?;
+    let python = python::environment(ENVIRONMENT, &[FMPY])?;
     run(&python, &["fmu/check.py", &fmu.to_string_lossy()])
 }
 

@@ -9,6 +9,7 @@ mod ci;
 mod command;
 mod dist;
 mod examples;
+mod files;
 mod flash;
 mod fmu;
 mod fuzz;

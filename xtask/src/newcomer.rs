@@ -7,6 +7,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use crate::command::{ChoreError, build_program, program, run, say, workspace};
+use crate::files::unwritable;
 use crate::{build_fw, python};
 
 const FOLDER: &str = "target/newcomer";
@@ -108,8 +109,8 @@ pub fn run_chore() -> Result<(), ChoreError> {
     for (number, task) in (1..).zip(&TASKS) {
         let start = Instant::now();
         user.perform(task)?;
-        seconds.push(start.elapsed().as_secs_f64());
         let took = start.elapsed().as_secs_f64();
+        seconds.push(took);
         say(&format!("{number:>2}. {}: {took:.1} s", task.what))?;
     }
     let first_figure_s: f64 = seconds.iter().take(2).sum();
@@ -144,13 +145,7 @@ impl User {
             let copy = folder.join(file.file_name().unwrap_or_default());
             fs::copy(&file, &copy).map_err(|cause| unwritable(&copy, &cause))?;
         }
-        let environment = format!("{FOLDER}/venv");
-        run("python3", &["-m", "venv", &environment])?;
-        let pip = ["-m", "pip", "install", "--quiet"];
-        run(
-            &format!("{environment}/bin/python"),
-            &[&pip[..], &TOOLS].concat(),
-        )?;
+        python::environment(&format!("{FOLDER}/venv"), &TOOLS)?;
         let program = program().to_string_lossy().into_owned();
         let [record, board] = ["run", "board"].map(|name| format!("{FOLDER}/{name}.mcap"));
         let simulate = ["run", "--no-plot", "--record"];
@@ -201,8 +196,4 @@ impl User {
         }
         Ok(())
     }
-}
-
-fn unwritable(path: &Path, cause: &std::io::Error) -> ChoreError {
-    ChoreError(format!("cannot write {}: {cause}", path.display()))
 }

@@ -22,10 +22,7 @@ const TOOLS: [&str; 6] = [
 /// # Errors
 /// If a step fails.
 pub fn run_chore() -> Result<(), ChoreError> {
-    run("python3", &["-m", "venv", FOLDER])?;
-    let python = format!("{FOLDER}/bin/python");
-    let pip = ["-m", "pip", "install", "--quiet"];
-    run(&python, &[&pip[..], &TOOLS].concat())?;
+    let python = environment(FOLDER, &TOOLS)?;
     run(
         &format!("{FOLDER}/bin/maturin"),
         &[
@@ -41,14 +38,30 @@ pub fn run_chore() -> Result<(), ChoreError> {
         ],
     )?;
     let install = [
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
         "--force-reinstall",
         "--no-index",
         "--find-links",
         WHEELS,
         "painleve",
     ];
-    run(&python, &[&pip[..], &install].concat())?;
+    run(&python, &install)?;
     run(&python, &["-m", "pytest", "-q", "python/tests"])
+}
+
+/// Makes an environment with packages of the index in a folder of the workspace, and returns its Python.
+///
+/// # Errors
+/// If Python lacks `venv`, or a package cannot be installed.
+pub fn environment(folder: &str, packages: &[&str]) -> Result<String, ChoreError> {
+    run("python3", &["-m", "venv", folder])?;
+    let python = format!("{folder}/bin/python");
+    let pip = ["-m", "pip", "install", "--quiet"];
+    run(&python, &[&pip[..], packages].concat())?;
+    Ok(python)
 }
 
 /// Returns the newest wheel that this chore has built.

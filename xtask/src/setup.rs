@@ -7,6 +7,7 @@ use clap::Args;
 
 use crate::build_fw::{debian_can_build, target_is_installed};
 use crate::command::{ChoreError, run_with, starts, workspace};
+use crate::files::unwritable;
 use crate::{examples, policy};
 
 /// Executes the board's image in tests; see `tests/flash-image`.
@@ -156,8 +157,7 @@ fn install_unicorn(sudo: bool) -> Result<(), ChoreError> {
     let python = environment.join("bin/python");
     let pip = ["-m", "pip", "install", "--quiet", "--no-deps", UNICORN];
     run_with(&python.to_string_lossy(), &pip, &[])?;
-    std::fs::write(&installed, UNICORN)
-        .map_err(|cause| ChoreError(format!("cannot write {}: {cause}", installed.display())))
+    std::fs::write(&installed, UNICORN).map_err(|cause| unwritable(&installed, &cause))
 }
 
 /// Installs Debian packages; a user other than root must allow sudo.
