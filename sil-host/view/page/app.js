@@ -88,10 +88,15 @@ class Page {
     for (const { title, head, rows } of comparison.tables) {
       const table = $("comparison").appendChild(document.createElement("table"));
       table.createCaption().textContent = title;
-      const line = table.createTHead().insertRow();
-      for (const text of head) line.appendChild(document.createElement("th")).textContent = text;
+      const isText = head.map((_, column) => rows.some((cells) => /[a-z]/.test(cells[column])));
+      const fill = (row, kind, cells) => cells.forEach((text, column) => {
+        const cell = row.appendChild(document.createElement(kind));
+        cell.textContent = text;
+        cell.classList.toggle("text", isText[column]);
+      });
+      fill(table.createTHead().insertRow(), "th", head);
       const body = table.createTBody();
-      for (const cells of rows) { const row = body.insertRow(); for (const text of cells) row.insertCell().textContent = text; }
+      for (const cells of rows) fill(body.insertRow(), "td", cells);
     }
   }
 

@@ -74,7 +74,7 @@ class Charts {
       legend: { show: false },
       cursor: { sync: { key: "run" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 }, bind: { dblclick: () => () => this.zoom(0) } },
       scales: { x: { time: false }, y: chart.log ? { distr: 3, log: 10, range: (_, low, high) => decades(low, high) } : { range: (u, low, high) => span(...(chart.measured ? near(u, chart) : [low, high]), chart) } },
-      axes: [{ ...axis, size: 30, values: ticks }, { ...axis, size: 70, space: 20, ...(chart.log ? { splits: (u) => between(u.scales.y), filter: (_, splits) => splits, values: (_, splits) => splits.map(String) } : { values: ticks }) }],
+      axes: [{ ...axis, size: 30, values: seconds }, { ...axis, size: 70, space: 20, ...(chart.log ? { splits: (u) => between(u.scales.y), filter: (_, splits) => splits, values: (_, splits) => splits.map(String) } : { values: ticks }) }],
       series: [{}, ...chart.curves.map(([, , colour, , dashed, width]) => ({ stroke: ink(colour), width: width ?? (dashed ? 1 : 1.5), dash: dashed ? [5, 4] : undefined, spanGaps: false, points: { show: false } })), ...this.overlaid(chart).map(({ other }) => ({ stroke: ink(other.colour), width: 1.5, dash: [7, 3], spanGaps: false, points: { show: false } }))],
       bands: chart.band ? [{ series: chart.band, fill: ink("--purple") + "33" }] : [],
       hooks: {
@@ -189,6 +189,12 @@ function near(u, { measured, curves }) {
     if (most >= low - room && least <= high + room) { low = Math.min(low, Math.max(least, low - room)); high = Math.max(high, Math.min(most, high + room)); }
   }
   return [low, high];
+}
+
+/** Labels of times, the last with its unit. */
+function seconds(...axis) {
+  const texts = ticks(...axis);
+  return texts.map((text, number) => (number === texts.length - 1 ? `${text} s` : text));
 }
 
 /** Labels with as many decimals as distinguish them. */
