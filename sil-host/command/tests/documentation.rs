@@ -1,13 +1,25 @@
-//! Checks that the program accepts the command lines in the README and in `docs/`.
+//! Checks that the program accepts the command lines and the scenarios in the README and in `docs/`.
 
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use clap::error::ErrorKind;
 use painleve_command::Cli;
+use painleve_plant::scenario::Scenario;
+
+/// Returns the README and the pages of the documentation.
+fn pages() -> Vec<PathBuf> {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut pages = vec![workspace.join("README.md")];
+    for entry in fs::read_dir(workspace.join("docs")).unwrap() {
+        pages.push(entry.unwrap().path());
+    }
+    pages.retain(|page| page.extension().is_some_and(|it| it == "md"));
+    pages
+}
 
 /// Returns the `painleve` command lines of a page, from code blocks and inline code.
 fn commands(text: &str) -> Vec<String> {
@@ -46,14 +58,8 @@ fn is_pattern(command: &str) -> bool {
 
 #[test]
 fn documented_command_lines_are_accepted() {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut pages = vec![workspace.join("README.md")];
-    for entry in fs::read_dir(workspace.join("docs")).unwrap() {
-        pages.push(entry.unwrap().path());
-    }
-    pages.retain(|page| page.extension().is_some_and(|it| it == "md"));
     let (mut checked, mut refused) = (0, Vec::new());
-    for page in pages {
+    for page in pages() {
         for command in commands(&fs::read_to_string(&page).unwrap()) {
             if is_pattern(&command) {
                 continue;
@@ -74,4 +80,29 @@ fn documented_command_lines_are_accepted() {
     }
     assert!(checked > 40, "only {checked} command lines found");
     assert!(refused.is_empty(), "{refused:#?}");
+}
+
+/// Returns the parts of scenarios on a page: its TOML, but for campaigns and the manifests of crates.
+fn scenarios(text: &str) -> impl Iterator<Item = &str> {
+    let blocks = text.split("```toml\n").skip(1);
+    let blocks = blocks.filter_map(|it| it.split("```").next());
+    blocks.filter(|it| {
+        !["study =", "[dependencies]"]
+            .iter()
+            .any(|head| it.starts_with(head))
+    })
+}
+
+#[test]
+fn documented_scenarios_are_accepted() {
+    let mut checked = 0;
+    for page in pages() {
+        for text in scenarios(&fs::read_to_string(&page).unwrap()) {
+            if let Err(error) = Scenario::from_toml(text) {
+                panic!("{}: {error}:\n{text}", page.display());
+            }
+            checked += 1;
+        }
+    }
+    assert!(checked >= 5, "only {checked} scenarios found");
 }
