@@ -11,6 +11,7 @@ use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_firmware::law::LawSettings;
 use painleve_identify::geometry::joint_rad;
 use painleve_identify::parameters::Drawn;
+use painleve_identify::passes::ON_BELT;
 use painleve_identify::{
     Identified, Limits, Parameter, Parameters, Prior, Reading, Refusal, Slide, identify,
 };
@@ -46,6 +47,9 @@ const RIPPLES: f64 = 8.0;
 
 /// Rate at which the mean force follows, from which the ripple is taken, per tick.
 const MEAN_PER_TICK: f64 = 0.01;
+
+/// Largest number of attempts at a slide whose tip leaves the belt.
+const ATTEMPTS: usize = 3;
 
 /// An arm whose controller slides its tip, and its operator.
 pub trait SlideRig {
@@ -232,13 +236,22 @@ pub fn identify_arm<R: SlideRig>(
     let mut slide = |known: &Scenario, share: f64, postures: [Posture; 2]| {
         for posture in postures {
             let program = slide_scenario(known, share, posture)?;
-            let frames = rig
-                .slide(&program, posture)
-                .map_err(IdentificationError::Rig)?;
-            slides.push(Slide {
-                posture,
-                readings: readings(scenario, frames),
-            });
+            let mut slid = || {
+                let frames = rig.slide(&program, posture);
+                Ok::<_, IdentificationError<R::Error>>(Slide {
+                    posture,
+                    readings: readings(scenario, frames.map_err(IdentificationError::Rig)?),
+                })
+            };
+            let mut slide = slid()?;
+            // An arm that is hardly known may throw its tip off when it starts.
+            for _ in 1..ATTEMPTS {
+                if slide.share_on_belt(&limits) >= ON_BELT {
+                    break;
+                }
+                slide = slid()?;
+            }
+            slides.push(slide);
         }
         Ok::<_, IdentificationError<R::Error>>(slides.clone())
     };

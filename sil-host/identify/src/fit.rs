@@ -123,10 +123,7 @@ impl Fit {
                 FAR * (2.0 * size - FAR)
             }
         };
-        let places = points
-            .points
-            .iter()
-            .map(|point| Place::at(parameters, point.encoders_rad));
+        let places = points.points.iter().map(|point| point.place(parameters));
         let of_points: f64 = places
             .map(|place| far(place.depth_m / (self.noise * points.deviation_m(&place))))
             .sum();
@@ -137,7 +134,7 @@ impl Fit {
     /// Returns the equations of all points, in deviations of noise and prior.
     pub(crate) fn rows(&self, points: &Points, prior: &Prior) -> impl Iterator<Item = Row> {
         points.points.iter().map(|point| {
-            let place = Place::at(&self.parameters, point.encoders_rad);
+            let place = point.place(&self.parameters);
             let deviation_m = self.noise * points.deviation_m(&place);
             let off = place.depth_m / deviation_m;
             Row {
@@ -264,10 +261,7 @@ fn covariance(information: &Square, prior: &Prior) -> Square {
 
 /// Returns the noise: what is left over, times the root of the number of neighbours that share an error.
 fn noise(points: &Points, parameters: &Parameters) -> f64 {
-    let places = points
-        .points
-        .iter()
-        .map(|point| Place::at(parameters, point.encoders_rad));
+    let places = points.points.iter().map(|point| point.place(parameters));
     let off: Vec<f64> = places
         .map(|place| (place.depth_m / points.deviation_m(&place)).clamp(-1e3, 1e3))
         .collect();

@@ -43,6 +43,8 @@ pub struct Place {
     pub tip_by: Values,
     /// Derivatives of the depth after the angles of both joints, m/rad.
     pub depth_by_joint: [f64; 2],
+    /// The same of the position along the belt.
+    pub tip_by_joint: [f64; 2],
 }
 
 /// Returns the angle of a joint, rad, from that of its encoder.
@@ -115,7 +117,15 @@ impl Place {
             tip_t_m,
             tip_by,
             depth_by_joint,
+            tip_by_joint,
         }
+    }
+
+    /// Returns how both joints turn when the tip moves into the belt, at the same place along it, rad/m.
+    pub fn across_rad_m(&self) -> [f64; 2] {
+        let ([depth_1, depth_2], [tip_1, tip_2]) = (self.depth_by_joint, self.tip_by_joint);
+        let determinant = depth_1 * tip_2 - depth_2 * tip_1;
+        [tip_2 / determinant, -tip_1 / determinant]
     }
 
     /// Evaluates the arm with its tip on the belt at z_t (m) in a posture; `None` out of reach.

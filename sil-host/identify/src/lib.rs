@@ -50,6 +50,19 @@ pub struct Slide {
     pub readings: Vec<Reading>,
 }
 
+impl Slide {
+    /// Returns the readings with the tip on the belt.
+    pub(crate) fn on_belt(&self, limits: &Limits) -> impl Iterator<Item = &Reading> {
+        let readings = self.readings.iter();
+        readings.filter(|it| it.force_n[1] >= limits.contact_n)
+    }
+
+    /// Returns the share of the readings with the tip on the belt.
+    pub fn share_on_belt(&self, limits: &Limits) -> f64 {
+        self.on_belt(limits).count() as f64 / self.readings.len().max(1) as f64
+    }
+}
+
 /// Limits of an identification.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {

@@ -2,6 +2,10 @@
 //!
 //! Neighbouring readings of a slow slide share their rounding errors. The mean over a millimetre, which is some counts,
 //! rounds much less, and its error is nearly independent of its neighbours'.
+//!
+//! Waves of the belt move the tip, and with it the angles at which the derivatives are taken. Plain least squares would
+//! therefore make encoders' errors up by which the waves look lower. So a depth is measured in what the encoders turn for it
+//! (Sampson's distance).
 
 use painleve_shared::Posture;
 
@@ -16,18 +20,41 @@ const STRETCH_M: f64 = 1e-3;
 const UNEVEN_M: f64 = 20e-6;
 
 /// Least share of readings with the tip on the belt.
-const ON_BELT: f64 = 0.8;
+pub const ON_BELT: f64 = 0.8;
 
 /// Least number of stretches of all slides.
 const LEAST_POINTS: usize = 60;
 
-/// Mean angles of both encoders over a short stretch, rad.
+/// Motion across the belt over which a depth's gain is measured, m.
+const ACROSS_M: f64 = 1e-4;
+
+/// Mean angles of both encoders over a short stretch.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     /// Index of the slide.
     pub slide: usize,
     /// The angles.
     pub encoders_rad: [f64; 2],
+    /// How they turn when the tip moves into the belt, by what is known beforehand, rad/m.
+    across_rad_m: [f64; 2],
+}
+
+impl Point {
+    /// Evaluates the arm. The depth is that which turns the encoders as much by what is known beforehand.
+    pub fn place(&self, parameters: &Parameters) -> Place {
+        let place = Place::at(parameters, self.encoders_rad);
+        let encoders_rad =
+            [0, 1].map(|joint| self.encoders_rad[joint] + ACROSS_M * self.across_rad_m[joint]);
+        let across = Place::at(parameters, encoders_rad);
+        let gain = (across.depth_m - place.depth_m) / ACROSS_M;
+        let gain_by = (across.depth_by - place.depth_by) / ACROSS_M;
+        let depth_m = place.depth_m / gain;
+        Place {
+            depth_m,
+            depth_by: (place.depth_by - gain_by * depth_m) / gain,
+            ..place
+        }
+    }
 }
 
 /// Where a point is.
@@ -88,12 +115,7 @@ impl Points {
         if let Some(tick) = of.readings.iter().position(|it| !is_finite(&it)) {
             return Err(Refusal::NotFinite { slide, tick });
         }
-        let touching: Vec<_> = of
-            .readings
-            .iter()
-            .filter(|it| it.force_n[1] >= limits.contact_n)
-            .collect();
-        let share = touching.len() as f64 / of.readings.len().max(1) as f64;
+        let share = of.share_on_belt(limits);
         if share < ON_BELT {
             return Err(Refusal::NotOnBelt {
                 slide,
@@ -101,6 +123,7 @@ impl Points {
                 contact_n: limits.contact_n,
             });
         }
+        let touching: Vec<_> = of.on_belt(limits).collect();
         let tip_t_m = |encoders_rad| Place::at(parameters, encoders_rad).tip_t_m;
         let mut rest = touching.as_slice();
         while let Some(first) = rest.first() {
@@ -114,9 +137,11 @@ impl Points {
                 let angles = these.iter().map(|it| it.encoders_rad[joint]);
                 angles.sum::<f64>() / count as f64
             };
+            let encoders_rad = [mean(0), mean(1)];
             self.points.push(Point {
                 slide,
-                encoders_rad: [mean(0), mean(1)],
+                encoders_rad,
+                across_rad_m: Place::at(parameters, encoders_rad).across_rad_m(),
             });
         }
         self.readings += touching.len();
@@ -140,14 +165,14 @@ impl Points {
 
     /// Returns the depth of the tip in the belt at each point, m.
     pub fn depths_m(&self, parameters: &Parameters) -> impl Iterator<Item = f64> {
-        let at = |point: &Point| Place::at(parameters, point.encoders_rad).depth_m;
-        self.points.iter().map(at)
+        let points = self.points.iter();
+        points.map(|point| point.place(parameters).depth_m)
     }
 
     /// Returns where each point is by these parameters.
     pub fn residuals(&self, parameters: &Parameters) -> impl Iterator<Item = Residual> {
         self.points.iter().map(|point| {
-            let place = Place::at(parameters, point.encoders_rad);
+            let place = point.place(parameters);
             Residual {
                 posture: self.postures[point.slide],
                 tip_t_m: place.tip_t_m,

@@ -12,7 +12,7 @@ use painleve_process::terminal::warn;
 use painleve_shared::Posture;
 use painleve_shared::frame::{SensorFrame, StatusFlags};
 use painleve_shared::message::FrameSource;
-use painleve_shared::status::SupervisorState;
+use painleve_shared::status::{Fault, SupervisorState};
 
 use crate::commission::BoardRigError;
 use crate::drive::{Operator, OperatorCommand};
@@ -64,8 +64,13 @@ impl BoardSlides {
             let Some(ArmEvent::Tick { sensor, answer }) = arm.next_event(PATIENCE)? else {
                 continue;
             };
-            if let Some(fault) = answer.latched_fault() {
-                return Err(BoardRigError::Faulted(fault));
+            match answer.latched_fault() {
+                None => {}
+                Some(Fault::LiftOffTooLong | Fault::RecoveryFailed) => {
+                    warn("the tip has left the belt");
+                    return Ok(frames);
+                }
+                Some(fault) => return Err(BoardRigError::Faulted(fault)),
             }
             let is_tracking = answer.supervisor_state() == Some(SupervisorState::Tracking);
             frames.extend(sensor.filter(|_| is_tracking));

@@ -13,10 +13,15 @@ pub const COUNT_RAD: f64 = core::f64::consts::TAU / 16384.0;
 /// Speed of a slide at 1 kHz, m per reading.
 const STEP_M: f64 = 1e-4;
 
+/// Waves of 0.1 m on a belt of 0.4 m/s.
+const WAVE_RAD_PER_TICK: f64 = core::f64::consts::TAU * 4e-3;
+
 /// An arm with what is known of it.
 pub struct Rig {
     pub actual: Parameters,
     pub prior: Prior,
+    /// Amplitude of waves that pass under the tip as the belt runs, m.
+    pub waves_m: f64,
     pub generator: Pcg64,
 }
 
@@ -51,6 +56,7 @@ impl Rig {
         Self {
             actual,
             prior: measured.prior(nominal),
+            waves_m: 0.0,
             generator,
         }
     }
@@ -61,9 +67,10 @@ impl Rig {
         let steps = (reach * (to - from) / STEP_M) as usize;
         let there = (0..=steps).map(|step| from * reach + STEP_M * step as f64);
         let places: Vec<f64> = there.clone().chain(there.rev()).collect();
-        let readings = places
-            .into_iter()
-            .map(|tip| self.reading(posture, tip, 0.0));
+        let readings = places.into_iter().enumerate().map(|(tick, tip)| {
+            let raised_m = self.waves_m * (WAVE_RAD_PER_TICK * tick as f64).sin();
+            self.reading(posture, tip, raised_m)
+        });
         Slide {
             posture,
             readings: readings.collect(),
