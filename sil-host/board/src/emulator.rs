@@ -67,8 +67,8 @@ pub fn built_image(name: &str) -> PathBuf {
         .unwrap_or(image)
 }
 
-/// Checks that image, emulator and, `with_log`, the program that prints the image's log exist, before anything is
-/// started.
+/// Checks that the image exists, and that the emulator and, `with_log`, the program that prints the image's log start.
+/// This also reads them from a disk that may be slow, before any limit of time applies.
 ///
 /// # Errors
 /// [`BoardError::ImageMissing`], [`BoardError::EmulatorMissing`], [`BoardError::LogPrinterMissing`].
@@ -88,8 +88,10 @@ pub fn check(image: &Path, with_log: bool) -> Result<(), BoardError> {
 }
 
 fn is_installed(program: &str) -> bool {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
+    let mut command = Command::new(program);
+    command.arg("--version").stdin(Stdio::null());
+    let status = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success())
 }
 
 /// Starts the program that prints the log of `image` on stderr, and returns its end for the log. It ends with the log.

@@ -8,6 +8,7 @@
 use std::fs::Permissions;
 use std::io::Write;
 use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -330,18 +331,56 @@ fn the_error_about_a_missing_image_names_the_build_command() {
     assert!(text.contains("cargo xtask build-fw"), "{text}");
 }
 
+/// The path of QEMU.
+fn qemu() -> String {
+    let found = Command::new("/bin/sh")
+        .args(["-c", "command -v qemu-system-arm"])
+        .output()
+        .unwrap();
+    String::from_utf8(found.stdout).unwrap().trim_end().into()
+}
+
+/// Writes a shell script.
+fn script(path: &Path, text: &str) {
+    std::fs::write(path, format!("#!/bin/sh\n{text}\n")).unwrap();
+    std::fs::set_permissions(path, Permissions::from_mode(0o755)).unwrap();
+}
+
+/// A first start reads QEMU from the disk.
+#[test]
+fn a_slow_start_of_qemu_is_no_silence_of_the_board() {
+    let bench = Bench::new("slow-start");
+    let tools = bench.path("tools");
+    std::fs::create_dir(&tools).unwrap();
+    let started = tools.join("started");
+    let slow = format!(
+        "[ -e {0} ] || {{ : > {0}; /bin/sleep 2; }}; exec {1} \"$@\"",
+        started.display(),
+        qemu()
+    );
+    script(&tools.join("qemu-system-arm"), &slow);
+    let elf = image().to_str().unwrap();
+    let run = [
+        "run",
+        "--host",
+        "qemu",
+        "--elf",
+        elf,
+        "--set",
+        "run.duration_s=0.1",
+    ];
+    let mut run = bench.command(&[&run[..], &QUIET].concat());
+    let output = run.env("PATH", &tools).output().unwrap();
+    assert!(output.status.success(), "{}", errors(&output));
+}
+
 #[test]
 fn the_log_is_printed_by_defmt_print() {
     let bench = Bench::new("log");
     let image = image().to_str().unwrap();
     let tools = bench.path("tools");
     std::fs::create_dir(&tools).unwrap();
-    let qemu = Command::new("/bin/sh")
-        .args(["-c", "command -v qemu-system-arm"])
-        .output()
-        .unwrap();
-    let qemu = String::from_utf8(qemu.stdout).unwrap();
-    symlink(qemu.trim_end(), tools.join("qemu-system-arm")).unwrap();
+    symlink(qemu(), tools.join("qemu-system-arm")).unwrap();
     let qemu = ["run", "--host", "qemu", "--log", "--elf", image];
     let mut run = bench.command(&[&qemu[..], &SHORT, &QUIET].concat());
     run.env("PATH", &tools);
@@ -353,13 +392,10 @@ fn the_log_is_printed_by_defmt_print() {
         "{output:?}"
     );
 
-    let printer = tools.join("defmt-print");
-    std::fs::write(
-        &printer,
-        "#!/bin/sh\nPATH=/bin:/usr/bin; echo \"log of $2: $(wc -c) bytes\"",
-    )
-    .unwrap();
-    std::fs::set_permissions(&printer, Permissions::from_mode(0o755)).unwrap();
+    script(
+        &tools.join("defmt-print"),
+        "PATH=/bin:/usr/bin; echo \"log of $2: $(wc -c) bytes\"",
+    );
     let output = run.output().unwrap();
     assert!(output.status.success(), "{output:?}");
     assert!(
