@@ -59,7 +59,7 @@ pub struct Recovery {
 /// State of a [`Recovery`]; idle while the tip touches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RecoveryState {
-    /// Landing point (m) and wanted height (m), once the tip is in the air.
+    /// Landing point (m) and desired height (m), once the tip is in the air.
     flight: Option<Flight>,
 }
 

@@ -37,7 +37,7 @@ impl TorqueOutput {
         Ok(())
     }
 
-    /// Limits the wanted torques and converts them to counts.
+    /// Limits the desired torques and converts them to counts.
     #[inline]
     fn limit(
         &self,

@@ -263,7 +263,7 @@ fn torque_is_limited_and_counted() {
 fn the_tip_is_pressed_less_where_torque_is_short() {
     let mut limited = configuration();
     limited.settings.torque_limit_nm = 1.5;
-    // A force that never follows the torque would be that of a contact that gives.
+    // A force that never follows the torque would be that of a compliant contact.
     limited.settings.response.enabled = false;
     let mut controller = Controller::new(&limited).unwrap();
     let (answer, telemetry) = run_with_telemetry(&mut controller, 0..200);

@@ -7,7 +7,7 @@
 //! - **Encoders**: the height of the tip above the belt is measured to half a count of each
 //!   encoder, h = ½ (|z_t| Δθ₁ + l₂ |sin θ₂| Δθ₂₁). A gap larger than h shows flight. In addition,
 //!   when the contact force vanishes, the joints accelerate against the prediction of the tracking
-//!   loops, which includes the wanted force. The innovations therefore weigh the wanted force
+//!   loops, which includes the desired force. The innovations therefore weigh the desired force
 //!   against none, as the force cell's reading does.
 
 use painleve_shared::{Real, settings};

@@ -5,7 +5,7 @@
 //! - [`contact`]: contact decision; [`ContactEstimate`]: what is known of the contact
 //! - [`friction`], [`belt`]: friction and direction of slip, bounds of the belt's speed
 //! - [`calibration`]: length of the links
-//! - [`response`]: how much the contact gives
+//! - [`response`]: how compliant the contact is
 //! - [`joint_friction`]: Coulomb friction of the joints
 //! - [`disturbance`]: torques that the model does not explain
 

@@ -1,4 +1,4 @@
-//! Estimates how much the contact gives, from the response of the contact force to small changes of torque.
+//! Estimates how compliant the contact is, from the response of the contact force to small changes of torque.
 //!
 //! On a rigid contact f_n = −b/p: the force follows a change of torque at once. On a spring and damper
 //! the tip must move first, and within a tick T only the fraction ρ ≈ c p T + ½ k p T² shows. The
@@ -67,12 +67,12 @@ pub struct ContactResponse {
     /// Part of the force error that loops through the contact force may remove in a tick, before the
     /// factor of each loop: p/Q22 on a rigid contact.
     pub loop_share: f32,
-    /// How much the contact gives, 0 … 1: 0 if it is rigid.
+    /// How compliant the contact is, 0 … 1: 0 if it is rigid.
     pub give: f32,
     /// How certainly the contact is not rigid, 0 … 1: 0 where the upper bound of the response is that of a
     /// rigid contact, 1 where it is half of that or less.
     pub lags: f32,
-    /// Probe to be added to the wanted normal force, N.
+    /// Probe to be added to the desired normal force, N.
     pub probe_n: f32,
 }
 
@@ -173,7 +173,7 @@ pub struct ResponseState {
     upper: f32,
     /// Fraction of the observers' full gain that the lower bound allows.
     gain: f32,
-    /// How much the contact gives, from the upper bound.
+    /// How compliant the contact is, from the upper bound.
     give: f32,
     /// How certainly it is not rigid, from the upper bound of second differences.
     lags: f32,

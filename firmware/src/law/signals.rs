@@ -40,7 +40,7 @@ pub struct LawInput<'a> {
 /// A law's answer; the default is no torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LawOutput {
-    /// Wanted joint torques, N·m, before limits.
+    /// Desired joint torques, N·m, before limits.
     pub torque_nm: JointTorque<f32>,
     /// Contact force (f_t, f_n) that the law expects with these torques, N.
     pub contact_force_n: Vector2<f32>,

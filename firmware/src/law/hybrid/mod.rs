@@ -28,7 +28,7 @@ const OBSERVER_SHARE: f32 = 0.5;
 const FORCE_INTEGRAL_SHARE: f32 = 0.165;
 /// Largest correction by that integral, as a part of f_n*.
 const FORCE_INTEGRAL_PART: f32 = 0.5;
-/// Part of the friction observer's rate that a contact that gives takes away.
+/// Part of the friction observer's rate that a compliant contact takes away.
 const CALMER_OBSERVER: f32 = 0.7;
 
 /// Slowing of the rate at which the law learns the acceleration by other contact forces, for each unit of p, kg.
@@ -81,7 +81,7 @@ fn affordable_part(
         .limited(0.0, 1.0)
 }
 
-/// Wanted acceleration above which the law makes a sticking tip break away, m/s².
+/// Desired acceleration above which the law makes a sticking tip break away, m/s².
 const BREAKING_AWAY_M_S2: f32 = 1.0;
 
 /// The hybrid law's state.
@@ -97,7 +97,7 @@ pub struct HybridState {
     slip: Option<Slip>,
     /// Last friction feed-forward as a ratio f_t/f_n.
     fed_ratio: f32,
-    /// Present fraction of the wanted contact force: at most that for which torque is available.
+    /// Present fraction of the desired contact force: at most that for which torque is available.
     pressing: f32,
     /// Low-passed normal force, N.
     slow_force_n: f32,
@@ -237,7 +237,7 @@ impl HybridSettings {
         }
         let response = input.response;
         let damping_n = if response.give > 0.0 {
-            // Press less while the force rises: this damps a contact that gives.
+            // Press less while the force rises: this damps a compliant contact.
             let rate = input.tick_s * self.contact_damping_rad_s;
             state.slow_force_n += rate / (1.0 + rate) * (input.force_n.y - state.slow_force_n);
             self.contact_damping * response.give * (input.force_n.y - state.slow_force_n)
@@ -266,7 +266,7 @@ impl HybridSettings {
             FrictionFeedForward::Observed { time_constant_s } => {
                 let friction = input.friction;
                 // In stick the friction force follows the feed-forward. Feeding forward the friction
-                // of the wanted slip brings it to the edge of its cone, where the tip breaks away
+                // of the desired slip brings it to the edge of its cone, where the tip breaks away
                 // without a jerk.
                 let wants_slip = tangential_acceleration_m_s2.abs() > BREAKING_AWAY_M_S2;
                 let slip = if friction.sticks && wants_slip {
@@ -290,7 +290,7 @@ impl HybridSettings {
                 let step = FRICTION_SLEW_PER_S * input.tick_s;
                 state.fed_ratio += (ratio - state.fed_ratio).within(step);
                 let expected = state.fed_ratio * normal_force_n;
-                // Where the contact gives, the difference is mostly noise of the force cell.
+                // On a compliant contact, the difference is mostly noise of the force cell.
                 let calm = 1.0 - CALMER_OBSERVER * input.response.lags;
                 let weight = (calm * input.tick_s / (time_constant_s + input.tick_s))
                     .at_most(OBSERVER_SHARE * input.response.loop_share);

@@ -100,7 +100,7 @@ fn gives() -> ContactResponse {
     }
 }
 
-/// Returns the input of a tip that slides at its reference on a contact that gives.
+/// Returns the input of a tip that slides at its reference on a compliant contact.
 fn sliding<'a>(arm: &'a Arm<f32>, model: &'a Model, response: &'a ContactResponse) -> LawInput<'a> {
     LawInput {
         arm,
@@ -118,7 +118,7 @@ fn sliding<'a>(arm: &'a Arm<f32>, model: &'a Model, response: &'a ContactRespons
     }
 }
 
-/// Runs `test` with the default settings, the input of a tip that slides on a contact that gives, and a new state.
+/// Runs `test` with the default settings, the input of a tip that slides on a compliant contact, and a new state.
 fn while_sliding(test: impl FnOnce(&HybridSettings, &mut LawInput<'_>, &mut HybridState)) {
     let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
     let model = at_rest(&arm);

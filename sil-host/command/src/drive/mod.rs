@@ -286,20 +286,23 @@ impl Drive {
     }
 }
 
-/// Highest control rate with two sensors on each channel, Hz: a set of readings takes some 160 µs.
-const FASTEST_WITH_TWO_SENSORS_HZ: f64 = 5000.0;
+/// Highest control rates at which the emulated boards read their sensors in time, Hz: one on each channel, and two.
+const FASTEST_HZ: [f64; 2] = [7500.0, 2500.0];
 
 /// Refuses a control rate at which the board cannot read the sensors at every tick.
-fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
-    if scenario.converters.mounting.sensors != SensorParts::Both {
-        return Ok(());
-    }
+///
+/// # Errors
+/// [`ScenarioError`] with the range.
+pub(crate) fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
+    let [one, two] = FASTEST_HZ;
+    let fastest_hz = match scenario.converters.mounting.sensors {
+        SensorParts::Both => two,
+        SensorParts::First | SensorParts::Second => one,
+    };
     let hz = f64::from(scenario.run.tick_hz);
-    range::check("run.tick_hz", hz, 1.0, FASTEST_WITH_TWO_SENSORS_HZ).map_err(|source| {
-        ScenarioError::Range {
-            origin: scenario.name.clone(),
-            source,
-        }
+    range::check("run.tick_hz", hz, 1.0, fastest_hz).map_err(|source| ScenarioError::Range {
+        origin: scenario.name.clone(),
+        source,
     })
 }
 

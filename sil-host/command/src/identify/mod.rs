@@ -22,6 +22,7 @@ use serde_json::json;
 
 use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
+use super::drive::check_rate;
 use super::output_error::output;
 use super::{CommandError, distinct_files, figure_path, say};
 
@@ -127,6 +128,7 @@ fn found(
         return Ok((found, format!("{} recorded slides", slides.len())));
     }
     if let Some(port) = &arguments.port {
+        check_rate(scenario)?;
         let found = on_board(port, scenario, drawn);
         let found = found.map_err(|error| failed(name, error, CommandError::from))?;
         return Ok((found, format!("slides of the arm at {}", port.display())));

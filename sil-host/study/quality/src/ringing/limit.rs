@@ -1,4 +1,4 @@
-//! The stability limit of a contact that gives, with a friction observer around it.
+//! The stability limit of a compliant contact, with a friction observer around it.
 
 /// A sliding contact and the arm behind it, at one place on the belt.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -24,13 +24,13 @@ pub enum Part {
     ForceRamp,
     /// Estimate of unknown torques.
     Disturbance,
-    /// Estimate of how much the contact gives; without it the contact is taken to be rigid.
+    /// Estimate of how compliant the contact is; without it the contact is taken to be rigid.
     Response,
-    /// Probe: small changes of the wanted force that show how much the contact gives.
+    /// Probe: small changes of the desired force that show how compliant the contact is.
     Probe,
     /// Cancelling of the acceleration by contact forces that were not fed forward.
     ForceDrift,
-    /// Damping of a contact that gives.
+    /// Damping of a compliant contact.
     ContactDamping,
 }
 

@@ -96,13 +96,16 @@ fn an_arm_with_one_sensor_on_each_channel_is_an_exception_that_is_announced() {
 #[test]
 fn a_rate_at_which_the_sensors_cannot_be_read_is_refused() {
     let rig = EmulatedRig::new();
-    let rate = "run.tick_hz=8000";
-    let program = StartedProgram::drive(&rig.port, &["--set", rate, "--no-record"]);
-    let (output, _) = program.end();
-    assert_eq!(output.status.code(), Some(2));
-    let text = errors(&output);
-    let range = "run.tick_hz = 8000 is outside the allowed range 1 to 5000";
-    assert!(text.contains(range), "{text}");
+    for (sensors, rate, fastest) in [("both", 3000, 2500), ("first", 8000, 7500)] {
+        let sensors = format!("converters.mounting.sensors={sensors}");
+        let set = format!("run.tick_hz={rate}");
+        let arguments = ["--set", &set, "--set", &sensors, "--no-record"];
+        let (output, _) = StartedProgram::drive(&rig.port, &arguments).end();
+        assert_eq!(output.status.code(), Some(2));
+        let text = errors(&output);
+        let range = format!("run.tick_hz = {rate} is outside the allowed range 1 to {fastest}");
+        assert!(text.contains(&range), "{text}");
+    }
 }
 
 #[test]
