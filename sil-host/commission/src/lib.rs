@@ -72,6 +72,14 @@ pub enum OperatorTask {
     Enable,
 }
 
+/// Returns where the elbow of an arm is whose tip is below joint 1, as an operator is told.
+pub fn elbow_side(posture: Posture) -> &'static str {
+    match posture {
+        Posture::ElbowDown => "forwards, towards +t",
+        Posture::ElbowUp => "backwards, away from +t",
+    }
+}
+
 impl core::fmt::Display for OperatorTask {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let direction = |degrees: f64| match degrees {
@@ -88,16 +96,11 @@ impl core::fmt::Display for OperatorTask {
                 direction(*one),
                 direction(*two)
             ),
-            Self::SetDown { posture } => {
-                let side = match posture {
-                    Posture::ElbowDown => "forwards, towards +t",
-                    Posture::ElbowUp => "backwards, away from +t",
-                };
-                write!(
-                    f,
-                    "with the belt standing still, set the tip on it right below joint 1, the elbow {side}, and let go"
-                )
-            }
+            Self::SetDown { posture } => write!(
+                f,
+                "with the belt standing still, set the tip on it right below joint 1, the elbow {}, and let go",
+                elbow_side(*posture)
+            ),
             Self::Enable => write!(
                 f,
                 "keep clear of the arm; open the switch ENABLE, then close it"

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use painleve_board::arm::{ArmEvent, ConnectedArm};
-use painleve_commission::OperatorTask;
+use painleve_commission::elbow_side;
 use painleve_commission::identification::SlideRig;
 use painleve_plant::scenario::Scenario;
 use painleve_process::interrupt::Interrupt;
@@ -95,18 +95,21 @@ impl SlideRig for BoardSlides {
     ) -> Result<Vec<SensorFrame>, BoardRigError> {
         let configuration = scenario.controller_configuration();
         let mut arm = ConnectedArm::open(&self.port, &configuration, FrameSource::Sensors)?;
-        let set_down = OperatorTask::SetDown { posture };
         let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
         warn(format_args!(
-            "operator: let the belt run towards {}t, at about {:.1} m/s; {set_down}; then press Return",
+            "operator: let the belt run towards {}t, at about {:.1} m/s; hold the arm with its tip on the belt right below \
+             joint 1, the elbow {}; then press Return",
             if speed_m_s < 0.0 { '−' } else { '+' },
-            speed_m_s.abs()
+            speed_m_s.abs(),
+            elbow_side(posture)
         ));
         while !self.check()? {
             arm.next_event(PATIENCE)?;
         }
         arm.permit_arming(true)?;
-        warn(format_args!("operator: {}", OperatorTask::Enable));
+        warn(
+            "operator: open the switch ENABLE, then close it, and let go when the drive takes the arm over",
+        );
         let duration = Duration::from_secs_f64(scenario.run.duration_s);
         let frames = self.frames(&mut arm, duration);
         // Whatever ended the slide, the torque is off.
