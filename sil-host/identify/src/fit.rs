@@ -134,7 +134,7 @@ impl Fit {
     /// Returns the equations of all points, in deviations of noise and prior.
     pub(crate) fn rows(&self, points: &Points, prior: &Prior) -> impl Iterator<Item = Row> {
         points.points.iter().map(|point| {
-            let place = point.place(&self.parameters);
+            let place = point.place_by(&self.parameters);
             let deviation_m = self.noise * points.deviation_m(&place);
             let off = place.depth_m / deviation_m;
             Row {

@@ -45,6 +45,8 @@ pub struct Place {
     pub depth_by_joint: [f64; 2],
     /// The same of the position along the belt.
     pub tip_by_joint: [f64; 2],
+    /// How much each joint turns for its encoder.
+    pub joint_by_encoder: [f64; 2],
 }
 
 /// Returns the angle of a joint, rad, from that of its encoder.
@@ -69,15 +71,30 @@ fn correction_rad(parameters: &Parameters, joint: usize, angle: f64) -> f64 {
         .sum()
 }
 
+/// Returns how much a joint turns for its encoder, at an angle of the joint, rad.
+fn joint_by_encoder(parameters: &Parameters, joint: usize, angle: f64) -> f64 {
+    let [
+        _,
+        (_, sine),
+        (_, cosine),
+        (_, second_sine),
+        (_, second_cosine),
+    ] = basis(joint, angle);
+    let of = |parameter: Parameter| parameters.get(parameter);
+    let slope = of(Parameter::Sine(joint)) * cosine - of(Parameter::Cosine(joint)) * sine
+        + 2.0 * of(Parameter::SecondSine(joint)) * second_cosine
+        - 2.0 * of(Parameter::SecondCosine(joint)) * second_sine;
+    1.0 / (1.0 - slope)
+}
+
 fn basis(joint: usize, angle: f64) -> [(Parameter, f64); 5] {
     let (sine, cosine) = libm::sincos(angle);
-    let (second_sine, second_cosine) = libm::sincos(2.0 * angle);
     [
         (Parameter::Zero(joint), 1.0),
         (Parameter::Sine(joint), sine),
         (Parameter::Cosine(joint), cosine),
-        (Parameter::SecondSine(joint), second_sine),
-        (Parameter::SecondCosine(joint), second_cosine),
+        (Parameter::SecondSine(joint), 2.0 * sine * cosine),
+        (Parameter::SecondCosine(joint), 1.0 - 2.0 * sine * sine),
     ]
 }
 
@@ -118,6 +135,8 @@ impl Place {
             tip_by,
             depth_by_joint,
             tip_by_joint,
+            joint_by_encoder: [0, 1]
+                .map(|joint| joint_by_encoder(parameters, joint, joints[joint])),
         }
     }
 
@@ -200,6 +219,12 @@ mod tests {
                 prop_assert!(close(place.depth_by[index], plus.depth_m - minus.depth_m), "{index}");
                 prop_assert!(close(place.tip_by[index], plus.tip_t_m - minus.tip_t_m), "{index}");
                 prop_assert!(close(reach_m(&parameters).1[index], far - near), "{index}");
+            }
+            for joint in [0, 1] {
+                let at = |step: f64| joint_rad(&parameters, joint, elbow + step);
+                let turned = (at(1e-4) - at(-1e-4)) / 2e-4;
+                let found = joint_by_encoder(&parameters, joint, at(0.0));
+                prop_assert!((found - turned).abs() < 1e-6, "joint {joint}: {found}, {turned}");
             }
         }
 

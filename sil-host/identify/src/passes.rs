@@ -4,8 +4,8 @@
 //! rounds much less, and its error is nearly independent of its neighbours'.
 //!
 //! Waves of the belt move the tip, and with it the angles at which the derivatives are taken. Plain least squares would
-//! therefore make encoders' errors up by which the waves look lower. So a depth is measured in what the encoders turn for it
-//! (Sampson's distance).
+//! therefore make encoders' errors up by which the waves look lower. So a depth is measured by what the encoders turn for it,
+//! as in Sampson's distance.
 
 use painleve_shared::Posture;
 
@@ -25,7 +25,7 @@ pub const ON_BELT: f64 = 0.8;
 /// Least number of stretches of all slides.
 const LEAST_POINTS: usize = 60;
 
-/// Motion across the belt over which a depth's gain is measured, m.
+/// Motion across the belt over which the derivatives of a depth change, m.
 const ACROSS_M: f64 = 1e-4;
 
 /// Mean angles of both encoders over a short stretch.
@@ -40,20 +40,44 @@ pub struct Point {
 }
 
 impl Point {
-    /// Evaluates the arm. The depth is that which turns the encoders as much by what is known beforehand.
+    /// Makes a point; `known` is what is known beforehand.
+    fn new(slide: usize, encoders_rad: [f64; 2], known: &Parameters) -> Self {
+        Self {
+            slide,
+            encoders_rad,
+            across_rad_m: Place::at(known, encoders_rad).across_rad_m(),
+        }
+    }
+
+    /// Evaluates the arm. The depth is that which turns the encoders as much by what is known beforehand, but its
+    /// derivatives are those of the depth itself.
     pub fn place(&self, parameters: &Parameters) -> Place {
         let place = Place::at(parameters, self.encoders_rad);
+        Place {
+            depth_m: place.depth_m / self.gain(&place),
+            ..place
+        }
+    }
+
+    /// The same with the derivatives of that depth.
+    pub fn place_by(&self, parameters: &Parameters) -> Place {
+        let place = self.place(parameters);
         let encoders_rad =
             [0, 1].map(|joint| self.encoders_rad[joint] + ACROSS_M * self.across_rad_m[joint]);
         let across = Place::at(parameters, encoders_rad);
-        let gain = (across.depth_m - place.depth_m) / ACROSS_M;
         let gain_by = (across.depth_by - place.depth_by) / ACROSS_M;
-        let depth_m = place.depth_m / gain;
         Place {
-            depth_m,
-            depth_by: (place.depth_by - gain_by * depth_m) / gain,
+            depth_by: (place.depth_by - gain_by * place.depth_m) / self.gain(&place),
             ..place
         }
+    }
+
+    /// Returns how deep the tip gets for each metre by what is known beforehand.
+    fn gain(&self, place: &Place) -> f64 {
+        let of = |joint: usize| {
+            place.depth_by_joint[joint] * place.joint_by_encoder[joint] * self.across_rad_m[joint]
+        };
+        of(0) + of(1)
     }
 }
 
@@ -137,12 +161,8 @@ impl Points {
                 let angles = these.iter().map(|it| it.encoders_rad[joint]);
                 angles.sum::<f64>() / count as f64
             };
-            let encoders_rad = [mean(0), mean(1)];
-            self.points.push(Point {
-                slide,
-                encoders_rad,
-                across_rad_m: Place::at(parameters, encoders_rad).across_rad_m(),
-            });
+            self.points
+                .push(Point::new(slide, [mean(0), mean(1)], parameters));
         }
         self.readings += touching.len();
         Ok(())
@@ -210,10 +230,10 @@ impl Points {
     }
 
     /// Returns the same with other angles.
-    pub(crate) fn with(&self, change: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+    pub(crate) fn with(&self, known: &Parameters, change: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let mut changed = self.clone();
         for point in &mut changed.points {
-            point.encoders_rad = change(point.encoders_rad);
+            *point = Point::new(point.slide, change(point.encoders_rad), known);
         }
         changed
     }

@@ -59,7 +59,7 @@ pub(crate) fn check_line(
             ),
         ];
         for (change, refusal) in others {
-            let changed = points.with(change);
+            let changed = points.with(&prior.parameters, change);
             let fit = Fit::new(&changed, prior);
             let left_m = changed.off_line_m(&fit.parameters);
             let is_whole = left_m <= limits.off_line_m && other_posture(&changed, &fit).is_none();
