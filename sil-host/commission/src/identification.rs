@@ -236,21 +236,19 @@ pub fn identify_arm<R: SlideRig>(
     let mut slide = |known: &Scenario, share: f64, postures: [Posture; 2]| {
         for posture in postures {
             let program = slide_scenario(known, share, posture)?;
-            let mut slid = || {
+            // An arm that is hardly known may throw its tip off when it starts.
+            let mut attempt = 1;
+            let slide = loop {
                 let frames = rig.slide(&program, posture);
-                Ok::<_, IdentificationError<R::Error>>(Slide {
+                let slide = Slide {
                     posture,
                     readings: readings(scenario, frames.map_err(IdentificationError::Rig)?),
-                })
-            };
-            let mut slide = slid()?;
-            // An arm that is hardly known may throw its tip off when it starts.
-            for _ in 1..ATTEMPTS {
-                if slide.share_on_belt(&limits) >= ON_BELT {
-                    break;
+                };
+                if attempt == ATTEMPTS || slide.share_on_belt(&limits) >= ON_BELT {
+                    break slide;
                 }
-                slide = slid()?;
-            }
+                attempt += 1;
+            };
             slides.push(slide);
         }
         Ok::<_, IdentificationError<R::Error>>(slides.clone())
