@@ -403,8 +403,8 @@ fn check_command(command: &Path) -> Result<(), ChoreError> {
 fn check_foreign_command(command: &Path, processor: &str) -> Result<(), ChoreError> {
     let library = format!("/usr/{processor}-linux-gnu");
     let start = Command::new(command).arg("--version").output();
-    let is_foreign = start.is_err_and(|cause| cause.raw_os_error() == Some(nix::libc::ENOEXEC));
-    if is_foreign || !Path::new(&library).exists() {
+    let is_unknown = start.is_err_and(|cause| cause.raw_os_error() == Some(nix::libc::ENOEXEC));
+    if is_unknown || !Path::new(&library).exists() {
         return say(&format!(
             "{} is NOT tested: that needs qemu-user-static, binfmt_misc and {library}",
             command.display()

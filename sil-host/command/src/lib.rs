@@ -210,8 +210,9 @@ pub enum CommandError {
 }
 
 impl CommandError {
-    /// 1: the plant failed, a drive ended with a fault, an arm or board was refused, or a sweep is incomplete; 2: bad input; 3: a peer is missing or has died;
-    /// 4: an output cannot be written; 5: deadlines missed; 130: interrupted.
+    /// 1: the plant failed, a drive ended with a fault, an arm or board was refused, or a sweep is incomplete;
+    /// 2: bad input; 3: a peer is missing or has died; 4: an output cannot be written; 5: deadlines missed;
+    /// 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
             Self::Scenario(_)
