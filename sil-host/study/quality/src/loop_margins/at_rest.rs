@@ -22,7 +22,8 @@ const AT_REST_M: f64 = 1e-4;
 /// The loop in its state of rest.
 pub(super) struct AtRest {
     trial: Trial,
-    /// The commands: for each the push per unit, N, and the weights with which it follows from the joints' torques.
+    arm: Arm<f64>,
+    /// The commands: for each its torques per unit, and the weights with which it follows from the joints' torques.
     commands: [Command; 2],
 }
 
@@ -30,8 +31,8 @@ pub(super) struct AtRest {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Command {
     name: &'static str,
-    /// Force on the tip for one unit of the command, N.
-    push_n: Vector2<f64>,
+    /// Generalised torques for one unit of the command, N·m.
+    torque_nm: Vector2<f64>,
     /// The command as a sum of the joints' torques.
     weights: [f64; 2],
     /// Size of the disturbances, in units of the command.
@@ -47,9 +48,9 @@ pub(super) struct Recorded {
     pub(super) force_n: f64,
 }
 
-/// Disturbances far from the edge: half a newton, and as much at the joints.
-const FORCE_N: f64 = 0.5;
-const TORQUE_NM: f64 = 0.05;
+/// Disturbances far from the edge: a quarter of a newton, and as much at the joints.
+const FORCE_N: f64 = 0.25;
+const TORQUE_NM: f64 = 0.025;
 
 /// Smallest part of these.
 const LEAST_SIZE: f64 = 0.02;
@@ -101,8 +102,8 @@ impl AtRest {
             return Ok(Err(NotHeld::Restless));
         };
         let mut commands = match wanted_force_n(scenario) {
-            Some(_) => tip_commands(&to_force),
-            None => joint_commands(&to_force),
+            Some(_) => tip_commands(&jacobian, &to_force),
+            None => joint_commands(),
         };
         // Near the edge the contact multiplies a force by Q22/p: a smaller disturbance keeps it.
         let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
@@ -111,7 +112,11 @@ impl AtRest {
         for command in &mut commands {
             command.size *= p_ratio.clamp(LEAST_SIZE, 1.0);
         }
-        Ok(Ok(Self { trial, commands }))
+        Ok(Ok(Self {
+            trial,
+            arm,
+            commands,
+        }))
     }
 
     pub(super) fn name(&self, number: usize) -> &'static str {
@@ -143,12 +148,15 @@ impl AtRest {
         for _ in 0..skipped {
             trial.tick(&mut ())?;
         }
-        let push_n = self.commands[number].push_n;
         let mut recorded = Vec::with_capacity(ticks);
         for tick in 0..ticks {
-            let push_n = push_n * disturbance(tick);
-            if push_n != Vector2::zeros() {
-                trial.push(push_n.into());
+            let torque_nm = self.commands[number].torque_nm * disturbance(tick);
+            // A push on the tip, by the pose that the arm has now: integrals move it on for many seconds.
+            let jacobian = self.arm.jacobian(&Pose::new(&trial.theta_rad()));
+            if torque_nm != Vector2::zeros()
+                && let Some(to_force) = jacobian.transpose().try_inverse()
+            {
+                trial.push((to_force * torque_nm).into());
             }
             trial.tick(&mut ())?;
             let simulation = trial.simulation();
@@ -171,30 +179,26 @@ fn unit_torques() -> [Vector2<f64>; 2] {
 }
 
 /// The force of the tip along the belt and normal to it.
-fn tip_commands(to_force: &Matrix2<f64>) -> [Command; 2] {
+fn tip_commands(jacobian: &Matrix2<f64>, to_force: &Matrix2<f64>) -> [Command; 2] {
     let [first, second] = unit_torques().map(|torque| to_force * torque);
-    [("position", 0), ("force", 1)].map(|(name, row)| {
-        let mut push_n = Vector2::zeros();
-        push_n[row] = 1.0;
-        Command {
-            name,
-            push_n,
-            weights: [first[row], second[row]],
-            size: FORCE_N,
-        }
+    [("position", 0), ("force", 1)].map(|(name, row)| Command {
+        name,
+        torque_nm: jacobian.row(row).transpose(),
+        weights: [first[row], second[row]],
+        size: FORCE_N,
     })
 }
 
 /// The torques of the joints.
-fn joint_commands(to_force: &Matrix2<f64>) -> [Command; 2] {
-    let [first, second] = unit_torques().map(|torque| to_force * torque);
+fn joint_commands() -> [Command; 2] {
+    let [first, second] = unit_torques();
     [
         ("joint 1", first, [1.0, 0.0]),
         ("joint 2", second, [0.0, 1.0]),
     ]
-    .map(|(name, push_n, weights)| Command {
+    .map(|(name, torque_nm, weights)| Command {
         name,
-        push_n,
+        torque_nm,
         weights,
         size: TORQUE_NM,
     })

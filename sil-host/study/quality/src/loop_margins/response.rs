@@ -17,7 +17,7 @@ pub(super) const FAST_S: f64 = 8.0;
 /// controller's slow work.
 const STARTS: usize = 8;
 /// Size of the disturbance of one tick, in that of a sine: it lasts a thousandth of a second.
-const TICK_SIZE: f64 = 4.0;
+const TICK_SIZE: f64 = 8.0;
 /// What the response of a stable loop still contains after some ticks is slow: from this tick on it is averaged over this
 /// part of the time since the disturbance, which removes the counts of the encoders.
 const SMOOTH_FROM: usize = 128;
