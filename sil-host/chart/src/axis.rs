@@ -120,6 +120,41 @@ impl ValueAxis {
     }
 }
 
+/// Returns labels of an axis of base-10 logarithms within its range: powers of ten, with as many multiples between them as
+/// four labels need.
+pub fn logarithmic(range: &Range<f64>) -> Vec<(f64, String)> {
+    let steps: [(&[i32], i32); 4] = [
+        (&[1], 0),
+        (&[1, 2, 5], 0),
+        (&[1, 2, 3, 4, 5, 6, 7, 8, 9], 0),
+        (
+            &[10, 12, 15, 17, 20, 25, 30, 35, 40, 45, 50, 60, 70, 80, 90],
+            1,
+        ),
+    ];
+    let mut labels = Vec::new();
+    for (multiples, more) in steps {
+        let decades = range.start.floor() as i32..=range.end.ceil() as i32;
+        labels = decades
+            .flat_map(|decade| {
+                multiples
+                    .iter()
+                    .map(move |multiple| (*multiple, decade - more))
+            })
+            .map(|(multiple, decade)| {
+                let value = f64::from(multiple) * 10_f64.powi(decade);
+                let decimals = (-decade).max(0) as usize;
+                (value.log10(), format!("{value:.decimals$}"))
+            })
+            .filter(|(place, _)| range.contains(place))
+            .collect();
+        if labels.len() >= 4 {
+            break;
+        }
+    }
+    labels
+}
+
 /// Formats a label with enough decimals to distinguish values `step` apart.
 pub fn label(value: f64, step: f64) -> String {
     if !(1e-6..1e7).contains(&step) {
@@ -221,5 +256,23 @@ mod tests {
                 let _ = (label(value, span / 5.0), short(value));
             }
         }
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_as_many_labels_as_it_needs() {
+        let names = |low: f64, high: f64| {
+            let labels = logarithmic(&(low.log10()..high.log10()));
+            labels.into_iter().map(|(_, name)| name).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            names(0.005, 2000.0),
+            ["0.01", "0.1", "1", "10", "100", "1000"]
+        );
+        assert_eq!(
+            names(0.9, 201.0),
+            ["1", "2", "5", "10", "20", "50", "100", "200"]
+        );
+        assert_eq!(names(0.29, 0.61), ["0.3", "0.4", "0.5", "0.6"]);
+        assert_eq!(names(0.024, 0.041), ["0.025", "0.030", "0.035", "0.040"]);
     }
 }

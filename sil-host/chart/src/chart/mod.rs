@@ -68,6 +68,8 @@ pub struct Panel {
     pub unit: String,
     /// Title and ends of an axis of its own instead of the shared one.
     pub x: Option<(String, Range<f64>)>,
+    /// Labels of that axis and their positions; round numbers by default.
+    pub x_labels: Option<Vec<(f64, String)>>,
     /// Ends of the value axis; by default those of all points.
     pub y: Option<Range<f64>>,
     /// Smallest span of an axis chosen from the points, so that noise on a constant stays small.
@@ -89,6 +91,7 @@ impl Default for Panel {
             note: String::new(),
             unit: String::new(),
             x: None,
+            x_labels: None,
             y: None,
             minimum_span: 0.0,
             y_ticks: 6,

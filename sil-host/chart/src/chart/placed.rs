@@ -50,7 +50,13 @@ impl<'a> Placed<'a> {
             panel.legend()
         };
         let (x, x_labels) = match &panel.x {
-            Some((_, own)) => (own.clone(), round_labels(own, &sides)),
+            Some((_, own)) => {
+                let labels = panel.x_labels.clone();
+                (
+                    own.clone(),
+                    labels.unwrap_or_else(|| round_labels(own, &sides)),
+                )
+            }
             None => (x.clone(), x_labels(chart, x, &sides)),
         };
         Self {

@@ -182,7 +182,7 @@ impl Section {
         if !self.comparisons.is_empty() {
             writeln!(
                 html,
-                "<table>\n<tr><th></th><th>the paper</th><th>here</th><th></th></tr>"
+                "<div class=\"scroll\"><table>\n<tr><th></th><th>the paper</th><th>here</th><th></th></tr>"
             )?;
             for comparison in &self.comparisons {
                 let (class, verdict) = comparison.verdict.words();
@@ -194,7 +194,7 @@ impl Section {
                     escaped(&comparison.here)
                 )?;
             }
-            writeln!(html, "</table>")?;
+            writeln!(html, "</table></div>")?;
         }
         for reason in &self.reasons {
             writeln!(html, "<p>{}</p>", escaped(reason))?;

@@ -1,5 +1,6 @@
 //! Bode plots with the measured points on the linearised curves, the margins along the belt, and the steps.
 
+use painleve_chart::axis::logarithmic;
 use painleve_chart::style::{BLACK_INK, BLUE_INK, Colour, GREEN, ORANGE, PURPLE, SKY, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel};
 
@@ -111,9 +112,11 @@ impl LoopOutcome {
         let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
             (at.min(low), at.max(high))
         });
+        let ends = low..high.max(low + 0.1);
         Panel {
             title: title.into(),
-            x: Some(("Frequency (10ˣ Hz)".into(), low..high.max(low + 0.1))),
+            x_labels: Some(logarithmic(&ends)),
+            x: Some(("Frequency (Hz)".into(), ends)),
             height: HEIGHT,
             marks,
             ..Panel::default()

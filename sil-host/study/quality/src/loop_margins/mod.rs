@@ -132,7 +132,7 @@ pub struct Point {
     pub frequency_hz: f64,
     /// Gain of the linearised loop, dB.
     pub gain_db: f64,
-    /// Its phase, degrees, from −360 to 0.
+    /// Its phase, degrees, continued from frequency to frequency.
     pub phase_deg: f64,
     /// Gain as measured with a sine, dB.
     pub measured_gain_db: f64,
@@ -284,14 +284,12 @@ impl Study for LoopMargins {
             let margins = Margins::of(|hz| linear.open_loop(hz), at_rest.tick_hz());
             let frequencies = response::frequencies_hz(self.frequencies, at_rest.tick_hz());
             let measured = at_rest.measured(number, &frequencies)?;
-            let points = frequencies.iter().zip(measured);
-            let points =
-                points.map(|(hz, measured)| Point::of(*hz, linear.open_loop(*hz), measured));
+            let points = response::points(&frequencies, |hz| linear.open_loop(hz), &measured);
             row.loops.push(Loop {
                 name: at_rest.name(number),
                 sensitivity: self.sensitivity(index, number, &scenario, margins.modulus)?,
                 margins,
-                points: points.collect(),
+                points,
             });
         }
         row.steps = steps::steps(&scenario, &at_rest, tip_m)?;

@@ -168,27 +168,32 @@ fn smoothed(response: &[f64]) -> Vec<f64> {
     (0..response.len()).map(smooth).collect()
 }
 
-impl Point {
-    pub(super) fn of(hz: f64, linear: Complex<f64>, measured: Complex<f64>) -> Self {
-        let phase_deg = phase_deg(linear);
-        // On the same turn as the linearised one.
-        let difference_deg = angle(measured / linear).to_degrees();
-        Self {
-            frequency_hz: hz,
+/// Returns the points of a loop at frequencies, Hz, from its linearised and its measured response there.
+pub(super) fn points(
+    frequencies_hz: &[f64],
+    linear: impl Fn(f64) -> Complex<f64>,
+    measured: &[Complex<f64>],
+) -> Vec<Point> {
+    // The first one between −270° and 90°.
+    let mut before_deg = -90.0;
+    let points = frequencies_hz.iter().zip(measured);
+    let points = points.map(|(&frequency_hz, measured)| {
+        let linear = linear(frequency_hz);
+        // On the turn of its neighbour, and the measured one on that of the linearised.
+        let phase_deg = near_deg(angle(linear).to_degrees(), before_deg);
+        before_deg = phase_deg;
+        Point {
+            frequency_hz,
             gain_db: decibels(size(linear)),
             phase_deg,
-            measured_gain_db: decibels(size(measured)),
-            measured_phase_deg: phase_deg + difference_deg,
+            measured_gain_db: decibels(size(*measured)),
+            measured_phase_deg: phase_deg + angle(measured / linear).to_degrees(),
         }
-    }
+    });
+    points.collect()
 }
 
-/// Returns a phase from −360 to 0 degrees: that of a loop with delay.
-pub(super) fn phase_deg(value: Complex<f64>) -> f64 {
-    let degrees = angle(value).to_degrees();
-    if degrees > 0.0 {
-        degrees - 360.0
-    } else {
-        degrees
-    }
+/// Returns an angle on the turn that is nearest to another angle, degrees.
+fn near_deg(angle_deg: f64, other_deg: f64) -> f64 {
+    angle_deg + 360.0 * ((other_deg - angle_deg) / 360.0).round()
 }

@@ -1,5 +1,6 @@
 //! The trials of a search: error beside change of torque, with those that no other one beats in both.
 
+use painleve_chart::axis::logarithmic;
 use painleve_chart::style::{BLUE_INK, GREEN, GREY, ORANGE, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel};
 
@@ -22,12 +23,15 @@ pub fn svg(trials: &[Trial], given: &Score, best: &Trial) -> String {
             .map(|trial| at(&trial.score))
             .collect()
     };
+    let scores = || trials.iter().map(|trial| &trial.score).chain([given]);
+    let x = ends(scores().map(|score| score.error_mm));
+    let y = ends(scores().map(|score| score.torque_change_nm));
     let panel = Panel {
-        title: "Change of torque (N·m), logarithmic: 10ˣ".into(),
-        x: Some((
-            "Tracking error (mm), logarithmic: 10ˣ".into(),
-            ends(trials, given),
-        )),
+        title: "Change of torque (N·m)".into(),
+        x_labels: Some(logarithmic(&x)),
+        x: Some(("Tracking error (mm)".into(), x)),
+        y_labels: Some(logarithmic(&y)),
+        y: Some(y),
         height: 700,
         marks: vec![
             dots("not kept in every case", VERMILLION, 9, of(false)),
@@ -55,14 +59,11 @@ pub fn svg(trials: &[Trial], given: &Score, best: &Trial) -> String {
     .svg()
 }
 
-fn ends(trials: &[Trial], given: &Score) -> core::ops::Range<f64> {
-    let errors = trials
-        .iter()
-        .map(|trial| trial.score.error_mm)
-        .chain([given.error_mm]);
-    let errors = errors.map(f64::log10).filter(|error| error.is_finite());
-    let (low, high) = errors.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), error| {
-        (error.min(low), error.max(high))
+/// Returns the ends of a logarithmic axis for values.
+fn ends(values: impl Iterator<Item = f64>) -> core::ops::Range<f64> {
+    let places = values.map(f64::log10).filter(|place| place.is_finite());
+    let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), place| {
+        (place.min(low), place.max(high))
     });
     if low <= high {
         low - 0.05..high + 0.05
