@@ -1,8 +1,8 @@
 //! `cargo xtask dist`: makes what a maintainer publishes, in `target/dist`.
 //!
-//! Everything is built in a target folder of its own, without the names of this machine's folders in it. Zig is the linker and
-//! the C compiler, because it links for other processors and for an old glibc. The command is not static: iceoryx2 0.9 does not
-//! compile with musl, and 0.10, which does, allocates memory for every frame that the ends of the bus exchange.
+//! Everything is built in a target folder of its own, without the names of this machine's folders in it. The command is static,
+//! with glibc: iceoryx2 0.9 does not compile with musl, and 0.10, which does, allocates memory for every frame that the ends of
+//! the bus exchange. The wheels need an old glibc, for which Zig links.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -62,10 +62,10 @@ const TOOLS: [&str; 4] = [
 /// Processors of Linux machines.
 const PROCESSORS: [&str; 2] = ["x86_64", "aarch64"];
 
-/// The oldest glibc with which Rust's standard library works.
-const GLIBC: &str = "2.17";
+/// The names by which the crate libc calls a function of a shared glibc. A static one has only the name before the `@`.
+const VERSIONED: [&str; 2] = ["cfsetspeed@GLIBC_2.2.5", "cfsetspeed@GLIBC_2.17"];
 
-/// The tag of wheels that work with that glibc.
+/// The tag of wheels that work with the oldest glibc with which Rust's standard library works.
 const WHEEL_TAG: &str = "manylinux_2_17";
 
 /// Longest time for installing a wheel and one run, s.
@@ -121,7 +121,7 @@ impl Dist {
         let path = std::env::var("PATH").unwrap_or_default();
         Ok(Self {
             folder,
-            config: format!("target.'cfg(all())'.rustflags={:?}", remapping()),
+            config: config(&remapping()),
             variables: vec![
                 ("PATH", format!("{}:{path}", programs.display())),
                 ("SOURCE_DATE_EPOCH", commit_time()?),
@@ -140,38 +140,38 @@ impl Dist {
     }
 
     fn command(&self) -> Result<(), ChoreError> {
-        for processor in PROCESSORS {
+        for (processor, versioned) in PROCESSORS.into_iter().zip(VERSIONED) {
             let target = target(processor);
-            let with_glibc = format!("{target}.{GLIBC}");
-            let build = [
-                "zigbuild",
-                "--release",
-                "--locked",
-                "--config",
-                &self.config,
+            let linker = format!("{processor}-linux-gnu-gcc");
+            if Command::new(&linker).arg("--version").output().is_err() {
+                return Err(ChoreError(format!(
+                    "{linker} is missing (Debian: gcc-{}-linux-gnu with the libc6-dev of that processor)",
+                    processor.replace('_', "-")
+                )));
+            }
+            let (name, _) = versioned.split_once('@').unwrap_or_default();
+            let flags = [
+                "-Ctarget-feature=+crt-static".to_owned(),
+                "-Cstrip=symbols".to_owned(),
+                format!("-Clinker={linker}"),
+                "-Clink-arg=-fuse-ld=bfd".to_owned(),
+                format!("-Clink-arg=-Wl,-u,{name},--defsym=\"{versioned}\"={name}"),
             ];
+            let config = config(&[&remapping()[..], &flags].concat());
+            let build = ["build", "--release", "--locked", "--config", &config];
             let of = [
                 "--package",
                 "painleve-command",
                 "--target",
-                &with_glibc,
+                &target,
                 "--target-dir",
                 TARGET,
             ];
-            run_with(
-                "cargo-zigbuild",
-                &[&build[..], &of].concat(),
-                &self.environment(),
-            )?;
-            let built = format!("{TARGET}/{target}/release/painleve");
-            let command = format!("{FOLDER}/painleve-{processor}-linux");
-            convert(&["--strip-all"], &built, &command)?;
-            let command = workspace().join(command);
-            if processor == std::env::consts::ARCH {
-                check_command(&command)?;
-            } else {
-                check_foreign_command(&command, processor)?;
-            }
+            run_with("cargo", &[&build[..], &of].concat(), &self.environment())?;
+            let built = workspace().join(format!("{TARGET}/{target}/release/painleve"));
+            let command = self.folder.join(format!("painleve-{processor}-linux"));
+            copy(&built, &command)?;
+            check_command(&command)?;
         }
         Ok(())
     }
@@ -332,6 +332,11 @@ fn target(processor: &str) -> String {
     format!("{processor}-unknown-linux-gnu")
 }
 
+/// Returns cargo's option for options of the compiler.
+fn config(flags: &[String]) -> String {
+    format!("target.'cfg(all())'.rustflags={flags:?}")
+}
+
 /// Returns the compiler's options that replace the names of this machine's folders.
 fn remapping() -> Vec<String> {
     let home = std::env::var("HOME").unwrap_or_default();
@@ -372,59 +377,40 @@ fn convert(options: &[&str], from: &str, to: &str) -> Result<(), ChoreError> {
     )
 }
 
-/// Runs the command in a root with nothing but the command and glibc.
+/// Runs the command in a root with nothing else, one of another processor with the emulator that the kernel starts for it. Says
+/// so if this machine has none.
 fn check_command(command: &Path) -> Result<(), ChoreError> {
+    let start = Command::new(command).arg("--version").output();
+    if start.is_err_and(|cause| cause.raw_os_error() == Some(nix::libc::ENOEXEC)) {
+        return say(&format!(
+            "{} is NOT tested: that needs qemu-user-static and binfmt_misc",
+            command.display()
+        ));
+    }
     let root = tempfile::tempdir().map_err(|cause| ChoreError(format!("no folder: {cause}")))?;
     let root = root.path();
     for folder in ["dev", "proc", "tmp"] {
         fs::create_dir(root.join(folder)).map_err(|cause| unwritable(root, &cause))?;
     }
     copy(command, &root.join("painleve"))?;
-    let libraries = output(Command::new("ldd").arg(command))?;
-    let libraries = String::from_utf8_lossy(&libraries.stdout).into_owned();
-    for library in libraries
-        .split_whitespace()
-        .filter(|word| word.starts_with('/'))
-    {
-        copy(
-            Path::new(library),
-            &root.join(library.trim_start_matches('/')),
-        )?;
-    }
     let enter =
         "mount --rbind /dev dev && mount --rbind /proc proc && exec chroot . /painleve run edge";
-    let mut run = Command::new("unshare");
-    run.args(["--map-root-user", "--mount", "/bin/sh", "-c", enter]);
-    check_run(run.env_clear(), root, command)
-}
-
-/// Runs the command of another processor, with the emulator that the kernel starts for it and the glibc of Debian's
-/// package for it. Says so if this machine does not have them.
-fn check_foreign_command(command: &Path, processor: &str) -> Result<(), ChoreError> {
-    let library = format!("/usr/{processor}-linux-gnu");
-    let start = Command::new(command).arg("--version").output();
-    let is_unknown = start.is_err_and(|cause| cause.raw_os_error() == Some(nix::libc::ENOEXEC));
-    if is_unknown || !Path::new(&library).exists() {
-        return say(&format!(
-            "{} is NOT tested: that needs qemu-user-static, binfmt_misc and {library}",
-            command.display()
-        ));
-    }
-    let folder = tempfile::tempdir().map_err(|cause| ChoreError(format!("no folder: {cause}")))?;
-    let mut run = Command::new(command);
-    run.args(["run", "edge"]).env("QEMU_LD_PREFIX", library);
-    check_run(&mut run, folder.path(), command)
-}
-
-/// Checks that a run of the command in a folder leaves its page there.
-fn check_run(run: &mut Command, folder: &Path, command: &Path) -> Result<(), ChoreError> {
     let start = Instant::now();
-    output(run.current_dir(folder))?;
-    if !folder.join("out/run.html").exists() {
+    output(
+        Command::new("unshare")
+            .args(["--map-root-user", "--mount", "/bin/sh", "-c", enter])
+            .env_clear()
+            .env("PATH", "/usr/sbin:/usr/bin:/sbin:/bin")
+            .current_dir(root),
+    )?;
+    if !root.join("out/run.html").exists() {
         return Err(ChoreError(format!("{} writes no page", command.display())));
     }
     let seconds = start.elapsed().as_secs_f64();
-    say(&format!("{} runs: {seconds:.1} s", command.display()))
+    say(&format!(
+        "{} runs where nothing else is: {seconds:.1} s",
+        command.display()
+    ))
 }
 
 /// Installs a wheel in a new environment without programs and without the package index, and runs a scenario.

@@ -9,7 +9,9 @@ use painleve_commission::identification::{Found, IdentificationError, identify_a
 use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
 use painleve_identify::Parameter;
 use painleve_identify::parameters::Drawn;
+use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
+use painleve_shared::{Arm, Pose, Slip};
 use painleve_study_core::case::ControllerChoice;
 use painleve_study_quality::distribution::Percentiles;
 use painleve_study_quality::effects::{Contact, EffectsStudy};
@@ -62,6 +64,15 @@ fn identified(
     (found, rig)
 }
 
+/// Returns p at the start of a run, 1/kg.
+fn start_p_per_kg(scenario: &Scenario) -> f64 {
+    let arm = Arm::new(scenario.moving_arm()).unwrap();
+    let pose = Pose::new(&theta(&scenario.initial.state(&scenario.arm).unwrap()));
+    let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
+    let inverse = arm.inverse_tip_inertia(&pose);
+    inverse.m22 - scenario.belt.friction * slip.sign::<f64>() * inverse.m12
+}
+
 /// Results of closed loops.
 fn describe(name: &str, rows: &[Row]) -> (Proportion, Percentiles) {
     let kept: Vec<&Row> = rows.iter().filter(|row| row.ending.is_kept()).collect();
@@ -105,7 +116,8 @@ fn identified_arms_put_the_tip_where_they_say() {
     let arms = std::env::var("PAINLEVE_ARMS").map_or(10, |arms| arms.parse().unwrap());
     let study = loops(LOOPS * arms);
     let cell = study.cells()[0];
-    let (mut without, mut drawn_margin, mut with) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut without, mut drawn_margin) = (Vec::new(), Vec::new());
+    let (mut with, mut within_margin) = (Vec::new(), Vec::new());
     let (mut refused, mut inside, mut parameters) = (Vec::new(), 0, 0);
     let (mut time_s, mut force_n) = (0.0_f64, 0.0_f64);
     for arm in 0..arms {
@@ -123,7 +135,11 @@ fn identified_arms_put_the_tip_where_they_say() {
             drawn_margin.push(robustness::run(run, &careful).unwrap());
             if let Ok(found) = &found {
                 let known = found.applied_to(&actual, "").unwrap();
-                with.push(robustness::run(run, &known).unwrap());
+                let row = robustness::run(run, &known).unwrap();
+                if start_p_per_kg(&known) >= f64::from(known.controller.governor.p_per_kg) {
+                    within_margin.push(row.clone());
+                }
+                with.push(row);
             }
         }
         match found {
@@ -153,6 +169,7 @@ fn identified_arms_put_the_tip_where_they_say() {
     describe("not identified, no margin for it", &without);
     let (_, before) = describe("not identified, margin of a drawing", &drawn_margin);
     let (_, after) = describe("identified", &with);
+    describe("identified, started within the margin", &within_margin);
     assert!(after.median < 0.2 * before.median, "{after:?} {before:?}");
 }
 

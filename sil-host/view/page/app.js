@@ -203,7 +203,7 @@ class Page {
       ["normal force", show("fn_n", 2, "N")], ["tangential force", show("ft_n", 2, "N")],
       ["u1", show("u1_nm", 3, "N·m")], ["u2", show("u2_nm", 3, "N·m")],
       ["b", show("b_m_s2", 2, "m/s²")], ["p", show("p_per_kg", 3, "1/kg")],
-      ["edge at", edge], ["p/Q22", show("p_ratio", 3, "")],
+      ["to the edge", edge], ["p/Q22", show("p_ratio", 3, "")],
       ["μ estimate", `${decimals(c.friction[i], 3, "")}± ${decimals(c.friction_deviation[i], 3, "")}`], ["contact confidence", show("confidence", 3, "")],
     ];
     const body = $("readout").tBodies[0];

@@ -1,5 +1,6 @@
 //! The settings that the page of a live run offers; every other key can be set by name.
 
+use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::Scenario;
 use serde_json::{Value, json};
 
@@ -12,8 +13,7 @@ const HYBRID: [(&str, &str, f64); 3] = [
 
 /// Returns the settings with their present values. In a template, `%` stands for the number.
 pub fn settings(scenario: &Scenario) -> Value {
-    let segments = &scenario.controller.reference.segments;
-    let target_m = segments.iter().rev().find_map(|segment| segment.target_m());
+    let target_m = scenario.target_m();
     let mut settings = vec![
         json!({ "key": "belt.friction", "label": "belt friction μ", "value": scenario.belt.friction, "minimum": 0, "maximum": 2, "step": 0.01 }),
         json!({ "key": "belt.profile", "label": "belt speed, m/s", "value": scenario.belt.profile.speed_m_s(0.0), "minimum": -2, "maximum": 2, "step": 0.05, "template": "{ kind = \"constant\", speed_m_s = % }" }),
@@ -21,8 +21,9 @@ pub fn settings(scenario: &Scenario) -> Value {
     ];
     let law = serde_json::to_value(&scenario.controller.law).unwrap_or_default();
     for (key, label, maximum) in HYBRID {
-        let value = &law["hybrid"][key];
-        if value.is_number() {
+        // Without the binary digits beyond single precision.
+        let value = law["hybrid"][key].as_f64();
+        if let Some(value) = value.map(|value| as_written(value as f32)) {
             settings.push(json!({ "key": format!("controller.law.hybrid.{key}"), "label": label, "value": value, "minimum": 0, "maximum": maximum, "step": "any" }));
         }
     }
@@ -31,7 +32,6 @@ pub fn settings(scenario: &Scenario) -> Value {
 
 /// Returns the command that runs a scenario with what was set in a live run, one key on each line.
 pub fn changes(given: &Scenario, set: &Scenario) -> String {
-    // Nothing that is set makes another key absent, except the other way to give the start.
     // Nothing that is set makes another key absent, except the other way to give the start.
     let options = given.differences(set).into_iter().filter_map(|change| {
         // A single quote ends the shell's quotation.
@@ -64,8 +64,8 @@ mod tests {
         let overrides = [
             "belt.friction=0.3",
             "belt.profile.speed_m_s=-0.25",
-            "controller.reference.0.minimum-jerk.target_m=0.125",
-            "controller.law.hybrid.normal_force_n=12.5",
+            "controller.reference.0.minimum-jerk.target_m=0.148",
+            "controller.law.hybrid.normal_force_n=12.3",
             "controller.law.hybrid.position_gain_per_s2=2000",
             "controller.law.hybrid.velocity_gain_per_s=70",
         ];
@@ -74,7 +74,7 @@ mod tests {
         let settings = settings(&scenario);
         let values = settings.as_array().unwrap().iter();
         let values: Vec<_> = values.map(|setting| setting["value"].as_f64()).collect();
-        let expected = [0.3, -0.25, 0.125, 12.5, 2000.0, 70.0].map(Some);
+        let expected = [0.3, -0.25, 0.148, 12.3, 2000.0, 70.0].map(Some);
         assert_eq!(values, expected);
     }
 
