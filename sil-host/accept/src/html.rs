@@ -11,7 +11,9 @@ body{font-family:Helvetica,Arial,'Liberation Sans','DejaVu Sans',sans-serif;colo
 margin:0 auto;max-width:1040px;padding:24px;line-height:1.45}\
 table{border-collapse:collapse;width:100%;font-size:14px}th,td{text-align:left;vertical-align:top;\
 padding:4px 10px;border-bottom:1px solid #ddd}h2{font-size:19px;margin:32px 0 4px}p{margin:4px 0 8px}\
-.passed{color:#0a6b2d}.failed{color:#b00020;font-weight:bold}.noted{color:#666}";
+.passed{color:#0a6b2d}.failed{color:#b00020;font-weight:bold}.noted{color:#666}\
+@media(prefers-color-scheme:dark){body{color:#e8e8e8;background:#161616}th,td{border-color:#444}\
+.passed{color:#3fc39a}.failed{color:#ff8a80}.noted{color:#a0a0a0}}";
 
 fn class(verdict: Verdict) -> &'static str {
     match verdict {
@@ -29,7 +31,8 @@ impl Acceptance {
         // Writing to a string does not fail.
         let _ = write!(
             page,
-            "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Acceptance: {chip}</title>\
+            "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\">\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>Acceptance: {chip}</title>\
              <style>{STYLE}</style><h1>Acceptance: {chip}</h1>\
              <p class=\"{}\">{}</p><p>painleve {}, sources {}</p>",
             class(self.verdict),
