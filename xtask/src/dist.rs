@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use crate::command::{ChoreError, cargo, run, run_with, say, workspace};
+use crate::command::{ChoreError, cargo, run, run_with, say, starts, workspace};
 use crate::files::{copy, unwritable};
 use crate::{boards, build_fw, fmu, python, size};
 
@@ -62,8 +62,9 @@ const TOOLS: [&str; 4] = [
 /// Processors of Linux machines.
 const PROCESSORS: [&str; 2] = ["x86_64", "aarch64"];
 
-/// The names by which the crate libc calls a function of a shared glibc. A static one has only the name before the `@`.
-const VERSIONED: [&str; 2] = ["cfsetspeed@GLIBC_2.2.5", "cfsetspeed@GLIBC_2.17"];
+/// A function that the crate libc calls by its version in the shared glibc of each processor. A static one has only the name.
+const FUNCTION: &str = "cfsetspeed";
+const VERSIONS: [&str; 2] = ["GLIBC_2.2.5", "GLIBC_2.17"];
 
 /// The tag of wheels that work with the oldest glibc with which Rust's standard library works.
 const WHEEL_TAG: &str = "manylinux_2_17";
@@ -140,22 +141,23 @@ impl Dist {
     }
 
     fn command(&self) -> Result<(), ChoreError> {
-        for (processor, versioned) in PROCESSORS.into_iter().zip(VERSIONED) {
+        for (processor, version) in PROCESSORS.into_iter().zip(VERSIONS) {
             let target = target(processor);
             let linker = format!("{processor}-linux-gnu-gcc");
-            if Command::new(&linker).arg("--version").output().is_err() {
+            if !starts(&linker) {
                 return Err(ChoreError(format!(
                     "{linker} is missing (Debian: gcc-{}-linux-gnu with the libc6-dev of that processor)",
                     processor.replace('_', "-")
                 )));
             }
-            let (name, _) = versioned.split_once('@').unwrap_or_default();
             let flags = [
                 "-Ctarget-feature=+crt-static".to_owned(),
                 "-Cstrip=symbols".to_owned(),
                 format!("-Clinker={linker}"),
                 "-Clink-arg=-fuse-ld=bfd".to_owned(),
-                format!("-Clink-arg=-Wl,-u,{name},--defsym=\"{versioned}\"={name}"),
+                format!(
+                    "-Clink-arg=-Wl,-u,{FUNCTION},--defsym=\"{FUNCTION}@{version}\"={FUNCTION}"
+                ),
             ];
             let config = config(&[&remapping()[..], &flags].concat());
             let build = ["build", "--release", "--locked", "--config", &config];
@@ -167,7 +169,7 @@ impl Dist {
                 "--target-dir",
                 TARGET,
             ];
-            run_with("cargo", &[&build[..], &of].concat(), &self.environment())?;
+            run_with(&cargo(), &[&build[..], &of].concat(), &self.environment())?;
             let built = workspace().join(format!("{TARGET}/{target}/release/painleve"));
             let command = self.folder.join(format!("painleve-{processor}-linux"));
             copy(&built, &command)?;

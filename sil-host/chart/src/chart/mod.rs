@@ -151,7 +151,7 @@ impl Chart {
         let mut end = bottoms.iter().copied().max().unwrap_or(top);
         for (sides, bottom) in column_sides(columns).into_iter().zip(&bottoms) {
             if is_shared {
-                let labels = x_labels(self, &x, &sides);
+                let labels = x_labels(self.x_labels.as_ref(), &x, &sides);
                 let below = draw_x_axis(&mut canvas, &labels, &self.x_title, &x, &sides, *bottom);
                 end = end.max(below);
             }
@@ -211,12 +211,13 @@ fn column_sides(columns: usize) -> Vec<Range<i32>> {
         .collect()
 }
 
-/// Returns the labels of the shared axis.
-fn x_labels(chart: &Chart, x: &Range<f64>, sides: &Range<i32>) -> Vec<(f64, String)> {
-    if let Some(labels) = &chart.x_labels {
-        return labels.clone();
-    }
-    round_labels(x, sides)
+/// Returns the given labels of an axis, or round numbers.
+fn x_labels(
+    given: Option<&Vec<(f64, String)>>,
+    x: &Range<f64>,
+    sides: &Range<i32>,
+) -> Vec<(f64, String)> {
+    given.map_or_else(|| round_labels(x, sides), Clone::clone)
 }
 
 /// Returns as many round numbers as have room along an axis.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::heading::Heading;
 use super::mark::{BAND_OPACITY, Mark};
-use super::{Chart, Panel, draw_x_axis, round_labels, x_labels};
+use super::{Chart, Panel, draw_x_axis, x_labels};
 use crate::axis::{ValueAxis, label};
 use crate::canvas::{Anchor, At, Canvas, Fill, Stroke};
 use crate::decimate::Extent;
@@ -49,22 +49,17 @@ impl<'a> Placed<'a> {
         } else {
             panel.legend()
         };
-        let (x, x_labels) = match &panel.x {
-            Some((_, own)) => {
-                let labels = panel.x_labels.clone();
-                (
-                    own.clone(),
-                    labels.unwrap_or_else(|| round_labels(own, &sides)),
-                )
-            }
-            None => (x.clone(), x_labels(chart, x, &sides)),
+        let (x, given) = match &panel.x {
+            Some((_, own)) => (own, &panel.x_labels),
+            None => (x, &chart.x_labels),
         };
+        let x_labels = x_labels(given.as_ref(), x, &sides);
         Self {
             panel,
             heading: Heading::new(&panel.title, &note, entries, sides.clone()),
             x_labels,
             sides,
-            x,
+            x: x.clone(),
             axis,
         }
     }
