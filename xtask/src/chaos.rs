@@ -1,8 +1,8 @@
-//! `cargo xtask chaos`: the test in `tests/chaos`, which builds what it disturbs.
+//! `cargo xtask chaos`: the test in `tests/chaos`, on the program under test.
 
 use clap::Args;
 
-use crate::command::{ChoreError, PROFILE, run_cargo};
+use crate::command::{self, CHAOS, ChoreError, build_program, built};
 
 /// Options of the test, which `--help` lists.
 #[derive(Debug, Args)]
@@ -38,13 +38,6 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
 }
 
 fn start(options: &[&str]) -> Result<(), ChoreError> {
-    let test = [
-        "run",
-        "--profile",
-        PROFILE,
-        "--package",
-        "painleve-chaos",
-        "--",
-    ];
-    run_cargo(&[&test, options].concat())
+    build_program()?;
+    command::run(&built(CHAOS).to_string_lossy(), options)
 }

@@ -14,7 +14,7 @@ const TARGET: &str = "target/examples";
 const OWN_FIRMWARE: &str = "examples/own-firmware/Cargo.toml";
 
 /// The targets for which it is built, and what of it: `cortex-m-rt`, with which its program starts, is for ARM. The
-/// boards' target is one of them.
+/// first is that of the boards.
 pub const CHIPS: [(&str, &str); 4] = [
     (build_fw::TARGET, "--bins"),
     ("thumbv6m-none-eabi", "--bins"),
@@ -22,13 +22,17 @@ pub const CHIPS: [(&str, &str); 4] = [
     ("riscv32imac-unknown-none-elf", "--lib"),
 ];
 
-/// Builds the example of a firmware for all its chips, and runs its tests on this machine.
+/// Builds the example of a firmware for the boards' chip, and runs its tests on this machine.
 ///
 /// # Errors
 /// If it does not build, or fails a test.
 pub fn own_firmware() -> Result<(), ChoreError> {
+    own_firmware_for(&CHIPS[..1])
+}
+
+fn own_firmware_for(chips: &[(&str, &str)]) -> Result<(), ChoreError> {
     let manifest = ["--manifest-path", OWN_FIRMWARE];
-    for (chip, part) in CHIPS {
+    for &(chip, part) in chips {
         build_fw::build(
             chip,
             &[&[part], &manifest[..]].concat(),
@@ -41,13 +45,13 @@ pub fn own_firmware() -> Result<(), ChoreError> {
     run_cargo(&[&test[..], &manifest[..]].concat())
 }
 
-/// Handles the firmware, then every other folder of `examples/` that has a `Cargo.toml`, sorted by name: builds the image
+/// Handles the firmware, for all its chips, then every other folder of `examples/` that has a `Cargo.toml`, sorted by name: builds the image
 /// named by `[package.metadata] image`, runs the program, then its tests.
 ///
 /// # Errors
 /// If an example does not build, ends with an error, or fails a test.
 pub fn run() -> Result<(), ChoreError> {
-    own_firmware()?;
+    own_firmware_for(&CHIPS)?;
     for manifest in manifests()? {
         let manifest_path = manifest.to_string_lossy();
         let of_example = ["--release", "--manifest-path", &manifest_path];
