@@ -31,7 +31,7 @@ const TESTS: [&str; 7] = [
 ];
 const FRAMES: &str = "random_frames";
 /// Compares both ends of a bus with a model. Its cases wait for each other, so there are fewer.
-const BUS: [&str; 4] = ["--package", "painleve-link", "--lib", "both_ends"];
+const BUS: [&str; 2] = ["--lib", "both_ends"];
 const BUS_SHARE: u32 = 20;
 
 /// Runs the part that belongs to `cargo xtask test --all`.
@@ -69,11 +69,7 @@ pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
         &variables,
     )?;
     let bus_cases = (arguments.cases / BUS_SHARE).max(1).to_string();
-    run_with(
-        &cargo(),
-        &[&["test", "--profile", PROFILE], &BUS[..]].concat(),
-        &[("PROPTEST_CASES", &bus_cases)],
-    )?;
+    test(&BUS, &[("PROPTEST_CASES", &bus_cases)])?;
     let frames = arguments.frames.to_string();
     test(&["--tests", FRAMES], &[("PAINLEVE_FUZZ_TICKS", &frames)])
 }

@@ -38,10 +38,11 @@ pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
         &cargo(),
         &[
             "test",
-            "--package",
-            "painleve-tests",
+            "--workspace",
             "--profile",
             PROFILE,
+            "--test",
+            "it",
             "soak",
             "--",
             "--nocapture",
