@@ -91,7 +91,7 @@ enum Command {
     Accept(accept::AcceptArguments),
     /// Measure how the sensors and torque stages of an arm are mounted, and correct its scenario.
     Commission(commission::CommissionArguments),
-    /// Measure the geometry of an arm by slides along its belt, and how well it is known.
+    /// Measure geometry, joint friction and springs of an arm by slides along its belt, and how well they are known.
     Identify(identify::IdentifyArguments),
     /// Drive a real arm through its board: watch, permit arming, record, stop.
     Drive(drive::DriveArguments),

@@ -1,23 +1,28 @@
-//! Identification of an arm's geometry by slides of its tip along the belt.
+//! Identification of an arm's geometry and joints by slides of its tip along the belt.
 //!
 //! The arm's own controller makes the slides: with a small force, slowly, to and fro, and with the governor's distance for an
 //! arm that is known badly. The operator sets the tip down in each posture, and lets the belt run in the direction in which
-//! friction does not press the tip into it. A first round, short of the edges, corrects the zeros; a second one goes nearer.
+//! friction does not press the tip into it. A first round, short of the edges, corrects the zeros; a second one goes nearer. The
+//! torques of the slides show the joints' friction and springs.
 //!
 //! The belt's waves and vibration, and whatever else the controller does not know, accelerate the tip by some a. The normal
 //! force ripples by a/p, as the slides show. In use, the governor keeps p so large that the ripple leaves most of the force.
+
+use core::convert::Infallible;
 
 use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_firmware::law::LawSettings;
 use painleve_identify::geometry::joint_rad;
 use painleve_identify::parameters::Drawn;
 use painleve_identify::passes::ON_BELT;
+use painleve_identify::torques::Joints;
 use painleve_identify::{
     Identified, Limits, Parameter, Parameters, Prior, Reading, Refusal, Slide, identify,
 };
 use painleve_plant::decimal::as_written;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError};
+use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Pose, Posture};
 
@@ -51,13 +56,22 @@ const MEAN_PER_TICK: f64 = 0.01;
 /// Largest number of attempts at a slide whose tip leaves the belt.
 const ATTEMPTS: usize = 3;
 
+/// A tick of a slide.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SlideTick {
+    /// The readings.
+    pub sensor: SensorFrame,
+    /// The torques that answered them.
+    pub torques: [TorqueCounts; 2],
+}
+
 /// An arm whose controller slides its tip, and its operator.
 pub trait SlideRig {
     /// Failure of the rig.
     type Error: std::error::Error;
 
     /// Has the tip set down in a posture and the belt run as the scenario says, runs the controller with its settings and
-    /// reference, and returns the frames of the ticks in which it was tracking.
+    /// reference, and returns the ticks in which it was tracking.
     ///
     /// # Errors
     /// If the operator gives up, or the rig or its drive fails.
@@ -65,7 +79,7 @@ pub trait SlideRig {
         &mut self,
         scenario: &Scenario,
         posture: Posture,
-    ) -> Result<Vec<SensorFrame>, Self::Error>;
+    ) -> Result<Vec<SlideTick>, Self::Error>;
 }
 
 /// Reason for the end of an identification without a result.
@@ -134,30 +148,35 @@ pub fn limits(scenario: &Scenario) -> Limits {
     }
 }
 
-/// Returns the readings of frames, by the scenario's zeros and scales. Frames without all readings are left out.
-pub fn readings(
-    scenario: &Scenario,
-    frames: impl IntoIterator<Item = SensorFrame>,
-) -> Vec<Reading> {
+/// Returns the readings of ticks, by the scenario's zeros and scales. Ticks without all readings are left out.
+pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>) -> Vec<Reading> {
     let scales = scenario.converters.scales();
     let [scale_1, scale_2] = scales.encoders;
-    let per_count = f64::from(scales.force.per_count());
-    let frames = frames.into_iter().filter(|frame| {
+    let newtons = f64::from(scales.force.per_count());
+    let newton_metres = f64::from(scales.torque.per_count());
+    let ticks = ticks.into_iter().filter(|tick| {
+        let frame = &tick.sensor;
         scale_1.contains(frame.joints[0])
             && scale_2.contains(frame.joints[1])
             && scales.force.contains(frame.normal_force.0)
             && scales.force.contains(frame.tangential_force.0)
     });
-    frames
-        .map(|frame| Reading {
-            encoders_rad: [(scale_1, frame.joints[0]), (scale_2, frame.joints[1])].map(
-                |(scale, reading)| {
-                    f64::from(scale.counts_from_zero(reading)) * scale.rad_per_count::<f64>()
-                },
-            ),
-            force_n: [frame.tangential_force, frame.normal_force]
-                .map(|force| f64::from(force.0) * per_count),
-        })
+    ticks
+        .map(
+            |SlideTick {
+                 sensor: frame,
+                 torques,
+             }| Reading {
+                encoders_rad: [(scale_1, frame.joints[0]), (scale_2, frame.joints[1])].map(
+                    |(scale, reading)| {
+                        f64::from(scale.counts_from_zero(reading)) * scale.rad_per_count::<f64>()
+                    },
+                ),
+                force_n: [frame.tangential_force, frame.normal_force]
+                    .map(|force| f64::from(force.0) * newtons),
+                torque_nm: torques.map(|torque| f64::from(torque.0) * newton_metres),
+            },
+        )
         .collect()
 }
 
@@ -208,15 +227,15 @@ pub fn slide_scenario(
 /// Identifies an arm by slides that have been made.
 ///
 /// # Errors
-/// [`Refusal`] with the reason.
+/// [`IdentificationError`] with the reason.
 pub fn identify_slides(
     slides: &[Slide],
     scenario: &Scenario,
     drawn: &Drawn,
-) -> Result<Found, Refusal> {
+) -> Result<Found, IdentificationError<Infallible>> {
     let prior = prior(scenario, drawn);
     let identified = identify(slides, &prior, &limits(scenario))?;
-    Ok(Found::new(identified, prior, slides))
+    Ok(Found::new(identified, prior, slides, scenario)?)
 }
 
 /// Slides in both postures, and identifies the arm. The scenario's posture comes first, so that the operator turns the
@@ -239,10 +258,10 @@ pub fn identify_arm<R: SlideRig>(
             // An arm that is hardly known may throw its tip off when it starts.
             let mut attempt = 1;
             let slide = loop {
-                let frames = rig.slide(&program, posture);
+                let ticks = rig.slide(&program, posture);
                 let slide = Slide {
                     posture,
-                    readings: readings(scenario, frames.map_err(IdentificationError::Rig)?),
+                    readings: readings(scenario, ticks.map_err(IdentificationError::Rig)?),
                 };
                 if attempt == ATTEMPTS || slide.share_on_belt(&limits) >= ON_BELT {
                     break slide;
@@ -258,11 +277,12 @@ pub fn identify_arm<R: SlideRig>(
     known.controller.estimator.tip_deviation_m = setting(prior.tip_deviation_m());
     let slid = slide(&known, near, [first, first.mirrored()])?;
     let identified = identify(&slid, &prior, &limits.of_first_look())?;
-    let known = Found::new(identified, prior, &slid).applied_to(scenario, "first look")?;
+    let known = Found::new(identified, prior, &slid, scenario)?;
+    let known = known.applied_to(scenario, "first look")?;
     // The elbow stays as it is.
     let slid = slide(&known, far, [first.mirrored(), first])?;
     let identified = identify(&slid, &prior, &limits)?;
-    Ok(Found::new(identified, prior, &slid))
+    Ok(Found::new(identified, prior, &slid, scenario)?)
 }
 
 /// Returns the posture of a scenario's start.
@@ -287,16 +307,37 @@ pub struct Found {
     pub identified: Identified,
     /// What was known before.
     pub prior: Prior,
+    /// What the torques show.
+    pub joints: Joints,
     slides: Vec<Slide>,
 }
 
 impl Found {
-    fn new(identified: Identified, prior: Prior, slides: &[Slide]) -> Self {
-        Self {
+    fn new(
+        identified: Identified,
+        prior: Prior,
+        slides: &[Slide],
+        scenario: &Scenario,
+    ) -> Result<Self, OutOfRange> {
+        let geometry = &identified.fit.parameters;
+        let known = ArmParameters {
+            link_length_m: geometry.link_length_m(),
+            height_m: geometry.get(Parameter::Height),
+            ..scenario.controller_configuration().arm.cast()
+        };
+        let limits = limits(scenario);
+        Ok(Self {
+            joints: Joints::of(
+                slides,
+                geometry,
+                &known,
+                f64::from(scenario.run.tick_hz),
+                &limits,
+            )?,
             identified,
             prior,
             slides: slides.to_vec(),
-        }
+        })
     }
 
     /// Returns the acceleration of the tip off the belt by what the controller does not know, root mean square, m/s²: the
@@ -340,6 +381,11 @@ impl Found {
         let mut arm = scenario.controller_configuration().arm;
         arm.link_length_m = parameters.link_length_m().map(|it| rounded(it) as f32);
         arm.height_m = rounded(parameters.get(Parameter::Height)) as f32;
+        let joints = &self.joints.joints;
+        arm.coulomb_friction_nm =
+            [0, 1].map(|joint| rounded(joints[joint].friction_nm.value).max(0.0) as f32);
+        arm.stiffness_nm_rad =
+            [0, 1].map(|joint| rounded(joints[joint].stiffness_nm_rad.value).max(0.0) as f32);
         corrected.arm_model = Some(arm);
         let estimator = &mut corrected.controller.estimator;
         for (parameter, values_rad) in terms(&mut estimator.encoders) {
@@ -368,6 +414,8 @@ impl Found {
             tip_m: rounded(self.identified.place_deviation_m),
             off_line_m: rounded(self.identified.off_line_m[1]),
             ripple_m_s2: rounded(ripple_m_s2),
+            coulomb_friction_nm: joints.map(|it| rounded(it.friction_nm.deviation)),
+            stiffness_nm_rad: joints.map(|it| rounded(it.stiffness_nm_rad.deviation)),
         };
         painleve_shared::settings::Settings::validate(&corrected)?;
         Ok(corrected)

@@ -9,9 +9,10 @@ use painleve_commission::identification::{Found, IdentificationError, identify_a
 use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
 use painleve_identify::Parameter;
 use painleve_identify::parameters::Drawn;
+use painleve_identify::torques::{Estimate, Joints};
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, Pose, Slip};
+use painleve_shared::{Arm, ArmParameters, Pose, Slip};
 use painleve_study_core::case::ControllerChoice;
 use painleve_study_quality::distribution::Percentiles;
 use painleve_study_quality::effects::{Contact, EffectsStudy};
@@ -102,10 +103,23 @@ fn arms_as_bad_as_life_are_identified() {
     for seed in 51_000..51_003 {
         let scenario = Scenario::default();
         let (found, rig) = identified(&scenario, seed, None);
-        let identified = found.unwrap().identified;
+        let Found {
+            identified, joints, ..
+        } = found.unwrap();
         assert!(identified.off_line_m[1] < 0.1 * identified.off_line_m[0]);
         assert!(identified.place_deviation_m < 6e-4 && rig.time_s < 120.0);
         assert!(rig.largest_force_n < 8.0, "{}", rig.largest_force_n);
+        let actual = imperfect(&scenario, seed).unwrap();
+        for (name, truth, found) in joint_truths(&actual, &joints) {
+            let error = found.value - truth;
+            assert!(
+                error.abs() < 3.0 * found.deviation,
+                "{name}: {truth}, {found:?}"
+            );
+            assert!(found.deviation < 0.1 * truth, "{name}: {truth}, {found:?}");
+        }
+        let [before_nm, after_nm] = joints.left_over_nm;
+        assert!(after_nm < 0.2 * before_nm, "{before_nm} {after_nm}");
     }
 }
 
@@ -116,7 +130,7 @@ fn identified_arms_put_the_tip_where_they_say() {
     let arms = std::env::var("PAINLEVE_ARMS").map_or(10, |arms| arms.parse().unwrap());
     let study = loops(LOOPS * arms);
     let cell = study.cells()[0];
-    let (mut without, mut drawn_margin) = (Vec::new(), Vec::new());
+    let (mut drawn_margin, mut geometry) = (Vec::new(), Vec::new());
     let (mut with, mut within_margin) = (Vec::new(), Vec::new());
     let (mut refused, mut inside, mut parameters) = (Vec::new(), 0, 0);
     let (mut time_s, mut force_n) = (0.0_f64, 0.0_f64);
@@ -128,7 +142,6 @@ fn identified_arms_put_the_tip_where_they_say() {
         force_n = force_n.max(rig.largest_force_n);
         for run in LOOPS * arm..LOOPS * (arm + 1) {
             let actual = imperfect(&study.scenario(cell, run).unwrap(), seed).unwrap();
-            without.push(robustness::run(run, &actual).unwrap());
             let mut careful = actual.clone();
             let deviation_m = prior(&actual, &drawn()).tip_deviation_m();
             careful.controller.estimator.tip_deviation_m = deviation_m as f32;
@@ -140,6 +153,16 @@ fn identified_arms_put_the_tip_where_they_say() {
                     within_margin.push(row.clone());
                 }
                 with.push(row);
+                let drawn_joints = ArmParameters {
+                    coulomb_friction_nm: actual.arm_model.unwrap().coulomb_friction_nm,
+                    stiffness_nm_rad: actual.arm_model.unwrap().stiffness_nm_rad,
+                    ..known.arm_model.unwrap()
+                };
+                let known = Scenario {
+                    arm_model: Some(drawn_joints),
+                    ..known
+                };
+                geometry.push(robustness::run(run, &known).unwrap());
             }
         }
         match found {
@@ -147,16 +170,22 @@ fn identified_arms_put_the_tip_where_they_say() {
             Ok(found) => {
                 let actual = imperfect(&first, seed).unwrap();
                 let fit = &found.identified.fit;
-                for (parameter, truth) in truths(&actual) {
-                    let error = fit.parameters.get(parameter) - truth;
+                let of_geometry = truths(&actual).into_iter().map(|(parameter, truth)| {
+                    let estimate = Estimate {
+                        value: fit.parameters.get(parameter),
+                        deviation: fit.deviation(parameter),
+                    };
+                    (parameter.to_string(), truth, estimate)
+                });
+                for (name, truth, estimate) in
+                    of_geometry.chain(joint_truths(&actual, &found.joints))
+                {
+                    let error = estimate.value - truth;
                     parameters += 1;
-                    let deviation = fit.deviation(parameter);
-                    if error.abs() < 3.0 * deviation {
+                    if error.abs() < 3.0 * estimate.deviation {
                         inside += 1;
                     } else {
-                        println!(
-                            "{seed}: {parameter} off by {error:.2e}, deviation {deviation:.2e}"
-                        );
+                        println!("{seed}: {name} off by {error:.2e}, {estimate:?}");
                     }
                 }
             }
@@ -166,8 +195,8 @@ fn identified_arms_put_the_tip_where_they_say() {
     println!(
         "within 3 deviations: {inside} of {parameters}; {time_s:.0} s, {force_n:.1} N at most"
     );
-    describe("not identified, no margin for it", &without);
     let (_, before) = describe("not identified, margin of a drawing", &drawn_margin);
+    describe("identified, joints as drawn", &geometry);
     let (_, after) = describe("identified", &with);
     describe("identified, started within the margin", &within_margin);
     assert!(after.median < 0.2 * before.median, "{after:?} {before:?}");
@@ -197,6 +226,22 @@ fn truths(actual: &Scenario) -> Vec<(Parameter, f64)> {
             (Parameter::SecondSine(joint), -twice * second_cosine),
             (Parameter::SecondCosine(joint), -twice * second_sine),
         ]);
+    }
+    truths
+}
+
+/// Returns friction and stiffness of the joints in commanded torque, with what was found.
+fn joint_truths(actual: &Scenario, found: &Joints) -> Vec<(String, f64, Estimate)> {
+    let mut truths = Vec::new();
+    for (index, joint) in found.joints.iter().enumerate() {
+        let commanded = 1.0 / (1.0 + actual.converters.torque.error.gain[index]);
+        let friction_nm = commanded * actual.effects.joints.coulomb_nm;
+        truths.push((format!("friction {index}"), friction_nm, joint.friction_nm));
+        let stiffness_nm_rad = commanded * actual.arm.stiffness_nm_rad[index];
+        if stiffness_nm_rad > 0.0 {
+            let name = format!("stiffness {index}");
+            truths.push((name, stiffness_nm_rad, joint.stiffness_nm_rad));
+        }
     }
     truths
 }

@@ -265,13 +265,19 @@ fn noise(points: &Points, parameters: &Parameters) -> f64 {
     let off: Vec<f64> = places
         .map(|place| (place.depth_m / points.deviation_m(&place)).clamp(-1e3, 1e3))
         .collect();
+    let freedom = off.len().saturating_sub(COUNT).max(1);
+    let variance = off.iter().map(|it| it * it).sum::<f64>() / freedom as f64;
+    libm::sqrt(variance * sharing(&off)).max(LEAST_NOISE)
+}
+
+/// Returns the number of neighbours in a series that share an error: twice the sum of its correlations, until they have gone
+/// (Geyer: initial positive sequence).
+pub(crate) fn sharing(off: &[f64]) -> f64 {
     let count = off.len();
     let power = |lag: usize| {
         let pairs = off.iter().zip(&off[lag.min(count)..]);
-        pairs.map(|(one, other)| one * other).sum::<f64>() / count as f64
+        pairs.map(|(one, other)| one * other).sum::<f64>()
     };
-    let variance = power(0) * count as f64 / count.saturating_sub(COUNT).max(1) as f64;
-    // Until the correlation has gone (Geyer: initial positive sequence).
     let mut shared = 1.0;
     for lag in 1..count / 4 {
         let correlation = power(lag) / power(0).max(1e-300);
@@ -280,5 +286,5 @@ fn noise(points: &Points, parameters: &Parameters) -> f64 {
         }
         shared += 2.0 * correlation;
     }
-    libm::sqrt(variance * shared).max(LEAST_NOISE)
+    shared
 }

@@ -1,4 +1,4 @@
-//! Identifies an arm's geometry from slides of its tip along the belt.
+//! Identifies an arm's geometry and joints from slides of its tip along the belt.
 //!
 //! The tip stays on a straight line, whatever the joints do: l1 cos θ1 + l2 cos θ2 = H. Each reading of both encoders
 //! is one such equation. Slides in both postures determine the encoders' zeros, their errors once and twice around, the
@@ -12,6 +12,7 @@
 //! - [`passes`]: slides as means over short stretches
 //! - [`fit`]: nonlinear least squares with that prior knowledge, and the covariance
 //! - [`verdict`]: reasons to refuse a result, and the motion that is missing
+//! - [`torques`]: friction and springs of the joints, and gains of their stages, once the geometry is known
 //!
 //! Parameters are strongly correlated: a zero and the cosine of its encoder's error differ little over a part of a
 //! turn. What counts is the tip, so a result is judged by the standard deviation of the tip's position
@@ -22,6 +23,7 @@ pub mod geometry;
 pub mod parameters;
 pub mod passes;
 pub mod refusal;
+pub mod torques;
 pub mod verdict;
 
 use painleve_shared::Posture;
@@ -39,6 +41,8 @@ pub struct Reading {
     pub encoders_rad: [f64; 2],
     /// Contact force along and off the belt, f_t and f_n, N.
     pub force_n: [f64; 2],
+    /// Commanded torque of each joint, N·m.
+    pub torque_nm: [f64; 2],
 }
 
 /// A slide of the tip along the belt, to and fro, in one posture.

@@ -15,6 +15,7 @@ mod first_ten_things;
 mod foxglove;
 mod hardware_in_the_loop;
 mod hostile_surroundings;
+mod identification;
 mod json;
 mod live;
 mod processor_in_the_loop;

@@ -5,12 +5,12 @@ use std::time::{Duration, Instant};
 
 use painleve_board::arm::{ArmEvent, ConnectedArm};
 use painleve_commission::elbow_side;
-use painleve_commission::identification::SlideRig;
+use painleve_commission::identification::{SlideRig, SlideTick};
 use painleve_plant::scenario::Scenario;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
 use painleve_shared::Posture;
-use painleve_shared::frame::{SensorFrame, StatusFlags};
+use painleve_shared::frame::StatusFlags;
 use painleve_shared::message::FrameSource;
 use painleve_shared::status::{Fault, SupervisorState};
 
@@ -51,14 +51,14 @@ impl BoardSlides {
         Ok(order == Some(OperatorCommand::Confirm))
     }
 
-    /// Collects the frames of one slide.
-    fn frames(
+    /// Collects the ticks of one slide.
+    fn ticks(
         &self,
         arm: &mut ConnectedArm,
         duration: Duration,
-    ) -> Result<Vec<SensorFrame>, BoardRigError> {
+    ) -> Result<Vec<SlideTick>, BoardRigError> {
         let start = Instant::now();
-        let mut frames = Vec::new();
+        let mut ticks = Vec::new();
         while start.elapsed() < duration + LIMIT {
             self.check()?;
             let Some(ArmEvent::Tick { sensor, answer }) = arm.next_event(PATIENCE)? else {
@@ -68,16 +68,19 @@ impl BoardSlides {
                 None => {}
                 Some(Fault::LiftOffTooLong | Fault::RecoveryFailed) => {
                     warn("the tip has left the belt");
-                    return Ok(frames);
+                    return Ok(ticks);
                 }
                 Some(fault) => return Err(BoardRigError::Faulted(fault)),
             }
             let is_tracking = answer.supervisor_state() == Some(SupervisorState::Tracking);
-            frames.extend(sensor.filter(|_| is_tracking));
+            ticks.extend(sensor.filter(|_| is_tracking).map(|sensor| SlideTick {
+                sensor,
+                torques: answer.torques,
+            }));
             if is_tracking && answer.flags.contains(StatusFlags::REFERENCE_DONE) {
-                return Ok(frames);
+                return Ok(ticks);
             }
-            if !frames.is_empty() && answer.supervisor_state() == Some(SupervisorState::Idle) {
+            if !ticks.is_empty() && answer.supervisor_state() == Some(SupervisorState::Idle) {
                 return Err(BoardRigError::Off);
             }
         }
@@ -92,7 +95,7 @@ impl SlideRig for BoardSlides {
         &mut self,
         scenario: &Scenario,
         posture: Posture,
-    ) -> Result<Vec<SensorFrame>, BoardRigError> {
+    ) -> Result<Vec<SlideTick>, BoardRigError> {
         let configuration = scenario.controller_configuration();
         let mut arm = ConnectedArm::open(&self.port, &configuration, FrameSource::Sensors)?;
         let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
@@ -111,11 +114,11 @@ impl SlideRig for BoardSlides {
             "operator: open the switch ENABLE, then close it, and let go when the drive takes the arm over",
         );
         let duration = Duration::from_secs_f64(scenario.run.duration_s);
-        let frames = self.frames(&mut arm, duration);
+        let ticks = self.ticks(&mut arm, duration);
         // Whatever ended the slide, the torque is off.
         let stopped = arm.stop();
-        let frames = frames?;
+        let ticks = ticks?;
         stopped?;
-        Ok(frames)
+        Ok(ticks)
     }
 }

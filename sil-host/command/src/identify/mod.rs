@@ -1,4 +1,4 @@
-//! `painleve identify`: measures an arm's geometry by slides of its tip along the belt, and writes its scenario with the
+//! `painleve identify`: measures an arm's geometry and joints by slides of its tip along the belt, and writes its scenario with the
 //! values and how well they are known.
 
 mod board_slides;
@@ -15,6 +15,7 @@ use painleve_commission::identification::{
 use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
 use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_identify::parameters::Drawn;
+use painleve_identify::torques::{Estimate, Joint, Joints};
 use painleve_identify::{Parameter, Prior, Slide};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_process::terminal::{self, warn};
@@ -123,8 +124,8 @@ fn found(
 ) -> Result<(Found, String), CommandError> {
     let name = &arguments.scenario;
     if !slides.is_empty() {
-        let found = identify_slides(slides, scenario, drawn);
-        let found = found.map_err(CommandError::Geometry)?;
+        let found = identify_slides(slides, scenario, drawn)
+            .map_err(|error| failed(name, error, |never| match never {}))?;
         return Ok((found, format!("{} recorded slides", slides.len())));
     }
     if let Some(port) = &arguments.port {
@@ -206,6 +207,15 @@ fn report(arguments: &IdentifyArguments, found: &Found) -> Result<(), CommandErr
         });
         return say(json!({
             "parameters": parameters,
+            "joints": found.joints.joints.map(|joint| {
+                let of = |it: Estimate| json!({ "value": it.value, "deviation": it.deviation });
+                json!({
+                    "coulomb_friction_nm": of(joint.friction_nm),
+                    "stiffness_nm_rad": of(joint.stiffness_nm_rad),
+                    "stage_gain": of(joint.gain),
+                })
+            }),
+            "torque_left_over_nm": found.joints.left_over_nm,
             "tip_deviation_m": identified.tip_deviation_m,
             "tip_deviation_before_m": before_m,
             "place_deviation_m": identified.place_deviation_m,
@@ -228,7 +238,43 @@ fn report(arguments: &IdentifyArguments, found: &Found) -> Result<(), CommandErr
         1e3 * identified.tip_deviation_m,
         1e3 * before_m
     ))?;
+    say(terminal::readable(joints_table(&found.joints)))?;
+    let [left_before_nm, left_after_nm] = found.joints.left_over_nm;
+    say(format_args!(
+        "the arm's model explains the torques to {:.0} mN·m (by the values before: {:.0} mN·m)",
+        1e3 * left_after_nm,
+        1e3 * left_before_nm
+    ))?;
     say(format_args!("written: {}", arguments.output.display()))
+}
+
+/// Returns what the torques show. The gain of a stage is only told: it can hardly be told from those of the force cells.
+fn joints_table(found: &Joints) -> comfy_table::Table {
+    let mut table = terminal::table(["", "joint 1", "joint 2", "unit"]);
+    type Of = fn(&Joint) -> Estimate;
+    let rows: [(&str, Of, f64, usize, &str); 3] = [
+        ("friction", |it| it.friction_nm, 1e3, 0, "mN·m"),
+        (
+            "stiffness of the spring",
+            |it| it.stiffness_nm_rad,
+            1.0,
+            3,
+            "N·m/rad",
+        ),
+        ("torque to commanded torque", |it| it.gain, 1.0, 2, ""),
+    ];
+    for (name, of, scale, digits, unit) in rows {
+        let [one, two] = found.joints.map(|joint| {
+            let Estimate { value, deviation } = of(&joint);
+            format!(
+                "{:.digits$} ± {:.digits$}",
+                scale * value,
+                scale * deviation
+            )
+        });
+        table.add_row([name.to_owned(), one, two, unit.to_owned()]);
+    }
+    table
 }
 
 fn table(before: &Prior, found: &Found) -> comfy_table::Table {

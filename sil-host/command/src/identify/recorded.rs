@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::ValueEnum;
-use painleve_commission::identification::readings;
+use painleve_commission::identification::{SlideTick, readings};
 use painleve_files::input_file;
 use painleve_identify::Slide;
 use painleve_plant::scenario::Scenario;
 use painleve_record::export::ticks_to_csv;
-use painleve_shared::counts::{EncoderCounts, ForceCounts};
+use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::frame::SensorFrame;
 use painleve_study_core::options::PostureOption;
 
@@ -18,11 +18,13 @@ use super::super::CommandError;
 use super::super::output_error::InputError;
 
 /// Columns of the table that a slide needs.
-const COLUMNS: [&str; 4] = [
+const COLUMNS: [&str; 6] = [
     "sensor.joint1_counts",
     "sensor.joint2_counts",
     "sensor.tangential_force_counts",
     "sensor.normal_force_counts",
+    "actuator.u1_counts",
+    "actuator.u2_counts",
 ];
 
 /// Column with the supervisor's state, and the state in which a slide counts. A table without it counts as a whole.
@@ -56,17 +58,17 @@ impl Recorded {
     /// # Errors
     /// [`InputError`] if the file cannot be read or has no such columns.
     pub fn read(&self, scenario: &Scenario) -> Result<Slide, CommandError> {
-        let frames = self.frames().map_err(|reason| InputError::Slide {
+        let ticks = self.ticks().map_err(|reason| InputError::Slide {
             path: self.path.clone(),
             reason,
         })?;
         Ok(Slide {
             posture: self.posture.into(),
-            readings: readings(scenario, frames),
+            readings: readings(scenario, ticks),
         })
     }
 
-    fn frames(&self) -> Result<Vec<SensorFrame>, String> {
+    fn ticks(&self) -> Result<Vec<SlideTick>, String> {
         let file = input_file::open(&self.path).map_err(|error| error.to_string())?;
         if self.path.extension().is_some_and(|it| it == "csv") {
             return of_table(BufReader::new(file));
@@ -80,42 +82,46 @@ impl Recorded {
     }
 }
 
-/// Reads the frames of a table.
-fn of_table(table: impl Read) -> Result<Vec<SensorFrame>, String> {
+/// Reads the ticks of a table.
+fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
     let mut reader = csv::Reader::from_reader(table);
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
     let place = |name: &str| header.iter().position(|column| column == name);
-    let mut places = [0; 4];
+    let mut places = [0; COLUMNS.len()];
     for (at, name) in places.iter_mut().zip(COLUMNS) {
         *at = place(name).ok_or_else(|| format!("it has no column {name}"))?;
     }
     let (state, tracking) = STATE;
     let state = place(state);
-    let mut frames = Vec::new();
+    let mut ticks = Vec::new();
     for row in reader.records() {
         let row = row.map_err(|error| error.to_string())?;
         if state.is_some_and(|at| row.get(at) != Some(tracking)) {
             continue;
         }
-        let mut counts = [0_i64; 4];
+        let mut counts = [0_i64; COLUMNS.len()];
         for (value, (at, name)) in counts.iter_mut().zip(places.into_iter().zip(COLUMNS)) {
             let text = row.get(at).unwrap_or_default();
             *value = text
                 .parse()
                 .map_err(|_| format!("{name} = {text:?} is not a whole number"))?;
         }
-        let [joint_1, joint_2, tangential, normal] = counts;
+        let [joint_1, joint_2, tangential, normal, torque_1, torque_2] = counts;
         // Whatever does not fit is out of every encoder's range, too.
         let joint = |counts| EncoderCounts(u32::try_from(counts).unwrap_or(u32::MAX));
         let force = |counts| ForceCounts(i32::try_from(counts).unwrap_or(i32::MAX));
-        frames.push(SensorFrame {
-            joints: [joint(joint_1), joint(joint_2)],
-            tangential_force: force(tangential),
-            normal_force: force(normal),
-            ..SensorFrame::default()
+        let torque = |counts| TorqueCounts(i32::try_from(counts).unwrap_or(i32::MAX));
+        ticks.push(SlideTick {
+            sensor: SensorFrame {
+                joints: [joint(joint_1), joint(joint_2)],
+                tangential_force: force(tangential),
+                normal_force: force(normal),
+                ..SensorFrame::default()
+            },
+            torques: [torque(torque_1), torque(torque_2)],
         });
     }
-    Ok(frames)
+    Ok(ticks)
 }
 
 #[cfg(test)]
@@ -124,13 +130,16 @@ mod tests {
 
     #[test]
     fn a_table_gives_the_frames_of_the_ticks_that_track() {
-        let table = "time_s,sensor.joint1_counts,sensor.joint2_counts,sensor.tangential_force_counts,sensor.normal_force_counts,actuator.state\n\
-                     0,1,2,3,7,armed\n0.001,4,5,8,-6,tracking\n";
-        let frames = of_table(table.as_bytes()).unwrap();
-        assert_eq!(frames.len(), 1);
-        assert_eq!(frames[0].joints, [EncoderCounts(4), EncoderCounts(5)]);
-        assert_eq!(frames[0].tangential_force, ForceCounts(8));
-        assert_eq!(frames[0].normal_force, ForceCounts(-6));
+        let table = "time_s,sensor.joint1_counts,sensor.joint2_counts,sensor.tangential_force_counts,sensor.normal_force_counts,\
+                     actuator.u1_counts,actuator.u2_counts,actuator.state\n0,1,2,3,7,1,1,armed\n0.001,4,5,8,-6,9,-3,tracking\n";
+        let ticks = of_table(table.as_bytes()).unwrap();
+        let [SlideTick { sensor, torques }] = ticks[..] else {
+            panic!("{ticks:?}");
+        };
+        assert_eq!(sensor.joints, [EncoderCounts(4), EncoderCounts(5)]);
+        assert_eq!(sensor.tangential_force, ForceCounts(8));
+        assert_eq!(sensor.normal_force, ForceCounts(-6));
+        assert_eq!(torques, [TorqueCounts(9), TorqueCounts(-3)]);
     }
 
     #[test]
@@ -141,7 +150,7 @@ mod tests {
             "it has no column sensor.joint2_counts"
         );
         let header = COLUMNS.join(",");
-        let wrong = of_table(format!("{header}\n1,x,3,4\n").as_bytes());
+        let wrong = of_table(format!("{header}\n1,x,3,4,5,6\n").as_bytes());
         assert_eq!(
             wrong.unwrap_err(),
             "sensor.joint2_counts = \"x\" is not a whole number"

@@ -10,7 +10,7 @@ use painleve_shared::{Arm, Posture};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use super::SimulatedError;
-use crate::identification::SlideRig;
+use crate::identification::{SlideRig, SlideTick};
 
 /// A mistake that a geometry cannot describe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray)]
@@ -91,7 +91,7 @@ impl SlideRig for SimulatedSlides {
         &mut self,
         scenario: &Scenario,
         posture: Posture,
-    ) -> Result<Vec<SensorFrame>, SimulatedError> {
+    ) -> Result<Vec<SlideTick>, SimulatedError> {
         self.slides += 1;
         let posture = match self.mistake {
             Some(GeometryMistake::SamePosture) => Posture::ElbowDown,
@@ -118,7 +118,7 @@ impl SlideRig for SimulatedSlides {
         };
         let mut simulation = Simulation::new(&slid)?;
         let mut controller = Controller::new(&slid.controller_configuration())?;
-        let mut frames = Vec::new();
+        let mut slid_ticks = Vec::new();
         let ticks = slid.run.ticks();
         for tick in 0..ticks {
             let frame = self.mistaken(simulation.sample(&mut ())?, tick as f64 / ticks as f64);
@@ -127,13 +127,16 @@ impl SlideRig for SimulatedSlides {
                 break;
             }
             if answer.supervisor_state() == Some(SupervisorState::Tracking) {
-                frames.push(frame);
+                slid_ticks.push(SlideTick {
+                    sensor: frame,
+                    torques: answer.torques,
+                });
                 let force_n = simulation.plant().snapshot().normal_force_n;
                 self.largest_force_n = self.largest_force_n.max(force_n);
             }
             simulation.advance(Some(&answer), &mut ())?;
         }
         self.time_s += slid.run.duration_s;
-        Ok(frames)
+        Ok(slid_ticks)
     }
 }

@@ -92,6 +92,7 @@ impl Rig {
         Reading {
             encoders_rad: rounded,
             force_n: [0.0, 4.0 + self.generator.random_range(-0.3..0.3)],
+            torque_nm: [0.0; 2],
         }
     }
 

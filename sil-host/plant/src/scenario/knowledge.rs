@@ -3,7 +3,7 @@
 use painleve_shared::settings;
 
 settings! {
-    /// Standard deviations of an arm's geometry, as `painleve identify` has written them: a record of how the arm is
+    /// Standard deviations of an arm's geometry and joints, as `painleve identify` has written them: a record of how the arm is
     /// known. The values are in `arm_model` and `controller.estimator.encoders`. The controller needs what follows from
     /// them for the tip, `controller.estimator.tip_deviation_m`.
     pub struct Knowledge {
@@ -26,5 +26,9 @@ settings! {
         /// Acceleration of the tip off the belt by waves, vibration and torques that the controller does not know, root mean
         /// square in the slides. `controller.governor.p_per_kg` follows from it.
         ripple_m_s2: f64 = 0.0, 0.0..=1e6, "m/s²";
+        /// Coulomb friction of each joint.
+        coulomb_friction_nm: [f64; 2] = [0.0; 2], 0.0..=1e4, "N·m";
+        /// Stiffness of the spring in each joint.
+        stiffness_nm_rad: [f64; 2] = [0.0; 2], 0.0..=1e6, "N·m/rad";
     }
 }

@@ -1,0 +1,336 @@
+//! What the torques of slides show of the joints: their friction and springs, and the gains of their stages.
+//!
+//! In a slow slide the commanded torque u of a joint carries gravity, spring, contact force and friction. What the arm's
+//! model u_m leaves over is linear in what the model does not know (Khalil and Dombre, "Modeling, Identification and Control
+//! of Robots", 2002, chapter 12):
+//!
+//! u − u_m = c sgn q̇ + δk (q − q₀) + b u_m + o,
+//!
+//! plus the effects of both force cells' gains and cross-talk and of the belt's tilt, which are the same for both joints.
+//! Least squares determine all of these, with what is known beforehand. A stage gives 1/(1 + b) times the commanded torque;
+//! that differs little from the gains of the force cells, and its deviation says so. Friction and stiffness are in commanded
+//! torque, as the controller needs them, so that this does not matter to them. u itself is no regressor: with its noise, the
+//! sum of squares would be least for torques that are too small.
+
+use nalgebra::{SMatrix, SVector, Vector2};
+use painleve_shared::{
+    Arm, ArmParameters, GeneralisedTorque, JointMotion, JointTorque, OutOfRange, Pose,
+};
+
+use crate::fit::sharing;
+use crate::geometry::joint_rad;
+use crate::parameters::Parameters;
+use crate::{Limits, Slide};
+
+/// Time over which readings are averaged, s.
+const MEAN_S: f64 = 0.1;
+
+/// Least turn of a joint from one mean to the next, and on to the one after it in the same direction, rad. In a joint that
+/// turns slowly, waves and vibration of the belt reverse the friction.
+const LEAST_TURN_RAD: f64 = 9e-3;
+
+/// Standard deviations known beforehand: gain of a stage, stiffness relative to the scenario's, gain and cross-talk of the force
+/// cells, and tilt of the belt, rad.
+const GAIN: f64 = 0.1;
+const STIFFNESS: f64 = 0.15;
+const CELL: f64 = 0.05;
+const TILT_RAD: f64 = 0.04;
+
+/// Part of a result that is always assumed to be wrong: at the low speed of a slide, friction is a little more than Coulomb's.
+const ALWAYS: f64 = 0.02;
+
+/// Change of the tilt for its derivative, rad.
+const TILTED_RAD: f64 = 1e-4;
+
+/// Rounds in which the noise is estimated.
+const ROUNDS: usize = 4;
+
+/// Number of unknowns: four of each joint, four of the force cells, the tilt.
+const COUNT: usize = 13;
+
+type Values = SVector<f64, COUNT>;
+
+/// Index of an unknown of a joint.
+const FRICTION: usize = 0;
+const SPRING: usize = 1;
+const STAGE: usize = 2;
+const OFFSET: usize = 3;
+const OF_JOINT: usize = 4;
+
+/// A value with its standard deviation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub deviation: f64,
+}
+
+/// What the slides show of a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Joint {
+    /// Coulomb friction, in commanded torque, N·m.
+    pub friction_nm: Estimate,
+    /// Stiffness of the spring, in commanded torque, N·m/rad.
+    pub stiffness_nm_rad: Estimate,
+    /// Torque of the stage relative to the commanded one.
+    pub gain: Estimate,
+}
+
+/// What the slides show of both joints.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Joints {
+    /// Joints 1 and 2.
+    pub joints: [Joint; 2],
+    /// Torque that the model leaves over, root mean square, N·m: that of the arm known before, and with this result.
+    pub left_over_nm: [f64; 2],
+}
+
+/// Means of readings over a short time.
+#[derive(Clone, Copy)]
+struct Mean {
+    joints_rad: Vector2<f64>,
+    force_n: Vector2<f64>,
+    torque_nm: Vector2<f64>,
+}
+
+/// One joint's torque that the model leaves over, and its derivatives.
+struct Equation {
+    joint: usize,
+    by: Values,
+    left_over_nm: f64,
+}
+
+impl Joints {
+    /// Takes the joints' parameters from slides at `tick_hz` of an arm with this geometry, and what is known of its dynamics.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for an arm that cannot be built.
+    pub fn of(
+        slides: &[Slide],
+        geometry: &Parameters,
+        known: &ArmParameters<f64>,
+        tick_hz: f64,
+        limits: &Limits,
+    ) -> Result<Self, OutOfRange> {
+        let ticks = libm::round(MEAN_S * tick_hz).max(1.0);
+        let model = Model::new(known, ticks / tick_hz)?;
+        let mut equations = Vec::new();
+        let (mut square, mut count) = (0.0, 0.0);
+        for slide in slides {
+            let means: Vec<Option<Mean>> = slide
+                .readings
+                .chunks_exact(ticks as usize)
+                .map(|readings| Mean::of(readings, geometry, limits))
+                .collect();
+            for mean in means.iter().flatten() {
+                square += mean.torque_nm.norm_squared();
+                count += 2.0;
+            }
+            for window in means.windows(3) {
+                if let [Some(before), Some(now), Some(after)] = window {
+                    equations.extend(model.equations(before, now, after));
+                }
+            }
+        }
+        // Friction and offset are hardly known, but less than the torques themselves.
+        let torque_nm = libm::sqrt(square / f64::max(count, 1.0));
+        let mut deviations = Values::repeat(CELL);
+        for joint in 0..2 {
+            let own = OF_JOINT * joint;
+            deviations[own + FRICTION] = torque_nm;
+            deviations[own + SPRING] = STIFFNESS * known.stiffness_nm_rad[joint];
+            deviations[own + STAGE] = GAIN;
+            deviations[own + OFFSET] = torque_nm;
+        }
+        deviations[COUNT - 1] = TILT_RAD;
+        Ok(Self::fitted(&equations, &deviations, known))
+    }
+
+    /// Solves the equations: the most probable unknowns, in deviations of what is known beforehand.
+    fn fitted(equations: &[Equation], deviations: &Values, known: &ArmParameters<f64>) -> Self {
+        let mut unknowns = Values::zeros();
+        let mut covariance = SMatrix::<f64, COUNT, COUNT>::identity();
+        let mut noise_nm = noise_nm(equations, &unknowns);
+        for _ in 0..ROUNDS {
+            let mut information = SMatrix::<f64, COUNT, COUNT>::identity();
+            let mut gradient = Values::zeros();
+            for equation in equations {
+                let by = equation.by.component_mul(deviations) / noise_nm;
+                information += by * by.transpose();
+                gradient += by * (equation.left_over_nm / noise_nm);
+            }
+            let Some(decomposed) = information.cholesky() else {
+                break;
+            };
+            unknowns = decomposed.solve(&gradient).component_mul(deviations);
+            covariance = decomposed.inverse();
+            noise_nm = self::noise_nm(equations, &unknowns);
+        }
+        // A sum of unknowns.
+        let estimate = |factors: &Values| {
+            let scaled = factors.component_mul(deviations);
+            Estimate {
+                value: factors.dot(&unknowns),
+                deviation: libm::sqrt(scaled.dot(&(covariance * scaled))),
+            }
+        };
+        let joint = |joint: usize| {
+            let unit = |index: usize| {
+                let mut factors = Values::zeros();
+                factors[OF_JOINT * joint + index] = 1.0;
+                factors
+            };
+            let assured = |value: f64, deviation: f64| Estimate {
+                value,
+                deviation: libm::hypot(deviation, ALWAYS * value),
+            };
+            let friction = estimate(&unit(FRICTION));
+            let nominal = known.stiffness_nm_rad[joint];
+            let stiffness = estimate(&(unit(SPRING) + unit(STAGE) * nominal));
+            let commanded = estimate(&unit(STAGE));
+            let gain = 1.0 / (1.0 + commanded.value);
+            Joint {
+                friction_nm: assured(friction.value, friction.deviation),
+                stiffness_nm_rad: assured(nominal + stiffness.value, stiffness.deviation),
+                gain: assured(gain, commanded.deviation * gain * gain),
+            }
+        };
+        let rms = |unknowns: &Values| {
+            let squares = equations.iter().map(|it| it.off_nm(unknowns).powi(2));
+            libm::sqrt(squares.sum::<f64>() / equations.len().max(1) as f64)
+        };
+        Self {
+            joints: [joint(0), joint(1)],
+            left_over_nm: [rms(&Values::zeros()), rms(&unknowns)],
+        }
+    }
+}
+
+impl Equation {
+    /// Returns what is left over with these unknowns, N·m.
+    fn off_nm(&self, unknowns: &Values) -> f64 {
+        self.left_over_nm - self.by.dot(unknowns)
+    }
+}
+
+/// Returns the noise of an equation, N·m, times the root of the number of neighbours that share an error.
+fn noise_nm(equations: &[Equation], unknowns: &Values) -> f64 {
+    let (mut sum, mut count, mut shared) = (0.0, 0, 1.0_f64);
+    for joint in 0..2 {
+        let of_joint = equations.iter().filter(|it| it.joint == joint);
+        let off: Vec<f64> = of_joint.map(|it| it.off_nm(unknowns)).collect();
+        sum += off.iter().map(|it| it * it).sum::<f64>();
+        count += off.len();
+        shared = shared.max(sharing(&off));
+    }
+    let freedom = count.saturating_sub(COUNT).max(1);
+    libm::sqrt(sum * shared / freedom as f64).max(f64::MIN_POSITIVE)
+}
+
+impl Mean {
+    /// Returns the means of readings, if the tip is on the belt in all of them.
+    fn of(readings: &[crate::Reading], geometry: &Parameters, limits: &Limits) -> Option<Self> {
+        let mut sum = Self {
+            joints_rad: Vector2::zeros(),
+            force_n: Vector2::zeros(),
+            torque_nm: Vector2::zeros(),
+        };
+        for reading in readings {
+            if reading.force_n[1] < limits.contact_n {
+                return None;
+            }
+            sum.joints_rad += Vector2::from(reading.encoders_rad);
+            sum.force_n += Vector2::from(reading.force_n);
+            sum.torque_nm += Vector2::from(reading.torque_nm);
+        }
+        let share = 1.0 / readings.len() as f64;
+        let encoders_rad = sum.joints_rad * share;
+        Some(Self {
+            joints_rad: Vector2::from([0, 1].map(|it| joint_rad(geometry, it, encoders_rad[it]))),
+            force_n: sum.force_n * share,
+            torque_nm: sum.torque_nm * share,
+        })
+    }
+}
+
+/// The arm's model by what is known.
+struct Model {
+    arm: Arm<f64>,
+    tilted: Arm<f64>,
+    rest_rad: [f64; 2],
+    /// Time between two means, s.
+    step_s: f64,
+}
+
+impl Model {
+    fn new(known: &ArmParameters<f64>, step_s: f64) -> Result<Self, OutOfRange> {
+        let tilted = ArmParameters {
+            belt_tilt_rad: known.belt_tilt_rad + TILTED_RAD,
+            ..*known
+        };
+        Ok(Self {
+            arm: Arm::new(*known)?,
+            tilted: Arm::new(tilted)?,
+            rest_rad: known.spring_rest_rad,
+            step_s,
+        })
+    }
+
+    /// Returns the equations of the joints that turn.
+    fn equations(&self, before: &Mean, now: &Mean, after: &Mean) -> impl Iterator<Item = Equation> {
+        let links = |joints: Vector2<f64>| JointMotion::from_vector(joints).to_links();
+        let turned_rad = after.joints_rad - before.joints_rad;
+        let theta = links(now.joints_rad);
+        let rate = links(turned_rad / (2.0 * self.step_s));
+        let change = after.joints_rad - 2.0 * now.joints_rad + before.joints_rad;
+        let acceleration = links(change / (self.step_s * self.step_s));
+        let pose = Pose::new(&theta);
+        let arm = &self.arm;
+        let moving_nm = arm.passive_torque_nm(&theta, &rate, &pose)
+            + arm.centrifugal_torque_nm(&rate, &pose)
+            + GeneralisedTorque::from_vector(arm.mass_matrix(&pose) * acceleration.vector());
+        let tilted_nm = self.tilted.passive_torque_nm(&theta, &rate, &pose)
+            - arm.passive_torque_nm(&theta, &rate, &pose);
+        let jacobian = arm.jacobian(&pose);
+        let held_nm = |along_n: f64, off_n: f64| -> JointTorque<f64> {
+            let force_n = Vector2::new(along_n, off_n);
+            GeneralisedTorque::from_vector(jacobian.transpose() * force_n).to_joints()
+        };
+        let [along_n, off_n] = now.force_n.into();
+        let model_nm = moving_nm.to_joints().vector() - held_nm(along_n, off_n).vector();
+        let common = [
+            held_nm(along_n, 0.0),
+            held_nm(0.0, off_n),
+            held_nm(off_n, 0.0),
+            held_nm(0.0, along_n),
+            tilted_nm.map(|nm| nm / TILTED_RAD).to_joints(),
+        ];
+        let halves_rad = [
+            now.joints_rad - before.joints_rad,
+            after.joints_rad - now.joints_rad,
+        ];
+        let (now, rest_rad) = (*now, self.rest_rad);
+        (0..2)
+            .filter(move |joint| {
+                let [one_rad, two_rad] = halves_rad.map(|it| it[*joint]);
+                one_rad.abs().min(two_rad.abs()) >= LEAST_TURN_RAD && one_rad * two_rad > 0.0
+            })
+            .map(move |joint| {
+                let mut by = Values::zeros();
+                let own = OF_JOINT * joint;
+                by[own + FRICTION] = turned_rad[joint].signum();
+                by[own + SPRING] = now.joints_rad[joint] - rest_rad[joint];
+                by[own + STAGE] = model_nm[joint];
+                by[own + OFFSET] = 1.0;
+                for (at, torque_nm) in common.iter().enumerate() {
+                    by[2 * OF_JOINT + at] = torque_nm.vector()[joint];
+                }
+                Equation {
+                    joint,
+                    by,
+                    left_over_nm: now.torque_nm[joint] - model_nm[joint],
+                }
+            })
+    }
+}

@@ -1,0 +1,90 @@
+//! `painleve identify`: in rehearsal, and from records of slides.
+
+#![allow(clippy::unwrap_used)]
+
+use painleve_commission::identification::slide_scenario;
+use painleve_plant::scenario::Scenario;
+use painleve_shared::Posture;
+use painleve_tests::{Bench, code, errors};
+use serde_json::Value;
+
+const FRICTION_NM: f64 = 0.05;
+
+fn friction_nm(found: &Value, joint: usize) -> f64 {
+    let friction = &found["joints"][joint]["coulomb_friction_nm"];
+    friction["value"].as_f64().unwrap()
+}
+
+#[test]
+fn a_rehearsal_writes_what_it_has_found() {
+    let bench = Bench::new("identify");
+    let found = bench.report(&["identify", "--rehearse", "--seed", "3", "--json"]);
+    assert!(found["tip_deviation_m"].as_f64().unwrap() < 6e-4, "{found}");
+    let differences = bench.report(&["diff", "edge", "out/identified.toml", "--json"]);
+    let written = differences["differences"].as_array().unwrap();
+    for key in [
+        "arm_model",
+        "controller.estimator.encoders.zero_rad",
+        "knowledge.coulomb_friction_nm",
+    ] {
+        let has = |it: &&Value| it["key"].as_str().is_some_and(|it| it.starts_with(key));
+        assert!(written.iter().any(|it| has(&it)), "{key}: {differences}");
+    }
+}
+
+/// Records a slide of an arm with friction that its controller does not know; returns the file.
+fn recorded(bench: &Bench, posture: Posture, name: &str) -> String {
+    let overrides = [
+        "contact.kind=compliant".to_owned(),
+        format!("effects.joints.coulomb_nm={FRICTION_NM}"),
+        format!(
+            "initial={{ tip_m = 0.0, elbow = '{}' }}",
+            &name["elbow-".len()..]
+        ),
+    ];
+    let arm = Scenario::default()
+        .with_overrides("arm", &overrides)
+        .unwrap();
+    let slide = slide_scenario(&arm, 0.93, posture).unwrap();
+    std::fs::write(bench.path("slide.toml"), slide.to_commented_toml()).unwrap();
+    let file = format!("{name}.mcap");
+    let report = bench.report(&[
+        "run",
+        "slide.toml",
+        "--record",
+        &file,
+        "--no-plot",
+        "--json",
+    ]);
+    assert!(report["kept"].as_bool().unwrap(), "{report}");
+    file
+}
+
+#[test]
+fn records_of_slides_show_an_arm() {
+    let bench = Bench::new("identify-records");
+    let down = recorded(&bench, Posture::ElbowDown, "elbow-down");
+    let up = recorded(&bench, Posture::ElbowUp, "elbow-up");
+    let table = bench.run(&["export", &up, "--csv", "up.csv"]);
+    assert!(table.status.success(), "{}", errors(&table));
+    let slides = [format!("elbow-down={down}"), "elbow-up=up.csv".to_owned()];
+    let line = [
+        "identify", "--slide", &slides[0], "--slide", &slides[1], "--json",
+    ];
+    let found = bench.report(&line);
+    for joint in 0..2 {
+        let error_nm = friction_nm(&found, joint) - FRICTION_NM;
+        assert!(error_nm.abs() < 0.06 * FRICTION_NM, "{joint}: {found}");
+    }
+    // Told the wrong posture, it writes nothing.
+    std::fs::remove_file(bench.path("out/identified.toml")).unwrap();
+    let swapped = ["elbow-up=elbow-down.mcap", "elbow-down=up.csv"];
+    let refused = bench.run(&["identify", "--slide", swapped[0], "--slide", swapped[1]]);
+    assert_eq!(code(refused.status), 1, "{}", errors(&refused));
+    assert!(
+        errors(&refused).contains("not as told"),
+        "{}",
+        errors(&refused)
+    );
+    assert!(!bench.path("out/identified.toml").exists());
+}
