@@ -1,6 +1,7 @@
 //! The board with the simulated arm on its sensors and torque stages.
 
 use painleve_chips::BridgeAmplifier;
+use painleve_plant::Plant;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
@@ -22,6 +23,9 @@ const SECOND_ENCODER_OFFSET: u16 = 9000;
 
 /// Readings of f_t and f_n of the second force cell without a load, counts.
 const SECOND_FORCE_TARE: [i32; 2] = [31, -44];
+
+/// Turn of a link in a tick in which an operator carries the arm, rad.
+const CARRIED_RAD: f64 = 2e-3;
 
 /// Ticks between two alive messages of the host.
 const ALIVE_TICKS: u32 = 50;
@@ -68,6 +72,8 @@ pub struct Bench<C: BoardChip> {
     is_held: bool,
     /// Link angles at which an operator holds the arm, rad.
     held_rad: Option<LinkMotion<f64>>,
+    /// The arm where an operator is carrying it.
+    carried_to: Option<Box<Simulation>>,
 }
 
 /// State of a bench at one instant.
@@ -93,6 +99,16 @@ pub fn with_one_sensor(name: &str) -> Scenario {
     let mut scenario = scenario(name);
     scenario.converters.mounting.sensors = SensorParts::First;
     scenario
+}
+
+/// Simulates the arm of a board, which itself takes one tick from the sample to the torque.
+///
+/// # Panics
+/// If the scenario is out of range.
+fn simulated(scenario: &Scenario) -> Simulation {
+    let mut simulated = scenario.clone();
+    simulated.converters.torque.delay_ticks = 0.0;
+    Simulation::new(&simulated).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Encodes a scenario's configuration for the board.
@@ -134,13 +150,9 @@ impl<C: BoardChip> Bench<C> {
     /// # Panics
     /// If the scenario is out of range.
     pub fn without_configuration(scenario: &Scenario, board: EmulatedBoard<C>) -> Self {
-        // The board itself takes one tick from the sample to the torque.
-        let mut simulated = scenario.clone();
-        simulated.converters.torque.delay_ticks = 0.0;
-        let simulation = Simulation::new(&simulated).unwrap_or_else(|error| panic!("{error}"));
         let mut bench = Self {
             board,
-            simulation,
+            simulation: simulated(scenario),
             statistics: Statistics::new(0.05),
             frame: SensorFrame::default(),
             period: 1_000_000 * MICROSECOND / u64::from(scenario.run.tick_hz),
@@ -158,6 +170,7 @@ impl<C: BoardChip> Bench<C> {
             second_is_aligned: false,
             is_held: true,
             held_rad: None,
+            carried_to: None,
         };
         bench.present();
         bench
@@ -240,12 +253,41 @@ impl<C: BoardChip> Bench<C> {
     /// # Panics
     /// If the scenario is out of range.
     pub fn set_down(&mut self, scenario: &Scenario) {
-        let mut simulated = scenario.clone();
-        simulated.converters.torque.delay_ticks = 0.0;
-        self.simulation = Simulation::new(&simulated).unwrap_or_else(|error| panic!("{error}"));
+        self.simulation = simulated(scenario);
         self.held_rad = None;
         self.is_held = false;
         self.present();
+    }
+
+    /// An operator carries the arm to the start of this scenario, as fast as a hand does, and holds it there until it is driven.
+    ///
+    /// # Panics
+    /// If the scenario is out of range.
+    pub fn carry(&mut self, scenario: &Scenario) {
+        let here_rad = self.simulation.plant().snapshot().theta_rad;
+        self.held_rad = self.held_rad.or(Some(here_rad));
+        self.carried_to = Some(Box::new(simulated(scenario)));
+        self.is_held = true;
+    }
+
+    /// Moves an arm that is carried on by one tick.
+    fn carry_on(&mut self, there: Box<Simulation>) {
+        let there_rad = there.plant().snapshot().theta_rad;
+        let here_rad = self.held_rad.unwrap_or(there_rad);
+        let step_rad = (there_rad - here_rad).map(|rad| rad.clamp(-CARRIED_RAD, CARRIED_RAD));
+        if step_rad.amax() > 0.0 {
+            self.held_rad = Some(here_rad + step_rad);
+            self.carried_to = Some(there);
+        } else {
+            self.held_rad = None;
+            self.simulation = *there;
+        }
+        self.present();
+    }
+
+    /// Returns whether an operator is carrying the arm.
+    pub fn is_carried(&self) -> bool {
+        self.carried_to.is_some()
     }
 
     /// Runs one control tick of the image. Closes the switch after a while; holds the arm until it
@@ -255,6 +297,9 @@ impl<C: BoardChip> Bench<C> {
         self.ticks += 1;
         if self.ticks == BEFORE_ENABLE && self.closes_switch {
             self.board.enable(true);
+        }
+        if let Some(there) = self.carried_to.take() {
+            return self.carry_on(there);
         }
         self.is_held &= self.board.torque().enabled != Some(true);
         if self.is_held || self.held_rad.is_some() {

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod commissioning;
+mod identification;
 pub mod rig;
 mod stored;
 

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use painleve_flash_image::bench::{BoardBench, scenario};
 use painleve_flash_image::board::FlashedBoard;
+use painleve_plant::scenario::Scenario;
 use painleve_tests::line::terminal;
 
 /// The scenario of the simulated arm.
@@ -25,6 +26,8 @@ const LIMIT: Duration = Duration::from_secs(120);
 struct Observed {
     switch_closed: AtomicBool,
     is_over: AtomicBool,
+    /// Whether the arm is being carried, or about to be.
+    is_carried: AtomicBool,
     /// Whether the torque stages are enabled now.
     is_on: AtomicBool,
     /// Ticks with the stages enabled.
@@ -87,6 +90,19 @@ impl EmulatedRig {
         self.observed.switch_closed.store(true, Ordering::SeqCst);
     }
 
+    pub fn open_switch(&self) {
+        self.observed.switch_closed.store(false, Ordering::SeqCst);
+    }
+
+    /// Has the arm carried to the start of a scenario.
+    pub fn carry(&self, scenario: Scenario) {
+        self.observed.is_carried.store(true, Ordering::SeqCst);
+        self.act(move |bench| bench.carry(&scenario));
+        self.wait_until("the arm is there", |rig| {
+            !rig.observed.is_carried.load(Ordering::SeqCst)
+        });
+    }
+
     /// Waits until the board is configured and has read its sensors for more than 100 ticks.
     pub fn wait_for_work(&self) {
         self.wait_until("the board runs", |rig| {
@@ -125,6 +141,7 @@ fn emulate(mut line: File, observed: &Observed, acts: &Receiver<Act>) {
         for act in acts.try_iter() {
             act(&mut bench);
         }
+        let is_carried = bench.is_carried();
         while is_readable(&line) {
             let length = line.read(&mut bytes).unwrap();
             bench.board.send_bytes(&bytes[..length]);
@@ -133,6 +150,9 @@ fn emulate(mut line: File, observed: &Observed, acts: &Receiver<Act>) {
             .board
             .enable(observed.switch_closed.load(Ordering::SeqCst));
         bench.tick();
+        if is_carried && !bench.is_carried() {
+            observed.is_carried.store(false, Ordering::SeqCst);
+        }
         let is_on = bench.board.torque().enabled == Some(true);
         observed.is_on.store(is_on, Ordering::SeqCst);
         observed.ticks_on.fetch_add(is_on.into(), Ordering::SeqCst);
