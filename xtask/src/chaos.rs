@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::command::{self, CHAOS, ChoreError, build_program, built};
+use crate::command::{CHAOS, ChoreError, built, run_on_program};
 
 /// Options of the test, which `--help` lists.
 #[derive(Debug, Args)]
@@ -38,6 +38,5 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
 }
 
 fn start(options: &[&str]) -> Result<(), ChoreError> {
-    build_program()?;
-    command::run(&built(CHAOS).to_string_lossy(), options)
+    run_on_program(&built(CHAOS).to_string_lossy(), options, &[])
 }

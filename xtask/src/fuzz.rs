@@ -3,7 +3,7 @@
 
 use clap::Args;
 
-use crate::command::{ChoreError, PROFILE, cargo, run_with};
+use crate::command::{ChoreError, PROFILE, cargo, run_on_program};
 
 /// Options of the fuzzing.
 #[derive(Debug, Args)]
@@ -52,7 +52,7 @@ pub fn nightly() -> Result<(), ChoreError> {
 /// If a test fails; its input is printed.
 pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
     let test = |selection: &[&str], variables: &[(&str, &str)]| {
-        run_with(
+        run_on_program(
             &cargo(),
             &[&["test", "--workspace", "--profile", PROFILE], selection].concat(),
             variables,

@@ -4,7 +4,7 @@
 
 use clap::Args;
 
-use crate::command::{ChoreError, PROFILE, cargo, run_with};
+use crate::command::{ChoreError, PROFILE, cargo, run_on_program};
 
 /// Options of the soak.
 #[derive(Debug, Args)]
@@ -34,7 +34,7 @@ pub fn nightly() -> Result<(), ChoreError> {
 /// If a counter is wrong or the arm moves wrongly.
 pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
     let minutes = |hours: f64| ((60.0 * hours).round() as u32).to_string();
-    run_with(
+    run_on_program(
         &cargo(),
         &[
             "test",

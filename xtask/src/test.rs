@@ -12,7 +12,7 @@ use clap::Args;
 
 use crate::build_fw;
 use crate::command::{
-    ChoreError, PROFILE, build_program, cargo, program, run_cargo, say, workspace,
+    ChoreError, PROFILE, build_program, cargo, run_cargo, say, under_test, workspace,
 };
 use crate::setup::{self, Tools};
 use crate::{campaign, chaos, examples, fmu, fuzz, newcomer, policy, python, size, soak};
@@ -132,8 +132,7 @@ fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError>
     tests
         .args(&line)
         .current_dir(workspace())
-        .env("PAINLEVE_PROGRAM", program())
-        .env("PAINLEVE_IMAGES", build_fw::folder())
+        .envs(under_test())
         .env("PAINLEVE_SKIPPED", notices.path());
     eprintln!("$ cargo {}", line.join(" "));
     let durations = passed_through(tests)?;

@@ -2,18 +2,9 @@
 
 use core::fmt::Write;
 
-use painleve_chart::markup::escaped;
+use painleve_chart::markup::{document, escaped};
 
 use crate::report::{Acceptance, Verdict};
-
-const STYLE: &str = "\
-body{font-family:Helvetica,Arial,'Liberation Sans','DejaVu Sans',sans-serif;color:#1a1a1a;background:#fff;\
-margin:0 auto;max-width:1040px;padding:24px;line-height:1.45}\
-table{border-collapse:collapse;width:100%;font-size:14px}th,td{text-align:left;vertical-align:top;\
-padding:4px 10px;border-bottom:1px solid #ddd}h2{font-size:19px;margin:32px 0 4px}p{margin:4px 0 8px}\
-.passed{color:#0a6b2d}.failed{color:#b00020;font-weight:bold}.noted{color:#666}\
-@media(prefers-color-scheme:dark){body{color:#e8e8e8;background:#161616}th,td{border-color:#444}\
-.passed{color:#3fc39a}.failed{color:#ff8a80}.noted{color:#a0a0a0}}";
 
 fn class(verdict: Verdict) -> &'static str {
     match verdict {
@@ -26,15 +17,11 @@ fn class(verdict: Verdict) -> &'static str {
 impl Acceptance {
     /// Returns the report as an HTML page.
     pub fn html(&self) -> String {
-        let mut page = String::new();
-        let chip = escaped(self.chip.unwrap_or("an unknown chip"));
+        let mut body = String::new();
         // Writing to a string does not fail.
         let _ = write!(
-            page,
-            "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\">\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>Acceptance: {chip}</title>\
-             <style>{STYLE}</style><h1>Acceptance: {chip}</h1>\
-             <p class=\"{}\">{}</p><p>painleve {}, sources {}</p>",
+            body,
+            "<p class=\"{}\">{}</p><p>painleve {}, sources {}</p>",
             class(self.verdict),
             self.verdict.word(),
             self.version,
@@ -42,7 +29,7 @@ impl Acceptance {
         );
         for step in &self.steps {
             let _ = write!(
-                page,
+                body,
                 "<h2>{} <span class=\"{}\">{}</span></h2><p>{} ({:.1} s)</p>\
                  <table><tr><th>what<th>measured<th>expected<th>verdict</tr>",
                 escaped(step.name),
@@ -53,7 +40,7 @@ impl Acceptance {
             );
             for check in &step.checks {
                 let _ = write!(
-                    page,
+                    body,
                     "<tr><td>{}<td>{}<td>{}<td class=\"{}\">{}</tr>",
                     escaped(&check.what),
                     escaped(&check.measured),
@@ -62,10 +49,10 @@ impl Acceptance {
                     check.verdict.word(),
                 );
             }
-            page.push_str("</table>");
+            body.push_str("</table>");
         }
-        page.push_str("</html>\n");
-        page
+        let chip = self.chip.unwrap_or("an unknown chip");
+        document(&format!("Acceptance: {chip}"), &body)
     }
 }
 

@@ -147,33 +147,12 @@ impl Joints {
         Ok(Self::fitted(&equations, &deviations, known))
     }
 
-    /// Solves the equations: the most probable unknowns, in deviations of what is known beforehand.
+    /// Takes the parameters from the unknowns that solve the equations.
     fn fitted(equations: &[Equation], deviations: &Values, known: &ArmParameters<f64>) -> Self {
-        let mut unknowns = Values::zeros();
-        let mut covariance = SMatrix::<f64, COUNT, COUNT>::identity();
-        let mut noise_nm = noise_nm(equations, &unknowns);
-        for _ in 0..ROUNDS {
-            let mut information = SMatrix::<f64, COUNT, COUNT>::identity();
-            let mut gradient = Values::zeros();
-            for equation in equations {
-                let by = equation.by.component_mul(deviations) / noise_nm;
-                information += by * by.transpose();
-                gradient += by * (equation.left_over_nm / noise_nm);
-            }
-            let Some(decomposed) = information.cholesky() else {
-                break;
-            };
-            unknowns = decomposed.solve(&gradient).component_mul(deviations);
-            covariance = decomposed.inverse();
-            noise_nm = self::noise_nm(equations, &unknowns);
-        }
-        // A sum of unknowns.
-        let estimate = |factors: &Values| {
-            let scaled = factors.component_mul(deviations);
-            Estimate {
-                value: factors.dot(&unknowns),
-                deviation: libm::sqrt(scaled.dot(&(covariance * scaled))),
-            }
+        let solution = Solution::of(equations, deviations);
+        let assured = |value: f64, deviation: f64| Estimate {
+            value,
+            deviation: libm::hypot(deviation, ALWAYS * value),
         };
         let joint = |joint: usize| {
             let unit = |index: usize| {
@@ -181,14 +160,10 @@ impl Joints {
                 factors[OF_JOINT * joint + index] = 1.0;
                 factors
             };
-            let assured = |value: f64, deviation: f64| Estimate {
-                value,
-                deviation: libm::hypot(deviation, ALWAYS * value),
-            };
-            let friction = estimate(&unit(FRICTION));
+            let friction = solution.sum(&unit(FRICTION));
             let nominal = known.stiffness_nm_rad[joint];
-            let stiffness = estimate(&(unit(SPRING) + unit(STAGE) * nominal));
-            let commanded = estimate(&unit(STAGE));
+            let stiffness = solution.sum(&(unit(SPRING) + unit(STAGE) * nominal));
+            let commanded = solution.sum(&unit(STAGE));
             let gain = 1.0 / (1.0 + commanded.value);
             Joint {
                 friction_nm: assured(friction.value, friction.deviation),
@@ -202,7 +177,51 @@ impl Joints {
         };
         Self {
             joints: [joint(0), joint(1)],
-            left_over_nm: [rms(&Values::zeros()), rms(&unknowns)],
+            left_over_nm: [rms(&Values::zeros()), rms(&solution.unknowns)],
+        }
+    }
+}
+
+/// The most probable unknowns.
+struct Solution {
+    unknowns: Values,
+    covariance: SMatrix<f64, COUNT, COUNT>,
+}
+
+impl Solution {
+    /// Solves equations, with the unknowns' standard deviations known beforehand.
+    fn of(equations: &[Equation], deviations: &Values) -> Self {
+        let mut solution = Self {
+            unknowns: Values::zeros(),
+            covariance: SMatrix::from_diagonal(&deviations.component_mul(deviations)),
+        };
+        for _ in 0..ROUNDS {
+            let noise_nm = noise_nm(equations, &solution.unknowns);
+            // In deviations of what is known beforehand, so that one of zero is no special case.
+            let mut information = SMatrix::<f64, COUNT, COUNT>::identity();
+            let mut gradient = Values::zeros();
+            for equation in equations {
+                let by = equation.by.component_mul(deviations) / noise_nm;
+                information += by * by.transpose();
+                gradient += by * (equation.left_over_nm / noise_nm);
+            }
+            let Some(decomposed) = information.cholesky() else {
+                break;
+            };
+            let scale = SMatrix::from_diagonal(deviations);
+            solution = Self {
+                unknowns: scale * decomposed.solve(&gradient),
+                covariance: scale * decomposed.inverse() * scale,
+            };
+        }
+        solution
+    }
+
+    /// Returns a sum of unknowns.
+    fn sum(&self, factors: &Values) -> Estimate {
+        Estimate {
+            value: factors.dot(&self.unknowns),
+            deviation: libm::sqrt(factors.dot(&(self.covariance * factors))),
         }
     }
 }

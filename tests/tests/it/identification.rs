@@ -20,8 +20,17 @@ fn a_rehearsal_writes_what_it_has_found() {
     let bench = Bench::new("identify");
     let found = bench.report(&["identify", "--rehearse", "--seed", "3", "--json"]);
     assert!(found["tip_deviation_m"].as_f64().unwrap() < 6e-4, "{found}");
-    let differences = bench.report(&["diff", "edge", "out/identified.toml", "--json"]);
+    let differences = bench.report(&["diff", "hybrid-elbow-down", "out/identified.toml", "--json"]);
     let written = differences["differences"].as_array().unwrap();
+    let page = std::fs::read_to_string(bench.path("out/identified.html")).unwrap();
+    for part in [
+        "Identification: hybrid-elbow-down",
+        "friction",
+        "The arm's model explains",
+        "</svg>",
+    ] {
+        assert!(page.contains(part), "{part}: {page}");
+    }
     for key in [
         "arm_model",
         "controller.estimator.encoders.zero_rad",

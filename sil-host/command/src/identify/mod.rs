@@ -3,29 +3,27 @@
 
 mod board_slides;
 mod recorded;
+mod report;
 mod residuals;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use painleve_chart::picture;
 use painleve_commission::identification::{
     Found, IdentificationError, identify_arm, identify_slides,
 };
 use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
 use painleve_files::atomic_file::{commit_all, prepare};
+use painleve_identify::Slide;
 use painleve_identify::parameters::Drawn;
-use painleve_identify::torques::{Estimate, Joint, Joints};
-use painleve_identify::{Parameter, Prior, Slide};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
-use painleve_process::terminal::{self, warn};
-use serde_json::json;
+use painleve_process::terminal::warn;
 
 use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
 use super::drive::check_rate;
 use super::output_error::output;
-use super::{CommandError, distinct_files, figure_path, say};
+use super::{CommandError, distinct_files, say};
 
 /// Standard deviation of a length that has been measured with a calliper, m.
 const MEASURED_M: f64 = 1e-4;
@@ -65,9 +63,9 @@ pub struct IdentifyArguments {
     /// File for the scenario with the measured values.
     #[arg(long, value_name = "PATH", default_value = "out/identified.toml")]
     output: PathBuf,
-    /// Figure of the distances from the line, before and after: SVG or PNG.
-    #[arg(long, value_name = "PATH", value_parser = figure_path())]
-    svg: Option<PathBuf>,
+    /// Report page, with the tip's distances from the line before and after.
+    #[arg(long, value_name = "PATH", default_value = "out/identified.html")]
+    html: PathBuf,
     /// Print one JSON object on stdout instead of the text.
     #[arg(long)]
     json: bool,
@@ -90,9 +88,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         .map(|it| it.read(&scenario))
         .collect();
     let slides = recorded?;
-    let mut files = vec![("--output", arguments.output.as_path())];
-    files.extend(arguments.svg.iter().map(|path| ("--svg", path.as_path())));
-    distinct_files::check(&files)?;
+    distinct_files::check(&[("--output", &arguments.output), ("--html", &arguments.html)])?;
     let mut drawn = Drawn::default();
     if let Some(length_m) = arguments.link_1_m {
         let mut arm = scenario.controller_configuration().arm;
@@ -106,12 +102,16 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         .applied_to(&scenario, &source)
         .map_err(|error| range(&arguments.scenario, error))?;
     let text = identified.to_commented_toml();
-    let mut files = vec![prepare(&arguments.output, text.as_bytes()).map_err(output)?];
-    if let Some(path) = &arguments.svg {
-        let figure = picture::encoded(path, residuals::svg(&found)).map_err(output)?;
-        files.push(prepare(path, &figure).map_err(output)?);
-    }
-    commit_all(files).map_err(output)?;
+    let page = report::html(&identified.name, &found);
+    let files = [
+        (&arguments.output, text.as_bytes()),
+        (&arguments.html, page.as_bytes()),
+    ];
+    let files: Result<Vec<_>, _> = files
+        .map(|(path, content)| prepare(path, content))
+        .into_iter()
+        .collect();
+    commit_all(files.map_err(output)?).map_err(output)?;
     report(arguments, &found)
 }
 
@@ -189,116 +189,15 @@ fn warn_of_change(scenario: &Scenario, found: &Found) {
     }
 }
 
-/// Prints what was found and where the scenario is.
+/// Prints what was found and where it is written.
 fn report(arguments: &IdentifyArguments, found: &Found) -> Result<(), CommandError> {
-    let identified = &found.identified;
-    let fit = &identified.fit;
-    let before_m = found.prior.tip_deviation_m();
+    let (output, html) = (arguments.output.display(), arguments.html.display());
     if arguments.json {
-        let parameters = Parameter::ALL.map(|parameter| {
-            json!({
-                "parameter": parameter.to_string(),
-                "unit": parameter.unit(),
-                "value": fit.parameters.get(parameter),
-                "deviation": fit.deviation(parameter),
-                "before": found.prior.parameters.get(parameter),
-                "deviation_before": found.prior.deviations[parameter.index()],
-            })
-        });
-        return say(json!({
-            "parameters": parameters,
-            "joints": found.joints.joints.map(|joint| {
-                let of = |it: Estimate| json!({ "value": it.value, "deviation": it.deviation });
-                json!({
-                    "coulomb_friction_nm": of(joint.friction_nm),
-                    "stiffness_nm_rad": of(joint.stiffness_nm_rad),
-                    "stage_gain": of(joint.gain),
-                })
-            }),
-            "torque_left_over_nm": found.joints.left_over_nm,
-            "tip_deviation_m": identified.tip_deviation_m,
-            "tip_deviation_before_m": before_m,
-            "place_deviation_m": identified.place_deviation_m,
-            "off_line_m": identified.off_line_m,
-            "readings": identified.readings,
-            "output": arguments.output.display().to_string(),
-        }));
+        let mut object = report::json(found);
+        object["output"] = output.to_string().into();
+        object["html"] = html.to_string().into();
+        return say(object);
     }
-    say(terminal::readable(table(&found.prior, found)))?;
-    let [off_before_m, off_after_m] = identified.off_line_m;
-    say(format_args!(
-        "the tip stays on a line to {:.3} mm (by the values before: {:.2} mm), in {} readings",
-        1e3 * off_after_m,
-        1e3 * off_before_m,
-        identified.readings
-    ))?;
-    say(format_args!(
-        "its position is known to {:.2} mm, its distance from the edges to {:.2} mm (before: {:.1} mm)",
-        1e3 * identified.place_deviation_m,
-        1e3 * identified.tip_deviation_m,
-        1e3 * before_m
-    ))?;
-    say(terminal::readable(joints_table(&found.joints)))?;
-    let [left_before_nm, left_after_nm] = found.joints.left_over_nm;
-    say(format_args!(
-        "the arm's model explains the torques to {:.0} mN·m (by the values before: {:.0} mN·m)",
-        1e3 * left_after_nm,
-        1e3 * left_before_nm
-    ))?;
-    say(format_args!("written: {}", arguments.output.display()))
-}
-
-/// Returns what the torques show. The gain of a stage is only told: it can hardly be told from those of the force cells.
-fn joints_table(found: &Joints) -> comfy_table::Table {
-    let mut table = terminal::table(["", "joint 1", "joint 2", "unit"]);
-    type Of = fn(&Joint) -> Estimate;
-    let rows: [(&str, Of, f64, usize, &str); 3] = [
-        ("friction", |it| it.friction_nm, 1e3, 0, "mN·m"),
-        (
-            "stiffness of the spring",
-            |it| it.stiffness_nm_rad,
-            1.0,
-            3,
-            "N·m/rad",
-        ),
-        ("torque to commanded torque", |it| it.gain, 1.0, 2, ""),
-    ];
-    for (name, of, scale, digits, unit) in rows {
-        let [one, two] = found.joints.map(|joint| {
-            let Estimate { value, deviation } = of(&joint);
-            format!(
-                "{:.digits$} ± {:.digits$}",
-                scale * value,
-                scale * deviation
-            )
-        });
-        table.add_row([name.to_owned(), one, two, unit.to_owned()]);
-    }
-    table
-}
-
-fn table(before: &Prior, found: &Found) -> comfy_table::Table {
-    let fit = &found.identified.fit;
-    let mut table = terminal::table(["", "before", "now", "unit"]);
-    for parameter in Parameter::ALL {
-        // Angles in milliradians, lengths in millimetres.
-        let scale = if parameter.unit().is_empty() {
-            1.0
-        } else {
-            1e3
-        };
-        let of =
-            |value: f64, deviation: f64| format!("{:.3} ± {:.3}", scale * value, scale * deviation);
-        let known = before.deviations[parameter.index()];
-        table.add_row([
-            parameter.to_string(),
-            of(before.parameters.get(parameter), known),
-            of(fit.parameters.get(parameter), fit.deviation(parameter)),
-            match parameter.unit() {
-                "" => String::new(),
-                unit => format!("m{unit}"),
-            },
-        ]);
-    }
-    table
+    say(report::text(found))?;
+    say(format_args!("written: {output} and {html}"))
 }

@@ -1,0 +1,167 @@
+//! What `painleve identify` tells of an arm: as text, as one JSON object, and as a page with the figure.
+
+use core::fmt::Write;
+
+use painleve_chart::markup::{document, escaped};
+use painleve_commission::identification::Found;
+use painleve_identify::Parameter;
+use painleve_identify::torques::{Estimate, Joint};
+use painleve_process::terminal;
+use serde_json::{Value, json};
+
+use super::residuals;
+
+/// A table for readers.
+struct Table {
+    header: [&'static str; 4],
+    rows: Vec<[String; 4]>,
+}
+
+/// Returns the result as text.
+pub fn text(found: &Found) -> String {
+    let mut text = String::new();
+    for Table { header, rows } in [geometry(found), joints(found)] {
+        let mut table = terminal::table(header);
+        table.add_rows(rows);
+        text += &terminal::readable_table(table);
+        text.push('\n');
+    }
+    text + &terminal::readable(sentences(found).join("\n"))
+}
+
+/// Returns the result as a page.
+pub fn html(name: &str, found: &Found) -> String {
+    let mut body = String::new();
+    for sentence in sentences(found) {
+        // Writing to a string does not fail.
+        let _ = write!(body, "<p>{}</p>", escaped(&sentence));
+    }
+    for Table { header, rows } in [geometry(found), joints(found)] {
+        body += "<table><tr>";
+        for name in header {
+            let _ = write!(body, "<th>{name}");
+        }
+        for row in rows {
+            body += "<tr>";
+            for cell in row {
+                let _ = write!(body, "<td>{}", escaped(&cell));
+            }
+        }
+        body += "</table>";
+    }
+    body += &residuals::svg(found);
+    document(&format!("Identification: {name}"), &body)
+}
+
+/// Returns the result as JSON.
+pub fn json(found: &Found) -> Value {
+    let identified = &found.identified;
+    let fit = &identified.fit;
+    let parameters = Parameter::ALL.map(|parameter| {
+        json!({
+            "parameter": parameter.to_string(),
+            "unit": parameter.unit(),
+            "value": fit.parameters.get(parameter),
+            "deviation": fit.deviation(parameter),
+            "before": found.prior.parameters.get(parameter),
+            "deviation_before": found.prior.deviations[parameter.index()],
+        })
+    });
+    let of_joint = |joint: Joint| {
+        let of = |it: Estimate| json!({ "value": it.value, "deviation": it.deviation });
+        json!({
+            "coulomb_friction_nm": of(joint.friction_nm),
+            "stiffness_nm_rad": of(joint.stiffness_nm_rad),
+            "stage_gain": of(joint.gain),
+        })
+    };
+    json!({
+        "parameters": parameters,
+        "joints": found.joints.joints.map(of_joint),
+        "torque_left_over_nm": found.joints.left_over_nm,
+        "tip_deviation_m": identified.tip_deviation_m,
+        "tip_deviation_before_m": found.prior.tip_deviation_m(),
+        "place_deviation_m": identified.place_deviation_m,
+        "off_line_m": identified.off_line_m,
+        "readings": identified.readings,
+    })
+}
+
+fn sentences(found: &Found) -> [String; 3] {
+    let identified = &found.identified;
+    let [off_before_m, off_after_m] = identified.off_line_m;
+    let [left_before_nm, left_after_nm] = found.joints.left_over_nm;
+    [
+        format!(
+            "The tip stays on a line to {:.3} mm (by the values before: {:.2} mm), in {} readings.",
+            1e3 * off_after_m,
+            1e3 * off_before_m,
+            identified.readings
+        ),
+        format!(
+            "Its position is known to {:.2} mm, its distance from the edges to {:.2} mm (before: {:.1} mm).",
+            1e3 * identified.place_deviation_m,
+            1e3 * identified.tip_deviation_m,
+            1e3 * found.prior.tip_deviation_m()
+        ),
+        format!(
+            "The arm's model explains the torques to {:.0} mN·m (by the values before: {:.0} mN·m).",
+            1e3 * left_after_nm,
+            1e3 * left_before_nm
+        ),
+    ]
+}
+
+/// Returns the geometry, with angles in milliradians and lengths in millimetres.
+fn geometry(found: &Found) -> Table {
+    let (before, fit) = (&found.prior, &found.identified.fit);
+    let rows = Parameter::ALL.map(|parameter| {
+        let (scale, unit) = match parameter.unit() {
+            "" => (1.0, String::new()),
+            unit => (1e3, format!("m{unit}")),
+        };
+        let of = |value: f64, deviation: f64| spread(scale * value, scale * deviation, 3);
+        let known = before.deviations[parameter.index()];
+        [
+            parameter.to_string(),
+            of(before.parameters.get(parameter), known),
+            of(fit.parameters.get(parameter), fit.deviation(parameter)),
+            unit,
+        ]
+    });
+    Table {
+        header: ["", "before", "now", "unit"],
+        rows: rows.into(),
+    }
+}
+
+/// Returns what the torques show. No setting takes the gain of a stage: it is for information.
+fn joints(found: &Found) -> Table {
+    type Of = fn(&Joint) -> Estimate;
+    let rows: [(&str, Of, f64, usize, &str); 3] = [
+        ("friction", |it| it.friction_nm, 1e3, 0, "mN·m"),
+        (
+            "stiffness of the spring",
+            |it| it.stiffness_nm_rad,
+            1.0,
+            3,
+            "N·m/rad",
+        ),
+        ("torque to commanded torque", |it| it.gain, 1.0, 2, ""),
+    ];
+    let rows = rows.map(|(name, of, scale, digits, unit)| {
+        let [one, two] = found.joints.joints.map(|joint| {
+            let Estimate { value, deviation } = of(&joint);
+            spread(scale * value, scale * deviation, digits)
+        });
+        [name.into(), one, two, unit.into()]
+    });
+    Table {
+        header: ["", "joint 1", "elbow", "unit"],
+        rows: rows.into(),
+    }
+}
+
+fn spread(value: f64, deviation: f64, digits: usize) -> String {
+    format!("{value:.digits$} ± {deviation:.digits$}")
+}
