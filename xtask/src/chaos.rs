@@ -2,7 +2,8 @@
 
 use clap::Args;
 
-use crate::command::{CHAOS, ChoreError, built, run_on_program};
+use crate::command::{CHAOS, ChoreError, built};
+use crate::under_test::run_on_program;
 
 /// Options of the test, which `--help` lists.
 #[derive(Debug, Args)]

@@ -6,8 +6,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::build_fw;
-
 /// Why a chore failed.
 #[derive(Debug)]
 pub struct ChoreError(pub String);
@@ -113,31 +111,6 @@ pub fn run_with(
     } else {
         Err(ChoreError(format!("`{line}` failed ({status})")))
     }
-}
-
-/// Returns what tells tests where program and images are; without it they build their own.
-pub fn under_test() -> [(&'static str, PathBuf); 2] {
-    [
-        ("PAINLEVE_PROGRAM", program()),
-        ("PAINLEVE_IMAGES", build_fw::folder()),
-    ]
-}
-
-/// Builds images and program, and runs a program that tests them.
-///
-/// # Errors
-/// As [`run`].
-pub fn run_on_program(
-    tester: &str,
-    arguments: &[&str],
-    environment: &[(&str, &str)],
-) -> Result<(), ChoreError> {
-    build_fw::run()?;
-    build_program()?;
-    let under_test = under_test().map(|(name, path)| (name, path.to_string_lossy().into_owned()));
-    let under_test = under_test.iter().map(|(name, path)| (*name, path.as_str()));
-    let environment: Vec<_> = under_test.chain(environment.iter().copied()).collect();
-    run_with(tester, arguments, &environment)
 }
 
 /// Runs cargo in the workspace's folder.

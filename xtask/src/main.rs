@@ -21,6 +21,7 @@ mod setup;
 mod size;
 mod soak;
 mod test;
+mod under_test;
 
 use std::process::ExitCode;
 

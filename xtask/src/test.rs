@@ -11,10 +11,9 @@ use std::time::Instant;
 use clap::Args;
 
 use crate::build_fw;
-use crate::command::{
-    ChoreError, PROFILE, build_program, cargo, run_cargo, say, under_test, workspace,
-};
+use crate::command::{ChoreError, PROFILE, build_program, cargo, run_cargo, say, workspace};
 use crate::setup::{self, Tools};
+use crate::under_test::under_test;
 use crate::{campaign, chaos, examples, fmu, fuzz, newcomer, policy, python, size, soak};
 
 /// Options of `cargo xtask test`.
