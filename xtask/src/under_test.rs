@@ -16,7 +16,7 @@ pub fn under_test() -> [(&'static str, PathBuf); 2] {
 /// Builds images and program, and runs a program that tests them.
 ///
 /// # Errors
-/// As [`run`].
+/// As [`run_with`].
 pub fn run_on_program(
     tester: &str,
     arguments: &[&str],
