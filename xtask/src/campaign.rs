@@ -5,7 +5,8 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::command::{ChoreError, program, say, workspace};
+use crate::command::{ChoreError, say, workspace};
+use crate::under_test::program;
 
 /// A contact: its name, the arguments that select it, and the least lower limit of the success rate (Wilson, 95 %). With
 /// the rates that the documentation prints, chance goes below it in fewer than one of 1,000 campaigns.

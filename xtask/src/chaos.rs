@@ -2,8 +2,8 @@
 
 use clap::Args;
 
-use crate::command::{CHAOS, ChoreError, built};
-use crate::under_test::run_on_program;
+use crate::command::ChoreError;
+use crate::under_test::{chaos, run_on_program};
 
 /// Options of the test, which `--help` lists.
 #[derive(Debug, Args)]
@@ -39,5 +39,5 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
 }
 
 fn start(options: &[&str]) -> Result<(), ChoreError> {
-    run_on_program(&built(CHAOS).to_string_lossy(), options, &[])
+    run_on_program(&chaos().to_string_lossy(), options, &[])
 }

@@ -1,7 +1,8 @@
 //! `cargo xtask ci`: formatting, lints, links in doc comments and tests, in this order.
 
-use crate::command::{ChoreError, PROFILE, cargo, run_cargo, run_with};
+use crate::command::{ChoreError, cargo, run_cargo, run_with};
 use crate::test::{self, TestArguments};
+use crate::under_test::PROFILE;
 
 /// Runs the steps of continuous integration.
 ///

@@ -25,39 +25,6 @@ pub fn say(line: &str) -> Result<(), ChoreError> {
         .map_err(|cause| ChoreError(format!("cannot write to stdout: {cause}")))
 }
 
-/// The profile of the program under test and of all tests.
-pub const PROFILE: &str = "verify";
-
-/// The program of `tests/chaos`.
-pub const CHAOS: &str = "chaos";
-
-/// Returns the path of the program under test.
-pub fn program() -> PathBuf {
-    built("painleve")
-}
-
-/// Returns the path of a program that [`build_program`] builds.
-pub fn built(name: &str) -> PathBuf {
-    workspace().join("target").join(PROFILE).join(name)
-}
-
-/// Builds the program under test, the one that disturbs it, and all tests: in one call, so that each dependency is
-/// compiled with one set of features, once.
-///
-/// # Errors
-/// As [`run`].
-pub fn build_program() -> Result<(), ChoreError> {
-    let selection = [
-        "--workspace",
-        "--tests",
-        "--bin",
-        "painleve",
-        "--bin",
-        CHAOS,
-    ];
-    run_cargo(&[&["build", "--profile", PROFILE], &selection[..]].concat())
-}
-
 /// Returns the workspace's folder.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -3,8 +3,8 @@
 
 use clap::Args;
 
-use crate::command::{ChoreError, PROFILE, cargo};
-use crate::under_test::run_on_program;
+use crate::command::{ChoreError, cargo};
+use crate::under_test::{PROFILE, run_on_program};
 
 /// Options of the fuzzing.
 #[derive(Debug, Args)]

@@ -16,7 +16,8 @@ use clap::Args;
 use serde_json::Value;
 use toml::Table;
 
-use crate::command::{ChoreError, build_program, cargo, program, run_with, say, workspace};
+use crate::command::{ChoreError, cargo, run_with, say, workspace};
+use crate::under_test::{build_program, program};
 
 #[derive(Debug, Args)]
 pub struct MeasureArguments {

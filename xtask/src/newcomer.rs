@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use crate::command::{ChoreError, build_program, program, run, say, workspace};
+use crate::command::{ChoreError, run, say, workspace};
 use crate::files::unwritable;
+use crate::under_test::{build_program, program};
 use crate::{build_fw, python};
 
 const FOLDER: &str = "target/newcomer";

@@ -3,7 +3,8 @@
 
 use std::process::{Command, Stdio};
 
-use crate::command::{ChoreError, PROFILE, run, starts};
+use crate::command::{ChoreError, run, starts};
+use crate::under_test::PROFILE;
 
 /// The least Rust version, from the workspace's `Cargo.toml`.
 const LEAST_RUST: &str = env!("CARGO_PKG_RUST_VERSION");

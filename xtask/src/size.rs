@@ -10,7 +10,8 @@ use serde_json::Value;
 
 use crate::boards;
 use crate::build_fw;
-use crate::command::{ChoreError, build_program, program, say, workspace};
+use crate::command::{ChoreError, say, workspace};
+use crate::under_test::{build_program, program};
 
 /// All limits; the end-to-end tests check those of the ticks and of the stack as well.
 const BUDGET: &str = include_str!("../../tests/budget.json");

@@ -4,8 +4,8 @@
 
 use clap::Args;
 
-use crate::command::{ChoreError, PROFILE, cargo};
-use crate::under_test::run_on_program;
+use crate::command::{ChoreError, cargo};
+use crate::under_test::{PROFILE, run_on_program};
 
 /// Options of the soak.
 #[derive(Debug, Args)]

@@ -11,9 +11,9 @@ use std::time::Instant;
 use clap::Args;
 
 use crate::build_fw;
-use crate::command::{ChoreError, PROFILE, build_program, cargo, run_cargo, say, workspace};
+use crate::command::{ChoreError, cargo, run_cargo, say, workspace};
 use crate::setup::{self, Tools};
-use crate::under_test::under_test;
+use crate::under_test::{PROFILE, build_program, under_test};
 use crate::{campaign, chaos, examples, fmu, fuzz, newcomer, policy, python, size, soak};
 
 /// Options of `cargo xtask test`.

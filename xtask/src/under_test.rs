@@ -1,9 +1,39 @@
-//! What runs tests or disturbs the program: program and images are built first, and their places told.
+//! The program under test: where it is, how it is built, and how tests are told of it.
 
 use std::path::PathBuf;
 
 use crate::build_fw;
-use crate::command::{ChoreError, build_program, program, run_with};
+use crate::command::{ChoreError, run_cargo, run_with, workspace};
+
+/// The profile of the program under test and of all tests.
+pub const PROFILE: &str = "verify";
+
+const PROGRAM: &str = "painleve";
+const CHAOS: &str = "chaos";
+
+/// Returns the path of the program under test.
+pub fn program() -> PathBuf {
+    built(PROGRAM)
+}
+
+/// Returns the path of the program of `tests/chaos`, which disturbs it.
+pub fn chaos() -> PathBuf {
+    built(CHAOS)
+}
+
+fn built(name: &str) -> PathBuf {
+    workspace().join("target").join(PROFILE).join(name)
+}
+
+/// Builds the program under test, the one that disturbs it, and all tests: in one call, so that each dependency is
+/// compiled with one set of features, once.
+///
+/// # Errors
+/// If they do not build.
+pub fn build_program() -> Result<(), ChoreError> {
+    let tests = ["build", "--profile", PROFILE, "--workspace", "--tests"];
+    run_cargo(&[&tests[..], &["--bin", PROGRAM, "--bin", CHAOS]].concat())
+}
 
 /// Returns what tells tests where program and images are; without it they build their own.
 pub fn under_test() -> [(&'static str, PathBuf); 2] {

@@ -15,14 +15,14 @@ use painleve_firmware::law::LawSettings;
 use painleve_identify::geometry::joint_rad;
 use painleve_identify::parameters::Drawn;
 use painleve_identify::passes::ON_BELT;
-use painleve_identify::torques::Joints;
+use painleve_identify::torques::{Estimate, Joints};
 use painleve_identify::{
     Identified, Limits, Parameter, Parameters, Prior, Reading, Refusal, Slide, identify,
 };
 use painleve_plant::decimal::as_written;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError};
-use painleve_shared::counts::TorqueCounts;
+use painleve_shared::counts::{EncoderScale, TorqueCounts};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Pose, Posture};
 
@@ -154,29 +154,27 @@ pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>)
     let [scale_1, scale_2] = scales.encoders;
     let newtons = f64::from(scales.force.per_count());
     let newton_metres = f64::from(scales.torque.per_count());
-    let ticks = ticks.into_iter().filter(|tick| {
-        let frame = &tick.sensor;
+    let is_whole = |frame: &SensorFrame| {
         scale_1.contains(frame.joints[0])
             && scale_2.contains(frame.joints[1])
             && scales.force.contains(frame.normal_force.0)
             && scales.force.contains(frame.tangential_force.0)
-    });
+    };
+    let rad = |scale: EncoderScale, reading| {
+        f64::from(scale.counts_from_zero(reading)) * scale.rad_per_count::<f64>()
+    };
     ticks
-        .map(
-            |SlideTick {
-                 sensor: frame,
-                 torques,
-             }| Reading {
-                encoders_rad: [(scale_1, frame.joints[0]), (scale_2, frame.joints[1])].map(
-                    |(scale, reading)| {
-                        f64::from(scale.counts_from_zero(reading)) * scale.rad_per_count::<f64>()
-                    },
-                ),
-                force_n: [frame.tangential_force, frame.normal_force]
-                    .map(|force| f64::from(force.0) * newtons),
-                torque_nm: torques.map(|torque| f64::from(torque.0) * newton_metres),
-            },
-        )
+        .into_iter()
+        .filter(|tick| is_whole(&tick.sensor))
+        .map(|SlideTick { sensor, torques }| Reading {
+            encoders_rad: [
+                rad(scale_1, sensor.joints[0]),
+                rad(scale_2, sensor.joints[1]),
+            ],
+            force_n: [sensor.tangential_force, sensor.normal_force]
+                .map(|force| f64::from(force.0) * newtons),
+            torque_nm: torques.map(|torque| f64::from(torque.0) * newton_metres),
+        })
         .collect()
 }
 
@@ -382,10 +380,9 @@ impl Found {
         arm.link_length_m = parameters.link_length_m().map(|it| rounded(it) as f32);
         arm.height_m = rounded(parameters.get(Parameter::Height)) as f32;
         let joints = &self.joints.joints;
-        arm.coulomb_friction_nm =
-            [0, 1].map(|joint| rounded(joints[joint].friction_nm.value).max(0.0) as f32);
-        arm.stiffness_nm_rad =
-            [0, 1].map(|joint| rounded(joints[joint].stiffness_nm_rad.value).max(0.0) as f32);
+        let value = |it: Estimate| rounded(it.value).max(0.0) as f32;
+        arm.coulomb_friction_nm = joints.map(|it| value(it.friction_nm));
+        arm.stiffness_nm_rad = joints.map(|it| value(it.stiffness_nm_rad));
         corrected.arm_model = Some(arm);
         let estimator = &mut corrected.controller.estimator;
         for (parameter, values_rad) in terms(&mut estimator.encoders) {

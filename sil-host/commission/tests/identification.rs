@@ -70,8 +70,7 @@ fn start_p_per_kg(scenario: &Scenario) -> f64 {
     let arm = Arm::new(scenario.moving_arm()).unwrap();
     let pose = Pose::new(&theta(&scenario.initial.state(&scenario.arm).unwrap()));
     let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
-    let inverse = arm.inverse_tip_inertia(&pose);
-    inverse.m22 - scenario.belt.friction * slip.sign::<f64>() * inverse.m12
+    arm.p(&pose, scenario.belt.friction, slip)
 }
 
 /// Results of closed loops.

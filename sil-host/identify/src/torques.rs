@@ -250,25 +250,21 @@ fn noise_nm(equations: &[Equation], unknowns: &Values) -> f64 {
 impl Mean {
     /// Returns the means of readings, if the tip is on the belt in all of them.
     fn of(readings: &[crate::Reading], geometry: &Parameters, limits: &Limits) -> Option<Self> {
-        let mut sum = Self {
-            joints_rad: Vector2::zeros(),
-            force_n: Vector2::zeros(),
-            torque_nm: Vector2::zeros(),
-        };
+        let [mut encoders_rad, mut force_n, mut torque_nm] = [Vector2::zeros(); 3];
         for reading in readings {
             if reading.force_n[1] < limits.contact_n {
                 return None;
             }
-            sum.joints_rad += Vector2::from(reading.encoders_rad);
-            sum.force_n += Vector2::from(reading.force_n);
-            sum.torque_nm += Vector2::from(reading.torque_nm);
+            encoders_rad += Vector2::from(reading.encoders_rad);
+            force_n += Vector2::from(reading.force_n);
+            torque_nm += Vector2::from(reading.torque_nm);
         }
         let share = 1.0 / readings.len() as f64;
-        let encoders_rad = sum.joints_rad * share;
+        encoders_rad *= share;
         Some(Self {
             joints_rad: Vector2::from([0, 1].map(|it| joint_rad(geometry, it, encoders_rad[it]))),
-            force_n: sum.force_n * share,
-            torque_nm: sum.torque_nm * share,
+            force_n: force_n * share,
+            torque_nm: torque_nm * share,
         })
     }
 }

@@ -103,15 +103,11 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         .map_err(|error| range(&arguments.scenario, error))?;
     let text = identified.to_commented_toml();
     let page = report::html(&identified.name, &found);
-    let files = [
-        (&arguments.output, text.as_bytes()),
-        (&arguments.html, page.as_bytes()),
-    ];
-    let files: Result<Vec<_>, _> = files
-        .map(|(path, content)| prepare(path, content))
-        .into_iter()
-        .collect();
-    commit_all(files.map_err(output)?).map_err(output)?;
+    commit_all(vec![
+        prepare(&arguments.output, text.as_bytes()).map_err(output)?,
+        prepare(&arguments.html, page.as_bytes()).map_err(output)?,
+    ])
+    .map_err(output)?;
     report(arguments, &found)
 }
 
