@@ -16,7 +16,11 @@ pub const PLAIN: usize = 5;
 
 /// Number of states with drives: also the rotors' angles (rad) and rates (rad/s) in the joints'
 /// coordinates θ1 and θ2 − θ1, and the deflections of the joints' bristles.
-pub const FULL: usize = 11;
+pub const WITH_DRIVES: usize = 11;
+
+/// Number of states on a hanging belt, with or without drives: also the height (m) of its piece
+/// under the tip, and its rate (m/s).
+pub const FULL: usize = 13;
 
 /// The equations of one stretch of motion.
 #[derive(Clone, Copy, Debug)]
@@ -48,28 +52,29 @@ pub struct Touch {
     pub slip_m_s: f64,
     /// Velocity at which tip and belt approach each other, m/s.
     pub closing_m_s: f64,
-    /// Height of the belt's surface above the flat belt, m.
+    /// Height of the belt's surface above the flat, unloaded belt, m.
     pub surface_m: f64,
 }
 
 impl CompliantMotion<'_> {
-    /// Returns the contact at a pose of the arm, with the tip's velocity (m/s) and the bristles'
-    /// deflection.
-    pub fn touch(
+    /// Returns the contact at a pose of the arm, with the tip's velocity (m/s), the bristles'
+    /// deflection, and height (m) and rate (m/s) of a hanging belt.
+    fn touch(
         &self,
         t_s: f64,
         pose: &Pose<f64>,
         velocity_m_s: &Vector2<f64>,
         bristles: f64,
+        (hanging_m, hanging_m_s): (f64, f64),
     ) -> Touch {
         let slip_m_s = velocity_m_s.x - self.belt.speed_m_s(t_s);
-        let mut closing_m_s = -velocity_m_s.y;
-        let mut surface_m = 0.0;
+        let mut closing_m_s = hanging_m_s - velocity_m_s.y;
+        let mut surface_m = hanging_m;
         let surface = &self.effects.surface;
         if !surface.is_flat() {
             let along_m = self.along_belt_m(t_s, self.arm.tip_m(pose).x);
             let (height_m, slope, speed_m_s) = surface.at(t_s, along_m);
-            surface_m = height_m;
+            surface_m += height_m;
             closing_m_s += slope * slip_m_s + speed_m_s;
         }
         let friction = self.friction_at(t_s, self.arm.tip_m(pose).x);
@@ -113,7 +118,17 @@ impl CompliantMotion<'_> {
     pub fn touch_at<const N: usize>(&self, t_s: f64, x: &SVector<f64, N>) -> Touch {
         let pose = Pose::new(&LinkMotion::new(x[0], x[1]));
         let velocity = self.arm.jacobian(&pose) * Vector2::new(x[2], x[3]);
-        self.touch(t_s, &pose, &velocity, x[4])
+        self.touch(t_s, &pose, &velocity, x[4], hanging(x))
+    }
+}
+
+/// Returns height (m) and rate (m/s) of a hanging belt.
+#[inline]
+fn hanging<const N: usize>(x: &SVector<f64, N>) -> (f64, f64) {
+    if N == FULL {
+        (x[11], x[12])
+    } else {
+        (0.0, 0.0)
     }
 }
 
@@ -128,10 +143,10 @@ impl<const N: usize> Equations<N> for CompliantMotion<'_> {
         let pose = Pose::new(&angles);
         let jacobian = self.arm.jacobian(&pose);
         let velocity = jacobian * rates.vector();
-        let touch = self.touch(t_s, &pose, &velocity, x[4]);
+        let touch = self.touch(t_s, &pose, &velocity, x[4], hanging(x));
         let mut derivative = SVector::<f64, N>::zeros();
         let mut joint_nm = self.torque.at(t_s).to_array();
-        if N == FULL {
+        if N >= WITH_DRIVES {
             let joints = [(x[0], x[2]), (x[1] - x[0], x[3] - x[2])];
             let friction = &self.effects.joints;
             for (joint, (angle, rate)) in joints.into_iter().enumerate() {
@@ -163,6 +178,11 @@ impl<const N: usize> Equations<N> for CompliantMotion<'_> {
         derivative[2] = acceleration.x;
         derivative[3] = acceleration.y;
         derivative[4] = touch.bristle_rate_per_s;
+        if N == FULL && self.effects.hanging_belt.is_on() {
+            let belt = &self.effects.hanging_belt;
+            derivative[11] = x[12];
+            derivative[12] = belt.acceleration_m_s2(x[11], x[12], touch.force_n.y);
+        }
         derivative
     }
 

@@ -18,7 +18,7 @@ use painleve_shared::{
 };
 
 pub use contact::{CompliantContact, ContactKind, NormalDamping, TipContact};
-use equations::{CompliantMotion, FULL, PLAIN};
+use equations::{CompliantMotion, FULL, PLAIN, WITH_DRIVES};
 use step::CompliantStep;
 
 use super::arm_on_belt::{CONTACT_AT_START_M, INSIDE_AT_START_M};
@@ -156,8 +156,10 @@ impl CompliantArmOnBelt {
                 .min(self.effects.push.next_corner_s(self.time_s))
                 .min(payload.next_corner_s(self.time_s))
                 .min(until_s);
-            if self.has_drives {
+            if self.effects.hanging_belt.is_on() {
                 self.advance_smoothly::<FULL>(corner, probe)?;
+            } else if self.has_drives {
+                self.advance_smoothly::<WITH_DRIVES>(corner, probe)?;
             } else {
                 self.advance_smoothly::<PLAIN>(corner, probe)?;
             }

@@ -1,3 +1,5 @@
+use painleve_shared::Pose;
+
 use super::*;
 use crate::mechanics::ArmOnBelt;
 use crate::mechanics::effects::payload::Payload;
@@ -216,6 +218,71 @@ fn a_payload_changes_the_arm_once_it_is_picked_up_and_no_velocity_with_it() {
     assert!((picked.state() - free.state()).norm() > 1e-3);
 }
 
+fn on_hanging_belt(stiffness_n_m: f64, joint_friction_nm: f64) -> CompliantArmOnBelt {
+    let mut effects = Effects::default();
+    effects.hanging_belt.mass_kg = 0.02;
+    effects.hanging_belt.stiffness_n_m = stiffness_n_m;
+    effects.joints.coulomb_nm = joint_friction_nm;
+    compliant(&contact(1e5, 1e-8), &effects, ON_BELT_DEG)
+}
+
+#[test]
+fn a_hanging_belt_sags_by_the_force_over_its_stiffness() {
+    let mut plant = on_hanging_belt(2e4, 0.0);
+    for step in 1..20_000 {
+        plant.advance(f64::from(step) * 1e-3, &mut ()).unwrap();
+    }
+    let force_n = plant.contact_force_n().y;
+    assert!(force_n > 0.3, "{force_n}");
+    // Belt and contact are springs in series.
+    let sag_m = force_n / 2e4;
+    assert!((plant.state[11] + sag_m).abs() < 1e-3 * sag_m);
+    let tip_m = plant
+        .arm
+        .gap_m(&Pose::new(&LinkMotion::new(plant.state[0], plant.state[1])));
+    let both_m = force_n * (1.0 / 2e4 + 1.0 / 1e5);
+    assert!((tip_m + both_m).abs() < 2e-3 * both_m, "{tip_m} {both_m}");
+}
+
+#[test]
+fn a_hanging_belt_rings_at_its_natural_frequency_after_the_tip_has_left_it() {
+    let mut plant = on_hanging_belt(2e4, 0.0);
+    // The tip is far away, and the belt is released from 1 mm above its rest.
+    plant.state[0] = 40.0_f64.to_radians();
+    plant.state[1] = 80.0_f64.to_radians();
+    plant.state[11] = 1e-3;
+    let (natural, ratio) = ((2e4_f64 / 0.02).sqrt(), 0.15);
+    let damped = natural * (1.0_f64 - ratio * ratio).sqrt();
+    let period_s = core::f64::consts::TAU / damped;
+    plant.advance(period_s, &mut ()).unwrap();
+    let decayed_m = 1e-3 * (-ratio * natural * period_s).exp();
+    assert!(
+        (plant.state[11] - decayed_m).abs() < 1e-6,
+        "{}",
+        plant.state[11]
+    );
+}
+
+#[test]
+fn a_stiff_hanging_belt_is_a_belt_on_a_firm_bed_with_and_without_drives() {
+    let end = |mut plant: CompliantArmOnBelt| {
+        for tick in 0..200 {
+            plant.command_torque(torque_nm(tick), 0.0);
+            plant.advance(f64::from(tick + 1) * 1e-3, &mut ()).unwrap();
+        }
+        plant.state()
+    };
+    let firm = end(compliant(
+        &contact(1e5, 1e-8),
+        &Effects::default(),
+        ON_BELT_DEG,
+    ));
+    let hanging = end(on_hanging_belt(1e9, 0.0));
+    assert!((firm - hanging).norm() < 1e-3);
+    let with_drives = end(on_hanging_belt(1e9, 1e-9));
+    assert!((hanging - with_drives).norm() < 1e-3);
+}
+
 #[test]
 fn the_rigid_plant_refuses_every_effect_by_its_key() {
     for (key, value) in [
@@ -224,6 +291,7 @@ fn the_rigid_plant_refuses_every_effect_by_its_key() {
             "effects.friction={ kind = 'sine', amplitude = 0.1, frequency_hz = 1.0 }",
         ),
         ("effects.surface", "effects.surface.waviness_m=1e-4"),
+        ("effects.hanging_belt", "effects.hanging_belt.mass_kg=0.02"),
         ("effects.joints", "effects.joints.coulomb_nm=0.1"),
         (
             "arm.coulomb_friction_nm",

@@ -4,6 +4,7 @@
 //! - [`friction`]: friction that changes along the belt and over time
 //!   ([`friction_file`]: from a CSV file)
 //! - [`surface`]: a belt that is uneven or vibrates
+//! - [`hanging_belt`]: a belt that yields between its rollers
 //! - [`joints`]: friction in the joints
 //! - [`gear`]: elastic gears with backlash and separate rotors, encoders on either side
 //! - [`push`]: external forces on the tip; [`payload`]: a mass that it picks up
@@ -14,6 +15,7 @@
 pub mod friction;
 pub mod friction_file;
 pub mod gear;
+pub mod hanging_belt;
 pub mod joints;
 pub mod payload;
 pub mod push;
@@ -23,6 +25,7 @@ use painleve_shared::{ArmParameters, OutOfRange, range, settings};
 
 use friction::FrictionChange;
 use gear::GearSettings;
+use hanging_belt::HangingBelt;
 use joints::JointFriction;
 use payload::Payload;
 use push::Push;
@@ -35,6 +38,8 @@ settings! {
         friction: FrictionChange = FrictionChange::None;
         /// The belt's surface.
         surface: Surface = Surface::default();
+        /// A belt that hangs between its rollers.
+        hanging_belt: HangingBelt = HangingBelt::default();
         /// Friction in the joints.
         joints: JointFriction = JointFriction::default();
         /// Gears between motors and joints.
@@ -65,6 +70,10 @@ impl Effects {
         off(
             "effects.surface with contact.kind = rigid",
             !self.surface.is_flat(),
+        )?;
+        off(
+            "effects.hanging_belt with contact.kind = rigid",
+            self.hanging_belt.is_on(),
         )?;
         off(
             "effects.joints with contact.kind = rigid",

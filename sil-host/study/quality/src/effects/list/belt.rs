@@ -26,6 +26,16 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
         [1.0, 2.0, 4.0], typical 1.0,
         overrides: Computed(|level, _| contact(1e6, level));
 
+    "hanging-belt": "effects.hanging_belt.stiffness_n_m", "N/m, 20 g, 0.15 of critical damping",
+        [5e4, 2e4, 1e4], typical 2e4,
+        overrides: Computed(|level, _| {
+            let (mass_kg, ratio) = (0.02, 0.15);
+            let damping_ns_m = 2.0 * ratio * libm::sqrt(level * mass_kg);
+            set![
+                "effects.hanging_belt={{ mass_kg = {mass_kg:?}, stiffness_n_m = {level:?}, damping_ns_m = {damping_ns_m:?} }}"
+            ]
+        });
+
     "static-friction": "contact.static_friction_ratio", "on a belt of 0.05 … 0.2 m/s",
         [1.0, 1.2, 1.4, 1.8], typical 1.2,
         overrides: Computed(|level, drawn| {
