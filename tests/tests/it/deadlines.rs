@@ -13,7 +13,7 @@ use painleve_process::interrupt::Interrupt;
 use painleve_shared::counts::{ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame};
 use painleve_shared::status::{Fault, SupervisorState};
-use painleve_tests::{Bench, child_of, code, errors, signal};
+use painleve_tests::{Bench, child_of, code, errors, is_running, signal};
 use serde_json::Value;
 
 const ON: DigitalInputs = DigitalInputs::ENABLE;
@@ -111,7 +111,9 @@ fn a_controller_refuses_the_plant_of_another_build() {
     let mut plant = Pressing::of_build(build() ^ 1, &bench.bus);
     let controller = bench.start(&["controller", "--bus", &bench.bus, "--wait-s", "20"]);
     // Announces the session; the controller leaves before its first frame.
-    let _ = plant.end.wait_for_controller(Duration::from_secs(10));
+    while is_running(controller.id()) {
+        let _ = plant.end.wait_for_controller(Duration::from_millis(100));
+    }
     let (output, _) = controller.end(Duration::from_secs(30));
     drop(plant);
     assert_eq!(code(output.status), 3, "{output:?}");
