@@ -29,6 +29,9 @@ const MEAN_S: f64 = 0.1;
 /// turns slowly, waves and vibration of the belt reverse the friction.
 const LEAST_TURN_RAD: f64 = 9e-3;
 
+/// Time over which a joint turns back if it vibrates, s: half a period of a belt that hangs softly.
+const BACK_S: f64 = 8e-3;
+
 /// Standard deviations known beforehand: gain of a stage, stiffness relative to the scenario's, gain and cross-talk of the force
 /// cells, and tilt of the belt, rad.
 const GAIN: f64 = 0.1;
@@ -92,6 +95,8 @@ struct Mean {
     joints_rad: Vector2<f64>,
     force_n: Vector2<f64>,
     torque_nm: Vector2<f64>,
+    /// Whether each joint turned back at some time.
+    turns_back: [bool; 2],
 }
 
 /// One joint's torque that the model leaves over, and its derivatives.
@@ -114,6 +119,7 @@ impl Joints {
         limits: &Limits,
     ) -> Result<Self, OutOfRange> {
         let ticks = libm::round(MEAN_S * tick_hz).max(1.0);
+        let back_ticks = libm::round(BACK_S * tick_hz).max(1.0) as usize;
         let model = Model::new(known, ticks / tick_hz)?;
         let mut equations = Vec::new();
         let (mut square, mut count) = (0.0, 0.0);
@@ -121,7 +127,7 @@ impl Joints {
             let means: Vec<Option<Mean>> = slide
                 .readings
                 .chunks_exact(ticks as usize)
-                .map(|readings| Mean::of(readings, geometry, limits))
+                .map(|readings| Mean::of(readings, back_ticks, geometry, limits))
                 .collect();
             for mean in means.iter().flatten() {
                 square += mean.torque_nm.norm_squared();
@@ -249,7 +255,12 @@ fn noise_nm(equations: &[Equation], unknowns: &Values) -> f64 {
 
 impl Mean {
     /// Returns the means of readings, if the tip is on the belt in all of them.
-    fn of(readings: &[crate::Reading], geometry: &Parameters, limits: &Limits) -> Option<Self> {
+    fn of(
+        readings: &[crate::Reading],
+        back_ticks: usize,
+        geometry: &Parameters,
+        limits: &Limits,
+    ) -> Option<Self> {
         let [mut encoders_rad, mut force_n, mut torque_nm] = [Vector2::zeros(); 3];
         for reading in readings {
             if reading.force_n[1] < limits.contact_n {
@@ -265,6 +276,18 @@ impl Mean {
             joints_rad: Vector2::from([0, 1].map(|it| joint_rad(geometry, it, encoders_rad[it]))),
             force_n: force_n * share,
             torque_nm: torque_nm * share,
+            turns_back: [0, 1].map(|joint| {
+                let (first, last) = (readings.first(), readings.last());
+                let turn_rad = |(from, to): (&crate::Reading, &crate::Reading)| {
+                    to.encoders_rad[joint] - from.encoders_rad[joint]
+                };
+                let direction = first.zip(last).map_or(0.0, turn_rad).signum();
+                let later = readings.iter().skip(back_ticks);
+                readings
+                    .iter()
+                    .zip(later)
+                    .any(|pair| turn_rad(pair) * direction < 0.0)
+            }),
         })
     }
 }
@@ -329,7 +352,9 @@ impl Model {
         (0..2)
             .filter(move |joint| {
                 let [one_rad, two_rad] = halves_rad.map(|it| it[*joint]);
-                one_rad.abs().min(two_rad.abs()) >= LEAST_TURN_RAD && one_rad * two_rad > 0.0
+                one_rad.abs().min(two_rad.abs()) >= LEAST_TURN_RAD
+                    && one_rad * two_rad > 0.0
+                    && !now.turns_back[*joint]
             })
             .map(move |joint| {
                 let mut by = Values::zeros();
