@@ -72,7 +72,7 @@ settings! {
         first_guess: f32 = 0.6, 0.0..=2.0;
         /// Standard deviation of the initial estimate, and of μ whenever the filter restarts; 0 if μ is known exactly,
         /// and not estimated.
-        first_deviation: f32 = 0.2, 0.0..=2.0;
+        first_deviation: f32 = 0.15, 0.0..=2.0;
         /// Random walk of μ.
         drift_per_sqrt_s: f32 = 0.0005, 1e-4..=1.0, "1/√s";
     }

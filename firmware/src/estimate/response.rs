@@ -28,13 +28,11 @@ settings! {
         /// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full
         /// gain.
         rigid: f32 = 0.5, 1e-3..=1.0;
-        /// Upper bound of the response below which the law damps the contact.
-        gives: f32 = 0.2, 1e-3..=1.0;
         /// Amplitude of the probe, a noise-like force that is added to the desired normal force until the contact is known
         /// to be rigid.
         probe_n: f32 = 0.1, 0.0..=10.0, "N";
         /// Least contact damping c that is assumed.
-        least_damping_ns_m: f32 = 15.0, 1e-3..=1e9, "N·s/m";
+        least_damping_ns_m: f32 = 10.0, 1e-3..=1e9, "N·s/m";
     }
 }
 
@@ -47,6 +45,8 @@ const BLOCK_TICKS: u8 = 15;
 const END_TICKS: u8 = BLOCK_TICKS + 2;
 /// Ticks from one block to the next, if every other tick has spare time.
 const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
+/// Part of the response of a rigid contact below whose upper bound the law damps the contact.
+const DAMPED: f32 = 0.4;
 /// Least 1 − p/Q22 in the stability limit: where p is greater, that limit does not matter.
 const LEAST_REST: f32 = 0.05;
 /// Time in contact before the correlation starts, s.
@@ -308,7 +308,7 @@ impl ResponseEstimator {
         state.lower = response - settings.deviations * deviation;
         state.upper = response + settings.deviations * deviation;
         state.gain = state.lower / settings.rigid;
-        state.give = (1.0 - state.upper / settings.gives).at_least(0.0);
+        state.give = (1.0 - state.upper / (DAMPED * settings.rigid)).at_least(0.0);
         let (response, deviation) = second.response(weight);
         let upper = response + settings.deviations * deviation;
         state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);

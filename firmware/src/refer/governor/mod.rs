@@ -26,6 +26,11 @@ const STEPS_OVER_REACH: f32 = 32.0;
 /// Fraction of the reach in use: beyond it the arm is almost straight.
 const USABLE_REACH: f32 = 0.995;
 
+/// Standard deviation of the tip's place for each count of an encoder by which rounding moves it. With a third of it, 44
+/// instead of 37 of 9,000 runs on rigid contact failed.
+const ROUNDING: f32 = 1.5;
+/// The same for each N·m of the joints' known friction, m/(N·m).
+const FRICTION_M_NM: f32 = 0.03;
 /// Control period for which the distance from the edge is set, s.
 const PERIOD_S: f32 = 1e-3;
 
@@ -52,7 +57,7 @@ pub struct JointErrors {
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeGovernor {
     enabled: bool,
-    friction_deviations: f32,
+    deviations: f32,
     braking_m_s2: f32,
     catch_up_m_s: f32,
     tick_s: f32,
@@ -127,13 +132,14 @@ impl EdgeGovernor {
     /// Makes a governor that is called every `tick_s`, for these joints.
     pub fn new(settings: &GovernorSettings, tick_s: f32, joints: &JointErrors) -> Self {
         let square = |value: f32| value * value;
+        let variance_m2 = square(ROUNDING * joints.count_m)
+            + square(FRICTION_M_NM * joints.friction_nm)
+            + square(joints.tip_deviation_m);
         let distance_m2 = square(settings.distance_m * square(tick_s / PERIOD_S))
-            + square(settings.distance_counts * joints.count_m)
-            + square(settings.distance_m_nm * joints.friction_nm)
-            + square(settings.distance_deviations * joints.tip_deviation_m);
+            + square(settings.deviations) * variance_m2;
         Self {
             enabled: settings.enabled,
-            friction_deviations: settings.friction_deviations,
+            deviations: settings.deviations,
             braking_m_s2: settings.braking_m_s2,
             catch_up_m_s: settings.catch_up_m_s,
             tick_s,
@@ -169,7 +175,7 @@ impl EdgeGovernor {
         let admissibility = Admissibility {
             arm,
             posture,
-            friction: friction.coefficient + self.friction_deviations * friction.deviation,
+            friction: friction.coefficient + self.deviations * friction.deviation,
             slip: friction.slip_seen.then_some(friction.slip),
             least_p_ratio: self.least_p_ratio.at_least(landing_p_ratio),
             least_p_per_kg: self.least_p_per_kg,

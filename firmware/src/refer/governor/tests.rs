@@ -26,7 +26,6 @@ fn governor() -> EdgeGovernor {
     let settings = GovernorSettings {
         p_ratio: 0.0,
         distance_m: 0.0,
-        distance_counts: 0.0,
         ..Default::default()
     };
     EdgeGovernor::new(&settings, TICK_S, &JointErrors::default())
