@@ -45,7 +45,7 @@ const BLOCK_TICKS: u8 = 15;
 const END_TICKS: u8 = BLOCK_TICKS + 2;
 /// Ticks from one block to the next, if every other tick has spare time.
 const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
-/// Part of the response of a rigid contact below whose upper bound the law damps the contact.
+/// The law damps a contact if the upper bound of its response is below this part of `rigid`.
 const DAMPED: f32 = 0.4;
 /// Least 1 − p/Q22 in the stability limit: where p is greater, that limit does not matter.
 const LEAST_REST: f32 = 0.05;

@@ -20,7 +20,7 @@ use painleve_shared::{
 use crate::fit::sharing;
 use crate::geometry::joint_rad;
 use crate::parameters::Parameters;
-use crate::{Limits, Slide};
+use crate::{Limits, Reading, Slide};
 
 /// Time over which readings are averaged, s.
 const MEAN_S: f64 = 0.1;
@@ -256,7 +256,7 @@ fn noise_nm(equations: &[Equation], unknowns: &Values) -> f64 {
 impl Mean {
     /// Returns the means of readings, if the tip is on the belt in all of them.
     fn of(
-        readings: &[crate::Reading],
+        readings: &[Reading],
         back_ticks: usize,
         geometry: &Parameters,
         limits: &Limits,
@@ -276,20 +276,21 @@ impl Mean {
             joints_rad: Vector2::from([0, 1].map(|it| joint_rad(geometry, it, encoders_rad[it]))),
             force_n: force_n * share,
             torque_nm: torque_nm * share,
-            turns_back: [0, 1].map(|joint| {
-                let (first, last) = (readings.first(), readings.last());
-                let turn_rad = |(from, to): (&crate::Reading, &crate::Reading)| {
-                    to.encoders_rad[joint] - from.encoders_rad[joint]
-                };
-                let direction = first.zip(last).map_or(0.0, turn_rad).signum();
-                let later = readings.iter().skip(back_ticks);
-                readings
-                    .iter()
-                    .zip(later)
-                    .any(|pair| turn_rad(pair) * direction < 0.0)
-            }),
+            turns_back: [0, 1].map(|joint| turns_back(readings, joint, back_ticks)),
         })
     }
+}
+
+/// Returns whether a joint turns within `back_ticks` against the direction in which it turns as a whole.
+fn turns_back(readings: &[Reading], joint: usize, back_ticks: usize) -> bool {
+    let turn_rad = |readings: &[Reading]| match readings {
+        [from, .., to] => to.encoders_rad[joint] - from.encoders_rad[joint],
+        _ => 0.0,
+    };
+    let direction = turn_rad(readings).signum();
+    readings
+        .windows(back_ticks + 1)
+        .any(|stretch| turn_rad(stretch) * direction < 0.0)
 }
 
 /// The arm's model by what is known.

@@ -28,7 +28,8 @@ const OBSERVER_SHARE: f32 = 0.5;
 const FORCE_INTEGRAL_SHARE: f32 = 0.165;
 /// Largest correction by that integral, as a part of f_n*.
 const FORCE_INTEGRAL_PART: f32 = 0.5;
-/// Part of the friction observer's rate that a compliant contact takes away: with 0.7, a belt that hangs on 10⁴ N/m rings more often.
+/// Part of the friction observer's rate that a compliant contact takes away. With 0.7, more belts that hang on 10⁴ N/m
+/// ring.
 const CALMER_OBSERVER: f32 = 0.85;
 
 /// Slowing of the rate at which the law learns the acceleration by other contact forces, for each unit of p, kg.

@@ -57,16 +57,20 @@ pub struct Touch {
 }
 
 impl CompliantMotion<'_> {
-    /// Returns the contact at a pose of the arm, with the tip's velocity (m/s), the bristles'
-    /// deflection, and height (m) and rate (m/s) of a hanging belt.
-    fn touch(
+    /// Returns the contact at a state, whose pose of the arm and velocity of the tip (m/s) are known.
+    fn touch<const N: usize>(
         &self,
         t_s: f64,
+        x: &SVector<f64, N>,
         pose: &Pose<f64>,
         velocity_m_s: &Vector2<f64>,
-        bristles: f64,
-        (hanging_m, hanging_m_s): (f64, f64),
     ) -> Touch {
+        let bristles = x[4];
+        let (hanging_m, hanging_m_s) = if N == FULL {
+            (x[11], x[12])
+        } else {
+            (0.0, 0.0)
+        };
         let slip_m_s = velocity_m_s.x - self.belt.speed_m_s(t_s);
         let mut closing_m_s = hanging_m_s - velocity_m_s.y;
         let mut surface_m = hanging_m;
@@ -118,17 +122,7 @@ impl CompliantMotion<'_> {
     pub fn touch_at<const N: usize>(&self, t_s: f64, x: &SVector<f64, N>) -> Touch {
         let pose = Pose::new(&LinkMotion::new(x[0], x[1]));
         let velocity = self.arm.jacobian(&pose) * Vector2::new(x[2], x[3]);
-        self.touch(t_s, &pose, &velocity, x[4], hanging(x))
-    }
-}
-
-/// Returns height (m) and rate (m/s) of a hanging belt.
-#[inline]
-fn hanging<const N: usize>(x: &SVector<f64, N>) -> (f64, f64) {
-    if N == FULL {
-        (x[11], x[12])
-    } else {
-        (0.0, 0.0)
+        self.touch(t_s, x, &pose, &velocity)
     }
 }
 
@@ -143,7 +137,7 @@ impl<const N: usize> Equations<N> for CompliantMotion<'_> {
         let pose = Pose::new(&angles);
         let jacobian = self.arm.jacobian(&pose);
         let velocity = jacobian * rates.vector();
-        let touch = self.touch(t_s, &pose, &velocity, x[4], hanging(x));
+        let touch = self.touch(t_s, x, &pose, &velocity);
         let mut derivative = SVector::<f64, N>::zeros();
         let mut joint_nm = self.torque.at(t_s).to_array();
         if N >= WITH_DRIVES {

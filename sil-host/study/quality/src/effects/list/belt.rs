@@ -30,7 +30,7 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
         [5e4, 2e4, 1e4], typical 2e4,
         overrides: Computed(|level, _| {
             let (mass_kg, ratio) = (0.02, 0.15);
-            let damping_ns_m = 2.0 * ratio * libm::sqrt(level * mass_kg);
+            let damping_ns_m = damping_ns_m(ratio, level, mass_kg);
             set![
                 "effects.hanging_belt={{ mass_kg = {mass_kg:?}, stiffness_n_m = {level:?}, damping_ns_m = {damping_ns_m:?} }}"
             ]
@@ -85,9 +85,14 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
     "vibration": "effects.surface.vibration_m", "m at 50 Hz", [2e-5, 5e-5, 1e-4, 2e-4], typical 5e-5;
 };
 
+/// Damping of a mass (kg) on a spring (N/m), N·s/m.
+fn damping_ns_m(ratio: f64, stiffness_n_m: f64, mass_kg: f64) -> f64 {
+    2.0 * ratio * libm::sqrt(stiffness_n_m * mass_kg)
+}
+
 /// Stiffness (N/m) and damping ratio of the contact.
 fn contact(stiffness_n_m: f64, ratio: f64) -> Vec<String> {
-    let damping_ns_m = 2.0 * ratio * libm::sqrt(stiffness_n_m * MASS_KG);
+    let damping_ns_m = damping_ns_m(ratio, stiffness_n_m, MASS_KG);
     set![
         "contact.stiffness_n_m={stiffness_n_m:?}",
         "contact.normal={{ kelvin-voigt = {{ damping_ns_m = {damping_ns_m:?} }} }}"
