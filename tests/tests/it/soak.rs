@@ -310,12 +310,12 @@ fn soak<B: Far>(minutes: u32, far: impl FnOnce(&Scenario) -> B) {
 
 #[test]
 fn every_counter_is_exact_after_a_long_run_with_a_fault_every_minute() {
-    soak(minutes("PAINLEVE_SOAK_MINUTES", 20), Native::new);
+    soak(minutes("PAINLEVE_SOAK_MINUTES", 10), Native::new);
 }
 
 #[test]
 fn every_counter_is_exact_after_a_long_run_of_the_image() {
-    soak(minutes("PAINLEVE_SOAK_QEMU_MINUTES", 2), |scenario| {
+    soak(minutes("PAINLEVE_SOAK_QEMU_MINUTES", 1), |scenario| {
         let configuration = scenario.controller_configuration();
         let limit = Duration::from_secs(20);
         Emulator::start(image(), &configuration, false, limit).expect("QEMU starts")

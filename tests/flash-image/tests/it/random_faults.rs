@@ -169,8 +169,8 @@ fn random_faults_on_the_nucleo_take_the_torque_off_or_are_survived() {
 
 #[test]
 fn random_faults_of_an_arm_with_one_sensor_take_the_torque_off_or_are_survived() {
-    take_the_torque_off_or_are_survived::<F405>(&with_one_sensor(DEFAULT), FAULTS / 4);
-    take_the_torque_off_or_are_survived::<G474>(&with_one_sensor(DEFAULT), FAULTS / 4);
+    take_the_torque_off_or_are_survived::<F405>(&with_one_sensor(DEFAULT), FAULTS / 8);
+    take_the_torque_off_or_are_survived::<G474>(&with_one_sensor(DEFAULT), FAULTS / 8);
 }
 
 fn take_the_torque_off_or_are_survived<C: BoardChip>(scenario: &Scenario, faults: u32) {
