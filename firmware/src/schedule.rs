@@ -25,3 +25,16 @@ impl Turn {
         core::mem::replace(self, other)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_returns_after_their_number() {
+        let mut turn = Turn::default();
+        let first = turn.take();
+        let updates = 1 + (0..10).take_while(|_| turn.take() != first).count();
+        assert_eq!(updates as f32, Turn::COUNT);
+    }
+}

@@ -231,3 +231,36 @@ fn a_friction_that_is_not_estimated_stays_the_first_guess() {
         }
     }
 }
+
+/// Passes readings of the friction 0.6 without noise.
+fn without_noise(ticks: u32) -> Tested {
+    let mut tested = Tested::new(0.6);
+    for _ in 0..ticks {
+        tested.update(&Vector2::new(-6.0, 10.0));
+    }
+    tested
+}
+
+#[test]
+fn a_rise_of_less_than_a_hundredth_is_not_sudden() {
+    let mut tested = without_noise(3000);
+    tested.update(&Vector2::new(-6.08, 10.0));
+    let learnt = tested.estimate().coefficient - 0.6;
+    assert!(learnt < 0.004, "{learnt}");
+}
+
+#[test]
+fn without_readings_the_deviation_grows_with_the_root_of_time() {
+    let Tested(estimator, mut state, _) = without_noise(3000);
+    let variance = |state: &FrictionState| state.estimate().deviation.powi(2);
+    let before = variance(&state);
+    for _ in 0..1000 {
+        estimator.update(&mut state, &Vector2::new(-6.0, 10.0));
+    }
+    let grown = variance(&state) - before;
+    let expected = FrictionSettings::default().drift_per_sqrt_s.powi(2);
+    assert!(
+        (grown - expected).abs() < 0.1 * expected,
+        "{grown} {expected}"
+    );
+}

@@ -97,3 +97,45 @@ fn all_is_allowed_if_it_is_off() {
     let found = estimator.response(&estimator.start(), P_PER_KG, P_RATIO);
     assert_eq!(found, ContactResponse::rigid(P_RATIO));
 }
+
+/// Passes readings without a change to an estimator, and counts the ticks until `is_there`.
+fn ticks_until(state: &mut ResponseState, is_there: impl Fn(&ResponseState) -> bool) -> u8 {
+    let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
+    let reading = ForceReading {
+        normal_force_n: 10.0,
+        withheld_n: 0.0,
+    };
+    let mut ticks = 0;
+    loop {
+        ticks += 1;
+        if estimator.update(state, &reading) && ticks % 2 == 0 {
+            estimator.evaluate(state);
+        }
+        if is_there(state) {
+            return ticks;
+        }
+    }
+}
+
+#[test]
+fn blocks_follow_each_other_after_the_period_of_their_weight() {
+    let mut state = ResponseEstimator::new(&ResponseSettings::default(), TICK_S).start();
+    state.touched_s = SETTLING_S;
+    let first = ticks_until(&mut state, |state| {
+        state.blocks == 1.0 && state.block_ticks == 0
+    });
+    let second = ticks_until(&mut state, |state| {
+        state.blocks == 2.0 && state.block_ticks == 0
+    });
+    assert_eq!([first, second], [PERIOD_TICKS; 2]);
+}
+
+#[test]
+fn after_a_pause_the_contact_settles_before_the_next_probe() {
+    let mut state = ResponseEstimator::new(&ResponseSettings::default(), TICK_S).start();
+    ticks_until(&mut state, |state| state.probe_n != 0.0);
+    state.pause();
+    let ticks = ticks_until(&mut state, |state| state.probe_n != 0.0);
+    let settling = SETTLING_S / TICK_S;
+    assert!((f32::from(ticks) - settling).abs() <= 1.0, "{ticks}");
+}

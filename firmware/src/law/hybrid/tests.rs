@@ -201,3 +201,26 @@ fn the_force_begins_with_the_present_one_but_with_no_more_than_desired() {
         }
     });
 }
+
+#[test]
+fn the_force_integral_removes_the_error_up_to_its_limit() {
+    while_sliding(|settings, input, state| {
+        let settings = HybridSettings {
+            force_integral_gain_per_s: 650.0,
+            ..*settings
+        };
+        for (force_n, sign) in [(9.0, 1.0), (11.0, -1.0)] {
+            input.force_n.y = force_n;
+            settings.reset(state, input);
+            state.pressing = 1.0;
+            settings.commanded_force_n(state, input);
+            let step = sign * state.force_integral_n;
+            assert!(step > 0.0, "{step}");
+            for _ in 0..100_000 {
+                settings.commanded_force_n(state, input);
+            }
+            let limit = FORCE_INTEGRAL_PART * settings.normal_force_n;
+            assert_eq!(state.force_integral_n, sign * limit);
+        }
+    });
+}

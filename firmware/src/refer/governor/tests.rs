@@ -186,3 +186,14 @@ proptest! {
         prop_assert!(!state.is_at_edge());
     }
 }
+
+#[test]
+fn a_reference_that_was_reached_is_followed_however_fast() {
+    let mut state = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
+    state.restart(0.0);
+    for tick in 0..100 {
+        // 0.3 mm in a tick is a motion, not a jump.
+        let wanted = ramp(0.0, 0.3, 0.2)(tick as f32 * TICK_S);
+        assert_eq!(governor().govern(&mut state, &wanted), wanted, "{tick}");
+    }
+}
