@@ -224,3 +224,14 @@ fn the_force_integral_removes_the_error_up_to_its_limit() {
         }
     });
 }
+
+#[test]
+fn pressing_gets_the_torque_that_the_motion_leaves() {
+    let pressing_nm = JointTorque::new(1.0, -1.0);
+    for (motion_nm, share) in [(1.0, 1.0), (1.9, 0.1), (3.0, 0.0)] {
+        let motion_nm = JointTorque::new(motion_nm, 0.0);
+        let found = affordable(&motion_nm, &pressing_nm, 2.0, 0.0);
+        assert!((found - share).abs() < 1e-6, "{found} {share}");
+        assert_eq!(affordable(&motion_nm, &pressing_nm, 2.0, 1.0), 1.0);
+    }
+}

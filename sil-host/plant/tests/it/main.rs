@@ -1,6 +1,7 @@
 //! Tests of the plant against references, and of the documentation that describes it.
 
 mod alternate_readings;
+mod bits;
 mod contact_force;
 mod contact_states;
 mod documentation;
