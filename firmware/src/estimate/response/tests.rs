@@ -7,10 +7,14 @@ const TICK_S: f32 = 1e-3;
 const P_PER_KG: f32 = 2.4;
 const P_RATIO: f32 = 0.09;
 
+fn estimator() -> ResponseEstimator {
+    ResponseEstimator::new(&ResponseSettings::default(), TICK_S)
+}
+
 /// Returns the response after `ticks` of a contact that gives the force (N) in
 /// answer to the force commanded at the previous tick.
 fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
-    let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
+    let estimator = estimator();
     let mut state = estimator.start();
     // The probe of a tick is drawn after the tick before.
     let (mut withheld, mut probe_n, mut commanded) = (0.0, 0.0, 10.0);
@@ -100,7 +104,7 @@ fn all_is_allowed_if_it_is_off() {
 
 /// Passes readings without a change to an estimator, and counts the ticks until `is_there`.
 fn ticks_until(state: &mut ResponseState, is_there: impl Fn(&ResponseState) -> bool) -> u8 {
-    let estimator = ResponseEstimator::new(&ResponseSettings::default(), TICK_S);
+    let estimator = estimator();
     let reading = ForceReading {
         normal_force_n: 10.0,
         withheld_n: 0.0,
@@ -119,7 +123,7 @@ fn ticks_until(state: &mut ResponseState, is_there: impl Fn(&ResponseState) -> b
 
 #[test]
 fn blocks_follow_each_other_after_the_period_of_their_weight() {
-    let mut state = ResponseEstimator::new(&ResponseSettings::default(), TICK_S).start();
+    let mut state = estimator().start();
     state.touched_s = SETTLING_S;
     let first = ticks_until(&mut state, |state| {
         state.blocks == 1.0 && state.block_ticks == 0
@@ -132,7 +136,7 @@ fn blocks_follow_each_other_after_the_period_of_their_weight() {
 
 #[test]
 fn after_a_pause_the_contact_settles_before_the_next_probe() {
-    let mut state = ResponseEstimator::new(&ResponseSettings::default(), TICK_S).start();
+    let mut state = estimator().start();
     ticks_until(&mut state, |state| state.probe_n != 0.0);
     state.pause();
     let ticks = ticks_until(&mut state, |state| state.probe_n != 0.0);
