@@ -12,6 +12,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use painleve_files::atomic_file;
 use painleve_firmware::SOURCES;
 use painleve_plant::scenario::describe::settings_table;
 use painleve_shared::frame::StatusFlags;
@@ -63,7 +64,7 @@ fn check(page: &str, name: &str, expected: &str) {
     }
     if std::env::var_os("UPDATE_DOCUMENTATION").is_some() {
         let text = format!("{before}{begin}{expected}<!-- end -->{after}");
-        std::fs::write(&path, text).unwrap();
+        atomic_file::write(&path, text.as_bytes()).unwrap();
         return;
     }
     panic!(
@@ -341,7 +342,8 @@ fn check_measured_figures() {
              UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant documentation",
             page.display()
         );
-        fs::write(&page, expected).unwrap();
+        // Other tests read the page meanwhile.
+        atomic_file::write(&page, expected.as_bytes()).unwrap();
     }
 }
 
