@@ -12,6 +12,8 @@ use painleve_shared::{Arm, LinkMotion, Posture, Real, settings};
 use crate::estimate::model::Model;
 use crate::law::LawOutput;
 
+/// Height above the belt at which the tip moves along it, m.
+const CLEARANCE_M: f32 = 1e-3;
 /// Distance from the landing point within which the tip is lowered, m.
 const OVER_LANDING_PLACE_M: f32 = 2e-3;
 /// A contact that lasts this long is not a bounce, s.
@@ -40,8 +42,6 @@ settings! {
         bandwidth_rad_s: f32 = 60.0, 1.0..=1e3, "rad/s";
         /// Largest acceleration of the joints in the air.
         acceleration_rad_s2: f32 = 500.0, 1.0..=1e5, "rad/s²";
-        /// Height above the belt at which the tip moves along it.
-        clearance_m: f32 = 1e-3, 0.0..=0.05, "m";
         /// Speed at which the tip is lowered onto the belt.
         landing_speed_m_s: f32 = 0.02, 1e-3..=1.0, "m/s";
         /// Least p/Q22 at the landing point: closer to the edge, impacts throw the tip off.
@@ -133,7 +133,7 @@ impl Recovery {
         });
         flight.touched_s = 0.0;
         // Where the belt is higher than assumed, the tip rests on it on its way: it may land there, too.
-        let waits = !flight.lands && flight.height_m == settings.clearance_m;
+        let waits = !flight.lands && flight.height_m == CLEARANCE_M;
         if waits && model.tip_velocity_m_s.x.abs() < AT_REST_M_S {
             flight.landing_m = model.tip_m.x;
         }
@@ -152,7 +152,7 @@ impl Recovery {
             settings.landing_speed_m_s + DESCENT_PER_S * flight.height_m
         };
         let vertical_speed = if !flight.lands {
-            let rise = (settings.clearance_m - flight.height_m) / tick_s;
+            let rise = (CLEARANCE_M - flight.height_m) / tick_s;
             rise.limited(-down, RAISING_M_S)
         } else {
             -down

@@ -78,6 +78,7 @@ impl<L: Law> Stages<L> {
                 tracking_speed: speed,
                 encoders: converters.encoders,
                 force: converters.force,
+                torque_limit_nm: settings.torque_limit_nm,
                 link_length_m: parameters.link_length_m[0],
                 joints: &settings.estimator,
                 contact: &settings.contact,
@@ -102,7 +103,7 @@ impl<L: Law> Stages<L> {
                 settings.torque_limit_nm,
             ),
             torques: TorqueOutput::new(converters.torque, settings.torque_limit_nm),
-            joint_friction: JointFriction::new(&settings.estimator, parameters.coulomb_friction_nm),
+            joint_friction: JointFriction::new(parameters.coulomb_friction_nm),
             ranges: ReadingRanges::of(converters),
         }
     }

@@ -8,6 +8,8 @@ use painleve_shared::{Arm, Real, settings};
 
 /// Fraction of a reading's error that averaging does not remove: successive roundings are not independent.
 const LASTING_ERROR: f32 = 0.1;
+/// Longest averaging time, s.
+const AVERAGING_S: f32 = 2.0;
 
 settings! {
     /// Settings of the calibration.
@@ -15,8 +17,6 @@ settings! {
     pub struct CalibrationSettings {
         /// Largest deviation from the nominal length, as a fraction of it; 0 for no calibration.
         tolerance: f32 = 0.08, 0.0..=0.5;
-        /// Longest averaging time.
-        averaging_s: f32 = 2.0, 1e-3..=1e4, "s";
     }
 }
 
@@ -57,7 +57,7 @@ impl LengthCalibrator {
         Self {
             nominal_m,
             deviation_m: settings.tolerance * nominal_m,
-            most_readings: (settings.averaging_s / tick_s).at_least(1.0),
+            most_readings: (AVERAGING_S / tick_s).at_least(1.0),
         }
     }
 

@@ -49,8 +49,6 @@ settings! {
         contact_n: f32 = 0.35, 1e-3..=1e6, "N";
         /// Standard deviation of one reading of the force cell, σ; at most the force cell's range.
         force_noise_n: f32 = 0.08, 1e-4..=1e6, "N";
-        /// Uncertainty of the gap beyond the encoders' resolution.
-        gap_uncertainty_m: f32 = 15e-6, 0.0..=0.01, "m";
     }
 }
 
@@ -116,11 +114,6 @@ impl ContactDetector {
         self.settings.evidence
     }
 
-    /// Returns the uncertainty of the gap beyond the encoders' resolution, m.
-    pub fn gap_uncertainty_m(&self) -> f32 {
-        self.settings.gap_uncertainty_m
-    }
-
     /// Updates the decision with one tick's normal force from the force cell, N. Returns whether
     /// the tip touches.
     #[inline]
@@ -183,7 +176,7 @@ impl ContactState {
         } else {
             -self.log_odds
         };
-        ((toward + DECISION) / (CERTAIN + DECISION)).limited(0.0, 1.0)
+        ((toward + DECISION) / (CERTAIN + DECISION)).at_least(0.0)
     }
 }
 

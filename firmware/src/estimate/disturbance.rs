@@ -18,6 +18,8 @@ use crate::estimate::model::Model;
 const SHARE: f32 = 0.1;
 /// The same per unit of the share that the contact allows.
 const CONTACT_SHARE: f32 = 0.333;
+/// Largest disturbance of either link, as a part of the largest torque.
+const LARGEST: f32 = 0.2;
 
 settings! {
     /// Settings of the disturbance observer.
@@ -25,8 +27,6 @@ settings! {
     pub struct DisturbanceSettings {
         /// Bandwidth far from the edge; 0 for no estimate.
         bandwidth_rad_s: f32 = 20.0, 0.0..=1e3, "rad/s";
-        /// Largest disturbance of either link.
-        limit_nm: f32 = 1.0, 0.0..=1e3, "N·m";
     }
 }
 
@@ -42,7 +42,8 @@ pub struct LoopLimit {
 /// The low-pass of the residual.
 #[derive(Clone, Copy, Debug)]
 pub struct DisturbanceEstimator {
-    settings: DisturbanceSettings,
+    bandwidth_rad_s: f32,
+    limit_nm: f32,
     period_s: f32,
 }
 
@@ -67,10 +68,11 @@ struct Acted {
 }
 
 impl DisturbanceEstimator {
-    /// Makes an estimator that is updated every `period_s`.
-    pub fn new(settings: &DisturbanceSettings, period_s: f32) -> Self {
+    /// Makes an estimator that is updated every `period_s`, for stages with torques up to `torque_limit_nm`.
+    pub fn new(settings: &DisturbanceSettings, torque_limit_nm: f32, period_s: f32) -> Self {
         Self {
-            settings: *settings,
+            bandwidth_rad_s: settings.bandwidth_rad_s,
+            limit_nm: LARGEST * torque_limit_nm,
             period_s,
         }
     }
@@ -94,7 +96,7 @@ impl DisturbanceEstimator {
         let acceleration = change / acted.elapsed_s;
         let needed_nm = model.inverse_dynamics_nm(&acceleration, &force_n);
         let residual_nm = (needed_nm - torque_nm).to_links();
-        let limit_nm = self.settings.limit_nm;
+        let limit_nm = self.limit_nm;
         // Estimate and disturbance may be at the limit with opposite signs; more is an impact.
         if residual_nm.amax() > 2.0 * limit_nm {
             return;
@@ -102,7 +104,7 @@ impl DisturbanceEstimator {
         let share = limit.p_ratio.map_or(1.0, |p_ratio| {
             (SHARE * p_ratio).limited(0.0, CONTACT_SHARE * limit.loop_share)
         });
-        let weight = (self.settings.bandwidth_rad_s * self.period_s).at_most(share);
+        let weight = (self.bandwidth_rad_s * self.period_s).at_most(share);
         state.torque_nm =
             (state.torque_nm + residual_nm * weight).map(|torque| torque.within(limit_nm));
     }
@@ -147,7 +149,7 @@ mod tests {
     ) -> GeneralisedTorque<f32> {
         let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
         let theta = LinkMotion::new(-0.3, 0.7);
-        let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), TICK_S);
+        let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), 5.0, TICK_S);
         let mut state = DisturbanceState::default();
         for tick in 0..ticks {
             let rate = acceleration * (tick as f32 * TICK_S);
@@ -205,7 +207,7 @@ mod tests {
     /// Returns the estimate for an arm in balance after a sudden change of its rates.
     fn after_a_jump(rate_rad_s: LinkMotion<f32>) -> GeneralisedTorque<f32> {
         let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), TICK_S);
+        let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), 5.0, TICK_S);
         let mut state = DisturbanceState::default();
         for rate in [LinkMotion::zeros(), rate_rad_s] {
             let model = Model::new(

@@ -35,6 +35,9 @@ const REVERSAL_TICKS: u8 = 3;
 /// stick and sliding, and switching between them at every tick would shake the tip off.
 const STICK_TICKS: u8 = 3;
 
+/// Random walk of μ, 1/√s.
+const DRIFT_PER_SQRT_S: f32 = 0.0005;
+
 /// Averaging time of the innovations, s.
 const MEAN_S: f32 = 0.02;
 /// Square of the number of standard deviations at which that average is significant.
@@ -73,8 +76,6 @@ settings! {
         /// Standard deviation of the initial estimate, and of μ whenever the filter restarts; 0 if μ is known exactly,
         /// and not estimated.
         first_deviation: f32 = 0.15, 0.0..=2.0;
-        /// Random walk of μ.
-        drift_per_sqrt_s: f32 = 0.0005, 1e-4..=1.0, "1/√s";
     }
 }
 
@@ -168,7 +169,7 @@ impl FrictionEstimator {
             observable_n: OBSERVABLE * cell.contact_n,
             force_variance_n2,
             first_variance: square(settings.first_deviation),
-            drift_variance: square(settings.drift_per_sqrt_s) * tick_s,
+            drift_variance: square(DRIFT_PER_SQRT_S) * tick_s,
             clear_force_n2: 9.0 * force_variance_n2,
             mean_weight: tick_s / (MEAN_S + tick_s),
             changing_weight: tick_s / (CHANGING_S + tick_s),

@@ -4,6 +4,9 @@ use super::contact::EncoderReading;
 use super::{EstimatesState, Estimators};
 use crate::last_command::LastCommand;
 
+/// Uncertainty of the gap beyond the encoders' resolution, m.
+const GAP_UNCERTAINTY_M: f32 = 15e-6;
+
 impl Estimators {
     /// Returns the measured height of the tip above the belt, m.
     #[inline]
@@ -28,8 +31,7 @@ impl Estimators {
         let release = -self.joints.lag_counts(&last.contact_acceleration_rad_s2);
         EncoderReading {
             gap_m: self.gap_m(state),
-            gap_error_m: self.contact.gap_uncertainty_m()
-                + state.calibration.gap_error_m(rounding_m),
+            gap_error_m: GAP_UNCERTAINTY_M + state.calibration.gap_error_m(rounding_m),
             moved: state.joints.has_moved(),
             release: release.dot(&self.joints.innovation_counts(&state.joints)),
             full_release: release.norm_squared(),

@@ -5,7 +5,10 @@
 
 use painleve_shared::{GeneralisedTorque, JointMotion, JointTorque, Real};
 
-use super::joints::JointEstimatorSettings;
+/// Travel of a joint over which its Coulomb friction reverses, rad.
+const TRAVEL_RAD: f32 = 1e-3;
+/// Fraction of the known Coulomb friction that is compensated.
+const COMPENSATED: f32 = 0.85;
 
 /// Model of both joints' Coulomb friction.
 #[derive(Clone, Copy, Debug)]
@@ -14,8 +17,6 @@ pub struct JointFriction {
     is_zero: bool,
     /// Compensated Coulomb friction, N·m.
     coulomb_nm: [f32; 2],
-    /// Reciprocal of the travel over which friction reverses, 1/rad.
-    per_travel_per_rad: f32,
 }
 
 /// Friction of both joints between ticks; initially zero.
@@ -33,12 +34,11 @@ struct Travel {
 
 impl JointFriction {
     /// Makes the model for joints with this Coulomb friction, N·m.
-    pub fn new(settings: &JointEstimatorSettings, coulomb_friction_nm: [f32; 2]) -> Self {
-        let coulomb_nm = coulomb_friction_nm.map(|nm| settings.friction_compensation * nm);
+    pub fn new(coulomb_friction_nm: [f32; 2]) -> Self {
+        let coulomb_nm = coulomb_friction_nm.map(|nm| COMPENSATED * nm);
         Self {
             is_zero: coulomb_nm == [0.0; 2],
             coulomb_nm,
-            per_travel_per_rad: 1.0 / settings.friction_travel_rad,
         }
     }
 
@@ -61,7 +61,7 @@ impl JointFriction {
         let mut changes_nm = [0.0; 2];
         for (((joint, coulomb_nm), angle_rad), change_nm) in joints.zip(&mut changes_nm) {
             let before_rad = joint.angle_rad.replace(angle_rad).unwrap_or(angle_rad);
-            let travel = ((angle_rad - before_rad) * self.per_travel_per_rad).within(1.0);
+            let travel = ((angle_rad - before_rad) * (1.0 / TRAVEL_RAD)).within(1.0);
             *change_nm = travel * coulomb_nm - travel.abs() * joint.torque_nm;
             joint.torque_nm += *change_nm;
         }
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn coulomb_friction_follows_the_travel() {
-        let model = JointFriction::new(&JointEstimatorSettings::default(), [0.1, 0.0]);
+        let model = JointFriction::new([0.1, 0.0]);
         let mut state = JointFrictionState::default();
         let mut friction_nm = |angle_rad: f32| {
             let before_nm = state.torque_nm();
@@ -109,8 +109,7 @@ mod tests {
 
     #[test]
     fn joints_without_friction_need_no_compensation() {
-        let settings = JointEstimatorSettings::default();
-        assert!(JointFriction::new(&settings, [0.0; 2]).is_zero());
-        assert!(!JointFriction::new(&settings, [0.0, 0.1]).is_zero());
+        assert!(JointFriction::new([0.0; 2]).is_zero());
+        assert!(!JointFriction::new([0.0, 0.1]).is_zero());
     }
 }

@@ -26,10 +26,6 @@ settings! {
         bandwidth_rad_s: f32 = 500.0, 1.0..=3e5, "rad/s";
         /// Largest joint rate; a faster reading latches the fault `EncoderJump`.
         rate_limit_rad_s: f32 = 100.0, 1.0..=1e4, "rad/s";
-        /// Travel of a joint over which its Coulomb friction reverses.
-        friction_travel_rad: f32 = 1e-3, 1e-6..=1.0, "rad";
-        /// Fraction of the arm's Coulomb friction that is compensated.
-        friction_compensation: f32 = 0.85, 0.0..=1.0;
         /// Twist of each gear for each N·m of commanded torque, if the encoders are on the motors; 0 if they
         /// are on the links. Tracking loops and hybrid law are slower where the arm's natural frequency on
         /// these gears is below ω.

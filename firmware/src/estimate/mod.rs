@@ -83,6 +83,8 @@ pub struct EstimateSettings<'a> {
     pub encoders: [EncoderScale; 2],
     /// Scaling of the force cell.
     pub force: LinearScale<f32>,
+    /// Largest torque on either joint, N·m.
+    pub torque_limit_nm: f32,
     /// Length of the first link before calibration, m.
     pub link_length_m: f32,
     /// Tracking loops of the joints.
@@ -165,7 +167,11 @@ impl Estimators {
             friction: FrictionEstimator::new(settings.friction, settings.contact, tick_s),
             belt: BeltEstimator::new(settings.belt, tick_s),
             response: ResponseEstimator::new(settings.response, tick_s),
-            disturbance: DisturbanceEstimator::new(settings.disturbance, slow_period_s),
+            disturbance: DisturbanceEstimator::new(
+                settings.disturbance,
+                settings.torque_limit_nm,
+                slow_period_s,
+            ),
             calibrator: LengthCalibrator::new(
                 settings.calibration,
                 settings.link_length_m,

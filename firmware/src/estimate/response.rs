@@ -21,13 +21,6 @@ settings! {
     pub struct ResponseSettings {
         /// Whether the response is estimated; if not, the contact is taken to be rigid.
         enabled: bool = true;
-        /// Averaging time of the correlation.
-        averaging_s: f32 = 0.25, 1e-3..=1e3, "s";
-        /// Number of standard deviations from the estimated response to its bounds.
-        deviations: f32 = 3.0, 0.0..=10.0;
-        /// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full
-        /// gain.
-        rigid: f32 = 0.5, 1e-3..=1.0;
         /// Amplitude of the probe, a noise-like force that is added to the desired normal force until the contact is known
         /// to be rigid.
         probe_n: f32 = 0.1, 0.0..=10.0, "N";
@@ -36,6 +29,12 @@ settings! {
     }
 }
 
+/// Averaging time of the correlation, s.
+const AVERAGING_S: f32 = 0.25;
+/// Number of standard deviations from the estimated response to its bounds.
+const DEVIATIONS: f32 = 3.0;
+/// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full gain.
+const RIGID: f32 = 0.5;
 /// Number of delays between torque and force that are considered, in ticks.
 const DELAYS: usize = 3;
 /// Ticks of one block of sums. After a block, averages and bounds are updated in the next two ticks with
@@ -45,7 +44,7 @@ const BLOCK_TICKS: u8 = 15;
 const END_TICKS: u8 = BLOCK_TICKS + 2;
 /// Ticks from one block to the next, if every other tick has spare time.
 const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
-/// The law damps a contact if the upper bound of its response is below this part of `rigid`.
+/// The law damps a contact if the upper bound of its response is below this part of [`RIGID`].
 const DAMPED: f32 = 0.4;
 /// Least 1 − p/Q22 in the stability limit: where p is greater, that limit does not matter.
 const LEAST_REST: f32 = 0.05;
@@ -188,7 +187,7 @@ impl ResponseEstimator {
         Self {
             settings: *settings,
             tick_s,
-            weight: period_s / settings.averaging_s,
+            weight: period_s / AVERAGING_S,
             least_share_kg: settings.least_damping_ns_m * tick_s,
         }
     }
@@ -260,7 +259,7 @@ impl ResponseEstimator {
         if state.touched_s < SETTLING_S {
             return false;
         }
-        if state.lower < self.settings.rigid {
+        if state.lower < RIGID {
             state.draw_probe(self.settings.probe_n);
         }
         if state.block_ticks < BLOCK_TICKS {
@@ -302,16 +301,15 @@ impl ResponseEstimator {
     fn bound(&self, state: &mut ResponseState) {
         state.block_ticks = 0;
         let weight = state.block_weight;
-        let settings = &self.settings;
         let [first, second] = &state.averages;
         let (response, deviation) = first.response(weight);
-        state.lower = response - settings.deviations * deviation;
-        state.upper = response + settings.deviations * deviation;
-        state.gain = state.lower / settings.rigid;
-        state.give = (1.0 - state.upper / (DAMPED * settings.rigid)).at_least(0.0);
+        state.lower = response - DEVIATIONS * deviation;
+        state.upper = response + DEVIATIONS * deviation;
+        state.gain = state.lower / RIGID;
+        state.give = (1.0 - state.upper / (DAMPED * RIGID)).at_least(0.0);
         let (response, deviation) = second.response(weight);
-        let upper = response + settings.deviations * deviation;
-        state.lags = (2.0 - 2.0 * upper / settings.rigid).limited(0.0, 1.0);
+        let upper = response + DEVIATIONS * deviation;
+        state.lags = (2.0 - 2.0 * upper / RIGID).limited(0.0, 1.0);
     }
 }
 

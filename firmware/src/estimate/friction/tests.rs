@@ -258,7 +258,7 @@ fn without_readings_the_deviation_grows_with_the_root_of_time() {
         estimator.update(&mut state, &Vector2::new(-6.0, 10.0));
     }
     let grown = variance(&state) - before;
-    let expected = FrictionSettings::default().drift_per_sqrt_s.powi(2);
+    let expected = DRIFT_PER_SQRT_S.powi(2);
     assert!(
         (grown - expected).abs() < 0.1 * expected,
         "{grown} {expected}"

@@ -32,6 +32,9 @@ const FORCE_INTEGRAL_PART: f32 = 0.5;
 /// ring.
 const CALMER_OBSERVER: f32 = 0.85;
 
+/// Rate of change of the force above which the law damps a compliant contact, rad/s.
+const DAMPING_RAD_S: f32 = 1000.0;
+
 /// Slowing of the rate at which the law learns the acceleration by other contact forces, for each unit of p, kg.
 const SLOWER_KG: f32 = 1.0;
 
@@ -239,7 +242,7 @@ impl HybridSettings {
         let response = input.response;
         let damping_n = if response.give > 0.0 {
             // Press less while the force rises: this damps a compliant contact.
-            let rate = input.tick_s * self.contact_damping_rad_s;
+            let rate = input.tick_s * DAMPING_RAD_S;
             state.slow_force_n += rate / (1.0 + rate) * (input.force_n.y - state.slow_force_n);
             self.contact_damping * response.give * (input.force_n.y - state.slow_force_n)
         } else {
@@ -283,9 +286,6 @@ impl HybridSettings {
                 let ratio = slip.map_or(0.0, |slip| -coefficient * slip.sign::<f32>());
                 if slip != state.slip {
                     state.filtered_friction_n = 0.0;
-                    if state.slip.is_none() {
-                        state.fed_ratio = ratio;
-                    }
                     state.slip = slip;
                 }
                 let step = FRICTION_SLEW_PER_S * input.tick_s;

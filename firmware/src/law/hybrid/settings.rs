@@ -57,8 +57,6 @@ settings! {
         force_integral_gain_per_s: f32 = 0.0, 0.0..=1e4, "1/s";
         /// Damping of a compliant contact, as a fraction of the change of force.
         contact_damping: f32 = 4.0, 0.0..=10.0;
-        /// Rate of change above which it damps.
-        contact_damping_rad_s: f32 = 1000.0, 1.0..=1e4, "rad/s";
         /// Friction feed-forward.
         friction: FrictionFeedForward = FrictionFeedForward::Observed { time_constant_s: 0.015 };
     }

@@ -187,15 +187,12 @@ fn other_settings(part: Part) -> &'static [&'static str] {
             "controller.recovery.bandwidth_rad_s=20",
             "controller.recovery.landing_speed_m_s=0.2",
         ],
-        Part::Calibration => &["controller.calibration.averaging_s=0.01"],
-        Part::FrictionEstimate => &["controller.friction.drift_per_sqrt_s=0.1"],
-        Part::Disturbance => &["controller.disturbance.limit_nm=0.01"],
-        Part::Response => &[
-            "controller.response.averaging_s=1",
-            "controller.response.probe_n=1",
-        ],
-        Part::ContactDamping => &["controller.law.hybrid.contact_damping_rad_s=50"],
-        Part::FrictionFeedForward
+        Part::Response => &["controller.response.probe_n=1"],
+        Part::Calibration
+        | Part::FrictionEstimate
+        | Part::FrictionFeedForward
+        | Part::Disturbance
+        | Part::ContactDamping
         | Part::PositionIntegral
         | Part::ForceReduction
         | Part::ForceRamp
