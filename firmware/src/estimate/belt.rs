@@ -119,7 +119,6 @@ mod tests {
     fn friction(slip: Slip, sticks: bool) -> FrictionEstimate {
         FrictionEstimate {
             coefficient: 0.6,
-            next_coefficient: 0.6,
             catch_up: 0.0,
             deviation: 0.01,
             slip,

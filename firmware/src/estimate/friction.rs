@@ -19,10 +19,9 @@ use painleve_shared::{Real, Slip, settings};
 
 use super::contact::ContactSettings;
 
-/// Square of the number of standard deviations below the estimate at which the tip may stick.
-const STICK_DEVIATIONS_SQUARE: f32 = 25.0;
-/// Fraction of the estimate that is added to these deviations.
-const STICK_FRACTION: f32 = 0.1;
+/// Square of the number of standard deviations by which a reading that is not noise differs: of another μ or, below the
+/// estimate, of a tip that may stick.
+const DIFFERENT_SQUARE: f32 = 64.0;
 
 /// Fraction of the estimated friction that indicates a slip in the opposite direction.
 const REVERSAL_FRACTION: f32 = 0.8;
@@ -30,10 +29,6 @@ const REVERSAL_FRACTION: f32 = 0.8;
 /// Number of such ticks in a row that reverse the slip. In stick the friction force follows the
 /// feed-forward, so an immediate reversal would confirm itself and then alternate.
 const REVERSAL_TICKS: u8 = 3;
-
-/// Number of ticks without a sign of stick after which stick ends. The feed-forward differs between
-/// stick and sliding, and switching between them at every tick would shake the tip off.
-const STICK_TICKS: u8 = 3;
 
 /// Random walk of μ, 1/√s.
 const DRIFT_PER_SQRT_S: f32 = 0.0005;
@@ -43,29 +38,12 @@ const MEAN_S: f32 = 0.02;
 /// Square of the number of standard deviations at which that average is significant.
 const SIGNIFICANT_SQUARE: f32 = 14.0;
 
-/// Number of standard deviations above the estimate, and fixed amount added to them, beyond which a ratio
-/// shows that μ has risen: no stick looks like this.
-const RISE_DEVIATIONS_SQUARE: f32 = 64.0;
-const RISE: f32 = 0.01;
-
-/// Time for which the filter stays fast after a change of μ, s.
-const CHANGING_S: f32 = 1.0;
-/// Least gain of the filter at the beginning of that time.
-const CHANGING_GAIN: f32 = 0.1;
-/// Fraction of that time that must be left for μ to have a rate.
-const CHANGING: f32 = 0.1;
-/// Gain above which the filter has just restarted, so that an innovation says nothing about the rate.
-const RESTART_GAIN: f32 = 0.5;
 /// Largest square of a change of the innovation that counts as noise, as a multiple of the noise's. A sudden
 /// change of μ is not noise: counted as such, it would hide the next one.
 const NOISE_JUMP: f32 = 16.0;
-/// Least normal force at which friction is observed, as a multiple of the smallest force of a contact.
-const OBSERVABLE: f32 = 2.0;
 /// Ticks for which the torque misses a sudden change of μ: on average half a tick until a reading shows it,
 /// and one until the torque that it causes acts.
 const MISSED_TICKS: f32 = 1.5;
-/// Ticks from a reading to the middle of the tick in which the torque that it causes acts.
-const LEAD_TICKS: f32 = 2.0;
 
 settings! {
     /// Settings of the friction estimator.
@@ -84,8 +62,6 @@ settings! {
 pub struct FrictionEstimate {
     /// Estimated friction coefficient μ̂.
     pub coefficient: f32,
-    /// μ̂ at the time at which the next torque acts.
-    pub next_coefficient: f32,
     /// Excess of μ that, fed forward in this tick, gives the tip the impulse that it has missed since a change
     /// of μ.
     pub catch_up: f32,
@@ -113,8 +89,6 @@ pub struct FrictionEstimator {
     clear_force_n2: f32,
     /// Weight of one innovation in their average.
     mean_weight: f32,
-    /// Part of [`CHANGING_S`] in one tick.
-    changing_weight: f32,
 }
 
 /// The filter's state.
@@ -123,10 +97,6 @@ pub struct FrictionState {
     coefficient: f32,
     /// Excess of μ to be fed forward in this tick.
     catch_up: f32,
-    /// Change of μ̂ in one tick.
-    rate_per_tick: f32,
-    /// 1 when a change of μ is found; falls towards 0 while none is.
-    changing: f32,
     variance: f32,
     slip: Slip,
     slip_seen: bool,
@@ -134,8 +104,7 @@ pub struct FrictionState {
     contrary_ticks: u8,
     /// Whether the next reading may show another slip.
     slip_in_doubt: bool,
-    /// Remaining ticks for which the tip counts as sticking.
-    stick_ticks: u8,
+    sticks: bool,
     /// The last correction, until the update.
     correction: Option<Correction>,
     /// Average of the last innovations.
@@ -166,13 +135,12 @@ impl FrictionEstimator {
         let force_variance_n2 = square(cell.force_noise_n);
         Self {
             first_guess: settings.first_guess,
-            observable_n: OBSERVABLE * cell.contact_n,
+            observable_n: cell.contact_n,
             force_variance_n2,
             first_variance: square(settings.first_deviation),
             drift_variance: square(DRIFT_PER_SQRT_S) * tick_s,
             clear_force_n2: 9.0 * force_variance_n2,
             mean_weight: tick_s / (MEAN_S + tick_s),
-            changing_weight: tick_s / (CHANGING_S + tick_s),
         }
     }
 
@@ -181,14 +149,12 @@ impl FrictionEstimator {
         FrictionState {
             coefficient: self.first_guess,
             catch_up: 0.0,
-            rate_per_tick: 0.0,
-            changing: 0.0,
             variance: self.first_variance,
             slip: Slip::Positive,
             slip_seen: false,
             contrary_ticks: 0,
             slip_in_doubt: true,
-            stick_ticks: 0,
+            sticks: false,
             correction: None,
             mean_innovation: 0.0,
             innovation: 0.0,
@@ -212,45 +178,29 @@ impl FrictionEstimator {
         }
         let normal_n = force_n.y;
         if normal_n < self.observable_n {
-            state.stick_ticks = 0;
+            state.sticks = false;
             return;
         }
-        let coefficient = state.coefficient + state.rate_per_tick;
-        state.coefficient = coefficient;
-        let expected_n = coefficient * normal_n;
-        let excess_n = -state.slip.sign::<f32>() * force_n.x - expected_n;
+        let excess_n = -state.slip.sign::<f32>() * force_n.x - state.coefficient * normal_n;
         let square_n2 = normal_n * normal_n;
         let mut variance_n2 = state.variance * square_n2;
         let noise_n2 = state.force_variance_n2;
         let quiet_n2 = (state.noise_variance * square_n2).limited(0.01 * noise_n2, noise_n2);
-        let below_n = -excess_n - STICK_FRACTION * expected_n;
-        let above_n = excess_n - RISE * normal_n;
-        let beyond = |distance_n: f32, deviations_square: f32, variance_n2: f32| {
-            distance_n > 0.0 && distance_n * distance_n > deviations_square * variance_n2
-        };
-        let falls = beyond(below_n, STICK_DEVIATIONS_SQUARE, variance_n2 + noise_n2);
-        if falls && is_dragged(state.slip) {
-            state.stick_ticks = STICK_TICKS;
+        let differs = excess_n * excess_n > DIFFERENT_SQUARE * (variance_n2 + quiet_n2);
+        state.sticks = differs && excess_n < 0.0 && is_dragged(state.slip);
+        if state.sticks || self.is_known() {
             return;
         }
-        if self.is_known() {
-            state.stick_ticks = state.stick_ticks.saturating_sub(1);
-            return;
-        }
-        if falls || beyond(above_n, RISE_DEVIATIONS_SQUARE, variance_n2 + quiet_n2) {
-            self.restart(state);
+        if differs {
+            // μ has changed.
+            state.variance = self.first_variance;
             variance_n2 = state.variance * square_n2;
-        } else if state.stick_ticks > 0 {
-            state.stick_ticks -= 1;
-            return;
         }
         let innovation = excess_n / normal_n;
         let gain = variance_n2 / (variance_n2 + quiet_n2);
         let change = gain * innovation;
-        state.coefficient = (coefficient + change).at_least(0.0);
-        if state.changing > CHANGING {
-            state.catch_up = MISSED_TICKS * change;
-        }
+        state.coefficient = (state.coefficient + change).at_least(0.0);
+        state.catch_up = MISSED_TICKS * change;
         state.correction = Some(Correction {
             innovation,
             gain,
@@ -275,7 +225,7 @@ impl FrictionEstimator {
         state.slip_in_doubt = !state.slip_seen || state.contrary_ticks + 1 >= REVERSAL_TICKS;
     }
 
-    /// Adapts variances and rate to a correction.
+    /// Adapts the variances to a correction.
     fn adapt(&self, state: &mut FrictionState, correction: &Correction) {
         let Correction {
             innovation,
@@ -284,12 +234,6 @@ impl FrictionEstimator {
         } = *correction;
         let ratio_variance = state.force_variance_n2 / (normal_force_n * normal_force_n);
         state.variance *= 1.0 - gain;
-        if state.changing > CHANGING && gain < RESTART_GAIN {
-            // The gains of a filter of a random rate.
-            state.rate_per_tick += 0.5 * gain * (gain * innovation);
-        } else {
-            state.rate_per_tick = 0.0;
-        }
         // Innovations that keep their sign are not noise: μ has changed.
         let weight = self.mean_weight;
         let change = innovation - state.innovation;
@@ -303,24 +247,12 @@ impl FrictionEstimator {
         let square = state.mean_innovation * state.mean_innovation;
         if square > SIGNIFICANT_SQUARE * (state.variance + ratio_variance) * weight {
             state.variance = state.variance.at_least(square);
-            state.changing = 1.0;
         }
-        state.changing -= state.changing * self.changing_weight;
-        let floor = CHANGING_GAIN * state.changing;
-        state.variance = state.variance.at_least(floor * ratio_variance);
     }
 
     /// Returns whether μ is known exactly. It then has no variance, at the start or later.
     fn is_known(&self) -> bool {
         self.first_variance == 0.0
-    }
-
-    /// Restarts the filter after a sudden change of μ.
-    fn restart(&self, state: &mut FrictionState) {
-        state.stick_ticks = 0;
-        state.changing = 1.0;
-        state.variance = self.first_variance;
-        state.rate_per_tick = 0.0;
     }
 
     // Out of line: few readings can decide before their tick is answered.
@@ -340,7 +272,7 @@ impl FrictionEstimator {
             state.slip = slip;
             state.slip_seen = true;
             state.contrary_ticks = 0;
-            state.stick_ticks = 0;
+            state.sticks = false;
         }
     }
 
@@ -355,23 +287,21 @@ impl FrictionState {
     #[inline]
     pub fn correct_estimate(&self, estimate: &mut FrictionEstimate) {
         estimate.coefficient = self.coefficient;
-        estimate.next_coefficient = self.coefficient + LEAD_TICKS * self.rate_per_tick;
         estimate.catch_up = self.catch_up;
         estimate.slip = self.slip;
         estimate.slip_seen = self.slip_seen;
-        estimate.sticks = self.stick_ticks > 0;
+        estimate.sticks = self.sticks;
     }
 
     /// Returns the present estimate.
     pub fn estimate(&self) -> FrictionEstimate {
         FrictionEstimate {
             coefficient: self.coefficient,
-            next_coefficient: self.coefficient + LEAD_TICKS * self.rate_per_tick,
             catch_up: self.catch_up,
             deviation: self.variance.square_root(),
             slip: self.slip,
             slip_seen: self.slip_seen,
-            sticks: self.stick_ticks > 0,
+            sticks: self.sticks,
         }
     }
 }

@@ -38,10 +38,6 @@ const DAMPING_RAD_S: f32 = 1000.0;
 /// Slowing of the rate at which the law learns the acceleration by other contact forces, for each unit of p, kg.
 const SLOWER_KG: f32 = 1.0;
 
-/// Rate limit of the friction feed-forward, as a fraction of f_n, 1/s: at a reversal of slip it
-/// passes through stick without a jerk.
-const FRICTION_SLEW_PER_S: f32 = 1000.0;
-
 /// Fraction of the torque limit available for pressing the tip on the belt; the rest is for motion.
 const TORQUE_USED: f32 = 0.95;
 /// Least desired force by which the present one is divided, N.
@@ -99,8 +95,6 @@ pub struct HybridState {
     filtered_friction_n: f32,
     /// Slip direction of the last friction feed-forward.
     slip: Option<Slip>,
-    /// Last friction feed-forward as a ratio f_t/f_n.
-    fed_ratio: f32,
     /// Present fraction of the desired contact force: at most that for which torque is available.
     pressing: f32,
     /// Low-passed normal force, N.
@@ -118,7 +112,6 @@ impl Default for HybridState {
             position_integral_m_s2: 0.0,
             filtered_friction_n: 0.0,
             slip: None,
-            fed_ratio: 0.0,
             pressing: 1.0,
             slow_force_n: 0.0,
             fed_force_n: Vector2::zeros(),
@@ -282,15 +275,13 @@ impl HybridSettings {
                 // A rigid contact would follow the excess at once.
                 let lags = input.response.lags > 0.0;
                 let catch_up = if lags { friction.catch_up } else { 0.0 };
-                let coefficient = (friction.next_coefficient + catch_up).at_least(0.0);
+                let coefficient = (friction.coefficient + catch_up).at_least(0.0);
                 let ratio = slip.map_or(0.0, |slip| -coefficient * slip.sign::<f32>());
                 if slip != state.slip {
                     state.filtered_friction_n = 0.0;
                     state.slip = slip;
                 }
-                let step = FRICTION_SLEW_PER_S * input.tick_s;
-                state.fed_ratio += (ratio - state.fed_ratio).within(step);
-                let expected = state.fed_ratio * normal_force_n;
+                let expected = ratio * normal_force_n;
                 // On a compliant contact, the difference is mostly noise of the force cell.
                 let calm = 1.0 - CALMER_OBSERVER * input.response.lags;
                 let weight = (calm * input.tick_s / (time_constant_s + input.tick_s))

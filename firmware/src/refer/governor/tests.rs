@@ -13,7 +13,6 @@ fn arm() -> Arm<f32> {
 fn known(coefficient: f32, slip: Slip) -> FrictionEstimate {
     FrictionEstimate {
         coefficient,
-        next_coefficient: coefficient,
         catch_up: 0.0,
         deviation: 0.0,
         slip,
