@@ -18,7 +18,7 @@ use rand_pcg::Pcg64;
 pub use built_in_mistake::BuiltInMistake;
 pub use imperfect::imperfect;
 pub use random_arm::random_arm;
-pub use slides::{GeometryMistake, SimulatedSlides};
+pub use slides::{GeometryMistake, PlantOf, SimulatedSlides};
 pub use wiring::Wiring;
 
 use crate::{OperatorTask, RawReadings, Rig};

@@ -1,12 +1,13 @@
 //! The slides of a simulated arm: its controller runs on the arm as it is.
 
+use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::{BeltSettings, InitialState, RunSettings, Scenario};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Controller, Plant};
 use painleve_shared::counts::EncoderCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::status::SupervisorState;
-use painleve_shared::{Arm, Posture};
+use painleve_shared::{Arm, OutOfRange, Posture};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use super::SimulatedError;
@@ -39,8 +40,12 @@ impl GeometryMistake {
 /// Slip of the magnet, rad.
 const SLIP_RAD: f64 = 0.0105;
 
+/// Makes the plant of a scenario in its initial state.
+pub type PlantOf<P> = fn(&Scenario) -> Result<P, OutOfRange>;
+
 /// A simulated arm whose controller slides its tip.
-pub struct SimulatedSlides {
+pub struct SimulatedSlides<P = BuiltInPlant> {
+    plant_of: PlantOf<P>,
     /// The arm as it is; its controller and model are those of each slide.
     actual: Scenario,
     mistake: Option<GeometryMistake>,
@@ -53,7 +58,18 @@ pub struct SimulatedSlides {
 
 impl SimulatedSlides {
     /// Creates an arm that is as the plant of `actual`, except for the mistake.
-    pub fn new(mut actual: Scenario, mistake: Option<GeometryMistake>) -> Self {
+    pub fn new(actual: Scenario, mistake: Option<GeometryMistake>) -> Self {
+        Self::on(BuiltInPlant::new, actual, mistake)
+    }
+}
+
+impl<P: Plant> SimulatedSlides<P> {
+    /// Creates an arm on any plant; `actual`, except for the mistake, is what the plant of each slide is made from.
+    pub fn on(
+        plant_of: PlantOf<P>,
+        mut actual: Scenario,
+        mistake: Option<GeometryMistake>,
+    ) -> Self {
         let told = actual.controller_configuration().arm;
         actual.arm_model = Some(told);
         let [length_1, length_2] = &mut actual.arm.link_length_m;
@@ -63,6 +79,7 @@ impl SimulatedSlides {
             _ => {}
         }
         Self {
+            plant_of,
             actual,
             mistake,
             slides: 0,
@@ -84,7 +101,7 @@ impl SimulatedSlides {
     }
 }
 
-impl SlideRig for SimulatedSlides {
+impl<P: Plant> SlideRig for SimulatedSlides<P> {
     type Error = SimulatedError;
 
     fn slide(
@@ -116,7 +133,7 @@ impl SlideRig for SimulatedSlides {
             },
             ..self.actual.clone()
         };
-        let mut simulation = Simulation::new(&slid)?;
+        let mut simulation = Simulation::of((self.plant_of)(&slid)?, &slid)?;
         let mut controller = Controller::new(&slid.controller_configuration())?;
         let mut slid_ticks = Vec::new();
         let ticks = slid.run.ticks();

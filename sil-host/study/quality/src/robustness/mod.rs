@@ -17,6 +17,7 @@ mod row;
 
 use std::collections::BTreeMap;
 
+use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_study_core::loop_study::{LoopStudy, MakePlant};
@@ -93,12 +94,15 @@ impl LoopStudy for Robustness {
 /// # Errors
 /// [`StudyError`] if the scenario is invalid.
 pub fn run(index: usize, scenario: &Scenario) -> Result<Row, StudyError> {
-    judge::run(
-        BuiltInPlant::new(scenario)?,
-        scenario,
-        index,
-        LiftOffRule::Fail,
-    )
+    run_on(BuiltInPlant::new(scenario)?, index, scenario)
+}
+
+/// Runs a scenario as [`run`] does, on any plant in its initial state.
+///
+/// # Errors
+/// [`StudyError`] if the scenario is invalid.
+pub fn run_on(plant: impl Plant, index: usize, scenario: &Scenario) -> Result<Row, StudyError> {
+    judge::run(plant, scenario, index, LiftOffRule::Fail)
 }
 
 impl Tabular for Robustness {
