@@ -20,8 +20,8 @@ STEP_S = 1e-4
 RADIUS_M = 1e-4
 # Of the contact, as of our own. MuJoCo counts both per kilogram, by the inverse mass of the tip's body in its first posture.
 STIFFNESS_N_M, DAMPING_NS_M = 1e5, 76.0
-# Part of the acceleration that the contact takes off in the same step. Where friction holds a joint, p may be negative, and a step with
-# a hard contact has no solution: with 0.5 up to 0.3 % of the steps, with MuJoCo's default, 0.9, more. So little has always one.
+# Part of the acceleration that the contact takes off in the same step. With more, some steps have no solution, probably because p is
+# negative where friction holds a joint: up to 0.3 % of them with 0.5. All steps with so little have one.
 IMPEDANCE = 0.05
 # Slip below which the friction is proportional to it.
 STICK_M_S = 0.02
