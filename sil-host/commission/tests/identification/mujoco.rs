@@ -4,12 +4,13 @@
 //! prints the figures of the lab book.
 
 use nalgebra::Vector2;
-use painleve_commission::simulated::imperfect;
+use painleve_commission::simulated::{PlantOf, imperfect};
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_plant::{Plant, Snapshot};
 use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose, Slip};
+use painleve_study_quality::distribution::Percentiles;
 use painleve_study_quality::proportion::Proportion;
 use painleve_study_quality::robustness;
 
@@ -22,13 +23,8 @@ const FIRST_SEED: u64 = 7_004_000;
 const ERROR_M: f64 = 7e-4;
 const KEPT: f64 = 0.95;
 
-#[test]
-#[ignore = "installs MuJoCo and takes minutes"]
-fn arms_in_mujoco_are_identified() {
-    if python().is_none() {
-        return;
-    }
-    the_arms_move_as_ours();
+/// Identifies arms and runs one closed loop of each; returns those kept, and the errors of their tips.
+fn identified_arms(plant_of: PlantOf<MujocoArm>) -> (Proportion, Percentiles) {
     let arms = std::env::var("PAINLEVE_ARMS").map_or(2, |arms| arms.parse().unwrap());
     let study = loops(FIRST_SEED, arms);
     let cell = study.cells()[0];
@@ -37,7 +33,7 @@ fn arms_in_mujoco_are_identified() {
     for arm in 0..arms {
         let seed = FIRST_SEED + arm as u64;
         let scenario = study.scenario(cell, arm).unwrap();
-        let (found, rig) = identified_on(MujocoArm::new, &scenario, seed, None);
+        let (found, rig) = identified_on(plant_of, &scenario, seed, None);
         forces_n.push(rig.largest_force_n);
         let found = match found {
             Ok(found) => found,
@@ -51,7 +47,7 @@ fn arms_in_mujoco_are_identified() {
         parameters += all;
         let actual = imperfect(&scenario, seed).unwrap();
         let known = found.applied_to(&actual, "").unwrap();
-        let row = robustness::run_on(MujocoArm::new(&known).unwrap(), arm, &known).unwrap();
+        let row = robustness::run_on(plant_of(&known).unwrap(), arm, &known).unwrap();
         println!(
             "{seed}: {:?}, {:.2} mm off, {:.1} N at most in slides of {:.0} s",
             row.ending,
@@ -65,13 +61,33 @@ fn arms_in_mujoco_are_identified() {
     println!("within 3 deviations: {inside} of {parameters}");
     forces_n.sort_by(f64::total_cmp);
     println!("largest force of each arm, N: {forces_n:.1?}");
+    assert!(100 * inside >= 99 * parameters, "{inside} of {parameters}");
     let (kept, error_m) = describe("identified", &rows);
     // A refused arm is not kept.
-    let kept = Proportion::new(kept.successes, arms);
+    (Proportion::new(kept.successes, arms), error_m)
+}
+
+#[test]
+#[ignore = "installs MuJoCo and takes minutes"]
+fn arms_in_mujoco_are_identified() {
+    if python().is_none() {
+        return;
+    }
+    the_arms_move_as_ours();
+    let (kept, error_m) = identified_arms(MujocoArm::new);
     assert!(
         error_m.p95 <= ERROR_M && kept.rate >= KEPT,
         "{error_m:?} {kept}"
     );
+}
+
+/// An arm whose elbow sticks has p < 0 over much of the belt: its tip swings, however well it is known.
+#[test]
+#[ignore = "installs MuJoCo and takes minutes"]
+fn arms_in_mujoco_whose_joints_do_not_bend_are_identified() {
+    if python().is_some() {
+        identified_arms(MujocoArm::without_bristles);
+    }
 }
 
 /// The same torques move MuJoCo's arm and ours alike: in the air, with and without friction of the joints, and on the belt.
@@ -89,8 +105,8 @@ fn the_arms_move_as_ours() {
             scenario
         };
         let swing = |force_n, swing_nm| Torques { force_n, swing_nm };
-        // Until the elbow turns back: our joints have bristles, which bend by a milliradian. Friction takes 90 mrad off.
-        swing(0.0, 0.3).both_after(0.06, &in_air, 5e-3);
+        // Friction takes 90 mrad off.
+        swing(0.0, 0.3).both_after(0.06, &in_air, 2e-4);
         swing(0.0, 0.1).both_after(0.3, &without(in_air), 2e-4);
         let (ours, theirs) = swing(4.0, 0.02).both_after(0.2, &without(actual), 1e-4);
         assert!((ours.normal_force_n - theirs.normal_force_n).abs() < 0.01);

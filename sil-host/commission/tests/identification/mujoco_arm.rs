@@ -40,11 +40,23 @@ pub struct MujocoArm {
 }
 
 impl MujocoArm {
-    /// Starts the arm of a scenario.
+    /// Starts the arm of a scenario, whose joints bend by a milliradian before they slip, as ours do.
     ///
     /// # Errors
     /// [`OutOfRange`] if the arm does not reach its start.
     pub fn new(scenario: &Scenario) -> Result<Self, OutOfRange> {
+        Self::with_bristles(scenario, 1e-3)
+    }
+
+    /// Starts the arm of a scenario, whose joints stick without bending, by MuJoCo's own friction.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if the arm does not reach its start.
+    pub fn without_bristles(scenario: &Scenario) -> Result<Self, OutOfRange> {
+        Self::with_bristles(scenario, 0.0)
+    }
+
+    fn with_bristles(scenario: &Scenario, bristles_rad: f64) -> Result<Self, OutOfRange> {
         assert_eq!(scenario.converters.torque.lag_s, 0.0, "it has no lag");
         let arm = scenario.moving_arm();
         assert_eq!(arm.tip_mass_kg, 0.0, "its tip has no mass");
@@ -83,6 +95,7 @@ impl MujocoArm {
             ("height", arm.height_m),
             ("belt", belt_speed_m_s),
             ("mu", scenario.belt.friction),
+            ("bristles", bristles_rad),
         ];
         let of_pairs = pairs.iter().flat_map(|(name, [one, two])| {
             [format!("{name}1={one:?}"), format!("{name}2={two:?}")]

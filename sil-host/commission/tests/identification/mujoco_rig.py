@@ -4,7 +4,8 @@ The arm is given as name=value in SI units; those of a joint or link end with 1 
 how long they last, s, as doubles. Standard output, at the start and after each: the links' angles and rates, the tip's place,
 height and speed along the belt, the tangential and the normal force, and whether the tip was pressed in every step; doubles again.
 
-Arm, joint friction and normal contact are MuJoCo's. Its own friction of the tip would separate surfaces that slide, so that mu f_n
+Arm and normal contact are MuJoCo's. So is the friction of the joints without bristles; with these, the joints bend by so much, rad,
+before they slip, as on our own plant. MuJoCo's own friction of the tip would separate surfaces that slide, so that mu f_n
 of the same step is added along the belt, as benches/others/mujoco_arm.py explains.
 """
 
@@ -59,6 +60,13 @@ class Rig:
     """The arm, at rest at its start."""
 
     def __init__(self, arm):
+        self.friction_nm = [arm["friction1"], arm["friction2"]]
+        if arm["bristles"] > 0.0:
+            arm = dict(arm, friction1=0.0, friction2=0.0)
+        else:
+            self.friction_nm = [0.0, 0.0]
+        # Deflection of each joint's bristles, as a part of that in steady slip.
+        self.bent = [0.0, 0.0]
         text = XML.format(
             step=STEP_S,
             gravity_t=-arm["gravity"] * math.sin(arm["tilt"]),
@@ -86,8 +94,11 @@ class Rig:
         self.model.opt.timestep = duration_s / steps
         pressed = True
         for _ in range(steps):
-            self.solve(torque_nm)
+            self.solve([nm - most * bent for nm, most, bent in zip(torque_nm, self.friction_nm, self.bent)])
             mujoco.mj_implicit(self.model, self.data)
+            if self.arm["bristles"] > 0.0:
+                turned = [rate * self.model.opt.timestep / self.arm["bristles"] for rate in self.data.qvel.tolist()]
+                self.bent = [bent + turn - abs(turn) * bent for bent, turn in zip(self.bent, turned)]
             pressed = pressed and self.force_n[1] > 0
         return pressed
 
