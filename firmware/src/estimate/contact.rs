@@ -12,19 +12,14 @@
 
 use painleve_shared::{Real, settings};
 
-/// Log-odds beyond which contact or flight is certain.
+/// Log-odds beyond which contact or flight is certain, and the most that one reading adds to them.
 const CERTAIN: f32 = 6.0;
 /// Log-odds at which the decision changes.
 const DECISION: f32 = 3.0;
-/// Largest contribution of the force cell in one tick.
-const FORCE_LIMIT: f32 = 6.0;
-/// Largest contribution of a gap, in either direction.
+/// Largest contribution of a gap to contact.
 const GAP_FOR: f32 = 2.0;
-const GAP_AGAINST: f32 = 6.0;
 /// Slope of the log-odds over the gap in units of its uncertainty.
 const GAP_SLOPE: f32 = 16.0;
-/// Largest contribution of a missing contact force to flight.
-const RELEASE_AGAINST: f32 = 6.0;
 /// Variance of an innovation due to rounding, counts².
 const INNOVATION_VARIANCE: f32 = 1.0 / 12.0;
 
@@ -119,7 +114,7 @@ impl ContactDetector {
     #[inline]
     pub fn update_from_force(&self, state: &mut ContactState, normal_force_n: f32) -> bool {
         let above = normal_force_n - 0.5 * self.settings.contact_n;
-        state.weigh((self.slope_per_n * above).within(FORCE_LIMIT))
+        state.weigh((self.slope_per_n * above).within(CERTAIN))
     }
 
     /// Updates the decision with one tick's encoder readings. Returns whether the tip touches.
@@ -129,9 +124,9 @@ impl ContactDetector {
         encoders: &EncoderReading,
     ) -> bool {
         let gap = (GAP_SLOPE * (1.0 - encoders.gap_m.abs() / encoders.gap_error_m))
-            .limited(-GAP_AGAINST, GAP_FOR);
+            .limited(-CERTAIN, GAP_FOR);
         let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
-            .limited(-RELEASE_AGAINST, 0.0);
+            .limited(-CERTAIN, 0.0);
         let change = gap + release;
         // Unchanged readings add no evidence against contact.
         state.weigh(if encoders.moved {
