@@ -136,6 +136,7 @@ pub trait Port {
     /// Moves received bytes into `buffer`; returns their number, 0 if there are none.
     fn receive(&mut self, buffer: &mut [u8]) -> usize;
 
-    /// Sends all bytes or, if the host does not accept them, none.
-    fn send(&mut self, bytes: &[u8]) -> bool;
+    /// Sends all bytes or, if the host does not accept them, none. A port that keeps bytes until the line is free also refuses
+    /// them if it could not keep `spare` others after them.
+    fn send(&mut self, bytes: &[u8], spare: usize) -> bool;
 }

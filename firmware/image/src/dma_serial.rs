@@ -133,8 +133,8 @@ impl<R: DmaRegisters> Port for DmaPort<R> {
         length
     }
 
-    fn send(&mut self, bytes: &[u8]) -> bool {
-        if self.to_send.capacity() - self.to_send.len() < bytes.len() {
+    fn send(&mut self, bytes: &[u8], spare: usize) -> bool {
+        if self.to_send.capacity() - self.to_send.len() < bytes.len() + spare {
             return false;
         }
         for byte in bytes {

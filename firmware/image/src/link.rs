@@ -82,7 +82,8 @@ pub fn link<D, L, P, F>(
         black_box::note_fault(fault);
     }
     while let Some(answer) = answers.dequeue() {
-        send(port, &answer);
+        // At a rate that the line cannot carry, ticks are lost rather than the responses to requests.
+        send(port, &answer, MAXIMUM_RESPONSE_LENGTH);
         *awaits_answer = false;
     }
     // A later tick has the answer.
@@ -204,7 +205,7 @@ pub fn link<D, L, P, F>(
                 }
                 Err(_) => continue,
             };
-            send(port, &response);
+            send(port, &response, 0);
         }
     }
 }
@@ -316,11 +317,12 @@ fn note_message<D: BoardDrive, L: Law, M>(
     task.note(Lapse::Garbage, u32::from(garbage));
 }
 
-/// A response that the host does not accept is lost; the host asks again or gives up.
+/// Sends a response if the port can keep `spare` bytes after it. One that the host does not accept is lost; the host asks again or
+/// gives up.
 #[inline(never)]
-fn send(port: &mut impl Port, response: &Response) {
+fn send(port: &mut impl Port, response: &Response, spare: usize) {
     let mut buffer = [0; MAXIMUM_RESPONSE_LENGTH];
     if let Ok(bytes) = wire::encode(response, &mut buffer) {
-        let _ = port.send(bytes);
+        let _ = port.send(bytes, spare);
     }
 }

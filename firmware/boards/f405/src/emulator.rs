@@ -138,9 +138,9 @@ impl Port for Link {
         }
     }
 
-    fn send(&mut self, bytes: &[u8]) -> bool {
+    fn send(&mut self, bytes: &[u8], spare: usize) -> bool {
         if self.requests == NONE {
-            self.line.send(bytes)
+            self.line.send(bytes, spare)
         } else {
             write(self.responses, bytes)
         }
