@@ -193,7 +193,7 @@ impl FrictionEstimator {
         }
         if differs {
             // μ has changed.
-            state.variance = self.first_variance;
+            self.doubt(state);
             variance_n2 = state.variance * square_n2;
         }
         let innovation = excess_n / normal_n;
@@ -276,7 +276,7 @@ impl FrictionEstimator {
         }
     }
 
-    /// Forgets how well μ is known: the tip has left the belt, and more friction than estimated may have thrown it off.
+    /// Forgets how well μ is known. A tip that has left the belt may have been thrown off by more friction than estimated.
     pub fn doubt(&self, state: &mut FrictionState) {
         state.variance = self.first_variance;
     }
