@@ -139,32 +139,51 @@ fn an_invalid_replay_is_refused() {
 }
 
 #[test]
-fn an_ablation_has_a_line_for_each_part() {
+fn an_ablation_has_a_line_for_each_part_and_a_column_for_each_condition() {
     let bench = Bench::new("ablation");
-    let all = ["study", "ablation", "--runs", "2"];
+    let all = ["study", "ablation", "--on", "rigid,capture", "--runs", "2"];
     let output = bench.run(&all);
     assert!(output.status.success(), "{output:?}");
     let table = String::from_utf8_lossy(&output.stdout).into_owned();
-    let count = |part: &str| table.lines().filter(|line| line.contains(part)).count();
+    let count = |text: &str| table.lines().filter(|line| line.contains(text)).count();
+    assert_eq!(count("│ without "), 1, "{table}");
     let report = bench.report(&[&all[..], &["--json"]].concat());
     let rows = list(&report["rows"]);
-    assert!(rows.len() > 10, "{report}");
-    assert_eq!(
-        (count("│ everything "), rows[0]["without"].clone()),
-        (1, Value::Null)
-    );
-    for row in &rows[1..] {
-        let part = row["without"].as_str().unwrap_or_default();
-        assert_eq!(count(&format!("│ without {part} ")), 1, "{part}: {table}");
-        assert_eq!(row["runs"], 2);
+    let (rigid, capture) = rows.split_at(rows.len() / 2);
+    assert!(rigid.len() > 10, "{report}");
+    for (rows, condition) in [(rigid, "rigid"), (capture, "capture")] {
+        assert_eq!(count(&format!("┆ {condition} ")), 1, "{table}");
+        for (place, row) in rows.iter().enumerate() {
+            let part = row["without"].as_str();
+            assert_eq!(
+                (part.is_none(), &row["runs"]),
+                (place == 0, &Value::from(2))
+            );
+            assert_eq!(row["condition"], condition);
+            assert_eq!(
+                count(&format!("│ {} ", part.unwrap_or("none"))),
+                1,
+                "{table}"
+            );
+        }
     }
-    assert_eq!(count("│ without "), rows.len() - 1, "{table}");
     let two = ["--without", "disturbance,governor", "--csv", "a.csv"];
     bench.report(&[&all[..], &["--json"], &two].concat());
     let csv = std::fs::read_to_string(bench.path("a.csv")).unwrap_or_default();
-    let parts = csv.lines().filter_map(|line| line.split(',').next());
-    let parts: Vec<&str> = parts.collect();
-    assert_eq!(parts, ["without", "", "disturbance", "governor"], "{csv}");
+    let cells = csv.lines().map(|line| {
+        let cells: Vec<&str> = line.split(',').take(2).collect();
+        cells.join(" ")
+    });
+    let expected = [
+        "condition without",
+        "rigid ",
+        "rigid disturbance",
+        "rigid governor",
+        "capture ",
+        "capture disturbance",
+        "capture governor",
+    ];
+    assert_eq!(cells.collect::<Vec<_>>(), expected, "{csv}");
 }
 
 #[test]

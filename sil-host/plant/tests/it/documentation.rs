@@ -209,8 +209,9 @@ fn success(result: &Table) -> Option<String> {
 fn measured_table(entries: &[Entry]) -> String {
     let first = entries.first().unwrap();
     let keys = first.result.keys().map(String::as_str);
-    let figures: Vec<&str> = keys.filter(|key| !NO_COLUMN.contains(key)).collect();
     let is_campaign = success(&first.result).is_some();
+    let is_figure = |key: &&str| !NO_COLUMN.contains(key) || *key == "runs" && !is_campaign;
+    let figures: Vec<&str> = keys.filter(is_figure).collect();
     let mut columns: Vec<String> = figures.iter().map(|key| key.replace('_', " ")).collect();
     if is_campaign {
         columns.splice(0..0, ["success (95 % interval)", "runs"].map(String::from));
@@ -237,7 +238,7 @@ fn measured_table(entries: &[Entry]) -> String {
             cells.push(seed.split(' ').next().unwrap().into());
         }
         cells.push(result["commit"].as_str().unwrap().into());
-        rows.push((label, cells));
+        rows.push((label.clone(), cells));
     }
     // What all rows share stands once, below.
     let mut shared = Vec::new();
@@ -253,6 +254,16 @@ fn measured_table(entries: &[Entry]) -> String {
             }
             shared.push(format!("{name} {value}"));
         }
+    }
+    // A table with more figures than entries stands upright: a column for each entry.
+    if figures.len() > entries.len() {
+        let labels = rows.iter().map(|(label, _)| label.clone()).collect();
+        let upright = core::mem::replace(&mut columns, labels).into_iter();
+        let upright = upright.enumerate().map(|(column, name)| {
+            let cells = rows.iter().map(|(_, cells)| cells[column].clone());
+            (name, cells.collect())
+        });
+        rows = upright.collect();
     }
     let mut text = format!("| | {} |\n|---|", columns.join(" | "));
     writeln!(text, "{}", "---|".repeat(columns.len())).unwrap();

@@ -3,19 +3,30 @@
 use clap::Args;
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::StudyOptions;
+use painleve_study_core::options::RandomRuns;
 
-use super::{Ablation, AblationStudy};
-use crate::robustness::{CampaignOptions, Part, Row};
+use super::{Ablation, AblationStudy, Condition};
+use crate::robustness::{Part, Row};
 
-/// Contribution of each part of the controller to success in the robustness campaign.
+/// Contribution of each part of the controller to the share of runs in which the tip is kept on the belt.
 #[derive(Debug, Args)]
 #[command(
-    mut_arg("runs", |runs| runs.default_value("500").help("Number of runs with each part switched off")),
-    mut_arg("without", |without| without.help("Parts to switch off, one at a time; all parts by default"))
+    mut_arg("runs", |runs| runs.default_value("100").help("Number of runs with each part switched off under each condition"))
 )]
 pub struct Options {
+    /// Conditions; all by default.
+    #[arg(
+        long = "on",
+        value_name = "CONDITIONS",
+        value_enum,
+        value_delimiter = ','
+    )]
+    conditions: Vec<Condition>,
+    /// Parts of the controller to switch off, one at a time; all parts by default.
+    #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
+    without: Vec<Part>,
     #[command(flatten)]
-    campaign: CampaignOptions,
+    runs: RandomRuns,
 }
 
 impl StudyOptions for Options {
@@ -25,18 +36,22 @@ impl StudyOptions for Options {
 
     fn study(&self) -> Result<AblationStudy, StudyError> {
         let study = AblationStudy {
-            campaign: self.campaign.campaign(),
-            parts: if self.campaign.without.is_empty() {
-                Part::ALL.to_vec()
-            } else {
-                self.campaign.without.clone()
-            },
+            conditions: or_all(&self.conditions, &Condition::ALL),
+            parts: or_all(&self.without, &Part::ALL),
+            seed: self.runs.seed,
+            runs: self.runs.runs,
+            overrides: self.runs.overrides(),
         };
-        study.campaign.check()?;
+        study.check()?;
         Ok(study)
     }
 
     fn outcome(study: &AblationStudy, rows: Vec<Row>) -> Ablation {
-        Ablation::new(study, rows)
+        Ablation::new(study, &rows)
     }
+}
+
+/// Returns what was chosen, or all if nothing was.
+fn or_all<T: Copy>(chosen: &[T], all: &[T]) -> Vec<T> {
+    if chosen.is_empty() { all } else { chosen }.to_vec()
 }

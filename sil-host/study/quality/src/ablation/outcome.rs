@@ -4,117 +4,138 @@ use comfy_table::Table;
 use painleve_study_core::outcome::{self, Outcome};
 use serde::Serialize;
 
-use super::AblationStudy;
+use super::{AblationStudy, Condition};
 use crate::paired_difference::PairedDifference;
 use crate::proportion::Proportion;
-use crate::robustness::{Criterion, Ending, Part, Robustness, RobustnessOutcome, Row};
+use crate::robustness::{Ending, Part, Row};
 
-/// Result of the campaign without one part.
+/// Result without one part under one condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ablated {
+    /// The condition.
+    pub condition: Condition,
     /// The part that is switched off; `None` for the whole controller.
     pub without: Option<Part>,
     /// The configuration keys that switch it off.
     pub keys: String,
     /// Number of runs.
     pub runs: usize,
-    /// Number of runs that succeeded.
+    /// Number of runs in which the tip was kept.
     pub successes: usize,
-    /// Success rate, 0 … 1.
+    /// Their share, 0 … 1.
     pub rate: f64,
     /// Lower bound of its 95 % confidence interval.
     pub lower: f64,
     /// Upper bound of its 95 % confidence interval.
     pub upper: f64,
-    /// Runs that succeed with the part and fail without it.
+    /// Runs in which the tip is kept with the part, and not without it.
     pub lost: usize,
-    /// Runs that fail with the part and succeed without it.
+    /// Runs in which the tip is kept without the part, and not with it.
     pub gained: usize,
     /// Runs with a lift-off after capture.
     pub lift_offs: usize,
-    /// Runs that ended elsewhere, or at a wrongly estimated edge.
-    pub not_reached: usize,
     /// Runs without capture.
     pub not_captured: usize,
     /// Runs with a fault, or whose plant could not be solved.
     pub faults: usize,
     /// Mean distance from the governed reference at the end, mm.
     pub mean_error_mm: f64,
+    /// What the table shows: the share of the whole controller or the change without the part, in percent. A change that
+    /// may be chance is in parentheses.
+    pub shown: String,
 }
 
 /// The contribution of each part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ablation {
-    /// What counts as a success.
-    pub criterion: Criterion,
-    /// The whole controller first, then one line per part.
+    /// For each condition the whole controller first, then without each part.
     pub rows: Vec<Ablated>,
 }
 
 impl Ablation {
     /// Collects all rows of a study.
-    pub fn new(study: &AblationStudy, rows: Vec<Row>) -> Self {
-        let runs = study.campaign.runs.max(1);
-        let without = std::iter::once(None).chain(study.parts.iter().copied().map(Some));
-        let whole = &rows[..runs.min(rows.len())];
-        let Robustness {
-            arms,
-            seed,
-            criterion,
-            ..
-        } = study.campaign;
-        let rows = without
-            .zip(rows.chunks(runs))
-            .map(|(without, rows)| {
-                let campaign = RobustnessOutcome::new(arms, seed, criterion, rows.to_vec());
-                let differing = |with: bool| {
-                    let pairs = whole.iter().zip(rows);
-                    let succeed = |(one, other): &(&Row, &Row)| {
-                        (criterion.holds(one.ending), criterion.holds(other.ending))
-                            == (with, !with)
-                    };
-                    pairs.filter(succeed).count()
-                };
-                let errors: f64 = rows.iter().map(|row| row.error_m).sum();
-                Ablated {
-                    without,
-                    keys: without.map_or(String::new(), |part| part.without().join(" ")),
-                    runs: campaign.success.runs,
-                    successes: campaign.success.successes,
-                    rate: campaign.success.rate,
-                    lower: campaign.success.lower,
-                    upper: campaign.success.upper,
-                    lost: differing(true),
-                    gained: differing(false),
-                    lift_offs: campaign.count(Ending::LiftOff),
-                    not_reached: campaign.count(Ending::NotReached)
-                        + campaign.count(Ending::StoppedEarly),
-                    not_captured: campaign.count(Ending::NotCaptured),
-                    faults: campaign.count(Ending::Fault) + campaign.count(Ending::Unsolved),
-                    mean_error_mm: 1e3 * errors / rows.len() as f64,
-                }
-            })
-            .collect();
-        Self { criterion, rows }
+    pub fn new(study: &AblationStudy, rows: &[Row]) -> Self {
+        let runs = study.runs.max(1);
+        let mut whole: &[Row] = &[];
+        let cells = study.cells().into_iter().zip(rows.chunks(runs));
+        let rows = cells.map(|((condition, without), rows)| {
+            if without.is_none() {
+                whole = rows;
+            }
+            Ablated::new(condition, without, whole, rows)
+        });
+        Self {
+            rows: rows.collect(),
+        }
+    }
+
+    /// Returns the results under each condition, the whole controller first.
+    pub(super) fn by_condition(&self) -> impl Iterator<Item = &[Ablated]> {
+        self.rows
+            .chunk_by(|one, other| one.condition == other.condition)
     }
 }
 
 impl Ablated {
-    /// Returns the change of the success rate when the part is switched off, in the same runs.
+    fn new(condition: Condition, without: Option<Part>, whole: &[Row], rows: &[Row]) -> Self {
+        let count = |is: fn(Ending) -> bool| rows.iter().filter(|row| is(row.ending)).count();
+        let differing = |with: bool| {
+            let pairs = whole.iter().zip(rows);
+            let differ = |(one, other): &(&Row, &Row)| {
+                (one.ending.is_kept(), other.ending.is_kept()) == (with, !with)
+            };
+            pairs.filter(differ).count()
+        };
+        let Proportion {
+            successes,
+            runs,
+            rate,
+            lower,
+            upper,
+        } = Proportion::new(count(Ending::is_kept), rows.len());
+        let errors_m: f64 = rows.iter().map(|row| row.error_m).sum();
+        let (lost, gained) = (differing(true), differing(false));
+        let shown = match without {
+            None => format!("{:.1} %", 100.0 * rate),
+            Some(_) => shown(PairedDifference::new(gained, lost, runs)),
+        };
+        Self {
+            condition,
+            without,
+            keys: without.map_or(String::new(), |part| part.without().join(" ")),
+            runs,
+            successes,
+            rate,
+            lower,
+            upper,
+            lost,
+            gained,
+            lift_offs: count(|ending| ending == Ending::LiftOff),
+            not_captured: count(|ending| ending == Ending::NotCaptured),
+            faults: count(|ending| matches!(ending, Ending::Fault | Ending::Unsolved)),
+            mean_error_mm: 1e3 * errors_m / rows.len() as f64,
+            shown,
+        }
+    }
+
+    /// Returns the change of the share when the part is switched off, in the same runs.
     pub(super) fn difference(&self) -> PairedDifference {
         PairedDifference::new(self.gained, self.lost, self.runs)
     }
 
-    pub(super) fn name(&self) -> String {
-        match &self.without {
-            Some(_) => format!("without {}", self.part()),
-            None => "everything".into(),
-        }
-    }
-
-    /// Returns the part that is switched off; empty if none is.
+    /// Returns the part that is switched off; `none` for the whole controller.
     pub(super) fn part(&self) -> String {
-        self.without.as_ref().map_or(String::new(), outcome::name)
+        self.without.as_ref().map_or("none".into(), outcome::name)
+    }
+}
+
+/// Returns a change as the table shows it.
+fn shown(change: PairedDifference) -> String {
+    let text = format!("{:+.1}", 100.0 * change.difference).replace('-', "−");
+    if change.lower > 0.0 || change.upper < 0.0 {
+        text
+    } else {
+        format!("({text})")
     }
 }
 
@@ -124,28 +145,12 @@ impl Outcome for Ablation {
     }
 
     fn table(&self) -> Table {
-        let mut table = outcome::table([
-            "controller",
-            &format!("{} (95 %)", self.criterion.words()),
-            "paired difference (95 %)",
-            "lift-off",
-            "not reached",
-            "not captured",
-            "fault or unsolved",
-            "mean error (mm)",
-        ]);
-        for row in &self.rows {
-            table.add_row([
-                row.name(),
-                Proportion::new(row.successes, row.runs).to_string(),
-                row.without
-                    .map_or("–".into(), |_| row.difference().to_string()),
-                row.lift_offs.to_string(),
-                row.not_reached.to_string(),
-                row.not_captured.to_string(),
-                row.faults.to_string(),
-                format!("{:.2}", row.mean_error_mm),
-            ]);
+        let columns: Vec<&[Ablated]> = self.by_condition().collect();
+        let names = columns.iter().map(|rows| outcome::name(&rows[0].condition));
+        let mut table = outcome::table(std::iter::once("without".to_owned()).chain(names));
+        for place in 0..columns.first().map_or(0, |rows| rows.len()) {
+            let cells = columns.iter().map(|rows| rows[place].shown.clone());
+            table.add_row(std::iter::once(columns[0][place].part()).chain(cells));
         }
         table
     }

@@ -3,30 +3,34 @@
 use crate::plain;
 
 use super::*;
+use crate::robustness::Ending;
 use crate::robustness::tables::rows;
-use crate::robustness::{Arms, Criterion, Ending};
 
 #[test]
-fn each_part_has_a_line() {
+fn each_part_has_a_line_and_each_condition_a_column() {
     let study = AblationStudy {
-        campaign: Robustness {
-            arms: Arms::Paper,
-            seed: 7,
-            criterion: Criterion::InPlace,
-            runs: 4,
-            overrides: Vec::new(),
-        },
+        conditions: vec![Condition::Rigid, Condition::Capture],
         parts: vec![Part::Governor, Part::FrictionEstimate],
+        seed: 7,
+        runs: 40,
+        overrides: Vec::new(),
     };
-    let (reached, fell) = ((Ending::Reached, 1e-4), (Ending::LiftOff, 0.08));
-    let whole = [reached, reached, (Ending::AtEdge, 2e-4), reached];
-    let without_governor = [reached, fell, (Ending::Fault, 0.04), fell];
-    let without_estimate = [
-        reached,
-        (Ending::StoppedEarly, 5e-4),
-        (Ending::NotCaptured, 0.01),
-        (Ending::Unsolved, 0.0),
-    ];
-    let all = [whole, without_governor, without_estimate].concat();
-    insta::assert_snapshot!(plain(&Ablation::new(&study, rows(&all))));
+    let lost = |number: usize, ending| {
+        let endings = (0..40).map(move |run| {
+            if run < number {
+                ending
+            } else {
+                Ending::Reached
+            }
+        });
+        endings.map(|ending| (ending, 1e-4))
+    };
+    let all: Vec<_> = lost(1, Ending::LiftOff)
+        .chain(lost(20, Ending::Fault))
+        .chain(lost(0, Ending::Reached))
+        .chain(lost(0, Ending::Reached))
+        .chain(lost(30, Ending::NotCaptured))
+        .chain(lost(0, Ending::Reached))
+        .collect();
+    insta::assert_snapshot!(plain(&Ablation::new(&study, &rows(&all))));
 }

@@ -9,7 +9,7 @@ use painleve_shared::status::Fault;
 use painleve_study_core::{Outcome, rows};
 
 use super::*;
-use crate::ablation::{Ablation, AblationStudy};
+use crate::ablation::{Ablation, AblationStudy, Condition};
 
 /// A fixed seed, which gates every change: its runs show that a change has broken the controller. They do not measure
 /// success on new seeds, as the campaigns in the documentation do.
@@ -165,10 +165,13 @@ fn a_stiff_damped_contact_is_found() {
 #[test]
 fn without_its_governor_the_controller_runs_over_the_edge() {
     let study = AblationStudy {
-        campaign: campaign(10),
+        conditions: vec![Condition::Rigid],
         parts: vec![Part::Governor],
+        seed: 1,
+        runs: 10,
+        overrides: Vec::new(),
     };
-    let ablation = Ablation::new(&study, rows(&study, || ()).unwrap());
+    let ablation = Ablation::new(&study, &rows(&study, || ()).unwrap());
     let [whole, without] = &ablation.rows[..] else {
         panic!("two lines");
     };
