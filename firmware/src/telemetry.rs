@@ -113,7 +113,7 @@ impl<'a> TelemetrySink<'a> {
             contact: contact.touches,
             contact_confidence: *contact_confidence,
             friction: contact.friction.coefficient,
-            friction_deviation: contact.friction.deviation,
+            friction_deviation: contact.friction.deviation(),
             slip: contact.friction.slip,
             sticks: contact.friction.sticks,
             edges_m: target.edges_m.into(),

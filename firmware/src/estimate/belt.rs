@@ -120,7 +120,7 @@ mod tests {
         FrictionEstimate {
             coefficient: 0.6,
             catch_up: 0.0,
-            deviation: 0.01,
+            variance: 1e-4,
             slip,
             slip_seen: true,
             sticks,

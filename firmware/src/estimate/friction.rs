@@ -65,14 +65,21 @@ pub struct FrictionEstimate {
     /// Excess of μ that, fed forward in this tick, gives the tip the impulse that it has missed since a change
     /// of μ.
     pub catch_up: f32,
-    /// Standard deviation of μ̂.
-    pub deviation: f32,
+    /// Variance of μ̂.
+    pub variance: f32,
     /// Direction of slip, from the sign of the friction force.
     pub slip: Slip,
     /// Whether a slip has been observed; until then, `slip` is a guess.
     pub slip_seen: bool,
     /// Whether the tip is estimated to stick to the belt.
     pub sticks: bool,
+}
+
+impl FrictionEstimate {
+    /// Returns the standard deviation of μ̂.
+    pub fn deviation(&self) -> f32 {
+        self.variance.square_root()
+    }
 }
 
 /// The filter's settings.
@@ -82,7 +89,7 @@ pub struct FrictionEstimator {
     /// Normal force below which friction is not observed, N.
     observable_n: f32,
     force_variance_n2: f32,
-    /// Variance of μ at the start and whenever the filter restarts, and its growth in one tick.
+    /// Largest variance of μ, at the start and whenever the filter restarts, and its growth in one tick.
     first_variance: f32,
     drift_variance: f32,
     /// Square of a tangential force beyond the noise, N².
@@ -94,17 +101,11 @@ pub struct FrictionEstimator {
 /// The filter's state.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionState {
-    coefficient: f32,
-    /// Excess of μ to be fed forward in this tick.
-    catch_up: f32,
-    variance: f32,
-    slip: Slip,
-    slip_seen: bool,
+    estimate: FrictionEstimate,
     /// Ticks in a row that indicate a slip in the opposite direction.
     contrary_ticks: u8,
     /// Whether the next reading may show another slip.
     slip_in_doubt: bool,
-    sticks: bool,
     /// The last correction, until the update.
     correction: Option<Correction>,
     /// Average of the last innovations.
@@ -147,14 +148,16 @@ impl FrictionEstimator {
     /// Starts with the initial estimate.
     pub fn start(&self) -> FrictionState {
         FrictionState {
-            coefficient: self.first_guess,
-            catch_up: 0.0,
-            variance: self.first_variance,
-            slip: Slip::Positive,
-            slip_seen: false,
+            estimate: FrictionEstimate {
+                coefficient: self.first_guess,
+                catch_up: 0.0,
+                variance: self.first_variance,
+                slip: Slip::Positive,
+                slip_seen: false,
+                sticks: false,
+            },
             contrary_ticks: 0,
             slip_in_doubt: true,
-            sticks: false,
             correction: None,
             mean_innovation: 0.0,
             innovation: 0.0,
@@ -172,35 +175,35 @@ impl FrictionEstimator {
         force_n: &Vector2<f32>,
         is_dragged: impl FnOnce(Slip) -> bool,
     ) {
-        state.catch_up = 0.0;
         if state.slip_in_doubt {
             self.observe_slip(state, force_n);
         }
+        let estimate = &mut state.estimate;
         let normal_n = force_n.y;
         if normal_n < self.observable_n {
-            state.sticks = false;
+            estimate.sticks = false;
             return;
         }
-        let excess_n = -state.slip.sign::<f32>() * force_n.x - state.coefficient * normal_n;
+        let excess_n = -estimate.slip.sign::<f32>() * force_n.x - estimate.coefficient * normal_n;
         let square_n2 = normal_n * normal_n;
-        let mut variance_n2 = state.variance * square_n2;
+        let mut variance_n2 = estimate.variance * square_n2;
         let noise_n2 = state.force_variance_n2;
         let quiet_n2 = (state.noise_variance * square_n2).limited(0.01 * noise_n2, noise_n2);
         let differs = excess_n * excess_n > DIFFERENT_SQUARE * (variance_n2 + quiet_n2);
-        state.sticks = differs && excess_n < 0.0 && is_dragged(state.slip);
-        if state.sticks || self.is_known() {
+        estimate.sticks = differs && excess_n < 0.0 && is_dragged(estimate.slip);
+        if estimate.sticks {
             return;
         }
         if differs {
             // μ has changed.
-            self.doubt(state);
-            variance_n2 = state.variance * square_n2;
+            estimate.variance = self.first_variance;
+            variance_n2 = estimate.variance * square_n2;
         }
         let innovation = excess_n / normal_n;
         let gain = variance_n2 / (variance_n2 + quiet_n2);
         let change = gain * innovation;
-        state.coefficient = (state.coefficient + change).at_least(0.0);
-        state.catch_up = MISSED_TICKS * change;
+        estimate.coefficient = (estimate.coefficient + change).at_least(0.0);
+        estimate.catch_up = MISSED_TICKS * change;
         state.correction = Some(Correction {
             innovation,
             gain,
@@ -214,15 +217,18 @@ impl FrictionEstimator {
         if let Some(correction) = state.correction.take() {
             self.adapt(state, &correction);
         }
-        let variance = state.variance + self.drift_variance;
-        state.variance = variance.at_most(self.first_variance);
+        let estimate = &mut state.estimate;
+        estimate.catch_up = 0.0;
+        let variance = estimate.variance + self.drift_variance;
+        estimate.variance = variance.at_most(self.first_variance);
         state.force_variance_n2 =
-            self.force_variance_n2 * (1.0 + state.coefficient * state.coefficient);
+            self.force_variance_n2 * (1.0 + estimate.coefficient * estimate.coefficient);
         // A reading that could decide has been considered before its tick was answered.
         if !state.slip_in_doubt {
             self.observe_slip(state, force_n);
         }
-        state.slip_in_doubt = !state.slip_seen || state.contrary_ticks + 1 >= REVERSAL_TICKS;
+        state.slip_in_doubt =
+            !state.estimate.slip_seen || state.contrary_ticks + 1 >= REVERSAL_TICKS;
     }
 
     /// Adapts the variances to a correction.
@@ -233,7 +239,7 @@ impl FrictionEstimator {
             normal_force_n,
         } = *correction;
         let ratio_variance = state.force_variance_n2 / (normal_force_n * normal_force_n);
-        state.variance *= 1.0 - gain;
+        state.estimate.variance *= 1.0 - gain;
         // Innovations that keep their sign are not noise: μ has changed.
         let weight = self.mean_weight;
         let change = innovation - state.innovation;
@@ -245,64 +251,43 @@ impl FrictionEstimator {
         let ratio_variance = state.noise_variance.limited(least_variance, ratio_variance);
         state.mean_innovation += weight * (innovation - state.mean_innovation);
         let square = state.mean_innovation * state.mean_innovation;
-        if square > SIGNIFICANT_SQUARE * (state.variance + ratio_variance) * weight {
-            state.variance = state.variance.at_least(square);
+        if square > SIGNIFICANT_SQUARE * (state.estimate.variance + ratio_variance) * weight {
+            state.estimate.variance = state.estimate.variance.at_least(square);
         }
-    }
-
-    /// Returns whether μ is known exactly. It then has no variance, at the start or later.
-    fn is_known(&self) -> bool {
-        self.first_variance == 0.0
     }
 
     // Out of line: few readings can decide before their tick is answered.
     #[inline(never)]
     fn observe_slip(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
+        let estimate = &mut state.estimate;
         let slip = Slip::of(-force_n.x);
         // Below the noise level the sign carries no information.
         let clear = force_n.x * force_n.x > self.clear_force_n2;
-        let cone_n = REVERSAL_FRACTION * state.coefficient * force_n.y;
-        let contrary = clear && slip != state.slip && force_n.x.abs() >= cone_n;
+        let cone_n = REVERSAL_FRACTION * estimate.coefficient * force_n.y;
+        let contrary = clear && slip != estimate.slip && force_n.x.abs() >= cone_n;
         state.contrary_ticks = if contrary {
             state.contrary_ticks + 1
         } else {
             0
         };
-        if state.contrary_ticks >= REVERSAL_TICKS || (clear && !state.slip_seen) {
-            state.slip = slip;
-            state.slip_seen = true;
+        if state.contrary_ticks >= REVERSAL_TICKS || (clear && !estimate.slip_seen) {
+            estimate.slip = slip;
+            estimate.slip_seen = true;
             state.contrary_ticks = 0;
-            state.sticks = false;
+            estimate.sticks = false;
         }
     }
 
     /// Forgets how well μ is known. A tip that has left the belt may have been thrown off by more friction than estimated.
     pub fn doubt(&self, state: &mut FrictionState) {
-        state.variance = self.first_variance;
+        state.estimate.variance = self.first_variance;
     }
 }
 
 impl FrictionState {
-    /// Takes over into an estimate what a reading corrects.
-    #[inline]
-    pub fn correct_estimate(&self, estimate: &mut FrictionEstimate) {
-        estimate.coefficient = self.coefficient;
-        estimate.catch_up = self.catch_up;
-        estimate.slip = self.slip;
-        estimate.slip_seen = self.slip_seen;
-        estimate.sticks = self.sticks;
-    }
-
     /// Returns the present estimate.
-    pub fn estimate(&self) -> FrictionEstimate {
-        FrictionEstimate {
-            coefficient: self.coefficient,
-            catch_up: self.catch_up,
-            deviation: self.variance.square_root(),
-            slip: self.slip,
-            slip_seen: self.slip_seen,
-            sticks: self.sticks,
-        }
+    pub fn estimate(&self) -> &FrictionEstimate {
+        &self.estimate
     }
 }
 

@@ -184,7 +184,7 @@ impl Estimators {
     pub fn start(&self, arm: Arm<f32>) -> EstimatesState {
         let (friction, response) = (self.friction.start(), self.response.start());
         let contact = ContactEstimate::without_readings(
-            friction.estimate(),
+            *friction.estimate(),
             self.response.response(&response, 0.0, 0.0),
         );
         EstimatesState {
@@ -279,7 +279,7 @@ impl Estimators {
             self.friction
                 .correct(&mut state.friction, &contact.force_n, is_dragged);
         }
-        state.friction.correct_estimate(&mut contact.friction);
+        contact.friction = *state.friction.estimate();
         contact.p_per_kg = state
             .model
             .p_per_kg(contact.friction.coefficient, contact.friction.slip);
@@ -307,7 +307,7 @@ impl Estimators {
         }
         let friction = state.friction.estimate();
         self.belt
-            .update(&mut state.belt, model.tip_velocity_m_s.x, Some(&friction));
+            .update(&mut state.belt, model.tip_velocity_m_s.x, Some(friction));
         let (last, p_per_kg) = (observed.last, contact.p_per_kg);
         let slides = p_per_kg > 0.0 && !friction.sticks;
         let mut completes_block = false;
@@ -399,12 +399,11 @@ impl Estimators {
             &disturbance_nm,
         );
         let (model, contact) = (&state.model, &mut state.contact);
-        let mut friction = state.friction.estimate();
+        let friction = state.friction.estimate();
         let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
         let p_ratio = p_per_kg / model.q22_per_kg;
         let response = self.response.response(&state.response, p_per_kg, p_ratio);
-        friction.catch_up = 0.0;
-        contact.friction = friction;
+        contact.friction = *friction;
         contact.p_per_kg = p_per_kg;
         contact.p_ratio = p_ratio;
         contact.response = response;

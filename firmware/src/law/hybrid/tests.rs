@@ -32,7 +32,7 @@ proptest! {
         let input = LawInput {
             arm: &arm, model: &model, posture,
             friction: &FrictionEstimate {
-                coefficient: friction, catch_up: 0.0, deviation: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
+                coefficient: friction, catch_up: 0.0, variance: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
             },
             p_per_kg: model.p_per_kg(friction, Slip::Positive), response: &ContactResponse::rigid(1.0),
             force_n: Vector2::zeros(), contact: true, saturated: false,
@@ -86,7 +86,7 @@ fn at_rest(arm: &Arm<f32>) -> Model {
 const SLIDES: FrictionEstimate = FrictionEstimate {
     coefficient: FRICTION,
     catch_up: 0.0,
-    deviation: 0.0,
+    variance: 0.0,
     slip: Slip::Positive,
     slip_seen: true,
     sticks: false,

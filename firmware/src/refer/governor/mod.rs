@@ -175,7 +175,7 @@ impl EdgeGovernor {
         let admissibility = Admissibility {
             arm,
             posture,
-            friction: friction.coefficient + self.deviations * friction.deviation,
+            friction: friction.coefficient + self.deviations * friction.deviation(),
             slip: friction.slip_seen.then_some(friction.slip),
             least_p_ratio: self.least_p_ratio.at_least(landing_p_ratio),
             least_p_per_kg: self.least_p_per_kg,

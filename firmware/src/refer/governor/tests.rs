@@ -14,7 +14,7 @@ fn known(coefficient: f32, slip: Slip) -> FrictionEstimate {
     FrictionEstimate {
         coefficient,
         catch_up: 0.0,
-        deviation: 0.0,
+        variance: 0.0,
         slip,
         slip_seen: true,
         sticks: false,
