@@ -254,6 +254,27 @@ mod tests {
         }
     }
 
+    #[test]
+    fn an_arm_that_is_nearly_straight_is_asked_for_less() {
+        let arm = Arm::new(ArmParameters::default()).unwrap();
+        for (sine, share) in [
+            (0.2, 1.0),
+            (0.05, 1.0),
+            (0.04, 0.8),
+            (0.01, 0.2),
+            (-0.01, 0.2),
+        ] {
+            let elbow_rad = libm::asinf(sine);
+            let theta = LinkMotion::new(0.3, 0.3 + elbow_rad);
+            let still = LinkMotion::zeros();
+            let model = Model::new(&arm, theta, still, &GeneralisedTorque::zeros());
+            let wanted = Vector2::new(2.0, -1.0);
+            let links = model.link_acceleration_rad_s2(&wanted);
+            let found = model.jacobian * links.vector();
+            assert!((found - wanted * share).norm() < 2e-3, "{sine}: {found}");
+        }
+    }
+
     proptest! {
         #[test]
         fn forward_dynamics_undo_inverse_dynamics(
