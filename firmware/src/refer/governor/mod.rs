@@ -70,7 +70,7 @@ pub struct EdgeGovernor {
 }
 
 /// The edges that an [`EdgeGovernor`] has found, and the reference it follows.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct GovernorState {
     /// Edges of the admissible stretch around the tip, m.
     lower_m: f32,
@@ -95,13 +95,7 @@ impl GovernorState {
         Self {
             lower_m: -USABLE_REACH * reach_m,
             upper_m: USABLE_REACH * reach_m,
-            search: None,
-            asked_p_ratio: 0.0,
-            is_fresh: false,
-            position_m: 0.0,
-            velocity_m_s: 0.0,
-            follows: false,
-            at_edge: false,
+            ..Self::default()
         }
     }
 
@@ -190,7 +184,7 @@ impl EdgeGovernor {
         };
         for _ in 0..points {
             let point = search.point(step, reach);
-            search = search.next(point, admissibility.at(point), reach);
+            search = search.next(point, admissibility.excess_per_kg(point), reach);
         }
         state.search = Some(search);
         if !search.is_over() {

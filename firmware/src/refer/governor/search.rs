@@ -2,9 +2,9 @@
 
 use painleve_shared::{Arm, Posture, Real, Slip};
 
-/// Largest number of inadmissible points that the search tries: enough to cover the whole reach on
-/// either side of the tip.
-const MOST_REFUSED: u32 = 64;
+/// Largest number of inadmissible points that the search tries, on both sides of the tip together. A stretch farther off
+/// is not for this tip: on the way there it would be thrown off.
+const MOST_REFUSED: u32 = 8;
 /// Halvings of the last step: 12 mm / 2¹⁰ is 11 µm.
 const HALVINGS: u32 = 10;
 
@@ -26,18 +26,18 @@ pub(super) struct Admissibility<'a> {
 }
 
 impl Admissibility<'_> {
-    /// Returns whether sliding has a solution at this point with the margin.
-    pub(super) fn at(&self, tip_t_m: f32) -> bool {
+    /// Returns how much p exceeds its least value at this point, 1/kg. Where it does, sliding has a solution with the margin.
+    pub(super) fn excess_per_kg(&self, tip_t_m: f32) -> f32 {
         let there_m = tip_t_m + self.distance_m;
         let row = self.arm.inverse_inertia_row_on_belt(there_m, self.posture);
-        row.is_some_and(|(tangential, normal, factor)| {
+        row.map_or(f32::MIN, |(tangential, normal, factor)| {
             let against = match self.slip {
                 Some(slip) => slip.sign::<f32>() * tangential,
                 // Both directions must be admissible.
                 None => tangential.abs(),
             };
             let least = (self.least_p_ratio * normal).at_least(self.least_p_per_kg * factor);
-            normal - self.friction * against >= least
+            (normal - self.friction * against - least) / factor
         })
     }
 }
@@ -49,6 +49,9 @@ enum Stage {
     Entering {
         /// Number of points found inadmissible.
         refused: u32,
+        /// The best of them, m, and the excess of p there, 1/kg.
+        best_m: f32,
+        most_per_kg: f32,
     },
     /// Searches outwards for an inadmissible point.
     Marching,
@@ -75,7 +78,11 @@ impl Search {
         Self {
             direction,
             inside_m: tip_t_m,
-            stage: Stage::Entering { refused: 0 },
+            stage: Stage::Entering {
+                refused: 0,
+                best_m: tip_t_m,
+                most_per_kg: f32::MIN,
+            },
         }
     }
 
@@ -89,7 +96,7 @@ impl Search {
         let point = match self.stage {
             Stage::Found => self.inside_m,
             // Alternate between the side towards the middle of the belt and the other side.
-            Stage::Entering { refused } => {
+            Stage::Entering { refused, .. } => {
                 let away_m = step_m * refused.div_ceil(2) as f32;
                 let inwards = refused % 2 == 1;
                 let outwards_m = away_m.copysign(self.inside_m);
@@ -102,14 +109,31 @@ impl Search {
     }
 
     /// Returns the search after the point has been evaluated.
-    pub(super) fn next(self, point_m: f32, admissible: bool, reach_m: f32) -> Self {
-        let (inside_m, stage) = match (self.stage, admissible) {
+    pub(super) fn next(self, point_m: f32, excess_per_kg: f32, reach_m: f32) -> Self {
+        let (inside_m, stage) = match (self.stage, excess_per_kg >= 0.0) {
             (Stage::Entering { .. }, true) => (point_m, Stage::Marching),
-            // No point is admissible: fall back to the middle of the belt.
-            (Stage::Entering { refused }, false) if refused >= MOST_REFUSED => (0.0, Stage::Found),
-            (Stage::Entering { refused }, false) => {
-                let refused = refused + 1;
-                (self.inside_m, Stage::Entering { refused })
+            // No point is admissible: the best one, from where the next search goes on.
+            (
+                Stage::Entering {
+                    refused, best_m, ..
+                },
+                false,
+            ) if refused >= MOST_REFUSED => (best_m, Stage::Found),
+            (
+                Stage::Entering {
+                    refused,
+                    best_m,
+                    most_per_kg,
+                },
+                false,
+            ) => {
+                let is_best = excess_per_kg > most_per_kg;
+                let entering = Stage::Entering {
+                    refused: refused + 1,
+                    best_m: if is_best { point_m } else { best_m },
+                    most_per_kg: excess_per_kg.at_least(most_per_kg),
+                };
+                (self.inside_m, entering)
             }
             (Stage::Marching, true) if point_m.abs() >= reach_m => (point_m, Stage::Found),
             (Stage::Marching, true) => (point_m, Stage::Marching),

@@ -122,6 +122,34 @@ fn a_tip_beyond_the_edge_is_led_back_to_the_stretch_next_to_it() {
     assert!((upper - 0.164_71).abs() < 2e-5, "{upper}");
 }
 
+/// p of 6/kg is kept beyond 0.165 m only, where the arm is nearly straight; on the way there it falls to 1.3/kg.
+#[test]
+fn without_an_admissible_place_nearby_the_tip_is_led_to_the_best_one_and_not_across_the_belt() {
+    let settings = GovernorSettings {
+        p_per_kg: 6.0,
+        ..Default::default()
+    };
+    let governor = EdgeGovernor::new(&settings, TICK_S, &JointErrors::default());
+    let friction = known(0.79, Slip::Negative);
+    let mut state = GovernorState::new(arm().reach_on_belt_m());
+    let mut tip_t_m = 0.03;
+    for _ in 0..3000 {
+        governor.search(
+            &mut state,
+            &arm(),
+            Posture::ElbowDown,
+            tip_t_m,
+            &friction,
+            0.0,
+        );
+        if state.fresh_edges_m().is_some() {
+            let (lower_m, upper_m) = state.edges_m();
+            tip_t_m += (tip_t_m.max(lower_m).min(upper_m) - tip_t_m).clamp(-1e-3, 1e-3);
+        }
+    }
+    assert!((tip_t_m + 0.1).abs() < 0.015, "{tip_t_m}");
+}
+
 /// Follows the reference `wanted` until it stands still; returns the final and the largest
 /// position.
 fn follow(state: &mut GovernorState, wanted: impl Fn(f32) -> TipReference) -> (TipReference, f32) {
