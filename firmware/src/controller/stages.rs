@@ -271,7 +271,7 @@ impl<L: Law> Stages<L> {
 impl<L: Law> State<L> {
     /// Takes the torque off and cancels a recovery in progress.
     pub fn release(&mut self) {
-        self.command.clear();
+        self.command = LastCommand::default();
         self.demand.cancel_recovery();
     }
 }

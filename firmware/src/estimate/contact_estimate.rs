@@ -7,7 +7,7 @@ use super::response::ContactResponse;
 
 /// The contact estimate at a tick: contact and force from its readings, the rest from those before, evaluated
 /// for the posture predicted for the tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ContactEstimate {
     /// Whether the tip touches.
     pub touches: bool,
@@ -27,21 +27,4 @@ pub struct ContactEstimate {
     pub p_ratio: f32,
     /// What the contact's response to torque allows.
     pub response: ContactResponse,
-}
-
-impl ContactEstimate {
-    /// Returns the estimate before the first readings, with friction and response as they start.
-    pub fn without_readings(friction: FrictionEstimate, response: ContactResponse) -> Self {
-        Self {
-            touches: false,
-            lands: false,
-            leaves: false,
-            in_flight: false,
-            force_n: Vector2::zeros(),
-            friction,
-            p_per_kg: 0.0,
-            p_ratio: 0.0,
-            response,
-        }
-    }
 }

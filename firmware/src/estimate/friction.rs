@@ -58,7 +58,7 @@ settings! {
 }
 
 /// The friction estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionEstimate {
     /// Estimated friction coefficient μ̂.
     pub coefficient: f32,
@@ -99,7 +99,7 @@ pub struct FrictionEstimator {
 }
 
 /// The filter's state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FrictionState {
     estimate: FrictionEstimate,
     /// Ticks in a row that indicate a slip in the opposite direction.
@@ -150,19 +150,13 @@ impl FrictionEstimator {
         FrictionState {
             estimate: FrictionEstimate {
                 coefficient: self.first_guess,
-                catch_up: 0.0,
                 variance: self.first_variance,
-                slip: Slip::Positive,
-                slip_seen: false,
-                sticks: false,
+                ..Default::default()
             },
-            contrary_ticks: 0,
             slip_in_doubt: true,
-            correction: None,
-            mean_innovation: 0.0,
-            innovation: 0.0,
             noise_variance: 1.0,
             force_variance_n2: self.force_variance_n2,
+            ..Default::default()
         }
     }
 

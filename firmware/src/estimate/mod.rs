@@ -183,10 +183,11 @@ impl Estimators {
     /// Starts without readings of this arm.
     pub fn start(&self, arm: Arm<f32>) -> EstimatesState {
         let (friction, response) = (self.friction.start(), self.response.start());
-        let contact = ContactEstimate::without_readings(
-            *friction.estimate(),
-            self.response.response(&response, 0.0, 0.0),
-        );
+        let contact = ContactEstimate {
+            friction: *friction.estimate(),
+            response: self.response.response(&response, 0.0, 0.0),
+            ..Default::default()
+        };
         EstimatesState {
             contact,
             model: Model::default(),

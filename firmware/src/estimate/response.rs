@@ -61,7 +61,7 @@ pub struct ForceReading {
 }
 
 /// What the response allows.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactResponse {
     /// Part of the force error that loops through the contact force may remove in a tick, before the
     /// factor of each loop: p/Q22 on a rigid contact.
@@ -80,9 +80,7 @@ impl ContactResponse {
     pub fn rigid(p_ratio: f32) -> Self {
         Self {
             loop_share: p_ratio.at_least(0.0),
-            give: 0.0,
-            lags: 0.0,
-            probe_n: 0.0,
+            ..Self::default()
         }
     }
 }
@@ -144,7 +142,7 @@ impl Moments {
 }
 
 /// The estimator's state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ResponseState {
     /// Last normal force and its last change, N.
     force_n: f32,
@@ -195,25 +193,10 @@ impl ResponseEstimator {
     /// Starts without knowledge of the contact.
     pub fn start(&self) -> ResponseState {
         ResponseState {
-            force_n: 0.0,
-            change_n: 0.0,
-            withheld_n: 0.0,
-            excitation_n: 0.0,
-            acting_probe_n: 0.0,
-            probe_n: 0.0,
             random: 1,
-            expected_n: [0.0; DELAYS + 1],
-            block: Default::default(),
-            block_ticks: 0,
-            averages: Default::default(),
-            blocks: 0.0,
             block_weight: 1.0,
-            lower: 0.0,
             upper: 1.0,
-            gain: 0.0,
-            give: 0.0,
-            lags: 0.0,
-            touched_s: 0.0,
+            ..Default::default()
         }
     }
 

@@ -17,7 +17,7 @@ const POINTS_IN_A_HURRY: u32 = 2;
 const MOST_ENDS: u32 = 3;
 
 /// Bytes that the interrupts clear at once, at most; every call is checked.
-pub const CLEARED_BYTES: u32 = 48;
+pub const CLEARED_BYTES: u32 = 64;
 
 /// Function that clears memory: its second argument is the number of bytes.
 pub const CLEARS: &str = "__aeabi_memclr";
