@@ -16,6 +16,8 @@
 //! [`identification`] goes on from there: the controller itself slides the tip along the belt, which determines zeros
 //! and errors of the encoders, the links' lengths and the belt's height much more closely.
 //!
+//! [`set_down`] says where the tip of an arm may be set down before the drive is armed.
+//!
 //! The belt stands still while an arm is commissioned. A deviation that a setting can describe is corrected and reported; any
 //! other ends the procedure with one [`Mistake`].
 
@@ -25,6 +27,7 @@ mod mistake;
 mod readings;
 pub mod rest;
 pub mod second_sensors;
+pub mod set_down;
 pub mod simulated;
 pub mod slide;
 pub mod stages;

@@ -20,6 +20,15 @@ fn a_rehearsal_writes_what_it_has_found() {
     let bench = Bench::new("identify");
     let found = bench.report(&["identify", "--rehearse", "--seed", "3", "--json"]);
     assert!(found["tip_deviation_m"].as_f64().unwrap() < 6e-4, "{found}");
+    for posture in ["elbow_down", "elbow_up"] {
+        let found = &found["set_down"][posture];
+        let [from_m, to_m] = [0, 1].map(|end| found["stretch_m"][end].as_f64().unwrap());
+        let best_m = found["best_m"].as_f64().unwrap();
+        assert!(
+            from_m <= best_m && best_m <= to_m && to_m - from_m > 0.2,
+            "{found}"
+        );
+    }
     let differences = bench.report(&["diff", "hybrid-elbow-down", "out/identified.toml", "--json"]);
     let written = differences["differences"].as_array().unwrap();
     let page = std::fs::read_to_string(bench.path("out/identified.html")).unwrap();

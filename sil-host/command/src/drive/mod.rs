@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use painleve_board::BoardError;
 use painleve_board::arm::{ArmEvent, ConnectedArm, Measured};
+use painleve_commission::set_down;
 use painleve_files::input_file;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_process::interrupt::Interrupt;
@@ -163,11 +164,12 @@ struct Drive {
 
 impl Drive {
     fn open(arguments: &DriveArguments, scenario: &Scenario) -> Result<Self, CommandError> {
-        let configuration = scenario.controller_configuration();
-        let measured = Measured::new(&configuration).map_err(|source| ScenarioError::Range {
+        let range = |source| ScenarioError::Range {
             origin: scenario.name.clone(),
             source,
-        })?;
+        };
+        let configuration = scenario.controller_configuration();
+        let measured = Measured::new(&configuration).map_err(range)?;
         let source = if arguments.dry_run {
             FrameSource::DryRun
         } else {
@@ -192,6 +194,7 @@ impl Drive {
                 ""
             },
         ));
+        warn(set_down::advice(scenario).map_err(range)?);
         Ok(Self {
             arm,
             measured,

@@ -12,12 +12,15 @@ use clap::Args;
 use painleve_commission::identification::{
     Found, IdentificationError, identify_arm, identify_slides,
 };
+use painleve_commission::set_down::{SetDown, advice};
 use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
 use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_identify::Slide;
 use painleve_identify::parameters::Drawn;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
-use painleve_process::terminal::warn;
+use painleve_process::terminal::{self, warn};
+use painleve_shared::Posture;
+use serde_json::json;
 
 use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
@@ -108,7 +111,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         prepare(&arguments.html, page.as_bytes()).map_err(output)?,
     ])
     .map_err(output)?;
-    report(arguments, &found)
+    report(arguments, &found, &identified)
 }
 
 /// Returns the result and where it comes from.
@@ -185,15 +188,29 @@ fn warn_of_change(scenario: &Scenario, found: &Found) {
     }
 }
 
-/// Prints what was found and where it is written.
-fn report(arguments: &IdentifyArguments, found: &Found) -> Result<(), CommandError> {
+/// Prints what was found, where it is written, and where the identified arm may be set down.
+fn report(
+    arguments: &IdentifyArguments,
+    found: &Found,
+    identified: &Scenario,
+) -> Result<(), CommandError> {
     let (output, html) = (arguments.output.display(), arguments.html.display());
+    let failed = |error| range(&arguments.scenario, error);
     if arguments.json {
         let mut object = report::json(found);
         object["output"] = output.to_string().into();
         object["html"] = html.to_string().into();
+        for (key, posture) in [
+            ("elbow_down", Posture::ElbowDown),
+            ("elbow_up", Posture::ElbowUp),
+        ] {
+            let SetDown { best_m, stretch_m } = SetDown::of(identified, posture).map_err(failed)?;
+            let stretch_m = stretch_m.map(|it| [it.start, it.end]);
+            object["set_down"][key] = json!({ "best_m": best_m, "stretch_m": stretch_m });
+        }
         return say(object);
     }
     say(report::text(found))?;
+    say(terminal::readable(advice(identified).map_err(failed)?))?;
     say(format_args!("written: {output} and {html}"))
 }

@@ -52,7 +52,12 @@ fn an_arm_is_driven_after_the_order_and_the_switch_and_recorded() {
     assert_eq!(report["lost_ticks"], 0, "{report}");
     assert_eq!(report["fault"], 0, "{report}");
     let text = errors(&output);
-    for part in ["arming is permitted", "state: armed", "state: tracking"] {
+    for part in [
+        "Set the tip down here",
+        "arming is permitted",
+        "state: armed",
+        "state: tracking",
+    ] {
         assert!(text.contains(part), "{text}");
     }
     let record = std::fs::read(folder.path("drive.mcap")).unwrap();
