@@ -8,7 +8,7 @@ use core::ops::Range;
 use painleve_firmware::estimate::friction::FrictionEstimate;
 use painleve_firmware::refer::governor::{EdgeGovernor, GovernorState};
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, OutOfRange, Posture, Slip};
+use painleve_shared::{Arm, OutOfRange, Pose, Posture, Slip};
 
 /// Standard deviation of the belt's friction as commissioning measures it, as a part of μ.
 const FRICTION_KNOWN: f32 = 0.05;
@@ -58,15 +58,17 @@ impl SetDown {
         let reach_m = arm.reach_on_belt_m();
         let farthest_m = BENT * reach_m;
         let place_m = |place: i16| farthest_m * f32::from(place) / f32::from(PLACES);
+        let slips = if friction.slip_seen {
+            [friction.slip; 2]
+        } else {
+            [Slip::Positive, Slip::Negative]
+        };
         let p_per_kg = |there_m: f32| {
-            let row = arm.inverse_inertia_row_on_belt(there_m, posture);
-            row.map_or(f32::MIN, |(tangential, normal, factor)| {
-                let against = if friction.slip_seen {
-                    friction.slip.sign::<f32>() * tangential
-                } else {
-                    tangential.abs()
-                };
-                (normal - coefficient * against) / factor
+            let theta_rad = arm.link_angles_on_belt_rad(there_m, posture);
+            theta_rad.map_or(f32::MIN, |theta_rad| {
+                let pose = Pose::new(&theta_rad);
+                let [one, other] = slips.map(|slip| arm.p(&pose, coefficient, slip));
+                one.min(other)
             })
         };
         let away_m = governor.distance_m();

@@ -30,17 +30,6 @@ pub enum Condition {
 }
 
 impl Condition {
-    /// All conditions.
-    pub const ALL: [Self; 7] = [
-        Self::Rigid,
-        Self::Compliant,
-        Self::Soft,
-        Self::Hanging,
-        Self::Patches,
-        Self::Half,
-        Self::Capture,
-    ];
-
     /// Returns the scenario of run `index`, and how its lift-offs are judged.
     ///
     /// # Errors

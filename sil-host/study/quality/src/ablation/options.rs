@@ -1,6 +1,6 @@
 //! Options of the study.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::StudyOptions;
 use painleve_study_core::options::RandomRuns;
@@ -36,8 +36,8 @@ impl StudyOptions for Options {
 
     fn study(&self) -> Result<AblationStudy, StudyError> {
         let study = AblationStudy {
-            conditions: or_all(&self.conditions, &Condition::ALL),
-            parts: or_all(&self.without, &Part::ALL),
+            conditions: or_all(&self.conditions, Condition::value_variants()),
+            parts: or_all(&self.without, Part::value_variants()),
             seed: self.runs.seed,
             runs: self.runs.runs,
             overrides: self.runs.overrides(),

@@ -35,23 +35,6 @@ pub enum Part {
 }
 
 impl Part {
-    /// All parts.
-    pub const ALL: [Self; 13] = [
-        Self::Governor,
-        Self::Recovery,
-        Self::Calibration,
-        Self::FrictionEstimate,
-        Self::FrictionFeedForward,
-        Self::PositionIntegral,
-        Self::ForceReduction,
-        Self::ForceRamp,
-        Self::Disturbance,
-        Self::Response,
-        Self::Probe,
-        Self::ForceDrift,
-        Self::ContactDamping,
-    ];
-
     /// Returns the overrides that switch the part off.
     pub fn without(self) -> &'static [&'static str] {
         match self {
