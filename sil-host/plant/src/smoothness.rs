@@ -8,6 +8,10 @@ use crate::converters::ConverterSettings;
 /// Velocity from which a reference counts as moving, m/s. One that an edge holds back creeps with the estimated edge.
 const MOVING_M_S: f64 = 5e-3;
 
+/// Time after which a reference that has come to rest counts as standing, s. Landing and the end of a motion are neither:
+/// the force then rises to its desired value.
+const SETTLING_S: f64 = 0.5;
+
 /// Smoothness while the controller tracks a moving reference, and one that stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothness {
@@ -16,6 +20,8 @@ pub struct Smoothness {
     /// While it stands.
     pub holding: Roughness,
     tick_hz: f64,
+    /// Ticks since the reference moved, or since tracking began.
+    rest_ticks: u64,
     /// The answer before, if the controller tracked, and the changes of torque that it brought, counts.
     last: Option<(ActuatorFrame, [i64; 2])>,
 }
@@ -76,6 +82,7 @@ impl Smoothness {
             moving: Roughness::default(),
             holding: Roughness::default(),
             tick_hz,
+            rest_ticks: 0,
             last: None,
         }
     }
@@ -86,6 +93,7 @@ impl Smoothness {
         let tracking = Some(SupervisorState::Tracking);
         let Some(answer) = answer.filter(|answer| answer.supervisor_state() == tracking) else {
             self.last = None;
+            self.rest_ticks = 0;
             return;
         };
         let mut changes = [0; 2];
@@ -94,12 +102,15 @@ impl Smoothness {
                 *change = i64::from(answer.torques[joint].0) - i64::from(last.torques[joint].0);
             }
             let way_m = answer.reference_tip.to_metres() - last.reference_tip.to_metres();
-            let roughness = if way_m.abs() * self.tick_hz > MOVING_M_S {
-                &mut self.moving
+            if way_m.abs() * self.tick_hz > MOVING_M_S {
+                self.rest_ticks = 0;
+                self.moving.add(changes, *before, normal_force_n);
             } else {
-                &mut self.holding
-            };
-            roughness.add(changes, *before, normal_force_n);
+                self.rest_ticks += 1;
+                if self.rest_ticks as f64 > SETTLING_S * self.tick_hz {
+                    self.holding.add(changes, *before, normal_force_n);
+                }
+            }
         }
         self.last = Some((*answer, changes));
     }
@@ -122,9 +133,12 @@ mod tests {
     #[test]
     fn a_torque_that_alternates_reverses_at_every_change() {
         let mut smoothness = Smoothness::new(1000.0);
-        for tick in 0..1001 {
+        for tick in 0..2001 {
             let torque = if tick % 2 == 0 { 3 } else { -1 };
-            smoothness.add(Some(&answer([torque, 7], 0)), 10.0 + f64::from(torque - 1));
+            // The force that rises after landing is no ripple.
+            let landing_n = if tick < 400 { -5.0 } else { 0.0 };
+            let normal_force_n = 10.0 + f64::from(torque - 1) + landing_n;
+            smoothness.add(Some(&answer([torque, 7], 0)), normal_force_n);
         }
         let Smoothness {
             moving, holding, ..
