@@ -2,8 +2,8 @@
 
 use painleve_shared::{Arm, Posture, Real, Slip};
 
-/// Largest number of inadmissible points that the search tries, on both sides of the tip together. A stretch farther off
-/// is not for this tip: on the way there it would be thrown off.
+/// Largest number of inadmissible points that the search tries beside the tip, on both sides together. A stretch farther
+/// off is not for this tip: on the way there it would be thrown off.
 const MOST_REFUSED: u32 = 8;
 /// Halvings of the last step: 12 mm / 2¹⁰ is 11 µm.
 const HALVINGS: u32 = 10;
@@ -112,13 +112,6 @@ impl Search {
     pub(super) fn next(self, point_m: f32, excess_per_kg: f32, reach_m: f32) -> Self {
         let (inside_m, stage) = match (self.stage, excess_per_kg >= 0.0) {
             (Stage::Entering { .. }, true) => (point_m, Stage::Marching),
-            // No point is admissible: the best one, from where the next search goes on.
-            (
-                Stage::Entering {
-                    refused, best_m, ..
-                },
-                false,
-            ) if refused >= MOST_REFUSED => (best_m, Stage::Found),
             (
                 Stage::Entering {
                     refused,
@@ -128,12 +121,18 @@ impl Search {
                 false,
             ) => {
                 let is_best = excess_per_kg > most_per_kg;
+                let best_m = if is_best { point_m } else { best_m };
                 let entering = Stage::Entering {
                     refused: refused + 1,
-                    best_m: if is_best { point_m } else { best_m },
+                    best_m,
                     most_per_kg: excess_per_kg.at_least(most_per_kg),
                 };
-                (self.inside_m, entering)
+                if refused < MOST_REFUSED {
+                    (self.inside_m, entering)
+                } else {
+                    // No point is admissible: the best one, from where the next search goes on.
+                    (best_m, Stage::Found)
+                }
             }
             (Stage::Marching, true) if point_m.abs() >= reach_m => (point_m, Stage::Found),
             (Stage::Marching, true) => (point_m, Stage::Marching),
