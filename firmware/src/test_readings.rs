@@ -7,10 +7,11 @@ use crate::configuration::Configuration;
 
 /// Returns uniform noise in −1 … 1 from a fixed stream.
 pub fn noise(step: u32) -> f32 {
-    let bits = step
-        .wrapping_mul(2_654_435_761)
-        .rotate_left(13)
-        .wrapping_mul(2_246_822_519);
+    // The finaliser of MurmurHash3: successive steps are not correlated.
+    let bits = step.wrapping_add(1);
+    let bits = (bits ^ (bits >> 16)).wrapping_mul(0x85eb_ca6b);
+    let bits = (bits ^ (bits >> 13)).wrapping_mul(0xc2b2_ae35);
+    let bits = bits ^ (bits >> 16);
     (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
 }
 

@@ -3,8 +3,8 @@
 //! On a rigid contact f_n = −b/p: the force follows a change of torque at once. On a spring and damper
 //! the tip must move first, and within a tick T only the fraction ρ ≈ c p T + ½ k p T² shows. The
 //! rounding of the torque to counts changes the torque like noise at every tick, by a known amount; until ρ shows that
-//! the contact is rigid, a small probe is added. ρ is the correlation of the measured changes of force with those
-//! that a rigid contact would show.
+//! the contact is rigid, a small probe is added, the smaller the better ρ is known. ρ is the correlation of the measured
+//! changes of force with those that a rigid contact would show.
 //!
 //! An observer that feeds the measured force back at the rate λ takes damping away from the contact. It
 //! is stable while λ < c p²/(Q22 − p), near the edge λ T < ρ p/Q22. ρ therefore limits the part of the
@@ -21,8 +21,8 @@ settings! {
     pub struct ResponseSettings {
         /// Whether the response is estimated; if not, the contact is taken to be rigid.
         enabled: bool = true;
-        /// Amplitude of the probe, a noise-like force that is added to the desired normal force until the contact is known
-        /// to be rigid.
+        /// Largest amplitude of the probe, a noise-like force that is added to the desired normal force until the contact
+        /// is known to be rigid. It shrinks with the interval in which the response lies.
         probe_n: f32 = 0.1, 0.0..=10.0, "N";
         /// Least contact damping c that is assumed.
         least_damping_ns_m: f32 = 10.0, 1e-3..=1e9, "N·s/m";
@@ -243,7 +243,9 @@ impl ResponseEstimator {
             return false;
         }
         if state.lower < RIGID {
-            state.draw_probe(self.settings.probe_n);
+            // As much as there is to find out.
+            let width = (state.upper - state.lower).at_most(1.0);
+            state.draw_probe(width * self.settings.probe_n);
         }
         if state.block_ticks < BLOCK_TICKS {
             state.block_ticks += 1;
