@@ -36,6 +36,7 @@ fn a_rehearsal_writes_what_it_has_found() {
         "Identification: hybrid-elbow-down",
         "friction",
         "The arm's model explains",
+        "Set the tip down here",
         "</svg>",
     ] {
         assert!(page.contains(part), "{part}: {page}");

@@ -105,13 +105,14 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         .applied_to(&scenario, &source)
         .map_err(|error| range(&arguments.scenario, error))?;
     let text = identified.to_commented_toml();
-    let page = report::html(&identified.name, &found);
+    let place = advice(&identified).map_err(|error| range(&arguments.scenario, error))?;
+    let page = report::html(&identified.name, &found, &place);
     commit_all(vec![
         prepare(&arguments.output, text.as_bytes()).map_err(output)?,
         prepare(&arguments.html, page.as_bytes()).map_err(output)?,
     ])
     .map_err(output)?;
-    report(arguments, &found, &identified)
+    report(arguments, &found, &identified, &place)
 }
 
 /// Returns the result and where it comes from.
@@ -188,14 +189,14 @@ fn warn_of_change(scenario: &Scenario, found: &Found) {
     }
 }
 
-/// Prints what was found, where it is written, and where the identified arm may be set down.
+/// Prints what was found, where it is written, and the `place` where the identified arm may be set down.
 fn report(
     arguments: &IdentifyArguments,
     found: &Found,
     identified: &Scenario,
+    place: &str,
 ) -> Result<(), CommandError> {
     let (output, html) = (arguments.output.display(), arguments.html.display());
-    let failed = |error| range(&arguments.scenario, error);
     if arguments.json {
         let mut object = report::json(found);
         object["output"] = output.to_string().into();
@@ -204,13 +205,14 @@ fn report(
             ("elbow_down", Posture::ElbowDown),
             ("elbow_up", Posture::ElbowUp),
         ] {
-            let SetDown { best_m, stretch_m } = SetDown::of(identified, posture).map_err(failed)?;
+            let SetDown { best_m, stretch_m } = SetDown::of(identified, posture)
+                .map_err(|error| range(&arguments.scenario, error))?;
             let stretch_m = stretch_m.map(|it| [it.start, it.end]);
             object["set_down"][key] = json!({ "best_m": best_m, "stretch_m": stretch_m });
         }
         return say(object);
     }
     say(report::text(found))?;
-    say(terminal::readable(advice(identified).map_err(failed)?))?;
+    say(terminal::readable(place))?;
     say(format_args!("written: {output} and {html}"))
 }

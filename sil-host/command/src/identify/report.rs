@@ -29,12 +29,12 @@ pub fn text(found: &Found) -> String {
     text + &terminal::readable(sentences(found).join("\n"))
 }
 
-/// Returns the result as a page.
-pub fn html(name: &str, found: &Found) -> String {
+/// Returns the result as a page, with the `place` where the tip may be set down.
+pub fn html(name: &str, found: &Found, place: &str) -> String {
     let mut body = String::new();
-    for sentence in sentences(found) {
+    for sentence in sentences(found).iter().map(String::as_str).chain([place]) {
         // Writing to a string does not fail.
-        let _ = write!(body, "<p>{}</p>", escaped(&sentence));
+        let _ = write!(body, "<p>{}</p>", escaped(sentence));
     }
     for Table { header, rows } in [geometry(found), joints(found)] {
         body += "<table><tr>";
