@@ -12,7 +12,7 @@ use rand_pcg::Pcg64;
 /// Returns the scenario with an arm that differs from what its controller knows. Uniformly: zeros by 3° (a plumb line
 /// held by hand, and the magnet), errors of an AS5048A once (0.3°) and twice around (0.1°), the second link by 1 % and the
 /// first, which has been measured, by 0.05 %, the belt's height by 3 mm and its tilt by 2°, springs by 10 %, joint
-/// friction of 0.02 … 0.1 N·m of which nothing is known, stages by 10 %, force cell by 3 % of gain and cross-talk; waves of the belt of
+/// friction of 0.02 … 0.1 N·m of which nothing is known, stages by 10 % and their limits by 20 %, force cell by 3 % of gain and cross-talk; waves of the belt of
 /// 0.1 mm and a seam of 0.2 mm, on a contact of 1e5 N/m.
 ///
 /// # Errors
@@ -45,6 +45,9 @@ pub fn imperfect(scenario: &Scenario, seed: u64) -> Result<Scenario, OutOfRange>
     actual.effects.joints.static_ratio = 1.2;
     actual.effects.surface.waviness_m = 1e-4;
     actual.effects.surface.seam_height_m = 2e-4;
+    let limit_nm = f64::from(scenario.controller.torque_limit_nm);
+    let torque_error = &mut actual.converters.torque.error;
+    torque_error.limit_nm = Some([0, 1].map(|_| limit_nm * (1.0 + draw(0.2))));
     actual.run.seed = seed;
     set_down(scenario, &mut actual)?;
     Ok(actual)

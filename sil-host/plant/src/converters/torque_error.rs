@@ -1,6 +1,7 @@
 //! Errors between the commanded torque and the torque at the joint.
 //!
-//! τ = (1 + g) D(u) (1 + r sin nθ) + c sin nθ + τ_pulse, with the dead zone D, the joint angle θ and n periods in a turn.
+//! τ = L((1 + g) D(u)) (1 + r sin nθ) + c sin nθ + τ_pulse, with the dead zone D, the stage's own limit L, the joint angle
+//! θ and n periods in a turn.
 //! It is evaluated where the torque changes, once per tick, and held until the next change.
 
 use core::f64::consts::TAU;
@@ -13,6 +14,8 @@ settings! {
     pub struct TorqueErrorSettings {
         /// Relative error g of the gain of each joint.
         gain: [f64; 2] = [0.0; 2], -1.0..=10.0;
+        /// Largest torque that each stage gives, which the controller does not know; that of its range if absent.
+        limit_nm: Option<[f64; 2]> = None, 0.0..=1e6, "N·m";
         /// Dead zone: reduces the magnitude of a commanded torque by this amount, to zero for
         /// smaller torques.
         dead_zone_nm: f64 = 0.0, 0.0..=1e6, "N·m";
@@ -55,8 +58,11 @@ impl TorqueErrorSettings {
                 .copysign(command_nm);
             let turns = angles[joint] / TAU * f64::from(self.periods_per_turn);
             let wave = libm::sin(TAU * turns);
-            *torque_nm = (1.0 + self.gain[joint]) * beyond_nm * (1.0 + self.ripple * wave)
-                + self.cogging_nm * wave;
+            let mut given_nm = (1.0 + self.gain[joint]) * beyond_nm;
+            if let Some(limits_nm) = self.limit_nm {
+                given_nm = given_nm.clamp(-limits_nm[joint], limits_nm[joint]);
+            }
+            *torque_nm = given_nm * (1.0 + self.ripple * wave) + self.cogging_nm * wave;
             if is_pulse {
                 *torque_nm += self.pulse_nm[joint];
             }
@@ -86,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pulse_lasts_from_its_start_to_its_end_and_the_dead_zone_is_symmetric() {
+    fn a_pulse_lasts_from_its_start_to_its_end_and_dead_zone_and_limit_are_symmetric() {
         let pulse = TorqueErrorSettings {
             pulse_nm: [0.5, 0.0],
             ..Default::default()
@@ -102,6 +108,13 @@ mod tests {
         };
         let through = [-1.0, -0.2, 0.2, 1.0].map(|command| applied(&dead, command, 0.0, 0.0));
         assert_eq!(through, [-0.75, 0.0, 0.0, 0.75]);
+        let limited = TorqueErrorSettings {
+            limit_nm: Some([0.5, 1.0]),
+            gain: [1.0, 0.0],
+            ..Default::default()
+        };
+        let given = [-1.0, -0.2, 0.2, 1.0].map(|command| applied(&limited, command, 0.0, 0.0));
+        assert_eq!(given, [-0.5, -0.4, 0.4, 0.5]);
     }
 
     proptest! {
