@@ -27,7 +27,7 @@ use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Pose, Posture};
 
 /// Normal force of a slide, N.
-const FORCE_N: f64 = 4.0;
+pub const FORCE_N: f64 = 4.0;
 
 /// Least normal force of a tip on the belt in a slide, N.
 const CONTACT_N: f64 = 0.25 * FORCE_N;
@@ -53,8 +53,9 @@ const RIPPLES: f64 = 8.0;
 /// Rate at which the mean force follows, from which the ripple is taken, per tick.
 const MEAN_PER_TICK: f64 = 0.01;
 
-/// Largest number of attempts at a slide whose tip leaves the belt.
-const ATTEMPTS: usize = 3;
+/// Normal forces of the attempts at a slide whose tip leaves the belt, N: torques that a badly known model takes for
+/// those of the arm may lift a tip that presses less.
+const ATTEMPTS_N: [f64; 3] = [FORCE_N, 1.25 * FORCE_N, 1.5 * FORCE_N];
 
 /// A tick of a slide.
 #[derive(Clone, Copy, Debug, Default)]
@@ -178,8 +179,8 @@ pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>)
         .collect()
 }
 
-/// Returns the scenario of a slide in a posture to both ends, a part of the reach from the middle. The belt runs in the
-/// direction in which p is larger.
+/// Returns the scenario of a slide in a posture, under a normal force (N), to both ends, a part of the reach from the
+/// middle. The belt runs in the direction in which p is larger.
 ///
 /// # Errors
 /// [`ScenarioError`] if the arm does not reach the belt, or a value is out of range.
@@ -187,6 +188,7 @@ pub fn slide_scenario(
     scenario: &Scenario,
     share: f64,
     posture: Posture,
+    force_n: f64,
 ) -> Result<Scenario, ScenarioError> {
     let arm = Arm::new(scenario.controller_configuration().arm).map_err(|source| {
         ScenarioError::Range {
@@ -212,7 +214,7 @@ pub fn slide_scenario(
     let speed_m_s =
         size_m_s.copysign(coupling.map_or(1.0, |(tangential, ..)| f64::from(tangential)));
     let overrides = [
-        format!("controller.law={{ hybrid = {{ normal_force_n = {FORCE_N:?} }} }}"),
+        format!("controller.law={{ hybrid = {{ normal_force_n = {force_n:?} }} }}"),
         reference,
         format!("run.duration_s={duration_s}"),
         "run.enable_at_s=0.0".into(),
@@ -252,20 +254,21 @@ pub fn identify_arm<R: SlideRig>(
     let mut slides = Vec::new();
     let mut slide = |known: &Scenario, share: f64, postures: [Posture; 2]| {
         for posture in postures {
-            let program = slide_scenario(known, share, posture)?;
-            // An arm that is hardly known may throw its tip off when it starts.
-            let mut attempt = 1;
-            let slide = loop {
+            let mut attempt = |force_n| {
+                let program = slide_scenario(known, share, posture, force_n)?;
                 let ticks = rig.slide(&program, posture);
-                let slide = Slide {
+                Ok::<_, IdentificationError<R::Error>>(Slide {
                     posture,
                     readings: readings(scenario, ticks.map_err(IdentificationError::Rig)?),
-                };
-                if attempt == ATTEMPTS || slide.share_on_belt(&limits) >= ON_BELT {
-                    break slide;
-                }
-                attempt += 1;
+                })
             };
+            let [first_n, others_n @ ..] = ATTEMPTS_N;
+            let mut slide = attempt(first_n)?;
+            for force_n in others_n {
+                if slide.share_on_belt(&limits) < ON_BELT {
+                    slide = attempt(force_n)?;
+                }
+            }
             slides.push(slide);
         }
         Ok::<_, IdentificationError<R::Error>>(slides.clone())

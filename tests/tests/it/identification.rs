@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use painleve_commission::identification::slide_scenario;
+use painleve_commission::identification::{FORCE_N, slide_scenario};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
 use painleve_tests::{Bench, code, errors};
@@ -64,7 +64,7 @@ fn recorded(bench: &Bench, posture: Posture, name: &str) -> String {
     let arm = Scenario::default()
         .with_overrides("arm", &overrides)
         .unwrap();
-    let slide = slide_scenario(&arm, 0.93, posture).unwrap();
+    let slide = slide_scenario(&arm, 0.93, posture, FORCE_N).unwrap();
     std::fs::write(bench.path("slide.toml"), slide.to_commented_toml()).unwrap();
     let file = format!("{name}.mcap");
     let report = bench.report(&[

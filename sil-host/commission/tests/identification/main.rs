@@ -144,6 +144,16 @@ fn arms_as_bad_as_life_are_identified() {
     }
 }
 
+/// Zeros that are wrong by almost 3° lift a tip that presses with 4 N only.
+#[test]
+fn a_tip_that_is_lifted_presses_more_at_the_next_attempt() {
+    let study = loops(7_005_000, 211);
+    let scenario = study.scenario(study.cells()[0], 210).unwrap();
+    let (found, rig) = identified(&scenario, 7_005_070, None);
+    assert_eq!(found.map(|_| ()), Ok(()));
+    assert!(rig.largest_force_n < 10.0, "{}", rig.largest_force_n);
+}
+
 /// Joints that turn to and fro show less friction than they have.
 #[test]
 fn joints_that_vibrate_do_not_pass_for_joints_with_less_friction() {

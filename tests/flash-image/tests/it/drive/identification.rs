@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader};
 
 use painleve_commission::elbow_side;
-use painleve_commission::identification::slide_scenario;
+use painleve_commission::identification::{FORCE_N, slide_scenario};
 use painleve_flash_image::bench::scenario;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
@@ -31,7 +31,7 @@ fn at_start(task: &str) -> Scenario {
         format!("initial={{ tip_m = 0.0, elbow = '{elbow}' }}"),
     ];
     let arm = scenario(DEFAULT).with_overrides("arm", &overrides).unwrap();
-    let slide = slide_scenario(&arm, 0.5, posture).unwrap();
+    let slide = slide_scenario(&arm, 0.5, posture, FORCE_N).unwrap();
     let belt_m_s = slide.belt.profile.speed_m_s(0.0);
     let direction = if belt_m_s < 0.0 { "−t" } else { "+t" };
     assert!(task.contains(&format!(
