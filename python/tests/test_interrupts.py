@@ -29,7 +29,9 @@ STIFF = {
     "contact.local_error": 1e-12,
 }
 PROGRAM = """
-import os, sys, time, painleve
+import os, signal, painleve
+# A shell starts commands in the background with the signal ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 STIFF = {stiff!r}
 plant, simulation = painleve.Plant("open-loop-bounce", STIFF), painleve.Simulation("open-loop-bounce", STIFF)
 os.write(1, b"x")
