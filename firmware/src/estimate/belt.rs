@@ -5,7 +5,7 @@
 //! these bounds and widens them with the largest acceleration of the belt. After the tip has slid
 //! in both directions, or stuck, the bounds meet.
 
-use painleve_shared::{OutOfRange, Real, Slip, check_setting, settings};
+use painleve_shared::{Real, Slip, settings};
 
 use crate::estimate::friction::FrictionEstimate;
 
@@ -16,19 +16,10 @@ settings! {
     /// Settings of the belt-speed estimator.
     #[derive(Copy)]
     pub struct BeltSpeedSettings {
-        /// Belt speed if it is known and constant; at most `fastest_m_s` in either direction.
+        /// Belt speed if it is known and constant.
         given_m_s: Option<f32> = None, -100.0..=100.0, "m/s";
-        /// Largest belt speed in either direction.
-        fastest_m_s: f32 = 2.0, 1e-3..=100.0, "m/s";
         /// Largest acceleration of the belt.
         acceleration_m_s2: f32 = 2.0, 0.0..=1e3, "m/s²";
-    }
-    check Self::relations;
-}
-
-impl BeltSpeedSettings {
-    fn relations(&self) -> Result<(), OutOfRange> {
-        check_setting!(self.given_m_s, -self.fastest_m_s, self.fastest_m_s)
     }
 }
 
@@ -79,9 +70,8 @@ impl BeltEstimator {
             return;
         }
         let widening = self.widening_m_s;
-        let limit = self.settings.fastest_m_s;
-        state.slowest_m_s = (state.slowest_m_s - widening).at_least(-limit);
-        state.fastest_m_s = (state.fastest_m_s + widening).at_most(limit);
+        state.slowest_m_s -= widening;
+        state.fastest_m_s += widening;
         let Some(friction) = friction.filter(|friction| friction.slip_seen) else {
             return;
         };
