@@ -100,7 +100,7 @@ impl SlideRig for BoardSlides {
         let mut arm = ConnectedArm::open(&self.port, &configuration, FrameSource::Sensors)?;
         let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
         warn(format_args!(
-            "operator: let the belt run towards {}t, at about {:.1} m/s; hold the arm with its tip on the belt right below \
+            "operator: let the belt run towards {}t, at about {:.2} m/s; hold the arm with its tip on the belt right below \
              joint 1, the elbow {}; then press Return",
             if speed_m_s < 0.0 { '−' } else { '+' },
             speed_m_s.abs(),

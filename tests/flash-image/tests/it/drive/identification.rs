@@ -35,7 +35,7 @@ fn at_start(task: &str) -> Scenario {
     let belt_m_s = slide.belt.profile.speed_m_s(0.0);
     let direction = if belt_m_s < 0.0 { "−t" } else { "+t" };
     assert!(task.contains(&format!(
-        "towards {direction}, at about {:.1} m/s",
+        "towards {direction}, at about {:.2} m/s",
         belt_m_s.abs()
     )));
     slide
