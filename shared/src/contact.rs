@@ -44,15 +44,6 @@ impl Slip {
             Slip::Negative => -T::one(),
         }
     }
-
-    /// Returns the opposite direction.
-    #[inline]
-    pub fn reversed(self) -> Self {
-        match self {
-            Slip::Positive => Slip::Negative,
-            Slip::Negative => Slip::Positive,
-        }
-    }
 }
 
 /// The solutions of the sliding equations at one state (paper, section II-A).

@@ -86,31 +86,39 @@ pub trait Real: RealField + Copy + SettingValue {
     fn square_root(self) -> Self;
 }
 
+/// Conversions that differ only in the type, with the bits of a number, the bias of its exponent and the length of its
+/// fraction.
+macro_rules! conversions {
+    ($bits:ty, $bias:literal, $fraction:literal) => {
+        #[inline]
+        fn literal(value: f64) -> Self {
+            value as Self
+        }
+
+        #[inline]
+        fn to_f64(self) -> f64 {
+            self as f64
+        }
+
+        #[inline]
+        fn from_integer(value: i32) -> Self {
+            value as Self
+        }
+
+        #[inline]
+        fn negative_power_of_two(exponent: u8) -> Self {
+            Self::from_bits(($bias - <$bits>::from(exponent & 127)) << $fraction)
+        }
+
+        #[inline]
+        fn truncate_to_i32(self) -> i32 {
+            self as i32
+        }
+    };
+}
+
 impl Real for f64 {
-    #[inline]
-    fn literal(value: f64) -> Self {
-        value
-    }
-
-    #[inline]
-    fn to_f64(self) -> f64 {
-        self
-    }
-
-    #[inline]
-    fn from_integer(value: i32) -> Self {
-        f64::from(value)
-    }
-
-    #[inline]
-    fn negative_power_of_two(exponent: u8) -> Self {
-        Self::from_bits((1023 - u64::from(exponent & 127)) << 52)
-    }
-
-    #[inline]
-    fn truncate_to_i32(self) -> i32 {
-        self as i32
-    }
+    conversions!(u64, 1023, 52);
 
     #[inline]
     fn sine_cosine(self) -> (Self, Self) {
@@ -134,30 +142,7 @@ impl Real for f64 {
 }
 
 impl Real for f32 {
-    #[inline]
-    fn literal(value: f64) -> Self {
-        value as f32
-    }
-
-    #[inline]
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
-
-    #[inline]
-    fn from_integer(value: i32) -> Self {
-        value as f32
-    }
-
-    #[inline]
-    fn negative_power_of_two(exponent: u8) -> Self {
-        Self::from_bits((127 - u32::from(exponent & 127)) << 23)
-    }
-
-    #[inline]
-    fn truncate_to_i32(self) -> i32 {
-        self as i32
-    }
+    conversions!(u32, 127, 23);
 
     #[inline]
     fn sine_cosine(self) -> (Self, Self) {
