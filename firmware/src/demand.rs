@@ -1,13 +1,12 @@
 //! The torque that a tick demands: from the law while the tip touches, from the recovery while a tip
 //! that left the belt is returned to it.
 
-use painleve_shared::{Arm, Posture};
+use painleve_shared::Posture;
 
-use crate::estimate::ContactEstimate;
-use crate::estimate::model::Model;
-use crate::last_command::LastCommand;
+use crate::configuration::Configuration;
+use crate::estimate::EstimatesState;
 use crate::law::{Law, LawInput, LawOutput};
-use crate::recover::{Recovery, RecoverySettings, RecoveryState};
+use crate::recover::{RecoverySettings, RecoveryState};
 use crate::refer::Target;
 use crate::supervise::supervisor::Phase;
 
@@ -15,7 +14,7 @@ use crate::supervise::supervisor::Phase;
 #[derive(Clone, Debug)]
 pub struct TorqueDemand<L> {
     law: L,
-    recovery: Recovery,
+    recovery: RecoverySettings,
     tick_s: f32,
     torque_limit_nm: f32,
 }
@@ -39,32 +38,15 @@ impl<L: Law> DemandState<L> {
     }
 }
 
-/// Inputs of a [`TorqueDemand`] at one tick.
-#[derive(Clone, Copy, Debug)]
-pub struct DemandInput<'a> {
-    /// The arm with its calibrated length.
-    pub arm: &'a Arm<f32>,
-    /// Its model at the estimated angles and rates.
-    pub model: &'a Model,
-    /// The contact estimate.
-    pub contact: &'a ContactEstimate,
-    /// The drive's state.
-    pub phase: &'a Phase,
-    /// The reference.
-    pub target: &'a Target,
-    /// The command until now.
-    pub last: &'a LastCommand,
-}
-
 impl<L: Law> TorqueDemand<L> {
-    /// Makes the demand of this law and this recovery, with a control period of `tick_s` (s) and torques
-    /// up to `torque_limit_nm` (N·m).
-    pub fn new(law: L, recovery: &RecoverySettings, tick_s: f32, torque_limit_nm: f32) -> Self {
+    /// Makes the demand of this configuration, with motion loops of the law that are faster by a factor.
+    pub fn new(configuration: &Configuration<L>, speed: f32) -> Self {
+        let settings = &configuration.settings;
         Self {
-            law,
-            recovery: Recovery::new(recovery, tick_s),
-            tick_s,
-            torque_limit_nm,
+            law: settings.law.sped_up(speed),
+            recovery: settings.recovery,
+            tick_s: configuration.tick_s(),
+            torque_limit_nm: settings.torque_limit_nm,
         }
     }
 
@@ -81,20 +63,27 @@ impl<L: Law> TorqueDemand<L> {
         self.law.is_on()
     }
 
-    /// Returns the torque that this tick demands, and the contact force that it is meant to cause.
+    /// Returns the torque that this tick demands, and the contact force that it is meant to cause. `saturated` states
+    /// whether the torque until now was limited.
     #[inline]
-    pub fn tick(&self, state: &mut DemandState<L>, input: &DemandInput<'_>) -> LawOutput {
-        let DemandInput {
+    pub fn tick(
+        &self,
+        state: &mut DemandState<L>,
+        estimates: &EstimatesState,
+        phase: &Phase,
+        target: &Target,
+        saturated: bool,
+    ) -> LawOutput {
+        let EstimatesState {
             arm,
             model,
             contact,
-            phase,
-            target,
-            last,
-        } = *input;
+            ..
+        } = estimates;
         if target.recovering {
-            let edges_m = target.fresh_edges_m;
-            return self.recovery.tick(&mut state.recovery, arm, model, edges_m);
+            let (edges_m, tick_s) = (target.fresh_edges_m, self.tick_s);
+            let recovery = &mut state.recovery;
+            return self.recovery.tick(recovery, arm, model, edges_m, tick_s);
         }
         state.recovery.touch(self.tick_s);
         let starts = phase.arms || contact.lands;
@@ -107,7 +96,7 @@ impl<L: Law> TorqueDemand<L> {
             p_per_kg: contact.p_per_kg,
             response: &contact.response,
             contact: contact.touches,
-            saturated: last.saturated && !starts,
+            saturated: saturated && !starts,
             reference: target.reference,
             torque_limit_nm: self.torque_limit_nm,
             tick_s: self.tick_s,

@@ -49,14 +49,7 @@ settings! {
     }
 }
 
-/// Computes the torques that return the tip to the belt.
-#[derive(Clone, Copy, Debug)]
-pub struct Recovery {
-    settings: RecoverySettings,
-    tick_s: f32,
-}
-
-/// State of a [`Recovery`]; idle while the tip touches.
+/// State of a recovery; idle while the tip touches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RecoveryState {
     /// Landing point (m) and desired height (m), once the tip is in the air.
@@ -97,21 +90,8 @@ struct Flight {
     touched_s: f32,
 }
 
-impl Recovery {
-    /// Makes a recovery that is called every `tick_s`.
-    pub fn new(settings: &RecoverySettings, tick_s: f32) -> Self {
-        Self {
-            settings: *settings,
-            tick_s,
-        }
-    }
-
-    /// Returns the least p, as a fraction of Q22, at which the tip may land.
-    pub fn minimum_p_ratio(&self) -> f32 {
-        self.settings.minimum_p_ratio
-    }
-
-    /// Computes the torques for one tick in the air, with the admissible stretch `edges_m`; until it
+impl RecoverySettings {
+    /// Computes the torques for one tick of `tick_s` (s) in the air, with the admissible stretch `edges_m`; until it
     /// is known the tip is held above the belt.
     // Out of line: its code in the controller's would take registers from every tick.
     #[inline(never)]
@@ -121,8 +101,8 @@ impl Recovery {
         arm: &Arm<f32>,
         model: &Model,
         edges_m: Option<(f32, f32)>,
+        tick_s: f32,
     ) -> LawOutput {
-        let (settings, tick_s) = (&self.settings, self.tick_s);
         let mut flight = state.flight.unwrap_or(Flight {
             landing_m: model.tip_m.x,
             height_m: model.gap_m.at_least(0.0),
@@ -147,9 +127,9 @@ impl Recovery {
         });
         // Descend faster at greater height, and at landing speed close to the belt.
         let down = if flight.height_m < 0.0 {
-            SEARCHING * settings.landing_speed_m_s
+            SEARCHING * self.landing_speed_m_s
         } else {
-            settings.landing_speed_m_s + DESCENT_PER_S * flight.height_m
+            self.landing_speed_m_s + DESCENT_PER_S * flight.height_m
         };
         let vertical_speed = if !flight.lands {
             let rise = (CLEARANCE_M - flight.height_m) / tick_s;
@@ -174,12 +154,12 @@ impl Recovery {
         flight.path_rad = Some(path_rad);
         state.flight = Some(flight);
 
-        let bandwidth = settings.bandwidth_rad_s;
+        let bandwidth = self.bandwidth_rad_s;
         let wanted = (path_rad - model.theta_rad) * (bandwidth * bandwidth)
             + (path_rate_rad_s - model.theta_dot_rad_s) * (2.0 * bandwidth);
         let size = wanted.vector().norm_squared().square_root();
-        let scale = (settings.acceleration_rad_s2 / size.at_least(settings.acceleration_rad_s2))
-            .at_most(1.0);
+        let scale =
+            (self.acceleration_rad_s2 / size.at_least(self.acceleration_rad_s2)).at_most(1.0);
         LawOutput {
             torque_nm: model.inverse_dynamics_in_air_nm(&(wanted * scale)),
             contact_force_n: Vector2::zeros(),
@@ -205,10 +185,10 @@ mod tests {
             LinkMotion::zeros(),
             &GeneralisedTorque::zeros(),
         );
-        let recovery = Recovery::new(&RecoverySettings::default(), 1e-3);
+        let recovery = RecoverySettings::default();
         let mut state = RecoveryState::default();
         for _ in 0..10 {
-            recovery.tick(&mut state, &arm, &model, None);
+            recovery.tick(&mut state, &arm, &model, None, 1e-3);
             (0..40).for_each(|_| state.touch(1e-3));
             assert_eq!(state.posture(), Some(Posture::ElbowDown));
         }
@@ -229,7 +209,7 @@ mod tests {
         let theta = arm.link_angles_rad(&tip_m, posture).unwrap();
         let torque = GeneralisedTorque::zeros();
         let model = Model::new(&arm, theta, LinkMotion::zeros(), &torque);
-        let recovery = Recovery::new(&RecoverySettings::default(), 1e-3);
+        let recovery = RecoverySettings::default();
         let mut state = RecoveryState {
             flight: Some(Flight {
                 landing_m,
@@ -242,7 +222,11 @@ mod tests {
         };
         let edges = Some((-0.15, 0.15));
         let torque = (0..ticks)
-            .map(|_| recovery.tick(&mut state, &arm, &model, edges).torque_nm)
+            .map(|_| {
+                recovery
+                    .tick(&mut state, &arm, &model, edges, 1e-3)
+                    .torque_nm
+            })
             .last()
             .unwrap();
         let acceleration = model.free_acceleration_rad_s2(&torque);
@@ -280,12 +264,12 @@ mod tests {
             let at = Vector2::new(tip, height - arm.height_m());
             let mut theta = arm.link_angles_rad(&at, posture).unwrap();
             let mut theta_dot = LinkMotion::new(w1, w2);
-            let recovery = Recovery::new(&RecoverySettings::default(), 1e-3);
+            let recovery = RecoverySettings::default();
             let mut state = RecoveryState::default();
             let edges = (-0.18, 0.155);
             let landing = (0..1000).find_map(|_| {
                 let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
-                let torque = recovery.tick(&mut state, &arm, &model, Some(edges)).torque_nm;
+                let torque = recovery.tick(&mut state, &arm, &model, Some(edges), 1e-3).torque_nm;
                 for _ in 0..10 {
                     let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
                     theta_dot += model.free_acceleration_rad_s2(&torque) * 1e-4;

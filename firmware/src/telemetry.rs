@@ -3,13 +3,12 @@
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::{JointTorque, LinkMotion, Slip};
 
-use crate::estimate::ContactEstimate;
-use crate::estimate::model::Model;
+use crate::estimate::EstimatesState;
 use crate::last_command::LastCommand;
 use crate::refer::Target;
 use crate::supervise::supervisor::Supervision;
 
-/// A snapshot for logs and displays. The controller can only write it, through a `TelemetrySink`.
+/// A snapshot for logs and displays. The controller only writes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Telemetry {
@@ -59,46 +58,19 @@ pub struct Telemetry {
     pub saturated_ticks: u32,
 }
 
-/// Results of the stages of one tick.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct TelemetryTick<'a> {
-    pub(crate) model: &'a Model,
-    pub(crate) contact: &'a ContactEstimate,
-    pub(crate) contact_confidence: f32,
-    pub(crate) target: &'a Target,
-    pub(crate) command: &'a LastCommand,
-    pub(crate) recovering: bool,
-}
-
-/// Destination of the controller's telemetry, if it is wanted.
-pub(crate) struct TelemetrySink<'a>(Option<&'a mut Telemetry>);
-
-impl<'a> TelemetrySink<'a> {
-    /// Discards the telemetry.
-    pub(crate) fn nowhere() -> Self {
-        Self(None)
-    }
-
-    /// Writes to this snapshot.
-    pub(crate) fn to(telemetry: &'a mut Telemetry) -> Self {
-        Self(Some(telemetry))
-    }
-
+impl Telemetry {
     /// Writes the results of a tick.
     #[inline]
-    pub(crate) fn record(self, of: &TelemetryTick<'_>, tick: u32, supervision: &Supervision) {
-        let Some(telemetry) = self.0 else {
-            return;
-        };
-        let TelemetryTick {
-            model,
-            contact,
-            contact_confidence,
-            target,
-            command,
-            recovering,
-        } = of;
-        *telemetry = Telemetry {
+    pub(crate) fn record(
+        &mut self,
+        tick: u32,
+        estimates: &EstimatesState,
+        target: &Target,
+        command: &LastCommand,
+        supervision: &Supervision,
+    ) {
+        let (model, contact) = (&estimates.model, &estimates.contact);
+        *self = Self {
             tick,
             state: supervision.state(),
             fault: supervision.fault(),
@@ -111,33 +83,29 @@ impl<'a> TelemetrySink<'a> {
             tangential_force_n: contact.force_n.x,
             torque_nm: command.torque_nm,
             contact: contact.touches,
-            contact_confidence: *contact_confidence,
+            contact_confidence: estimates.contact_confidence(),
             friction: contact.friction.coefficient,
             friction_deviation: contact.friction.deviation(),
             slip: contact.friction.slip,
             sticks: contact.friction.sticks,
             edges_m: target.edges_m.into(),
             at_edge: target.at_edge,
-            recovering: *recovering,
+            recovering: target.recovering && supervision.drives(),
             saturated: command.saturated,
-            saturated_ticks: telemetry
-                .saturated_ticks
-                .wrapping_add(command.saturated.into()),
+            saturated_ticks: self.saturated_ticks.wrapping_add(command.saturated.into()),
         };
     }
 
     /// Records that the torque has been taken off without a tick.
-    pub(crate) fn stop(self, supervision: &Supervision) {
-        if let Some(telemetry) = self.0 {
-            *telemetry = Telemetry {
-                state: supervision.state(),
-                fault: supervision.fault(),
-                torque_nm: JointTorque::zeros(),
-                at_edge: false,
-                recovering: false,
-                saturated: false,
-                ..*telemetry
-            };
-        }
+    pub(crate) fn stop(&mut self, supervision: &Supervision) {
+        *self = Self {
+            state: supervision.state(),
+            fault: supervision.fault(),
+            torque_nm: JointTorque::zeros(),
+            at_edge: false,
+            recovering: false,
+            saturated: false,
+            ..*self
+        };
     }
 }

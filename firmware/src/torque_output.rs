@@ -1,14 +1,11 @@
 //! Converts a law's torque to counts: checked, limited and rounded.
 
 use painleve_shared::counts::{LinearConverter, LinearScale, TorqueCounts};
+use painleve_shared::status::Fault;
 use painleve_shared::{JointTorque, Real};
 
 use crate::last_command::LastCommand;
 use crate::law::LawOutput;
-
-/// A requested torque is not a finite number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NotFinite;
 
 /// Limits torques and converts them to counts of the torque stages.
 #[derive(Clone, Copy, Debug)]
@@ -26,31 +23,20 @@ impl TorqueOutput {
         }
     }
 
-    /// Converts a law's answer at one tick to a command.
+    /// Converts a law's answer at one tick to a command: limits the desired torques and rounds them to counts.
     ///
     /// # Errors
-    /// [`NotFinite`] if the law's torque is not a finite number; the command stays unchanged.
+    /// [`Fault::NotFinite`] if the law's torque is not a finite number; the command stays unchanged.
     #[inline]
-    pub fn tick(&self, command: &mut LastCommand, output: &LawOutput) -> Result<(), NotFinite> {
-        self.limit(command, &output.torque_nm)?;
-        command.contact_force_n = output.contact_force_n;
-        Ok(())
-    }
-
-    /// Limits the desired torques and converts them to counts.
-    #[inline]
-    fn limit(
-        &self,
-        command: &mut LastCommand,
-        wanted_nm: &JointTorque<f32>,
-    ) -> Result<(), NotFinite> {
+    pub fn tick(&self, command: &mut LastCommand, output: &LawOutput) -> Result<(), Fault> {
+        let wanted_nm = output.torque_nm;
         // Check before clamping, which would turn an infinity into a limit.
         if !(wanted_nm.first().is_finite() && wanted_nm.second().is_finite()) {
-            return Err(NotFinite);
+            return Err(Fault::NotFinite);
         }
         // Carry the rounding remainder to the next tick: near the edge, where p is small, half a
         // count of constant torque would cause one newton of force.
-        let owed = (*wanted_nm + command.rounding_nm).map(|torque| torque.within(self.limit_nm));
+        let owed = (wanted_nm + command.rounding_nm).map(|torque| torque.within(self.limit_nm));
         let converter = &self.converter;
         let (counts_1, over_1) = converter.counts(owed.first());
         let (counts_2, over_2) = converter.counts(owed.second());
@@ -60,6 +46,7 @@ impl TorqueOutput {
         command.torque_nm = given;
         command.saturated = over_1 || over_2 || wanted_nm.amax() > self.limit_nm;
         command.rounding_nm = (owed - given).map(|rest| rest.within(half));
+        command.contact_force_n = output.contact_force_n;
         Ok(())
     }
 }
@@ -76,6 +63,14 @@ mod tests {
         TorqueOutput::new(scale, 5.0)
     }
 
+    fn limit(command: &mut LastCommand, torque_nm: &JointTorque<f32>) -> Result<(), Fault> {
+        let output = LawOutput {
+            torque_nm: *torque_nm,
+            ..Default::default()
+        };
+        stages().tick(command, &output)
+    }
+
     #[test]
     fn a_torque_that_is_not_a_number_is_refused() {
         for wanted in [
@@ -83,7 +78,7 @@ mod tests {
             JointTorque::new(0.0, f32::INFINITY),
         ] {
             let mut command = LastCommand::default();
-            assert_eq!(stages().limit(&mut command, &wanted), Err(NotFinite));
+            assert_eq!(limit(&mut command, &wanted), Err(Fault::NotFinite));
             assert_eq!(command, LastCommand::default());
         }
     }
@@ -95,7 +90,7 @@ mod tests {
         let mut command = LastCommand::default();
         let mut sum = JointTorque::zeros();
         for _ in 0..100 {
-            stages().limit(&mut command, &wanted).unwrap();
+            limit(&mut command, &wanted).unwrap();
             sum += command.torque_nm;
         }
         assert!((sum - wanted * 100.0).amax() <= count, "{sum:?}");
@@ -104,14 +99,10 @@ mod tests {
     #[test]
     fn a_torque_beyond_the_limit_is_limited_and_flagged() {
         let mut command = LastCommand::default();
-        stages()
-            .limit(&mut command, &JointTorque::new(7.0, -1.0))
-            .unwrap();
+        limit(&mut command, &JointTorque::new(7.0, -1.0)).unwrap();
         assert!(command.saturated);
         assert!(command.torque_nm.first() <= 5.0);
-        stages()
-            .limit(&mut command, &JointTorque::new(4.0, -1.0))
-            .unwrap();
+        limit(&mut command, &JointTorque::new(4.0, -1.0)).unwrap();
         assert!(!command.saturated);
     }
 }

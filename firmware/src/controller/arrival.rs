@@ -78,9 +78,7 @@ impl Lapses<'_> {
     /// torque off.
     #[inline]
     fn stop_at(&mut self, first: Option<Lapse>) {
-        if let Some(lapse) = first
-            && self.supervision.fault().is_none()
-        {
+        if let Some(lapse) = first {
             self.supervision.latch(lapse.fault());
         }
     }
@@ -127,9 +125,9 @@ pub(super) fn arrive(
         .unwrap_or(frame.sequence.wrapping_sub(1));
     let ahead = frame.sequence.wrapping_sub(last);
     let reading = ranges.readability(frame);
-    let board_faults = frame.inputs.intersection(BOARD_FAULTS);
-    if ahead != 1 || !reading.encoders || !reading.forces || !board_faults.is_empty() {
-        return irregular(state, lapses, frame.sequence, ahead, reading, board_faults);
+    let is_readable = reading.encoders && reading.forces;
+    if ahead != 1 || !is_readable || frame.inputs.intersects(BOARD_FAULTS) {
+        return irregular(state, lapses, frame, ahead, reading);
     }
     state.last_sequence = Some(frame.sequence);
     for lapse in Lapse::OF_FRAMES {
@@ -150,15 +148,14 @@ struct Readability {
 fn irregular(
     state: &mut ArrivalState,
     mut lapses: Lapses<'_>,
-    sequence: u32,
+    frame: &SensorFrame,
     ahead: u32,
     Readability { encoders, forces }: Readability,
-    board_faults: DigitalInputs,
 ) -> Arrival {
     // More than half the counter's range ahead means behind.
     let stale = ahead == 0 || ahead > u32::MAX / 2;
     let first = &mut None;
-    let times = |bit| u32::from(board_faults.contains(bit));
+    let times = |bit| u32::from(frame.inputs.contains(bit));
     lapses.note_among(
         first,
         Lapse::ArmingRefused,
@@ -180,7 +177,7 @@ fn irregular(
         lapses.stop_at(*first);
         return Arrival::Stale;
     }
-    state.last_sequence = Some(sequence);
+    state.last_sequence = Some(frame.sequence);
     lapses.note_among(first, Lapse::StaleFrame, 0);
     lapses.note_among(first, Lapse::LostFrame, ahead - 1);
     lapses.note_among(first, Lapse::EncoderOutOfRange, u32::from(!encoders));

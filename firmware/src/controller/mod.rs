@@ -26,10 +26,9 @@ use painleve_shared::range::OutOfRange;
 use self::arrival::{Arrival, Lapses, arrive};
 use self::stages::{Stages, State, report};
 use crate::configuration::Configuration;
-use crate::estimate::Readings;
 use crate::law::{Law, LawSettings};
 use crate::supervise::lapses::{Lapse, LapseMonitor};
-use crate::telemetry::{Telemetry, TelemetrySink};
+use crate::telemetry::Telemetry;
 
 /// The controller of one arm, with the laws `L`.
 ///
@@ -133,16 +132,17 @@ impl<L: Law> Controller<L> {
         frame: &SensorFrame,
         telemetry: &mut Telemetry,
     ) -> ActuatorFrame {
-        self.answer_into(frame, TelemetrySink::to(telemetry));
+        self.answer_into(frame, Some(telemetry));
         self.update();
         self.last_answer
     }
 
     /// Answers one sensor frame: the first part of a tick, after which the torque can go out. The second part is
     /// [`update`](Self::update).
-    #[inline]
+    // Out of line, because the compiler then finds fewer values that have to wait on the stack.
+    #[inline(never)]
     pub fn answer(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
-        self.answer_in_place(frame);
+        self.answer_into(frame, None);
         &self.last_answer
     }
 
@@ -150,12 +150,6 @@ impl<L: Law> Controller<L> {
     #[inline]
     pub fn last_answer(&self) -> &ActuatorFrame {
         &self.last_answer
-    }
-
-    // Out of line, because the compiler then finds fewer values that have to wait on the stack.
-    #[inline(never)]
-    fn answer_in_place(&mut self, frame: &SensorFrame) {
-        self.answer_into(frame, TelemetrySink::nowhere());
     }
 
     /// Updates the state with the readings that the last [`answer`](Self::answer) has used, and prepares the next
@@ -187,7 +181,7 @@ impl<L: Law> Controller<L> {
             supervision: &mut self.state.supervision,
         };
         lapses.note(lapse, times).then(|| {
-            self.stop(TelemetrySink::nowhere());
+            self.stop(None);
             self.last_answer
         })
     }
@@ -198,7 +192,7 @@ impl<L: Law> Controller<L> {
     }
 
     #[inline]
-    fn answer_into(&mut self, frame: &SensorFrame, telemetry: TelemetrySink<'_>) {
+    fn answer_into(&mut self, frame: &SensorFrame, telemetry: Option<&mut Telemetry>) {
         if !matches!(self.due, Due::Nothing) {
             self.catch_up();
         }
@@ -215,12 +209,11 @@ impl<L: Law> Controller<L> {
         let supervision = &mut self.state.supervision;
         match arrival {
             Arrival::After(elapsed_ticks) => {
-                let readings = Readings {
-                    frame,
-                    elapsed_ticks,
-                };
                 let (state, answer) = (&mut self.state, &mut self.last_answer);
-                self.due = match self.stages.answer(state, &readings, answer, telemetry) {
+                let followed = self
+                    .stages
+                    .answer(state, frame, elapsed_ticks, answer, telemetry);
+                self.due = match followed {
                     Ok(()) => Due::Everything,
                     Err(_) => Due::Preparation,
                 };
@@ -246,7 +239,7 @@ impl<L: Law> Controller<L> {
     /// Takes the torque off without a tick.
     #[cold]
     #[inline(never)]
-    fn stop(&mut self, telemetry: TelemetrySink<'_>) {
+    fn stop(&mut self, telemetry: Option<&mut Telemetry>) {
         self.state.release();
         let answer = &mut self.last_answer;
         answer.torques = [TorqueCounts(0); 2];
@@ -254,6 +247,8 @@ impl<L: Law> Controller<L> {
         answer
             .flags
             .remove(StatusFlags::SATURATED | StatusFlags::AT_EDGE | StatusFlags::RECOVERING);
-        telemetry.stop(&self.state.supervision);
+        if let Some(telemetry) = telemetry {
+            telemetry.stop(&self.state.supervision);
+        }
     }
 }

@@ -1,33 +1,22 @@
 //! The stages of a tick, from readings to an answer, and what they learn after it.
 
 use painleve_shared::counts::Micrometres;
-use painleve_shared::frame::{ActuatorFrame, StatusFlags};
+use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::status::Fault;
 use painleve_shared::{Arm, Slip};
 
 use super::arrival::{ArrivalState, ReadingRanges};
 use crate::configuration::Configuration;
-use crate::demand::{DemandInput, DemandState, TorqueDemand};
-use crate::estimate::joint_friction::{JointFriction, JointFrictionState};
+use crate::demand::{DemandState, TorqueDemand};
 use crate::estimate::joints::Restart;
-use crate::estimate::{EstimateSettings, EstimatesState, Estimators, Observed, Readings};
+use crate::estimate::{ContactEstimate, EstimatesState, Estimators, Observed};
 use crate::last_command::LastCommand;
 use crate::law::Law;
-use crate::refer::{References, ReferencesState};
+use crate::refer::{References, ReferencesState, Target};
 use crate::schedule::Turn;
 use crate::supervise::supervisor::{Supervision, Supervisor};
-use crate::telemetry::{TelemetrySink, TelemetryTick};
-use crate::torque_output::{NotFinite, TorqueOutput};
-
-/// What the update needs of the tick that has been answered, besides the state of the stages.
-#[derive(Clone, Copy, Debug, Default)]
-struct Answered {
-    elapsed_ticks: u32,
-    /// Whether torque was applied before the tick.
-    drove: bool,
-    /// Least p, as a fraction of Q22, at which the tip may land; 0 if it is not being returned to the belt.
-    landing_p_ratio: f32,
-}
+use crate::telemetry::Telemetry;
+use crate::torque_output::TorqueOutput;
 
 /// The stages of a tick: settings only.
 #[derive(Clone, Debug)]
@@ -35,7 +24,6 @@ struct Answered {
 pub struct Stages<L> {
     estimators: Estimators,
     torques: TorqueOutput,
-    joint_friction: JointFriction,
     supervisor: Supervisor,
     demand: TorqueDemand<L>,
     references: References,
@@ -49,61 +37,30 @@ pub struct Stages<L> {
 pub struct State<L: Law> {
     estimates: EstimatesState,
     command: LastCommand,
-    /// The command before that.
-    before: LastCommand,
     demand: DemandState<L>,
     /// Whether the arm is driven, and the latched fault.
     pub supervision: Supervision,
     references: ReferencesState,
-    answered: Answered,
+    /// The tick that has been answered, for its update.
+    observed: Observed,
+    /// Least p, as a fraction of Q22, at which the tip may land; 0 if it is not being returned to the belt.
+    landing_p_ratio: f32,
     turn: Turn,
     /// What has arrived.
     pub arrivals: ArrivalState,
-    joint_friction: JointFrictionState,
 }
 
 impl<L: Law> Stages<L> {
     /// Makes the stages, each with its own settings.
     pub fn new(configuration: &Configuration<L>, arm: &Arm<f32>) -> Self {
-        let Configuration {
-            tick_hz,
-            arm: parameters,
-            converters,
-            settings,
-        } = configuration;
+        let (converters, settings) = (&configuration.converters, &configuration.settings);
         let speed = configuration.loop_speed(arm);
         Self {
-            estimators: Estimators::new(&EstimateSettings {
-                tick_hz: *tick_hz,
-                tracking_speed: speed,
-                encoders: converters.encoders,
-                force: converters.force,
-                torque_limit_nm: settings.torque_limit_nm,
-                link_length_m: parameters.link_length_m[0],
-                joints: &settings.estimator,
-                contact: &settings.contact,
-                friction: &settings.friction,
-                belt: &settings.belt,
-                response: &settings.response,
-                disturbance: &settings.disturbance,
-                calibration: &settings.calibration,
-            }),
-            supervisor: Supervisor::new(settings.supervisor, *tick_hz),
-            references: References::new(
-                &settings.reference,
-                &settings.governor,
-                *tick_hz,
-                &configuration.joint_errors(),
-                settings.recovery.minimum_p_ratio,
-            ),
-            demand: TorqueDemand::new(
-                settings.law.sped_up(speed),
-                &settings.recovery,
-                configuration.tick_s(),
-                settings.torque_limit_nm,
-            ),
+            estimators: Estimators::new(configuration, speed),
+            supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
+            references: References::new(configuration),
+            demand: TorqueDemand::new(configuration, speed),
             torques: TorqueOutput::new(converters.torque, settings.torque_limit_nm),
-            joint_friction: JointFriction::new(parameters.coulomb_friction_nm),
             ranges: ReadingRanges::of(converters),
         }
     }
@@ -117,14 +74,13 @@ impl<L: Law> Stages<L> {
             references: self.references.start(&arm),
             demand: self.demand.start(),
             command: LastCommand::default(),
-            before: LastCommand::default(),
-            answered: Answered::default(),
+            observed: Observed::default(),
+            landing_p_ratio: 0.0,
             turn: Turn::default(),
-            joint_friction: JointFrictionState::default(),
         }
     }
 
-    /// Answers readings.
+    /// Answers a frame's readings, `elapsed_ticks` after the previous ones.
     ///
     /// # Errors
     /// [`Restart`] if the estimates have started from these readings, which then show nothing else.
@@ -132,70 +88,63 @@ impl<L: Law> Stages<L> {
     pub fn answer(
         &self,
         state: &mut State<L>,
-        readings: &Readings<'_>,
+        frame: &SensorFrame,
+        elapsed_ticks: u32,
         answer: &mut ActuatorFrame,
-        telemetry: TelemetrySink<'_>,
+        telemetry: Option<&mut Telemetry>,
     ) -> Result<(), Restart> {
-        let followed = self.estimators.observe(
-            &mut state.estimates,
-            readings,
-            &state.command,
-            &self.joint_friction,
-            &mut state.joint_friction,
-        );
+        let followed =
+            self.estimators
+                .observe(&mut state.estimates, frame, elapsed_ticks, &state.command);
         if followed == Err(Restart::EncoderJump) {
             state.supervision.latch(Fault::EncoderJump);
         }
         let (model, contact) = (&state.estimates.model, &state.estimates.contact);
-        state.answered.drove = state.supervision.drives();
+        state.observed.drove = state.supervision.drives();
         let phase = self.supervisor.tick(
             &mut state.supervision,
-            readings.frame.inputs,
+            frame.inputs,
             contact.touches,
             self.demand.is_on(),
         );
         let references = &mut state.references;
         let landing = state.demand.landing_posture();
-        let beginning = self
+        let target = self
             .references
-            .begin(references, model, contact, &phase, landing);
-        state.answered.elapsed_ticks = readings.elapsed_ticks;
-        state.answered.landing_p_ratio = beginning.landing_p_ratio;
-        let target = self.references.tick(references, &beginning, model, &phase);
+            .tick(references, model, contact, &phase, landing);
+        state.observed.elapsed_ticks = elapsed_ticks;
+        state.landing_p_ratio = target.landing_p_ratio;
         if phase.drives() {
-            let input = DemandInput {
-                arm: &state.estimates.arm,
-                model,
-                contact,
-                phase: &phase,
-                target: &target,
-                last: &state.command,
-            };
-            let output = self.demand.tick(&mut state.demand, &input);
+            let output = self.demand.tick(
+                &mut state.demand,
+                &state.estimates,
+                &phase,
+                &target,
+                state.command.saturated,
+            );
             let torques = self.torques.tick(&mut state.command, &output);
             state.command.reference_velocity_m_s = target.reference.velocity_m_s;
-            if let Err(NotFinite) = torques {
-                state.supervision.latch(Fault::NotFinite);
+            if let Err(fault) = torques {
+                state.supervision.latch(fault);
                 state.release();
             }
         } else {
             state.release();
         }
-        let (model, contact) = (&state.estimates.model, &state.estimates.contact);
-        let tick = TelemetryTick {
-            model,
-            contact,
-            contact_confidence: state.estimates.contact_confidence(),
-            target: &target,
-            command: &state.command,
-            recovering: target.recovering && state.supervision.drives(),
-        };
-        answer.torques = state.command.counts;
+        let (estimates, command) = (&state.estimates, &state.command);
+        answer.torques = command.counts;
         answer.reference_tip = Micrometres::from_metres(target.reference.position_m);
-        answer.estimated_tip = Micrometres::from_metres(model.tip_m.x);
-        answer.flags = flags(&tick, self.references.is_done(&state.references));
+        answer.estimated_tip = Micrometres::from_metres(estimates.model.tip_m.x);
+        answer.flags = flags(&estimates.contact, &target, command);
+        let is_done = self.references.is_done(&state.references);
+        answer.flags.set(StatusFlags::REFERENCE_DONE, is_done);
+        let recovers = target.recovering && state.supervision.drives();
+        answer.flags.set(StatusFlags::RECOVERING, recovers);
         report(answer, &state.supervision);
-        telemetry.record(&tick, readings.frame.tick, &state.supervision);
+        if let Some(telemetry) = telemetry {
+            let tick = frame.tick;
+            telemetry.record(tick, estimates, &target, command, &state.supervision);
+        }
         followed
     }
 
@@ -207,33 +156,27 @@ impl<L: Law> Stages<L> {
     #[inline(never)]
     pub fn learn(&self, state: &mut State<L>) {
         let turn = state.turn.take();
-        let (estimates, last, answered) = (&mut state.estimates, &state.before, &state.answered);
-        let observed = Observed {
-            elapsed_ticks: answered.elapsed_ticks,
-            drove: answered.drove,
-            last,
-        };
+        let (estimates, observed) = (&mut state.estimates, &state.observed);
         let estimators = &self.estimators;
         if estimates.contact.touches {
-            let slow = estimators.learn_in_contact(estimates, &observed);
+            let slow = estimators.learn_in_contact(estimates, observed);
             match turn {
                 Turn::Balance => {
                     estimators.balance_torques(estimates);
-                    estimators.calibrate(estimates, &slow);
-                }
-                Turn::Edges => {
-                    if !estimators.evaluate_response(estimates, &slow) {
-                        self.search(state);
+                    if slow.shows_length {
+                        estimators.calibrate(estimates);
                     }
                 }
+                Turn::Edges if slow.completes_block => estimators.evaluate_response(estimates),
+                Turn::Edges => self.search(state),
             }
         } else {
-            estimators.learn_in_the_air(estimates, &observed);
+            estimators.learn_in_the_air(estimates, observed);
             if turn == Turn::Balance {
                 estimators.balance_torques(estimates);
             }
             // A tip that is being returned to the belt needs the edges soon.
-            if turn == Turn::Edges || answered.landing_p_ratio > 0.0 {
+            if turn == Turn::Edges || state.landing_p_ratio > 0.0 {
                 self.search(state);
             }
         }
@@ -248,7 +191,7 @@ impl<L: Law> Stages<L> {
             &state.estimates.arm,
             state.estimates.model.tip_m.x,
             contact.friction,
-            state.answered.landing_p_ratio,
+            state.landing_p_ratio,
         );
     }
 
@@ -256,15 +199,11 @@ impl<L: Law> Stages<L> {
     #[inline]
     pub fn prepare(&self, state: &mut State<L>) {
         let drives = state.supervision.drives();
-        self.estimators.prepare(
-            &mut state.estimates,
-            &mut state.command,
-            drives,
-            &state.joint_friction,
-        );
+        self.estimators
+            .prepare(&mut state.estimates, &mut state.command, drives);
         self.references
             .prepare(&mut state.references, state.supervision.state());
-        state.before = state.command;
+        state.observed.last = state.command;
     }
 }
 
@@ -282,22 +221,13 @@ pub fn report(answer: &mut ActuatorFrame, supervision: &Supervision) {
     answer.fault = supervision.fault().map_or(0, |fault| fault as u8);
 }
 
-/// Returns the answer's flags for one tick.
-fn flags(tick: &TelemetryTick<'_>, reference_done: bool) -> StatusFlags {
-    let TelemetryTick {
-        contact,
-        target,
-        command,
-        recovering,
-        ..
-    } = tick;
+/// Returns the answer's flags that contact, target and command show.
+fn flags(contact: &ContactEstimate, target: &Target, command: &LastCommand) -> StatusFlags {
     let friction = &contact.friction;
     let mut flags = StatusFlags::default();
     flags.set(StatusFlags::CONTACT, contact.touches);
     flags.set(StatusFlags::SATURATED, command.saturated);
-    flags.set(StatusFlags::REFERENCE_DONE, reference_done);
     flags.set(StatusFlags::AT_EDGE, target.at_edge);
-    flags.set(StatusFlags::RECOVERING, *recovering);
     flags.set(
         StatusFlags::SLIP_NEGATIVE,
         contact.touches && friction.slip == Slip::Negative,

@@ -65,8 +65,7 @@ impl LengthCalibrator {
     /// tip is on the belt, and scales the arm to the length that follows.
     #[inline]
     pub fn update(&self, state: &mut CalibrationState, arm: &mut Arm<f32>, measured_gap_m: f32) {
-        let [present_m, _] = arm.link_length_m();
-        arm.scale_to(self.length_m(state, present_m, arm.height_m(), measured_gap_m));
+        arm.scale_to(self.length_m(state, arm, measured_gap_m));
     }
 
     /// Restarts the mean at this measured gap (m): the tip is assumed on the belt, because it cannot be below
@@ -84,13 +83,8 @@ impl LengthCalibrator {
     }
 
     /// Returns the length of link 1 after one more reading, m.
-    fn length_m(
-        &self,
-        state: &mut CalibrationState,
-        present_m: f32,
-        height_m: f32,
-        measured_gap_m: f32,
-    ) -> f32 {
+    fn length_m(&self, state: &mut CalibrationState, arm: &Arm<f32>, measured_gap_m: f32) -> f32 {
+        let ([present_m, _], height_m) = (arm.link_length_m(), arm.height_m());
         if self.deviation_m == 0.0 {
             return present_m;
         }

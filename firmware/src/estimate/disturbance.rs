@@ -30,15 +30,6 @@ settings! {
     }
 }
 
-/// What a loop through the contact may remove of the residual at an update.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LoopLimit {
-    /// p/Q22 of a tip in contact.
-    pub p_ratio: Option<f32>,
-    /// Part of the force error that a loop through the contact may remove in a tick.
-    pub loop_share: f32,
-}
-
 /// The low-pass of the residual.
 #[derive(Clone, Copy, Debug)]
 pub struct DisturbanceEstimator {
@@ -78,8 +69,16 @@ impl DisturbanceEstimator {
     }
 
     /// Updates the estimate of an arm whose `model` includes the present d with the ticks added since the last update.
+    /// `p_ratio` is p/Q22 of a tip in contact, `loop_share` the part of the force error that a loop through the contact may
+    /// remove in a tick.
     #[inline]
-    pub fn update(&self, state: &mut DisturbanceState, model: &Model, limit: &LoopLimit) {
+    pub fn update(
+        &self,
+        state: &mut DisturbanceState,
+        model: &Model,
+        p_ratio: Option<f32>,
+        loop_share: f32,
+    ) {
         let rate_rad_s = model.theta_dot_rad_s;
         let acted = core::mem::take(&mut state.acted);
         if acted.ticks == 0.0 {
@@ -101,8 +100,8 @@ impl DisturbanceEstimator {
         if residual_nm.amax() > 2.0 * limit_nm {
             return;
         }
-        let share = limit.p_ratio.map_or(1.0, |p_ratio| {
-            (SHARE * p_ratio).limited(0.0, CONTACT_SHARE * limit.loop_share)
+        let share = p_ratio.map_or(1.0, |p_ratio| {
+            (SHARE * p_ratio).limited(0.0, CONTACT_SHARE * loop_share)
         });
         let weight = (self.bandwidth_rad_s * self.period_s).at_most(share);
         state.torque_nm =
@@ -157,11 +156,7 @@ mod tests {
             let model = Model::new(&arm, theta, rate, &state.torque_nm);
             let torque_nm = truth.inverse_dynamics_nm(&acceleration, &force_n);
             state.add(&torque_nm, &force_n, TICK_S);
-            let limit = LoopLimit {
-                p_ratio,
-                loop_share: 1.0,
-            };
-            estimator.update(&mut state, &model, &limit);
+            estimator.update(&mut state, &model, p_ratio, 1.0);
         }
         state.torque_nm
     }
@@ -219,11 +214,7 @@ mod tests {
             let force_n = Vector2::zeros();
             let torque_nm = model.inverse_dynamics_nm(&LinkMotion::zeros(), &force_n);
             state.add(&torque_nm, &force_n, TICK_S);
-            let limit = LoopLimit {
-                p_ratio: None,
-                loop_share: 1.0,
-            };
-            estimator.update(&mut state, &model, &limit);
+            estimator.update(&mut state, &model, None, 1.0);
         }
         state.torque_nm
     }

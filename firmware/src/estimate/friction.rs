@@ -209,7 +209,7 @@ impl FrictionEstimator {
     #[inline]
     pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
         if let Some(correction) = state.correction.take() {
-            self.adapt(state, &correction);
+            self.adapt(state, correction);
         }
         let estimate = &mut state.estimate;
         estimate.catch_up = 0.0;
@@ -226,14 +226,10 @@ impl FrictionEstimator {
     }
 
     /// Adapts the variances to a correction.
-    fn adapt(&self, state: &mut FrictionState, correction: &Correction) {
-        let Correction {
-            innovation,
-            gain,
-            normal_force_n,
-        } = *correction;
-        let ratio_variance = state.force_variance_n2 / (normal_force_n * normal_force_n);
-        state.estimate.variance *= 1.0 - gain;
+    fn adapt(&self, state: &mut FrictionState, correction: Correction) {
+        let (innovation, normal_n) = (correction.innovation, correction.normal_force_n);
+        let ratio_variance = state.force_variance_n2 / (normal_n * normal_n);
+        state.estimate.variance *= 1.0 - correction.gain;
         // Innovations that keep their sign are not noise: μ has changed.
         let weight = self.mean_weight;
         let change = innovation - state.innovation;

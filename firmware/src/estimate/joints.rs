@@ -310,8 +310,7 @@ impl JointState {
 
     /// Returns the link angles θ = (θ1, θ2), rad; zero before the first readings.
     pub fn theta_rad(&self) -> LinkMotion<f32> {
-        let [one, two] = &self.joints;
-        JointMotion::new(one.angle_rad, two.angle_rad).to_links()
+        self.angles_rad().to_links()
     }
 
     /// Returns the measured minus the expected link angles at the last tick, rad.

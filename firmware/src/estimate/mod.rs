@@ -23,21 +23,23 @@ pub mod model;
 pub mod response;
 
 use nalgebra::Vector2;
-use painleve_shared::counts::{EncoderScale, LinearConverter, LinearScale};
+use painleve_shared::counts::LinearConverter;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, Pose, Slip};
 
-use self::belt::{BeltEstimator, BeltSpeedSettings, BeltState};
-use self::calibration::{CalibrationSettings, CalibrationState, LengthCalibrator};
-use self::contact::{ContactDetector, ContactSettings, ContactState, Evidence};
+use self::belt::{BeltEstimator, BeltState};
+use self::calibration::{CalibrationState, LengthCalibrator};
+use self::contact::{ContactDetector, ContactState, Evidence};
 pub use self::contact_estimate::ContactEstimate;
-use self::disturbance::{DisturbanceEstimator, DisturbanceSettings, DisturbanceState, LoopLimit};
-use self::friction::{FrictionEstimator, FrictionSettings, FrictionState};
+use self::disturbance::{DisturbanceEstimator, DisturbanceState};
+use self::friction::{FrictionEstimator, FrictionState};
 use self::joint_friction::{JointFriction, JointFrictionState};
 use self::joints::{JointEstimator, JointEstimatorSettings, JointState, Restart};
 use self::model::Model;
-use self::response::{ForceReading, ResponseEstimator, ResponseSettings, ResponseState};
+use self::response::{ForceReading, ResponseEstimator, ResponseState};
+use crate::configuration::Configuration;
 use crate::last_command::LastCommand;
+use crate::law::Law;
 use crate::schedule::Turn;
 
 /// Least velocity by which a sticking tip falls behind its reference, m/s.
@@ -47,60 +49,20 @@ const DRAGGED_M_S: f32 = 0.02;
 #[derive(Clone, Copy, Debug)]
 pub struct SlowReadings {
     /// Whether the gap shows the links' length: the tip certainly touches, and has moved.
-    shows_length: bool,
+    pub shows_length: bool,
     /// Whether a block of the response's readings is complete.
-    completes_block: bool,
-}
-
-/// One frame's readings.
-#[derive(Clone, Copy, Debug)]
-pub struct Readings<'a> {
-    /// The frame.
-    pub frame: &'a SensorFrame,
-    /// Ticks since the previous readings: 1 unless frames were lost.
-    pub elapsed_ticks: u32,
+    pub completes_block: bool,
 }
 
 /// What the update after a tick needs of it besides the estimates.
-#[derive(Clone, Copy, Debug)]
-pub struct Observed<'a> {
-    /// Ticks since the previous readings.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Observed {
+    /// Ticks since the previous readings: 1 unless frames were lost.
     pub elapsed_ticks: u32,
     /// Whether torque was applied before the tick.
     pub drove: bool,
     /// The command until the tick.
-    pub last: &'a LastCommand,
-}
-
-/// Settings of all estimators, and the scalings of their readings.
-#[derive(Clone, Copy, Debug)]
-pub struct EstimateSettings<'a> {
-    /// Control rate, Hz.
-    pub tick_hz: f32,
-    /// Factor by which the tracking loops are faster than their settings.
-    pub tracking_speed: f32,
-    /// Scalings of the encoders of θ1 and of θ2 − θ1.
-    pub encoders: [EncoderScale; 2],
-    /// Scaling of the force cell.
-    pub force: LinearScale<f32>,
-    /// Largest torque on either joint, N·m.
-    pub torque_limit_nm: f32,
-    /// Length of the first link before calibration, m.
-    pub link_length_m: f32,
-    /// Tracking loops of the joints.
-    pub joints: &'a JointEstimatorSettings,
-    /// Contact decision.
-    pub contact: &'a ContactSettings,
-    /// Friction.
-    pub friction: &'a FrictionSettings,
-    /// Bounds of the belt's speed.
-    pub belt: &'a BeltSpeedSettings,
-    /// Response of the contact.
-    pub response: &'a ResponseSettings,
-    /// Unknown torques.
-    pub disturbance: &'a DisturbanceSettings,
-    /// Calibration of the links' length.
-    pub calibration: &'a CalibrationSettings,
+    pub last: LastCommand,
 }
 
 /// All estimators of one arm.
@@ -117,6 +79,7 @@ pub struct Estimators {
     response: ResponseEstimator,
     disturbance: DisturbanceEstimator,
     calibrator: LengthCalibrator,
+    joint_friction: JointFriction,
 }
 
 /// State of the [`Estimators`] between ticks.
@@ -136,6 +99,7 @@ pub struct EstimatesState {
     response: ResponseState,
     disturbance: DisturbanceState,
     calibration: CalibrationState,
+    joint_friction: JointFrictionState,
 }
 
 impl EstimatesState {
@@ -146,37 +110,38 @@ impl EstimatesState {
 }
 
 impl Estimators {
-    /// Makes the estimators with these settings.
-    pub fn new(settings: &EstimateSettings<'_>) -> Self {
-        let tick_s = 1.0 / settings.tick_hz;
+    /// Makes the estimators of this configuration, with tracking loops that are faster than their settings by a factor.
+    pub fn new<L: Law>(configuration: &Configuration<L>, tracking_speed: f32) -> Self {
+        let Configuration {
+            arm,
+            converters,
+            settings,
+            ..
+        } = configuration;
+        let tick_s = configuration.tick_s();
         let slow_period_s = Turn::COUNT * tick_s;
-        let force_cell = settings.force.converter();
+        let force_cell = converters.force.converter();
+        let joints = JointEstimatorSettings {
+            bandwidth_rad_s: tracking_speed * settings.estimator.bandwidth_rad_s,
+            ..settings.estimator
+        };
+        let [link_length_m, _] = arm.link_length_m;
         Self {
             force_cell,
             force_range_n: force_cell.value(force_cell.maximum_counts),
             tick_s,
-            joints: JointEstimator::new(
-                &JointEstimatorSettings {
-                    bandwidth_rad_s: settings.tracking_speed * settings.joints.bandwidth_rad_s,
-                    ..*settings.joints
-                },
-                settings.encoders,
-                settings.tick_hz,
-            ),
-            contact: ContactDetector::new(settings.contact),
-            friction: FrictionEstimator::new(settings.friction, settings.contact, tick_s),
-            belt: BeltEstimator::new(settings.belt, tick_s),
-            response: ResponseEstimator::new(settings.response, tick_s),
+            joints: JointEstimator::new(&joints, converters.encoders, configuration.tick_hz),
+            contact: ContactDetector::new(&settings.contact),
+            friction: FrictionEstimator::new(&settings.friction, &settings.contact, tick_s),
+            belt: BeltEstimator::new(&settings.belt, tick_s),
+            response: ResponseEstimator::new(&settings.response, tick_s),
             disturbance: DisturbanceEstimator::new(
-                settings.disturbance,
+                &settings.disturbance,
                 settings.torque_limit_nm,
                 slow_period_s,
             ),
-            calibrator: LengthCalibrator::new(
-                settings.calibration,
-                settings.link_length_m,
-                slow_period_s,
-            ),
+            calibrator: LengthCalibrator::new(&settings.calibration, link_length_m, slow_period_s),
+            joint_friction: JointFriction::new(arm.coulomb_friction_nm),
         }
     }
 
@@ -199,10 +164,12 @@ impl Estimators {
             response,
             disturbance: DisturbanceState::default(),
             calibration: CalibrationState::default(),
+            joint_friction: JointFrictionState::default(),
         }
     }
 
-    /// Corrects the predicted state of the arm with the encoders' readings, and decides about contact.
+    /// Corrects the predicted state of the arm with a frame's readings, `elapsed_ticks` after the previous ones, and
+    /// decides about contact.
     ///
     /// # Errors
     /// [`Restart`] if the estimate of the joints has started from these readings, at rest.
@@ -210,14 +177,12 @@ impl Estimators {
     pub fn observe(
         &self,
         state: &mut EstimatesState,
-        readings: &Readings<'_>,
+        frame: &SensorFrame,
+        elapsed_ticks: u32,
         last: &LastCommand,
-        friction: &JointFriction,
-        friction_state: &mut JointFrictionState,
     ) -> Result<(), Restart> {
-        let frame = readings.frame;
         let expected = &last.expected_acceleration_rad_s2;
-        let (joints, elapsed_ticks) = (&mut state.joints, readings.elapsed_ticks);
+        let joints = &mut state.joints;
         let followed = self
             .joints
             .correct(joints, &frame.joints, elapsed_ticks, expected);
@@ -226,14 +191,15 @@ impl Estimators {
                 self.joints.untwist(joints, &last.torque_nm);
                 let (theta_rad, theta_dot_rad_s) = (joints.theta_rad(), joints.theta_dot_rad_s());
                 state.model.move_to(&state.arm, theta_rad, theta_dot_rad_s);
-                if !friction.is_zero() {
+                if !self.joint_friction.is_zero() {
                     // It follows the travel between readings, which the prediction does not show.
-                    let change_nm = friction.tick(friction_state, &state.joints.angles_rad());
+                    let (friction, angles_rad) = (&mut state.joint_friction, joints.angles_rad());
+                    let change_nm = self.joint_friction.tick(friction, &angles_rad);
                     state.model.add_friction_nm(&change_nm);
                 }
             }
             // Nothing has been predicted for these readings.
-            Err(Restart::FirstReadings) => self.evaluate(state, friction_state),
+            Err(Restart::FirstReadings) => self.evaluate(state),
             // The drive stops, and the model follows at the next tick.
             Err(Restart::EncoderJump) => {}
         }
@@ -298,7 +264,7 @@ impl Estimators {
     pub fn learn_in_contact(
         &self,
         state: &mut EstimatesState,
-        observed: &Observed<'_>,
+        observed: &Observed,
     ) -> SlowReadings {
         let is_informative = self.add_to_balance(state, observed);
         let (model, contact) = (&state.model, &state.contact);
@@ -309,7 +275,7 @@ impl Estimators {
         let friction = state.friction.estimate();
         self.belt
             .update(&mut state.belt, model.tip_velocity_m_s.x, Some(friction));
-        let (last, p_per_kg) = (observed.last, contact.p_per_kg);
+        let (last, p_per_kg) = (&observed.last, contact.p_per_kg);
         let slides = p_per_kg > 0.0 && !friction.sticks;
         let mut completes_block = false;
         if is_informative && slides && !last.saturated && self.response.is_enabled() {
@@ -331,7 +297,7 @@ impl Estimators {
 
     /// Updates friction and belt at a tick without contact.
     #[inline]
-    pub fn learn_in_the_air(&self, state: &mut EstimatesState, observed: &Observed<'_>) {
+    pub fn learn_in_the_air(&self, state: &mut EstimatesState, observed: &Observed) {
         if state.contact.leaves {
             self.friction.doubt(&mut state.friction);
         }
@@ -344,7 +310,7 @@ impl Estimators {
     /// Adds a tick to the next update of the disturbance; returns whether force and torque show what the model does
     /// not explain.
     #[inline]
-    fn add_to_balance(&self, state: &mut EstimatesState, observed: &Observed<'_>) -> bool {
+    fn add_to_balance(&self, state: &mut EstimatesState, observed: &Observed) -> bool {
         let force_n = &state.contact.force_n;
         let is_informative =
             state.decision.is_certain() && self.is_in_range(force_n) && observed.drove;
@@ -361,13 +327,7 @@ impl Estimators {
     /// Predicts the arm's state at the next tick, given the command until then and whether it drives, and evaluates
     /// model and contact there.
     #[inline]
-    pub fn prepare(
-        &self,
-        state: &mut EstimatesState,
-        command: &mut LastCommand,
-        drives: bool,
-        friction: &JointFrictionState,
-    ) {
+    pub fn prepare(&self, state: &mut EstimatesState, command: &mut LastCommand, drives: bool) {
         if drives {
             let model = &state.model;
             command.contact_acceleration_rad_s2 = model
@@ -380,14 +340,14 @@ impl Estimators {
         }
         self.joints
             .predict(&mut state.joints, &command.expected_acceleration_rad_s2);
-        self.evaluate(state, friction);
+        self.evaluate(state);
     }
 
     /// Evaluates model, friction, p and the response of the contact at the estimated angles and rates.
     #[inline(never)]
-    fn evaluate(&self, state: &mut EstimatesState, friction: &JointFrictionState) {
+    fn evaluate(&self, state: &mut EstimatesState) {
         // Friction of the joints enters as an unknown torque does.
-        let disturbance_nm = state.disturbance.torque_nm - friction.torque_nm();
+        let disturbance_nm = state.disturbance.torque_nm - state.joint_friction.torque_nm();
         let (theta_rad, theta_dot_rad_s) =
             (state.joints.theta_rad(), state.joints.theta_dot_rad_s());
         let pose = Pose::new(&theta_rad);
@@ -410,23 +370,18 @@ impl Estimators {
         contact.response = response;
     }
 
-    /// Evaluates the response of the contact if a block of readings is complete; returns whether it was.
+    /// Evaluates the response of the contact with a complete block of readings.
     #[inline]
-    pub fn evaluate_response(&self, state: &mut EstimatesState, slow: &SlowReadings) -> bool {
-        if slow.completes_block {
-            self.response.evaluate(&mut state.response);
-        }
-        slow.completes_block
+    pub fn evaluate_response(&self, state: &mut EstimatesState) {
+        self.response.evaluate(&mut state.response);
     }
 
-    /// Updates the calibration.
+    /// Updates the calibration with a gap that shows the links' length.
     #[inline]
-    pub fn calibrate(&self, state: &mut EstimatesState, slow: &SlowReadings) {
-        if slow.shows_length {
-            let gap_m = self.gap_m(state);
-            self.calibrator
-                .update(&mut state.calibration, &mut state.arm, gap_m);
-        }
+    pub fn calibrate(&self, state: &mut EstimatesState) {
+        let gap_m = self.gap_m(state);
+        self.calibrator
+            .update(&mut state.calibration, &mut state.arm, gap_m);
     }
 
     /// Updates the disturbance.
@@ -434,11 +389,9 @@ impl Estimators {
     #[inline(never)]
     pub fn balance_torques(&self, state: &mut EstimatesState) {
         let contact = &state.contact;
-        let limit = LoopLimit {
-            p_ratio: contact.touches.then_some(contact.p_ratio),
-            loop_share: contact.response.loop_share,
-        };
+        let p_ratio = contact.touches.then_some(contact.p_ratio);
+        let loop_share = contact.response.loop_share;
         self.disturbance
-            .update(&mut state.disturbance, &state.model, &limit);
+            .update(&mut state.disturbance, &state.model, p_ratio, loop_share);
     }
 }

@@ -1,14 +1,12 @@
 //! The control laws, and sets from which one is selected.
 //!
 //! - [`Law`]: the trait of a law, from [`LawInput`] to [`LawOutput`]
-//! - [`off`]: no law
 //! - [`pid`]: the paper's PID on the joints
 //! - [`hybrid`]: the paper's hybrid force/motion law
 //! - [`law_set!`](crate::law_set!): declares a set of laws that is itself a law; [`LawSettings`] is
 //!   the set built into the controller
 
 pub mod hybrid;
-pub mod off;
 pub mod pid;
 mod signals;
 
@@ -156,7 +154,7 @@ macro_rules! law_set {
 
             fn is_on(&self) -> bool {
                 match self {
-                    Self::Off => $crate::law::Law::is_on(&$crate::law::off::Off {}),
+                    Self::Off => false,
                     $(Self::$law(law) => $crate::law::Law::is_on(law),)*
                 }
             }
@@ -172,7 +170,7 @@ macro_rules! law_set {
             #[inline(never)]
             fn reset(&self, state: &mut $states, input: &$crate::law::LawInput<'_>) {
                 match self {
-                    Self::Off => $crate::law::Law::reset(&$crate::law::off::Off {}, &mut (), input),
+                    Self::Off => {}
                     $(Self::$law(law) => $crate::law::Law::reset(law, &mut state.$law, input),)*
                 }
             }
@@ -184,7 +182,7 @@ macro_rules! law_set {
                 input: &$crate::law::LawInput<'_>,
             ) -> $crate::law::LawOutput {
                 match self {
-                    Self::Off => $crate::law::Law::tick(&$crate::law::off::Off {}, &mut (), input),
+                    Self::Off => ::core::default::Default::default(),
                     $(Self::$law(law) => $crate::law::Law::tick(law, &mut state.$law, input),)*
                 }
             }

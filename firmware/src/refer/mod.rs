@@ -9,11 +9,13 @@ pub mod reference;
 use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, Posture};
 
-use self::governor::{EdgeGovernor, GovernorSettings, GovernorState, JointErrors};
-use self::reference::{Program, ReferenceGenerator, ReferenceState, TipReference};
+use self::governor::{EdgeGovernor, GovernorState};
+use self::reference::{ReferenceGenerator, ReferenceState, TipReference};
+use crate::configuration::Configuration;
 use crate::estimate::ContactEstimate;
 use crate::estimate::friction::FrictionEstimate;
 use crate::estimate::model::Model;
+use crate::law::Law;
 use crate::supervise::supervisor::Phase;
 
 /// The target of the tip at one tick, and its limits.
@@ -33,15 +35,6 @@ pub struct Target {
     pub at_edge: bool,
     /// Whether the tip must be returned to the belt before it can follow.
     pub recovering: bool,
-}
-
-/// How a tick of the [`References`] begins.
-#[derive(Clone, Copy, Debug)]
-pub struct Beginning {
-    /// Whether the tip must be returned to the belt before it can follow.
-    recovering: bool,
-    /// Whether the reference starts at the tip.
-    starts: bool,
     /// Least p as a fraction of Q22 at which the tip may land; 0 if it is not being returned to the belt.
     pub landing_p_ratio: f32,
 }
@@ -67,19 +60,14 @@ pub struct ReferencesState {
 }
 
 impl References {
-    /// Makes the references with these settings at this control rate. `landing_p_ratio` is the least p, as a fraction of Q22, at
-    /// which a recovered tip may land.
-    pub fn new(
-        program: &Program,
-        governor: &GovernorSettings,
-        tick_hz: f32,
-        joints: &JointErrors,
-        landing_p_ratio: f32,
-    ) -> Self {
+    /// Makes the references of this configuration.
+    pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
+        let settings = &configuration.settings;
+        let (tick_s, joints) = (configuration.tick_s(), configuration.joint_errors());
         Self {
-            governor: EdgeGovernor::new(governor, 1.0 / tick_hz, joints),
-            landing_p_ratio,
-            generator: ReferenceGenerator::new(program, tick_hz),
+            governor: EdgeGovernor::new(&settings.governor, tick_s, &joints),
+            landing_p_ratio: settings.recovery.minimum_p_ratio,
+            generator: ReferenceGenerator::new(&settings.reference, configuration.tick_hz),
         }
     }
 
@@ -97,16 +85,16 @@ impl References {
         self.generator.is_done(&state.generator)
     }
 
-    /// Begins a tick. `landing` is the posture in which a thrown tip is being returned to the belt.
+    /// Returns the target of a tick. `landing` is the posture in which a thrown tip is being returned to the belt.
     #[inline]
-    pub fn begin(
+    pub fn tick(
         &self,
         state: &mut ReferencesState,
         model: &Model,
         contact: &ContactEstimate,
         phase: &Phase,
         landing: Option<Posture>,
-    ) -> Beginning {
+    ) -> Target {
         // The descent continues, and presses the tip gently, until contact is certain. The law's
         // whole force while in doubt would be evidence that comes and goes with the law.
         let descends = contact.in_flight || landing.is_some();
@@ -126,9 +114,30 @@ impl References {
             // position has changed with the links' length.
             state.generator.start_from(tip_t_m);
         }
-        Beginning {
+        let wanted = match phase.state {
+            SupervisorState::Armed => state.generator.start(),
+            // The reference waits for a tip that is being returned to the belt.
+            SupervisorState::LiftOff if recovering => state.generator.present(),
+            SupervisorState::Tracking if phase.starts_tracking => state.generator.start(),
+            SupervisorState::Tracking | SupervisorState::LiftOff => state.generator.next_tick(),
+            SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
+        };
+        if starts || phase.starts_tracking {
+            state.governor.restart(tip_t_m);
+        }
+        let drives = phase.drives();
+        Target {
+            reference: if drives {
+                self.governor.govern(&mut state.governor, &wanted)
+            } else {
+                wanted
+            },
+            requested_m: wanted.position_m,
+            posture: state.posture,
+            edges_m: state.governor.edges_m(),
+            fresh_edges_m: state.governor.fresh_edges_m(),
+            at_edge: drives && state.governor.is_at_edge(),
             recovering,
-            starts,
             landing_p_ratio: if recovering || landing.is_some() {
                 self.landing_p_ratio
             } else {
@@ -165,46 +174,6 @@ impl References {
     pub fn prepare(&self, state: &mut ReferencesState, drive: SupervisorState) {
         if matches!(drive, SupervisorState::Tracking | SupervisorState::LiftOff) {
             self.generator.prepare(&mut state.generator);
-        }
-    }
-
-    /// Returns the target of a tick that has begun.
-    #[inline]
-    pub fn tick(
-        &self,
-        state: &mut ReferencesState,
-        beginning: &Beginning,
-        model: &Model,
-        phase: &Phase,
-    ) -> Target {
-        let Beginning {
-            recovering, starts, ..
-        } = *beginning;
-        let tip_t_m = model.tip_m.x;
-        let wanted = match phase.state {
-            SupervisorState::Armed => state.generator.start(),
-            // The reference waits for a tip that is being returned to the belt.
-            SupervisorState::LiftOff if recovering => state.generator.present(),
-            SupervisorState::Tracking if phase.starts_tracking => state.generator.start(),
-            SupervisorState::Tracking | SupervisorState::LiftOff => state.generator.next_tick(),
-            SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
-        };
-        if starts || phase.starts_tracking {
-            state.governor.restart(tip_t_m);
-        }
-        let drives = phase.drives();
-        Target {
-            reference: if drives {
-                self.governor.govern(&mut state.governor, &wanted)
-            } else {
-                wanted
-            },
-            requested_m: wanted.position_m,
-            posture: state.posture,
-            edges_m: state.governor.edges_m(),
-            fresh_edges_m: state.governor.fresh_edges_m(),
-            at_edge: drives && state.governor.is_at_edge(),
-            recovering,
         }
     }
 }

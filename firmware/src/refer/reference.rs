@@ -225,27 +225,17 @@ impl ReferenceGenerator {
 }
 
 fn at(segment: &Segment, start_m: f32, elapsed_ticks: u32, tick_hz: f32) -> TipReference {
-    match *segment {
-        Segment::Hold { .. } => TipReference::at_rest(start_m),
-        Segment::Step { target_m, .. } => TipReference::at_rest(target_m),
-        Segment::Ramp {
-            target_m,
-            duration_s,
-        } => {
-            let distance = target_m - start_m;
-            let s = elapsed_ticks as f32 / (duration_s * tick_hz);
-            TipReference {
-                position_m: start_m + distance * s,
-                velocity_m_s: distance / duration_s,
-                acceleration_m_s2: 0.0,
-            }
-        }
-        Segment::MinimumJerk {
-            target_m,
-            duration_s,
-        } => {
-            let distance = target_m - start_m;
-            let s = elapsed_ticks as f32 / (duration_s * tick_hz);
+    let (duration_s, target_m) = (segment.duration_s(), segment.target_m().unwrap_or(start_m));
+    let distance = target_m - start_m;
+    let s = elapsed_ticks as f32 / (duration_s * tick_hz);
+    match segment {
+        Segment::Hold { .. } | Segment::Step { .. } => TipReference::at_rest(target_m),
+        Segment::Ramp { .. } => TipReference {
+            position_m: start_m + distance * s,
+            velocity_m_s: distance / duration_s,
+            acceleration_m_s2: 0.0,
+        },
+        Segment::MinimumJerk { .. } => {
             let (rest_of_s, s2) = (1.0 - s, s * s);
             let speed = distance / duration_s;
             TipReference {

@@ -14,7 +14,7 @@ mod settings;
 
 use painleve_shared::{Arm, Posture, Real};
 
-use self::search::{Admissibility, Search};
+use self::search::Search;
 pub use self::settings::GovernorSettings;
 use crate::estimate::friction::FrictionEstimate;
 use crate::refer::reference::TipReference;
@@ -56,16 +56,9 @@ pub struct JointErrors {
 /// The governor's settings for one arm and rate.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeGovernor {
-    enabled: bool,
-    deviations: f32,
-    braking_m_s2: f32,
-    catch_up_m_s: f32,
+    settings: GovernorSettings,
     tick_s: f32,
-    /// Least p as a fraction of Q22.
-    least_p_ratio: f32,
-    /// Least p, 1/kg.
-    least_p_per_kg: f32,
-    /// Distance kept from the point where p has that value, with these joints and this control rate, m.
+    /// Distance kept from the point where p has its least value, with these joints and this control rate, m.
     distance_m: f32,
 }
 
@@ -132,13 +125,8 @@ impl EdgeGovernor {
         let distance_m2 = square(settings.distance_m * square(tick_s / PERIOD_S))
             + square(settings.deviations) * variance_m2;
         Self {
-            enabled: settings.enabled,
-            deviations: settings.deviations,
-            braking_m_s2: settings.braking_m_s2,
-            catch_up_m_s: settings.catch_up_m_s,
+            settings: *settings,
             tick_s,
-            least_p_ratio: settings.p_ratio,
-            least_p_per_kg: settings.p_per_kg,
             distance_m: distance_m2.square_root(),
         }
     }
@@ -166,14 +154,22 @@ impl EdgeGovernor {
         }
         let mut search = state.search.unwrap_or(Search::start(1.0, tip_t_m));
         let direction = search.direction;
-        let admissibility = Admissibility {
-            arm,
-            posture,
-            friction: friction.coefficient + self.deviations * friction.deviation(),
-            slip: friction.slip_seen.then_some(friction.slip),
-            least_p_ratio: self.least_p_ratio.at_least(landing_p_ratio),
-            least_p_per_kg: self.least_p_per_kg,
-            distance_m: direction * self.distance_m,
+        let distance_m = direction * self.distance_m;
+        let worst_friction = friction.coefficient + self.settings.deviations * friction.deviation();
+        let least_p_ratio = self.settings.p_ratio.at_least(landing_p_ratio);
+        // How much p exceeds its least value, 1/kg. Where it does, sliding has a solution with the margin.
+        let excess_per_kg = |point_m: f32| {
+            let row = arm.inverse_inertia_row_on_belt(point_m + distance_m, posture);
+            row.map_or(f32::MIN, |(tangential, normal, factor)| {
+                let against = if friction.slip_seen {
+                    friction.slip.sign::<f32>() * tangential
+                } else {
+                    // Both directions must be admissible.
+                    tangential.abs()
+                };
+                let least = (least_p_ratio * normal).at_least(self.settings.p_per_kg * factor);
+                (normal - worst_friction * against - least) / factor
+            })
         };
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let step = 2.0 * reach / STEPS_OVER_REACH;
@@ -184,7 +180,7 @@ impl EdgeGovernor {
         };
         for _ in 0..points {
             let point = search.point(step, reach);
-            search = search.next(point, admissibility.excess_per_kg(point), reach);
+            search = search.next(point, excess_per_kg(point), reach);
         }
         state.search = Some(search);
         if !search.is_over() {
@@ -202,14 +198,14 @@ impl EdgeGovernor {
 
     /// Returns the reference to follow instead of `wanted`, one tick after the last one.
     pub fn govern(&self, state: &mut GovernorState, wanted: &TipReference) -> TipReference {
-        let tick_s = self.tick_s;
-        if !self.enabled {
+        let (tick_s, braking_m_s2) = (self.tick_s, self.settings.braking_m_s2);
+        if !self.settings.enabled {
             return *wanted;
         }
         let (lower, upper) = (state.lower_m, state.upper_m);
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
-        let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / self.braking_m_s2;
+        let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / braking_m_s2;
         let jumps = (wanted.position_m - state.position_m).abs() > JUMP_M;
         state.at_edge = outside(wanted.position_m);
         state.follows = !outside(stop_m)
@@ -226,20 +222,20 @@ impl EdgeGovernor {
         }
         // The highest speed from which the reference still stops within a distance.
         let stopping_speed = |distance: f32| {
-            (2.0 * self.braking_m_s2 * distance)
+            (2.0 * braking_m_s2 * distance)
                 .square_root()
                 .at_most(APPROACH_PER_S * distance)
         };
         let target = wanted.position_m.limited(lower, upper);
         let away = target - state.position_m;
-        let approach = stopping_speed(away.abs()).at_most(self.catch_up_m_s);
+        let approach = stopping_speed(away.abs()).at_most(self.settings.catch_up_m_s);
         let moves_along = if state.at_edge { 0.0 } else { speed };
         let velocity = (moves_along + approach.copysign(away)).limited(
             -stopping_speed((state.position_m - lower).at_least(0.0)),
             stopping_speed((upper - state.position_m).at_least(0.0)),
         );
         // Beyond an edge that has moved inwards, the limit above only forbids going further out.
-        let step = 2.0 * self.braking_m_s2 * tick_s;
+        let step = 2.0 * braking_m_s2 * tick_s;
         let change = (velocity - state.velocity_m_s).within(step);
         let velocity = state.velocity_m_s + change;
         let acceleration = change / tick_s;

@@ -1,46 +1,12 @@
 //! Searches for one end of the admissible stretch, one point of the belt at a time.
 
-use painleve_shared::{Arm, Posture, Real, Slip};
+use painleve_shared::Real;
 
 /// Largest number of inadmissible points that the search tries beside the tip, on both sides together. A stretch farther
 /// off is not for this tip: on the way there it would be thrown off.
 const MOST_REFUSED: u32 = 8;
 /// Halvings of the last step: 12 mm / 2¹⁰ is 11 µm.
 const HALVINGS: u32 = 10;
-
-/// Friction with its margin, for evaluating points of the belt.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Admissibility<'a> {
-    pub(super) arm: &'a Arm<f32>,
-    pub(super) posture: Posture,
-    /// μ̂ plus margin.
-    pub(super) friction: f32,
-    /// Direction of slip; `None` until a slip has been observed.
-    pub(super) slip: Option<Slip>,
-    /// Least p/Q22.
-    pub(super) least_p_ratio: f32,
-    /// Least p, 1/kg.
-    pub(super) least_p_per_kg: f32,
-    /// How far from a point along the belt it must still hold, m, with its sign.
-    pub(super) distance_m: f32,
-}
-
-impl Admissibility<'_> {
-    /// Returns how much p exceeds its least value at this point, 1/kg. Where it does, sliding has a solution with the margin.
-    pub(super) fn excess_per_kg(&self, tip_t_m: f32) -> f32 {
-        let there_m = tip_t_m + self.distance_m;
-        let row = self.arm.inverse_inertia_row_on_belt(there_m, self.posture);
-        row.map_or(f32::MIN, |(tangential, normal, factor)| {
-            let against = match self.slip {
-                Some(slip) => slip.sign::<f32>() * tangential,
-                // Both directions must be admissible.
-                None => tangential.abs(),
-            };
-            let least = (self.least_p_ratio * normal).at_least(self.least_p_per_kg * factor);
-            (normal - self.friction * against - least) / factor
-        })
-    }
-}
 
 /// Phase of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
