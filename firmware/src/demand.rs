@@ -4,7 +4,7 @@
 use painleve_shared::Posture;
 
 use crate::configuration::Configuration;
-use crate::estimate::EstimatesState;
+use crate::estimate::Estimators;
 use crate::law::{Law, LawInput, LawOutput};
 use crate::recover::{RecoverySettings, RecoveryState};
 use crate::refer::Target;
@@ -12,50 +12,39 @@ use crate::supervise::supervisor::Phase;
 
 /// The law, and the recovery that stands in for it.
 #[derive(Clone, Debug)]
-pub struct TorqueDemand<L> {
+#[repr(C)]
+pub struct TorqueDemand<L: Law> {
+    law_state: L::State,
+    recovery_state: RecoveryState,
     law: L,
     recovery: RecoverySettings,
     tick_s: f32,
     torque_limit_nm: f32,
 }
 
-/// State of a [`TorqueDemand`] between ticks.
-#[derive(Clone, Debug)]
-pub struct DemandState<L: Law> {
-    law: L::State,
-    recovery: RecoveryState,
-}
-
-impl<L: Law> DemandState<L> {
-    /// Posture in which the tip is to land; `None` while no recovery is in progress.
-    pub fn landing_posture(&self) -> Option<Posture> {
-        self.recovery.posture()
-    }
-
-    /// Cancels a recovery in progress.
-    pub fn cancel_recovery(&mut self) {
-        self.recovery = RecoveryState::default();
-    }
-}
-
 impl<L: Law> TorqueDemand<L> {
     /// Makes the demand of this configuration, with motion loops of the law that are faster by a factor.
     pub fn new(configuration: &Configuration<L>, speed: f32) -> Self {
         let settings = &configuration.settings;
+        let law = settings.law.sped_up(speed);
         Self {
-            law: settings.law.sped_up(speed),
+            law_state: law.initial_state(),
+            recovery_state: RecoveryState::default(),
+            law,
             recovery: settings.recovery,
             tick_s: configuration.tick_s(),
             torque_limit_nm: settings.torque_limit_nm,
         }
     }
 
-    /// Returns the state before the first tick.
-    pub fn start(&self) -> DemandState<L> {
-        DemandState {
-            law: self.law.initial_state(),
-            recovery: RecoveryState::default(),
-        }
+    /// Posture in which the tip is to land; `None` while no recovery is in progress.
+    pub fn landing_posture(&self) -> Option<Posture> {
+        self.recovery_state.posture()
+    }
+
+    /// Cancels a recovery in progress.
+    pub fn cancel_recovery(&mut self) {
+        self.recovery_state = RecoveryState::default();
     }
 
     /// Whether there is a law: without one the drive never arms.
@@ -67,14 +56,13 @@ impl<L: Law> TorqueDemand<L> {
     /// whether the torque until now was limited.
     #[inline]
     pub fn tick(
-        &self,
-        state: &mut DemandState<L>,
-        estimates: &EstimatesState,
+        &mut self,
+        estimates: &Estimators,
         phase: &Phase,
         target: &Target,
         saturated: bool,
     ) -> LawOutput {
-        let EstimatesState {
+        let Estimators {
             arm,
             model,
             contact,
@@ -82,10 +70,10 @@ impl<L: Law> TorqueDemand<L> {
         } = estimates;
         if target.recovering {
             let (edges_m, tick_s) = (target.fresh_edges_m, self.tick_s);
-            let recovery = &mut state.recovery;
+            let recovery = &mut self.recovery_state;
             return self.recovery.tick(recovery, arm, model, edges_m, tick_s);
         }
-        state.recovery.touch(self.tick_s);
+        self.recovery_state.touch(self.tick_s);
         let starts = phase.arms || contact.lands;
         let input = LawInput {
             arm,
@@ -104,8 +92,8 @@ impl<L: Law> TorqueDemand<L> {
         if starts {
             // Few ticks reset, and out of line: the copy spares all others to store the input in memory.
             let copy = input;
-            self.law.reset(&mut state.law, &copy);
+            self.law.reset(&mut self.law_state, &copy);
         }
-        self.law.tick(&mut state.law, &input)
+        self.law.tick(&mut self.law_state, &input)
     }
 }

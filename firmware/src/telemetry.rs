@@ -3,10 +3,10 @@
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::{JointTorque, LinkMotion, Slip};
 
-use crate::estimate::EstimatesState;
+use crate::estimate::Estimators;
 use crate::last_command::LastCommand;
 use crate::refer::Target;
-use crate::supervise::supervisor::Supervision;
+use crate::supervise::supervisor::Supervisor;
 
 /// A snapshot for logs and displays. The controller only writes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,16 +64,16 @@ impl Telemetry {
     pub(crate) fn record(
         &mut self,
         tick: u32,
-        estimates: &EstimatesState,
+        estimates: &Estimators,
         target: &Target,
         command: &LastCommand,
-        supervision: &Supervision,
+        supervisor: &Supervisor,
     ) {
         let (model, contact) = (&estimates.model, &estimates.contact);
         *self = Self {
             tick,
-            state: supervision.state(),
-            fault: supervision.fault(),
+            state: supervisor.state(),
+            fault: supervisor.fault(),
             theta_rad: model.theta_rad,
             theta_dot_rad_s: model.theta_dot_rad_s,
             tip_t_m: model.tip_m.x,
@@ -90,17 +90,17 @@ impl Telemetry {
             sticks: contact.friction.sticks,
             edges_m: target.edges_m.into(),
             at_edge: target.at_edge,
-            recovering: target.recovering && supervision.drives(),
+            recovering: target.recovering && supervisor.drives(),
             saturated: command.saturated,
             saturated_ticks: self.saturated_ticks.wrapping_add(command.saturated.into()),
         };
     }
 
     /// Records that the torque has been taken off without a tick.
-    pub(crate) fn stop(&mut self, supervision: &Supervision) {
+    pub(crate) fn stop(&mut self, supervisor: &Supervisor) {
         *self = Self {
-            state: supervision.state(),
-            fault: supervision.fault(),
+            state: supervisor.state(),
+            fault: supervisor.fault(),
             torque_nm: JointTorque::zeros(),
             at_edge: false,
             recovering: false,

@@ -8,9 +8,7 @@ use proptest::sample::select;
 use proptest_state_machine::{ReferenceStateMachine, StateMachineTest, prop_state_machine};
 
 use painleve_firmware::supervise::lapses::{Lapse, LapseLimits, LapseMonitor};
-use painleve_firmware::supervise::supervisor::{
-    OnLiftOff, Supervision, Supervisor, SupervisorSettings,
-};
+use painleve_firmware::supervise::supervisor::{OnLiftOff, Supervisor, SupervisorSettings};
 use painleve_shared::frame::DigitalInputs;
 use painleve_shared::status::{Fault, SupervisorState};
 
@@ -245,19 +243,14 @@ impl ReferenceStateMachine for SupervisorReference {
 struct SupervisorTest;
 
 impl StateMachineTest for SupervisorTest {
-    type SystemUnderTest = (Supervisor, Supervision);
+    type SystemUnderTest = Supervisor;
     type Reference = SupervisorReference;
 
     fn init_test(model: &SupervisorModel) -> Self::SystemUnderTest {
-        let supervisor = Supervisor::new(model.limits.settings(), f32::from(TICK_HZ));
-        (supervisor, Supervision::default())
+        Supervisor::new(model.limits.settings(), f32::from(TICK_HZ))
     }
 
-    fn apply(
-        (supervisor, mut supervision): Self::SystemUnderTest,
-        _: &SupervisorModel,
-        event: Event,
-    ) -> Self::SystemUnderTest {
+    fn apply(mut supervisor: Supervisor, _: &SupervisorModel, event: Event) -> Supervisor {
         match event {
             Event::Ticks(count, inputs) => {
                 let Inputs {
@@ -270,23 +263,23 @@ impl StateMachineTest for SupervisorTest {
                 inputs.set(DigitalInputs::ENABLE, enable);
                 inputs.set(DigitalInputs::RESET, reset);
                 for _ in 0..count {
-                    let before = supervision.state();
-                    let phase = supervisor.tick(&mut supervision, inputs, contact, has_law);
-                    assert_eq!(phase.state, supervision.state());
+                    let before = supervisor.state();
+                    let phase = supervisor.tick(inputs, contact, has_law);
+                    assert_eq!(phase.state, supervisor.state());
                     let arms = before != phase.state && phase.state == SupervisorState::Armed;
                     assert_eq!(phase.arms, arms);
                     // Off is off at once, and nothing drives with a fault.
-                    assert!(!phase.drives() || enable && supervision.fault().is_none());
+                    assert!(!phase.drives() || enable && supervisor.fault().is_none());
                 }
             }
-            Event::Fault(fault) => supervision.latch(fault),
-            Event::Disable => supervision.disable(),
+            Event::Fault(fault) => supervisor.latch(fault),
+            Event::Disable => supervisor.disable(),
         }
-        (supervisor, supervision)
+        supervisor
     }
 
-    fn check_invariants((_, supervision): &Self::SystemUnderTest, model: &SupervisorModel) {
-        assert_eq!((supervision.state(), supervision.fault()), model.state());
+    fn check_invariants(supervisor: &Supervisor, model: &SupervisorModel) {
+        assert_eq!((supervisor.state(), supervisor.fault()), model.state());
     }
 }
 

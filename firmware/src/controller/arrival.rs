@@ -5,7 +5,7 @@ use painleve_shared::frame::{DigitalInputs, SensorFrame};
 
 use crate::configuration::Converters;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
-use crate::supervise::supervisor::Supervision;
+use crate::supervise::supervisor::Supervisor;
 
 /// Largest count of ticks without readings: a fault is latched long before.
 const UNREAD_TICKS_LIMIT: u32 = 1 << 16;
@@ -38,7 +38,7 @@ pub(super) struct ArrivalState {
 /// Lapse monitor, and the supervisor that it stops.
 pub(super) struct Lapses<'a> {
     pub monitor: &'a mut LapseMonitor,
-    pub supervision: &'a mut Supervision,
+    pub supervisor: &'a mut Supervisor,
 }
 
 impl Lapses<'_> {
@@ -58,9 +58,9 @@ impl Lapses<'_> {
     #[cold]
     #[inline(never)]
     fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
-        let latches = self.monitor.note(lapse, times) && self.supervision.fault().is_none();
+        let latches = self.monitor.note(lapse, times) && self.supervisor.fault().is_none();
         if latches {
-            self.supervision.latch(lapse.fault());
+            self.supervisor.latch(lapse.fault());
         }
         latches
     }
@@ -79,7 +79,7 @@ impl Lapses<'_> {
     #[inline]
     fn stop_at(&mut self, first: Option<Lapse>) {
         if let Some(lapse) = first {
-            self.supervision.latch(lapse.fault());
+            self.supervisor.latch(lapse.fault());
         }
     }
 }

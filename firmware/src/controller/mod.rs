@@ -10,7 +10,7 @@
 //! readings of the next tick: the torque goes out earlier, and the update has the rest of the period (Åström and
 //! Wittenmark, Computer-Controlled Systems, 3rd edition, chapter 9).
 //!
-//! Each stage consists of constant settings and a state of its own; the stages' signatures show the
+//! Each stage holds its settings, which never change, and its state; the stages' signatures show the
 //! data flow between them. At the end of a tick its results are written to the telemetry, which is
 //! never read back.
 
@@ -24,7 +24,7 @@ use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFl
 use painleve_shared::range::OutOfRange;
 
 use self::arrival::{Arrival, Lapses, arrive};
-use self::stages::{Stages, State, report};
+use self::stages::{Stages, report};
 use crate::configuration::Configuration;
 use crate::law::{Law, LawSettings};
 use crate::supervise::lapses::{Lapse, LapseMonitor};
@@ -82,7 +82,6 @@ use crate::telemetry::Telemetry;
 #[repr(C)]
 pub struct Controller<L: Law = LawSettings> {
     last_answer: ActuatorFrame,
-    state: State<L>,
     stages: Stages<L>,
     monitor: LapseMonitor,
     due: Due,
@@ -107,13 +106,10 @@ impl<L: Law> Controller<L> {
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn new(configuration: &Configuration<L>) -> Result<Self, OutOfRange> {
         let arm = configuration.validate()?;
-        let settings = &configuration.settings;
-        let stages = Stages::new(configuration, &arm);
         Ok(Self {
             last_answer: ActuatorFrame::default(),
-            state: stages.start(arm),
-            stages,
-            monitor: LapseMonitor::new(settings.lapses),
+            stages: Stages::new(configuration, arm),
+            monitor: LapseMonitor::new(configuration.settings.lapses),
             due: Due::Nothing,
         })
     }
@@ -159,9 +155,9 @@ impl<L: Law> Controller<L> {
         match core::mem::take(&mut self.due) {
             Due::Nothing => return,
             Due::Preparation => {}
-            Due::Everything => self.stages.learn(&mut self.state),
+            Due::Everything => self.stages.learn(),
         }
-        self.stages.prepare(&mut self.state);
+        self.stages.prepare();
     }
 
     // Out of line: the bound on an answer's cycles leaves it out, because it proves that the update is in time.
@@ -178,7 +174,7 @@ impl<L: Law> Controller<L> {
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
         let mut lapses = Lapses {
             monitor: &mut self.monitor,
-            supervision: &mut self.state.supervision,
+            supervisor: &mut self.stages.supervisor,
         };
         lapses.note(lapse, times).then(|| {
             self.stop(None);
@@ -196,36 +192,35 @@ impl<L: Law> Controller<L> {
         if !matches!(self.due, Due::Nothing) {
             self.catch_up();
         }
-        let State {
+        let Stages {
+            ranges,
             arrivals,
-            supervision,
+            supervisor,
             ..
-        } = &mut self.state;
+        } = &mut self.stages;
         let lapses = Lapses {
             monitor: &mut self.monitor,
-            supervision,
+            supervisor,
         };
-        let arrival = arrive(&self.stages.ranges, arrivals, lapses, frame);
-        let supervision = &mut self.state.supervision;
+        let arrival = arrive(ranges, arrivals, lapses, frame);
+        let supervisor = &mut self.stages.supervisor;
         match arrival {
             Arrival::After(elapsed_ticks) => {
-                let (state, answer) = (&mut self.state, &mut self.last_answer);
-                let followed = self
-                    .stages
-                    .answer(state, frame, elapsed_ticks, answer, telemetry);
+                let answer = &mut self.last_answer;
+                let followed = self.stages.answer(frame, elapsed_ticks, answer, telemetry);
                 self.due = match followed {
                     Ok(()) => Due::Everything,
                     Err(_) => Due::Preparation,
                 };
             }
             // Without new readings, the last torque stays for a limited number of ticks.
-            Arrival::Stale if supervision.drives() => {}
+            Arrival::Stale if supervisor.drives() => {}
             Arrival::Stale => self.stop(telemetry),
             Arrival::OutOfRange => {
                 let enabled = frame.inputs.contains(DigitalInputs::ENABLE);
-                if !(supervision.drives() && enabled) {
-                    if supervision.drives() {
-                        supervision.disable();
+                if !(supervisor.drives() && enabled) {
+                    if supervisor.drives() {
+                        supervisor.disable();
                     }
                     self.stop(telemetry);
                 }
@@ -240,15 +235,15 @@ impl<L: Law> Controller<L> {
     #[cold]
     #[inline(never)]
     fn stop(&mut self, telemetry: Option<&mut Telemetry>) {
-        self.state.release();
+        self.stages.release();
         let answer = &mut self.last_answer;
         answer.torques = [TorqueCounts(0); 2];
-        report(answer, &self.state.supervision);
+        report(answer, &self.stages.supervisor);
         answer
             .flags
             .remove(StatusFlags::SATURATED | StatusFlags::AT_EDGE | StatusFlags::RECOVERING);
         if let Some(telemetry) = telemetry {
-            telemetry.stop(&self.state.supervision);
+            telemetry.stop(&self.stages.supervisor);
         }
     }
 }

@@ -7,76 +7,54 @@ use painleve_shared::{Arm, Slip};
 
 use super::arrival::{ArrivalState, ReadingRanges};
 use crate::configuration::Configuration;
-use crate::demand::{DemandState, TorqueDemand};
+use crate::demand::TorqueDemand;
 use crate::estimate::joints::Restart;
-use crate::estimate::{ContactEstimate, EstimatesState, Estimators, Observed};
+use crate::estimate::{ContactEstimate, Estimators, Observed};
 use crate::last_command::LastCommand;
 use crate::law::Law;
-use crate::refer::{References, ReferencesState, Target};
+use crate::refer::{References, Target};
 use crate::schedule::Turn;
-use crate::supervise::supervisor::{Supervision, Supervisor};
+use crate::supervise::supervisor::Supervisor;
 use crate::telemetry::Telemetry;
 use crate::torque_output::TorqueOutput;
 
-/// The stages of a tick: settings only.
+/// The stages of a tick, each with its settings, and their state between ticks.
+// In this order: see the fields of the controller.
 #[derive(Clone, Debug)]
 #[repr(C)]
-pub struct Stages<L> {
-    estimators: Estimators,
-    torques: TorqueOutput,
-    supervisor: Supervisor,
+pub struct Stages<L: Law> {
+    estimates: Estimators,
+    command: LastCommand,
     demand: TorqueDemand<L>,
+    /// Whether the arm is driven, and the latched fault.
+    pub supervisor: Supervisor,
     references: References,
+    /// The tick that has been answered, for its update.
+    observed: Observed,
+    turn: Turn,
+    /// What has arrived.
+    pub arrivals: ArrivalState,
+    torques: TorqueOutput,
     /// Ranges of the readings.
     pub ranges: ReadingRanges,
 }
 
-/// State of the stages between ticks.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub struct State<L: Law> {
-    estimates: EstimatesState,
-    command: LastCommand,
-    demand: DemandState<L>,
-    /// Whether the arm is driven, and the latched fault.
-    pub supervision: Supervision,
-    references: ReferencesState,
-    /// The tick that has been answered, for its update.
-    observed: Observed,
-    /// Least p, as a fraction of Q22, at which the tip may land; 0 if it is not being returned to the belt.
-    landing_p_ratio: f32,
-    turn: Turn,
-    /// What has arrived.
-    pub arrivals: ArrivalState,
-}
-
 impl<L: Law> Stages<L> {
-    /// Makes the stages, each with its own settings.
-    pub fn new(configuration: &Configuration<L>, arm: &Arm<f32>) -> Self {
+    /// Makes the stages, each with its own settings, without readings of this arm.
+    pub fn new(configuration: &Configuration<L>, arm: Arm<f32>) -> Self {
         let (converters, settings) = (&configuration.converters, &configuration.settings);
-        let speed = configuration.loop_speed(arm);
+        let speed = configuration.loop_speed(&arm);
         Self {
-            estimators: Estimators::new(configuration, speed),
-            supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
-            references: References::new(configuration),
+            estimates: Estimators::new(configuration, arm, speed),
+            command: LastCommand::default(),
             demand: TorqueDemand::new(configuration, speed),
+            supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
+            references: References::new(configuration, &arm),
+            observed: Observed::default(),
+            turn: Turn::default(),
+            arrivals: ArrivalState::default(),
             torques: TorqueOutput::new(converters.torque, settings.torque_limit_nm),
             ranges: ReadingRanges::of(converters),
-        }
-    }
-
-    /// Starts without readings of this arm.
-    pub fn start(&self, arm: Arm<f32>) -> State<L> {
-        State {
-            arrivals: ArrivalState::default(),
-            estimates: self.estimators.start(arm),
-            supervision: Supervision::default(),
-            references: self.references.start(&arm),
-            demand: self.demand.start(),
-            command: LastCommand::default(),
-            observed: Observed::default(),
-            landing_p_ratio: 0.0,
-            turn: Turn::default(),
         }
     }
 
@@ -86,64 +64,50 @@ impl<L: Law> Stages<L> {
     /// [`Restart`] if the estimates have started from these readings, which then show nothing else.
     #[inline]
     pub fn answer(
-        &self,
-        state: &mut State<L>,
+        &mut self,
         frame: &SensorFrame,
         elapsed_ticks: u32,
         answer: &mut ActuatorFrame,
         telemetry: Option<&mut Telemetry>,
     ) -> Result<(), Restart> {
-        let followed =
-            self.estimators
-                .observe(&mut state.estimates, frame, elapsed_ticks, &state.command);
+        let followed = self.estimates.observe(frame, elapsed_ticks, &self.command);
         if followed == Err(Restart::EncoderJump) {
-            state.supervision.latch(Fault::EncoderJump);
+            self.supervisor.latch(Fault::EncoderJump);
         }
-        let (model, contact) = (&state.estimates.model, &state.estimates.contact);
-        state.observed.drove = state.supervision.drives();
-        let phase = self.supervisor.tick(
-            &mut state.supervision,
-            frame.inputs,
-            contact.touches,
-            self.demand.is_on(),
-        );
-        let references = &mut state.references;
-        let landing = state.demand.landing_posture();
-        let target = self
-            .references
-            .tick(references, model, contact, &phase, landing);
-        state.observed.elapsed_ticks = elapsed_ticks;
-        state.landing_p_ratio = target.landing_p_ratio;
+        let contact = &self.estimates.contact;
+        self.observed.drove = self.supervisor.drives();
+        let phase = self
+            .supervisor
+            .tick(frame.inputs, contact.touches, self.demand.is_on());
+        let landing = self.demand.landing_posture();
+        let target = self.references.tick(&self.estimates, &phase, landing);
+        self.observed.elapsed_ticks = elapsed_ticks;
         if phase.drives() {
-            let output = self.demand.tick(
-                &mut state.demand,
-                &state.estimates,
-                &phase,
-                &target,
-                state.command.saturated,
-            );
-            let torques = self.torques.tick(&mut state.command, &output);
-            state.command.reference_velocity_m_s = target.reference.velocity_m_s;
+            let output = self
+                .demand
+                .tick(&self.estimates, &phase, &target, self.command.saturated);
+            let torques = self.torques.tick(&mut self.command, &output);
+            self.command.reference_velocity_m_s = target.reference.velocity_m_s;
             if let Err(fault) = torques {
-                state.supervision.latch(fault);
-                state.release();
+                self.supervisor.latch(fault);
+                self.release();
             }
         } else {
-            state.release();
+            self.release();
         }
-        let (estimates, command) = (&state.estimates, &state.command);
+        let (estimates, command) = (&self.estimates, &self.command);
         answer.torques = command.counts;
         answer.reference_tip = Micrometres::from_metres(target.reference.position_m);
         answer.estimated_tip = Micrometres::from_metres(estimates.model.tip_m.x);
         answer.flags = flags(&estimates.contact, &target, command);
-        let is_done = self.references.is_done(&state.references);
+        let is_done = self.references.is_done();
         answer.flags.set(StatusFlags::REFERENCE_DONE, is_done);
-        let recovers = target.recovering && state.supervision.drives();
+        let recovers = target.recovering && self.supervisor.drives();
         answer.flags.set(StatusFlags::RECOVERING, recovers);
-        report(answer, &state.supervision);
+        report(answer, &self.supervisor);
         if let Some(telemetry) = telemetry {
             let tick = frame.tick;
-            telemetry.record(tick, estimates, &target, command, &state.supervision);
+            telemetry.record(tick, estimates, &target, command, &self.supervisor);
         }
         followed
     }
@@ -154,60 +118,42 @@ impl<L: Law> Stages<L> {
     /// cycles can see.
     // Out of line, because the bound leaves it out of a tick that has started the estimates.
     #[inline(never)]
-    pub fn learn(&self, state: &mut State<L>) {
-        let turn = state.turn.take();
-        let (estimates, observed) = (&mut state.estimates, &state.observed);
-        let estimators = &self.estimators;
+    pub fn learn(&mut self) {
+        let turn = self.turn.take();
+        let (estimates, observed) = (&mut self.estimates, &self.observed);
         if estimates.contact.touches {
-            let slow = estimators.learn_in_contact(estimates, observed);
+            let slow = estimates.learn_in_contact(observed);
             match turn {
                 Turn::Balance => {
-                    estimators.balance_torques(estimates);
+                    estimates.balance_torques();
                     if slow.shows_length {
-                        estimators.calibrate(estimates);
+                        estimates.calibrate();
                     }
                 }
-                Turn::Edges if slow.completes_block => estimators.evaluate_response(estimates),
-                Turn::Edges => self.search(state),
+                Turn::Edges if slow.completes_block => estimates.evaluate_response(),
+                Turn::Edges => self.references.search(&self.estimates),
             }
         } else {
-            estimators.learn_in_the_air(estimates, observed);
+            estimates.learn_in_the_air(observed);
             if turn == Turn::Balance {
-                estimators.balance_torques(estimates);
+                estimates.balance_torques();
             }
             // A tip that is being returned to the belt needs the edges soon.
-            if turn == Turn::Edges || state.landing_p_ratio > 0.0 {
-                self.search(state);
+            if turn == Turn::Edges || self.references.asks_for_landing() {
+                self.references.search(&self.estimates);
             }
         }
     }
 
-    /// Continues the search for the edges.
-    #[inline]
-    fn search(&self, state: &mut State<L>) {
-        let contact = &state.estimates.contact;
-        self.references.search(
-            &mut state.references,
-            &state.estimates.arm,
-            state.estimates.model.tip_m.x,
-            contact.friction,
-            state.landing_p_ratio,
-        );
-    }
-
     /// Prepares the estimates for the next readings.
     #[inline]
-    pub fn prepare(&self, state: &mut State<L>) {
-        let drives = state.supervision.drives();
-        self.estimators
-            .prepare(&mut state.estimates, &mut state.command, drives);
-        self.references
-            .prepare(&mut state.references, state.supervision.state());
-        state.observed.last = state.command;
+    pub fn prepare(&mut self) {
+        let drives = self.supervisor.drives();
+        self.estimates.prepare(&mut self.command, drives);
+        self.references.prepare(self.supervisor.state());
+        self.observed.last = self.command;
     }
-}
 
-impl<L: Law> State<L> {
     /// Takes the torque off and cancels a recovery in progress.
     pub fn release(&mut self) {
         self.command = LastCommand::default();
@@ -216,9 +162,9 @@ impl<L: Law> State<L> {
 }
 
 /// Returns state and fault of an answer.
-pub fn report(answer: &mut ActuatorFrame, supervision: &Supervision) {
-    answer.state = supervision.state() as u8;
-    answer.fault = supervision.fault().map_or(0, |fault| fault as u8);
+pub fn report(answer: &mut ActuatorFrame, supervisor: &Supervisor) {
+    answer.state = supervisor.state() as u8;
+    answer.fault = supervisor.fault().map_or(0, |fault| fault as u8);
 }
 
 /// Returns the answer's flags that contact, target and command show.

@@ -23,71 +23,54 @@ settings! {
     }
 }
 
-/// Bounds of the belt's speed.
-#[derive(Clone, Copy, Debug)]
-pub struct BeltState {
-    slowest_m_s: f32,
-    fastest_m_s: f32,
-}
-
-impl Default for BeltState {
-    /// Starts without information.
-    fn default() -> Self {
-        Self {
-            slowest_m_s: f32::NEG_INFINITY,
-            fastest_m_s: f32::INFINITY,
-        }
-    }
-}
-
 /// Narrows the bounds of the belt's speed at each tick.
 #[derive(Clone, Copy, Debug)]
 pub struct BeltEstimator {
     settings: BeltSpeedSettings,
     /// Change of the belt's speed in one tick, m/s.
     widening_m_s: f32,
+    /// Bounds of the belt's speed.
+    slowest_m_s: f32,
+    fastest_m_s: f32,
 }
 
 impl BeltEstimator {
-    /// Makes an estimator that is called every `tick_s`.
+    /// Makes an estimator without information that is called every `tick_s`.
     pub fn new(settings: &BeltSpeedSettings, tick_s: f32) -> Self {
         Self {
             settings: *settings,
             widening_m_s: settings.acceleration_m_s2 * tick_s,
+            slowest_m_s: f32::NEG_INFINITY,
+            fastest_m_s: f32::INFINITY,
         }
     }
 
     /// Updates the bounds with one tick: the tip's velocity (m/s) and, in contact, the friction
     /// estimate.
     #[inline]
-    pub fn update(
-        &self,
-        state: &mut BeltState,
-        tip_velocity_m_s: f32,
-        friction: Option<&FrictionEstimate>,
-    ) {
+    pub fn update(&mut self, tip_velocity_m_s: f32, friction: Option<&FrictionEstimate>) {
         if self.settings.given_m_s.is_some() {
             return;
         }
         let widening = self.widening_m_s;
-        state.slowest_m_s -= widening;
-        state.fastest_m_s += widening;
+        self.slowest_m_s -= widening;
+        self.fastest_m_s += widening;
         let Some(friction) = friction.filter(|friction| friction.slip_seen) else {
             return;
         };
         if friction.sticks || friction.slip == Slip::Positive {
-            state.fastest_m_s = state.fastest_m_s.at_most(tip_velocity_m_s);
-            state.slowest_m_s = state.slowest_m_s.at_most(state.fastest_m_s);
+            self.fastest_m_s = self.fastest_m_s.at_most(tip_velocity_m_s);
+            self.slowest_m_s = self.slowest_m_s.at_most(self.fastest_m_s);
         }
         if friction.sticks || friction.slip == Slip::Negative {
-            state.slowest_m_s = state.slowest_m_s.at_least(tip_velocity_m_s);
-            state.fastest_m_s = state.fastest_m_s.at_least(state.slowest_m_s);
+            self.slowest_m_s = self.slowest_m_s.at_least(tip_velocity_m_s);
+            self.fastest_m_s = self.fastest_m_s.at_least(self.slowest_m_s);
         }
     }
 
     /// Returns the lowest and highest speed that the belt may have, m/s.
-    pub fn bounds_m_s(&self, state: &BeltState) -> (f32, f32) {
-        let known = (state.slowest_m_s, state.fastest_m_s);
+    pub fn bounds_m_s(&self) -> (f32, f32) {
+        let known = (self.slowest_m_s, self.fastest_m_s);
         self.settings
             .given_m_s
             .map_or(known, |speed| (speed, speed))
@@ -95,8 +78,8 @@ impl BeltEstimator {
 
     /// Returns whether the bounds allow a belt as fast as a tip with this velocity (m/s), which is then in
     /// stick.
-    pub fn may_stick(&self, state: &BeltState, tip_velocity_m_s: f32) -> bool {
-        let (slowest_m_s, fastest_m_s) = self.bounds_m_s(state);
+    pub fn may_stick(&self, tip_velocity_m_s: f32) -> bool {
+        let (slowest_m_s, fastest_m_s) = self.bounds_m_s();
         tip_velocity_m_s > slowest_m_s - BOUND_ERROR_M_S
             && tip_velocity_m_s < fastest_m_s + BOUND_ERROR_M_S
     }
@@ -119,62 +102,57 @@ mod tests {
 
     #[test]
     fn sliding_both_ways_closes_the_bounds() {
-        let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
-        let mut state = BeltState::default();
-        belt.update(&mut state, 0.1, Some(&friction(Slip::Positive, false)));
-        belt.update(&mut state, -0.3, Some(&friction(Slip::Negative, false)));
-        let (slowest, fastest) = belt.bounds_m_s(&state);
+        let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
+        belt.update(0.1, Some(&friction(Slip::Positive, false)));
+        belt.update(-0.3, Some(&friction(Slip::Negative, false)));
+        let (slowest, fastest) = belt.bounds_m_s();
         assert!((slowest + 0.3).abs() < 1e-6 && (fastest - 0.102).abs() < 1e-3);
     }
 
     #[test]
     fn a_tip_as_fast_as_one_that_slid_lately_does_not_stick() {
-        let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
-        let mut state = BeltState::default();
-        assert!(belt.may_stick(&state, 0.0));
-        belt.update(&mut state, 0.1, Some(&friction(Slip::Negative, false)));
-        assert!(!belt.may_stick(&state, 0.05) && belt.may_stick(&state, 0.095));
-        assert!(belt.may_stick(&state, 0.4));
+        let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
+        assert!(belt.may_stick(0.0));
+        belt.update(0.1, Some(&friction(Slip::Negative, false)));
+        assert!(!belt.may_stick(0.05) && belt.may_stick(0.095));
+        assert!(belt.may_stick(0.4));
         // The belt may have slowed down meanwhile.
         for _ in 0..50 {
-            belt.update(&mut state, 0.0, None);
+            belt.update(0.0, None);
         }
-        assert!(belt.may_stick(&state, 0.05));
+        assert!(belt.may_stick(0.05));
     }
 
     #[test]
     fn stick_gives_the_speed_and_the_bounds_widen_with_time() {
-        let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
-        let mut state = BeltState::default();
-        belt.update(&mut state, -0.25, Some(&friction(Slip::Positive, true)));
-        assert_eq!(belt.bounds_m_s(&state), (-0.25, -0.25));
+        let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
+        belt.update(-0.25, Some(&friction(Slip::Positive, true)));
+        assert_eq!(belt.bounds_m_s(), (-0.25, -0.25));
         for _ in 0..100 {
-            belt.update(&mut state, 0.0, None);
+            belt.update(0.0, None);
         }
-        let (slowest, fastest) = belt.bounds_m_s(&state);
+        let (slowest, fastest) = belt.bounds_m_s();
         assert!((slowest + 0.45).abs() < 1e-3 && (fastest + 0.05).abs() < 1e-3);
     }
 
     #[test]
     fn a_belt_faster_than_its_bounds_moves_them() {
-        let belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
-        let mut state = BeltState::default();
-        belt.update(&mut state, -0.5, Some(&friction(Slip::Positive, false)));
-        belt.update(&mut state, 0.5, Some(&friction(Slip::Negative, false)));
-        assert_eq!(belt.bounds_m_s(&state), (0.5, 0.5));
+        let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
+        belt.update(-0.5, Some(&friction(Slip::Positive, false)));
+        belt.update(0.5, Some(&friction(Slip::Negative, false)));
+        assert_eq!(belt.bounds_m_s(), (0.5, 0.5));
     }
 
     #[test]
     fn a_given_speed_stays() {
-        let belt = BeltEstimator::new(
+        let mut belt = BeltEstimator::new(
             &BeltSpeedSettings {
                 given_m_s: Some(-0.4),
                 ..Default::default()
             },
             1.0,
         );
-        let mut state = BeltState::default();
-        belt.update(&mut state, 3.0, Some(&friction(Slip::Negative, false)));
-        assert_eq!(belt.bounds_m_s(&state), (-0.4, -0.4));
+        belt.update(3.0, Some(&friction(Slip::Negative, false)));
+        assert_eq!(belt.bounds_m_s(), (-0.4, -0.4));
     }
 }

@@ -28,27 +28,10 @@ pub struct LengthCalibrator {
     deviation_m: f32,
     /// Number of readings beyond which old ones are forgotten.
     most_readings: f32,
-}
-
-/// Running mean of a [`LengthCalibrator`]; without readings by default.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CalibrationState {
     /// Mean of cos θ₁ + ρ cos θ₂.
     mean: f32,
     /// Number of readings in the mean.
     readings: f32,
-}
-
-impl CalibrationState {
-    /// Returns the largest error (m) of a gap whose readings are wrong by at most `reading_error_m`, including
-    /// the error of the length, which is averaged from such readings.
-    pub fn gap_error_m(&self, reading_error_m: f32) -> f32 {
-        if self.readings > 0.0 {
-            reading_error_m * (1.0 + LASTING_ERROR + 1.0 / self.readings.square_root())
-        } else {
-            reading_error_m
-        }
-    }
 }
 
 impl LengthCalibrator {
@@ -58,40 +41,52 @@ impl LengthCalibrator {
             nominal_m,
             deviation_m: settings.tolerance * nominal_m,
             most_readings: (AVERAGING_S / tick_s).at_least(1.0),
+            mean: 0.0,
+            readings: 0.0,
+        }
+    }
+
+    /// Returns the largest error (m) of a gap whose readings are wrong by at most `reading_error_m`, including
+    /// the error of the length, which is averaged from such readings.
+    pub fn gap_error_m(&self, reading_error_m: f32) -> f32 {
+        if self.readings > 0.0 {
+            reading_error_m * (1.0 + LASTING_ERROR + 1.0 / self.readings.square_root())
+        } else {
+            reading_error_m
         }
     }
 
     /// Updates the mean with the gap (m) that one tick's readings give for the arm's present length while the
     /// tip is on the belt, and scales the arm to the length that follows.
     #[inline]
-    pub fn update(&self, state: &mut CalibrationState, arm: &mut Arm<f32>, measured_gap_m: f32) {
-        arm.scale_to(self.length_m(state, arm, measured_gap_m));
+    pub fn update(&mut self, arm: &mut Arm<f32>, measured_gap_m: f32) {
+        arm.scale_to(self.length_m(arm, measured_gap_m));
     }
 
     /// Restarts the mean at this measured gap (m): the tip is assumed on the belt, because it cannot be below
     /// it.
     #[cold]
     #[inline(never)]
-    pub fn restart(&self, state: &mut CalibrationState, arm: &mut Arm<f32>, measured_gap_m: f32) {
-        state.readings = 0.0;
-        self.update(state, arm, measured_gap_m);
+    pub fn restart(&mut self, arm: &mut Arm<f32>, measured_gap_m: f32) {
+        self.readings = 0.0;
+        self.update(arm, measured_gap_m);
     }
 
     /// Returns whether the length is calibrated but has no reading yet.
-    pub fn is_open(&self, state: &CalibrationState) -> bool {
-        self.deviation_m > 0.0 && state.readings == 0.0
+    pub fn is_open(&self) -> bool {
+        self.deviation_m > 0.0 && self.readings == 0.0
     }
 
     /// Returns the length of link 1 after one more reading, m.
-    fn length_m(&self, state: &mut CalibrationState, arm: &Arm<f32>, measured_gap_m: f32) -> f32 {
+    fn length_m(&mut self, arm: &Arm<f32>, measured_gap_m: f32) -> f32 {
         let ([present_m, _], height_m) = (arm.link_length_m(), arm.height_m());
         if self.deviation_m == 0.0 {
             return present_m;
         }
         let sum = (height_m - measured_gap_m) / present_m;
-        state.readings = (state.readings + 1.0).at_most(self.most_readings);
-        state.mean += (sum - state.mean) / state.readings;
-        let length_m = height_m / state.mean;
+        self.readings = (self.readings + 1.0).at_most(self.most_readings);
+        self.mean += (sum - self.mean) / self.readings;
+        let length_m = height_m / self.mean;
         // Rejects non-finite lengths as well.
         if (length_m - self.nominal_m).abs() <= self.deviation_m {
             length_m
@@ -111,14 +106,12 @@ mod tests {
     /// A calibrator with its state and its arm.
     struct Calibration {
         calibrator: LengthCalibrator,
-        state: CalibrationState,
         arm: Arm<f32>,
     }
 
     impl Calibration {
         fn update(&mut self, gap_m: f32) -> f32 {
-            self.calibrator
-                .update(&mut self.state, &mut self.arm, gap_m);
+            self.calibrator.update(&mut self.arm, gap_m);
             self.arm.link_length_m()[0]
         }
     }
@@ -131,7 +124,6 @@ mod tests {
         };
         Calibration {
             calibrator: LengthCalibrator::new(&CalibrationSettings::default(), 0.21, 1e-3),
-            state: CalibrationState::default(),
             arm: Arm::new(parameters).unwrap(),
         }
     }
@@ -165,19 +157,15 @@ mod tests {
     #[test]
     fn a_restart_discards_earlier_readings() {
         let mut calibration = calibration();
-        let is_open = |of: &Calibration| of.calibrator.is_open(&of.state);
+        let is_open = |of: &Calibration| of.calibrator.is_open();
         assert!(is_open(&calibration));
         let mut length_m = 0.21;
         for _ in 0..10 {
             length_m = calibration.update(gap_m(0.2205, length_m));
         }
         assert!(!is_open(&calibration));
-        let Calibration {
-            calibrator,
-            state,
-            arm,
-        } = &mut calibration;
-        calibrator.restart(state, arm, gap_m(0.205, length_m));
+        let Calibration { calibrator, arm } = &mut calibration;
+        calibrator.restart(arm, gap_m(0.205, length_m));
         length_m = arm.link_length_m()[0];
         assert!((length_m - 0.205).abs() < 1e-6, "{length_m}");
     }
@@ -186,13 +174,13 @@ mod tests {
     fn the_gap_error_falls_with_the_number_of_readings() {
         let mut calibration = calibration();
         assert_eq!(
-            calibration.state.gap_error_m(50e-6),
+            calibration.calibrator.gap_error_m(50e-6),
             50e-6,
             "without readings"
         );
         let errors_m: [f32; 100] = core::array::from_fn(|_| {
             calibration.update(0.0);
-            calibration.state.gap_error_m(50e-6)
+            calibration.calibrator.gap_error_m(50e-6)
         });
         assert!((errors_m[0] - 105e-6).abs() < 1e-9 && (errors_m[99] - 60e-6).abs() < 1e-9);
         assert!(errors_m.is_sorted_by(|before, after| before > after));

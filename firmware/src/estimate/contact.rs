@@ -76,31 +76,19 @@ pub struct ContactDetector {
     settings: ContactSettings,
     /// f_c/σ², 1/N.
     slope_per_n: f32,
-}
-
-/// The log-odds of contact, and the contact decision.
-#[derive(Clone, Copy, Debug)]
-pub struct ContactState {
+    /// The log-odds of contact, and the contact decision.
     log_odds: f32,
     contact: bool,
 }
 
-impl Default for ContactState {
-    /// Starts with the tip in the air, without certainty.
-    fn default() -> Self {
-        Self {
-            log_odds: -DECISION,
-            contact: false,
-        }
-    }
-}
-
 impl ContactDetector {
-    /// Makes a detector with these settings.
+    /// Makes a detector with these settings, with the tip in the air, without certainty.
     pub fn new(settings: &ContactSettings) -> Self {
         Self {
             settings: *settings,
             slope_per_n: settings.contact_n / (settings.force_noise_n * settings.force_noise_n),
+            log_odds: -DECISION,
+            contact: false,
         }
     }
 
@@ -112,32 +100,26 @@ impl ContactDetector {
     /// Updates the decision with one tick's normal force from the force cell, N. Returns whether
     /// the tip touches.
     #[inline]
-    pub fn update_from_force(&self, state: &mut ContactState, normal_force_n: f32) -> bool {
+    pub fn update_from_force(&mut self, normal_force_n: f32) -> bool {
         let above = normal_force_n - 0.5 * self.settings.contact_n;
-        state.weigh((self.slope_per_n * above).within(CERTAIN))
+        self.weigh((self.slope_per_n * above).within(CERTAIN))
     }
 
     /// Updates the decision with one tick's encoder readings. Returns whether the tip touches.
-    pub fn update_from_encoders(
-        &self,
-        state: &mut ContactState,
-        encoders: &EncoderReading,
-    ) -> bool {
+    pub fn update_from_encoders(&mut self, encoders: &EncoderReading) -> bool {
         let gap = (GAP_SLOPE * (1.0 - encoders.gap_m.abs() / encoders.gap_error_m))
             .limited(-CERTAIN, GAP_FOR);
         let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
             .limited(-CERTAIN, 0.0);
         let change = gap + release;
         // Unchanged readings add no evidence against contact.
-        state.weigh(if encoders.moved {
+        self.weigh(if encoders.moved {
             change
         } else {
             change.at_least(0.0)
         })
     }
-}
 
-impl ContactState {
     /// Adds to the log-odds and updates the decision.
     fn weigh(&mut self, change: f32) -> bool {
         self.log_odds = (self.log_odds + change).within(CERTAIN);
@@ -199,62 +181,46 @@ mod tests {
 
     #[test]
     fn the_force_cell_decides_within_a_few_ticks_and_does_not_chatter() {
-        let (detector, mut state) = (detector(), ContactState::default());
-        assert!(!state.is_in_flight(), "initially flight is not certain");
-        assert_eq!(
-            ticks_until(true, || detector.update_from_force(&mut state, 0.5)),
-            2
-        );
+        let mut detector = detector();
+        assert!(!detector.is_in_flight(), "initially flight is not certain");
+        assert_eq!(ticks_until(true, || detector.update_from_force(0.5)), 2);
         for force in [0.3, 0.15, 0.4, 0.2, 0.35, 0.25] {
-            assert!(detector.update_from_force(&mut state, force), "{force}");
+            assert!(detector.update_from_force(force), "{force}");
         }
         for _ in 0..3 {
-            detector.update_from_force(&mut state, 10.0);
+            detector.update_from_force(10.0);
         }
-        assert_eq!(state.confidence(), 1.0);
-        assert!(ticks_until(false, || detector.update_from_force(&mut state, 0.0)) <= 3);
-        assert!(!detector.update_from_force(&mut state, 0.1));
+        assert_eq!(detector.confidence(), 1.0);
+        assert!(ticks_until(false, || detector.update_from_force(0.0)) <= 3);
+        assert!(!detector.update_from_force(0.1));
     }
 
     #[test]
     fn a_gap_that_the_encoders_resolve_is_no_contact() {
-        let (detector, mut state) = (detector(), ContactState::default());
+        let mut detector = detector();
         for tick in 0..1000 {
             // Quantisation alone.
-            detector
-                .update_from_encoders(&mut state, &gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
+            detector.update_from_encoders(&gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
         }
-        assert!(state.touches());
-        assert!(
-            ticks_until(false, || detector
-                .update_from_encoders(&mut state, &gap(100e-6)))
-                <= 3
-        );
-        assert!(
-            ticks_until(true, || detector
-                .update_from_encoders(&mut state, &gap(0.0)))
-                <= 8
-        );
+        assert!(detector.touches());
+        assert!(ticks_until(false, || detector.update_from_encoders(&gap(100e-6))) <= 3);
+        assert!(ticks_until(true, || detector.update_from_encoders(&gap(0.0))) <= 8);
     }
 
     #[test]
     fn an_unchanged_reading_adds_no_evidence_against_contact() {
-        let (detector, mut state) = (detector(), ContactState::default());
+        let mut detector = detector();
         for _ in 0..20 {
-            detector.update_from_encoders(&mut state, &gap(0.0));
+            detector.update_from_encoders(&gap(0.0));
         }
         let stays = EncoderReading {
             moved: false,
             ..gap(80e-6)
         };
         for _ in 0..100 {
-            assert!(detector.update_from_encoders(&mut state, &stays));
+            assert!(detector.update_from_encoders(&stays));
         }
-        assert!(
-            ticks_until(false, || detector
-                .update_from_encoders(&mut state, &gap(80e-6)))
-                <= 3
-        );
+        assert!(ticks_until(false, || detector.update_from_encoders(&gap(80e-6))) <= 3);
     }
 
     #[test]
@@ -266,12 +232,11 @@ mod tests {
                 full_release,
                 ..gap(0.0)
             };
-            let (detector, mut state) = (detector(), ContactState::default());
+            let mut detector = detector();
             for _ in 0..20 {
-                detector.update_from_encoders(&mut state, &reading(0.0));
+                detector.update_from_encoders(&reading(0.0));
             }
-            (1..100)
-                .find(|_| !detector.update_from_encoders(&mut state, &reading(part * full_release)))
+            (1..100).find(|_| !detector.update_from_encoders(&reading(part * full_release)))
         };
         assert_eq!(ticks_until_flight(9.0, 1.0), Some(3));
         assert_eq!(ticks_until_flight(9.0, 0.4), None);

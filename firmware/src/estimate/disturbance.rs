@@ -36,11 +36,6 @@ pub struct DisturbanceEstimator {
     bandwidth_rad_s: f32,
     limit_nm: f32,
     period_s: f32,
-}
-
-/// Estimate of a [`DisturbanceEstimator`]; initially zero.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct DisturbanceState {
     /// Generalised torque d on the arm in addition to the model's torques, N·m.
     pub torque_nm: GeneralisedTorque<f32>,
     /// θ̇ at the previous update, rad/s.
@@ -65,6 +60,9 @@ impl DisturbanceEstimator {
             bandwidth_rad_s: settings.bandwidth_rad_s,
             limit_nm: LARGEST * torque_limit_nm,
             period_s,
+            torque_nm: GeneralisedTorque::zeros(),
+            rate_rad_s: None,
+            acted: Acted::default(),
         }
     }
 
@@ -72,22 +70,16 @@ impl DisturbanceEstimator {
     /// `p_ratio` is p/Q22 of a tip in contact, `loop_share` the part of the force error that a loop through the contact may
     /// remove in a tick.
     #[inline]
-    pub fn update(
-        &self,
-        state: &mut DisturbanceState,
-        model: &Model,
-        p_ratio: Option<f32>,
-        loop_share: f32,
-    ) {
+    pub fn update(&mut self, model: &Model, p_ratio: Option<f32>, loop_share: f32) {
         let rate_rad_s = model.theta_dot_rad_s;
-        let acted = core::mem::take(&mut state.acted);
+        let acted = core::mem::take(&mut self.acted);
         if acted.ticks == 0.0 {
             return;
         }
         let per_tick = 1.0 / acted.ticks;
         let (torque_nm, force_n) = (acted.torque_nm * per_tick, acted.force_n * per_tick);
-        let Some(before) = &mut state.rate_rad_s else {
-            state.rate_rad_s = Some(rate_rad_s);
+        let Some(before) = &mut self.rate_rad_s else {
+            self.rate_rad_s = Some(rate_rad_s);
             return;
         };
         let change = rate_rad_s - *before;
@@ -104,12 +96,10 @@ impl DisturbanceEstimator {
             (SHARE * p_ratio).limited(0.0, CONTACT_SHARE * loop_share)
         });
         let weight = (self.bandwidth_rad_s * self.period_s).at_most(share);
-        state.torque_nm =
-            (state.torque_nm + residual_nm * weight).map(|torque| torque.within(limit_nm));
+        self.torque_nm =
+            (self.torque_nm + residual_nm * weight).map(|torque| torque.within(limit_nm));
     }
-}
 
-impl DisturbanceState {
     /// Adds a tick that began `elapsed_s` (s) after the previous one, with the joint torques (N·m) until then and the
     /// contact force (f_t, f_n), N.
     #[inline]
@@ -148,17 +138,16 @@ mod tests {
     ) -> GeneralisedTorque<f32> {
         let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
         let theta = LinkMotion::new(-0.3, 0.7);
-        let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), 5.0, TICK_S);
-        let mut state = DisturbanceState::default();
+        let mut estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), 5.0, TICK_S);
         for tick in 0..ticks {
             let rate = acceleration * (tick as f32 * TICK_S);
             let truth = Model::new(&arm, theta, rate, &disturbance_nm);
-            let model = Model::new(&arm, theta, rate, &state.torque_nm);
+            let model = Model::new(&arm, theta, rate, &estimator.torque_nm);
             let torque_nm = truth.inverse_dynamics_nm(&acceleration, &force_n);
-            state.add(&torque_nm, &force_n, TICK_S);
-            estimator.update(&mut state, &model, p_ratio, 1.0);
+            estimator.add(&torque_nm, &force_n, TICK_S);
+            estimator.update(&model, p_ratio, 1.0);
         }
-        state.torque_nm
+        estimator.torque_nm
     }
 
     proptest! {
@@ -202,8 +191,7 @@ mod tests {
     /// Returns the estimate for an arm in balance after a sudden change of its rates.
     fn after_a_jump(rate_rad_s: LinkMotion<f32>) -> GeneralisedTorque<f32> {
         let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), 5.0, TICK_S);
-        let mut state = DisturbanceState::default();
+        let mut estimator = DisturbanceEstimator::new(&DisturbanceSettings::default(), 5.0, TICK_S);
         for rate in [LinkMotion::zeros(), rate_rad_s] {
             let model = Model::new(
                 &arm,
@@ -213,10 +201,10 @@ mod tests {
             );
             let force_n = Vector2::zeros();
             let torque_nm = model.inverse_dynamics_nm(&LinkMotion::zeros(), &force_n);
-            state.add(&torque_nm, &force_n, TICK_S);
-            estimator.update(&mut state, &model, None, 1.0);
+            estimator.add(&torque_nm, &force_n, TICK_S);
+            estimator.update(&model, None, 1.0);
         }
-        state.torque_nm
+        estimator.torque_nm
     }
 
     #[test]

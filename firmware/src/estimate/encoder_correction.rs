@@ -102,7 +102,7 @@ impl EncoderCorrector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::joints::{JointEstimator, JointEstimatorSettings, JointState};
+    use crate::estimate::joints::{JointEstimator, JointEstimatorSettings};
     use painleve_shared::LinkMotion;
     use painleve_shared::counts::EncoderScale;
     use proptest::prelude::*;
@@ -153,9 +153,8 @@ mod tests {
             ..Default::default()
         };
         let scale = EncoderScale::default();
-        let estimator = JointEstimator::new(&settings, [scale; 2], 1000.0);
+        let mut estimator = JointEstimator::new(&settings, [scale; 2], 1000.0);
         let corrector = EncoderCorrector::new(&encoders);
-        let mut state = JointState::default();
         let still = JointMotion::zeros();
         for tick in 0..600_u16 {
             let time_s = 1e-3 * f32::from(tick);
@@ -165,13 +164,13 @@ mod tests {
             let readings = (joints - added)
                 .to_array()
                 .map(|angle| scale.reading(f64::from(angle)));
-            let _ = estimator.correct(&mut state, &readings, 1, &still);
-            let error = (state.angles_rad() - joints).amax();
+            let _ = estimator.correct(&readings, 1, &still);
+            let error = (estimator.angles_rad() - joints).amax();
             let most = if tick < 100 { 0.02 } else { 6e-4 };
             assert!(error < most, "{tick}: {error}");
-            estimator.predict(&mut state, &still);
-            let pose = Pose::new(&state.theta_rad());
-            estimator.expect_pose(&mut state, &pose);
+            estimator.predict(&still);
+            let pose = Pose::new(&estimator.theta_rad());
+            estimator.expect_pose(&pose);
         }
     }
 

@@ -82,10 +82,9 @@ impl FrictionEstimate {
     }
 }
 
-/// The filter's settings.
+/// The filter with its settings.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionEstimator {
-    first_guess: f32,
     /// Normal force below which friction is not observed, N.
     observable_n: f32,
     force_variance_n2: f32,
@@ -96,11 +95,6 @@ pub struct FrictionEstimator {
     clear_force_n2: f32,
     /// Weight of one innovation in their average.
     mean_weight: f32,
-}
-
-/// The filter's state.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FrictionState {
     estimate: FrictionEstimate,
     /// Ticks in a row that indicate a slip in the opposite direction.
     contrary_ticks: u8,
@@ -115,7 +109,7 @@ pub struct FrictionState {
     /// Variance of the noise of the ratio.
     noise_variance: f32,
     /// Variance of a reading's force by the noise of the force cell, σ² (1 + μ²), N².
-    force_variance_n2: f32,
+    reading_variance_n2: f32,
 }
 
 /// What a reading has changed.
@@ -134,45 +128,37 @@ impl FrictionEstimator {
     pub fn new(settings: &FrictionSettings, cell: &ContactSettings, tick_s: f32) -> Self {
         let square = |deviation: f32| deviation * deviation;
         let force_variance_n2 = square(cell.force_noise_n);
+        let first_variance = square(settings.first_deviation);
         Self {
-            first_guess: settings.first_guess,
             observable_n: cell.contact_n,
             force_variance_n2,
-            first_variance: square(settings.first_deviation),
+            first_variance,
             drift_variance: square(DRIFT_PER_SQRT_S) * tick_s,
             clear_force_n2: 9.0 * force_variance_n2,
             mean_weight: tick_s / (MEAN_S + tick_s),
-        }
-    }
-
-    /// Starts with the initial estimate.
-    pub fn start(&self) -> FrictionState {
-        FrictionState {
             estimate: FrictionEstimate {
-                coefficient: self.first_guess,
-                variance: self.first_variance,
+                coefficient: settings.first_guess,
+                variance: first_variance,
                 ..Default::default()
             },
+            contrary_ticks: 0,
             slip_in_doubt: true,
+            correction: None,
+            mean_innovation: 0.0,
+            innovation: 0.0,
             noise_variance: 1.0,
-            force_variance_n2: self.force_variance_n2,
-            ..Default::default()
+            reading_variance_n2: force_variance_n2,
         }
     }
 
     /// Corrects the estimate with one reading (f_t, f_n), N, of a tip in contact; `is_dragged` returns whether its
     /// motion allows stick.
     #[inline]
-    pub fn correct(
-        &self,
-        state: &mut FrictionState,
-        force_n: &Vector2<f32>,
-        is_dragged: impl FnOnce(Slip) -> bool,
-    ) {
-        if state.slip_in_doubt {
-            self.observe_slip(state, force_n);
+    pub fn correct(&mut self, force_n: &Vector2<f32>, is_dragged: impl FnOnce(Slip) -> bool) {
+        if self.slip_in_doubt {
+            self.observe_slip(force_n);
         }
-        let estimate = &mut state.estimate;
+        let estimate = &mut self.estimate;
         let normal_n = force_n.y;
         if normal_n < self.observable_n {
             estimate.sticks = false;
@@ -181,8 +167,8 @@ impl FrictionEstimator {
         let excess_n = -estimate.slip.sign::<f32>() * force_n.x - estimate.coefficient * normal_n;
         let square_n2 = normal_n * normal_n;
         let mut variance_n2 = estimate.variance * square_n2;
-        let noise_n2 = state.force_variance_n2;
-        let quiet_n2 = (state.noise_variance * square_n2).limited(0.01 * noise_n2, noise_n2);
+        let noise_n2 = self.reading_variance_n2;
+        let quiet_n2 = (self.noise_variance * square_n2).limited(0.01 * noise_n2, noise_n2);
         let differs = excess_n * excess_n > DIFFERENT_SQUARE * (variance_n2 + quiet_n2);
         estimate.sticks = differs && excess_n < 0.0 && is_dragged(estimate.slip);
         if estimate.sticks {
@@ -198,7 +184,7 @@ impl FrictionEstimator {
         let change = gain * innovation;
         estimate.coefficient = (estimate.coefficient + change).at_least(0.0);
         estimate.catch_up = MISSED_TICKS * change;
-        state.correction = Some(Correction {
+        self.correction = Some(Correction {
             innovation,
             gain,
             normal_force_n: normal_n,
@@ -207,74 +193,67 @@ impl FrictionEstimator {
 
     /// Updates variances and slip after the tip has touched at a tick, with its reading.
     #[inline]
-    pub fn update(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
-        if let Some(correction) = state.correction.take() {
-            self.adapt(state, correction);
+    pub fn update(&mut self, force_n: &Vector2<f32>) {
+        if let Some(correction) = self.correction.take() {
+            self.adapt(correction);
         }
-        let estimate = &mut state.estimate;
+        let estimate = &mut self.estimate;
         estimate.catch_up = 0.0;
         let variance = estimate.variance + self.drift_variance;
         estimate.variance = variance.at_most(self.first_variance);
-        state.force_variance_n2 =
+        self.reading_variance_n2 =
             self.force_variance_n2 * (1.0 + estimate.coefficient * estimate.coefficient);
         // A reading that could decide has been considered before its tick was answered.
-        if !state.slip_in_doubt {
-            self.observe_slip(state, force_n);
+        if !self.slip_in_doubt {
+            self.observe_slip(force_n);
         }
-        state.slip_in_doubt =
-            !state.estimate.slip_seen || state.contrary_ticks + 1 >= REVERSAL_TICKS;
+        self.slip_in_doubt = !self.estimate.slip_seen || self.contrary_ticks + 1 >= REVERSAL_TICKS;
     }
 
     /// Adapts the variances to a correction.
-    fn adapt(&self, state: &mut FrictionState, correction: Correction) {
+    fn adapt(&mut self, correction: Correction) {
         let (innovation, normal_n) = (correction.innovation, correction.normal_force_n);
-        let ratio_variance = state.force_variance_n2 / (normal_n * normal_n);
-        state.estimate.variance *= 1.0 - correction.gain;
+        let ratio_variance = self.reading_variance_n2 / (normal_n * normal_n);
+        self.estimate.variance *= 1.0 - correction.gain;
         // Innovations that keep their sign are not noise: μ has changed.
         let weight = self.mean_weight;
-        let change = innovation - state.innovation;
-        state.innovation = innovation;
+        let change = innovation - self.innovation;
+        self.innovation = innovation;
         let least_variance = 0.01 * ratio_variance;
-        let most = NOISE_JUMP * (state.noise_variance + least_variance);
+        let most = NOISE_JUMP * (self.noise_variance + least_variance);
         let square = (0.5 * change * change).at_most(most);
-        state.noise_variance += 0.25 * weight * (square - state.noise_variance);
-        let ratio_variance = state.noise_variance.limited(least_variance, ratio_variance);
-        state.mean_innovation += weight * (innovation - state.mean_innovation);
-        let square = state.mean_innovation * state.mean_innovation;
-        if square > SIGNIFICANT_SQUARE * (state.estimate.variance + ratio_variance) * weight {
-            state.estimate.variance = state.estimate.variance.at_least(square);
+        self.noise_variance += 0.25 * weight * (square - self.noise_variance);
+        let ratio_variance = self.noise_variance.limited(least_variance, ratio_variance);
+        self.mean_innovation += weight * (innovation - self.mean_innovation);
+        let square = self.mean_innovation * self.mean_innovation;
+        if square > SIGNIFICANT_SQUARE * (self.estimate.variance + ratio_variance) * weight {
+            self.estimate.variance = self.estimate.variance.at_least(square);
         }
     }
 
     // Out of line: few readings can decide before their tick is answered.
     #[inline(never)]
-    fn observe_slip(&self, state: &mut FrictionState, force_n: &Vector2<f32>) {
-        let estimate = &mut state.estimate;
+    fn observe_slip(&mut self, force_n: &Vector2<f32>) {
+        let estimate = &mut self.estimate;
         let slip = Slip::of(-force_n.x);
         // Below the noise level the sign carries no information.
         let clear = force_n.x * force_n.x > self.clear_force_n2;
         let cone_n = REVERSAL_FRACTION * estimate.coefficient * force_n.y;
         let contrary = clear && slip != estimate.slip && force_n.x.abs() >= cone_n;
-        state.contrary_ticks = if contrary {
-            state.contrary_ticks + 1
-        } else {
-            0
-        };
-        if state.contrary_ticks >= REVERSAL_TICKS || (clear && !estimate.slip_seen) {
+        self.contrary_ticks = if contrary { self.contrary_ticks + 1 } else { 0 };
+        if self.contrary_ticks >= REVERSAL_TICKS || (clear && !estimate.slip_seen) {
             estimate.slip = slip;
             estimate.slip_seen = true;
-            state.contrary_ticks = 0;
+            self.contrary_ticks = 0;
             estimate.sticks = false;
         }
     }
 
     /// Forgets how well μ is known. A tip that has left the belt may have been thrown off by more friction than estimated.
-    pub fn doubt(&self, state: &mut FrictionState) {
-        state.estimate.variance = self.first_variance;
+    pub fn doubt(&mut self) {
+        self.estimate.variance = self.first_variance;
     }
-}
 
-impl FrictionState {
     /// Returns the present estimate.
     pub fn estimate(&self) -> &FrictionEstimate {
         &self.estimate

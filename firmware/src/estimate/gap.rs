@@ -1,7 +1,7 @@
 //! The measured height of the tip above the belt: evidence of contact from the encoders, and of the links' length.
 
+use super::Estimators;
 use super::contact::EncoderReading;
-use super::{EstimatesState, Estimators};
 use crate::last_command::LastCommand;
 
 /// Uncertainty of the gap beyond the encoders' resolution, m.
@@ -10,42 +10,37 @@ const GAP_UNCERTAINTY_M: f32 = 15e-6;
 impl Estimators {
     /// Returns the measured height of the tip above the belt, m.
     #[inline]
-    pub(super) fn gap_m(&self, state: &EstimatesState) -> f32 {
-        let residual = state.joints.innovation_rad() * self.joints.residual_share();
-        let model = &state.model;
+    pub(super) fn gap_m(&self) -> f32 {
+        let residual = self.joints.innovation_rad() * self.joints.residual_share();
+        let model = &self.model;
         let jacobian = &model.jacobian;
         model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
     }
 
     /// Returns the contact evidence from the encoders.
-    pub(super) fn encoder_reading(
-        &self,
-        state: &EstimatesState,
-        last: &LastCommand,
-    ) -> EncoderReading {
-        let model = &state.model;
+    pub(super) fn encoder_reading(&self, last: &LastCommand) -> EncoderReading {
+        let model = &self.model;
         let count = self.joints.count_rad();
         // Half a count of each encoder; the second encoder affects θ2 alone.
         let rounding_m = 0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
         // Steady innovation after the contact force has vanished.
         let release = -self.joints.lag_counts(&last.contact_acceleration_rad_s2);
         EncoderReading {
-            gap_m: self.gap_m(state),
-            gap_error_m: GAP_UNCERTAINTY_M + state.calibration.gap_error_m(rounding_m),
-            moved: state.joints.has_moved(),
-            release: release.dot(&self.joints.innovation_counts(&state.joints)),
+            gap_m: self.gap_m(),
+            gap_error_m: GAP_UNCERTAINTY_M + self.calibrator.gap_error_m(rounding_m),
+            moved: self.joints.has_moved(),
+            release: release.dot(&self.joints.innovation_counts()),
             full_release: release.norm_squared(),
         }
     }
 
     /// With contact from the encoders, the belt is assumed at the lowest tip position so far: initially
     /// the start position, then every lower one.
-    pub(super) fn find_belt(&self, state: &mut EstimatesState, encoders: &mut EncoderReading) {
-        let starts = self.calibrator.is_open(&state.calibration);
+    pub(super) fn find_belt(&mut self, encoders: &mut EncoderReading) {
+        let starts = self.calibrator.is_open();
         if starts || encoders.is_below_belt() {
             let gap_m = encoders.gap_m;
-            self.calibrator
-                .restart(&mut state.calibration, &mut state.arm, gap_m);
+            self.calibrator.restart(&mut self.arm, gap_m);
         }
         if starts {
             encoders.gap_m = 0.0;

@@ -17,11 +17,9 @@ pub struct JointFriction {
     is_zero: bool,
     /// Compensated Coulomb friction, N·m.
     coulomb_nm: [f32; 2],
+    /// The joints between ticks.
+    joints: [Travel; 2],
 }
-
-/// Friction of both joints between ticks; initially zero.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct JointFrictionState([Travel; 2]);
 
 /// Travel and friction of one joint.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,6 +37,7 @@ impl JointFriction {
         Self {
             is_zero: coulomb_nm == [0.0; 2],
             coulomb_nm,
+            joints: [Travel::default(); 2],
         }
     }
 
@@ -51,13 +50,9 @@ impl JointFriction {
     /// Returns the change of the friction in one tick, as a torque on the links, N·m, given the joint angles q', rad.
     // Out of line: few arms need it.
     #[inline(never)]
-    pub fn tick(
-        &self,
-        state: &mut JointFrictionState,
-        angles_rad: &JointMotion<f32>,
-    ) -> GeneralisedTorque<f32> {
+    pub fn tick(&mut self, angles_rad: &JointMotion<f32>) -> GeneralisedTorque<f32> {
         let angles = [angles_rad.first(), angles_rad.second()];
-        let joints = state.0.iter_mut().zip(self.coulomb_nm).zip(angles);
+        let joints = self.joints.iter_mut().zip(self.coulomb_nm).zip(angles);
         let mut changes_nm = [0.0; 2];
         for (((joint, coulomb_nm), angle_rad), change_nm) in joints.zip(&mut changes_nm) {
             let before_rad = joint.angle_rad.replace(angle_rad).unwrap_or(angle_rad);
@@ -68,13 +63,11 @@ impl JointFriction {
         let [one, two] = changes_nm;
         JointTorque::new(one, two).to_links()
     }
-}
 
-impl JointFrictionState {
     /// Returns the friction, positive against a positive rate, as a torque on the links, N·m.
     #[inline]
     pub fn torque_nm(&self) -> GeneralisedTorque<f32> {
-        let [one, two] = &self.0;
+        let [one, two] = &self.joints;
         JointTorque::new(one.torque_nm, two.torque_nm).to_links()
     }
 }
@@ -85,12 +78,11 @@ mod tests {
 
     #[test]
     fn coulomb_friction_follows_the_travel() {
-        let model = JointFriction::new([0.1, 0.0]);
-        let mut state = JointFrictionState::default();
+        let mut model = JointFriction::new([0.1, 0.0]);
         let mut friction_nm = |angle_rad: f32| {
-            let before_nm = state.torque_nm();
-            let change_nm = model.tick(&mut state, &JointMotion::new(angle_rad, -0.3));
-            let friction_nm = state.torque_nm();
+            let before_nm = model.torque_nm();
+            let change_nm = model.tick(&JointMotion::new(angle_rad, -0.3));
+            let friction_nm = model.torque_nm();
             assert!((friction_nm - before_nm - change_nm).amax() < 1e-7);
             assert_eq!(friction_nm.second(), 0.0);
             friction_nm.first()

@@ -91,11 +91,6 @@ pub struct JointEstimator {
     twists: bool,
     compliance_rad_nm: [f32; 2],
     corrector: EncoderCorrector,
-}
-
-/// Angles and rates of both joints, for a [`JointEstimator`].
-#[derive(Clone, Copy, Debug, Default)]
-pub struct JointState {
     /// Whether there have been readings; until then, all estimates are zero.
     started: bool,
     joints: [TrackingLoop; 2],
@@ -127,6 +122,11 @@ impl JointEstimator {
             twists: settings.gear_compliance_rad_nm != [0.0; 2],
             compliance_rad_nm: settings.gear_compliance_rad_nm,
             corrector: EncoderCorrector::new(&settings.encoders),
+            started: false,
+            joints: [TrackingLoop::default(); 2],
+            moved: false,
+            predicted_ticks: 0,
+            most_counts: [0; 2],
         }
     }
 
@@ -141,34 +141,33 @@ impl JointEstimator {
     /// moved faster than it can.
     #[inline]
     pub fn correct(
-        &self,
-        state: &mut JointState,
+        &mut self,
         readings: &[EncoderCounts; 2],
         elapsed_ticks: u32,
         acceleration_rad_s2: &JointMotion<f32>,
     ) -> Result<(), Restart> {
-        if !state.started {
-            self.start(state, readings);
+        if !self.started {
+            self.start(readings);
             return Err(Restart::FirstReadings);
         }
-        let [joint_1, joint_2] = &state.joints;
+        let [joint_1, joint_2] = &self.joints;
         let [scale_1, scale_2] = &self.scales;
         let [reading_1, reading_2] = *readings;
         let moved_1 = scale_1.difference(joint_1.reading, reading_1);
         let moved_2 = scale_2.difference(joint_2.reading, reading_2);
-        if elapsed_ticks > state.predicted_ticks {
-            self.bridge(state, acceleration_rad_s2, elapsed_ticks);
+        if elapsed_ticks > self.predicted_ticks {
+            self.bridge(acceleration_rad_s2, elapsed_ticks);
         }
-        let [most_1, most_2] = state.most_counts;
+        let [most_1, most_2] = self.most_counts;
         let jumps = moved_1.abs() > most_1 || moved_2.abs() > most_2;
-        state.predicted_ticks = 0;
-        state.most_counts = [0; 2];
+        self.predicted_ticks = 0;
+        self.most_counts = [0; 2];
         if jumps {
-            self.start(state, readings);
+            self.start(readings);
             return Err(Restart::EncoderJump);
         }
-        state.moved = moved_1 != 0 || moved_2 != 0;
-        let [joint_1, joint_2] = &mut state.joints;
+        self.moved = moved_1 != 0 || moved_2 != 0;
+        let [joint_1, joint_2] = &mut self.joints;
         let follow = |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32| {
             joint.reading = reading;
             joint.counts = joint.counts.wrapping_add(moved);
@@ -186,27 +185,22 @@ impl JointEstimator {
 
     /// Predicts angles and rates at the next tick, given the expected acceleration of q' (rad/s²) until then.
     #[inline]
-    pub fn predict(&self, state: &mut JointState, acceleration_rad_s2: &JointMotion<f32>) {
+    pub fn predict(&mut self, acceleration_rad_s2: &JointMotion<f32>) {
         let limit = self.rate_limit_rad_s;
-        for joint in &mut state.joints {
+        for joint in &mut self.joints {
             joint.rate_rad_s = joint.rate_rad_s.within(limit);
         }
-        self.predict_over(state, acceleration_rad_s2, 1);
+        self.predict_over(acceleration_rad_s2, 1);
     }
 
     #[inline(always)]
-    fn predict_over(
-        &self,
-        state: &mut JointState,
-        acceleration_rad_s2: &JointMotion<f32>,
-        ticks: i32,
-    ) {
+    fn predict_over(&mut self, acceleration_rad_s2: &JointMotion<f32>, ticks: i32) {
         let time_s = ticks as f32 * self.tick_s;
-        state.predicted_ticks = state.predicted_ticks.saturating_add(ticks as u32);
-        for (most, jump) in state.most_counts.iter_mut().zip(self.jump_counts) {
+        self.predicted_ticks = self.predicted_ticks.saturating_add(ticks as u32);
+        for (most, jump) in self.most_counts.iter_mut().zip(self.jump_counts) {
             *most = most.saturating_add(jump.saturating_mul(ticks));
         }
-        let [joint_1, joint_2] = &mut state.joints;
+        let [joint_1, joint_2] = &mut self.joints;
         joint_1.predict(acceleration_rad_s2.first(), time_s);
         joint_2.predict(acceleration_rad_s2.second(), time_s);
     }
@@ -214,20 +208,15 @@ impl JointEstimator {
     /// Predicts the ticks of frames that have not arrived.
     // Out of line, because few ticks need it.
     #[inline(never)]
-    fn bridge(
-        &self,
-        state: &mut JointState,
-        acceleration_rad_s2: &JointMotion<f32>,
-        elapsed_ticks: u32,
-    ) {
-        let ticks = (elapsed_ticks - state.predicted_ticks).min(MOST_LOST_TICKS);
-        self.predict_over(state, acceleration_rad_s2, ticks as i32);
+    fn bridge(&mut self, acceleration_rad_s2: &JointMotion<f32>, elapsed_ticks: u32) {
+        let ticks = (elapsed_ticks - self.predicted_ticks).min(MOST_LOST_TICKS);
+        self.predict_over(acceleration_rad_s2, ticks as i32);
     }
 
     /// Takes the twist of the gears under the commanded torques (N·m) off the last readings, so that both loops
     /// follow the links. Called after each [`correct`](Self::correct).
     #[inline]
-    pub fn untwist(&self, state: &mut JointState, torque_nm: &JointTorque<f32>) {
+    pub fn untwist(&mut self, torque_nm: &JointTorque<f32>) {
         if !self.twists {
             return;
         }
@@ -236,7 +225,7 @@ impl JointEstimator {
             joint.angle_rad -= self.angle_gain * twist_rad;
             joint.rate_rad_s -= self.rate_gain_per_s * twist_rad;
         };
-        let [joint_1, joint_2] = &mut state.joints;
+        let [joint_1, joint_2] = &mut self.joints;
         let [soft_1, soft_2] = self.compliance_rad_nm;
         take_off(joint_1, soft_1 * torque_nm.first());
         take_off(joint_2, soft_2 * torque_nm.second());
@@ -244,18 +233,18 @@ impl JointEstimator {
 
     /// Corrects the next readings, which are expected near this pose.
     #[inline]
-    pub fn expect_pose(&self, state: &mut JointState, pose: &Pose<f32>) {
+    pub fn expect_pose(&mut self, pose: &Pose<f32>) {
         if let Some(corrections_rad) = self.corrector.in_pose(pose) {
-            let [joint_1, joint_2] = &mut state.joints;
+            let [joint_1, joint_2] = &mut self.joints;
             joint_1.correction_rad = corrections_rad.first();
             joint_2.correction_rad = corrections_rad.second();
         }
     }
 
     /// Restarts both loops from these readings, at rest.
-    fn start(&self, state: &mut JointState, readings: &[EncoderCounts; 2]) {
-        state.started = true;
-        state.moved = true;
+    fn start(&mut self, readings: &[EncoderCounts; 2]) {
+        self.started = true;
+        self.moved = true;
         let [scale_1, scale_2] = &self.scales;
         let [reading_1, reading_2] = *readings;
         let counts = [
@@ -264,7 +253,7 @@ impl JointEstimator {
         ];
         let angles_rad = [0, 1].map(|joint| counts[joint] as f32 * self.rad_per_count[joint]);
         let corrections_rad = self.corrector.at(angles_rad);
-        for (joint, tracking) in state.joints.iter_mut().enumerate() {
+        for (joint, tracking) in self.joints.iter_mut().enumerate() {
             *tracking = TrackingLoop {
                 reading: readings[joint],
                 counts: counts[joint],
@@ -276,8 +265,8 @@ impl JointEstimator {
     }
 
     /// Returns the measured minus the expected joint angles q' at the last tick, counts.
-    pub fn innovation_counts(&self, state: &JointState) -> Vector2<f32> {
-        let [one, two] = &state.joints;
+    pub fn innovation_counts(&self) -> Vector2<f32> {
+        let [one, two] = &self.joints;
         Vector2::new(one.innovation_rad, two.innovation_rad).component_mul(&self.counts_per_rad)
     }
 
@@ -299,9 +288,7 @@ impl JointEstimator {
     pub fn count_rad(&self) -> Vector2<f32> {
         self.rad_per_count.into()
     }
-}
 
-impl JointState {
     /// Returns the joint angles q', rad.
     pub fn angles_rad(&self) -> JointMotion<f32> {
         let [one, two] = &self.joints;
@@ -344,21 +331,20 @@ mod tests {
         JointEstimator::new(&JointEstimatorSettings::default(), [SCALE; 2], 1000.0)
     }
 
-    fn track(motion: impl Fn(f64) -> (f64, f64), acceleration: f32, ticks: u32) -> JointState {
-        let estimator = estimator();
-        let mut state = JointState::default();
+    fn track(motion: impl Fn(f64) -> (f64, f64), acceleration: f32, ticks: u32) -> JointEstimator {
+        let mut estimator = estimator();
         for tick in 0..ticks {
             let (one, two) = motion(f64::from(tick) * 1e-3);
             let readings = [SCALE.reading(one), SCALE.reading(two)];
             let expected = JointMotion::new(acceleration, 0.0);
             if tick > 0 {
-                estimator.predict(&mut state, &expected);
+                estimator.predict(&expected);
             }
-            let corrected = estimator.correct(&mut state, &readings, 1, &expected);
+            let corrected = estimator.correct(&readings, 1, &expected);
             let first = Err(Restart::FirstReadings);
             assert_eq!(corrected, if tick == 0 { first } else { Ok(()) });
         }
-        state
+        estimator
     }
 
     #[test]
@@ -394,8 +380,7 @@ mod tests {
             gear_compliance_rad_nm: [1e-3, 2e-3],
             ..Default::default()
         };
-        let estimator = JointEstimator::new(&settings, [SCALE; 2], 1000.0);
-        let mut state = JointState::default();
+        let mut estimator = JointEstimator::new(&settings, [SCALE; 2], 1000.0);
         // The torque alternates, so that the motors move, and the links stay.
         for tick in 0..400 {
             let share = f64::from(tick % 20) / 10.0 - 1.0;
@@ -405,15 +390,15 @@ mod tests {
                 SCALE.reading(0.1 - 2e-3 * 3.0 * share),
             ];
             let still = JointMotion::zeros();
-            let _ = estimator.correct(&mut state, &readings, 1, &still);
-            estimator.untwist(&mut state, &torque);
+            let _ = estimator.correct(&readings, 1, &still);
+            estimator.untwist(&torque);
             if tick > 100 {
-                let error = (state.theta_rad() - LinkMotion::new(0.2, 0.3)).amax();
+                let error = (estimator.theta_rad() - LinkMotion::new(0.2, 0.3)).amax();
                 assert!(error < 5e-4, "{tick}: {error}");
-                let rate = state.theta_dot_rad_s().amax();
+                let rate = estimator.theta_dot_rad_s().amax();
                 assert!(rate < 0.1, "{tick}: {rate}");
             }
-            estimator.predict(&mut state, &still);
+            estimator.predict(&still);
         }
     }
 
@@ -421,13 +406,13 @@ mod tests {
     fn a_jump_is_reported_and_the_loops_restart_from_it() {
         let jumped = [SCALE.reading(0.5), SCALE.reading(0.1)];
         let mut state = track(|t| (0.2 + t, 0.1), 0.0, 10);
-        let jump = estimator().correct(&mut state, &jumped, 1, &JointMotion::zeros());
+        let jump = state.correct(&jumped, 1, &JointMotion::zeros());
         assert_eq!(jump, Err(Restart::EncoderJump));
         assert!((state.theta_rad() - LinkMotion::new(0.5, 0.6)).amax() < 6e-4);
         assert_eq!(state.theta_dot_rad_s(), LinkMotion::zeros());
         // Over a longer time the same difference is a plausible motion.
         let mut state = track(|_| (0.2, 0.1), 0.0, 10);
-        let moved = estimator().correct(&mut state, &jumped, 10, &JointMotion::zeros());
+        let moved = state.correct(&jumped, 10, &JointMotion::zeros());
         assert!(moved.is_ok());
     }
 }

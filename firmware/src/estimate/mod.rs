@@ -27,16 +27,16 @@ use painleve_shared::counts::LinearConverter;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, Pose, Slip};
 
-use self::belt::{BeltEstimator, BeltState};
-use self::calibration::{CalibrationState, LengthCalibrator};
-use self::contact::{ContactDetector, ContactState, Evidence};
+use self::belt::BeltEstimator;
+use self::calibration::LengthCalibrator;
+use self::contact::{ContactDetector, Evidence};
 pub use self::contact_estimate::ContactEstimate;
-use self::disturbance::{DisturbanceEstimator, DisturbanceState};
-use self::friction::{FrictionEstimator, FrictionState};
-use self::joint_friction::{JointFriction, JointFrictionState};
-use self::joints::{JointEstimator, JointEstimatorSettings, JointState, Restart};
+use self::disturbance::DisturbanceEstimator;
+use self::friction::FrictionEstimator;
+use self::joint_friction::JointFriction;
+use self::joints::{JointEstimator, JointEstimatorSettings, Restart};
 use self::model::Model;
-use self::response::{ForceReading, ResponseEstimator, ResponseState};
+use self::response::{ForceReading, ResponseEstimator};
 use crate::configuration::Configuration;
 use crate::last_command::LastCommand;
 use crate::law::Law;
@@ -65,59 +65,44 @@ pub struct Observed {
     pub last: LastCommand,
 }
 
-/// All estimators of one arm.
+/// All estimators of one arm, and what they know of it.
 #[derive(Clone, Debug)]
-pub struct Estimators {
-    force_cell: LinearConverter<f32>,
-    /// Largest reading of the force cell, N.
-    force_range_n: f32,
-    tick_s: f32,
-    joints: JointEstimator,
-    contact: ContactDetector,
-    friction: FrictionEstimator,
-    belt: BeltEstimator,
-    response: ResponseEstimator,
-    disturbance: DisturbanceEstimator,
-    calibrator: LengthCalibrator,
-    joint_friction: JointFriction,
-}
-
-/// State of the [`Estimators`] between ticks.
-#[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct EstimatesState {
+pub struct Estimators {
     /// The contact estimate of the last tick and, after the update, for the next one.
     pub contact: ContactEstimate,
     /// The arm's model at the estimated angles and rates, with the joints' friction.
     pub model: Model,
     /// The arm with its calibrated length.
     pub arm: Arm<f32>,
-    joints: JointState,
-    decision: ContactState,
-    friction: FrictionState,
-    belt: BeltState,
-    response: ResponseState,
-    disturbance: DisturbanceState,
-    calibration: CalibrationState,
-    joint_friction: JointFrictionState,
+    joints: JointEstimator,
+    decision: ContactDetector,
+    friction: FrictionEstimator,
+    belt: BeltEstimator,
+    response: ResponseEstimator,
+    disturbance: DisturbanceEstimator,
+    calibrator: LengthCalibrator,
+    joint_friction: JointFriction,
+    force_cell: LinearConverter<f32>,
+    /// Largest reading of the force cell, N.
+    force_range_n: f32,
+    tick_s: f32,
 }
 
-impl EstimatesState {
+impl Estimators {
     /// Returns the certainty of the decision about contact, 0 … 1.
     pub fn contact_confidence(&self) -> f32 {
         self.decision.confidence()
     }
-}
 
-impl Estimators {
-    /// Makes the estimators of this configuration, with tracking loops that are faster than their settings by a factor.
-    pub fn new<L: Law>(configuration: &Configuration<L>, tracking_speed: f32) -> Self {
-        let Configuration {
-            arm,
-            converters,
-            settings,
-            ..
-        } = configuration;
+    /// Makes the estimators of this configuration, without readings of this arm, with tracking loops
+    /// that are faster than their settings by a factor.
+    pub fn new<L: Law>(
+        configuration: &Configuration<L>,
+        arm: Arm<f32>,
+        tracking_speed: f32,
+    ) -> Self {
+        let (converters, settings) = (&configuration.converters, &configuration.settings);
         let tick_s = configuration.tick_s();
         let slow_period_s = Turn::COUNT * tick_s;
         let force_cell = converters.force.converter();
@@ -125,46 +110,33 @@ impl Estimators {
             bandwidth_rad_s: tracking_speed * settings.estimator.bandwidth_rad_s,
             ..settings.estimator
         };
-        let [link_length_m, _] = arm.link_length_m;
+        let [link_length_m, _] = configuration.arm.link_length_m;
+        let friction = FrictionEstimator::new(&settings.friction, &settings.contact, tick_s);
+        let response = ResponseEstimator::new(&settings.response, tick_s);
+        let contact = ContactEstimate {
+            friction: *friction.estimate(),
+            response: response.response(0.0, 0.0),
+            ..Default::default()
+        };
         Self {
+            contact,
+            model: Model::default(),
+            arm,
             force_cell,
             force_range_n: force_cell.value(force_cell.maximum_counts),
             tick_s,
             joints: JointEstimator::new(&joints, converters.encoders, configuration.tick_hz),
-            contact: ContactDetector::new(&settings.contact),
-            friction: FrictionEstimator::new(&settings.friction, &settings.contact, tick_s),
+            decision: ContactDetector::new(&settings.contact),
+            friction,
             belt: BeltEstimator::new(&settings.belt, tick_s),
-            response: ResponseEstimator::new(&settings.response, tick_s),
+            response,
             disturbance: DisturbanceEstimator::new(
                 &settings.disturbance,
                 settings.torque_limit_nm,
                 slow_period_s,
             ),
             calibrator: LengthCalibrator::new(&settings.calibration, link_length_m, slow_period_s),
-            joint_friction: JointFriction::new(arm.coulomb_friction_nm),
-        }
-    }
-
-    /// Starts without readings of this arm.
-    pub fn start(&self, arm: Arm<f32>) -> EstimatesState {
-        let (friction, response) = (self.friction.start(), self.response.start());
-        let contact = ContactEstimate {
-            friction: *friction.estimate(),
-            response: self.response.response(&response, 0.0, 0.0),
-            ..Default::default()
-        };
-        EstimatesState {
-            contact,
-            model: Model::default(),
-            arm,
-            joints: JointState::default(),
-            decision: ContactState::default(),
-            friction,
-            belt: BeltState::default(),
-            response,
-            disturbance: DisturbanceState::default(),
-            calibration: CalibrationState::default(),
-            joint_friction: JointFrictionState::default(),
+            joint_friction: JointFriction::new(configuration.arm.coulomb_friction_nm),
         }
     }
 
@@ -175,31 +147,28 @@ impl Estimators {
     /// [`Restart`] if the estimate of the joints has started from these readings, at rest.
     #[inline]
     pub fn observe(
-        &self,
-        state: &mut EstimatesState,
+        &mut self,
         frame: &SensorFrame,
         elapsed_ticks: u32,
         last: &LastCommand,
     ) -> Result<(), Restart> {
         let expected = &last.expected_acceleration_rad_s2;
-        let joints = &mut state.joints;
-        let followed = self
-            .joints
-            .correct(joints, &frame.joints, elapsed_ticks, expected);
+        let followed = self.joints.correct(&frame.joints, elapsed_ticks, expected);
         match followed {
             Ok(()) => {
-                self.joints.untwist(joints, &last.torque_nm);
-                let (theta_rad, theta_dot_rad_s) = (joints.theta_rad(), joints.theta_dot_rad_s());
-                state.model.move_to(&state.arm, theta_rad, theta_dot_rad_s);
+                self.joints.untwist(&last.torque_nm);
+                let (theta_rad, theta_dot_rad_s) =
+                    (self.joints.theta_rad(), self.joints.theta_dot_rad_s());
+                self.model.move_to(&self.arm, theta_rad, theta_dot_rad_s);
                 if !self.joint_friction.is_zero() {
                     // It follows the travel between readings, which the prediction does not show.
-                    let (friction, angles_rad) = (&mut state.joint_friction, joints.angles_rad());
-                    let change_nm = self.joint_friction.tick(friction, &angles_rad);
-                    state.model.add_friction_nm(&change_nm);
+                    let angles_rad = self.joints.angles_rad();
+                    let change_nm = self.joint_friction.tick(&angles_rad);
+                    self.model.add_friction_nm(&change_nm);
                 }
             }
             // Nothing has been predicted for these readings.
-            Err(Restart::FirstReadings) => self.evaluate(state),
+            Err(Restart::FirstReadings) => self.evaluate(),
             // The drive stops, and the model follows at the next tick.
             Err(Restart::EncoderJump) => {}
         }
@@ -207,47 +176,43 @@ impl Estimators {
             self.force_cell.value(frame.tangential_force.0),
             self.force_cell.value(frame.normal_force.0),
         );
-        let touched = state.decision.touches();
-        let touches = match self.contact.evidence() {
-            Evidence::ForceCell => self
-                .contact
-                .update_from_force(&mut state.decision, force_n.y),
+        let touched = self.decision.touches();
+        let touches = match self.decision.evidence() {
+            Evidence::ForceCell => self.decision.update_from_force(force_n.y),
             Evidence::Encoders => {
-                let mut encoders = self.encoder_reading(state, last);
-                self.find_belt(state, &mut encoders);
-                self.contact
-                    .update_from_encoders(&mut state.decision, &encoders)
+                let mut encoders = self.encoder_reading(last);
+                self.find_belt(&mut encoders);
+                self.decision.update_from_encoders(&encoders)
             }
         };
-        let contact = &mut state.contact;
+        let contact = &mut self.contact;
         contact.touches = touches;
         contact.lands = touches && !touched;
         contact.leaves = touched && !touches;
-        contact.in_flight = state.decision.is_in_flight();
+        contact.in_flight = self.decision.is_in_flight();
         contact.force_n = force_n;
-        self.correct_friction(state, last.reference_velocity_m_s);
+        self.correct_friction(last.reference_velocity_m_s);
         followed
     }
 
     /// Corrects friction, and p with it, of a tip that touches and follows a reference with this velocity.
     #[inline(always)]
-    fn correct_friction(&self, state: &mut EstimatesState, reference_velocity_m_s: f32) {
-        let contact = &mut state.contact;
-        if !contact.touches {
+    fn correct_friction(&mut self, reference_velocity_m_s: f32) {
+        if !self.contact.touches {
             return;
         }
-        if self.is_in_range(&contact.force_n) {
-            let tip_velocity_m_s = state.model.tip_velocity_m_s.x;
+        let force_n = self.contact.force_n;
+        if self.is_in_range(&force_n) {
+            let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
             let is_dragged = |slip: Slip| {
                 let lag_m_s = reference_velocity_m_s - tip_velocity_m_s;
-                slip.sign::<f32>() * lag_m_s > DRAGGED_M_S
-                    && self.belt.may_stick(&state.belt, tip_velocity_m_s)
+                slip.sign::<f32>() * lag_m_s > DRAGGED_M_S && self.belt.may_stick(tip_velocity_m_s)
             };
-            self.friction
-                .correct(&mut state.friction, &contact.force_n, is_dragged);
+            self.friction.correct(&force_n, is_dragged);
         }
-        contact.friction = *state.friction.estimate();
-        contact.p_per_kg = state
+        let contact = &mut self.contact;
+        contact.friction = *self.friction.estimate();
+        contact.p_per_kg = self
             .model
             .p_per_kg(contact.friction.coefficient, contact.friction.slip);
     }
@@ -261,20 +226,15 @@ impl Estimators {
 
     /// Updates friction, belt and response of a contact with the force at the last tick.
     #[inline]
-    pub fn learn_in_contact(
-        &self,
-        state: &mut EstimatesState,
-        observed: &Observed,
-    ) -> SlowReadings {
-        let is_informative = self.add_to_balance(state, observed);
-        let (model, contact) = (&state.model, &state.contact);
+    pub fn learn_in_contact(&mut self, observed: &Observed) -> SlowReadings {
+        let is_informative = self.add_to_balance(observed);
+        let (model, contact) = (&self.model, &self.contact);
         let force_n = contact.force_n;
         if self.is_in_range(&force_n) {
-            self.friction.update(&mut state.friction, &force_n);
+            self.friction.update(&force_n);
         }
-        let friction = state.friction.estimate();
-        self.belt
-            .update(&mut state.belt, model.tip_velocity_m_s.x, Some(friction));
+        let friction = self.friction.estimate();
+        self.belt.update(model.tip_velocity_m_s.x, Some(friction));
         let (last, p_per_kg) = (&observed.last, contact.p_per_kg);
         let slides = p_per_kg > 0.0 && !friction.sticks;
         let mut completes_block = false;
@@ -284,42 +244,42 @@ impl Estimators {
                 normal_force_n: force_n.y,
                 withheld_n: last.rounding_nm.vector().dot(slope) / p_per_kg,
             };
-            completes_block = self.response.update(&mut state.response, &reading);
+            completes_block = self.response.update(&reading);
         } else {
-            state.response.pause();
+            self.response.pause();
         }
         SlowReadings {
             // An unchanged reading would gain weight merely with time.
-            shows_length: state.decision.is_certain() && state.joints.has_moved(),
+            shows_length: self.decision.is_certain() && self.joints.has_moved(),
             completes_block,
         }
     }
 
     /// Updates friction and belt at a tick without contact.
     #[inline]
-    pub fn learn_in_the_air(&self, state: &mut EstimatesState, observed: &Observed) {
-        if state.contact.leaves {
-            self.friction.doubt(&mut state.friction);
+    pub fn learn_in_the_air(&mut self, observed: &Observed) {
+        if self.contact.leaves {
+            self.friction.doubt();
         }
-        let tip_velocity_m_s = state.model.tip_velocity_m_s.x;
-        self.belt.update(&mut state.belt, tip_velocity_m_s, None);
-        state.response.pause();
-        self.add_to_balance(state, observed);
+        let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
+        self.belt.update(tip_velocity_m_s, None);
+        self.response.pause();
+        self.add_to_balance(observed);
     }
 
     /// Adds a tick to the next update of the disturbance; returns whether force and torque show what the model does
     /// not explain.
     #[inline]
-    fn add_to_balance(&self, state: &mut EstimatesState, observed: &Observed) -> bool {
-        let force_n = &state.contact.force_n;
+    fn add_to_balance(&mut self, observed: &Observed) -> bool {
+        let force_n = &self.contact.force_n;
         let is_informative =
-            state.decision.is_certain() && self.is_in_range(force_n) && observed.drove;
+            self.decision.is_certain() && self.is_in_range(force_n) && observed.drove;
         if is_informative {
             let elapsed_s = observed.elapsed_ticks as f32 * self.tick_s;
             let torque_nm = &observed.last.torque_nm;
-            state.disturbance.add(torque_nm, force_n, elapsed_s);
+            self.disturbance.add(torque_nm, force_n, elapsed_s);
         } else {
-            state.disturbance.pause();
+            self.disturbance.pause();
         }
         is_informative
     }
@@ -327,9 +287,9 @@ impl Estimators {
     /// Predicts the arm's state at the next tick, given the command until then and whether it drives, and evaluates
     /// model and contact there.
     #[inline]
-    pub fn prepare(&self, state: &mut EstimatesState, command: &mut LastCommand, drives: bool) {
+    pub fn prepare(&mut self, command: &mut LastCommand, drives: bool) {
         if drives {
-            let model = &state.model;
+            let model = &self.model;
             command.contact_acceleration_rad_s2 = model
                 .contact_acceleration_rad_s2(&command.contact_force_n)
                 .to_joints();
@@ -338,32 +298,30 @@ impl Estimators {
                 .to_joints()
                 + command.contact_acceleration_rad_s2;
         }
-        self.joints
-            .predict(&mut state.joints, &command.expected_acceleration_rad_s2);
-        self.evaluate(state);
+        self.joints.predict(&command.expected_acceleration_rad_s2);
+        self.evaluate();
     }
 
     /// Evaluates model, friction, p and the response of the contact at the estimated angles and rates.
     #[inline(never)]
-    fn evaluate(&self, state: &mut EstimatesState) {
+    fn evaluate(&mut self) {
         // Friction of the joints enters as an unknown torque does.
-        let disturbance_nm = state.disturbance.torque_nm - state.joint_friction.torque_nm();
-        let (theta_rad, theta_dot_rad_s) =
-            (state.joints.theta_rad(), state.joints.theta_dot_rad_s());
+        let disturbance_nm = self.disturbance.torque_nm - self.joint_friction.torque_nm();
+        let (theta_rad, theta_dot_rad_s) = (self.joints.theta_rad(), self.joints.theta_dot_rad_s());
         let pose = Pose::new(&theta_rad);
-        self.joints.expect_pose(&mut state.joints, &pose);
-        state.model = Model::in_pose(
-            &state.arm,
+        self.joints.expect_pose(&pose);
+        self.model = Model::in_pose(
+            &self.arm,
             &pose,
             theta_rad,
             theta_dot_rad_s,
             &disturbance_nm,
         );
-        let (model, contact) = (&state.model, &mut state.contact);
-        let friction = state.friction.estimate();
+        let (model, contact) = (&self.model, &mut self.contact);
+        let friction = self.friction.estimate();
         let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
         let p_ratio = p_per_kg / model.q22_per_kg;
-        let response = self.response.response(&state.response, p_per_kg, p_ratio);
+        let response = self.response.response(p_per_kg, p_ratio);
         contact.friction = *friction;
         contact.p_per_kg = p_per_kg;
         contact.p_ratio = p_ratio;
@@ -372,26 +330,24 @@ impl Estimators {
 
     /// Evaluates the response of the contact with a complete block of readings.
     #[inline]
-    pub fn evaluate_response(&self, state: &mut EstimatesState) {
-        self.response.evaluate(&mut state.response);
+    pub fn evaluate_response(&mut self) {
+        self.response.evaluate();
     }
 
     /// Updates the calibration with a gap that shows the links' length.
     #[inline]
-    pub fn calibrate(&self, state: &mut EstimatesState) {
-        let gap_m = self.gap_m(state);
-        self.calibrator
-            .update(&mut state.calibration, &mut state.arm, gap_m);
+    pub fn calibrate(&mut self) {
+        let gap_m = self.gap_m();
+        self.calibrator.update(&mut self.arm, gap_m);
     }
 
     /// Updates the disturbance.
     // Out of line: contact and flight both contain it.
     #[inline(never)]
-    pub fn balance_torques(&self, state: &mut EstimatesState) {
-        let contact = &state.contact;
+    pub fn balance_torques(&mut self) {
+        let contact = &self.contact;
         let p_ratio = contact.touches.then_some(contact.p_ratio);
         let loop_share = contact.response.loop_share;
-        self.disturbance
-            .update(&mut state.disturbance, &state.model, p_ratio, loop_share);
+        self.disturbance.update(&self.model, p_ratio, loop_share);
     }
 }

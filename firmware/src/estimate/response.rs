@@ -94,6 +94,38 @@ pub struct ResponseEstimator {
     weight: f32,
     /// Share for each unit of p that is always allowed, kg.
     least_share_kg: f32,
+    /// Last normal force and its last change, N.
+    force_n: f32,
+    change_n: f32,
+    /// Last withheld force, N.
+    withheld_n: f32,
+    /// Last change of force that was commanded in addition to the law's, N.
+    excitation_n: f32,
+    /// Probe in the torque that acts, and the one for the next torque, N, with the random numbers from which it is drawn.
+    acting_probe_n: f32,
+    probe_n: f32,
+    random: u16,
+    /// Expected changes of force, N, the latest first.
+    expected_n: [f32; DELAYS + 1],
+    /// Sums over the present block, of first and of second differences.
+    block: [Moments; 2],
+    block_ticks: u8,
+    /// Averages of the blocks.
+    averages: [Moments; 2],
+    blocks: f32,
+    /// Weight of the last block.
+    block_weight: f32,
+    /// Bounds of ρ from first differences.
+    lower: f32,
+    upper: f32,
+    /// Fraction of the observers' full gain that the lower bound allows.
+    gain: f32,
+    /// How compliant the contact is, from the upper bound.
+    give: f32,
+    /// How certainly it is not rigid, from the upper bound of second differences.
+    lags: f32,
+    /// Time since the tip touched, s.
+    touched_s: f32,
 }
 
 /// Sums or averages over blocks of ticks, N², of first or of second differences of the force.
@@ -141,43 +173,6 @@ impl Moments {
     }
 }
 
-/// The estimator's state.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct ResponseState {
-    /// Last normal force and its last change, N.
-    force_n: f32,
-    change_n: f32,
-    /// Last withheld force, N.
-    withheld_n: f32,
-    /// Last change of force that was commanded in addition to the law's, N.
-    excitation_n: f32,
-    /// Probe in the torque that acts, and the one for the next torque, N, with the random numbers from which it is drawn.
-    acting_probe_n: f32,
-    probe_n: f32,
-    random: u16,
-    /// Expected changes of force, N, the latest first.
-    expected_n: [f32; DELAYS + 1],
-    /// Sums over the present block, of first and of second differences.
-    block: [Moments; 2],
-    block_ticks: u8,
-    /// Averages of the blocks.
-    averages: [Moments; 2],
-    blocks: f32,
-    /// Weight of the last block.
-    block_weight: f32,
-    /// Bounds of ρ from first differences.
-    lower: f32,
-    upper: f32,
-    /// Fraction of the observers' full gain that the lower bound allows.
-    gain: f32,
-    /// How compliant the contact is, from the upper bound.
-    give: f32,
-    /// How certainly it is not rigid, from the upper bound of second differences.
-    lags: f32,
-    /// Time since the tip touched, s.
-    touched_s: f32,
-}
-
 impl ResponseEstimator {
     /// Makes an estimator that is called every `tick_s`.
     pub fn new(settings: &ResponseSettings, tick_s: f32) -> Self {
@@ -187,16 +182,25 @@ impl ResponseEstimator {
             tick_s,
             weight: period_s / AVERAGING_S,
             least_share_kg: settings.least_damping_ns_m * tick_s,
-        }
-    }
-
-    /// Starts without knowledge of the contact.
-    pub fn start(&self) -> ResponseState {
-        ResponseState {
+            force_n: 0.0,
+            change_n: 0.0,
+            withheld_n: 0.0,
+            excitation_n: 0.0,
+            acting_probe_n: 0.0,
+            probe_n: 0.0,
             random: 1,
+            expected_n: [0.0; DELAYS + 1],
+            block: Default::default(),
+            block_ticks: 0,
+            averages: Default::default(),
+            blocks: 0.0,
             block_weight: 1.0,
+            lower: 0.0,
             upper: 1.0,
-            ..Default::default()
+            gain: 0.0,
+            give: 0.0,
+            lags: 0.0,
+            touched_s: 0.0,
         }
     }
 
@@ -207,49 +211,49 @@ impl ResponseEstimator {
 
     /// Returns what the response allows where p is `p_per_kg` and `p_ratio` of Q22.
     #[inline]
-    pub fn response(&self, state: &ResponseState, p_per_kg: f32, p_ratio: f32) -> ContactResponse {
+    pub fn response(&self, p_per_kg: f32, p_ratio: f32) -> ContactResponse {
         if !self.settings.enabled {
             return ContactResponse::rigid(p_ratio);
         }
-        let gain = state.gain.at_least(self.least_share_kg * p_per_kg);
+        let gain = self.gain.at_least(self.least_share_kg * p_per_kg);
         ContactResponse {
             loop_share: (gain * p_ratio / (1.0 - p_ratio).at_least(LEAST_REST))
                 .limited(0.0, p_ratio.at_least(0.0)),
-            give: state.give,
-            lags: state.lags,
-            probe_n: state.probe_n,
+            give: self.give,
+            lags: self.lags,
+            probe_n: self.probe_n,
         }
     }
 
     /// Adds one tick of a tip that slides in contact to the present block, and returns whether the block is
     /// complete: [`evaluate`](Self::evaluate) is then due, twice, when there is time.
     #[inline]
-    pub fn update(&self, state: &mut ResponseState, reading: &ForceReading) -> bool {
-        let excitation_n = reading.withheld_n - state.withheld_n + state.acting_probe_n;
-        let expected_n = excitation_n - state.excitation_n;
-        state.withheld_n = reading.withheld_n;
-        state.excitation_n = excitation_n;
-        let [e1, e2, e3, _] = state.expected_n;
+    pub fn update(&mut self, reading: &ForceReading) -> bool {
+        let excitation_n = reading.withheld_n - self.withheld_n + self.acting_probe_n;
+        let expected_n = excitation_n - self.excitation_n;
+        self.withheld_n = reading.withheld_n;
+        self.excitation_n = excitation_n;
+        let [e1, e2, e3, _] = self.expected_n;
         let e0 = expected_n;
-        state.expected_n = [e0, e1, e2, e3];
-        let change_n = reading.normal_force_n - state.force_n;
-        let change_of_change_n = change_n - state.change_n;
-        state.force_n = reading.normal_force_n;
-        state.change_n = change_n;
-        state.touched_s += self.tick_s;
-        state.acting_probe_n = state.probe_n;
-        state.probe_n = 0.0;
-        if state.touched_s < SETTLING_S {
+        self.expected_n = [e0, e1, e2, e3];
+        let change_n = reading.normal_force_n - self.force_n;
+        let change_of_change_n = change_n - self.change_n;
+        self.force_n = reading.normal_force_n;
+        self.change_n = change_n;
+        self.touched_s += self.tick_s;
+        self.acting_probe_n = self.probe_n;
+        self.probe_n = 0.0;
+        if self.touched_s < SETTLING_S {
             return false;
         }
-        if state.lower < RIGID {
+        if self.lower < RIGID {
             // As much as there is to find out.
-            let width = (state.upper - state.lower).at_most(1.0);
-            state.draw_probe(width * self.settings.probe_n);
+            let width = (self.upper - self.lower).at_most(1.0);
+            self.draw_probe(width * self.settings.probe_n);
         }
-        if state.block_ticks < BLOCK_TICKS {
-            state.block_ticks += 1;
-            let [first, second] = &mut state.block;
+        if self.block_ticks < BLOCK_TICKS {
+            self.block_ticks += 1;
+            let [first, second] = &mut self.block;
             first.add(change_n, [e0, e1, e2]);
             second.add(change_of_change_n, [e0 - e1, e1 - e2, e2 - e3]);
             return false;
@@ -259,46 +263,44 @@ impl ResponseEstimator {
 
     /// Updates the averages or the bounds with a complete block.
     #[inline]
-    pub fn evaluate(&self, state: &mut ResponseState) {
-        state.block_ticks += 1;
-        if state.block_ticks < END_TICKS {
-            self.average(state);
+    pub fn evaluate(&mut self) {
+        self.block_ticks += 1;
+        if self.block_ticks < END_TICKS {
+            self.average();
         } else {
-            self.bound(state);
+            self.bound();
         }
     }
 
     /// Adds a block to the averages.
     #[inline(never)]
-    fn average(&self, state: &mut ResponseState) {
-        let sums = core::mem::take(&mut state.block);
-        state.blocks += 1.0;
+    fn average(&mut self) {
+        let sums = core::mem::take(&mut self.block);
+        self.blocks += 1.0;
         // The plain mean of the first blocks, until it covers the averaging time.
-        let weight = (1.0 / state.blocks).at_least(self.weight).at_most(1.0);
-        state.block_weight = weight;
-        for (averages, sums) in state.averages.iter_mut().zip(&sums) {
+        let weight = (1.0 / self.blocks).at_least(self.weight).at_most(1.0);
+        self.block_weight = weight;
+        for (averages, sums) in self.averages.iter_mut().zip(&sums) {
             averages.approach(sums, weight);
         }
     }
 
     /// Updates the bounds of ρ from the averages.
     #[inline(never)]
-    fn bound(&self, state: &mut ResponseState) {
-        state.block_ticks = 0;
-        let weight = state.block_weight;
-        let [first, second] = &state.averages;
+    fn bound(&mut self) {
+        self.block_ticks = 0;
+        let weight = self.block_weight;
+        let [first, second] = &self.averages;
         let (response, deviation) = first.response(weight);
-        state.lower = response - DEVIATIONS * deviation;
-        state.upper = response + DEVIATIONS * deviation;
-        state.gain = state.lower / RIGID;
-        state.give = (1.0 - state.upper / (DAMPED * RIGID)).at_least(0.0);
+        self.lower = response - DEVIATIONS * deviation;
+        self.upper = response + DEVIATIONS * deviation;
+        self.gain = self.lower / RIGID;
+        self.give = (1.0 - self.upper / (DAMPED * RIGID)).at_least(0.0);
         let (response, deviation) = second.response(weight);
         let upper = response + DEVIATIONS * deviation;
-        state.lags = (2.0 - 2.0 * upper / RIGID).limited(0.0, 1.0);
+        self.lags = (2.0 - 2.0 * upper / RIGID).limited(0.0, 1.0);
     }
-}
 
-impl ResponseState {
     /// Skips a tick without information: in the air, or with a reading in doubt.
     #[inline]
     pub fn pause(&mut self) {

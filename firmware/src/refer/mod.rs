@@ -10,11 +10,9 @@ use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, Posture};
 
 use self::governor::{EdgeGovernor, GovernorState};
-use self::reference::{ReferenceGenerator, ReferenceState, TipReference};
+use self::reference::{ReferenceGenerator, TipReference};
 use crate::configuration::Configuration;
-use crate::estimate::ContactEstimate;
-use crate::estimate::friction::FrictionEstimate;
-use crate::estimate::model::Model;
+use crate::estimate::Estimators;
 use crate::law::Law;
 use crate::supervise::supervisor::Phase;
 
@@ -35,8 +33,6 @@ pub struct Target {
     pub at_edge: bool,
     /// Whether the tip must be returned to the belt before it can follow.
     pub recovering: bool,
-    /// Least p as a fraction of Q22 at which the tip may land; 0 if it is not being returned to the belt.
-    pub landing_p_ratio: f32,
 }
 
 /// Follows the program within the edges.
@@ -44,136 +40,121 @@ pub struct Target {
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct References {
+    edges: GovernorState,
     governor: EdgeGovernor,
     /// Least p as a fraction of Q22 at which a recovered tip may land.
     landing_p_ratio: f32,
+    /// Posture in which the drive was armed or the tip landed.
+    posture: Posture,
+    /// Least p as a fraction of Q22 at which the tip may land; 0 if it is not being returned to the belt.
+    asked_p_ratio: f32,
     generator: ReferenceGenerator,
 }
 
-/// State of the [`References`] between ticks.
-#[derive(Clone, Copy, Debug)]
-pub struct ReferencesState {
-    generator: ReferenceState,
-    governor: GovernorState,
-    /// Posture in which the drive was armed or the tip landed.
-    posture: Posture,
-}
-
 impl References {
-    /// Makes the references of this configuration.
-    pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
+    /// Makes the references of this configuration for this arm.
+    pub fn new<L: Law>(configuration: &Configuration<L>, arm: &Arm<f32>) -> Self {
         let settings = &configuration.settings;
         let (tick_s, joints) = (configuration.tick_s(), configuration.joint_errors());
         Self {
+            edges: GovernorState::new(arm.reach_on_belt_m()),
+            posture: Posture::ElbowDown,
+            asked_p_ratio: 0.0,
             governor: EdgeGovernor::new(&settings.governor, tick_s, &joints),
             landing_p_ratio: settings.recovery.minimum_p_ratio,
             generator: ReferenceGenerator::new(&settings.reference, configuration.tick_hz),
         }
     }
 
-    /// Starts without a followed reference, with this arm.
-    pub fn start(&self, arm: &Arm<f32>) -> ReferencesState {
-        ReferencesState {
-            generator: ReferenceState::default(),
-            governor: GovernorState::new(arm.reach_on_belt_m()),
-            posture: Posture::ElbowDown,
-        }
-    }
-
     /// Returns whether the last segment has ended.
-    pub fn is_done(&self, state: &ReferencesState) -> bool {
-        self.generator.is_done(&state.generator)
+    pub fn is_done(&self) -> bool {
+        self.generator.is_done()
     }
 
     /// Returns the target of a tick. `landing` is the posture in which a thrown tip is being returned to the belt.
     #[inline]
     pub fn tick(
-        &self,
-        state: &mut ReferencesState,
-        model: &Model,
-        contact: &ContactEstimate,
+        &mut self,
+        estimates: &Estimators,
         phase: &Phase,
         landing: Option<Posture>,
     ) -> Target {
+        let (model, contact) = (&estimates.model, &estimates.contact);
         // The descent continues, and presses the tip gently, until contact is certain. The law's
         // whole force while in doubt would be evidence that comes and goes with the law.
         let descends = contact.in_flight || landing.is_some();
         let recovering = phase.recovers && !contact.touches && descends;
+        self.asked_p_ratio = if recovering || landing.is_some() {
+            self.landing_p_ratio
+        } else {
+            0.0
+        };
         let tip_t_m = model.tip_m.x;
         if phase.arms {
-            state.posture = Posture::of(&model.theta_rad);
+            self.posture = Posture::of(&model.theta_rad);
         } else if let Some(posture) = landing {
-            state.posture = posture;
+            self.posture = posture;
         }
         let starts = phase.arms || contact.lands;
         if phase.arms || (contact.lands && phase.state == SupervisorState::Armed) {
-            state.generator = ReferenceState::at(tip_t_m);
+            self.generator.restart(tip_t_m);
         }
         if phase.starts_tracking {
             // The belt has dragged the tip while friction was unknown, and the estimated tip
             // position has changed with the links' length.
-            state.generator.start_from(tip_t_m);
+            self.generator.start_from(tip_t_m);
         }
         let wanted = match phase.state {
-            SupervisorState::Armed => state.generator.start(),
+            SupervisorState::Armed => self.generator.start(),
             // The reference waits for a tip that is being returned to the belt.
-            SupervisorState::LiftOff if recovering => state.generator.present(),
-            SupervisorState::Tracking if phase.starts_tracking => state.generator.start(),
-            SupervisorState::Tracking | SupervisorState::LiftOff => state.generator.next_tick(),
+            SupervisorState::LiftOff if recovering => self.generator.present(),
+            SupervisorState::Tracking if phase.starts_tracking => self.generator.start(),
+            SupervisorState::Tracking | SupervisorState::LiftOff => self.generator.next_tick(),
             SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
         };
         if starts || phase.starts_tracking {
-            state.governor.restart(tip_t_m);
+            self.edges.restart(tip_t_m);
         }
         let drives = phase.drives();
         Target {
             reference: if drives {
-                self.governor.govern(&mut state.governor, &wanted)
+                self.governor.govern(&mut self.edges, &wanted)
             } else {
                 wanted
             },
             requested_m: wanted.position_m,
-            posture: state.posture,
-            edges_m: state.governor.edges_m(),
-            fresh_edges_m: state.governor.fresh_edges_m(),
-            at_edge: drives && state.governor.is_at_edge(),
+            posture: self.posture,
+            edges_m: self.edges.edges_m(),
+            fresh_edges_m: self.edges.fresh_edges_m(),
+            at_edge: drives && self.edges.is_at_edge(),
             recovering,
-            landing_p_ratio: if recovering || landing.is_some() {
-                self.landing_p_ratio
-            } else {
-                0.0
-            },
         }
     }
 
-    /// Continues the search for the edges of the admissible stretch around a tip at `tip_t_m`.
-    // Out of line: two kinds of tick contain it. Its arguments are few, because references to the stages'
-    // results would keep these in memory.
+    /// Returns whether the edges depend on where a thrown tip may land.
+    pub fn asks_for_landing(&self) -> bool {
+        self.asked_p_ratio > 0.0
+    }
+
+    /// Continues the search for the edges of the admissible stretch around the tip.
+    // Out of line: two kinds of tick contain it.
     #[inline(never)]
-    pub fn search(
-        &self,
-        state: &mut ReferencesState,
-        arm: &Arm<f32>,
-        tip_t_m: f32,
-        friction: FrictionEstimate,
-        landing_p_ratio: f32,
-    ) {
-        let posture = state.posture;
+    pub fn search(&mut self, estimates: &Estimators) {
         self.governor.search(
-            &mut state.governor,
-            arm,
-            posture,
-            tip_t_m,
-            &friction,
-            landing_p_ratio,
+            &mut self.edges,
+            &estimates.arm,
+            self.posture,
+            estimates.model.tip_m.x,
+            &estimates.contact.friction,
+            self.asked_p_ratio,
         );
     }
 
-    /// Prepares the program's reference for the next tick of a drive in this state.
+    /// Prepares the program's reference for the next tick of a drive in this self.
     #[inline]
-    pub fn prepare(&self, state: &mut ReferencesState, drive: SupervisorState) {
+    pub fn prepare(&mut self, drive: SupervisorState) {
         if matches!(drive, SupervisorState::Tracking | SupervisorState::LiftOff) {
-            self.generator.prepare(&mut state.generator);
+            self.generator.prepare();
         }
     }
 }

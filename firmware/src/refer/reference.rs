@@ -136,34 +136,39 @@ impl TipReference {
     }
 }
 
-/// Follows a program tick by tick.
+/// Follows a program tick by tick; initially at the start of its program, at z_t = 0.
 #[derive(Clone, Debug)]
 pub struct ReferenceGenerator {
     program: Program,
     tick_hz: f32,
-}
-
-/// Progress of a [`ReferenceGenerator`]; initially at the start of its program, at z_t = 0.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct ReferenceState {
     /// Present segment of the program.
     segment: usize,
     /// Position at the start of the segment, m.
     start_m: f32,
     /// Ticks since the start of the segment.
     elapsed_ticks: u32,
-    /// Reference at that time, once [prepared](ReferenceGenerator::prepare).
+    /// Reference at that time, once [prepared](Self::prepare).
     next: TipReference,
 }
 
-impl ReferenceState {
-    /// Stands at `start_m`, before the first segment.
-    pub fn at(start_m: f32) -> Self {
+impl ReferenceGenerator {
+    /// Makes a generator that follows `program` at `tick_hz` ticks a second.
+    pub fn new(program: &Program, tick_hz: f32) -> Self {
         Self {
-            start_m,
-            next: TipReference::at_rest(start_m),
-            ..Self::default()
+            program: program.clone(),
+            tick_hz,
+            segment: 0,
+            start_m: 0.0,
+            elapsed_ticks: 0,
+            next: TipReference::default(),
         }
+    }
+
+    /// Starts the program from `start_m` (m).
+    pub fn restart(&mut self, start_m: f32) {
+        self.segment = 0;
+        self.elapsed_ticks = 0;
+        self.start_from(start_m);
     }
 
     /// Starts the present segment from `start_m` (m).
@@ -187,40 +192,30 @@ impl ReferenceState {
         self.elapsed_ticks = self.elapsed_ticks.saturating_add(1);
         self.next
     }
-}
-
-impl ReferenceGenerator {
-    /// Makes a generator that follows `program` at `tick_hz` ticks a second.
-    pub fn new(program: &Program, tick_hz: f32) -> Self {
-        Self {
-            program: program.clone(),
-            tick_hz,
-        }
-    }
 
     /// Returns whether the last segment has ended.
-    pub fn is_done(&self, state: &ReferenceState) -> bool {
-        state.segment >= self.program.segments.len()
+    pub fn is_done(&self) -> bool {
+        self.segment >= self.program.segments.len()
     }
 
     /// Prepares the reference of the next tick. A segment without duration ends at once; of several in a row,
     /// `MOST_ENDS` end per tick.
     #[inline]
-    pub fn prepare(&self, state: &mut ReferenceState) {
+    pub fn prepare(&mut self) {
         for _ in 0..MOST_ENDS {
-            let Some(segment) = self.program.segments.get(state.segment) else {
+            let Some(segment) = self.program.segments.get(self.segment) else {
                 break;
             };
             let duration_ticks = segment.duration_s() * self.tick_hz;
-            if (state.elapsed_ticks as f32) < duration_ticks - 0.5 {
-                state.next = at(segment, state.start_m, state.elapsed_ticks, self.tick_hz);
+            if (self.elapsed_ticks as f32) < duration_ticks - 0.5 {
+                self.next = at(segment, self.start_m, self.elapsed_ticks, self.tick_hz);
                 return;
             }
-            state.start_m = segment.target_m().unwrap_or(state.start_m);
-            state.elapsed_ticks = 0;
-            state.segment += 1;
+            self.start_m = segment.target_m().unwrap_or(self.start_m);
+            self.elapsed_ticks = 0;
+            self.segment += 1;
         }
-        state.next = state.start();
+        self.next = self.start();
     }
 }
 
@@ -252,9 +247,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn next_tick(generator: &ReferenceGenerator, state: &mut ReferenceState) -> TipReference {
-        generator.prepare(state);
-        state.next_tick()
+    fn next_tick(generator: &mut ReferenceGenerator) -> TipReference {
+        generator.prepare();
+        generator.next_tick()
     }
 
     fn program(segments: &[Segment]) -> Program {
@@ -265,7 +260,7 @@ mod tests {
 
     #[test]
     fn segments_follow_each_other_and_the_last_one_holds() {
-        let generator = ReferenceGenerator::new(
+        let mut generator = ReferenceGenerator::new(
             &program(&[
                 Segment::Hold { duration_s: 0.002 },
                 Segment::Ramp {
@@ -279,15 +274,14 @@ mod tests {
             ]),
             1000.0,
         );
-        let mut state = ReferenceState::default();
         let positions: std::vec::Vec<f32> = (0..8)
-            .map(|_| next_tick(&generator, &mut state).position_m)
+            .map(|_| next_tick(&mut generator).position_m)
             .collect();
         let expected = [0.0, 0.0, 0.0, 0.025, 0.05, 0.075, -0.1, -0.1];
         for (ours, theirs) in positions.iter().zip(expected) {
             assert!((ours - theirs).abs() < 1e-7, "{positions:?}");
         }
-        assert!(generator.is_done(&state));
+        assert!(generator.is_done());
     }
 
     #[test]
@@ -297,12 +291,10 @@ mod tests {
             duration_s: 0.0,
         };
         let steps = [0.01, 0.02, 0.03, 0.04, 0.05].map(step);
-        let generator = ReferenceGenerator::new(&program(&steps), 1000.0);
-        let mut state = ReferenceState::default();
-        let positions: [f32; 4] =
-            core::array::from_fn(|_| next_tick(&generator, &mut state).position_m);
+        let mut generator = ReferenceGenerator::new(&program(&steps), 1000.0);
+        let positions: [f32; 4] = core::array::from_fn(|_| next_tick(&mut generator).position_m);
         assert_eq!(positions, [0.03, 0.05, 0.05, 0.05]);
-        assert!(generator.is_done(&state));
+        assert!(generator.is_done());
     }
 
     #[test]
@@ -324,12 +316,12 @@ mod tests {
             start in -0.18_f32..0.18, target in -0.18_f32..0.18, duration in 0.1_f32..5.0,
         ) {
             let segment = Segment::MinimumJerk { target_m: target, duration_s: duration };
-            let generator = ReferenceGenerator::new(&program(&[segment]), 1000.0);
-            let mut state = ReferenceState::at(start);
-            let mut before = next_tick(&generator, &mut state);
+            let mut generator = ReferenceGenerator::new(&program(&[segment]), 1000.0);
+            generator.restart(start);
+            let mut before = next_tick(&mut generator);
             prop_assert_eq!(before.position_m, start);
-            while !generator.is_done(&state) {
-                let now = next_tick(&generator, &mut state);
+            while !generator.is_done() {
+                let now = next_tick(&mut generator);
                 let slope = (now.position_m - before.position_m) * 1000.0;
                 let mean = 0.5 * (now.velocity_m_s + before.velocity_m_s);
                 // The tolerance covers the trapezoid's error, jerk · T²/12, and rounding of the

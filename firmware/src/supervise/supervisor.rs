@@ -47,16 +47,9 @@ impl SupervisorSettings {
     }
 }
 
-/// The rules of the state machine.
+/// The state machine; initially idle.
 #[derive(Clone, Copy, Debug)]
 pub struct Supervisor {
-    settings: SupervisorSettings,
-    tick_hz: f32,
-}
-
-/// State of the state machine; initially idle.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Supervision {
     state: SupervisorState,
     fault: Option<Fault>,
     /// Ticks in the present state or, while armed, in contact.
@@ -65,6 +58,8 @@ pub struct Supervision {
     /// Lift-offs in a row.
     lift_offs: u32,
     inputs: DigitalInputs,
+    settings: SupervisorSettings,
+    tick_hz: f32,
 }
 
 /// The supervisor's decision at one tick.
@@ -90,91 +85,88 @@ impl Phase {
 impl Supervisor {
     /// Makes a supervisor that is called `tick_hz` times a second.
     pub fn new(settings: SupervisorSettings, tick_hz: f32) -> Self {
-        Self { settings, tick_hz }
+        Self {
+            state: SupervisorState::Idle,
+            fault: None,
+            ticks: 0,
+            contact_ticks: 0,
+            lift_offs: 0,
+            inputs: DigitalInputs(0),
+            settings,
+            tick_hz,
+        }
     }
 
     /// Advances one tick; `has_law` states whether there is a law to arm.
     #[inline]
-    pub fn tick(
-        &self,
-        supervision: &mut Supervision,
-        inputs: DigitalInputs,
-        contact: bool,
-        has_law: bool,
-    ) -> Phase {
-        let before = supervision.state;
-        self.advance(supervision, inputs, contact, has_law);
-        let state = supervision.state;
+    pub fn tick(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) -> Phase {
+        let before = self.state;
+        self.advance(inputs, contact, has_law);
+        let state = self.state;
         Phase {
             state,
             arms: state == SupervisorState::Armed && before != state,
             starts_tracking: state == SupervisorState::Tracking && before == SupervisorState::Armed,
-            recovers: self.settings.on_lift_off == OnLiftOff::Recover && supervision.drives(),
+            recovers: self.settings.on_lift_off == OnLiftOff::Recover && self.drives(),
         }
     }
 
-    fn advance(
-        &self,
-        supervision: &mut Supervision,
-        inputs: DigitalInputs,
-        contact: bool,
-        has_law: bool,
-    ) {
-        let before = core::mem::replace(&mut supervision.inputs, inputs);
+    fn advance(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) {
+        let before = core::mem::replace(&mut self.inputs, inputs);
         let rises = |bit| inputs.contains(bit) && !before.contains(bit);
         let enabled = inputs.contains(DigitalInputs::ENABLE);
-        supervision.ticks = supervision.ticks.saturating_add(1);
-        match supervision.state {
+        self.ticks = self.ticks.saturating_add(1);
+        match self.state {
             SupervisorState::Fault => {
                 if rises(DigitalInputs::RESET) {
-                    supervision.fault = None;
-                    supervision.enter(SupervisorState::Idle);
+                    self.fault = None;
+                    self.enter(SupervisorState::Idle);
                 }
             }
             SupervisorState::Idle => {
                 // Arm on a rising edge, so that a reset alone does not start the drive again.
                 if rises(DigitalInputs::ENABLE) && has_law {
-                    supervision.lift_offs = 0;
-                    supervision.enter(SupervisorState::Armed);
+                    self.lift_offs = 0;
+                    self.enter(SupervisorState::Armed);
                 }
             }
-            _ if !enabled => supervision.enter(SupervisorState::Idle),
+            _ if !enabled => self.enter(SupervisorState::Idle),
             SupervisorState::Armed => {
-                supervision.contact_ticks = if contact {
-                    supervision.contact_ticks.saturating_add(1)
+                self.contact_ticks = if contact {
+                    self.contact_ticks.saturating_add(1)
                 } else {
                     0
                 };
-                if self.exceeds(supervision.contact_ticks, self.settings.arming_s) {
-                    supervision.enter(SupervisorState::Tracking);
-                } else if self.exceeds(supervision.ticks, self.settings.arming_limit_s) {
-                    supervision.latch(Fault::ContactNotFound);
+                if self.exceeds(self.contact_ticks, self.settings.arming_s) {
+                    self.enter(SupervisorState::Tracking);
+                } else if self.exceeds(self.ticks, self.settings.arming_limit_s) {
+                    self.latch(Fault::ContactNotFound);
                 }
             }
             SupervisorState::Tracking => {
-                if self.exceeds(supervision.ticks, self.settings.recovered_s) {
-                    supervision.lift_offs = 0;
+                if self.exceeds(self.ticks, self.settings.recovered_s) {
+                    self.lift_offs = 0;
                 }
                 if !contact {
-                    supervision.lift_offs = supervision.lift_offs.saturating_add(1);
+                    self.lift_offs = self.lift_offs.saturating_add(1);
                     let limit = self.settings.recoveries_limit;
                     match self.settings.on_lift_off {
-                        OnLiftOff::Recover if supervision.lift_offs > limit => {
-                            supervision.latch(Fault::RecoveryFailed);
+                        OnLiftOff::Recover if self.lift_offs > limit => {
+                            self.latch(Fault::RecoveryFailed);
                         }
                         OnLiftOff::Recover | OnLiftOff::Continue => {
-                            supervision.enter(SupervisorState::LiftOff);
+                            self.enter(SupervisorState::LiftOff);
                         }
-                        OnLiftOff::Fault => supervision.latch(Fault::LiftOffTooLong),
+                        OnLiftOff::Fault => self.latch(Fault::LiftOffTooLong),
                     }
                 }
             }
             SupervisorState::LiftOff => {
                 let limit_s = self.settings.lift_off_limit_s;
                 if contact {
-                    supervision.enter(SupervisorState::Tracking);
-                } else if limit_s > 0.0 && self.exceeds(supervision.ticks, limit_s) {
-                    supervision.latch(Fault::LiftOffTooLong);
+                    self.enter(SupervisorState::Tracking);
+                } else if limit_s > 0.0 && self.exceeds(self.ticks, limit_s) {
+                    self.latch(Fault::LiftOffTooLong);
                 }
             }
         }
@@ -184,9 +176,7 @@ impl Supervisor {
     fn exceeds(&self, ticks: u32, time_s: f32) -> bool {
         ticks as f32 > time_s * self.tick_hz
     }
-}
 
-impl Supervision {
     /// Returns the present state.
     pub fn state(&self) -> SupervisorState {
         self.state
@@ -232,18 +222,18 @@ mod tests {
     const ON: DigitalInputs = DigitalInputs::ENABLE;
     const OFF: DigitalInputs = DigitalInputs(0);
 
-    /// A supervisor with its state.
-    #[derive(Default)]
-    struct Tested(Supervision);
+    /// A supervisor with the default settings.
+    struct Tested(Supervisor);
+
+    impl Default for Tested {
+        fn default() -> Self {
+            Self(Supervisor::new(SupervisorSettings::default(), 1000.0))
+        }
+    }
 
     impl Tested {
         fn tick(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) {
-            Supervisor::new(SupervisorSettings::default(), 1000.0).tick(
-                &mut self.0,
-                inputs,
-                contact,
-                has_law,
-            );
+            self.0.tick(inputs, contact, has_law);
         }
 
         fn state(&self) -> SupervisorState {

@@ -26,8 +26,8 @@ fn slide(tested: &mut Tested, friction: f32, slip: Slip, ticks: u32) {
     }
 }
 
-/// An estimator with its state, and whether the tip is dragged along by the belt.
-struct Tested(FrictionEstimator, FrictionState, bool);
+/// An estimator, and whether the tip is dragged along by the belt.
+struct Tested(FrictionEstimator, bool);
 
 impl Tested {
     fn new(first_guess: f32) -> Self {
@@ -35,8 +35,7 @@ impl Tested {
             first_guess,
             ..Default::default()
         };
-        let estimator = FrictionEstimator::new(&settings, &cell(), 1e-3);
-        Self(estimator, estimator.start(), false)
+        Self(FrictionEstimator::new(&settings, &cell(), 1e-3), false)
     }
 
     fn update(&mut self, force_n: &Vector2<f32>) {
@@ -45,14 +44,15 @@ impl Tested {
 
     /// Updates, and returns what the tick's answer catches up with.
     fn catch_up(&mut self, force_n: &Vector2<f32>) -> f32 {
-        self.0.correct(&mut self.1, force_n, |_| self.2);
-        let catch_up = self.1.estimate().catch_up;
-        self.0.update(&mut self.1, force_n);
+        let is_dragged = self.1;
+        self.0.correct(force_n, |_| is_dragged);
+        let catch_up = self.0.estimate().catch_up;
+        self.0.update(force_n);
         catch_up
     }
 
     fn estimate(&self) -> FrictionEstimate {
-        *self.1.estimate()
+        *self.0.estimate()
     }
 }
 
@@ -86,7 +86,7 @@ fn nothing_is_learnt_in_the_air() {
 fn stick_does_not_lower_the_friction_estimate() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 200);
-    tested.2 = true;
+    tested.1 = true;
     slide(&mut tested, 0.1, Slip::Positive, 4000);
     assert!(tested.estimate().sticks);
     assert!((tested.estimate().coefficient - 0.6).abs() < 0.01);
@@ -96,7 +96,7 @@ fn stick_does_not_lower_the_friction_estimate() {
 fn only_friction_near_the_other_side_of_the_cone_reverses_the_slip() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 200);
-    tested.2 = true;
+    tested.1 = true;
     slide(&mut tested, 0.4, Slip::Negative, 100);
     let found = tested.estimate();
     assert!(found.slip == Slip::Positive && found.sticks);
@@ -118,10 +118,10 @@ fn less_friction_is_learnt_at_once_unless_the_belt_drags_the_tip() {
 fn less_friction_is_learnt_as_soon_as_the_belt_no_longer_drags_the_tip() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 2000);
-    tested.2 = true;
+    tested.1 = true;
     slide(&mut tested, 0.4, Slip::Positive, 1);
     assert!(tested.estimate().sticks);
-    tested.2 = false;
+    tested.1 = false;
     slide(&mut tested, 0.4, Slip::Positive, 3);
     assert!(!tested.estimate().sticks);
     assert!((tested.estimate().coefficient - 0.4).abs() < 0.02);
@@ -213,7 +213,7 @@ fn a_friction_that_is_not_estimated_stays_the_first_guess() {
     };
     let estimator = FrictionEstimator::new(&settings, &cell(), 1e-3);
     for (friction, drags) in [(0.3, false), (0.3, true), (0.8, false), (0.6, false)] {
-        let mut tested = Tested(estimator, estimator.start(), drags);
+        let mut tested = Tested(estimator, drags);
         for slip in [Slip::Negative, Slip::Positive] {
             slide(&mut tested, friction, slip, 2000);
             let found = tested.estimate();
@@ -244,13 +244,12 @@ fn a_rise_of_less_than_a_hundredth_is_not_sudden() {
 
 #[test]
 fn without_readings_the_deviation_grows_with_the_root_of_time() {
-    let Tested(estimator, mut state, _) = without_noise(3000);
-    let variance = |state: &FrictionState| state.estimate().variance;
-    let before = variance(&state);
+    let Tested(mut estimator, _) = without_noise(3000);
+    let before = estimator.estimate().variance;
     for _ in 0..1000 {
-        estimator.update(&mut state, &Vector2::new(-6.0, 10.0));
+        estimator.update(&Vector2::new(-6.0, 10.0));
     }
-    let grown = variance(&state) - before;
+    let grown = estimator.estimate().variance - before;
     let expected = DRIFT_PER_SQRT_S.powi(2);
     assert!(
         (grown - expected).abs() < 0.1 * expected,

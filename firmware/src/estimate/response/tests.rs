@@ -14,8 +14,7 @@ fn estimator() -> ResponseEstimator {
 /// Returns the response after `ticks` of a contact that gives the force (N) in
 /// answer to the force commanded at the previous tick.
 fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
-    let estimator = estimator();
-    let mut state = estimator.start();
+    let mut estimator = estimator();
     // The probe of a tick is drawn after the tick before.
     let (mut withheld, mut probe_n, mut commanded) = (0.0, 0.0, 10.0);
     for tick in 0..ticks {
@@ -23,14 +22,14 @@ fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse 
             normal_force_n: contact(commanded) + 0.03 * noise(3 * tick),
             withheld_n: withheld,
         };
-        if estimator.update(&mut state, &reading) && tick % 2 == 0 {
-            estimator.evaluate(&mut state);
+        if estimator.update(&reading) && tick % 2 == 0 {
+            estimator.evaluate();
         }
         let next = 0.05 * noise(3 * tick + 1);
         commanded = 10.0 + next - withheld + probe_n;
-        (withheld, probe_n) = (next, state.probe_n);
+        (withheld, probe_n) = (next, estimator.probe_n);
     }
-    estimator.response(&state, P_PER_KG, P_RATIO)
+    estimator.response(P_PER_KG, P_RATIO)
 }
 
 /// A spring and damper under an arm of mobility p, in small steps.
@@ -98,13 +97,15 @@ fn all_is_allowed_if_it_is_off() {
         ..Default::default()
     };
     let estimator = ResponseEstimator::new(&settings, TICK_S);
-    let found = estimator.response(&estimator.start(), P_PER_KG, P_RATIO);
+    let found = estimator.response(P_PER_KG, P_RATIO);
     assert_eq!(found, ContactResponse::rigid(P_RATIO));
 }
 
 /// Passes readings without a change to an estimator, and counts the ticks until `is_there`.
-fn ticks_until(state: &mut ResponseState, is_there: impl Fn(&ResponseState) -> bool) -> u8 {
-    let estimator = estimator();
+fn ticks_until(
+    estimator: &mut ResponseEstimator,
+    is_there: impl Fn(&ResponseEstimator) -> bool,
+) -> u8 {
     let reading = ForceReading {
         normal_force_n: 10.0,
         withheld_n: 0.0,
@@ -112,10 +113,10 @@ fn ticks_until(state: &mut ResponseState, is_there: impl Fn(&ResponseState) -> b
     let mut ticks = 0;
     loop {
         ticks += 1;
-        if estimator.update(state, &reading) && ticks % 2 == 0 {
-            estimator.evaluate(state);
+        if estimator.update(&reading) && ticks % 2 == 0 {
+            estimator.evaluate();
         }
-        if is_there(state) {
+        if is_there(estimator) {
             return ticks;
         }
     }
@@ -123,7 +124,7 @@ fn ticks_until(state: &mut ResponseState, is_there: impl Fn(&ResponseState) -> b
 
 #[test]
 fn blocks_follow_each_other_after_the_period_of_their_weight() {
-    let mut state = estimator().start();
+    let mut state = estimator();
     state.touched_s = SETTLING_S;
     let first = ticks_until(&mut state, |state| {
         state.blocks == 1.0 && state.block_ticks == 0
@@ -143,7 +144,7 @@ fn the_better_the_response_is_known_the_less_is_probed() {
 
 #[test]
 fn after_a_pause_the_contact_settles_before_the_next_probe() {
-    let mut state = estimator().start();
+    let mut state = estimator();
     ticks_until(&mut state, |state| state.probe_n != 0.0);
     state.pause();
     let ticks = ticks_until(&mut state, |state| state.probe_n != 0.0);
