@@ -41,8 +41,8 @@ const REST_S: f64 = 0.5;
 /// Ends of the slides of each round, as a part of the reach; the governor stops them earlier where it has to.
 const ROUNDS: [f64; 2] = [0.6, 0.93];
 
-/// Least p of a slide, 1/kg: where a belt's vibration of 5 m/s² takes a third of the force.
-const LEAST_P_PER_KG: f64 = 4.0;
+/// Least p of a slide, 1/kg: where a belt's vibration of 5 m/s² takes a fifth of the force.
+const LEAST_P_PER_KG: f64 = 6.0;
 
 /// Speed of the belt in a slide, m/s. Waves and seam shake a tip with the square of the speed.
 const BELT_M_S: f64 = 0.15;

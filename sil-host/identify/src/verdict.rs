@@ -18,6 +18,9 @@ const USUAL_NOISE: f64 = 3.0;
 /// Part of what is left over that a slip has to explain.
 const SLIPPED: f64 = 0.7;
 
+/// Factor by which the deviations of a looser prior are larger.
+const LOOSER: f64 = 10.0;
+
 /// Least part of a slip's effect that no parameter explains.
 const OWN: f64 = 1e-3;
 
@@ -68,7 +71,14 @@ pub(crate) fn check_line(
             }
         }
     }
-    if let Some(refusal) = slip(points, prior, limits, fit).or(other) {
+    // What contradicts the prior only is no slip: with a looser prior, the other parameters explain it.
+    let looser = Prior {
+        deviations: prior.deviations * LOOSER,
+        ..*prior
+    };
+    let with_looser = || slip(points, &looser, limits, &Fit::new(points, &looser));
+    let slipped = slip(points, prior, limits, fit).and_then(|slip| with_looser().and(Some(slip)));
+    if let Some(refusal) = slipped.or(other) {
         return Err(refusal);
     }
     if is_off {
