@@ -11,6 +11,7 @@ use painleve_shared::{Arm, LinkMotion, Posture, Real, settings};
 
 use crate::estimate::model::Model;
 use crate::law::LawOutput;
+use crate::refer::governor::USABLE_REACH;
 
 /// Height above the belt at which the tip moves along it, m.
 const CLEARANCE_M: f32 = 1e-3;
@@ -27,8 +28,6 @@ const DEEPEST_M: f32 = 0.03;
 /// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are
 /// shorter.
 const SEARCHING: f32 = 4.0;
-/// Part of the arm's reach that the path uses, so that the links are never quite straight.
-const USED_REACH: f32 = 0.9999;
 /// Rate at which the landing point moves inwards while the path is out of reach, 1/s.
 const INWARDS_PER_S: f32 = 0.5;
 /// Speed along the belt below which the tip is at rest, m/s.
@@ -142,7 +141,7 @@ impl RecoverySettings {
         // A path below the belt ends at the arm's reach, most of all once the links have been found shorter. Further
         // inwards it gets deeper and presses.
         let distance_m = wanted_m.norm_squared().square_root();
-        let excess = (distance_m / (USED_REACH * arm.reach_m())).at_least(1.0);
+        let excess = (distance_m / (USABLE_REACH * arm.reach_m())).at_least(1.0);
         if excess > 1.0 {
             flight.landing_m *= 1.0 - (tick_s * INWARDS_PER_S).at_most(1.0);
         }

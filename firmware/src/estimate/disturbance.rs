@@ -16,8 +16,6 @@ use crate::estimate::model::Model;
 
 /// Largest fraction of the residual adopted at once, per unit of p/Q22.
 const SHARE: f32 = 0.1;
-/// The same per unit of the share that the contact allows.
-const CONTACT_SHARE: f32 = 0.333;
 /// Largest disturbance of either link, as a part of the largest torque.
 const LARGEST: f32 = 0.2;
 
@@ -92,9 +90,7 @@ impl DisturbanceEstimator {
         if residual_nm.amax() > 2.0 * limit_nm {
             return;
         }
-        let share = p_ratio.map_or(1.0, |p_ratio| {
-            (SHARE * p_ratio).limited(0.0, CONTACT_SHARE * loop_share)
-        });
+        let share = p_ratio.map_or(1.0, |p_ratio| (SHARE * p_ratio).limited(0.0, loop_share));
         let weight = (self.bandwidth_rad_s * self.period_s).at_most(share);
         self.torque_nm =
             (self.torque_nm + residual_nm * weight).map(|torque| torque.within(limit_nm));

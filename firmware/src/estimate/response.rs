@@ -35,6 +35,8 @@ const AVERAGING_S: f32 = 0.25;
 const DEVIATIONS: f32 = 3.0;
 /// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full gain.
 const RIGID: f32 = 0.5;
+/// Loops through the contact force, which add up: friction observer, disturbance estimate, integral of the force.
+const LOOPS: f32 = 3.0;
 /// Number of delays between torque and force that are considered, in ticks.
 const DELAYS: usize = 3;
 /// Ticks of one block of sums. After a block, averages and bounds are updated in the next two ticks with
@@ -63,8 +65,8 @@ pub struct ForceReading {
 /// What the response allows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactResponse {
-    /// Part of the force error that loops through the contact force may remove in a tick, before the
-    /// factor of each loop: p/Q22 on a rigid contact.
+    /// Part of the force error that each loop through the contact force may remove in a tick: a third of p/Q22 on a rigid
+    /// contact.
     pub loop_share: f32,
     /// How compliant the contact is, 0 … 1: 0 if it is rigid.
     pub give: f32,
@@ -79,7 +81,7 @@ impl ContactResponse {
     /// The response of a rigid contact at this p/Q22.
     pub fn rigid(p_ratio: f32) -> Self {
         Self {
-            loop_share: p_ratio.at_least(0.0),
+            loop_share: p_ratio.at_least(0.0) / LOOPS,
             ..Self::default()
         }
     }
@@ -218,7 +220,8 @@ impl ResponseEstimator {
         let gain = self.gain.at_least(self.least_share_kg * p_per_kg);
         ContactResponse {
             loop_share: (gain * p_ratio / (1.0 - p_ratio).at_least(LEAST_REST))
-                .limited(0.0, p_ratio.at_least(0.0)),
+                .limited(0.0, p_ratio.at_least(0.0))
+                / LOOPS,
             give: self.give,
             lags: self.lags,
             probe_n: self.probe_n,

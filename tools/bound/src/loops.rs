@@ -10,9 +10,6 @@ use crate::cycles::Chip;
 use crate::graph::Graph;
 use crate::image::Image;
 
-/// Points of the belt that the governor checks per tick (`firmware/src/refer/governor`).
-const POINTS_IN_A_HURRY: u32 = 2;
-
 /// Segments of a reference that end in one tick (`firmware/src/refer/reference.rs`).
 const MOST_ENDS: u32 = 3;
 
@@ -88,11 +85,6 @@ impl Limits {
             .setup_ns
             .max(ForceCellDriver::TIMING.setup_ns);
         Self(vec![
-            declare(
-                "EdgeGovernor::search",
-                Limit::Times(POINTS_IN_A_HURRY),
-                "two points of the belt per tick",
-            ),
             declare(
                 "ReferenceGenerator::prepare",
                 Limit::Times(MOST_ENDS),

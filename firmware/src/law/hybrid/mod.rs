@@ -22,11 +22,7 @@ use painleve_shared::{JointTorque, Real, Slip};
 pub use self::settings::{FrictionFeedForward, HybridSettings};
 use super::{Law, LawInput, LawOutput};
 
-/// Largest share of the loop through the contact per sample: its pole is 1 − ½ p̂/p.
-const OBSERVER_SHARE: f32 = 0.5;
-/// The same for the integral of the force.
-const FORCE_INTEGRAL_SHARE: f32 = 0.165;
-/// Largest correction by that integral, as a part of f_n*.
+/// Largest correction by the integral of the force, as a part of f_n*.
 const FORCE_INTEGRAL_PART: f32 = 0.5;
 /// Part of the friction observer's rate that a compliant contact takes away. With 0.7, more belts that hang on 10⁴ N/m
 /// ring.
@@ -80,9 +76,6 @@ fn affordable_part(
         .at_most(of_joint(motion_nm.second(), pressing_nm.second()))
         .limited(0.0, 1.0)
 }
-
-/// Desired acceleration above which the law makes a sticking tip break away, m/s².
-const BREAKING_AWAY_M_S2: f32 = 1.0;
 
 /// The hybrid law's state.
 #[derive(Clone, Copy, Debug)]
@@ -226,8 +219,8 @@ impl HybridSettings {
         // Anti-windup: no integration in the air, where there is no force to control, nor while the
         // torque is limited.
         if input.contact && !input.saturated {
-            let weight = (self.force_integral_gain_per_s * input.tick_s)
-                .at_most(FORCE_INTEGRAL_SHARE * input.response.loop_share);
+            let weight =
+                (self.force_integral_gain_per_s * input.tick_s).at_most(input.response.loop_share);
             let step = weight * (state.pressing * wanted_n - input.force_n.y);
             let limit = FORCE_INTEGRAL_PART * wanted_n;
             state.force_integral_n = (state.force_integral_n + step).within(limit);
@@ -265,8 +258,7 @@ impl HybridSettings {
                 // In stick the friction force follows the feed-forward. Feeding forward the friction
                 // of the desired slip brings it to the edge of its cone, where the tip breaks away
                 // without a jerk.
-                let wants_slip = tangential_acceleration_m_s2.abs() > BREAKING_AWAY_M_S2;
-                let slip = if friction.sticks && wants_slip {
+                let slip = if friction.sticks {
                     Slip::of(tangential_acceleration_m_s2)
                 } else {
                     friction.slip
@@ -285,7 +277,7 @@ impl HybridSettings {
                 // On a compliant contact, the difference is mostly noise of the force cell.
                 let calm = 1.0 - CALMER_OBSERVER * input.response.lags;
                 let weight = (calm * input.tick_s / (time_constant_s + input.tick_s))
-                    .at_most(OBSERVER_SHARE * input.response.loop_share);
+                    .at_most(input.response.loop_share);
                 let rest = input.force_n.x - state.pressing * expected;
                 state.filtered_friction_n += weight * (rest - state.filtered_friction_n);
                 expected + state.filtered_friction_n

@@ -6,7 +6,7 @@
 //! around the tip. If the reference could not stop before an edge, the governor decelerates it within
 //! a bound and holds it at the edge.
 //!
-//! The search for the edges goes outwards from the tip, one or two points at a time. The time of a tick is
+//! The search for the edges goes outwards from the tip, one point at a time. The time of a tick is
 //! therefore bounded, and the edges follow the friction estimate within a tenth of a second at 1 kHz.
 
 mod search;
@@ -19,12 +19,10 @@ pub use self::settings::GovernorSettings;
 use crate::estimate::friction::FrictionEstimate;
 use crate::refer::reference::TipReference;
 
-/// Points evaluated at a time while the edges are unknown.
-const POINTS_WHILE_UNKNOWN: u32 = 2;
 /// Number of points from one end of the reach to the other in the outward search.
 const STEPS_OVER_REACH: f32 = 32.0;
 /// Fraction of the reach in use: beyond it the arm is almost straight.
-const USABLE_REACH: f32 = 0.995;
+pub const USABLE_REACH: f32 = 0.995;
 
 /// Standard deviation of the tip's place for each count of an encoder by which rounding moves it. With a third of it, 44
 /// instead of 37 of 9,000 runs on rigid contact failed.
@@ -152,36 +150,26 @@ impl EdgeGovernor {
             state.search = None;
             state.is_fresh = false;
         }
-        let mut search = state.search.unwrap_or(Search::start(1.0, tip_t_m));
+        let search = state.search.unwrap_or(Search::start(1.0, tip_t_m));
         let direction = search.direction;
-        let distance_m = direction * self.distance_m;
+        let reach = USABLE_REACH * arm.reach_on_belt_m();
+        let point_m = search.point(2.0 * reach / STEPS_OVER_REACH, reach);
         let worst_friction = friction.coefficient + self.settings.deviations * friction.deviation();
         let least_p_ratio = self.settings.p_ratio.at_least(landing_p_ratio);
+        let there_m = point_m + direction * self.distance_m;
+        let row = arm.inverse_inertia_row_on_belt(there_m, posture);
         // How much p exceeds its least value, 1/kg. Where it does, sliding has a solution with the margin.
-        let excess_per_kg = |point_m: f32| {
-            let row = arm.inverse_inertia_row_on_belt(point_m + distance_m, posture);
-            row.map_or(f32::MIN, |(tangential, normal, factor)| {
-                let against = if friction.slip_seen {
-                    friction.slip.sign::<f32>() * tangential
-                } else {
-                    // Both directions must be admissible.
-                    tangential.abs()
-                };
-                let least = (least_p_ratio * normal).at_least(self.settings.p_per_kg * factor);
-                (normal - worst_friction * against - least) / factor
-            })
-        };
-        let reach = USABLE_REACH * arm.reach_on_belt_m();
-        let step = 2.0 * reach / STEPS_OVER_REACH;
-        let points = if state.is_fresh {
-            1
-        } else {
-            POINTS_WHILE_UNKNOWN
-        };
-        for _ in 0..points {
-            let point = search.point(step, reach);
-            search = search.next(point, excess_per_kg(point), reach);
-        }
+        let excess_per_kg = row.map_or(f32::MIN, |(tangential, normal, factor)| {
+            let against = if friction.slip_seen {
+                friction.slip.sign::<f32>() * tangential
+            } else {
+                // Both directions must be admissible.
+                tangential.abs()
+            };
+            let least = (least_p_ratio * normal).at_least(self.settings.p_per_kg * factor);
+            (normal - worst_friction * against - least) / factor
+        });
+        let search = search.next(point_m, excess_per_kg, reach);
         state.search = Some(search);
         if !search.is_over() {
             return;
