@@ -71,13 +71,24 @@ pub fn built_image(name: &str) -> PathBuf {
 /// This also reads them from a disk that may be slow, before any limit of time applies.
 ///
 /// # Errors
-/// [`BoardError::ImageMissing`], [`BoardError::EmulatorMissing`], [`BoardError::LogPrinterMissing`].
+/// [`BoardError::ImageMissing`], [`BoardError::NotAnImage`], [`BoardError::EmulatorMissing`],
+/// [`BoardError::LogPrinterMissing`].
 pub fn check(image: &Path, with_log: bool) -> Result<(), BoardError> {
     if !image.is_file() {
         return Err(BoardError::ImageMissing(image.into()));
     }
-    // From now on it is known as an input. An image that cannot be read is reported where it is read.
-    let _ = input_file::open(image);
+    // From now on it is known as an input.
+    let mut header = [0; 20];
+    let read = input_file::open(image).and_then(|mut file| file.read_exact(&mut header));
+    let is_image = match read {
+        // 32 bits, for ARM.
+        Ok(()) => header.starts_with(b"\x7fELF\x01") && header.ends_with(&[40, 0]),
+        // An image that cannot be read is reported where it is read.
+        Err(error) => error.kind() != io::ErrorKind::UnexpectedEof,
+    };
+    if !is_image {
+        return Err(BoardError::NotAnImage(image.into()));
+    }
     if !is_installed(PROGRAM) {
         return Err(BoardError::EmulatorMissing);
     }

@@ -102,6 +102,9 @@ pub enum BoardError {
     /// The image does not exist.
     #[error("no image at {}: build it with `cargo xtask build-fw`, or give its path with --elf", .0.display())]
     ImageMissing(PathBuf),
+    /// The file is no program for this processor.
+    #[error("{} is not an ELF image for an ARM processor: give the path of one that `cargo xtask build-fw` has built", .0.display())]
+    NotAnImage(PathBuf),
     /// The emulator is not installed.
     #[error(
         "qemu-system-arm is not installed: run `cargo xtask setup` or `apt-get install qemu-system-arm`"

@@ -1,13 +1,12 @@
 //! `painleve bridge`: connects the controller's image on a board to the plant's bus.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use painleve_board::emulator::{self, Emulator};
 use painleve_board::timing::{TickTimes, TimingReport};
 use painleve_board::{BoardError, ConnectedBoard, Drivers, LineHealth, Serial};
-use painleve_files::atomic_file::AtomicFile;
+use painleve_files::atomic_file;
 use painleve_link::{Pacing, Received};
 use painleve_plant::Configuration;
 use painleve_process::interrupt::Interrupt;
@@ -202,7 +201,5 @@ fn carry_until<B: ConnectedBoard>(
 
 fn write(path: &Path, report: &TimingReport) -> Result<(), CommandError> {
     let text = serde_json::to_string_pretty(report).map_err(output)?;
-    let mut file = AtomicFile::create(path).map_err(output)?;
-    writeln!(file, "{text}").map_err(output)?;
-    file.commit().map_err(output)
+    atomic_file::write(path, format!("{text}\n").as_bytes()).map_err(output)
 }

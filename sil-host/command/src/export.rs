@@ -1,11 +1,12 @@
 //! `painleve export`: the ticks of a record as a table.
 
-use std::io::{BufReader, Write};
+use std::io::{self, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all, prepare};
 use painleve_files::input_file;
+use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
 use painleve_record::export::{ExportError, Exported, ticks_to_csv};
 use painleve_record::record_file;
@@ -37,11 +38,45 @@ pub struct ExportArguments {
     json: bool,
 }
 
+/// A file that takes nothing more once the user has interrupted, so that it is removed rather than left behind.
+struct Interruptible<W> {
+    file: W,
+    interrupt: Interrupt,
+}
+
+impl<W: Write> Write for Interruptible<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.interrupt.is_requested() {
+            return Err(io::Error::other("interrupted"));
+        }
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl<W: Seek> Seek for Interruptible<W> {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.file.seek(position)
+    }
+}
+
 /// Writes one row per control tick and one column per quantity.
 ///
 /// # Errors
-/// [`CommandError`] if the recording cannot be read, or the table cannot be written.
+/// [`CommandError`] if the recording cannot be read, the table cannot be written, or the user interrupts.
 pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
+    let interrupt = Interrupt::catch()?;
+    match export_all(arguments, &interrupt) {
+        Err(_) if interrupt.is_requested() => Err(CommandError::Interrupted),
+        outcome => outcome,
+    }
+}
+
+fn export_all(arguments: &ExportArguments, interrupt: &Interrupt) -> Result<(), CommandError> {
+    let interrupt = || interrupt.clone();
     let record = &arguments.record;
     let beside = |path: &Option<Option<PathBuf>>, extension: &str| {
         let path = path.as_ref()?;
@@ -75,17 +110,25 @@ pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
     let (mut files, mut exported) = (Vec::new(), None);
     if let Some(path) = &csv {
         let mut file = AtomicFile::create(path).map_err(output)?;
-        exported = Some(export(arguments, path, &mut file)?);
+        let table = Interruptible {
+            file: &mut file,
+            interrupt: interrupt(),
+        };
+        exported = Some(export(arguments, path, table)?);
         files.push(file);
     }
     if let Some(path) = &parquet {
         let mut table = Vec::new();
-        exported = Some(export(arguments, path, &mut table)?);
+        let rows = Interruptible {
+            file: &mut table,
+            interrupt: interrupt(),
+        };
+        exported = Some(export(arguments, path, rows)?);
         files.push(prepare(path, &columns(&table)?).map_err(output)?);
     }
     let mut rows = exported.as_ref().map(|exported| exported.rows);
     if let Some(path) = &bag {
-        let (bag, ticks) = export_bag(arguments, path)?;
+        let (bag, ticks) = export_bag(arguments, path, interrupt())?;
         rows = rows.or(Some(ticks));
         files.push(bag);
     }
@@ -158,20 +201,27 @@ fn export(
 }
 
 /// Writes the bag, and returns it with the number of its ticks.
-fn export_bag(arguments: &ExportArguments, path: &Path) -> Result<(AtomicFile, u64), CommandError> {
+fn export_bag(
+    arguments: &ExportArguments,
+    path: &Path,
+    interrupt: Interrupt,
+) -> Result<(AtomicFile, u64), CommandError> {
     let open = || record_error(arguments, input_file::open(&arguments.record)).map(BufReader::new);
     let notes = record_error(arguments, record_file::notes(open()?))?.unwrap_or_default();
     // Records of earlier versions do not tell when they began.
     let start_ns = notes
         .get("start_unix_ns")
         .and_then(|start| start.parse().ok());
-    let file = AtomicFile::create(path).map_err(output)?;
+    let file = Interruptible {
+        file: AtomicFile::create(path).map_err(output)?,
+        interrupt,
+    };
     match ros2::to_bag(open()?, start_ns.unwrap_or_default(), file) {
         Err(BagError::Write(source)) => Err(output(AtomicFileError::Write {
             path: path.to_path_buf(),
             source: std::io::Error::other(source),
         })),
-        bag => record_error(arguments, bag),
+        bag => record_error(arguments, bag).map(|(bag, ticks)| (bag.file, ticks)),
     }
 }
 

@@ -37,6 +37,7 @@ mod timing;
 mod tune;
 
 use std::io::Write;
+use std::num::NonZeroUsize;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -235,6 +236,7 @@ impl CommandError {
             Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,
             Self::Sweep(SweepError::Output(_)) => 4,
             Self::Sweep(_) => 2,
+            Self::Board(BoardError::NotAnImage(_)) => 2,
             Self::Loop(LoopError::Plant(_))
             | Self::Faulted(_)
             | Self::Mounting(_)
@@ -335,6 +337,31 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses a number of things.
+fn count(text: &str) -> Result<NonZeroUsize, String> {
+    match text.parse::<NonZeroUsize>() {
+        Ok(count) if count.get() <= 1_000_000 => Ok(count),
+        _ => Err("expected a whole number from 1 to 1000000".into()),
+    }
+}
+
+/// Checks the origin of a web page, as browsers send it.
+fn origin(text: &str) -> Result<String, String> {
+    let is_origin = text
+        .split_once("://")
+        .is_some_and(|(scheme, host)| match scheme {
+            "file" => host.is_empty(),
+            "http" | "https" => !host.is_empty() && !host.contains(['/', '?', '#', '@', ' ']),
+            _ => false,
+        });
+    match is_origin {
+        true => Ok(text.into()),
+        false => {
+            Err("expected http://HOST, http://HOST:PORT, the same with https, or file://".into())
+        }
+    }
+}
+
 /// Reads the path of a figure.
 fn figure_path() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(picture::path)
@@ -424,6 +451,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Commission(_)
         | Command::Identify(_)
         | Command::Drive(_)
+        | Command::Export(_)
         | Command::Timing(_)
         | Command::Doctor(_) => {}
         Command::Accept(_)
@@ -433,7 +461,6 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Arm(_)
         | Command::Diff(_)
         | Command::Tune(_)
-        | Command::Export(_)
         | Command::Scenarios(_)
         | Command::Study(_)
         | Command::Sweep(_)

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use painleve_board::{emulator, serial};
+use painleve_files::atomic_file::AtomicFile;
 use painleve_link::{BusName, Pair};
 use painleve_plant::scenario::Scenario;
 use painleve_process::interrupt::Interrupt;
@@ -21,7 +22,7 @@ use super::fail_on::{self, FailOn};
 use super::join::JoinArguments;
 use super::live;
 use super::output::OutputArguments;
-use super::output_error::InputError;
+use super::output_error::{InputError, output};
 use super::patience::PatienceArguments;
 use super::plan::Plan;
 use super::plant::{self, PlantArguments};
@@ -112,7 +113,7 @@ pub struct RunArguments {
     no_token: bool,
     /// With --live: let pages of this origin connect as Foxglove does, for example
     /// http://localhost:8080, or file:// for Foxglove's desktop app; may be repeated.
-    #[arg(long, value_name = "ORIGIN", requires = "live")]
+    #[arg(long, value_name = "ORIGIN", requires = "live", value_parser = super::origin)]
     live_origin: Vec<String>,
     /// Print errors and warnings only.
     #[arg(short, long, conflicts_with_all = ["json", "verbose"])]
@@ -190,6 +191,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         .as_deref()
         .map(|path| ("--timing", path));
     check_distinct(&[arguments.output.files(), Vec::from_iter(timing)].concat())?;
+    if let Some((_, path)) = timing {
+        drop(AtomicFile::create(path).map_err(output)?);
+    }
     if let (Host::Serial, Some(port)) = (arguments.host, &arguments.port) {
         serial::check(port)?;
     }

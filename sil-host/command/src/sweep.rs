@@ -59,7 +59,7 @@ struct PlanArguments {
     /// TOML file: study = "bifurcation" and its options, as on the command line.
     campaign: PathBuf,
     /// Number of shards; choose it so that each takes a few minutes.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::count)]
     shards: NonZeroUsize,
     #[command(flatten)]
     json: JsonOption,
@@ -131,7 +131,7 @@ enum Scheduler {
 #[derive(Debug, Args)]
 struct SlurmArguments {
     /// Cores of each shard.
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = super::count)]
     cpus: NonZeroUsize,
     /// Additional option of sbatch, for example --option=--time=30; may be repeated.
     #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]

@@ -71,6 +71,15 @@ impl Parameter {
             _ => "rad",
         }
     }
+
+    /// Returns what follows a number: a space and the unit, or nothing.
+    pub(crate) fn unit_after_number(self) -> &'static str {
+        match self {
+            Self::Length | Self::Height => " m",
+            Self::Ratio => "",
+            _ => " rad",
+        }
+    }
 }
 
 impl core::fmt::Display for Parameter {

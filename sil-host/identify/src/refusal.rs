@@ -125,8 +125,8 @@ pub enum Refusal {
     },
     /// A result contradicts what is known.
     #[error(
-        "{parameter}: {found:.4} {} by the slides, but {known:.4} ± {deviation:.4} is known beforehand: a link is bent or has another length than told, the belt is elsewhere, or a zero has been taken wrongly",
-        .parameter.unit()
+        "{parameter}: {found:.4}{} by the slides, but {known:.4} ± {deviation:.4} is known beforehand: a link is bent or has another length than told, the belt is elsewhere, or a zero has been taken wrongly",
+        .parameter.unit_after_number()
     )]
     Contradicts {
         /// The parameter.

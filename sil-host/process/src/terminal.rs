@@ -59,12 +59,24 @@ fn columns() -> Option<u16> {
 
 /// Returns a text for readers: in ASCII where the locale asks for it.
 pub fn readable(text: impl Display) -> String {
-    let text = text.to_string();
+    let mut text = text.to_string();
+    if text.contains(is_unprintable) {
+        // A name from somebody else's file must not steer the terminal.
+        let escape = |character: char| match is_unprintable(character) {
+            true => character.escape_default().to_string(),
+            false => character.to_string(),
+        };
+        text = text.chars().map(escape).collect();
+    }
     if is_ascii_only() {
         to_ascii(&text)
     } else {
         text
     }
+}
+
+fn is_unprintable(character: char) -> bool {
+    character.is_control() && !matches!(character, '\n' | '\t')
 }
 
 /// Returns a table for readers: in ASCII where the locale asks for it, and with one line for each cell
@@ -181,7 +193,12 @@ pub fn to_ascii(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{narrow, table, to_ascii, with_ascii_cells};
+    use super::{narrow, readable, table, to_ascii, with_ascii_cells};
+
+    #[test]
+    fn control_characters_are_shown_and_not_sent() {
+        assert_eq!(readable("a\u{1b}[31m\tb\n"), "a\\u{1b}[31m\tb\n");
+    }
 
     #[test]
     fn tables_and_units_become_ascii() {

@@ -90,6 +90,24 @@ fn outputs_that_cannot_be_written_are_refused_before_the_run() {
             &["/proc/nowhere"],
         );
     }
+    let timing = [
+        "run",
+        "--host",
+        "drivers",
+        "--timing",
+        "/proc/nowhere/t.json",
+    ];
+    assert_refused(&bench, &timing, 4, &["/proc/nowhere"]);
+}
+
+#[test]
+fn a_file_that_is_no_image_is_refused() {
+    let bench = Bench::new("image");
+    for (name, contents) in [("short.toml", &b""[..]), ("text.toml", &[b'x'; 100])] {
+        std::fs::write(bench.path(name), contents).unwrap();
+        let run = ["run", "--host", "qemu", "--elf", name];
+        assert_refused(&bench, &run, 2, &[name, "not an ELF image"]);
+    }
 }
 
 #[test]

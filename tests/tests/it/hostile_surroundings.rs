@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
-use painleve_tests::{Bench, child_of, code, errors, program, signal};
+use painleve_tests::{Bench, child_of, code, errors, is_running, program, signal};
 use serde_json::Value;
 
 const SOON: Duration = Duration::from_secs(5);
@@ -280,6 +280,26 @@ fn interrupted_studies_and_figures_end_with_their_exit_code_and_leave_nothing() 
         assert_eq!(code(output.status), 130, "{output:?}");
         assert_eq!(errors(&output), "error: interrupted\n");
         assert_eq!(bench.files(), [""; 0]);
+    }
+}
+
+#[test]
+fn an_interrupted_export_leaves_nothing() {
+    let bench = Bench::new("export");
+    let recorded = bench.run(&["run", "--set", "run.duration_s=60", "--record", "run.mcap"]);
+    assert_eq!(code(recorded.status), 0, "{recorded:?}");
+    let before = bench.files();
+    for format in ["--csv=new.csv", "--ros2=new.mcap"] {
+        let running = bench.start(&["export", "run.mcap", format]);
+        let is_written = || bench.files().len() > before.len();
+        while !is_written() && is_running(running.id()) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        signal(running.id(), Signal::SIGINT);
+        let (output, _) = running.end(SOON);
+        assert_eq!(code(output.status), 130, "{output:?}");
+        assert_eq!(errors(&output), "error: interrupted\n");
+        assert_eq!(bench.files(), before);
     }
 }
 

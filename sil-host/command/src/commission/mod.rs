@@ -78,7 +78,12 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let tick_hz = scenario.run.tick_hz;
     let as_written = scenario.clone();
-    scenario.run.tick_hz = tick_hz.min(FASTEST_HZ);
+    if tick_hz > FASTEST_HZ {
+        // The tracking loops have their range from the rate.
+        let bandwidth_rad_s = &mut scenario.controller.estimator.bandwidth_rad_s;
+        *bandwidth_rad_s *= FASTEST_HZ as f32 / tick_hz as f32;
+        scenario.run.tick_hz = FASTEST_HZ;
+    }
     if arguments.second_sensors {
         scenario = second_sensors::in_place_of_first(&scenario);
     }
@@ -104,8 +109,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         let found = SecondSensors::new(&commissioned, &as_written);
         (found.applied_to(&as_written), found.deviations)
     } else {
-        let mut corrected = commissioned.applied_to(&scenario).map_err(range)?;
-        corrected.run.tick_hz = tick_hz;
+        let corrected = commissioned.applied_to(&as_written).map_err(range)?;
         (corrected, commissioned.deviations)
     };
     let text = corrected.to_commented_toml();

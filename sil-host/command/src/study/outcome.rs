@@ -1,7 +1,6 @@
 //! Output files of a study, and the number of threads that compute it.
 
 use painleve_process::terminal;
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -40,8 +39,8 @@ pub struct OutcomeOptions {
 #[derive(Clone, Debug, Args)]
 pub struct Threads {
     /// Number of threads; all cores by default. The result does not depend on it.
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
 }
 
 impl Threads {
@@ -64,7 +63,7 @@ impl Threads {
     /// # Errors
     /// [`CommandError::Process`] if the threads cannot be started.
     pub fn in_pool<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, CommandError> {
-        let threads = self.threads.map_or(0, NonZeroUsize::get);
+        let threads = self.threads.map_or(0, usize::from);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
