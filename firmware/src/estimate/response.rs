@@ -35,8 +35,9 @@ const AVERAGING_S: f32 = 0.25;
 const DEVIATIONS: f32 = 3.0;
 /// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full gain.
 const RIGID: f32 = 0.5;
-/// Loops through the contact force, which add up: friction observer, disturbance estimate, integral of the force.
-const LOOPS: f32 = 3.0;
+/// Part of what the contact allows that each loop through it takes. They add up: friction observer, disturbance estimate,
+/// integral of the force.
+const EACH_LOOP: f32 = 1.0 / 3.0;
 /// Number of delays between torque and force that are considered, in ticks.
 const DELAYS: usize = 3;
 /// Ticks of one block of sums. After a block, averages and bounds are updated in the next two ticks with
@@ -81,7 +82,7 @@ impl ContactResponse {
     /// The response of a rigid contact at this p/Q22.
     pub fn rigid(p_ratio: f32) -> Self {
         Self {
-            loop_share: p_ratio.at_least(0.0) / LOOPS,
+            loop_share: EACH_LOOP * p_ratio.at_least(0.0),
             ..Self::default()
         }
     }
@@ -218,10 +219,9 @@ impl ResponseEstimator {
             return ContactResponse::rigid(p_ratio);
         }
         let gain = self.gain.at_least(self.least_share_kg * p_per_kg);
+        let share = gain * p_ratio / (1.0 - p_ratio).at_least(LEAST_REST);
         ContactResponse {
-            loop_share: (gain * p_ratio / (1.0 - p_ratio).at_least(LEAST_REST))
-                .limited(0.0, p_ratio.at_least(0.0))
-                / LOOPS,
+            loop_share: EACH_LOOP * share.limited(0.0, p_ratio.at_least(0.0)),
             give: self.give,
             lags: self.lags,
             probe_n: self.probe_n,

@@ -66,8 +66,8 @@ fn a_rigid_contact_behind_a_slow_torque_stage_is_rigid() {
 fn the_share_of_a_compliant_contact_falls_with_its_damping() {
     let of = |damping| observed(1500, compliant(1e5, damping));
     let (firm, soft) = (of(90.0), of(20.0));
-    assert!(soft.loop_share < firm.loop_share && firm.loop_share < P_RATIO / LOOPS);
-    assert!(soft.loop_share < 0.5 * P_RATIO / LOOPS, "{soft:?}");
+    assert!(soft.loop_share < firm.loop_share && firm.loop_share < EACH_LOOP * P_RATIO);
+    assert!(soft.loop_share < 0.5 * EACH_LOOP * P_RATIO, "{soft:?}");
     let softest = observed(1500, compliant(1e4, 5.0));
     assert!(softest.give > 0.0, "{softest:?}");
 }
