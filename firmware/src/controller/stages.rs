@@ -8,10 +8,12 @@ use painleve_shared::{Arm, Slip};
 use super::arrival::{ArrivalState, ReadingRanges};
 use crate::configuration::Configuration;
 use crate::demand::TorqueDemand;
-use crate::estimate::joints::Restart;
-use crate::estimate::{ContactEstimate, Estimators, Observed};
+use crate::estimate::joints::{JointEstimatorSettings, Restart};
+use crate::estimate::{ContactEstimate, EstimateSettings, Estimators, Observed};
 use crate::last_command::LastCommand;
 use crate::law::Law;
+use crate::refer::governor::EdgeGovernor;
+use crate::refer::reference::ReferenceGenerator;
 use crate::refer::{References, Target};
 use crate::schedule::Turn;
 use crate::supervise::supervisor::Supervisor;
@@ -44,12 +46,35 @@ impl<L: Law> Stages<L> {
     pub fn new(configuration: &Configuration<L>, arm: Arm<f32>) -> Self {
         let (converters, settings) = (&configuration.converters, &configuration.settings);
         let speed = configuration.loop_speed(&arm);
+        let joint_errors = configuration.joint_errors();
+        let estimates = EstimateSettings {
+            tick_hz: configuration.tick_hz,
+            encoders: converters.encoders,
+            force: converters.force,
+            torque_limit_nm: settings.torque_limit_nm,
+            coulomb_friction_nm: configuration.arm.coulomb_friction_nm,
+            joints: JointEstimatorSettings {
+                bandwidth_rad_s: speed * settings.estimator.bandwidth_rad_s,
+                ..settings.estimator
+            },
+            contact: &settings.contact,
+            friction: &settings.friction,
+            belt: &settings.belt,
+            response: &settings.response,
+            disturbance: &settings.disturbance,
+            calibration: &settings.calibration,
+        };
         Self {
-            estimates: Estimators::new(configuration, arm, speed),
+            estimates: Estimators::new(&estimates, arm),
             command: LastCommand::default(),
             demand: TorqueDemand::new(configuration, speed),
             supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
-            references: References::new(configuration, &arm),
+            references: References::new(
+                EdgeGovernor::new(&settings.governor, configuration.tick_s(), &joint_errors),
+                ReferenceGenerator::new(&settings.reference, configuration.tick_hz),
+                arm.reach_on_belt_m(),
+                settings.recovery.minimum_p_ratio,
+            ),
             observed: Observed::default(),
             turn: Turn::default(),
             arrivals: ArrivalState::default(),

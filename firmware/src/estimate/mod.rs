@@ -23,23 +23,21 @@ pub mod model;
 pub mod response;
 
 use nalgebra::Vector2;
-use painleve_shared::counts::LinearConverter;
+use painleve_shared::counts::{EncoderScale, LinearConverter, LinearScale};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, Pose, Slip};
 
-use self::belt::BeltEstimator;
-use self::calibration::LengthCalibrator;
-use self::contact::{ContactDetector, Evidence};
+use self::belt::{BeltEstimator, BeltSpeedSettings};
+use self::calibration::{CalibrationSettings, LengthCalibrator};
+use self::contact::{ContactDetector, ContactSettings, Evidence};
 pub use self::contact_estimate::ContactEstimate;
-use self::disturbance::DisturbanceEstimator;
-use self::friction::FrictionEstimator;
+use self::disturbance::{DisturbanceEstimator, DisturbanceSettings};
+use self::friction::{FrictionEstimator, FrictionSettings};
 use self::joint_friction::JointFriction;
 use self::joints::{JointEstimator, JointEstimatorSettings, Restart};
 use self::model::Model;
-use self::response::{ForceReading, ResponseEstimator};
-use crate::configuration::Configuration;
+use self::response::{ForceReading, ResponseEstimator, ResponseSettings};
 use crate::last_command::LastCommand;
-use crate::law::Law;
 use crate::schedule::Turn;
 
 /// Least velocity by which a sticking tip falls behind its reference, m/s.
@@ -63,6 +61,35 @@ pub struct Observed {
     pub drove: bool,
     /// The command until the tick.
     pub last: LastCommand,
+}
+
+/// Settings of all estimators, and the scalings of their readings.
+#[derive(Clone, Copy, Debug)]
+pub struct EstimateSettings<'a> {
+    /// Control rate, Hz.
+    pub tick_hz: f32,
+    /// Scalings of the encoders of θ1 and of θ2 − θ1.
+    pub encoders: [EncoderScale; 2],
+    /// Scaling of the force cell.
+    pub force: LinearScale<f32>,
+    /// Largest torque on either joint, N·m.
+    pub torque_limit_nm: f32,
+    /// Coulomb friction of the joints, N·m.
+    pub coulomb_friction_nm: [f32; 2],
+    /// Tracking loops of the joints.
+    pub joints: JointEstimatorSettings,
+    /// Contact decision.
+    pub contact: &'a ContactSettings,
+    /// Friction.
+    pub friction: &'a FrictionSettings,
+    /// Bounds of the belt's speed.
+    pub belt: &'a BeltSpeedSettings,
+    /// Response of the contact.
+    pub response: &'a ResponseSettings,
+    /// Unknown torques.
+    pub disturbance: &'a DisturbanceSettings,
+    /// Calibration of the links' length.
+    pub calibration: &'a CalibrationSettings,
 }
 
 /// All estimators of one arm, and what they know of it.
@@ -95,24 +122,14 @@ impl Estimators {
         self.decision.confidence()
     }
 
-    /// Makes the estimators of this configuration, without readings of this arm, with tracking loops
-    /// that are faster than their settings by a factor.
-    pub fn new<L: Law>(
-        configuration: &Configuration<L>,
-        arm: Arm<f32>,
-        tracking_speed: f32,
-    ) -> Self {
-        let (converters, settings) = (&configuration.converters, &configuration.settings);
-        let tick_s = configuration.tick_s();
+    /// Makes the estimators with these settings, without readings of this arm.
+    pub fn new(settings: &EstimateSettings<'_>, arm: Arm<f32>) -> Self {
+        let tick_s = 1.0 / settings.tick_hz;
         let slow_period_s = Turn::COUNT * tick_s;
-        let force_cell = converters.force.converter();
-        let joints = JointEstimatorSettings {
-            bandwidth_rad_s: tracking_speed * settings.estimator.bandwidth_rad_s,
-            ..settings.estimator
-        };
-        let [link_length_m, _] = configuration.arm.link_length_m;
-        let friction = FrictionEstimator::new(&settings.friction, &settings.contact, tick_s);
-        let response = ResponseEstimator::new(&settings.response, tick_s);
+        let force_cell = settings.force.converter();
+        let [link_length_m, _] = arm.link_length_m();
+        let friction = FrictionEstimator::new(settings.friction, settings.contact, tick_s);
+        let response = ResponseEstimator::new(settings.response, tick_s);
         let contact = ContactEstimate {
             friction: *friction.estimate(),
             response: response.response(0.0, 0.0),
@@ -125,18 +142,18 @@ impl Estimators {
             force_cell,
             force_range_n: force_cell.value(force_cell.maximum_counts),
             tick_s,
-            joints: JointEstimator::new(&joints, converters.encoders, configuration.tick_hz),
-            decision: ContactDetector::new(&settings.contact),
+            joints: JointEstimator::new(&settings.joints, settings.encoders, settings.tick_hz),
+            decision: ContactDetector::new(settings.contact),
             friction,
-            belt: BeltEstimator::new(&settings.belt, tick_s),
+            belt: BeltEstimator::new(settings.belt, tick_s),
             response,
             disturbance: DisturbanceEstimator::new(
-                &settings.disturbance,
+                settings.disturbance,
                 settings.torque_limit_nm,
                 slow_period_s,
             ),
-            calibrator: LengthCalibrator::new(&settings.calibration, link_length_m, slow_period_s),
-            joint_friction: JointFriction::new(configuration.arm.coulomb_friction_nm),
+            calibrator: LengthCalibrator::new(settings.calibration, link_length_m, slow_period_s),
+            joint_friction: JointFriction::new(settings.coulomb_friction_nm),
         }
     }
 

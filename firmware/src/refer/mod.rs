@@ -6,14 +6,12 @@
 pub mod governor;
 pub mod reference;
 
+use painleve_shared::Posture;
 use painleve_shared::status::SupervisorState;
-use painleve_shared::{Arm, Posture};
 
 use self::governor::{EdgeGovernor, GovernorState};
 use self::reference::{ReferenceGenerator, TipReference};
-use crate::configuration::Configuration;
 use crate::estimate::Estimators;
-use crate::law::Law;
 use crate::supervise::supervisor::Phase;
 
 /// The target of the tip at one tick, and its limits.
@@ -52,17 +50,21 @@ pub struct References {
 }
 
 impl References {
-    /// Makes the references of this configuration for this arm.
-    pub fn new<L: Law>(configuration: &Configuration<L>, arm: &Arm<f32>) -> Self {
-        let settings = &configuration.settings;
-        let (tick_s, joints) = (configuration.tick_s(), configuration.joint_errors());
+    /// Makes the references of an arm that reaches so far on the belt. `landing_p_ratio` is the least p, as a fraction of Q22, at
+    /// which a recovered tip may land.
+    pub fn new(
+        governor: EdgeGovernor,
+        generator: ReferenceGenerator,
+        reach_m: f32,
+        landing_p_ratio: f32,
+    ) -> Self {
         Self {
-            edges: GovernorState::new(arm.reach_on_belt_m()),
+            edges: GovernorState::new(reach_m),
             posture: Posture::ElbowDown,
             asked_p_ratio: 0.0,
-            governor: EdgeGovernor::new(&settings.governor, tick_s, &joints),
-            landing_p_ratio: settings.recovery.minimum_p_ratio,
-            generator: ReferenceGenerator::new(&settings.reference, configuration.tick_hz),
+            governor,
+            landing_p_ratio,
+            generator,
         }
     }
 

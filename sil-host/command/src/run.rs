@@ -191,6 +191,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         .as_deref()
         .map(|path| ("--timing", path));
     check_distinct(&[arguments.output.files(), Vec::from_iter(timing)].concat())?;
+    if arguments.host == Host::Qemu {
+        emulator::check_image(&arguments.image.path())?;
+    }
     if let Some((_, path)) = timing {
         drop(AtomicFile::create(path).map_err(output)?);
     }
