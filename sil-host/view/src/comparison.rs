@@ -100,7 +100,7 @@ fn tables(runs: &[Run], outcomes: &[Outcome], differences: &[Difference]) -> Vec
     tables
 }
 
-/// Returns the settings in which the runs differ from the first; `None` if no other run has settings.
+/// Returns the settings in which the runs differ from the first; `None` if there are none.
 fn settings(runs: &[Run]) -> Option<Value> {
     let (first, others) = runs.split_first()?;
     let scenario = first.scenario.as_ref()?;
@@ -114,9 +114,11 @@ fn settings(runs: &[Run]) -> Option<Value> {
             })
         })
         .collect();
-    Some(json!({
-        "title": "Settings that differ",
-        "head": ["run", "key", first.label, "here"],
-        "rows": rows,
-    }))
+    (!rows.is_empty()).then(|| {
+        json!({
+            "title": "Settings that differ",
+            "head": ["run", "key", first.label, "here"],
+            "rows": rows,
+        })
+    })
 }
