@@ -117,11 +117,6 @@ pub struct Estimators {
 }
 
 impl Estimators {
-    /// Returns the certainty of the decision about contact, 0 … 1.
-    pub fn contact_confidence(&self) -> f32 {
-        self.decision.confidence()
-    }
-
     /// Makes the estimators with these settings, without readings of this arm.
     pub fn new(settings: &EstimateSettings<'_>, arm: Arm<f32>) -> Self {
         let tick_s = 1.0 / settings.tick_hz;
@@ -155,6 +150,11 @@ impl Estimators {
             calibrator: LengthCalibrator::new(settings.calibration, link_length_m, slow_period_s),
             joint_friction: JointFriction::new(settings.coulomb_friction_nm),
         }
+    }
+
+    /// Returns the certainty of the decision about contact, 0 … 1.
+    pub fn contact_confidence(&self) -> f32 {
+        self.decision.confidence()
     }
 
     /// Corrects the predicted state of the arm with a frame's readings, `elapsed_ticks` after the previous ones, and

@@ -152,7 +152,7 @@ impl References {
         );
     }
 
-    /// Prepares the program's reference for the next tick of a drive in this self.
+    /// Prepares the program's reference for the next tick of a drive in this state.
     #[inline]
     pub fn prepare(&mut self, drive: SupervisorState) {
         if matches!(drive, SupervisorState::Tracking | SupervisorState::LiftOff) {

@@ -71,27 +71,13 @@ pub fn built_image(name: &str) -> PathBuf {
 /// This also reads them from a disk that may be slow, before any limit of time applies.
 ///
 /// # Errors
-/// [`BoardError::ImageMissing`], [`BoardError::EmulatorMissing`], [`BoardError::LogPrinterMissing`].
+/// [`BoardError::ImageMissing`], [`BoardError::NotAnImage`], [`BoardError::EmulatorMissing`],
+/// [`BoardError::LogPrinterMissing`].
 pub fn check(image: &Path, with_log: bool) -> Result<(), BoardError> {
     if !image.is_file() {
         return Err(BoardError::ImageMissing(image.into()));
     }
-    // From now on it is known as an input. An image that cannot be read is reported where it is read.
-    let _ = input_file::open(image);
-    if !is_installed(PROGRAM) {
-        return Err(BoardError::EmulatorMissing);
-    }
-    if with_log && !is_installed(LOG_PRINTER) {
-        return Err(BoardError::LogPrinterMissing);
-    }
-    Ok(())
-}
-
-/// Checks that a file holds a program for the board's processor.
-///
-/// # Errors
-/// [`BoardError::NotAnImage`].
-pub fn check_image(image: &Path) -> Result<(), BoardError> {
+    // From now on it is known as an input.
     let mut header = [0; 20];
     let read = input_file::open(image).and_then(|mut file| file.read_exact(&mut header));
     let is_image = match read {
@@ -102,6 +88,12 @@ pub fn check_image(image: &Path) -> Result<(), BoardError> {
     };
     if !is_image {
         return Err(BoardError::NotAnImage(image.into()));
+    }
+    if !is_installed(PROGRAM) {
+        return Err(BoardError::EmulatorMissing);
+    }
+    if with_log && !is_installed(LOG_PRINTER) {
+        return Err(BoardError::LogPrinterMissing);
     }
     Ok(())
 }

@@ -39,12 +39,12 @@ pub struct ExportArguments {
 }
 
 /// A file that takes nothing more once the user has interrupted, so that it is removed rather than left behind.
-struct Interruptible<W> {
+struct Interruptible<'a, W> {
     file: W,
-    interrupt: Interrupt,
+    interrupt: &'a Interrupt,
 }
 
-impl<W: Write> Write for Interruptible<W> {
+impl<W: Write> Write for Interruptible<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.interrupt.is_requested() {
             return Err(io::Error::other("interrupted"));
@@ -57,7 +57,7 @@ impl<W: Write> Write for Interruptible<W> {
     }
 }
 
-impl<W: Seek> Seek for Interruptible<W> {
+impl<W: Seek> Seek for Interruptible<'_, W> {
     fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
         self.file.seek(position)
     }
@@ -76,7 +76,6 @@ pub fn run(arguments: &ExportArguments) -> Result<(), CommandError> {
 }
 
 fn export_all(arguments: &ExportArguments, interrupt: &Interrupt) -> Result<(), CommandError> {
-    let interrupt = || interrupt.clone();
     let record = &arguments.record;
     let beside = |path: &Option<Option<PathBuf>>, extension: &str| {
         let path = path.as_ref()?;
@@ -110,25 +109,17 @@ fn export_all(arguments: &ExportArguments, interrupt: &Interrupt) -> Result<(), 
     let (mut files, mut exported) = (Vec::new(), None);
     if let Some(path) = &csv {
         let mut file = AtomicFile::create(path).map_err(output)?;
-        let table = Interruptible {
-            file: &mut file,
-            interrupt: interrupt(),
-        };
-        exported = Some(export(arguments, path, table)?);
+        exported = Some(export(arguments, path, &mut file, interrupt)?);
         files.push(file);
     }
     if let Some(path) = &parquet {
         let mut table = Vec::new();
-        let rows = Interruptible {
-            file: &mut table,
-            interrupt: interrupt(),
-        };
-        exported = Some(export(arguments, path, rows)?);
+        exported = Some(export(arguments, path, &mut table, interrupt)?);
         files.push(prepare(path, &columns(&table)?).map_err(output)?);
     }
     let mut rows = exported.as_ref().map(|exported| exported.rows);
     if let Some(path) = &bag {
-        let (bag, ticks) = export_bag(arguments, path, interrupt())?;
+        let (bag, ticks) = export_bag(arguments, path, interrupt)?;
         rows = rows.or(Some(ticks));
         files.push(bag);
     }
@@ -174,10 +165,12 @@ fn export_all(arguments: &ExportArguments, interrupt: &Interrupt) -> Result<(), 
 fn export(
     arguments: &ExportArguments,
     path: &Path,
-    table: impl Write,
+    file: impl Write,
+    interrupt: &Interrupt,
 ) -> Result<Exported, CommandError> {
-    let file = record_error(arguments, input_file::open(&arguments.record))?;
-    match ticks_to_csv(BufReader::with_capacity(1 << 20, file), table) {
+    let record = record_error(arguments, input_file::open(&arguments.record))?;
+    let table = Interruptible { file, interrupt };
+    match ticks_to_csv(BufReader::with_capacity(1 << 20, record), table) {
         Err(ExportError::Write(source)) => Err(output(AtomicFileError::Write {
             path: path.to_path_buf(),
             source: source.into(),
@@ -204,7 +197,7 @@ fn export(
 fn export_bag(
     arguments: &ExportArguments,
     path: &Path,
-    interrupt: Interrupt,
+    interrupt: &Interrupt,
 ) -> Result<(AtomicFile, u64), CommandError> {
     let open = || record_error(arguments, input_file::open(&arguments.record)).map(BufReader::new);
     let notes = record_error(arguments, record_file::notes(open()?))?.unwrap_or_default();

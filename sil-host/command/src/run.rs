@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use painleve_board::{emulator, serial};
 use painleve_files::atomic_file::AtomicFile;
+use painleve_files::input_file;
 use painleve_link::{BusName, Pair};
 use painleve_plant::scenario::Scenario;
 use painleve_process::interrupt::Interrupt;
@@ -183,7 +184,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         return live(arguments, &scenario, port);
     }
     if arguments.host == Host::Qemu {
-        emulator::check(&arguments.image.path(), arguments.image.log)?;
+        // From now on it is known as an input.
+        let _ = input_file::open(&arguments.image.path());
     }
     let timing = arguments
         .image
@@ -192,7 +194,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         .map(|path| ("--timing", path));
     check_distinct(&[arguments.output.files(), Vec::from_iter(timing)].concat())?;
     if arguments.host == Host::Qemu {
-        emulator::check_image(&arguments.image.path())?;
+        emulator::check(&arguments.image.path(), arguments.image.log)?;
     }
     if let Some((_, path)) = timing {
         drop(AtomicFile::create(path).map_err(output)?);

@@ -73,11 +73,10 @@ impl Parameter {
     }
 
     /// Returns what follows a number: a space and the unit, or nothing.
-    pub(crate) fn unit_after_number(self) -> &'static str {
-        match self {
-            Self::Length | Self::Height => " m",
-            Self::Ratio => "",
-            _ => " rad",
+    pub(crate) fn unit_after_number(self) -> String {
+        match self.unit() {
+            "" => String::new(),
+            unit => format!(" {unit}"),
         }
     }
 }

@@ -57,26 +57,22 @@ fn columns() -> Option<u16> {
         .filter(|&columns| columns > 0)
 }
 
-/// Returns a text for readers: in ASCII where the locale asks for it.
+/// Returns a text for readers: without control characters, and in ASCII where the locale asks for it.
 pub fn readable(text: impl Display) -> String {
-    let mut text = text.to_string();
-    if text.contains(is_unprintable) {
+    let mut printable = String::new();
+    for character in text.to_string().chars() {
         // A name from somebody else's file must not steer the terminal.
-        let escape = |character: char| match is_unprintable(character) {
-            true => character.escape_default().to_string(),
-            false => character.to_string(),
-        };
-        text = text.chars().map(escape).collect();
+        if character.is_control() && !matches!(character, '\n' | '\t') {
+            printable.extend(character.escape_default());
+        } else {
+            printable.push(character);
+        }
     }
     if is_ascii_only() {
-        to_ascii(&text)
+        to_ascii(&printable)
     } else {
-        text
+        printable
     }
-}
-
-fn is_unprintable(character: char) -> bool {
-    character.is_control() && !matches!(character, '\n' | '\t')
 }
 
 /// Returns a table for readers: in ASCII where the locale asks for it, and with one line for each cell

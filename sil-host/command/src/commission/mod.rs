@@ -79,7 +79,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     let tick_hz = scenario.run.tick_hz;
     let as_written = scenario.clone();
     if tick_hz > FASTEST_HZ {
-        // The tracking loops have their range from the rate.
+        // At a lower rate the tracking loops have to be slower.
         let bandwidth_rad_s = &mut scenario.controller.estimator.bandwidth_rad_s;
         *bandwidth_rad_s *= FASTEST_HZ as f32 / tick_hz as f32;
         scenario.run.tick_hz = FASTEST_HZ;
