@@ -355,18 +355,23 @@ fn a_tip_that_sticks_to_a_slow_belt_breaks_away_without_leaving_it() {
 #[test]
 fn margins_grow_with_the_tick_and_with_the_counts() {
     let beyond = minimum_jerk(0.18471);
+    // The mean of some seeds: the tip at rest swings by a tenth of a millimetre.
     let held = |overrides: &[&str]| {
-        let mut all = vec![NOISE, beyond.as_str()];
-        all.extend(overrides);
-        let (result, course) = run("hybrid-elbow-down", &all);
-        assert_eq!(result.statistics.lift_offs, 0, "{overrides:?}");
-        assert!(course.at_edge, "{overrides:?}");
-        result.final_tip_t_m
+        let seeds = ["run.seed=1", "run.seed=2", "run.seed=3", "run.seed=4"];
+        let held_m = seeds.map(|seed| {
+            let mut all = vec![NOISE, beyond.as_str(), seed];
+            all.extend(overrides);
+            let (result, course) = run("hybrid-elbow-down", &all);
+            assert_eq!(result.statistics.lift_offs, 0, "{overrides:?}");
+            assert!(course.at_edge, "{overrides:?}");
+            result.final_tip_t_m
+        });
+        held_m.iter().sum::<f64>() / held_m.len() as f64
     };
     let usual = held(&[]);
     let slow = held(&["run.tick_hz=500"]);
     let coarse = held(&["converters.encoder.bits=12"]);
     assert!(usual > 0.985 * 0.1647, "{usual}");
     assert!(slow < usual - 3e-4 && slow > 0.155, "{slow} {usual}");
-    assert!(coarse < usual - 8e-4 && coarse > 0.155, "{coarse} {usual}");
+    assert!(coarse < usual - 1e-3 && coarse > 0.155, "{coarse} {usual}");
 }
