@@ -112,11 +112,11 @@ const NO_COLUMN: [&str; 8] = [
 ];
 
 /// A figure, or several of one command.
-struct Entry {
-    name: String,
-    label: String,
+pub struct Entry {
+    pub name: String,
+    pub label: String,
     command: String,
-    result: Table,
+    pub result: Table,
 }
 
 /// Returns the README and the pages of the documentation.
@@ -130,7 +130,7 @@ fn pages() -> Vec<PathBuf> {
 }
 
 /// Returns the entries of a file of measured figures that have a result.
-fn entries(file: &str) -> Vec<Entry> {
+pub fn entries(file: &str) -> Vec<Entry> {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../docs/measured/{file}.toml"));
     let text =
@@ -151,7 +151,7 @@ fn entries(file: &str) -> Vec<Entry> {
     entries.filter_map(entry).collect()
 }
 
-fn number(value: &Value) -> Option<f64> {
+pub fn number(value: &Value) -> Option<f64> {
     value
         .as_float()
         .or_else(|| value.as_integer().map(|whole| whole as f64))

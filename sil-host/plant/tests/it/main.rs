@@ -10,3 +10,4 @@ mod mujoco_arms;
 mod open_loop_section;
 mod random_frames;
 mod settings;
+mod trade_off;

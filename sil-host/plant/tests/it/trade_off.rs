@@ -1,0 +1,88 @@
+//! Draws the figure of the trade-off between success and smoothness from its measured figures.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::Path;
+
+use painleve_chart::Mark;
+use painleve_chart::chart::{Chart, Panel};
+use painleve_chart::style::{BLUE_INK, Colour, VERMILLION};
+use painleve_files::atomic_file;
+
+use crate::documentation::{Entry, entries, number};
+
+/// Returns a panel of a figure of merit against the torque noise: value, lower and upper end for each entry.
+fn panel(title: &str, entries: &[Entry], value: impl Fn(&Entry) -> [f64; 3]) -> Panel {
+    let noise_mnm = |entry: &Entry| 1e3 * figure(entry, "torque, holding, 90 %, N·m");
+    let intervals = entries.iter().flat_map(|entry| {
+        let (x, [_, low, high]) = (noise_mnm(entry), value(entry));
+        [(x, low), (x, high), (f64::NAN, f64::NAN)]
+    });
+    let dots = |name: &str, colour: Colour, is_default: bool| {
+        let chosen = entries
+            .iter()
+            .filter(|entry| (entry.name == "default") == is_default);
+        Mark::Dots {
+            name: name.into(),
+            colour,
+            size: 18,
+            points: chosen
+                .map(|entry| (noise_mnm(entry), value(entry)[0]))
+                .collect(),
+        }
+    };
+    let labels = entries.iter().map(|entry| Mark::Label {
+        at: (noise_mnm(entry) + 1.0, value(entry)[0]),
+        centred: false,
+        text: entry.label.clone(),
+    });
+    let mut marks = vec![
+        Mark::line("", BLUE_INK, intervals.collect()),
+        dots("other gains", BLUE_INK, false),
+        dots("default gains", VERMILLION, true),
+    ];
+    marks.extend(labels);
+    Panel {
+        title: title.into(),
+        height: 300,
+        marks,
+        ..Panel::default()
+    }
+}
+
+fn figure(entry: &Entry, key: &str) -> f64 {
+    number(&entry.result[key]).unwrap()
+}
+
+#[test]
+fn documentation_draws_the_trade_off_as_measured() {
+    let entries = entries("smoothness");
+    let success = panel("Success (%)", &entries, |entry| {
+        let [successes, runs, lower, upper] =
+            ["successes", "runs", "lower_percent", "upper_percent"].map(|key| figure(entry, key));
+        [100.0 * successes / runs, lower, upper]
+    });
+    let error = panel("Error, 95 % (mm)", &entries, |entry| {
+        [1e3 * figure(entry, "error, 95 %, m"); 3]
+    });
+    let chart = Chart {
+        title: "Success and error against torque noise".into(),
+        subtitle: "Labels: bandwidth relative to the default; bars: 95 % intervals".into(),
+        x_title: "Torque change a tick while holding, 90th percentile (mN·m)".into(),
+        x: Some(55.0..135.0),
+        panels: vec![success, error],
+        one_legend: true,
+        ..Chart::default()
+    };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/images/smoothness.svg");
+    let expected = chart.svg();
+    if std::env::var_os("UPDATE_DOCUMENTATION").is_some() {
+        atomic_file::write(&path, expected.as_bytes()).unwrap();
+    }
+    assert!(
+        fs::read_to_string(&path).is_ok_and(|present| present == expected),
+        "docs/images/smoothness.svg does not show docs/measured/smoothness.toml; draw it again with:\n\
+         UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant documentation"
+    );
+}
