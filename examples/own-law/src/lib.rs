@@ -30,7 +30,7 @@ impl Law for ImpedanceSettings {
         let spring_n = self.stiffness_n_m * (reference.position_m - input.model.tip_m.x);
         let damper_n =
             self.damping_ns_m * (reference.velocity_m_s - input.model.tip_velocity_m_s.x);
-        let friction = &input.friction;
+        let friction = &input.contact.friction;
         let friction_n = if friction.slip_seen {
             -friction.coefficient * friction.slip.sign::<f32>() * self.normal_force_n
         } else {

@@ -10,11 +10,13 @@ use crate::supervise::supervisor::Supervisor;
 /// Largest count of ticks without readings: a fault is latched long before.
 const UNREAD_TICKS_LIMIT: u32 = 1 << 16;
 
-/// Faults that a board detects by itself.
-const BOARD_FAULTS: DigitalInputs = DigitalInputs::ARMING_REFUSED
-    .union(DigitalInputs::STAGE_NOT_READY)
-    .union(DigitalInputs::GAP_AGAINST_FORCE)
-    .union(DigitalInputs::WINDING_HOT);
+/// Lapses that a board detects by itself, and reports by these inputs.
+const BOARD_LAPSES: [(DigitalInputs, Lapse); 4] = [
+    (DigitalInputs::ARMING_REFUSED, Lapse::ArmingRefused),
+    (DigitalInputs::STAGE_NOT_READY, Lapse::StageNotReady),
+    (DigitalInputs::GAP_AGAINST_FORCE, Lapse::GapAgainstForce),
+    (DigitalInputs::WINDING_HOT, Lapse::WindingHot),
+];
 
 /// Result of the checks of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,7 +128,12 @@ pub(super) fn arrive(
     let ahead = frame.sequence.wrapping_sub(last);
     let reading = ranges.readability(frame);
     let is_readable = reading.encoders && reading.forces;
-    if ahead != 1 || !is_readable || frame.inputs.intersects(BOARD_FAULTS) {
+    if ahead != 1
+        || !is_readable
+        || BOARD_LAPSES
+            .iter()
+            .any(|(input, _)| frame.inputs.contains(*input))
+    {
         return irregular(state, lapses, frame, ahead, reading);
     }
     state.last_sequence = Some(frame.sequence);
@@ -155,23 +162,9 @@ fn irregular(
     // More than half the counter's range ahead means behind.
     let stale = ahead == 0 || ahead > u32::MAX / 2;
     let first = &mut None;
-    let times = |bit| u32::from(frame.inputs.contains(bit));
-    lapses.note_among(
-        first,
-        Lapse::ArmingRefused,
-        times(DigitalInputs::ARMING_REFUSED),
-    );
-    lapses.note_among(
-        first,
-        Lapse::StageNotReady,
-        times(DigitalInputs::STAGE_NOT_READY),
-    );
-    lapses.note_among(
-        first,
-        Lapse::GapAgainstForce,
-        times(DigitalInputs::GAP_AGAINST_FORCE),
-    );
-    lapses.note_among(first, Lapse::WindingHot, times(DigitalInputs::WINDING_HOT));
+    for (input, lapse) in BOARD_LAPSES {
+        lapses.note_among(first, lapse, u32::from(frame.inputs.contains(input)));
+    }
     if stale {
         lapses.note_among(first, Lapse::StaleFrame, 1);
         lapses.stop_at(*first);

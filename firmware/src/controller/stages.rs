@@ -70,9 +70,13 @@ impl<L: Law> Stages<L> {
             demand: TorqueDemand::new(configuration, speed),
             supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
             references: References::new(
-                EdgeGovernor::new(&settings.governor, configuration.tick_s(), &joint_errors),
+                EdgeGovernor::new(
+                    &settings.governor,
+                    configuration.tick_s(),
+                    &joint_errors,
+                    arm.reach_on_belt_m(),
+                ),
                 ReferenceGenerator::new(&settings.reference, configuration.tick_hz),
-                arm.reach_on_belt_m(),
                 settings.recovery.minimum_p_ratio,
             ),
             observed: Observed::default(),

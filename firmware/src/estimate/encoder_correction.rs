@@ -103,8 +103,8 @@ impl EncoderCorrector {
 mod tests {
     use super::*;
     use crate::estimate::joints::{JointEstimator, JointEstimatorSettings};
-    use painleve_shared::LinkMotion;
     use painleve_shared::counts::EncoderScale;
+    use painleve_shared::{JointTorque, LinkMotion};
     use proptest::prelude::*;
 
     fn pair(limit: f32) -> impl Strategy<Value = [f32; 2]> {
@@ -164,7 +164,7 @@ mod tests {
             let readings = (joints - added)
                 .to_array()
                 .map(|angle| scale.reading(f64::from(angle)));
-            let _ = estimator.correct(&readings, 1, &still);
+            let _ = estimator.correct(&readings, 1, &still, &JointTorque::zeros());
             let error = (estimator.angles_rad() - joints).amax();
             let most = if tick < 100 { 0.02 } else { 6e-4 };
             assert!(error < most, "{tick}: {error}");

@@ -87,8 +87,6 @@ pub struct JointEstimator {
     tick_s: f32,
     angle_gain: f32,
     rate_gain_per_s: f32,
-    /// Whether the gears twist, and by how much.
-    twists: bool,
     compliance_rad_nm: [f32; 2],
     corrector: EncoderCorrector,
     /// Whether there have been readings; until then, all estimates are zero.
@@ -119,7 +117,6 @@ impl JointEstimator {
             tick_s,
             angle_gain: 1.0 - pole * pole,
             rate_gain_per_s,
-            twists: settings.gear_compliance_rad_nm != [0.0; 2],
             compliance_rad_nm: settings.gear_compliance_rad_nm,
             corrector: EncoderCorrector::new(&settings.encoders),
             started: false,
@@ -133,8 +130,8 @@ impl JointEstimator {
     /// Corrects the prediction with the readings of one tick.
     ///
     /// `elapsed_ticks` is the time since the previous readings (1 unless readings were lost);
-    /// `acceleration_rad_s2` is the expected acceleration of q' in the ticks that have not been predicted. The first
-    /// readings set the angles with zero rates.
+    /// `acceleration_rad_s2` is the expected acceleration of q' in the ticks that have not been predicted; `torque_nm`
+    /// is the torque that twists the gears. The first readings set the angles with zero rates.
     ///
     /// # Errors
     /// [`Restart`] if the loops have started from these readings: they are the first, or a joint seems to have
@@ -145,6 +142,7 @@ impl JointEstimator {
         readings: &[EncoderCounts; 2],
         elapsed_ticks: u32,
         acceleration_rad_s2: &JointMotion<f32>,
+        torque_nm: &JointTorque<f32>,
     ) -> Result<(), Restart> {
         if !self.started {
             self.start(readings);
@@ -168,18 +166,31 @@ impl JointEstimator {
         }
         self.moved = moved_1 != 0 || moved_2 != 0;
         let [joint_1, joint_2] = &mut self.joints;
-        let follow = |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32| {
+        let follow = |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32, twist_rad: f32| {
             joint.reading = reading;
             joint.counts = joint.counts.wrapping_add(moved);
-            let measured_rad = joint.counts as f32 * lsb + joint.correction_rad;
+            let measured_rad = joint.counts as f32 * lsb + joint.correction_rad - twist_rad;
             let innovation = measured_rad - joint.angle_rad;
             joint.angle_rad += self.angle_gain * innovation;
             joint.rate_rad_s += self.rate_gain_per_s * innovation;
             joint.innovation_rad = innovation;
         };
         let [lsb_1, lsb_2] = self.rad_per_count;
-        follow(joint_1, reading_1, moved_1, lsb_1);
-        follow(joint_2, reading_2, moved_2, lsb_2);
+        let [soft_1, soft_2] = self.compliance_rad_nm;
+        follow(
+            joint_1,
+            reading_1,
+            moved_1,
+            lsb_1,
+            soft_1 * torque_nm.first(),
+        );
+        follow(
+            joint_2,
+            reading_2,
+            moved_2,
+            lsb_2,
+            soft_2 * torque_nm.second(),
+        );
         Ok(())
     }
 
@@ -211,24 +222,6 @@ impl JointEstimator {
     fn bridge(&mut self, acceleration_rad_s2: &JointMotion<f32>, elapsed_ticks: u32) {
         let ticks = (elapsed_ticks - self.predicted_ticks).min(MOST_LOST_TICKS);
         self.predict_over(acceleration_rad_s2, ticks as i32);
-    }
-
-    /// Takes the twist of the gears under the commanded torques (N·m) off the last readings, so that both loops
-    /// follow the links. Called after each [`correct`](Self::correct).
-    #[inline]
-    pub fn untwist(&mut self, torque_nm: &JointTorque<f32>) {
-        if !self.twists {
-            return;
-        }
-        let take_off = |joint: &mut TrackingLoop, twist_rad: f32| {
-            joint.innovation_rad -= twist_rad;
-            joint.angle_rad -= self.angle_gain * twist_rad;
-            joint.rate_rad_s -= self.rate_gain_per_s * twist_rad;
-        };
-        let [joint_1, joint_2] = &mut self.joints;
-        let [soft_1, soft_2] = self.compliance_rad_nm;
-        take_off(joint_1, soft_1 * torque_nm.first());
-        take_off(joint_2, soft_2 * torque_nm.second());
     }
 
     /// Corrects the next readings, which are expected near this pose.
@@ -340,7 +333,7 @@ mod tests {
             if tick > 0 {
                 estimator.predict(&expected);
             }
-            let corrected = estimator.correct(&readings, 1, &expected);
+            let corrected = estimator.correct(&readings, 1, &expected, &JointTorque::zeros());
             let first = Err(Restart::FirstReadings);
             assert_eq!(corrected, if tick == 0 { first } else { Ok(()) });
         }
@@ -390,8 +383,7 @@ mod tests {
                 SCALE.reading(0.1 - 2e-3 * 3.0 * share),
             ];
             let still = JointMotion::zeros();
-            let _ = estimator.correct(&readings, 1, &still);
-            estimator.untwist(&torque);
+            let _ = estimator.correct(&readings, 1, &still, &torque);
             if tick > 100 {
                 let error = (estimator.theta_rad() - LinkMotion::new(0.2, 0.3)).amax();
                 assert!(error < 5e-4, "{tick}: {error}");
@@ -406,13 +398,13 @@ mod tests {
     fn a_jump_is_reported_and_the_loops_restart_from_it() {
         let jumped = [SCALE.reading(0.5), SCALE.reading(0.1)];
         let mut state = track(|t| (0.2 + t, 0.1), 0.0, 10);
-        let jump = state.correct(&jumped, 1, &JointMotion::zeros());
+        let jump = state.correct(&jumped, 1, &JointMotion::zeros(), &JointTorque::zeros());
         assert_eq!(jump, Err(Restart::EncoderJump));
         assert!((state.theta_rad() - LinkMotion::new(0.5, 0.6)).amax() < 6e-4);
         assert_eq!(state.theta_dot_rad_s(), LinkMotion::zeros());
         // Over a longer time the same difference is a plausible motion.
         let mut state = track(|_| (0.2, 0.1), 0.0, 10);
-        let moved = state.correct(&jumped, 10, &JointMotion::zeros());
+        let moved = state.correct(&jumped, 10, &JointMotion::zeros(), &JointTorque::zeros());
         assert!(moved.is_ok());
     }
 }

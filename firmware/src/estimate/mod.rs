@@ -170,10 +170,11 @@ impl Estimators {
         last: &LastCommand,
     ) -> Result<(), Restart> {
         let expected = &last.expected_acceleration_rad_s2;
-        let followed = self.joints.correct(&frame.joints, elapsed_ticks, expected);
+        let followed = self
+            .joints
+            .correct(&frame.joints, elapsed_ticks, expected, &last.torque_nm);
         match followed {
             Ok(()) => {
-                self.joints.untwist(&last.torque_nm);
                 let (theta_rad, theta_dot_rad_s) =
                     (self.joints.theta_rad(), self.joints.theta_dot_rad_s());
                 self.model.move_to(&self.arm, theta_rad, theta_dot_rad_s);

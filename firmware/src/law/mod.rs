@@ -47,7 +47,7 @@ use pid::PidSettings;
 ///                 .theta_dot_rad_s
 ///                 .to_joints()
 ///                 .torque_by([-self.damping_nms_rad; 2]),
-///             contact_force_n: input.force_n,
+///             contact_force_n: input.contact.force_n,
 ///         }
 ///     }
 /// }

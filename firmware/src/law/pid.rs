@@ -60,7 +60,7 @@ impl Law for PidSettings {
             torque_nm: error.torque_by(self.proportional_nm_rad)
                 + state.integral_nm
                 + error_rate.torque_by(self.derivative_nms_rad),
-            contact_force_n: input.force_n,
+            contact_force_n: input.contact.force_n,
         }
     }
 }

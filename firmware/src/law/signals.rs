@@ -3,9 +3,8 @@
 use nalgebra::Vector2;
 use painleve_shared::{Arm, JointTorque, Posture};
 
-use crate::estimate::friction::FrictionEstimate;
+use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
-use crate::estimate::response::ContactResponse;
 use crate::refer::reference::TipReference;
 
 /// Inputs of a law at one tick.
@@ -17,16 +16,8 @@ pub struct LawInput<'a> {
     pub model: &'a Model,
     /// Posture in which the drive was armed.
     pub posture: Posture,
-    /// Measured contact force (f_t, f_n), N.
-    pub force_n: Vector2<f32>,
-    /// Estimated friction.
-    pub friction: &'a FrictionEstimate,
-    /// p with the estimated friction, 1/kg.
-    pub p_per_kg: f32,
-    /// What the contact's response to torque allows.
-    pub response: &'a ContactResponse,
-    /// Whether the tip touches the belt.
-    pub contact: bool,
+    /// The contact's estimate.
+    pub contact: &'a ContactEstimate,
     /// Whether the torque of the previous tick was limited.
     pub saturated: bool,
     /// Reference of the tip.

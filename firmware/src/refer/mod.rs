@@ -9,7 +9,7 @@ pub mod reference;
 use painleve_shared::Posture;
 use painleve_shared::status::SupervisorState;
 
-use self::governor::{EdgeGovernor, GovernorState};
+use self::governor::EdgeGovernor;
 use self::reference::{ReferenceGenerator, TipReference};
 use crate::estimate::Estimators;
 use crate::supervise::supervisor::Phase;
@@ -38,7 +38,6 @@ pub struct Target {
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct References {
-    edges: GovernorState,
     governor: EdgeGovernor,
     /// Least p as a fraction of Q22 at which a recovered tip may land.
     landing_p_ratio: f32,
@@ -50,16 +49,14 @@ pub struct References {
 }
 
 impl References {
-    /// Makes the references of an arm that reaches so far on the belt. `landing_p_ratio` is the least p, as a fraction of Q22, at
-    /// which a recovered tip may land.
+    /// Makes the references of an arm. `landing_p_ratio` is the least p, as a fraction of Q22, at which a recovered tip
+    /// may land.
     pub fn new(
         governor: EdgeGovernor,
         generator: ReferenceGenerator,
-        reach_m: f32,
         landing_p_ratio: f32,
     ) -> Self {
         Self {
-            edges: GovernorState::new(reach_m),
             posture: Posture::ElbowDown,
             asked_p_ratio: 0.0,
             governor,
@@ -115,20 +112,20 @@ impl References {
             SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
         };
         if starts || phase.starts_tracking {
-            self.edges.restart(tip_t_m);
+            self.governor.restart(tip_t_m);
         }
         let drives = phase.drives();
         Target {
             reference: if drives {
-                self.governor.govern(&mut self.edges, &wanted)
+                self.governor.govern(&wanted)
             } else {
                 wanted
             },
             requested_m: wanted.position_m,
             posture: self.posture,
-            edges_m: self.edges.edges_m(),
-            fresh_edges_m: self.edges.fresh_edges_m(),
-            at_edge: drives && self.edges.is_at_edge(),
+            edges_m: self.governor.edges_m(),
+            fresh_edges_m: self.governor.fresh_edges_m(),
+            at_edge: drives && self.governor.is_at_edge(),
             recovering,
         }
     }
@@ -143,7 +140,6 @@ impl References {
     #[inline(never)]
     pub fn search(&mut self, estimates: &Estimators) {
         self.governor.search(
-            &mut self.edges,
             &estimates.arm,
             self.posture,
             estimates.model.tip_m.x,

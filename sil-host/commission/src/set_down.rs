@@ -6,7 +6,7 @@
 use core::ops::Range;
 
 use painleve_firmware::estimate::friction::FrictionEstimate;
-use painleve_firmware::refer::governor::{EdgeGovernor, GovernorState};
+use painleve_firmware::refer::governor::EdgeGovernor;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::{Arm, OutOfRange, Pose, Posture, Slip};
 
@@ -40,11 +40,6 @@ impl SetDown {
     pub fn of(scenario: &Scenario, posture: Posture) -> Result<Self, OutOfRange> {
         let configuration = scenario.controller_configuration();
         let arm = Arm::new(configuration.arm)?;
-        let governor = EdgeGovernor::new(
-            &configuration.settings.governor,
-            configuration.tick_s(),
-            &configuration.joint_errors(),
-        );
         let coefficient = scenario.belt.friction as f32;
         let deviation = FRICTION_KNOWN * coefficient;
         let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
@@ -71,16 +66,18 @@ impl SetDown {
                 one.min(other)
             })
         };
-        let away_m = governor.distance_m();
+        let settings = &configuration.settings.governor;
+        let (tick_s, joints) = (configuration.tick_s(), configuration.joint_errors());
+        let away_m = settings.kept_distance_m(tick_s, &joints);
         let least_p = |place_m: f32| p_per_kg(place_m - away_m).min(p_per_kg(place_m + away_m));
         let places = (-PLACES..=PLACES).map(place_m);
         let best_m = places
             .max_by(|one, other| least_p(*one).total_cmp(&least_p(*other)))
             .unwrap_or_default();
-        let mut state = GovernorState::new(reach_m);
+        let mut governor = EdgeGovernor::new(settings, tick_s, &joints, reach_m);
         let found = (0..MOST_CALLS).find_map(|_| {
-            governor.search(&mut state, &arm, posture, best_m, &friction, 0.0);
-            state.fresh_edges_m()
+            governor.search(&arm, posture, best_m, &friction, 0.0);
+            governor.fresh_edges_m()
         });
         let clipped = |(lower_m, upper_m): (f32, f32)| {
             f64::from(lower_m.max(-farthest_m))..f64::from(upper_m.min(farthest_m))

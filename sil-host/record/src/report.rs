@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use comfy_table::CellAlignment;
 use hdrhistogram::Histogram;
-use painleve_firmware::refer::governor::{EdgeGovernor, JointErrors};
+use painleve_firmware::refer::governor::JointErrors;
 use painleve_plant::closed_loop::LoopResult;
 use painleve_plant::scenario::Scenario;
 use painleve_process::terminal;
@@ -317,7 +317,7 @@ fn distance_for_knowledge_m(scenario: &Scenario) -> f64 {
     let configuration = scenario.controller_configuration();
     let distance_m = |joints: &JointErrors| {
         let governor = &configuration.settings.governor;
-        f64::from(EdgeGovernor::new(governor, configuration.tick_s(), joints).distance_m())
+        f64::from(governor.kept_distance_m(configuration.tick_s(), joints))
     };
     let joints = configuration.joint_errors();
     let known = JointErrors {

@@ -78,7 +78,7 @@ fn affordable_part(
 }
 
 /// The hybrid law's state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct HybridState {
     /// K'_I ∫ (f_n* − f_n) dt, N.
     force_integral_n: f32,
@@ -98,21 +98,6 @@ pub struct HybridState {
     force_drift_m_s2: f32,
 }
 
-impl Default for HybridState {
-    fn default() -> Self {
-        Self {
-            force_integral_n: 0.0,
-            position_integral_m_s2: 0.0,
-            filtered_friction_n: 0.0,
-            slip: None,
-            pressing: 1.0,
-            slow_force_n: 0.0,
-            fed_force_n: Vector2::zeros(),
-            force_drift_m_s2: 0.0,
-        }
-    }
-}
-
 impl Law for HybridSettings {
     type State = HybridState;
 
@@ -130,15 +115,15 @@ impl Law for HybridSettings {
     /// Resets the integrals and starts from the present contact force, at most f_n*: an arm that fell on the
     /// belt may press with more than the torque can hold.
     fn reset(&self, state: &mut HybridState, input: &LawInput<'_>) {
-        let force_n = input.force_n.y.limited(0.0, self.normal_force_n);
+        let force_n = input.contact.force_n.y.limited(0.0, self.normal_force_n);
         // Limit to the friction cone: a saturated force cell gives any ratio.
-        let cone_n = input.friction.coefficient * force_n;
+        let cone_n = input.contact.friction.coefficient * force_n;
         *state = HybridState {
             pressing: (force_n / self.normal_force_n.at_least(LEAST_FORCE_N))
                 .at_least(self.least_pressing),
-            filtered_friction_n: input.force_n.x.within(cone_n),
-            slow_force_n: input.force_n.y,
-            fed_force_n: input.force_n,
+            filtered_friction_n: input.contact.force_n.x.within(cone_n),
+            slow_force_n: input.contact.force_n.y,
+            fed_force_n: input.contact.force_n,
             ..HybridState::default()
         };
     }
@@ -181,7 +166,7 @@ impl HybridSettings {
         let error = input.reference.position_m - input.model.tip_m.x;
         let error_rate = input.reference.velocity_m_s - input.model.tip_velocity_m_s.x;
         // Held in the air and while the torque is limited, it needs no limit of its own.
-        if input.contact && !input.saturated {
+        if input.contact.touches && !input.saturated {
             state.position_integral_m_s2 +=
                 self.position_integral_gain_per_s3 * error * input.tick_s;
         }
@@ -195,19 +180,19 @@ impl HybridSettings {
     /// m/s².
     fn force_drift_m_s2(&self, state: &mut HybridState, input: &LawInput<'_>) -> f32 {
         // On a rigid contact the friction observer is fast enough to do this.
-        if input.response.lags <= 0.0 {
+        if input.contact.response.lags <= 0.0 {
             state.force_drift_m_s2 = 0.0;
             return 0.0;
         }
-        if input.contact && !input.saturated {
-            let rest_n = input.force_n - state.fed_force_n;
+        if input.contact.touches && !input.saturated {
+            let rest_n = input.contact.force_n - state.fed_force_n;
             let model = input.model;
             let drift = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
             // Far from the edge noise of the force moves the tip little, and where the arm is almost straight it costs
             // much torque.
             let rate = self.force_drift_rad_s * input.tick_s;
-            let weight = rate / (1.0 + rate + SLOWER_KG * input.p_per_kg.at_least(0.0));
-            let drift = input.response.lags * drift;
+            let weight = rate / (1.0 + rate + SLOWER_KG * input.contact.p_per_kg.at_least(0.0));
+            let drift = input.contact.response.lags * drift;
             state.force_drift_m_s2 += weight * (drift - state.force_drift_m_s2);
         }
         state.force_drift_m_s2
@@ -218,21 +203,22 @@ impl HybridSettings {
         let wanted_n = self.normal_force_n;
         // Anti-windup: no integration in the air, where there is no force to control, nor while the
         // torque is limited.
-        if input.contact && !input.saturated {
-            let weight =
-                (self.force_integral_gain_per_s * input.tick_s).at_most(input.response.loop_share);
-            let step = weight * (state.pressing * wanted_n - input.force_n.y);
+        if input.contact.touches && !input.saturated {
+            let weight = (self.force_integral_gain_per_s * input.tick_s)
+                .at_most(input.contact.response.loop_share);
+            let step = weight * (state.pressing * wanted_n - input.contact.force_n.y);
             let limit = FORCE_INTEGRAL_PART * wanted_n;
             state.force_integral_n = (state.force_integral_n + step).within(limit);
         }
-        let response = input.response;
+        let response = &input.contact.response;
         let damping_n = if response.give > 0.0 {
             // Press less while the force rises: this damps a compliant contact.
             let rate = input.tick_s * DAMPING_RAD_S;
-            state.slow_force_n += rate / (1.0 + rate) * (input.force_n.y - state.slow_force_n);
-            self.contact_damping * response.give * (input.force_n.y - state.slow_force_n)
+            state.slow_force_n +=
+                rate / (1.0 + rate) * (input.contact.force_n.y - state.slow_force_n);
+            self.contact_damping * response.give * (input.contact.force_n.y - state.slow_force_n)
         } else {
-            state.slow_force_n = input.force_n.y;
+            state.slow_force_n = input.contact.force_n.y;
             0.0
         };
         wanted_n + state.force_integral_n - damping_n + response.probe_n
@@ -247,14 +233,15 @@ impl HybridSettings {
         tangential_acceleration_m_s2: f32,
     ) -> f32 {
         match self.friction {
-            FrictionFeedForward::Measured => input.force_n.x,
+            FrictionFeedForward::Measured => input.contact.force_n.x,
             FrictionFeedForward::Filtered { time_constant_s } => {
                 let weight = input.tick_s / (time_constant_s + input.tick_s);
-                state.filtered_friction_n += weight * (input.force_n.x - state.filtered_friction_n);
+                state.filtered_friction_n +=
+                    weight * (input.contact.force_n.x - state.filtered_friction_n);
                 state.filtered_friction_n
             }
             FrictionFeedForward::Observed { time_constant_s } => {
-                let friction = input.friction;
+                let friction = &input.contact.friction;
                 // In stick the friction force follows the feed-forward. Feeding forward the friction
                 // of the desired slip brings it to the edge of its cone, where the tip breaks away
                 // without a jerk.
@@ -265,7 +252,7 @@ impl HybridSettings {
                 };
                 let slip = friction.slip_seen.then_some(slip);
                 // A rigid contact would follow the excess at once.
-                let lags = input.response.lags > 0.0;
+                let lags = input.contact.response.lags > 0.0;
                 let catch_up = if lags { friction.catch_up } else { 0.0 };
                 let coefficient = (friction.coefficient + catch_up).at_least(0.0);
                 let ratio = slip.map_or(0.0, |slip| -coefficient * slip.sign::<f32>());
@@ -275,10 +262,10 @@ impl HybridSettings {
                 }
                 let expected = ratio * normal_force_n;
                 // On a compliant contact, the difference is mostly noise of the force cell.
-                let calm = 1.0 - CALMER_OBSERVER * input.response.lags;
+                let calm = 1.0 - CALMER_OBSERVER * input.contact.response.lags;
                 let weight = (calm * input.tick_s / (time_constant_s + input.tick_s))
-                    .at_most(input.response.loop_share);
-                let rest = input.force_n.x - state.pressing * expected;
+                    .at_most(input.contact.response.loop_share);
+                let rest = input.contact.force_n.x - state.pressing * expected;
                 state.filtered_friction_n += weight * (rest - state.filtered_friction_n);
                 expected + state.filtered_friction_n
             }

@@ -1,6 +1,7 @@
 //! Tests of the hybrid law against the equations of motion, and of its force.
 
 use super::*;
+use crate::estimate::ContactEstimate;
 use crate::estimate::friction::FrictionEstimate;
 use crate::estimate::model::Model;
 use crate::estimate::response::ContactResponse;
@@ -30,12 +31,7 @@ proptest! {
         };
         let reference = TipReference { position_m: tip + 0.001, velocity_m_s: speed, acceleration_m_s2: 0.7 };
         let input = LawInput {
-            arm: &arm, model: &model, posture,
-            friction: &FrictionEstimate {
-                coefficient: friction, catch_up: 0.0, variance: 0.0, slip: Slip::Positive, slip_seen: true, sticks: false,
-            },
-            p_per_kg: model.p_per_kg(friction, Slip::Positive), response: &ContactResponse::rigid(1.0),
-            force_n: Vector2::zeros(), contact: true, saturated: false,
+            arm: &arm, model: &model, posture, contact: &sliding(friction, &model), saturated: false,
             reference, torque_limit_nm: 50.0, tick_s: 1e-3,
         };
         let mut state = HybridState::default();
@@ -83,145 +79,162 @@ fn at_rest(arm: &Arm<f32>) -> Model {
     )
 }
 
-const SLIDES: FrictionEstimate = FrictionEstimate {
-    coefficient: FRICTION,
-    catch_up: 0.0,
-    variance: 0.0,
-    slip: Slip::Positive,
-    slip_seen: true,
-    sticks: false,
-};
-
-fn gives() -> ContactResponse {
-    ContactResponse {
-        lags: 1.0,
-        ..ContactResponse::rigid(1.0)
+/// Returns the contact of a tip that slides without pressing on a rigid belt, with known friction.
+fn sliding(coefficient: f32, model: &Model) -> ContactEstimate {
+    ContactEstimate {
+        touches: true,
+        friction: FrictionEstimate {
+            coefficient,
+            catch_up: 0.0,
+            variance: 0.0,
+            slip: Slip::Positive,
+            slip_seen: true,
+            sticks: false,
+        },
+        p_per_kg: model.p_per_kg(coefficient, Slip::Positive),
+        response: ContactResponse::rigid(1.0),
+        ..Default::default()
     }
 }
 
-/// Returns the input of a tip that slides at its reference on a compliant contact.
-fn sliding<'a>(arm: &'a Arm<f32>, model: &'a Model, response: &'a ContactResponse) -> LawInput<'a> {
-    LawInput {
-        arm,
-        model,
-        posture: Posture::ElbowDown,
-        friction: &SLIDES,
-        p_per_kg: model.p_per_kg(FRICTION, Slip::Positive),
-        response,
-        force_n: Vector2::new(-FRICTION * 10.0, 10.0),
-        contact: true,
-        saturated: false,
-        reference: TipReference::at_rest(model.tip_m.x),
-        torque_limit_nm: 50.0,
-        tick_s: 1e-3,
-    }
+/// The law, and a tip that slides at its reference on a compliant contact.
+struct Sliding {
+    law: HybridSettings,
+    state: HybridState,
+    arm: Arm<f32>,
+    model: Model,
+    contact: ContactEstimate,
+    saturated: bool,
+    torque_limit_nm: f32,
 }
 
-/// Runs `test` with the default settings, the input of a tip that slides on a compliant contact, and a new state.
-fn while_sliding(test: impl FnOnce(&HybridSettings, &mut LawInput<'_>, &mut HybridState)) {
-    let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-    let model = at_rest(&arm);
-    test(
-        &HybridSettings::default(),
-        &mut sliding(&arm, &model, &gives()),
-        &mut HybridState::default(),
-    );
+impl Sliding {
+    /// Returns a tip that presses as desired, with the law reset there.
+    fn new() -> Self {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let model = at_rest(&arm);
+        let mut contact = sliding(FRICTION, &model);
+        contact.force_n = Vector2::new(-FRICTION * 10.0, 10.0);
+        contact.response.lags = 1.0;
+        let mut sliding = Self {
+            law: HybridSettings::default(),
+            state: HybridState::default(),
+            arm,
+            model,
+            contact,
+            saturated: false,
+            torque_limit_nm: 50.0,
+        };
+        sliding.with(HybridSettings::reset);
+        sliding
+    }
+
+    /// Calls a method of the law.
+    fn with<R>(
+        &mut self,
+        method: impl FnOnce(&HybridSettings, &mut HybridState, &LawInput<'_>) -> R,
+    ) -> R {
+        let input = LawInput {
+            arm: &self.arm,
+            model: &self.model,
+            posture: Posture::ElbowDown,
+            contact: &self.contact,
+            saturated: self.saturated,
+            reference: TipReference::at_rest(self.model.tip_m.x),
+            torque_limit_nm: self.torque_limit_nm,
+            tick_s: 1e-3,
+        };
+        method(&self.law, &mut self.state, &input)
+    }
+
+    fn tick(&mut self) {
+        self.with(HybridSettings::tick);
+    }
 }
 
 #[test]
 fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
-    while_sliding(|settings, input, state| {
-        settings.reset(state, input);
-        let rest_n = Vector2::new(-0.3, 0.5);
-        let model = input.model;
-        let expected = model.q11_per_kg * rest_n.x + model.q12_per_kg * rest_n.y;
-        for _ in 0..200 {
-            input.force_n = state.fed_force_n + rest_n;
-            settings.force_drift_m_s2(state, input);
-        }
-        let learnt = settings.force_drift_m_s2(state, input);
-        assert!(
-            (learnt - expected).abs() < 1e-3 * expected.abs(),
-            "{learnt} {expected}"
-        );
-        // Nothing is learnt from a torque that was limited.
-        input.saturated = true;
-        input.force_n = Vector2::zeros();
-        assert_eq!(settings.force_drift_m_s2(state, input), learnt);
-    });
+    let mut tip = Sliding::new();
+    let rest_n = Vector2::new(-0.3, 0.5);
+    let expected = tip.model.q11_per_kg * rest_n.x + tip.model.q12_per_kg * rest_n.y;
+    for _ in 0..200 {
+        tip.contact.force_n = tip.state.fed_force_n + rest_n;
+        tip.with(HybridSettings::force_drift_m_s2);
+    }
+    let learnt = tip.with(HybridSettings::force_drift_m_s2);
+    assert!(
+        (learnt - expected).abs() < 1e-3 * expected.abs(),
+        "{learnt} {expected}"
+    );
+    // Nothing is learnt from a torque that was limited.
+    tip.saturated = true;
+    tip.contact.force_n = Vector2::zeros();
+    assert_eq!(tip.with(HybridSettings::force_drift_m_s2), learnt);
 }
 
 #[test]
 fn a_reduced_force_is_no_error_of_the_friction() {
-    while_sliding(|settings, input, state| {
-        settings.reset(state, input);
-        state.filtered_friction_n = 0.0;
-        input.torque_limit_nm = 1.0;
-        for _ in 0..100 {
-            settings.tick(state, input);
-            // The contact follows the reduced force exactly.
-            let normal_n = state.fed_force_n.y;
-            input.force_n = Vector2::new(-FRICTION * normal_n, normal_n);
-        }
-        assert!(state.pressing < 0.9, "{state:?}");
-        let fed = -state.fed_force_n.x / state.fed_force_n.y;
-        assert!((fed - FRICTION).abs() < 1e-4, "{state:?}");
-        assert!(state.force_drift_m_s2.abs() < 1e-2, "{state:?}");
-    });
+    let mut tip = Sliding::new();
+    tip.state.filtered_friction_n = 0.0;
+    tip.torque_limit_nm = 1.0;
+    for _ in 0..100 {
+        tip.tick();
+        // The contact follows the reduced force exactly.
+        let normal_n = tip.state.fed_force_n.y;
+        tip.contact.force_n = Vector2::new(-FRICTION * normal_n, normal_n);
+    }
+    let state = &tip.state;
+    assert!(state.pressing < 0.9, "{state:?}");
+    let fed = -state.fed_force_n.x / state.fed_force_n.y;
+    assert!((fed - FRICTION).abs() < 1e-4, "{state:?}");
+    assert!(state.force_drift_m_s2.abs() < 1e-2, "{state:?}");
 }
 
 #[test]
 fn the_force_falls_at_once_but_rises_slowly() {
-    while_sliding(|settings, input, state| {
-        settings.reset(state, input);
-        settings.tick(state, input);
-        assert_eq!(state.pressing, 1.0);
-        input.torque_limit_nm = 1.0;
-        settings.tick(state, input);
-        let reduced = state.pressing;
-        assert!(reduced < 0.9, "{reduced}");
-        input.torque_limit_nm = 50.0;
-        for _ in 0..10 {
-            settings.tick(state, input);
-        }
-        let share = (state.pressing - reduced) / (1.0 - reduced);
-        let expected = 1.0 - (1.0 + settings.pressing_rate_per_s * input.tick_s).powi(-10);
-        assert!((share - expected).abs() < 1e-3, "{share} {expected}");
-    });
+    let mut tip = Sliding::new();
+    tip.tick();
+    assert_eq!(tip.state.pressing, 1.0);
+    tip.torque_limit_nm = 1.0;
+    tip.tick();
+    let reduced = tip.state.pressing;
+    assert!(reduced < 0.9, "{reduced}");
+    tip.torque_limit_nm = 50.0;
+    for _ in 0..10 {
+        tip.tick();
+    }
+    let share = (tip.state.pressing - reduced) / (1.0 - reduced);
+    let expected = 1.0 - (1.0 + tip.law.pressing_rate_per_s * 1e-3).powi(-10);
+    assert!((share - expected).abs() < 1e-3, "{share} {expected}");
 }
 
 #[test]
 fn the_force_begins_with_the_present_one_but_with_no_more_than_desired() {
-    while_sliding(|settings, input, state| {
-        for (force_n, share) in [(20.0, 1.0), (4.0, 0.4), (-0.2, settings.least_pressing)] {
-            input.force_n.y = force_n;
-            settings.reset(state, input);
-            assert_eq!(state.pressing, share);
-        }
-    });
+    let mut tip = Sliding::new();
+    for (force_n, share) in [(20.0, 1.0), (4.0, 0.4), (-0.2, tip.law.least_pressing)] {
+        tip.contact.force_n.y = force_n;
+        tip.with(HybridSettings::reset);
+        assert_eq!(tip.state.pressing, share);
+    }
 }
 
 #[test]
 fn the_force_integral_removes_the_error_up_to_its_limit() {
-    while_sliding(|settings, input, state| {
-        let settings = HybridSettings {
-            force_integral_gain_per_s: 650.0,
-            ..*settings
-        };
-        for (force_n, sign) in [(9.0, 1.0), (11.0, -1.0)] {
-            input.force_n.y = force_n;
-            settings.reset(state, input);
-            state.pressing = 1.0;
-            settings.commanded_force_n(state, input);
-            let step = sign * state.force_integral_n;
-            assert!(step > 0.0, "{step}");
-            for _ in 0..100_000 {
-                settings.commanded_force_n(state, input);
-            }
-            let limit = FORCE_INTEGRAL_PART * settings.normal_force_n;
-            assert_eq!(state.force_integral_n, sign * limit);
+    let mut tip = Sliding::new();
+    tip.law.force_integral_gain_per_s = 650.0;
+    for (force_n, sign) in [(9.0, 1.0), (11.0, -1.0)] {
+        tip.contact.force_n.y = force_n;
+        tip.with(HybridSettings::reset);
+        tip.state.pressing = 1.0;
+        tip.with(HybridSettings::commanded_force_n);
+        let step = sign * tip.state.force_integral_n;
+        assert!(step > 0.0, "{step}");
+        for _ in 0..100_000 {
+            tip.with(HybridSettings::commanded_force_n);
         }
-    });
+        let limit = FORCE_INTEGRAL_PART * tip.law.normal_force_n;
+        assert_eq!(tip.state.force_integral_n, sign * limit);
+    }
 }
 
 #[test]

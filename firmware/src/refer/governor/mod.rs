@@ -51,18 +51,25 @@ pub struct JointErrors {
     pub tip_deviation_m: f32,
 }
 
-/// The governor's settings for one arm and rate.
-#[derive(Clone, Copy, Debug)]
-pub struct EdgeGovernor {
-    settings: GovernorSettings,
-    tick_s: f32,
-    /// Distance kept from the point where p has its least value, with these joints and this control rate, m.
-    distance_m: f32,
+impl GovernorSettings {
+    /// Returns the distance kept from the point where p/Q22 has its least value, m, with these joints and a control
+    /// period of `tick_s` (s).
+    pub fn kept_distance_m(&self, tick_s: f32, joints: &JointErrors) -> f32 {
+        let square = |value: f32| value * value;
+        let variance_m2 = square(ROUNDING * joints.count_m)
+            + square(FRICTION_M_NM * joints.friction_nm)
+            + square(joints.tip_deviation_m);
+        let distance_m2 = square(self.distance_m * square(tick_s / PERIOD_S))
+            + square(self.deviations) * variance_m2;
+        distance_m2.square_root()
+    }
 }
 
-/// The edges that an [`EdgeGovernor`] has found, and the reference it follows.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct GovernorState {
+/// The governor of one arm: the edges that it has found, and the reference that it follows.
+// In this order: see the fields of the controller.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct EdgeGovernor {
     /// Edges of the admissible stretch around the tip, m.
     lower_m: f32,
     upper_m: f32,
@@ -78,15 +85,32 @@ pub struct GovernorState {
     follows: bool,
     /// Whether the given reference is beyond an edge.
     at_edge: bool,
+    settings: GovernorSettings,
+    tick_s: f32,
+    distance_m: f32,
 }
 
-impl GovernorState {
-    /// Starts without edges except the arm's reach (m).
-    pub fn new(reach_m: f32) -> Self {
+impl EdgeGovernor {
+    /// Makes a governor that is called every `tick_s`, for these joints, without edges except the arm's reach (m).
+    pub fn new(
+        settings: &GovernorSettings,
+        tick_s: f32,
+        joints: &JointErrors,
+        reach_m: f32,
+    ) -> Self {
         Self {
             lower_m: -USABLE_REACH * reach_m,
             upper_m: USABLE_REACH * reach_m,
-            ..Self::default()
+            search: None,
+            asked_p_ratio: 0.0,
+            is_fresh: false,
+            position_m: 0.0,
+            velocity_m_s: 0.0,
+            follows: false,
+            at_edge: false,
+            settings: *settings,
+            tick_s,
+            distance_m: settings.kept_distance_m(tick_s, joints),
         }
     }
 
@@ -111,46 +135,23 @@ impl GovernorState {
     pub fn is_at_edge(&self) -> bool {
         self.at_edge
     }
-}
-
-impl EdgeGovernor {
-    /// Makes a governor that is called every `tick_s`, for these joints.
-    pub fn new(settings: &GovernorSettings, tick_s: f32, joints: &JointErrors) -> Self {
-        let square = |value: f32| value * value;
-        let variance_m2 = square(ROUNDING * joints.count_m)
-            + square(FRICTION_M_NM * joints.friction_nm)
-            + square(joints.tip_deviation_m);
-        let distance_m2 = square(settings.distance_m * square(tick_s / PERIOD_S))
-            + square(settings.deviations) * variance_m2;
-        Self {
-            settings: *settings,
-            tick_s,
-            distance_m: distance_m2.square_root(),
-        }
-    }
-
-    /// Returns the distance kept from the point where p/Q22 has its least value, m.
-    pub fn distance_m(&self) -> f32 {
-        self.distance_m
-    }
 
     /// Continues the search for the edges around a tip at `tip_t_m` (m). Where a thrown tip may land,
     /// p/Q22 is to be `landing_p_ratio` at least; a change of it makes the edges unknown.
     pub fn search(
-        &self,
-        state: &mut GovernorState,
+        &mut self,
         arm: &Arm<f32>,
         posture: Posture,
         tip_t_m: f32,
         friction: &FrictionEstimate,
         landing_p_ratio: f32,
     ) {
-        if landing_p_ratio != state.asked_p_ratio {
-            state.asked_p_ratio = landing_p_ratio;
-            state.search = None;
-            state.is_fresh = false;
+        if landing_p_ratio != self.asked_p_ratio {
+            self.asked_p_ratio = landing_p_ratio;
+            self.search = None;
+            self.is_fresh = false;
         }
-        let search = state.search.unwrap_or(Search::start(1.0, tip_t_m));
+        let search = self.search.unwrap_or(Search::start(1.0, tip_t_m));
         let direction = search.direction;
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         let point_m = search.point(2.0 * reach / STEPS_OVER_REACH, reach);
@@ -170,42 +171,42 @@ impl EdgeGovernor {
             (normal - worst_friction * against - least) / factor
         });
         let search = search.next(point_m, excess_per_kg, reach);
-        state.search = Some(search);
+        self.search = Some(search);
         if !search.is_over() {
             return;
         }
         if direction > 0.0 {
-            state.upper_m = search.inside_m;
+            self.upper_m = search.inside_m;
         } else {
             // A stretch shorter than both margins shrinks to a point.
-            state.lower_m = search.inside_m.at_most(state.upper_m);
-            state.is_fresh = true;
+            self.lower_m = search.inside_m.at_most(self.upper_m);
+            self.is_fresh = true;
         }
-        state.search = Some(Search::start(-direction, tip_t_m));
+        self.search = Some(Search::start(-direction, tip_t_m));
     }
 
     /// Returns the reference to follow instead of `wanted`, one tick after the last one.
-    pub fn govern(&self, state: &mut GovernorState, wanted: &TipReference) -> TipReference {
+    pub fn govern(&mut self, wanted: &TipReference) -> TipReference {
         let (tick_s, braking_m_s2) = (self.tick_s, self.settings.braking_m_s2);
         if !self.settings.enabled {
             return *wanted;
         }
-        let (lower, upper) = (state.lower_m, state.upper_m);
+        let (lower, upper) = (self.lower_m, self.upper_m);
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
         let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / braking_m_s2;
-        let jumps = (wanted.position_m - state.position_m).abs() > JUMP_M;
-        state.at_edge = outside(wanted.position_m);
-        state.follows = !outside(stop_m)
-            && !state.at_edge
-            && (if state.follows {
+        let jumps = (wanted.position_m - self.position_m).abs() > JUMP_M;
+        self.at_edge = outside(wanted.position_m);
+        self.follows = !outside(stop_m)
+            && !self.at_edge
+            && (if self.follows {
                 !jumps
             } else {
-                (wanted.position_m - state.position_m).abs() < CAUGHT_M
+                (wanted.position_m - self.position_m).abs() < CAUGHT_M
             });
-        if state.follows {
-            state.position_m = wanted.position_m;
-            state.velocity_m_s = speed;
+        if self.follows {
+            self.position_m = wanted.position_m;
+            self.velocity_m_s = speed;
             return *wanted;
         }
         // The highest speed from which the reference still stops within a distance.
@@ -215,22 +216,22 @@ impl EdgeGovernor {
                 .at_most(APPROACH_PER_S * distance)
         };
         let target = wanted.position_m.limited(lower, upper);
-        let away = target - state.position_m;
+        let away = target - self.position_m;
         let approach = stopping_speed(away.abs()).at_most(self.settings.catch_up_m_s);
-        let moves_along = if state.at_edge { 0.0 } else { speed };
+        let moves_along = if self.at_edge { 0.0 } else { speed };
         let velocity = (moves_along + approach.copysign(away)).limited(
-            -stopping_speed((state.position_m - lower).at_least(0.0)),
-            stopping_speed((upper - state.position_m).at_least(0.0)),
+            -stopping_speed((self.position_m - lower).at_least(0.0)),
+            stopping_speed((upper - self.position_m).at_least(0.0)),
         );
         // Beyond an edge that has moved inwards, the limit above only forbids going further out.
         let step = 2.0 * braking_m_s2 * tick_s;
-        let change = (velocity - state.velocity_m_s).within(step);
-        let velocity = state.velocity_m_s + change;
+        let change = (velocity - self.velocity_m_s).within(step);
+        let velocity = self.velocity_m_s + change;
         let acceleration = change / tick_s;
-        state.velocity_m_s = velocity;
-        state.position_m += velocity * tick_s;
+        self.velocity_m_s = velocity;
+        self.position_m += velocity * tick_s;
         TipReference {
-            position_m: state.position_m,
+            position_m: self.position_m,
             velocity_m_s: velocity,
             acceleration_m_s2: acceleration,
         }

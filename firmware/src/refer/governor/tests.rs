@@ -27,15 +27,19 @@ fn governor() -> EdgeGovernor {
         distance_m: 0.0,
         ..Default::default()
     };
-    EdgeGovernor::new(&settings, TICK_S, &JointErrors::default())
+    with(&settings, TICK_S, &JointErrors::default())
 }
 
-fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> GovernorState {
-    let mut state = GovernorState::new(arm().reach_on_belt_m());
+fn with(settings: &GovernorSettings, tick_s: f32, joints: &JointErrors) -> EdgeGovernor {
+    EdgeGovernor::new(settings, tick_s, joints, arm().reach_on_belt_m())
+}
+
+fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> EdgeGovernor {
+    let mut governor = governor();
     for _ in 0..300 {
-        governor().search(&mut state, &arm(), posture, tip_t_m, friction, 0.0);
+        governor.search(&arm(), posture, tip_t_m, friction, 0.0);
     }
-    state
+    governor
 }
 
 #[test]
@@ -50,14 +54,13 @@ fn the_edges_are_those_of_table_ii() {
 
 /// Returns the distance, m, from the upper edge with the friction 0.6 to where p is zero, 0.16471 m.
 fn distance_m(settings: &GovernorSettings, joints: &JointErrors, tick_s: f32, landing: f32) -> f32 {
-    let governor = EdgeGovernor::new(settings, tick_s, joints);
-    let mut state = GovernorState::new(arm().reach_on_belt_m());
+    let mut governor = with(settings, tick_s, joints);
     let friction = known(0.6, Slip::Positive);
     for _ in 0..300 {
         let posture = Posture::ElbowDown;
-        governor.search(&mut state, &arm(), posture, -0.1, &friction, landing);
+        governor.search(&arm(), posture, -0.1, &friction, landing);
     }
-    0.164_71 - state.edges_m().1
+    0.164_71 - governor.edges_m().1
 }
 
 #[test]
@@ -129,21 +132,13 @@ fn without_an_admissible_place_nearby_the_tip_is_led_to_the_best_one_and_not_acr
         p_per_kg: 6.0,
         ..Default::default()
     };
-    let governor = EdgeGovernor::new(&settings, TICK_S, &JointErrors::default());
+    let mut governor = with(&settings, TICK_S, &JointErrors::default());
     let friction = known(0.79, Slip::Negative);
-    let mut state = GovernorState::new(arm().reach_on_belt_m());
     let mut tip_t_m = 0.03;
     for _ in 0..3000 {
-        governor.search(
-            &mut state,
-            &arm(),
-            Posture::ElbowDown,
-            tip_t_m,
-            &friction,
-            0.0,
-        );
-        if state.fresh_edges_m().is_some() {
-            let (lower_m, upper_m) = state.edges_m();
+        governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
+        if governor.fresh_edges_m().is_some() {
+            let (lower_m, upper_m) = governor.edges_m();
             tip_t_m += (tip_t_m.max(lower_m).min(upper_m) - tip_t_m).clamp(-1e-3, 1e-3);
         }
     }
@@ -152,11 +147,14 @@ fn without_an_admissible_place_nearby_the_tip_is_led_to_the_best_one_and_not_acr
 
 /// Follows the reference `wanted` until it stands still; returns the final and the largest
 /// position.
-fn follow(state: &mut GovernorState, wanted: impl Fn(f32) -> TipReference) -> (TipReference, f32) {
+fn follow(
+    governor: &mut EdgeGovernor,
+    wanted: impl Fn(f32) -> TipReference,
+) -> (TipReference, f32) {
     let mut largest = f32::MIN;
     let mut last = TipReference::default();
     for tick in 0..8000 {
-        last = governor().govern(state, &wanted(tick as f32 * TICK_S));
+        last = governor.govern(&wanted(tick as f32 * TICK_S));
         largest = largest.max(last.position_m);
     }
     (last, largest)
@@ -192,11 +190,11 @@ proptest! {
     fn a_reference_beyond_the_edge_ends_at_it_and_never_passes_it(
         speed in 0.03_f32..0.5, end in 0.166_f32..0.3,
     ) {
-        let mut state = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
-        state.restart(0.0);
-        let edge = state.edges_m().1;
-        let (last, largest) = follow(&mut state, ramp(0.0, speed, end));
-        prop_assert!(state.is_at_edge());
+        let mut governor = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
+        governor.restart(0.0);
+        let edge = governor.edges_m().1;
+        let (last, largest) = follow(&mut governor, ramp(0.0, speed, end));
+        prop_assert!(governor.is_at_edge());
         prop_assert!(largest < edge + 1e-4, "{} {}", largest, edge);
         prop_assert!((last.position_m - edge).abs() < 1e-4 && last.velocity_m_s.abs() < 1e-3);
     }
@@ -205,22 +203,22 @@ proptest! {
     fn a_reference_inside_is_reached_and_then_followed_exactly(
         speed in 0.01_f32..0.3, end in -0.1_f32..0.16, start in -0.15_f32..0.15,
     ) {
-        let mut state = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
-        state.restart(start);
-        let (last, _) = follow(&mut state, ramp(-0.15, speed, end));
+        let mut governor = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
+        governor.restart(start);
+        let (last, _) = follow(&mut governor, ramp(-0.15, speed, end));
         let wanted = ramp(-0.15, speed, end)(7.999);
         prop_assert!((last.position_m - wanted.position_m).abs() < 1e-4, "{:?} {:?}", last, wanted);
-        prop_assert!(!state.is_at_edge());
+        prop_assert!(!governor.is_at_edge());
     }
 }
 
 #[test]
 fn a_reference_that_was_reached_is_followed_however_fast() {
-    let mut state = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
-    state.restart(0.0);
+    let mut governor = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
+    governor.restart(0.0);
     for tick in 0..100 {
         // 0.3 mm in a tick is a motion, not a jump.
         let wanted = ramp(0.0, 0.3, 0.2)(tick as f32 * TICK_S);
-        assert_eq!(governor().govern(&mut state, &wanted), wanted, "{tick}");
+        assert_eq!(governor.govern(&wanted), wanted, "{tick}");
     }
 }
