@@ -26,21 +26,21 @@ settings! {
         },
         /// Jump to the target and stand there.
         "step" => Step {
-            /// Target z_t; within the arm's reach on the belt.
+            /// Target z_t; without the governor, within the arm's reach on the belt.
             target_m: f32, -20.0..=20.0, "m";
             /// Duration of the pause at the target.
             duration_s: f32, 0.0..=1e5, "s";
         },
         /// Move to the target at constant speed.
         "ramp" => Ramp {
-            /// Target z_t; within the arm's reach on the belt.
+            /// Target z_t; without the governor, within the arm's reach on the belt.
             target_m: f32, -20.0..=20.0, "m";
             /// Duration of the motion.
             duration_s: f32, 0.0..=1e5, "s";
         },
         /// Move with minimum jerk from rest to rest, 10 s³ − 15 s⁴ + 6 s⁵ (Flash and Hogan 1985).
         "minimum-jerk" => MinimumJerk {
-            /// Target z_t; within the arm's reach on the belt.
+            /// Target z_t; without the governor, within the arm's reach on the belt.
             target_m: f32, -20.0..=20.0, "m";
             /// Duration of the motion.
             duration_s: f32, 0.0..=1e5, "s";

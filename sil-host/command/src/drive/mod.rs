@@ -142,7 +142,7 @@ fn recorder(
     if arguments.no_record {
         return Ok(None);
     }
-    // Its lines are orders.
+    // Its lines are commands.
     input_file::remember_standard_input()?;
     check_distinct(&[("--record", &arguments.record)])?;
     let log = McapLog::create(&arguments.record, scenario, Source::Arm).map_err(output)?;
@@ -184,7 +184,7 @@ impl Drive {
             warn(line);
         }
         warn(format_args!(
-            "connected: build {:016x}, sources {:016x}, scenario {}{}; orders: arm, disarm, stop",
+            "connected: build {:016x}, sources {:016x}, scenario {}{}; commands: arm, disarm, stop",
             painleve_plant::law_choice::build(),
             painleve_firmware::SOURCES,
             scenario.name,

@@ -63,6 +63,14 @@ pub enum ScenarioError {
     /// An override's key has more levels than any key of a scenario.
     #[error("a key has at most {MOST_LEVELS} levels (belt.friction has two)")]
     TooDeep,
+    /// An effect is on that a rigid contact does not support.
+    #[error("{origin}: {key} needs contact.kind = \"compliant\"")]
+    NeedsCompliant {
+        /// File or scenario.
+        origin: String,
+        /// The effect's key.
+        key: &'static str,
+    },
     /// A value is out of range.
     #[error("{origin}: {source}")]
     Range {

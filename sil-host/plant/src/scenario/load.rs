@@ -10,6 +10,7 @@ use super::error::ScenarioError;
 use super::override_key::with_override;
 use super::table::{from_table, parse};
 use super::{Scenario, built_in};
+use crate::mechanics::compliant::ContactKind;
 use crate::mechanics::{BuiltInPlant, without_files};
 
 impl Scenario {
@@ -20,6 +21,12 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
         let scenario = Self::load_unplaced(name, overrides)?;
+        if scenario.contact.kind == ContactKind::Rigid
+            && let Some(key) = scenario.effects.first_on(&scenario.plant_parameters().arm)
+        {
+            let origin = origin(name);
+            return Err(ScenarioError::NeedsCompliant { origin, key });
+        }
         let plant = BuiltInPlant::new(&scenario);
         plant.map_err(|source| ScenarioError::Range {
             origin: origin(name),

@@ -259,14 +259,16 @@ fn without_a_force_cell_arms_of_unknown_length_find_the_belt() {
 }
 
 /// Without any force reading, so that friction and the belt speed must be given.
-const NO_FORCE_CELL: [&str; 7] = [
+/// The settings of docs/controller.md for an arm without a force cell, whose channels read zero.
+const NO_FORCE_CELL: [&str; 8] = [
     "controller.contact.evidence=encoders",
-    "controller.law.hybrid.friction={ model = { friction = 0.6, belt_speed_m_s = -0.4 } }",
-    "controller.disturbance.bandwidth_rad_s=0",
-    "converters.force={ range_n = 0.01, noise_n = 0.0 }",
-    "controller.contact.contact_n=0.005",
-    "controller.contact.force_noise_n=0.001",
     "controller.belt.given_m_s=-0.4",
+    "controller.disturbance.bandwidth_rad_s=0",
+    "controller.response.enabled=false",
+    "controller.law.hybrid.friction={ model = { friction = 0.6, belt_speed_m_s = -0.4 } }",
+    "controller.friction={ first_guess = 0.6, first_deviation = 0.01 }",
+    "converters.faults.normal_force={ kind = 'off', from_s = 0, until_s = 100 }",
+    "converters.faults.tangential_force={ kind = 'off', from_s = 0, until_s = 100 }",
 ];
 
 #[test]

@@ -52,38 +52,32 @@ settings! {
 }
 
 impl Effects {
-    /// Checks that all effects are off, and that the joints have no friction, for a plant that does
-    /// not support them.
+    /// Returns the key of the first effect that is on, or of the joints' friction: a plant with rigid contact does not
+    /// support them.
+    pub fn first_on(&self, arm: &ArmParameters<f64>) -> Option<&'static str> {
+        let all = [
+            (
+                "arm.coulomb_friction_nm",
+                arm.coulomb_friction_nm != [0.0; 2],
+            ),
+            ("effects.friction", self.friction != FrictionChange::None),
+            ("effects.surface", !self.surface.is_flat()),
+            ("effects.hanging_belt", self.hanging_belt.is_on()),
+            ("effects.joints", self.joints.is_on()),
+            ("effects.gear", self.gear.elastic),
+            ("effects.push", self.push.is_on()),
+            ("effects.payload", self.payload.is_on()),
+        ];
+        all.into_iter()
+            .find_map(|(key, is_on)| is_on.then_some(key))
+    }
+
+    /// Checks that none is on.
     ///
     /// # Errors
-    /// [`OutOfRange`] naming the first effect that is on.
+    /// [`OutOfRange`] naming the [first one](Self::first_on) that is.
     pub fn none(&self, arm: &ArmParameters<f64>) -> Result<(), OutOfRange> {
-        let off = |key, is_on: bool| range::check(key, f64::from(u8::from(is_on)), 0.0, 0.0);
-        off(
-            "arm.coulomb_friction_nm with contact.kind = rigid",
-            arm.coulomb_friction_nm != [0.0; 2],
-        )?;
-        off(
-            "effects.friction with contact.kind = rigid",
-            self.friction != FrictionChange::None,
-        )?;
-        off(
-            "effects.surface with contact.kind = rigid",
-            !self.surface.is_flat(),
-        )?;
-        off(
-            "effects.hanging_belt with contact.kind = rigid",
-            self.hanging_belt.is_on(),
-        )?;
-        off(
-            "effects.joints with contact.kind = rigid",
-            self.joints.is_on(),
-        )?;
-        off("effects.gear with contact.kind = rigid", self.gear.elastic)?;
-        off("effects.push with contact.kind = rigid", self.push.is_on())?;
-        off(
-            "effects.payload with contact.kind = rigid",
-            self.payload.is_on(),
-        )
+        self.first_on(arm)
+            .map_or(Ok(()), |key| range::check(key, 1.0, 0.0, 0.0))
     }
 }
