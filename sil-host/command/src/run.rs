@@ -33,7 +33,7 @@ use super::scenario::ScenarioArguments;
 use super::system_path::SystemPath;
 use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED};
 
-/// Host of the controller.
+/// Where the controller runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Host {
     /// The firmware's controller in its own process.
@@ -85,7 +85,7 @@ pub struct RunArguments {
     /// Bus on which plant and controller meet; unique by default.
     #[arg(long)]
     bus: Option<BusName>,
-    /// Host of the controller.
+    /// Where the controller runs.
     #[arg(long, value_enum, default_value_t)]
     host: Host,
     /// Serial port of the board, for example /dev/ttyUSB0.
