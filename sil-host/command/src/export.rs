@@ -30,7 +30,7 @@ pub struct ExportArguments {
     /// Write a ROS 2 bag, by default beside the record.
     #[arg(long, value_name = "PATH", num_args = 0..=1, conflicts_with = "recover")]
     ros2: Option<Option<PathBuf>>,
-    /// Export what is whole of a damaged or truncated record: the ticks before the damage.
+    /// Export the intact part of a damaged or truncated record: the ticks before the damage.
     #[arg(long)]
     recover: bool,
     /// Print one JSON object on stdout.

@@ -103,7 +103,7 @@ enum Command {
     Doctor(doctor::DoctorArguments),
     /// Write the ticks of a record as a table.
     Export(export::ExportArguments),
-    /// Overlay runs in one page and one figure, and tell how much they differ.
+    /// Overlay runs in one page and one figure, and report how much they differ.
     Compare(compare::CompareArguments),
     /// Search keys of a scenario for a smaller error, ripple and change of torque.
     Tune(tune::TuneArguments),
@@ -117,7 +117,7 @@ enum Command {
     Arm(arm::ArmArguments),
     /// List the built-in scenarios, or print one as TOML with every key.
     Scenarios(scenarios::ScenariosArguments),
-    /// Compute one of the paper's studies as numbers, data files and figures.
+    /// Compute a study, of the paper or of the controller, as numbers, data files and figures.
     Study(study::StudyArguments),
     /// Compute a study in shards, on several machines.
     Sweep(sweep::SweepArguments),

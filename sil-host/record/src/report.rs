@@ -210,7 +210,10 @@ impl RunReport {
             None => self.lift_offs.to_string(),
         };
         row("lift-offs", lift_offs);
-        row("kept", if self.kept { "yes" } else { "no" }.into());
+        row(
+            "tip kept on the belt",
+            if self.kept { "yes" } else { "no" }.into(),
+        );
         row(
             "impacts",
             format!(
@@ -304,7 +307,7 @@ impl RunReport {
         if let (Some(number), Some(description)) = (self.fault, &self.fault_description) {
             row("fault", format!("{number}: {description}"));
         }
-        row("hash of all frames", self.log_hash.clone());
+        row("log hash", self.log_hash.clone());
         if let Some(column) = table.column_mut(0) {
             column.set_cell_alignment(CellAlignment::Right);
         }

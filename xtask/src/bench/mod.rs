@@ -60,7 +60,7 @@ pub fn run(arguments: &BenchArguments) -> Result<(), ChoreError> {
     campaign(arguments.runs, &machine, &mut rows)?;
 
     let mut table = format!(
-        "{}\n\n| benchmark | measured | bar |\n|---|---|---|\n",
+        "{}\n\n| benchmark | measured | required |\n|---|---|---|\n",
         machine.described()
     );
     for row in rows {

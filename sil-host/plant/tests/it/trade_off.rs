@@ -14,7 +14,8 @@ use crate::documentation::{Entry, entries, number};
 
 /// Returns a panel of a figure of merit against the torque noise: value, lower and upper end for each entry.
 fn panel(title: &str, entries: &[Entry], value: impl Fn(&Entry) -> [f64; 3]) -> Panel {
-    let noise_mnm = |entry: &Entry| 1e3 * figure(entry, "torque, holding, 90 %, N·m");
+    let noise_mnm =
+        |entry: &Entry| 1e3 * figure(entry, "torque change, holding, 90th percentile, N·m a tick");
     let intervals = entries.iter().flat_map(|entry| {
         let (x, [_, low, high]) = (noise_mnm(entry), value(entry));
         [(x, low), (x, high), (f64::NAN, f64::NAN)]
@@ -63,8 +64,8 @@ fn documentation_draws_the_trade_off_as_measured() {
             ["successes", "runs", "lower_percent", "upper_percent"].map(|key| figure(entry, key));
         [100.0 * successes / runs, lower, upper]
     });
-    let error = panel("Error, 95 % (mm)", &entries, |entry| {
-        [1e3 * figure(entry, "error, 95 %, m"); 3]
+    let error = panel("Error, 95th percentile (mm)", &entries, |entry| {
+        [1e3 * figure(entry, "error, 95th percentile, m"); 3]
     });
     let chart = Chart {
         title: "Success and error against torque noise".into(),
