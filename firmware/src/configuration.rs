@@ -44,6 +44,15 @@ settings! {
         /// Protection of the torque stages' windings.
         winding: WindingSettings = WindingSettings::default();
     }
+    check Self::relations;
+}
+
+impl Converters {
+    /// The boards' drivers and checks take both encoders for parts of one type.
+    fn relations(&self) -> Result<(), OutOfRange> {
+        let [one, two] = self.encoders.map(|encoder| f64::from(encoder.bits));
+        range::check("bits", two, one, one).map_err(|error| error.at(1).inside("encoders"))
+    }
 }
 
 settings! {

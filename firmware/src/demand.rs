@@ -23,10 +23,10 @@ pub struct TorqueDemand<L: Law> {
 }
 
 impl<L: Law> TorqueDemand<L> {
-    /// Makes the demand of this configuration, with motion loops of the law that are faster by a factor.
+    /// Makes the demand of this configuration, with motion loops of the law faster by the factor `speed`.
     pub fn new(configuration: &Configuration<L>, speed: f32) -> Self {
         let settings = &configuration.settings;
-        let law = settings.law.sped_up(speed);
+        let law = settings.law.at_speed(speed);
         Self {
             law_state: law.initial_state(),
             recovery_state: RecoveryState::default(),

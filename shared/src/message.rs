@@ -1,5 +1,5 @@
 //! Requests and responses that a host and a board exchange as bytes, encoded by
-//! [`wire`](crate::wire). Each request gets one response.
+//! [`wire`](crate::wire). Each request gets one response, except `Alive` and `Torque`, which get none.
 //!
 //! The first request carries the configuration, so one image serves every scenario.
 
@@ -132,7 +132,8 @@ pub enum Response {
         /// 10⁹ of virtual time under an emulator.
         stopwatch_hz: u32,
     },
-    /// A number in the configuration is out of range.
+    /// The request is refused: a configuration with a number out of range, or that cannot be decoded, or that would
+    /// drive an arm after a probe has changed a register; or a probe while an arm is driven.
     Refused,
     /// The configuration comes from another build: its bytes may mean something else.
     OtherBuild {

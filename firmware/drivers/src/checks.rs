@@ -52,7 +52,7 @@ impl Checks {
 
     /// Takes over the temperatures of the windings from `others`.
     pub fn keep_heat_of(&mut self, others: &Self) {
-        self.heating = others.heating;
+        self.heating = others.heating.at_a_steps_start();
         self.verdict.is_hot = self.heating_model.is_some() && self.heating.is_hot();
     }
 

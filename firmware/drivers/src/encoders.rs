@@ -48,11 +48,6 @@ impl Diagnostics {
     pub fn is_healthy(self) -> bool {
         self.0 & 0x0f00 == 0x0100
     }
-
-    /// Automatic gain: 0 for the strongest field, 255 for the weakest.
-    pub fn gain(self) -> u8 {
-        self.0 as u8
-    }
 }
 
 /// Position in the exchanges with one encoder.

@@ -77,6 +77,16 @@ impl Heating {
         self.is_hot
     }
 
+    /// Returns the temperatures without the torques of the present step, whose scale may be another one.
+    #[must_use]
+    pub fn at_a_steps_start(&self) -> Self {
+        Self {
+            squares: [0.0; 2],
+            ticks: 0,
+            ..*self
+        }
+    }
+
     /// Records the torques of one tick.
     pub fn tick(&mut self, torques: [TorqueCounts; 2]) {
         for (sum, torque) in self.squares.iter_mut().zip(torques) {
@@ -125,6 +135,21 @@ mod tests {
 
     fn torques(torque_nm: [f32; 2]) -> [TorqueCounts; 2] {
         torque_nm.map(|it| TorqueCounts(SCALE.counts(it).0))
+    }
+
+    #[test]
+    fn a_session_without_protection_heats_nothing_in_the_next_one() {
+        let model = model();
+        let mut heating = Heating::default();
+        for _ in 0..600_000 {
+            heating.tick(torques([5.0, 5.0]));
+        }
+        let mut next = heating.at_a_steps_start();
+        for _ in 0..2 * model.ticks {
+            next.tick(torques([0.0; 2]));
+            next.step(&model);
+        }
+        assert_eq!(next.rises, [0.0; 2]);
     }
 
     /// Returns the time until a winding changes to hot or cold, s, if it is within a minute.

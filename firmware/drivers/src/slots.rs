@@ -51,8 +51,8 @@ impl<F: NorFlash> Slots<F> {
         Self { flash }
     }
 
-    /// Returns the flash.
-    pub fn flash_mut(&mut self) -> &mut F {
+    #[cfg(test)]
+    fn flash_mut(&mut self) -> &mut F {
         &mut self.flash
     }
 

@@ -16,7 +16,7 @@ pub const BAUD: u32 = 921_600;
 /// Number of received bytes that may wait.
 const RECEIVED: usize = 1024;
 
-/// Number of bytes that may wait to be sent.
+/// Length of the queue of bytes to be sent, one more than may wait.
 const TO_SEND: usize = 512;
 
 /// Largest number of bytes in one transfer.

@@ -301,7 +301,7 @@ fn decode<L: Law + DeserializeOwned>(configuration: &mut Option<Configuration<L>
     }
 }
 
-/// Counts broken messages; an intact one resets the count.
+/// Counts broken messages as lapses, and intact ones as good.
 fn note_message<D: BoardDrive, L: Law, M>(
     task: &mut ControlTask<D, L>,
     request: &Result<M, WireError>,

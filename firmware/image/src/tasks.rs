@@ -26,10 +26,10 @@ use crate::board::{Board, BoardDrive, Parts};
 use crate::stack;
 pub use crate::watch::Change;
 
-/// Number of answers that may wait for the link.
+/// Length of the queue of answers for the link, one more than may wait.
 pub const ANSWERS: usize = 4;
 
-/// Number of events that may wait for the log.
+/// Length of the queue of events for the log, one more than may wait.
 pub const EVENTS: usize = 8;
 
 /// How long a host that watches an arm may be silent, ms. It sends [`Request::Alive`] more often.

@@ -184,7 +184,8 @@ impl<I: IndependentWatchdog, W: WindowWatchdog> Watchdogs<I, W> {
             let mut hz = tick_hz;
             for _ in 0..RATE_STEPS {
                 hz *= factor;
-                if fits(&hz) {
+                // Told as a whole number.
+                if fits(&(hz as u32 as f32)) {
                     return hz as u32;
                 }
             }

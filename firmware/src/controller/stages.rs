@@ -180,7 +180,9 @@ impl<L: Law> Stages<L> {
         let drives = self.supervisor.drives();
         self.estimates.prepare(&mut self.command, drives);
         self.references.prepare(self.supervisor.state());
-        self.observed.last = self.command;
+        self.observed.torque_nm = self.command.torque_nm;
+        self.observed.rounding_nm = self.command.rounding_nm;
+        self.observed.saturated = self.command.saturated;
     }
 
     /// Takes the torque off and cancels a recovery in progress.

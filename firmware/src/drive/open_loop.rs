@@ -64,13 +64,19 @@ impl OpenLoop {
     #[inline(never)]
     pub fn tick(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
         let is_enabled = frame.inputs.contains(DigitalInputs::ENABLE) && self.fault.is_none();
-        if is_enabled {
-            let start = *self.armed_at.get_or_insert(frame.joints);
-            if self.has_moved_far(start, frame.joints) {
+        match self.armed_at {
+            _ if !is_enabled => self.release(),
+            Some(start) if self.has_moved_far(start, frame.joints) => {
                 self.latch(Fault::MovedTooFar);
             }
-        } else {
-            self.release();
+            // The controller, whose lapses would count this, does not run.
+            Some(_) if frame.inputs.contains(DigitalInputs::WINDING_HOT) => {
+                self.latch(Fault::WindingTooHot);
+            }
+            Some(_) => {}
+            // A missing reading shows no motion from it.
+            None if self.are_readable(frame.joints) => self.armed_at = Some(frame.joints),
+            None => {}
         }
         self.age = self.age.saturating_add(1);
         if self.age > self.lifetime {
@@ -102,11 +108,16 @@ impl OpenLoop {
         self.torques = [TorqueCounts(0); 2];
     }
 
+    fn are_readable(&self, readings: [EncoderCounts; 2]) -> bool {
+        let ([scale_1, scale_2], [reading_1, reading_2]) = (&self.encoders, readings);
+        scale_1.contains(reading_1) && scale_2.contains(reading_2)
+    }
+
     /// Returns whether a joint has turned too far; a missing reading counts as no motion.
     fn has_moved_far(&self, from: [EncoderCounts; 2], to: [EncoderCounts; 2]) -> bool {
         let moved = |scale: &EncoderScale, from: EncoderCounts, to: EncoderCounts| {
             let turned = scale.difference(from, to).unsigned_abs();
-            scale.contains(from) && scale.contains(to) && turned > scale.modulus() / FARTHEST
+            scale.contains(to) && turned > scale.modulus() / FARTHEST
         };
         let ([scale_1, scale_2], [from_1, from_2], [to_1, to_2]) = (&self.encoders, from, to);
         moved(scale_1, from_1, to_1) || moved(scale_2, from_2, to_2)
@@ -193,6 +204,27 @@ mod tests {
             let answer = open_loop.tick(&frame(2, start, DigitalInputs::ENABLE));
             assert_eq!(answer.latched_fault(), fault, "latched");
         }
+    }
+
+    #[test]
+    fn nothing_is_armed_on_a_missing_reading_from_which_no_motion_would_show() {
+        let mut open_loop = open_loop();
+        let answer = open_loop.tick(&frame(0, u32::MAX, DigitalInputs::ENABLE));
+        assert_eq!(answer.supervisor_state(), Some(SupervisorState::Idle));
+        open_loop.tick(&frame(1, 100, DigitalInputs::ENABLE));
+        let answer = open_loop.tick(&frame(2, 700, DigitalInputs::ENABLE));
+        assert_eq!(answer.latched_fault(), Some(Fault::MovedTooFar));
+    }
+
+    #[test]
+    fn a_hot_winding_takes_the_torque_off() {
+        let mut open_loop = open_loop();
+        open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
+        open_loop.request(REQUEST);
+        let inputs = DigitalInputs::ENABLE | DigitalInputs::WINDING_HOT;
+        let answer = open_loop.tick(&frame(1, 100, inputs));
+        assert_eq!(answer.latched_fault(), Some(Fault::WindingTooHot));
+        assert_eq!(answer.torques, [TorqueCounts(0); 2]);
     }
 
     #[test]

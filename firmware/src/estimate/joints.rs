@@ -112,7 +112,7 @@ impl JointEstimator {
             lag_counts_s2: Vector2::from(rad_per_count.map(|lsb| tick_s / rate_gain_per_s / lsb)),
             // One count beyond the limit allows for the rounding of two readings.
             jump_counts: rad_per_count
-                .map(|lsb| (settings.rate_limit_rad_s * tick_s / lsb) as i32 + 2),
+                .map(|lsb| ((settings.rate_limit_rad_s * tick_s / lsb) as i32).saturating_add(2)),
             rate_limit_rad_s: settings.rate_limit_rad_s,
             tick_s,
             angle_gain: 1.0 - pole * pole,
@@ -157,13 +157,11 @@ impl JointEstimator {
             self.bridge(acceleration_rad_s2, elapsed_ticks);
         }
         let [most_1, most_2] = self.most_counts;
-        let jumps = moved_1.abs() > most_1 || moved_2.abs() > most_2;
-        self.predicted_ticks = 0;
-        self.most_counts = [0; 2];
-        if jumps {
+        if moved_1.abs() > most_1 || moved_2.abs() > most_2 {
             self.start(readings);
             return Err(Restart::EncoderJump);
         }
+        self.forget_prediction();
         self.moved = moved_1 != 0 || moved_2 != 0;
         let [joint_1, joint_2] = &mut self.joints;
         let follow = |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32, twist_rad: f32| {
@@ -234,10 +232,16 @@ impl JointEstimator {
         }
     }
 
+    fn forget_prediction(&mut self) {
+        self.predicted_ticks = 0;
+        self.most_counts = [0; 2];
+    }
+
     /// Restarts both loops from these readings, at rest.
     fn start(&mut self, readings: &[EncoderCounts; 2]) {
         self.started = true;
         self.moved = true;
+        self.forget_prediction();
         let [scale_1, scale_2] = &self.scales;
         let [reading_1, reading_2] = *readings;
         let counts = [
@@ -391,6 +395,22 @@ mod tests {
                 assert!(rate < 0.1, "{tick}: {rate}");
             }
             estimator.predict(&still);
+        }
+    }
+
+    #[test]
+    fn the_fastest_joint_on_the_finest_encoder_at_the_lowest_rate_is_no_jump() {
+        let settings = JointEstimatorSettings {
+            rate_limit_rad_s: 1e4,
+            ..Default::default()
+        };
+        let scale = EncoderScale { bits: 24, ..SCALE };
+        let mut estimator = JointEstimator::new(&settings, [scale; 2], 10.0);
+        let (still, no_torque) = (JointMotion::zeros(), JointTorque::zeros());
+        for angle in [0.0, 1.0] {
+            let readings = [scale.reading(angle); 2];
+            let followed = estimator.correct(&readings, 1, &still, &no_torque);
+            assert_ne!(followed, Err(Restart::EncoderJump));
         }
     }
 

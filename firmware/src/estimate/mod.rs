@@ -25,7 +25,7 @@ pub mod response;
 use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderScale, LinearConverter, LinearScale};
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::{Arm, Pose, Slip};
+use painleve_shared::{Arm, JointTorque, Pose, Slip};
 
 use self::belt::{BeltEstimator, BeltSpeedSettings};
 use self::calibration::{CalibrationSettings, LengthCalibrator};
@@ -59,8 +59,12 @@ pub struct Observed {
     pub elapsed_ticks: u32,
     /// Whether torque was applied before the tick.
     pub drove: bool,
-    /// The command until the tick.
-    pub last: LastCommand,
+    /// Torque until the tick, N·m.
+    pub torque_nm: JointTorque<f32>,
+    /// Torque that rounding withheld from it, N·m.
+    pub rounding_nm: JointTorque<f32>,
+    /// Whether that torque was limited.
+    pub saturated: bool,
 }
 
 /// Settings of all estimators, and the scalings of their readings.
@@ -253,14 +257,14 @@ impl Estimators {
         }
         let friction = self.friction.estimate();
         self.belt.update(model.tip_velocity_m_s.x, Some(friction));
-        let (last, p_per_kg) = (&observed.last, contact.p_per_kg);
+        let p_per_kg = contact.p_per_kg;
         let slides = p_per_kg > 0.0 && !friction.sticks;
         let mut completes_block = false;
-        if is_informative && slides && !last.saturated && self.response.is_enabled() {
+        if is_informative && slides && !observed.saturated && self.response.is_enabled() {
             let slope = &model.free_slope_per_kg_m;
             let reading = ForceReading {
                 normal_force_n: force_n.y,
-                withheld_n: last.rounding_nm.vector().dot(slope) / p_per_kg,
+                withheld_n: observed.rounding_nm.vector().dot(slope) / p_per_kg,
             };
             completes_block = self.response.update(&reading);
         } else {
@@ -294,8 +298,8 @@ impl Estimators {
             self.decision.is_certain() && self.is_in_range(force_n) && observed.drove;
         if is_informative {
             let elapsed_s = observed.elapsed_ticks as f32 * self.tick_s;
-            let torque_nm = &observed.last.torque_nm;
-            self.disturbance.add(torque_nm, force_n, elapsed_s);
+            self.disturbance
+                .add(&observed.torque_nm, force_n, elapsed_s);
         } else {
             self.disturbance.pause();
         }

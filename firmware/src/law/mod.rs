@@ -66,10 +66,10 @@ pub trait Law: Clone + Debug + Default + SettingValue {
         true
     }
 
-    /// Returns the law with motion loops that are faster by a factor, for joints with friction, or slower, for contact
-    /// that is detected from the encoders. A law without such loops stays as it is.
+    /// Returns the law with motion loops faster by a factor; on elastic gears it is less than 1. A law without such loops
+    /// stays as it is.
     #[must_use]
-    fn sped_up(&self, factor: f32) -> Self {
+    fn at_speed(&self, factor: f32) -> Self {
         let _ = factor;
         self.clone()
     }
@@ -159,10 +159,10 @@ macro_rules! law_set {
                 }
             }
 
-            fn sped_up(&self, factor: f32) -> Self {
+            fn at_speed(&self, factor: f32) -> Self {
                 match self {
                     Self::Off => Self::Off,
-                    $(Self::$law(law) => Self::$law($crate::law::Law::sped_up(law, factor)),)*
+                    $(Self::$law(law) => Self::$law($crate::law::Law::at_speed(law, factor)),)*
                 }
             }
 

@@ -89,7 +89,9 @@ impl References {
             0.0
         };
         let tip_t_m = model.tip_m.x;
-        if phase.arms {
+        let drives = phase.drives();
+        // While the drive is off, the edges are searched for the posture in which it would be armed.
+        if phase.arms || !drives {
             self.posture = Posture::of(&model.theta_rad);
         } else if let Some(posture) = landing {
             self.posture = posture;
@@ -114,7 +116,6 @@ impl References {
         if starts || phase.starts_tracking {
             self.governor.restart(tip_t_m);
         }
-        let drives = phase.drives();
         Target {
             reference: if drives {
                 self.governor.govern(&wanted)

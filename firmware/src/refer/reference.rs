@@ -16,34 +16,34 @@ pub const MAXIMUM_SEGMENTS: usize = 16;
 const MOST_ENDS: usize = 3;
 
 settings! {
-    /// One piece of the reference z_t*(t).
+    /// One piece of the reference z_t*(t). The longest duration is still countable at the highest control rate.
     #[derive(Copy)]
     pub enum Segment {
         /// Stand still.
         "hold" => Hold {
             /// Duration of the pause.
-            duration_s: f32, 0.0..=1e5, "s";
+            duration_s: f32, 0.0..=1e4, "s";
         },
         /// Jump to the target and stand there.
         "step" => Step {
             /// Target z_t; without the governor, within the arm's reach on the belt.
             target_m: f32, -20.0..=20.0, "m";
             /// Duration of the pause at the target.
-            duration_s: f32, 0.0..=1e5, "s";
+            duration_s: f32, 0.0..=1e4, "s";
         },
         /// Move to the target at constant speed.
         "ramp" => Ramp {
             /// Target z_t; without the governor, within the arm's reach on the belt.
             target_m: f32, -20.0..=20.0, "m";
             /// Duration of the motion.
-            duration_s: f32, 0.0..=1e5, "s";
+            duration_s: f32, 0.0..=1e4, "s";
         },
         /// Move with minimum jerk from rest to rest, 10 s³ − 15 s⁴ + 6 s⁵ (Flash and Hogan 1985).
         "minimum-jerk" => MinimumJerk {
             /// Target z_t; without the governor, within the arm's reach on the belt.
             target_m: f32, -20.0..=20.0, "m";
             /// Duration of the motion.
-            duration_s: f32, 0.0..=1e5, "s";
+            duration_s: f32, 0.0..=1e4, "s";
         },
     }
 }

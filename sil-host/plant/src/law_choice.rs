@@ -99,7 +99,7 @@ trait AnyLaw: Debug + Send + Sync + erased_serde::Serialize {
     fn is_equal(&self, other: &dyn Any) -> bool;
     fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused>;
     fn is_on(&self) -> bool;
-    fn sped_up(&self, factor: f32) -> LawChoice;
+    fn at_speed(&self, factor: f32) -> LawChoice;
     fn initial_state(&self) -> LawChoiceState;
     fn reset(&self, state: &mut LawChoiceState, input: &LawInput<'_>);
     fn tick(&self, state: &mut LawChoiceState, input: &LawInput<'_>) -> LawOutput;
@@ -126,8 +126,8 @@ impl<L: ScenarioLaws> AnyLaw for L {
         Law::is_on(self)
     }
 
-    fn sped_up(&self, factor: f32) -> LawChoice {
-        LawChoice::new(Law::sped_up(self, factor))
+    fn at_speed(&self, factor: f32) -> LawChoice {
+        LawChoice::new(Law::at_speed(self, factor))
     }
 
     fn initial_state(&self) -> LawChoiceState {
@@ -204,8 +204,8 @@ impl Law for LawChoice {
         self.0.is_on()
     }
 
-    fn sped_up(&self, factor: f32) -> Self {
-        self.0.sped_up(factor)
+    fn at_speed(&self, factor: f32) -> Self {
+        self.0.at_speed(factor)
     }
 
     fn initial_state(&self) -> LawChoiceState {
@@ -276,8 +276,8 @@ mod tests {
         assert_ne!(choice, LawChoice::new(hybrid(9.0)));
         assert_ne!(choice, LawChoice::new(HybridSettings::default()));
         assert_eq!(choice.name(), "hybrid");
-        let faster = LawChoice::new(Law::sped_up(&hybrid(8.0), 2.0));
-        assert_eq!(Law::sped_up(&choice, 2.0), faster);
+        let faster = LawChoice::new(Law::at_speed(&hybrid(8.0), 2.0));
+        assert_eq!(Law::at_speed(&choice, 2.0), faster);
         assert_ne!(faster, choice);
         assert_eq!(LawChoice::default().of_set(), Some(&LawSettings::default()));
     }

@@ -2,7 +2,8 @@
 
 #![allow(unsafe_code)] // the reset of a peripheral
 
-use stm32f4xx_hal::pac::TIM2;
+use cortex_m::peripheral::NVIC;
+use stm32f4xx_hal::pac::{Interrupt, TIM2};
 use stm32f4xx_hal::rcc::Reset;
 
 /// Starts the timer's interrupt with a period of `counts` of its clock.
@@ -16,6 +17,8 @@ pub fn start(timer: &TIM2, counts: f32) {
     timer.cr1().write(|w| w.cen().clear_bit());
     timer.arr().write(|w| w.arr().set(counts as u32 - 1));
     acknowledge(timer);
+    // One of the former period may wait since the interrupt was masked.
+    NVIC::unpend(Interrupt::TIM2);
     timer.dier().write(|w| w.uie().set_bit());
     timer.cr1().write(|w| w.cen().set_bit());
 }

@@ -1,6 +1,8 @@
 //! TIM2, the control timer.
 
-use crate::pac::TIM2;
+use cortex_m::peripheral::NVIC;
+
+use crate::pac::{Interrupt, TIM2};
 
 /// Restarts the timer with an interrupt after every `counts` of its clock; the first comes a period from now.
 pub fn restart(timer: &TIM2, counts: f32) {
@@ -10,6 +12,8 @@ pub fn restart(timer: &TIM2, counts: f32) {
     // Setting the count back raises the interrupt's flag, too.
     timer.egr().write(|w| w.ug().set_bit());
     acknowledge(timer);
+    // One of the former period may wait since the interrupt was masked.
+    NVIC::unpend(Interrupt::TIM2);
     timer.dier().write(|w| w.uie().set_bit());
     timer.cr1().write(|w| w.cen().set_bit());
 }

@@ -101,7 +101,7 @@ pub struct HybridState {
 impl Law for HybridSettings {
     type State = HybridState;
 
-    fn sped_up(&self, factor: f32) -> Self {
+    fn at_speed(&self, factor: f32) -> Self {
         let square = factor * factor;
         Self {
             position_gain_per_s2: square * self.position_gain_per_s2,

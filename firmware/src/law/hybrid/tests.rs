@@ -50,7 +50,7 @@ proptest! {
 #[test]
 fn a_law_twice_as_fast_has_poles_twice_as_far_out() {
     let law = HybridSettings::default();
-    let faster = law.sped_up(2.0);
+    let faster = law.at_speed(2.0);
     // x³ + K'_D x² + K'_P x + K_I at −s, and at −2 s.
     let polynomial = |law: &HybridSettings, rate: f32| {
         ((law.velocity_gain_per_s - rate) * rate - law.position_gain_per_s2) * rate
@@ -62,7 +62,7 @@ fn a_law_twice_as_fast_has_poles_twice_as_far_out() {
             8.0 * polynomial(&law, rate)
         );
     }
-    assert_eq!(law.sped_up(1.0), law);
+    assert_eq!(law.at_speed(1.0), law);
 }
 
 const FRICTION: f32 = 0.6;

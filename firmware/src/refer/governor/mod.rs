@@ -12,6 +12,8 @@
 mod search;
 mod settings;
 
+use core::ops::ControlFlow;
+
 use painleve_shared::{Arm, Posture, Real};
 
 use self::search::Search;
@@ -74,9 +76,11 @@ pub struct EdgeGovernor {
     lower_m: f32,
     upper_m: f32,
     search: Option<Search>,
-    /// Least ratio p/Q22 that the present search requires beyond the setting.
+    /// Posture for which the present search looks.
+    posture: Posture,
+    /// Least ratio p/Q22 that it requires beyond the setting.
     asked_p_ratio: f32,
-    /// Whether both edges have been found since that requirement was set.
+    /// Whether both edges have been found for these.
     is_fresh: bool,
     /// The last reference followed: position (m) and velocity (m/s).
     position_m: f32,
@@ -102,6 +106,7 @@ impl EdgeGovernor {
             lower_m: -USABLE_REACH * reach_m,
             upper_m: USABLE_REACH * reach_m,
             search: None,
+            posture: Posture::ElbowDown,
             asked_p_ratio: 0.0,
             is_fresh: false,
             position_m: 0.0,
@@ -137,7 +142,7 @@ impl EdgeGovernor {
     }
 
     /// Continues the search for the edges around a tip at `tip_t_m` (m). Where a thrown tip may land,
-    /// p/Q22 is to be `landing_p_ratio` at least; a change of it makes the edges unknown.
+    /// p/Q22 is to be `landing_p_ratio` at least; a change of it, or of the posture, makes the edges unknown.
     pub fn search(
         &mut self,
         arm: &Arm<f32>,
@@ -146,14 +151,18 @@ impl EdgeGovernor {
         friction: &FrictionEstimate,
         landing_p_ratio: f32,
     ) {
-        if landing_p_ratio != self.asked_p_ratio {
+        let reach = USABLE_REACH * arm.reach_on_belt_m();
+        if posture != self.posture {
+            (self.lower_m, self.upper_m) = (-reach, reach);
+        }
+        if posture != self.posture || landing_p_ratio != self.asked_p_ratio {
+            self.posture = posture;
             self.asked_p_ratio = landing_p_ratio;
             self.search = None;
             self.is_fresh = false;
         }
         let search = self.search.unwrap_or(Search::start(1.0, tip_t_m));
         let direction = search.direction;
-        let reach = USABLE_REACH * arm.reach_on_belt_m();
         let point_m = search.point(2.0 * reach / STEPS_OVER_REACH, reach);
         let worst_friction = friction.coefficient + self.settings.deviations * friction.deviation();
         let least_p_ratio = self.settings.p_ratio.at_least(landing_p_ratio);
@@ -170,16 +179,18 @@ impl EdgeGovernor {
             let least = (least_p_ratio * normal).at_least(self.settings.p_per_kg * factor);
             (normal - worst_friction * against - least) / factor
         });
-        let search = search.next(point_m, excess_per_kg, reach);
-        self.search = Some(search);
-        if !search.is_over() {
-            return;
-        }
+        let edge_m = match search.next(point_m, excess_per_kg, reach) {
+            ControlFlow::Continue(search) => {
+                self.search = Some(search);
+                return;
+            }
+            ControlFlow::Break(edge_m) => edge_m,
+        };
         if direction > 0.0 {
-            self.upper_m = search.inside_m;
+            self.upper_m = edge_m;
         } else {
             // A stretch shorter than both margins shrinks to a point.
-            self.lower_m = search.inside_m.at_most(self.upper_m);
+            self.lower_m = edge_m.at_most(self.upper_m);
             self.is_fresh = true;
         }
         self.search = Some(Search::start(-direction, tip_t_m));
@@ -195,14 +206,17 @@ impl EdgeGovernor {
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
         let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / braking_m_s2;
-        let jumps = (wanted.position_m - self.position_m).abs() > JUMP_M;
+        // A reference that moves or is about to is at most a step of its own away.
+        let (step_m, ahead_m) = (speed * tick_s, wanted.position_m - self.position_m);
+        let on_its_way_m = ahead_m.limited(step_m.at_most(0.0), step_m.at_least(0.0));
+        let away_m = (ahead_m - on_its_way_m).abs();
         self.at_edge = outside(wanted.position_m);
         self.follows = !outside(stop_m)
             && !self.at_edge
             && (if self.follows {
-                !jumps
+                away_m < JUMP_M
             } else {
-                (wanted.position_m - self.position_m).abs() < CAUGHT_M
+                away_m < CAUGHT_M
             });
         if self.follows {
             self.position_m = wanted.position_m;

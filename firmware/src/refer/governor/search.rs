@@ -1,5 +1,7 @@
 //! Searches for one end of the admissible stretch, one point of the belt at a time.
 
+use core::ops::ControlFlow;
+
 use painleve_shared::Real;
 
 /// Largest number of inadmissible points that the search tries beside the tip, on both sides together. A stretch farther
@@ -9,7 +11,7 @@ const MOST_REFUSED: u32 = 8;
 const HALVINGS: u32 = 10;
 
 /// Phase of the search.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 enum Stage {
     /// Searches from the tip to either side for an admissible point.
     Entering {
@@ -23,8 +25,6 @@ enum Stage {
     Marching,
     /// Bisects between an admissible and an inadmissible point.
     Halving { beyond_m: f32, times: u32 },
-    /// Done: the edge is the inner point.
-    Found,
 }
 
 /// The search for one end of the admissible stretch, with its progress.
@@ -52,15 +52,9 @@ impl Search {
         }
     }
 
-    /// Returns whether the edge, the inner point, has been found.
-    pub(super) fn is_over(&self) -> bool {
-        self.stage == Stage::Found
-    }
-
     /// Returns the next point to evaluate, m.
     pub(super) fn point(&self, step_m: f32, reach_m: f32) -> f32 {
         let point = match self.stage {
-            Stage::Found => self.inside_m,
             // Alternate between the side towards the middle of the belt and the other side.
             Stage::Entering { refused, .. } => {
                 let away_m = step_m * refused.div_ceil(2) as f32;
@@ -74,59 +68,62 @@ impl Search {
         point.within(reach_m)
     }
 
-    /// Returns the search after the point has been evaluated.
-    pub(super) fn next(self, point_m: f32, excess_per_kg: f32, reach_m: f32) -> Self {
-        let (inside_m, stage) = match (self.stage, excess_per_kg >= 0.0) {
-            (Stage::Entering { .. }, true) => (point_m, Stage::Marching),
-            (
-                Stage::Entering {
-                    refused,
-                    best_m,
-                    most_per_kg,
-                },
-                false,
-            ) => {
+    /// Returns the search after the point has been evaluated, or the edge (m) once it is found.
+    pub(super) fn next(
+        self,
+        point_m: f32,
+        excess_per_kg: f32,
+        reach_m: f32,
+    ) -> ControlFlow<f32, Self> {
+        let is_inside = excess_per_kg >= 0.0;
+        let (inside_m, stage) = match self.stage {
+            Stage::Entering { .. } if is_inside => (point_m, Stage::Marching),
+            Stage::Entering {
+                refused,
+                best_m,
+                most_per_kg,
+            } => {
                 let is_best = excess_per_kg > most_per_kg;
                 let best_m = if is_best { point_m } else { best_m };
+                if refused >= MOST_REFUSED {
+                    // No point is admissible: the best one, from where the next search goes on.
+                    return ControlFlow::Break(best_m);
+                }
                 let entering = Stage::Entering {
                     refused: refused + 1,
                     best_m,
                     most_per_kg: excess_per_kg.at_least(most_per_kg),
                 };
-                if refused < MOST_REFUSED {
-                    (self.inside_m, entering)
-                } else {
-                    // No point is admissible: the best one, from where the next search goes on.
-                    (best_m, Stage::Found)
-                }
+                (self.inside_m, entering)
             }
-            (Stage::Marching, true) if point_m.abs() >= reach_m => (point_m, Stage::Found),
-            (Stage::Marching, true) => (point_m, Stage::Marching),
-            (Stage::Marching, false) => {
+            Stage::Marching if is_inside && point_m.abs() >= reach_m => {
+                return ControlFlow::Break(point_m);
+            }
+            Stage::Marching if is_inside => (point_m, Stage::Marching),
+            Stage::Marching => {
                 let halving = Stage::Halving {
                     beyond_m: point_m,
                     times: 0,
                 };
                 (self.inside_m, halving)
             }
-            (Stage::Halving { times, .. }, _) if times >= HALVINGS => (self.inside_m, Stage::Found),
-            (Stage::Halving { beyond_m, times }, true) => {
-                let times = times + 1;
-                (point_m, Stage::Halving { beyond_m, times })
+            Stage::Halving { times, .. } if times >= HALVINGS => {
+                return ControlFlow::Break(self.inside_m);
             }
-            (Stage::Halving { times, .. }, false) => {
-                let halving = Stage::Halving {
-                    beyond_m: point_m,
-                    times: times + 1,
+            Stage::Halving { beyond_m, times } => {
+                let (inside_m, beyond_m) = if is_inside {
+                    (point_m, beyond_m)
+                } else {
+                    (self.inside_m, point_m)
                 };
-                (self.inside_m, halving)
+                let times = times + 1;
+                (inside_m, Stage::Halving { beyond_m, times })
             }
-            (Stage::Found, _) => (self.inside_m, Stage::Found),
         };
-        Self {
+        ControlFlow::Continue(Self {
             inside_m,
             stage,
             ..self
-        }
+        })
     }
 }

@@ -213,6 +213,41 @@ proptest! {
 }
 
 #[test]
+fn a_moving_reference_is_caught_without_a_step_at_any_rate() {
+    for tick_s in [1e-3, 1e-2] {
+        let mut governor = with(
+            &GovernorSettings::default(),
+            tick_s,
+            &JointErrors::default(),
+        );
+        governor.restart(-0.02);
+        let mut last = governor.govern(&TipReference::at_rest(-0.02));
+        let wanted = ramp(0.0, 0.25, 0.15);
+        for tick in 0..(0.5 / tick_s) as u32 {
+            let reference = governor.govern(&wanted(tick as f32 * tick_s));
+            let step_m = (reference.position_m - last.position_m).abs();
+            let fastest_m_s = reference.velocity_m_s.abs().max(last.velocity_m_s.abs());
+            assert!(
+                step_m < fastest_m_s * tick_s + CAUGHT_M + 1e-7,
+                "{tick}: {step_m}"
+            );
+            last = reference;
+        }
+        assert!(governor.follows, "{tick_s}");
+    }
+}
+
+#[test]
+fn edges_of_the_other_posture_are_forgotten() {
+    let friction = known(0.6, Slip::Positive);
+    let mut governor = searched(0.0, Posture::ElbowDown, &friction);
+    governor.search(&arm(), Posture::ElbowUp, 0.0, &friction, 0.0);
+    assert_eq!(governor.fresh_edges_m(), None);
+    let (_, upper_m) = governor.edges_m();
+    assert!(upper_m > 0.183, "{upper_m}");
+}
+
+#[test]
 fn a_reference_that_was_reached_is_followed_however_fast() {
     let mut governor = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
     governor.restart(0.0);
