@@ -21,7 +21,7 @@ use crate::under_test::{build_program, program};
 
 #[derive(Debug, Args)]
 pub struct MeasureArguments {
-    /// Files (`robustness`), entries (`robustness.rigid`), or ticks, bound, bench; all by default.
+    /// Files (`robustness`), entries (`robustness.rigid`), or ticks, bound, bench, figures; all by default.
     names: Vec<String>,
     /// A twentieth of the runs of every campaign, for a first look: prints the results and writes nothing.
     #[arg(long)]
@@ -61,6 +61,14 @@ const BLOCKS: [(&str, &[&str]); 3] = [
         ],
     ),
     ("bench", &["xtask", "bench"]),
+];
+
+/// The commands that draw the pages' figures of results, named `figures`.
+const FIGURES: [&str; 4] = [
+    "run edge --no-record --plot docs/images/edge.svg",
+    "run capture --no-record --plot docs/images/capture.svg",
+    "study sliding-range --mu 0.4,0.6,0.8 --reference minimum-jerk:3,ramp:2 --svg docs/images/sliding-range.svg",
+    "study lift-off --seed 7001508 --runs 1200 --svg docs/images/lift-off.svg",
 ];
 
 /// A file of entries.
@@ -141,6 +149,12 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
         "painleve-plant",
         "documentation",
     ];
+    if is_named("figures") {
+        for figure in FIGURES {
+            let arguments: Vec<&str> = figure.split(' ').collect();
+            run_with(&program().to_string_lossy(), &arguments, &[])?;
+        }
+    }
     let blocks = BLOCKS
         .iter()
         .filter(|(name, _)| is_named(name))
@@ -178,6 +192,7 @@ fn read_files() -> Result<Vec<Measured>, ChoreError> {
 
 fn check_names(names: &[String], files: &[Measured]) -> Result<(), ChoreError> {
     let mut known: Vec<String> = BLOCKS.iter().map(|(name, _)| (*name).into()).collect();
+    known.push("figures".into());
     for file in files {
         for place in 0..file.entries()?.len() {
             known.push(format!(

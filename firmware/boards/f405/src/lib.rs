@@ -27,8 +27,8 @@ pub mod uart_dma;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use defmt_rtt as _;
-use painleve_drivers::encoders::EncoderDriver;
-use painleve_drivers::force_cell::ForceCellDriver;
+use painleve_drivers::encoders::{self, EncoderDriver};
+use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_drivers::front_end::InputLevels;
 use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
@@ -70,6 +70,8 @@ const START_LIMIT_S: f32 = 0.5;
 /// divided.
 const ENCODER_BUS_HZ: u32 = 5_250_000;
 const FORCE_BUS_HZ: u32 = 1_312_500;
+const _: () = assert!(ENCODER_BUS_HZ <= encoders::FASTEST_HZ);
+const _: () = assert!(FORCE_BUS_HZ <= force_cell::FASTEST_HZ);
 
 /// What the memory may be used for (`memory.x`).
 const REGIONS: [Region; 5] = [

@@ -22,8 +22,8 @@
 pub mod safety;
 
 use defmt_rtt as _;
-use painleve_drivers::encoders::EncoderDriver;
-use painleve_drivers::force_cell::ForceCellDriver;
+use painleve_drivers::encoders::{self, EncoderDriver};
+use painleve_drivers::force_cell::{self, ForceCellDriver};
 use painleve_drivers::front_end::InputLevels;
 use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
@@ -245,10 +245,17 @@ fn start_clocks(rcc: &pac::RCC) {
     let _ = rcc.apb2enr().read();
 }
 
+const fn bus_hz(divider: u8) -> u32 {
+    CORE_HZ >> (divider + 1)
+}
+
+const _: () = assert!(bus_hz(ENCODER_DIVIDER) <= encoders::FASTEST_HZ);
+const _: () = assert!(bus_hz(FORCE_DIVIDER) <= force_cell::FASTEST_HZ);
+
 fn timing(word: Word, divider: u8) -> BusTiming {
     BusTiming {
         core_hz: CORE_HZ,
-        bus_hz: CORE_HZ >> (divider + 1),
+        bus_hz: bus_hz(divider),
         word_bits: word.bits(),
     }
 }
