@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use painleve_shared::range::OutOfRange;
+use painleve_shared::settings::Field;
 
 use super::built_in;
 use super::words::{TomlError, in_words, known_names};
@@ -85,8 +86,13 @@ pub enum ScenarioError {
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The key is unknown or its value has the wrong type.
-    #[error("{}", in_words(&.0.to_string()))]
-    Value(erased_serde::Error),
+    #[error("{}", in_words(&source.to_string(), setting.as_ref()))]
+    Value {
+        /// What the deserializer says.
+        source: erased_serde::Error,
+        /// The setting with its range, if there is one with this key.
+        setting: Option<Field>,
+    },
     /// The scenario cannot be written as a table.
     #[error(transparent)]
     Table(#[from] toml::ser::Error),

@@ -178,7 +178,17 @@ mod tests {
             ("contact=rigid", "expected a table of keys"),
             (
                 "run.tick_hz=fast",
-                "expected a whole number from 0 to 4294967295, not \"fast\"",
+                "expected a whole number from 10 to 100000, not \"fast\"",
+            ),
+            ("run.tick_hz=1e9", "from 10 to 100000, not 1000000000.0"),
+            (
+                "converters.encoder.bits=8.5",
+                "a whole number from 8 to 24, not 8.5",
+            ),
+            ("arm.link_length_m=[1,2,3]", "a list of 2 items, not 3"),
+            (
+                "arm.link_length_m=[1,\"x\"]",
+                "a number from 0.01 to 10, not \"x\"",
             ),
             (
                 "run.seed=18446744073709551615",
@@ -229,7 +239,7 @@ mod tests {
         );
         let message = message(&["controller.belt.given_m_s=fast"]);
         assert!(
-            message.ends_with("given_m_s: expected a number, not \"fast\""),
+            message.ends_with("given_m_s: expected a number from -100 to 100, not \"fast\""),
             "{message}"
         );
     }

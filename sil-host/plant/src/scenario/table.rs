@@ -5,7 +5,7 @@ use toml::{Table, Value};
 
 use super::error::{KeyError, ScenarioError};
 use super::words::TomlError;
-use super::{Scenario, initial_key, reference_file};
+use super::{Scenario, describe, initial_key, reference_file};
 
 /// Reads a table from TOML text; messages name its origin.
 pub(super) fn parse(origin: &str, text: &str) -> Result<Table, ScenarioError> {
@@ -30,10 +30,18 @@ pub(super) fn from_table(
     let source = Deserializer::new(Value::Table(table), &mut track);
     let scenario: Result<Scenario, _> =
         erased_serde::deserialize(&mut <dyn erased_serde::Deserializer<'_>>::erase(source));
-    let scenario = scenario.map_err(|error| ScenarioError::Key {
-        origin: origin.map(str::to_owned),
-        key: track.path().to_string(),
-        source: KeyError::Value(error),
+    let scenario = scenario.map_err(|source| {
+        let key = track.path().to_string();
+        let parts: Vec<&str> = key
+            .split(['.', '[', ']'])
+            .filter(|it| !it.is_empty())
+            .collect();
+        let setting = describe::setting(&parts);
+        ScenarioError::Key {
+            origin: origin.map(str::to_owned),
+            source: KeyError::Value { source, setting },
+            key,
+        }
     })?;
     initial_key::check(&scenario.initial).map_err(|(key, source)| ScenarioError::Key {
         origin: origin.map(str::to_owned),

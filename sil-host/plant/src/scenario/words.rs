@@ -1,9 +1,13 @@
 //! What the parsers of TOML and serde say, in the words of all other messages: what is expected, and what is given
 //! instead, without names of Rust's types.
 
+use painleve_shared::settings::{Field, Shape};
+
+use super::describe::interval;
+
 /// What is wrong with a TOML text, and in which line.
 #[derive(Debug, thiserror::Error)]
-#[error("{}{}", .line.map_or(String::new(), |line| format!("line {line}: ")), in_words(source.message()))]
+#[error("{}{}", .line.map_or(String::new(), |line| format!("line {line}: ")), in_words(source.message(), None))]
 pub struct TomlError {
     line: Option<usize>,
     source: toml::de::Error,
@@ -36,8 +40,8 @@ pub fn known_names<N: AsRef<str>>(unknown: &str, known: &[N]) -> String {
     format!("{meant}known: {}", names.join(", "))
 }
 
-/// Returns a message of serde or of the TOML parser in our words, on one line.
-pub(super) fn in_words(message: &str) -> String {
+/// Returns a message of serde or of the TOML parser in our words, on one line, with what is allowed for the setting.
+pub(super) fn in_words(message: &str, setting: Option<&Field>) -> String {
     // The parser repeats the keys in last lines.
     let lines = message.trim().lines().map(str::trim);
     let lines: Vec<&str> = lines
@@ -62,26 +66,23 @@ pub(super) fn in_words(message: &str) -> String {
         return "matches none of its kinds".into();
     }
     let mismatch = ["invalid type: ", "invalid value: ", "invalid length "];
-    let mismatch = mismatch.into_iter().find_map(|start| {
-        let (given, expected) = after(start)?.rsplit_once(", expected ")?;
-        Some((start, given, expected))
-    });
+    let mismatch = mismatch
+        .into_iter()
+        .find_map(|start| after(start)?.rsplit_once(", expected "));
     match mismatch {
-        Some(("invalid length ", given, "fewer elements in array")) => {
-            format!("expected fewer items than {given}")
-        }
-        Some(("invalid length ", given, expected)) => {
-            format!("expected {}, not {given}", of_type(expected))
-        }
-        Some((_, given, expected)) => {
-            format!("expected {}, not {}", of_type(expected), value(given))
+        Some((given, expected)) => {
+            format!(
+                "expected {}, not {}",
+                of_type(expected, setting),
+                value(given)
+            )
         }
         None => message,
     }
 }
 
 /// Returns the expected type in words.
-fn of_type(expected: &str) -> String {
+fn of_type(expected: &str, setting: Option<&Field>) -> String {
     // A type's name follows these.
     for (kind, meaning) in [
         ("struct ", "a table of keys"),
@@ -93,9 +94,19 @@ fn of_type(expected: &str) -> String {
             return meaning.into();
         }
     }
+    match setting.map(|setting| setting.shape) {
+        Some(Shape::Array { length, .. }) => return format!("a list of {length} items"),
+        Some(Shape::List { maximum_length, .. }) => {
+            return format!("a list of up to {maximum_length} items");
+        }
+        _ => {}
+    }
+    let range = setting.and_then(|setting| setting.range);
+    let within = range.map_or(String::new(), |range| format!(" from {}", interval(&range)));
     match expected {
-        "f32" | "f64" => "a number".into(),
-        "i32" | "i64" => "a whole number".into(),
+        "f32" | "f64" => format!("a number{within}"),
+        "i32" | "i64" => format!("a whole number{within}"),
+        "u8" | "u16" | "u32" | "u64" if range.is_some() => format!("a whole number{within}"),
         "u8" => up_to(u8::MAX.into()),
         "u16" => up_to(u16::MAX.into()),
         "u32" => up_to(u32::MAX.into()),
@@ -104,10 +115,7 @@ fn of_type(expected: &str) -> String {
         "a boolean" => "true or false".into(),
         "a string" | "string only" => "a text".into(),
         "a sequence" => "a list".into(),
-        other => match other.strip_prefix("an array of length ") {
-            Some(length) => format!("a list of {length} items"),
-            None => other.into(),
-        },
+        other => other.into(),
     }
 }
 
@@ -160,14 +168,6 @@ mod tests {
                 "expected a whole number from 0 to 4294967295, not -1",
             ),
             (
-                "invalid length 1, expected an array of length 2",
-                "expected a list of 2 items, not 1",
-            ),
-            (
-                "invalid length 3, expected fewer elements in array",
-                "expected fewer items than 3",
-            ),
-            (
                 "invalid type: floating point `0.5`, expected a boolean",
                 "expected true or false, not 0.5",
             ),
@@ -176,7 +176,7 @@ mod tests {
                 "unclosed table, expected ']'",
             ),
         ] {
-            assert_eq!(in_words(theirs), ours);
+            assert_eq!(in_words(theirs, None), ours);
         }
     }
 }

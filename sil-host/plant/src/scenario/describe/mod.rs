@@ -63,7 +63,7 @@ fn allowed(field: &Field) -> String {
     text.trim_start_matches(", ").into()
 }
 
-fn interval(range: &Range) -> String {
+pub(super) fn interval(range: &Range) -> String {
     format!("{} to {}", bound(range.minimum), bound(range.maximum))
 }
 
@@ -155,39 +155,65 @@ pub(super) fn chosen(path: &[&str], text: String) -> Value {
     Value::String(text)
 }
 
-/// Returns the kinds that the value at `path` may have.
-fn shapes(path: &[&str]) -> Vec<Shape> {
-    path.iter()
-        .fold(vec![Shape::Group(Scenario::FIELDS)], |shapes, part| {
-            let parts = shapes.into_iter().flat_map(|shape| inside(shape, part));
-            parts.collect()
-        })
+/// Returns the setting at `path`, which may be an item of one, unless several variants of a choice have one there.
+pub(super) fn setting(path: &[&str]) -> Option<Field> {
+    let [setting] = fields(path).try_into().ok()?;
+    let shape = match setting.shape.resolved() {
+        Shape::Optional(inner) => *inner,
+        known => known,
+    };
+    Some(Field { shape, ..setting })
 }
 
-/// Returns the kinds that a value's part may have: several if variants of a choice share its name.
-fn inside(shape: Shape, part: &str) -> Vec<Shape> {
-    match shape.resolved() {
+/// Returns the kinds that the value at `path` may have.
+fn shapes(path: &[&str]) -> Vec<Shape> {
+    fields(path).iter().map(|field| field.shape).collect()
+}
+
+/// Returns the settings that the value at `path` may be, with the kind of that value.
+fn fields(path: &[&str]) -> Vec<Field> {
+    let root = Field {
+        key: "",
+        meaning: "",
+        unit: "",
+        range: None,
+        shape: Shape::Group(Scenario::FIELDS),
+    };
+    path.iter().fold(vec![root], |fields, part| {
+        let parts = fields.into_iter().flat_map(|field| inside(field, part));
+        parts.collect()
+    })
+}
+
+/// Returns what a value's part may be: several if variants of a choice share its name.
+fn inside(field: Field, part: &str) -> Vec<Field> {
+    let with = |shape| Field { shape, ..field };
+    match field.shape.resolved() {
         Shape::Group(fields) => {
             let named = fields.iter().filter(|field| field.key == part);
-            named.map(|field| field.shape).collect()
+            named.copied().collect()
         }
-        Shape::Optional(inner) => inside(*inner, part),
+        Shape::Optional(inner) => inside(with(*inner), part),
         Shape::Array { item, .. } | Shape::List { item, .. } => {
             let is_index = part.parse::<usize>().is_ok();
-            is_index.then_some(*item).into_iter().collect()
+            is_index.then_some(with(*item)).into_iter().collect()
         }
         Shape::Choice {
             tag: None,
             variants,
         } => {
             let named = variants.iter().filter(|variant| variant.key == part);
-            named.filter_map(|variant| variant.content).collect()
+            named
+                .filter_map(|variant| variant.content.map(with))
+                .collect()
         }
         // The settings of a tagged variant are beside its name.
-        Shape::Choice { tag: Some(tag), .. } if tag == part => vec![Shape::Text],
+        Shape::Choice { tag: Some(tag), .. } if tag == part => vec![with(Shape::Text)],
         Shape::Choice { variants, .. } => {
             let contents = variants.iter().filter_map(|variant| variant.content);
-            contents.flat_map(|content| inside(content, part)).collect()
+            contents
+                .flat_map(|content| inside(with(content), part))
+                .collect()
         }
         Shape::Switch
         | Shape::Integer(_)
