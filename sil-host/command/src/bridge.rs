@@ -79,10 +79,7 @@ pub struct SensorLineArguments {
 }
 
 fn probability(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(value) if (0.0..=0.1).contains(&value) => Ok(value),
-        _ => Err("expected a probability from 0 to 0.1".into()),
-    }
+    painleve_study_core::options::number(text, 0.0..=0.1, "a probability")
 }
 
 /// The image to run, and which of its output to keep.

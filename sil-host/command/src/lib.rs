@@ -62,6 +62,7 @@ use painleve_process::interrupt::{Interrupt, exit_when_requested, ignore_file_si
 use painleve_process::memory_full::exit_when_shared_memory_is_full;
 use painleve_process::terminal::{self, warn};
 use painleve_study_core::StudyError;
+use painleve_study_core::options::number;
 use painleve_study_sweep::SweepError;
 
 use commission::BoardRigError;
@@ -75,11 +76,21 @@ use process_error::ProcessError;
 /// Without a subcommand, `run` is used.
 #[derive(Debug, Parser)]
 #[command(name = "painleve", version, args_conflicts_with_subcommands = true)]
+#[command(defer(with_negative_numbers))]
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
     run: run::RunArguments,
+}
+
+/// Lets `-1` be the value of every option: what is wrong with it is then told by the option.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let command = command.mut_args(|option| match option.get_action().takes_values() {
+        true => option.allow_negative_numbers(true),
+        false => option,
+    });
+    command.mut_subcommands(with_negative_numbers)
 }
 
 #[derive(Debug, Subcommand)]
@@ -331,18 +342,13 @@ fn or_interrupted<T>(
 
 /// Parses a time in seconds.
 fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.0..=86_400.0).contains(&seconds) => Ok(seconds),
-        _ => Err("expected a number of seconds from 0 to 86400".into()),
-    }
+    number(text, 0.0..=86_400.0, "seconds")
 }
 
 /// Parses a number of things.
 fn count(text: &str) -> Result<NonZeroUsize, String> {
-    match text.parse::<NonZeroUsize>() {
-        Ok(count) if count.get() <= 1_000_000 => Ok(count),
-        _ => Err("expected a whole number from 1 to 1000000".into()),
-    }
+    let count = number(text, 1..=1_000_000, "a whole number")?;
+    Ok(NonZeroUsize::MIN.saturating_add(count - 1))
 }
 
 /// Checks the origin of a web page, as browsers send it.

@@ -5,6 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use painleve_board::SILENCE_LIMIT;
 use painleve_link::DEFAULT_SILENCE_LIMIT;
+use painleve_study_core::options::number;
 use serde::{Deserialize, Serialize};
 
 /// Default longest wait for a missing peer, s: a process that waits in vain has ended after 2 s, its
@@ -39,8 +40,5 @@ impl PatienceArguments {
 }
 
 fn limit(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(seconds) if (0.1..=86_400.0).contains(&seconds) => Ok(seconds),
-        _ => Err("expected a number of seconds from 0.1 to 86400".into()),
-    }
+    number(text, 0.1..=86_400.0, "seconds")
 }

@@ -34,7 +34,7 @@ pub struct TuneArguments {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1000))]
     cases: u32,
     /// Seed of search and cases.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = painleve_study_core::options::seed)]
     seed: u64,
     /// The tuned scenario.
     #[arg(long, value_name = "PATH", default_value = "out/tuned.toml")]

@@ -74,8 +74,34 @@ fn bad_scenarios_are_refused_by_name_and_range() {
             &["plant", "--bus", "b", "--set", "run.tick_hz=1"],
             &["run.tick_hz = 1", "10 to"],
         ),
+        (
+            &["--set", "run.tick_hz=1e9"],
+            &["run.tick_hz: ", "from 10 to 100000", "1000000000"],
+        ),
     ] {
         assert_refused(&bench, arguments, 2, parts);
+    }
+}
+
+#[test]
+fn a_negative_number_is_refused_by_its_option() {
+    let bench = Bench::new("negative");
+    for (line, part) in [
+        ("run --silence-limit-s -1", "from 0.1 to 86400"),
+        ("plant --bus b --wait-s -1", "from 0 to 86400"),
+        ("drive --port p --duration -1", "from 0 to 86400"),
+        (
+            "study robustness --seed -1",
+            "from 0 to 18446744073709551615",
+        ),
+    ] {
+        let output = bench.run(&line.split(' ').collect::<Vec<_>>());
+        assert_eq!(code(output.status), 2, "{output:?}");
+        let message = errors(&output);
+        assert!(
+            message.contains("'-1'") && message.contains(part),
+            "{message}"
+        );
     }
 }
 

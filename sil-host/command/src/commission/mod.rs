@@ -43,7 +43,7 @@ pub struct CommissionArguments {
     #[arg(long, value_name = "MISTAKE", value_parser = mistakes(), requires = "rehearse")]
     mistake: Option<String>,
     /// Seed of the simulated operator's hands and of the noise.
-    #[arg(long, default_value_t = 1, requires = "rehearse")]
+    #[arg(long, default_value_t = 1, value_parser = painleve_study_core::options::seed, requires = "rehearse")]
     seed: u64,
     /// Largest torque on either joint, N·m; by default, a fifth of the torque stages' range.
     #[arg(long, value_name = "N·m")]

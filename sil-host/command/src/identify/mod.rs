@@ -57,7 +57,7 @@ pub struct IdentifyArguments {
     #[arg(long, value_name = "MISTAKE", value_parser = mistakes(), requires = "rehearse")]
     mistake: Option<String>,
     /// Seed of the simulated arm's errors.
-    #[arg(long, default_value_t = 1, requires = "rehearse")]
+    #[arg(long, default_value_t = 1, value_parser = painleve_study_core::options::seed, requires = "rehearse")]
     seed: u64,
     /// Length of link 1 from joint to joint, measured to a tenth of a millimetre, m; by default that of the scenario, to
     /// 0.6 %. A line has no scale: positions are as exact as this length.

@@ -3,6 +3,10 @@
 //! A study flattens them into its own options; where its default or help differs, it changes the
 //! argument with `mut_arg`.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
 use clap::{Args, ValueEnum};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
@@ -81,15 +85,14 @@ impl Overrides {
 #[derive(Clone, Debug, Args)]
 pub struct RandomRuns {
     /// Seed of all runs.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     /// Number of runs.
     #[arg(
         long,
         value_name = "N",
         default_value_t = 1000,
-        value_parser = runs,
-        allow_negative_numbers = true
+        value_parser = runs
     )]
     pub runs: usize,
     #[command(flatten)]
@@ -136,7 +139,7 @@ pub struct InitialOptions {
     #[arg(long, value_name = "LIST", default_value = "a")]
     pub initial: Initials,
     /// Seed of the random initial conditions.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
 }
 
@@ -148,8 +151,7 @@ pub struct RecordingOptions {
         long,
         value_name = "SECONDS",
         default_value_t = 250.0,
-        value_parser = seconds,
-        allow_negative_numbers = true
+        value_parser = seconds
     )]
     pub transient_s: f64,
     /// Recording time of each cell, s; 50 in the paper.
@@ -157,8 +159,7 @@ pub struct RecordingOptions {
         long,
         value_name = "SECONDS",
         default_value_t = 50.0,
-        value_parser = seconds,
-        allow_negative_numbers = true
+        value_parser = seconds
     )]
     pub record_s: f64,
 }
@@ -222,7 +223,7 @@ impl From<PostureOption> for Posture {
 /// # Errors
 /// The allowed range, if the text is no number within it: 1 µm to 1 m.
 pub fn metres(text: &str) -> Result<f64, String> {
-    positive(text, 1e-6, 1.0, "metres")
+    number(text, 1e-6..=1.0, "metres")
 }
 
 /// A duration on the command line.
@@ -230,7 +231,7 @@ pub fn metres(text: &str) -> Result<f64, String> {
 /// # Errors
 /// The allowed range, if the text is no number within it: 1 ms to 10⁶ s.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    positive(text, 1e-3, 1e6, "seconds")
+    number(text, 1e-3..=1e6, "seconds")
 }
 
 /// A level of an effect on the command line. The range of its key is checked by the scenario.
@@ -244,20 +245,31 @@ pub fn level(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A seed on the command line.
+///
+/// # Errors
+/// The allowed range, if the text is no number within it.
+pub fn seed(text: &str) -> Result<u64, String> {
+    number(text, 0..=u64::MAX, "a whole number")
+}
+
 /// A number of runs on the command line.
 ///
 /// # Errors
 /// The allowed range, if the text is no number within it: 1 to 10,000,000.
 pub fn runs(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(runs @ 1..=10_000_000) => Ok(runs),
-        _ => Err("the number of runs must be from 1 to 10000000".into()),
-    }
+    number(text, 1..=10_000_000, "a number of runs")
 }
 
-fn positive(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (least..=most).contains(&value) => Ok(value),
-        _ => Err(format!("give {unit} from {least} to {most}")),
-    }
+/// A number on the command line.
+///
+/// # Errors
+/// The allowed range, if the text is no number within it.
+pub fn number<N: FromStr + PartialOrd + Display>(
+    text: &str,
+    range: RangeInclusive<N>,
+    what: &str,
+) -> Result<N, String> {
+    let number = text.parse().ok().filter(|number| range.contains(number));
+    number.ok_or_else(|| format!("give {what} from {} to {}", range.start(), range.end()))
 }

@@ -21,7 +21,7 @@ pub struct CellOptions {
     recording: RecordingOptions,
     /// Relative error tolerance of one step of the plant; the absolute tolerance is a tenth of it
     /// [default: 1e-11].
-    #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
+    #[arg(long, value_name = "ERROR")]
     relative_tolerance: Option<f64>,
     #[command(flatten)]
     base: BaseOptions,

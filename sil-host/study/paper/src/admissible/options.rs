@@ -13,7 +13,7 @@ use crate::printed;
 #[derive(Debug, Args)]
 pub struct Options {
     /// Friction coefficient μ.
-    #[arg(long, default_value_t = printed::FRICTION, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = printed::FRICTION)]
     mu: f64,
     #[command(flatten)]
     base: BaseOptions,

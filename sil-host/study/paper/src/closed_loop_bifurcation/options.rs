@@ -37,7 +37,7 @@ pub struct Options {
     #[arg(long, default_value = "minimum-jerk:3")]
     reference: Reference,
     /// Target of the reference, m; by default the paper's farthest target for the law and posture.
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "METRES")]
     target_m: Option<f64>,
     #[command(flatten)]
     recording: RecordingOptions,

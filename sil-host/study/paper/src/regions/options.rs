@@ -23,7 +23,7 @@ enum SlipOption {
 #[derive(Debug, Args)]
 pub struct Options {
     /// Friction coefficient μ.
-    #[arg(long, default_value_t = printed::FRICTION, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = printed::FRICTION)]
     mu: f64,
     /// θ1 in degrees, FROM:TO:STEP or a list; values that do not reach the belt are discarded.
     #[arg(

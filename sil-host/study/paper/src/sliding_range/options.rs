@@ -52,8 +52,7 @@ pub struct Options {
         long,
         value_name = "METRES",
         default_value_t = Criterion::default().within_m,
-        value_parser = metres,
-        allow_negative_numbers = true
+        value_parser = metres
     )]
     within_m: f64,
     /// Longest settling time after the end of the reference, s.
@@ -61,8 +60,7 @@ pub struct Options {
         long,
         value_name = "SECONDS",
         default_value_t = Criterion::default().patience_s,
-        value_parser = seconds,
-        allow_negative_numbers = true
+        value_parser = seconds
     )]
     patience_s: f64,
     /// Spacing of the targets tried first, m.
@@ -70,8 +68,7 @@ pub struct Options {
         long,
         value_name = "METRES",
         default_value_t = Criterion::default().scan_step_m,
-        value_parser = metres,
-        allow_negative_numbers = true
+        value_parser = metres
     )]
     scan_step_m: f64,
     /// Accuracy of the result, m.
@@ -79,8 +76,7 @@ pub struct Options {
         long,
         value_name = "METRES",
         default_value_t = Criterion::default().resolution_m,
-        value_parser = metres,
-        allow_negative_numbers = true
+        value_parser = metres
     )]
     resolution_m: f64,
     #[command(flatten)]

@@ -38,7 +38,6 @@ pub struct Options {
         value_name = "LEVELS",
         value_delimiter = ',',
         value_parser = level,
-        allow_negative_numbers = true,
         requires = "effect"
     )]
     level: Vec<f64>,

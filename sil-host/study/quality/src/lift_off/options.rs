@@ -18,8 +18,7 @@ pub struct Options {
         long,
         value_name = "SECONDS",
         default_value_t = 10.0,
-        value_parser = options::seconds,
-        allow_negative_numbers = true
+        value_parser = options::seconds
     )]
     slide_s: f64,
 }
