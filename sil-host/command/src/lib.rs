@@ -58,7 +58,7 @@ use painleve_link::LinkError;
 use painleve_plant::closed_loop::LoopError;
 use painleve_plant::law_choice::{self, ScenarioLaws};
 use painleve_plant::scenario::ScenarioError;
-use painleve_process::interrupt::{Interrupt, exit_when_requested, ignore_file_size_limit};
+use painleve_process::interrupt::{self, Interrupt, exit_when_requested, ignore_file_size_limit};
 use painleve_process::memory_full::exit_when_shared_memory_is_full;
 use painleve_process::terminal::{self, warn};
 use painleve_study_core::StudyError;
@@ -401,6 +401,8 @@ pub fn main() -> ExitCode {
         },
     }));
     match result {
+        // Told by the panic hook.
+        Err(_) if THREAD_REFUSED.load(Ordering::Relaxed) => ExitCode::from(PEER_FAILED),
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => exit_code_of(&error),
     }
@@ -413,6 +415,9 @@ static PANIC_IN_ICEORYX2: AtomicBool = AtomicBool::new(false);
 /// Where the standard library panics if the system refuses memory to a thread that has just started.
 /// Nothing can catch this panic.
 const THREAD_START: &str = "library/std/src/sys/pal/unix/";
+
+/// Time for the first thread to end after that; it leaves a child a second.
+const REFUSED_END: Duration = Duration::from_millis(1500);
 
 /// Set by the first thread that the system refuses.
 static THREAD_REFUSED: AtomicBool = AtomicBool::new(false);
@@ -438,6 +443,9 @@ fn tell_panic(panic: &PanicHookInfo) {
         warn(format_args!(
             "error: the system refuses a thread: {message}"
         ));
+        // The first thread ends its children and tidies up, unless it waits for this one.
+        interrupt::request();
+        std::thread::sleep(REFUSED_END);
         std::process::exit(i32::from(PEER_FAILED));
     } else {
         let line = panic.location().map_or(0, |location| location.line());

@@ -4,24 +4,28 @@ use std::path::PathBuf;
 use std::process::ExitStatus;
 
 use painleve_link::{BusName, UnreadableConfiguration};
+use painleve_process::refusal::remedy;
 use painleve_shared::range::OutOfRange;
 
 /// Failure of a process, or of a message to it.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcessError {
     /// The operating system refuses something outside files and links.
-    #[error(transparent)]
+    #[error("{}{}", .0, remedy(.0, ""))]
     System(#[from] std::io::Error),
     /// A process cannot be started.
-    #[error("cannot start {}: {source}", program.display())]
+    #[error("cannot start {}: {source}{}", program.display(), remedy(source, ""))]
     Start {
         /// The program.
         program: PathBuf,
         /// The reason.
         source: std::io::Error,
     },
+    /// A thread that reads the output of a process cannot be started.
+    #[error("cannot start a thread: {}{}", .0, remedy(.0, ""))]
+    Thread(std::io::Error),
     /// The threads of a study cannot be started.
-    #[error("cannot start threads: {0}")]
+    #[error("cannot start threads: {}{}", .0, remedy(.0, ""))]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// A process ended before its run.
     #[error("the {process} process ended early ({status}){complaint}")]

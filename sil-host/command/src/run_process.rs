@@ -40,10 +40,13 @@ impl RunProcess {
         let mut child = end_with_parent(&mut command, Signal::SIGTERM)
             .spawn()
             .map_err(|source| ProcessError::Start { program, source })?;
+        let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
+        // From now on it is ended if a thread is refused.
+        let child = Guarded::new(child);
         Ok(Self {
-            stdout: Reader::start(child.stdout.take())?,
-            stderr: Reader::start(child.stderr.take())?,
-            child: Guarded::new(child),
+            stdout: Reader::start(stdout).map_err(ProcessError::Thread)?,
+            stderr: Reader::start(stderr).map_err(ProcessError::Thread)?,
+            child,
             stopped: Duration::ZERO,
         })
     }

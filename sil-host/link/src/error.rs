@@ -5,6 +5,8 @@ use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use painleve_process::refusal::remedy;
+
 use super::bus::BusName;
 use super::session::ConfigurationTooLong;
 
@@ -116,8 +118,8 @@ pub enum LinkError {
 
     /// The folder of a bus cannot be used.
     #[error(
-        "cannot use `{folder}` for a bus: {source}; \
-         set XDG_RUNTIME_DIR to a folder that only you can write to"
+        "cannot use `{folder}` for a bus: {source}{}",
+        remedy(source, "; set XDG_RUNTIME_DIR to a folder that only you can write to")
     )]
     Folder {
         /// The folder.
@@ -158,8 +160,8 @@ pub enum LinkError {
 
     /// iceoryx2 or the operating system reported an error.
     #[error(
-        "bus `{bus}`: could not {action} ({source}); \
-         check that /dev/shm is writable and not full, and `ulimit -n`"
+        "bus `{bus}`: could not {action} ({source}){}",
+        remedy(&**source, "; check that /dev/shm is writable, and `ulimit -a`")
     )]
     Transport {
         /// The bus.
@@ -175,7 +177,7 @@ pub enum LinkError {
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// The system refuses access to it.
-    #[error(transparent)]
+    #[error("{0}")]
     System(#[from] io::Error),
     /// It is not a folder.
     #[error("it is not a folder")]

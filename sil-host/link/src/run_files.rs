@@ -21,7 +21,7 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
-use std::io;
+use std::io::{self, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -181,6 +181,26 @@ impl RunFiles {
                     }
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Asks the system for a little of what iceoryx2 needs in the run's folder and in shared memory.
+    pub(super) fn probe(&self) -> Result<(), LinkError> {
+        for (folder, bytes) in [
+            (self.folder.as_path(), 1 << 12),
+            (Path::new(SHARED_MEMORY), 1 << 16),
+        ] {
+            let ask = || {
+                let mut file = tempfile::tempfile_in(folder)?;
+                file.write_all(&vec![1; bytes])?;
+                let descriptors = (0..8).map(|_| file.try_clone());
+                descriptors.collect::<io::Result<Vec<_>>>()
+            };
+            ask().map_err(|error| LinkError::Folder {
+                folder: folder.into(),
+                source: error.into(),
+            })?;
         }
         Ok(())
     }

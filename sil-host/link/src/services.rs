@@ -46,6 +46,7 @@ pub(super) enum Unavailable {
 /// A process as iceoryx2 sees it.
 pub(super) struct Presence {
     bus: BusName,
+    run: RunFiles,
     node: Node<ipc::Service>,
 }
 
@@ -57,9 +58,10 @@ impl Presence {
             .config(&run.config()?)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
-            .map_err(|cause| transport(bus, "join the bus", cause))?;
+            .map_err(|cause| refused(bus, run, "join the bus", cause))?;
         Ok(Self {
             bus: bus.clone(),
+            run: run.clone(),
             node,
         })
     }
@@ -68,13 +70,13 @@ impl Presence {
         &self.bus
     }
 
-    /// Returns a [`LinkError::Transport`] on this bus.
+    /// Returns the reason of a failure of iceoryx2 on this bus.
     pub(super) fn transport(
         &self,
         action: &'static str,
         cause: impl Into<Box<dyn Error + Send + Sync>>,
     ) -> LinkError {
-        transport(&self.bus, action, cause)
+        refused(&self.bus, &self.run, action, cause)
     }
 
     fn builder<T: BusPayload>(
@@ -123,6 +125,18 @@ pub(super) fn transport(
         action,
         source: cause.into(),
     }
+}
+
+/// Returns the reason of a failure of iceoryx2, whose own errors do not tell what the system has refused: what it
+/// refuses now, else that error.
+fn refused(
+    bus: &BusName,
+    run: &RunFiles,
+    action: &'static str,
+    cause: impl Into<Box<dyn Error + Send + Sync>>,
+) -> LinkError {
+    let refusal = run.probe().err();
+    refusal.unwrap_or_else(|| transport(bus, action, cause))
 }
 
 /// The three services of a bus.

@@ -52,6 +52,11 @@ impl Interrupt {
     }
 }
 
+/// Requests an end of this process from whoever watches an [`Interrupt`] for signals, as a signal does.
+pub fn request() {
+    note(0);
+}
+
 /// Makes SIGINT, SIGTERM and SIGHUP end the process at once with `code` and one message, unless
 /// they are ignored. Use it for work that leaves nothing to clean up.
 ///

@@ -80,6 +80,31 @@ fn a_shared_memory_that_fills_up_between_two_starts_ends_them() {
     assert_eq!(plant.trim().lines().count(), 1, "{plant}");
 }
 
+/// iceoryx2 does not tell what the system has refused it.
+#[test]
+fn what_the_system_refuses_is_named_with_its_remedy() {
+    let bench = Bench::new("refused");
+    for (limit, part) in [
+        ("-f 4", "raise `ulimit -f`"),
+        ("-n 16", "raise `ulimit -n`"),
+    ] {
+        let output = shell(
+            &bench,
+            &format!("ulimit {limit}; $P run --no-record {SHORT}"),
+        );
+        assert_reported(&output, 3, part);
+    }
+    let line = format!(
+        "mkdir -m 700 runtime && mount -t tmpfs -o size=64k,mode=700 tmpfs runtime
+         head -c 60k /dev/zero > runtime/filler
+         XDG_RUNTIME_DIR=$PWD/runtime $P run --no-record {SHORT}"
+    );
+    if let Some(output) = with_own_mounts(&bench, &line) {
+        assert_reported(&output, 3, "/runtime/painleve/");
+        assert!(errors(&output).contains("No space left"), "{output:?}");
+    }
+}
+
 #[test]
 fn read_only_folders_are_reported() {
     let bench = Bench::new("read-only");
