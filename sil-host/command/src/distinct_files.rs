@@ -66,7 +66,13 @@ pub fn check_distinct(outputs: &[Output<'_>]) -> Result<(), CommandError> {
 pub fn check(outputs: &[Output<'_>]) -> Result<(), CommandError> {
     check_distinct(outputs)?;
     for (_, path) in outputs {
-        AtomicFile::create(path).map_err(output)?;
+        let folders = path.ancestors().skip(1);
+        let missing: Vec<_> = folders.take_while(|folder| !folder.exists()).collect();
+        drop(AtomicFile::create(path).map_err(output)?);
+        for folder in missing {
+            // The command may yet fail, and then leaves nothing.
+            let _ = fs::remove_dir(folder);
+        }
     }
     Ok(())
 }
@@ -130,6 +136,8 @@ mod tests {
                 "{message}"
             );
         }
+        check(&[("--csv", &path("new/deeper/a"))]).unwrap();
+        assert!(!path("new").exists());
         for different in [["new", "new/new"], ["new", "there/new"], ["input", "new"]] {
             assert_eq!(message(different), None);
         }
