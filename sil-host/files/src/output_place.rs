@@ -46,7 +46,8 @@ pub(crate) struct OutputPlace {
 impl OutputPlace {
     /// Follows a path and creates its missing folders.
     pub fn find(path: &Path) -> Result<Self, PlaceError> {
-        if path.file_name().is_none() {
+        // Whoever gives `-` expects standard output.
+        if path.file_name().is_none() || path == Path::new("-") {
             return Err(PlaceError::NotAFile);
         }
         let mut walk = Walk::new(path)?;

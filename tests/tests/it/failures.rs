@@ -116,6 +116,8 @@ fn outputs_that_cannot_be_written_are_refused_before_the_run() {
             &["/proc/nowhere"],
         );
     }
+    let stdout = ["run", "--no-record", "--no-plot", "--csv", "-"];
+    assert_refused(&bench, &stdout, 4, &["`-` cannot be an output file"]);
     let timing = [
         "run",
         "--host",
