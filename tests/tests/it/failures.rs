@@ -75,6 +75,10 @@ fn bad_scenarios_are_refused_by_name_and_range() {
             &["run.tick_hz = 1", "10 to"],
         ),
         (
+            &["study", "loop", "--tip=5"],
+            &["5 m is out of reach", "0.1841 m"],
+        ),
+        (
             &["--set", "run.tick_hz=1e9"],
             &["run.tick_hz: ", "from 10 to 100000", "1000000000"],
         ),

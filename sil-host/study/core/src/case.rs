@@ -216,7 +216,10 @@ pub fn at_rest_on_belt(
 ) -> Result<InitialState, StudyError> {
     let theta = arm
         .link_angles_on_belt_rad(tip_t_m, posture)
-        .ok_or(StudyError::OutOfReach { tip_t_m })?;
+        .ok_or_else(|| StudyError::OutOfReach {
+            tip_t_m,
+            reach_m: arm.reach_on_belt_m(),
+        })?;
     Ok(InitialState::at_rest(
         theta.first().to_degrees(),
         theta.second().to_degrees(),

@@ -54,10 +54,14 @@ pub enum StudyError {
     #[error("--level needs exactly one effect other than none in --effect")]
     LevelsOfSeveralEffects,
     /// A position is out of reach.
-    #[error("z_t = {tip_t_m} m is out of reach")]
+    #[error(
+        "z_t = {tip_t_m} m is out of reach: the tip reaches the belt from −{reach_m:.4} to {reach_m:.4} m"
+    )]
     OutOfReach {
         /// Position along the belt, m.
         tip_t_m: f64,
+        /// Farthest position on either side, m.
+        reach_m: f64,
     },
     /// No θ1 of a grid puts the tip on the belt.
     #[error(
@@ -173,6 +177,7 @@ mod tests {
             match index {
                 70 | 30 => Err(StudyError::OutOfReach {
                     tip_t_m: index as f64,
+                    reach_m: 0.2,
                 }),
                 _ => Ok(index * index),
             }
@@ -208,7 +213,7 @@ mod tests {
             assert_eq!(pool.install(|| rows(&First(30), count)).unwrap(), expected);
             assert_eq!(done.into_inner(), 30);
             let error = pool.install(|| rows(&Squares, || ())).unwrap_err();
-            assert_eq!(error.to_string(), "z_t = 30 m is out of reach");
+            assert!(error.to_string().contains("z_t = 30 m"), "{error}");
         }
     }
 

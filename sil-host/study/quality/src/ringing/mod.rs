@@ -108,9 +108,10 @@ impl Ringing {
     ) -> Result<Scenario, StudyError> {
         let arm = Arm::new(self.base()?.arm)?;
         let line = BeltLine::new(&arm, POSTURE);
-        let tau = line
-            .tau(tip_t_m)
-            .ok_or(StudyError::OutOfReach { tip_t_m })?;
+        let tau = line.tau(tip_t_m).ok_or_else(|| StudyError::OutOfReach {
+            tip_t_m,
+            reach_m: arm.reach_on_belt_m(),
+        })?;
         let theta = line.theta_rad(tau);
         let mut overrides = self.overrides.clone();
         overrides.extend([
