@@ -4,6 +4,7 @@
 //! renderer with its fonts would cost every build more than all other output formats together.
 
 use std::io::Write;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -72,6 +73,8 @@ pub fn encoded(path: &Path, svg: String) -> Result<Vec<u8>, PictureError> {
         .args(["--format", format, "--zoom", zoom])
         // Otherwise a PDF holds the present time.
         .env("SOURCE_DATE_EPOCH", "0")
+        // Ctrl-C is for the run: a figure that is being converted at its end becomes whole.
+        .process_group(0)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

@@ -318,9 +318,9 @@ fn watch(
             return Ok(status);
         }
         if interrupt.is_requested() {
-            // The plant may keep a partial record and report its path.
-            plant.child.stop();
-            return Err(CommandError::Interrupted);
+            // The plant may keep a partial record and report its path, or may have completed everything.
+            let ended = plant.child.stop().filter(ExitStatus::success);
+            return ended.ok_or(CommandError::Interrupted);
         }
         if let Some(status) = controller.child.ended()?
             && !status.success()

@@ -1,6 +1,7 @@
 //! Every failure ends with one message, an exit code, and no leftovers.
 
-use std::process::Output;
+use std::os::unix::fs::PermissionsExt;
+use std::process::{Output, Stdio};
 use std::sync::Barrier;
 use std::time::Duration;
 
@@ -299,4 +300,26 @@ fn ctrl_c_ends_a_run_tidily() {
     );
     assert!(!is_running(plant) && !is_running(controller));
     assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
+}
+
+/// The plant has ended its ticks, and completes its files whatever it is asked.
+#[test]
+fn ctrl_c_while_the_last_figure_is_written_does_not_undo_the_run() {
+    let bench = Bench::new("late");
+    let converter = "#!/bin/sh\n[ $1 = --version ] && exit\ncat > given\nsleep 0.3\necho figure\n";
+    std::fs::write(bench.path("rsvg-convert"), converter).unwrap();
+    let executable = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(bench.path("rsvg-convert"), executable).unwrap();
+    let short = ["--set", "run.duration_s=0.05", "--no-record", "--no-html"];
+    let mut run = bench.command(&[&["run", "--plot", "run.png"], &short[..]].concat());
+    let path = std::env::var("PATH").unwrap();
+    run.env("PATH", format!("{}:{path}", bench.path("").display()));
+    let run = run.stdout(Stdio::null()).spawn().unwrap();
+    while !bench.path("given").exists() && is_running(run.id().cast_signed()) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    signal(run.id().cast_signed(), Signal::SIGINT);
+    let output = run.wait_with_output().unwrap();
+    assert_eq!(code(output.status), 0, "{output:?}");
+    assert_eq!(std::fs::read(bench.path("run.png")).unwrap(), b"figure\n");
 }
