@@ -83,8 +83,11 @@ pub fn check(image: &Path, with_log: bool) -> Result<(), BoardError> {
     let is_image = match read {
         // 32 bits, for ARM.
         Ok(()) => header.starts_with(b"\x7fELF\x01") && header.ends_with(&[40, 0]),
-        // An image that cannot be read is reported where it is read.
-        Err(error) => error.kind() != io::ErrorKind::UnexpectedEof,
+        // An image that cannot be read is reported where it is read; an empty one is an invalid input.
+        Err(error) => !matches!(
+            error.kind(),
+            io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput
+        ),
     };
     if !is_image {
         return Err(BoardError::NotAnImage(image.into()));

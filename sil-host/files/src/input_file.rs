@@ -25,7 +25,7 @@ fn refused(reason: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, reason)
 }
 
-/// Opens a regular file. Pipes and devices are refused, because they could block the process or never end.
+/// Opens a regular file with content. Pipes and devices are refused, because they could block the process or never end.
 ///
 /// # Errors
 /// Those of the system, and [`io::ErrorKind::InvalidInput`] with the reason.
@@ -38,6 +38,9 @@ pub fn open(path: &Path) -> io::Result<File> {
     let metadata = file.metadata()?;
     if !metadata.is_file() {
         return Err(refused("it is not a regular file".into()));
+    }
+    if metadata.len() == 0 {
+        return Err(refused("it is empty".into()));
     }
     remember(&metadata, path);
     Ok(file)
@@ -114,6 +117,9 @@ mod tests {
             let error = read(path).unwrap_err().to_string();
             assert!(error.contains("not a regular file"), "{error}");
         }
+        let empty = folder.path().join("empty");
+        File::create(&empty).unwrap();
+        assert_eq!(read(&empty).unwrap_err().to_string(), "it is empty");
         let sparse = folder.path().join("sparse");
         File::create(&sparse).unwrap().set_len(1 << 40).unwrap();
         let error = read(&sparse).unwrap_err().to_string();

@@ -355,11 +355,13 @@ fn pipes_and_devices_are_refused_at_once() {
     mkfifo(&bench.path("sw/shard-9.csv"), Mode::S_IRWXU).unwrap();
     let damaged = [&b"\x89MCAP0\r\n\x01"[..], &[0xff; 8]].concat();
     fs::write(bench.path("long.mcap"), damaged).unwrap();
+    fs::write(bench.path("empty.mcap"), "").unwrap();
     let before = bench.files();
     for (line, exit, part) in [
         ("export pipe --csv x.csv", 2, "not a regular file"),
         ("export /dev/zero --csv x.csv", 2, "not a regular file"),
         ("export sw --csv x.csv", 2, "not a regular file"),
+        ("export empty.mcap --csv x.csv", 2, "it is empty"),
         (
             "export long.mcap --csv x.csv",
             2,

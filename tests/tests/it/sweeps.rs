@@ -259,7 +259,8 @@ fn mistakes_are_reported_and_nothing_is_written() {
         refused(step, "plan the sweep first");
     }
     for (campaign, part) in [
-        ("", "no study"),
+        ("", "it is empty"),
+        ("\n", "no study"),
         ("study = 'bifurcation'\nmoo = 1", "'moo'"),
         ("study = 'regions'", "cannot be computed in shards"),
         ("study = 'bifurcation'\nmu = '1:0:0.1'", "leads away"),

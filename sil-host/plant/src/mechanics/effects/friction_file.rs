@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn mistakes_are_named_with_their_line() {
         for (text, part) in [
-            ("", "line 1 is ''"),
+            ("", "it is empty"),
             (
                 "time,mu\n0,0\n1,0\n",
                 "time_s,change or along_belt_m,change",
