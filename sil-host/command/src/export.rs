@@ -212,7 +212,7 @@ fn export_bag(
     match ros2::to_bag(open()?, start_ns.unwrap_or_default(), file) {
         Err(BagError::Write(source)) => Err(output(AtomicFileError::Write {
             path: path.to_path_buf(),
-            source: std::io::Error::other(source),
+            source,
         })),
         bag => record_error(arguments, bag).map(|(bag, ticks)| (bag.file, ticks)),
     }

@@ -207,7 +207,7 @@ fn unix_ns() -> u128 {
     now.map_or(0, |since| since.as_nanos())
 }
 
-fn reason(error: McapError) -> io::Error {
+pub(crate) fn reason(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,
         other => io::Error::other(other),

@@ -35,9 +35,7 @@ pub enum RecordError {
     #[error(transparent)]
     Picture(#[from] PictureError),
     /// Writing failed during the recording, for example because the disk is full.
-    #[error(
-        "cannot record to `{path}`: {source}; choose a path with enough space or run without recording"
-    )]
+    #[error("cannot write `{path}`: {source}; choose a path that can be written and has space")]
     Write {
         /// The requested path.
         path: PathBuf,

@@ -15,6 +15,7 @@ use mcap::records::MessageHeader;
 use serde_json::{Map, Value};
 
 use crate::fields::{ESTIMATES, PLANT, Read as Kind, SENSOR, TOPICS, Topic};
+use crate::mcap_log::reason;
 use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 
 /// Definition of the header of every message, and of the time in it.
@@ -44,7 +45,7 @@ pub enum BagError {
     NoTicks,
     /// The bag cannot be written.
     #[error(transparent)]
-    Write(#[from] McapError),
+    Write(#[from] io::Error),
 }
 
 /// Writes the messages of a record as a bag and returns it with the number of ticks. `start_ns` is the time by the clock at
@@ -267,15 +268,22 @@ impl Cdr {
     }
 }
 
-impl From<io::Error> for BagError {
-    fn from(error: io::Error) -> Self {
-        Self::Write(error.into())
+impl From<McapError> for BagError {
+    fn from(error: McapError) -> Self {
+        Self::Write(reason(error))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_cause_of_a_failed_write_is_told() {
+        let full = io::Cursor::new([0_u8; 16]);
+        let error = to_bag(io::empty(), 0, full).map(|_| ()).unwrap_err();
+        assert_eq!(error.to_string(), "failed to write whole buffer");
+    }
 
     #[test]
     fn a_message_is_aligned_as_cdr_wants_it() {
