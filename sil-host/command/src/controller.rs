@@ -6,7 +6,6 @@ use painleve_link::{BusDrive, Pacing};
 use painleve_plant::law_choice::LawChoice;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::realtime::request_realtime;
-use painleve_process::terminal::warn;
 use serde::{Deserialize, Serialize};
 
 use super::join::JoinArguments;
@@ -35,7 +34,7 @@ fn answer_until(
 ) -> Result<(), CommandError> {
     let (end, session, configuration) = arguments.plant.join(interrupt)?;
     if session.pacing == Pacing::Realtime {
-        warn(format_args!("controller: {}", request_realtime()));
+        request_realtime().tell("controller", arguments.plant.quiet);
     }
     let drive = BusDrive::new(end, &session);
     let source = drive.source();

@@ -26,6 +26,9 @@ pub struct JoinArguments {
     /// Join only the plant with the same mark: set by `painleve run`.
     #[arg(skip)]
     pub pair: Option<Pair>,
+    /// Print errors and warnings only: set by `painleve run`.
+    #[arg(skip)]
+    pub quiet: bool,
 }
 
 impl JoinArguments {

@@ -13,7 +13,7 @@ use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::realtime::request_realtime;
-use painleve_process::terminal::{self, warn};
+use painleve_process::terminal;
 use painleve_record::report::{DurationPercentiles, RunReport};
 use painleve_shared::status::Fault;
 use serde::{Deserialize, Serialize};
@@ -53,6 +53,9 @@ pub struct PlantArguments {
     /// about an interruption and about the peer to `run`.
     #[arg(skip)]
     pub pair: Option<Pair>,
+    /// Print errors and warnings only: set by `painleve run`.
+    #[arg(skip)]
+    pub quiet: bool,
 }
 
 /// Runs a scenario against the controller on the bus.
@@ -137,7 +140,7 @@ fn simulate(
     };
     let mut report = match pacing {
         Pacing::Realtime if !arguments.board_keeps_time => {
-            warn(format_args!("plant: {}", request_realtime()));
+            request_realtime().tell("plant", arguments.quiet);
             let paced = Paced::start(end, scenario.run.tick_hz)?;
             let (result, host, wall) = drive(scenario, simulation, paced, output)?;
             let (lateness_ns, missed, end) = host.finish();

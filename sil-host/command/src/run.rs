@@ -216,6 +216,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         host_name: arguments.host.name(),
         board_keeps_time: arguments.host == Host::Serial,
         pair: Some(pair),
+        quiet: arguments.quiet,
     });
     let mut plant = RunProcess::start(&plan, Stdio::inherit())?;
     // The controller's messages are shown only if the plant has none; a log is shown at once.
@@ -229,6 +230,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         wait_s: START_WAIT_S,
         patience: arguments.patience.clone(),
         pair: Some(pair),
+        quiet: arguments.quiet,
     };
     let mut controller = RunProcess::start(&controller_plan(arguments, join), stderr)?;
 

@@ -4,6 +4,7 @@ use std::fmt;
 use std::io;
 use std::time::Duration;
 
+use crate::terminal::warn;
 use nix::errno::Errno;
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::prctl::set_timerslack;
@@ -84,6 +85,13 @@ impl RealtimeStatus {
     pub fn is_complete(&self) -> bool {
         self.scheduling.is_ok() && self.memory.is_ok()
     }
+
+    /// Tells what `process` was granted; `quiet` only if something was refused.
+    pub fn tell(&self, process: &str, quiet: bool) {
+        if !quiet || !self.is_complete() {
+            warn(format_args!("{process}: {self}"));
+        }
+    }
 }
 
 impl fmt::Display for RealtimeStatus {
@@ -138,7 +146,10 @@ fn lock_memory() -> Result<(), String> {
         getrlimit(Resource::RLIMIT_MEMLOCK).is_ok_and(|(soft, _)| soft == RLIM_INFINITY);
     let mut flags = MlockAllFlags::MCL_CURRENT;
     flags.set(MlockAllFlags::MCL_FUTURE, unlimited);
-    mlockall(flags).map_err(|error| error.desc().to_owned())
+    mlockall(flags).map_err(|error| match error {
+        Errno::ENOMEM if !unlimited => "it is more than `ulimit -l` allows".to_owned(),
+        _ => error.desc().to_owned(),
+    })
 }
 
 #[cfg(test)]
