@@ -163,5 +163,5 @@ fn joints(found: &Found) -> Table {
 }
 
 fn spread(value: f64, deviation: f64, digits: usize) -> String {
-    format!("{value:.digits$} ± {deviation:.digits$}")
+    format!("{value:.digits$} ± {deviation:.digits$}").replace('-', "−")
 }

@@ -90,9 +90,9 @@ impl Outcome for LiftOffs {
     fn table(&self) -> Table {
         let mut table = outcome::table([
             "evidence",
-            "bar (ms)",
+            "limit (ms)",
             "lift-offs",
-            "longer than the bar",
+            "longer than the limit",
             "in time",
             "missed",
             "unsolved",

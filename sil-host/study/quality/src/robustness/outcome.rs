@@ -130,7 +130,7 @@ impl Outcome for RobustnessOutcome {
         table.add_row([&success, &self.success.to_string(), "", "", "", ""]);
         for (name, scale, values) in [
             ("error (mm)", 1e3, &self.place.error_m),
-            ("before the edge (mm)", 1e3, &self.place.to_edge_m),
+            ("before the edge, − beyond (mm)", 1e3, &self.place.to_edge_m),
             (
                 "torque change, moving (mN·m)",
                 1e3,
