@@ -306,7 +306,10 @@ fn the_rigid_plant_refuses_every_effect_by_its_key() {
             crate::scenario::Scenario::load("edge", &set)
         };
         let error = load(&[value]).unwrap_err().to_string();
-        assert!(error.contains(key) && error.contains("rigid"), "{error}");
+        assert!(
+            error.contains(key) && error.contains("compliant"),
+            "{error}"
+        );
         load(&[value, "contact.kind=compliant"]).unwrap();
     }
 }

@@ -18,7 +18,6 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::Scenario;
-use super::table::from_table;
 
 pub use difference::Difference;
 pub use markdown::settings_table;
@@ -228,7 +227,8 @@ fn default_at(path: &[&str]) -> Option<Value> {
     let chosen = path.iter().rev().skip(1).fold(Table::new(), |inner, key| {
         Table::from_iter([((*key).to_string(), Value::Table(inner))])
     });
-    let scenario = from_table(None, chosen).unwrap_or_default();
+    let chosen = &mut <dyn erased_serde::Deserializer<'_>>::erase(Value::Table(chosen));
+    let scenario: Scenario = erased_serde::deserialize(chosen).unwrap_or_default();
     path.iter()
         .try_fold(Value::Table(table(&scenario)), |value, key| {
             value.get(key).cloned()
