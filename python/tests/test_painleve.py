@@ -77,7 +77,7 @@ LOOP.append(LOOP)
         ({"belt.friction": None}, TypeError, "belt.friction: a value of type NoneType"),
         ({"belt.friction": 1j}, TypeError, "belt.friction: a value of type complex"),
         ({"belt.friction": [object()]}, TypeError, "belt.friction: a value of type object"),
-        ({"belt.friction": (0.5, 0.6)}, ValueError, "^belt.friction: expected a number, not a list"),
+        ({"belt.friction": (0.5, 0.6)}, ValueError, "^belt.friction: expected a number from 0 to 10, not a list"),
         ({"belt.friction": float("nan")}, ValueError, "belt.friction = NaN"),
         ({LENGTHS: LOOP}, ValueError, "more than 16 lists"),
         ({"run.seed": 2**63}, ValueError, "run.seed = 9223372036854775808 is out of range"),
