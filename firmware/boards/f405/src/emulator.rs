@@ -22,11 +22,10 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::DWT;
 use painleve_image::board::Port;
 use painleve_image::dma_serial::DmaPort;
+use painleve_stm32f4::uart_dma::UartDma;
 use semihosting::fd::{BorrowedFd, RawFd};
 use semihosting::sys::arm_compat::{OpenMode, sys_open, sys_read_orig, sys_write_orig};
 use stm32f4xx_hal::pac;
-
-use crate::uart_dma::UartDma;
 
 /// QEMU's timers count nanoseconds of virtual time, whatever the clock settings are.
 const TIMER_HZ: u32 = 1_000_000_000;

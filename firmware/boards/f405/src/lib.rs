@@ -19,10 +19,8 @@
 #![cfg(target_os = "none")]
 
 pub mod emulator;
-pub mod flash;
 pub mod program_memory;
 pub mod safety;
-pub mod uart_dma;
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -43,7 +41,9 @@ use painleve_image::watchdogs::{IndependentWatchdog, Watchdogs};
 use painleve_shared::black_box::ResetCause;
 use painleve_shared::message::RefusedRate;
 use painleve_stm32f4::spi::SpiPort;
-use painleve_stm32f4::timer;
+use painleve_stm32f4::uart_dma::UartDma;
+use painleve_stm32f4::watchdogs::{Independent, Window};
+use painleve_stm32f4::{clock, flash, supply, timer};
 use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PB0, PC0, PC1, PC2, PinState};
 pub use stm32f4xx_hal::pac;
 use stm32f4xx_hal::pac::{SPI1, SPI2};
@@ -53,8 +53,6 @@ use stm32f4xx_hal::serial::{Serial, config};
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
 
 use crate::emulator::Link;
-use crate::safety::{Independent, Window};
-use crate::uart_dma::UartDma;
 
 /// Crystal, MHz.
 const CRYSTAL_MHZ: u32 = 8;
@@ -174,7 +172,7 @@ impl Board for F405 {
         let mut rcc = start_clocks(device.RCC, is_emulated)?;
         pac::PWR::enable(&mut rcc);
         let (power, lines) = (&device.PWR, &device.EXTI);
-        safety::watch_supply(power, lines, &device.FLASH, &mut core.NVIC, &watchdog)?;
+        supply::watch(power, lines, &device.FLASH, &mut core.NVIC, &watchdog)?;
 
         let a = device.GPIOA.split(&mut rcc);
         let b = device.GPIOB.split(&mut rcc);
@@ -267,7 +265,7 @@ impl Board for F405 {
     }
 
     fn reset_cause() -> ResetCause {
-        safety::reset_cause()
+        clock::reset_cause()
     }
 
     fn take_torque_off() {
@@ -299,7 +297,7 @@ fn start_clocks(rcc: pac::RCC, is_emulated: bool) -> Result<Rcc, StartFault> {
     start_crystal(&rcc)?;
     let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(168.MHz());
     let rcc = rcc.freeze(clocks);
-    safety::watch_crystal(&rcc);
+    clock::watch_crystal(&rcc);
     Ok(rcc)
 }
 

@@ -6,6 +6,7 @@
 
 use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
+use cortex_m::peripheral::NVIC;
 use painleve_image::dma_serial::DmaRegisters;
 use stm32f4xx_hal::pac::{self, DMA2, USART1};
 
@@ -143,6 +144,6 @@ impl DmaRegisters for UartDma {
     }
 
     fn pend() {
-        rtic::pend(pac::Interrupt::USART1);
+        NVIC::pend(pac::Interrupt::USART1);
     }
 }
