@@ -16,16 +16,19 @@ crate::on_each_board! {
     without_permission_or_switch_there_is_no_torque,
     torques_from_the_host_do_nothing_to_a_law,
     a_joint_that_moves_far_takes_the_torque_off,
+    a_winding_that_the_host_heats_takes_the_torque_off,
     switch_sensors_stages_and_host_take_the_torque_off_as_with_a_law,
 }
 
 /// 1 N·m of 5 N·m in 12 bits.
 const LIMIT_COUNTS: i32 = 410;
 
-/// Commissioning reads one sensor of each channel at a time.
+/// Commissioning reads one sensor of each channel at a time. The windings become hot within a fifth of a second.
 fn limited() -> Scenario {
     let mut scenario = with_one_sensor("hybrid-elbow-down");
     scenario.controller.torque_limit_nm = 1.0;
+    scenario.converters.winding.continuous_torque_nm = Some([0.3; 2]);
+    scenario.converters.winding.time_constant_s = [1.0; 2];
     scenario
 }
 
@@ -154,6 +157,19 @@ fn a_joint_that_moves_far_takes_the_torque_off<C: BoardChip>() {
             assert!(bench.board.torque().is_off());
         }
     }
+}
+
+fn a_winding_that_the_host_heats_takes_the_torque_off<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    let mut ticks = 0;
+    while !bench.board.torque().is_off() {
+        request(&mut bench, [300, -200]);
+        bench.tick();
+        ticks += 1;
+        assert!(ticks < 1000);
+    }
+    assert!(ticks > 100, "{ticks}");
+    assert_eq!(latched_fault(&mut bench), Some(Fault::WindingTooHot));
 }
 
 fn switch_sensors_stages_and_host_take_the_torque_off_as_with_a_law<C: BoardChip>() {
