@@ -232,6 +232,14 @@ mod tests {
     }
 
     #[test]
+    fn encoders_of_different_resolution_are_refused() {
+        let mut configuration = Configuration::<LawSettings>::default();
+        configuration.converters.encoders[1].bits = 12;
+        let error = configuration.validate().unwrap_err();
+        assert_eq!(error.key, "converters.encoders.1.bits");
+    }
+
+    #[test]
     fn the_loops_stay_below_the_natural_frequency_of_the_arm_on_its_gears() {
         let mut configuration = <Configuration>::default();
         // Both links of 0.12 kg and 0.21 m turn with joint 1: 0.01411 kg·m². Joint 2 turns the second alone, 0.00176.
