@@ -21,12 +21,6 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
         let scenario = Self::load_unplaced(name, overrides)?;
-        if scenario.contact.kind == ContactKind::Rigid
-            && let Some(key) = scenario.effects.first_on(&scenario.plant_parameters().arm)
-        {
-            let origin = origin(name);
-            return Err(ScenarioError::NeedsCompliant { origin, key });
-        }
         let plant = BuiltInPlant::new(&scenario);
         plant.map_err(|source| ScenarioError::Range {
             origin: origin(name),
@@ -54,8 +48,8 @@ impl Scenario {
         from_table(Some(origin), parse(origin, text)?)?.with_overrides(origin, &[])
     }
 
-    /// Returns this scenario with overrides `key=value` applied in order and its numbers validated.
-    /// Messages name `origin` as the scenario that was overridden.
+    /// Returns this scenario with overrides `key=value` applied in order and validated, except for the
+    /// start of the arm. Messages name `origin` as the scenario that was overridden.
     ///
     /// # Errors
     /// [`ScenarioError`] in one sentence for the user.
@@ -71,7 +65,15 @@ impl Scenario {
             origin: origin.into(),
             source,
         })?;
-        Ok(self)
+        // Here rather than where the plant is made, so that studies, which make theirs later, say the same.
+        let on = self.effects.first_on(&self.plant_parameters().arm);
+        match on.filter(|_| self.contact.kind == ContactKind::Rigid) {
+            Some(key) => Err(ScenarioError::NeedsCompliant {
+                origin: origin.into(),
+                key,
+            }),
+            None => Ok(self),
+        }
     }
 
     /// Returns this scenario with one key changed by somebody who may not read what this process may: files that

@@ -310,6 +310,9 @@ fn the_rigid_plant_refuses_every_effect_by_its_key() {
             error.contains(key) && error.contains("compliant"),
             "{error}"
         );
+        // A study, which places the arm later, says the same.
+        let unplaced = crate::scenario::Scenario::load_unplaced("edge", &[value.into()]);
+        assert_eq!(unplaced.unwrap_err().to_string(), error);
         load(&[value, "contact.kind=compliant"]).unwrap();
     }
 }
