@@ -5,7 +5,6 @@ mod boards;
 mod build_fw;
 mod campaign;
 mod chaos;
-mod ci;
 mod command;
 mod dist;
 mod examples;
@@ -67,8 +66,6 @@ enum Chore {
     Bench(bench::BenchArguments),
     /// Measure the figures that the documentation prints, and write them to docs/measured/*.toml.
     Measure(measure::MeasureArguments),
-    /// Run the steps of continuous integration: formatting, clippy, links, tests of the default tier.
-    Ci,
 }
 
 fn main() -> ExitCode {
@@ -88,7 +85,6 @@ fn main() -> ExitCode {
         Chore::Dist(arguments) => dist::run_chore(&arguments),
         Chore::Bench(arguments) => bench::run(&arguments),
         Chore::Measure(arguments) => measure::run(&arguments),
-        Chore::Ci => ci::run(),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
