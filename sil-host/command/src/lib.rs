@@ -10,6 +10,8 @@ mod controller;
 mod diff;
 mod distinct_files;
 mod doctor;
+#[cfg(test)]
+mod documentation;
 mod drive;
 mod export;
 mod fail_on;

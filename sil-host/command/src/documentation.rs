@@ -1,14 +1,13 @@
 //! Checks that the program accepts the command lines and the scenarios in the README and in `docs/`.
 
-#![allow(clippy::unwrap_used)]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use clap::error::ErrorKind;
-use painleve_command::Cli;
 use painleve_plant::scenario::Scenario;
+
+use crate::Cli;
 
 /// Returns the README and the pages of the documentation.
 fn pages() -> Vec<PathBuf> {
