@@ -1,9 +1,9 @@
-//! What `cargo xtask test --all` checks of the workspace as a whole: that the least Rust version compiles it, and that
-//! its dependencies have the licences and come from the sources that `deny.toml` allows.
+//! What `cargo xtask test --all` checks of the workspace as a whole: that the least Rust version compiles it, that links
+//! in its doc comments lead somewhere, and that its dependencies have the licences and come from the sources that `deny.toml` allows.
 
 use std::process::{Command, Stdio};
 
-use crate::command::{ChoreError, run, starts};
+use crate::command::{ChoreError, cargo, run, run_with, starts};
 use crate::under_test::PROFILE;
 
 /// The least Rust version, from the workspace's `Cargo.toml`.
@@ -49,6 +49,18 @@ pub fn least_rust() -> Result<(), ChoreError> {
     run(
         "rustup",
         &[&["run", LEAST_RUST, "cargo"], &check[..]].concat(),
+    )
+}
+
+/// Checks the links in the doc comments of all crates.
+///
+/// # Errors
+/// If one leads nowhere.
+pub fn doc_comments() -> Result<(), ChoreError> {
+    run_with(
+        &cargo(),
+        &["doc", "--workspace", "--no-deps", "--profile", PROFILE],
+        &[("RUSTDOCFLAGS", "-D warnings")],
     )
 }
 

@@ -35,8 +35,9 @@ const LISTED: usize = 25;
 const LONGEST_TEST_S: f64 = 20.0;
 
 /// What `--all` runs after the tests of the workspace, in this order.
-const FURTHER_STEPS: [(&str, Step); 10] = [
+const FURTHER_STEPS: [(&str, Step); 11] = [
     ("least Rust version", policy::least_rust),
+    ("links in doc comments of all crates", policy::doc_comments),
     ("licences and sources of dependencies", policy::dependencies),
     ("campaigns with a fresh seed", campaign::run),
     ("examples", examples::run),
