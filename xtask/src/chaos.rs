@@ -18,7 +18,7 @@ pub struct ChaosArguments {
 /// # Errors
 /// If a flaw is found.
 pub fn short() -> Result<(), ChoreError> {
-    start(&["--trials=120", "--stop-after-s=30", "--end-s=20"])
+    start(&["--trials=120", "--stop-after-s=20", "--end-s=8"])
 }
 
 /// Runs the part that belongs to `cargo xtask test --all`.
@@ -26,7 +26,7 @@ pub fn short() -> Result<(), ChoreError> {
 /// # Errors
 /// If a flaw is found.
 pub fn nightly() -> Result<(), ChoreError> {
-    start(&["--trials=1000", "--end-s=20"])
+    start(&["--trials=1000", "--end-s=8"])
 }
 
 /// Runs the test.
